@@ -1,0 +1,23 @@
+"""Names for array shapes, used in every signature.
+
+numpy's types carry the dtype; the shape stands in the alias's name and comment.
+"""
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float32: TypeAlias = NDArray[np.float32]
+Float64: TypeAlias = NDArray[np.float64]
+Int32: TypeAlias = NDArray[np.int32]
+Bytes: TypeAlias = NDArray[np.uint8]
+
+Points: TypeAlias = Float32  # (n, 3), scene units, centred
+WorldPoints: TypeAlias = Float64  # (n, 3), scene units, in the scene file's own coordinates
+Directions: TypeAlias = Float32  # (n, 3), unit length
+Corners: TypeAlias = Float32  # (n_triangles, 3, 3), one point a corner
+CornerUvs: TypeAlias = Float32  # (n_triangles, 3, 2), v upwards
+Rgb: TypeAlias = Float32  # (n, 3), linear, Rec. 709 primaries
+Image: TypeAlias = Float32  # (height, width, 3), linear radiance, row 0 at the top
+Images: TypeAlias = Float32  # (n_lights, height, width, 3)
