@@ -1,0 +1,58 @@
+"""Files that appear whole or not at all: written beside the target, then renamed onto it."""
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from .errors import OutputError
+
+
+@contextmanager
+def whole_file(target: Path) -> Iterator[Path]:
+    """Yield a path to write to; on success it takes the place of `target`, on any failure it is removed.
+
+    The temporary file lies beside the target, so that the rename stays inside one file system. Its name starts
+    with a dot and ends in `.part`; it differs for each call, so several threads and programs may write at once.
+    Missing folders are made. An interrupt (Ctrl-C) counts as a failure.
+
+    Raises:
+        OutputError: the system refused to write; the message names `target` and the reason.
+    """
+    part = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
+    try:
+        make_folder(target.parent)
+        yield part
+        os.replace(part, target)
+    except BaseException as error:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise OutputError(f"{target}: cannot be written: {reason(error)}") from error
+        raise
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it, where they are missing.
+
+    Raises:
+        OutputError: the system refused, or a file is in the way.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:
+        raise OutputError(f"{folder}: a file of that name is in the way of the folder") from error
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot make the folder: {reason(error)}") from error
+
+
+def write_bytes(target: Path, data: bytes | memoryview) -> None:
+    """Write a file whole or not at all."""
+    with whole_file(target) as part:
+        part.write_bytes(data)
+
+
+def reason(error: OSError) -> str:
+    """Say what the system said, without the path that the caller's message starts with."""
+    return error.strerror or str(error) or type(error).__name__

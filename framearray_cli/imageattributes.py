@@ -1,0 +1,96 @@
+"""What an image says about itself: attribute names and camera matrices as OpenEXR defines them.
+
+Notation: matrices here act on columns, `camera_from_world @ point`. OpenEXR (Imath) multiplies rows from the left,
+`point * M44f`, so `images.py` stores each matrix transposed.
+"""
+
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import TypeAlias
+
+import numpy as np
+
+from .arrays import Float64
+from .framerate import frame_rate
+
+# A (4, 4) array is a matrix that acts on columns; three floats are a point or a colour; a Fraction is a rational.
+Attribute: TypeAlias = str | int | float | Fraction | tuple[float, float, float] | Float64
+Attributes: TypeAlias = Mapping[str, Attribute]
+
+# EXR and TIFF files carry a date. A fixed one makes equal images equal files.
+FIXED_DATE = "2000:01:01 00:00:00"
+
+
+def exr_camera_from_world(world_from_camera: Float64) -> Float64:
+    """Find OpenEXR's worldToCamera: x right, y up, z along the view (left-handed, as in RenderMan).
+
+    Args:
+        world_from_camera: (4, 4) rigid; the camera looks along -z, y up.
+
+    Returns:
+        (4, 4), acts on columns.
+    """
+    turned = np.linalg.inv(np.asarray(world_from_camera, np.float64))
+    turned[2] *= -1  # ours looks along -z
+    return turned
+
+
+def exr_ndc_from_world(world_from_camera: Float64, fov_deg: float, width: int, height: int) -> Float64:
+    """Find OpenEXR's worldToNDC: after division by w, (0, 0) is the image's upper left corner, (1, 1) the lower right.
+
+    z / w is 1 - 1 / distance along the view: the standard leaves z open, and this keeps the matrix invertible.
+
+    Args:
+        world_from_camera: (4, 4) rigid; the camera looks along -z, y up.
+        fov_deg: vertical field of view, degrees.
+        width: pixels.
+        height: pixels.
+
+    Returns:
+        (4, 4), acts on columns.
+    """
+    half_height = np.tan(np.radians(fov_deg) / 2)  # of the image plane at distance 1
+    half_width = half_height * width / height
+    ndc_from_camera = np.array(
+        [
+            [0.5 / half_width, 0, 0.5, 0],
+            [0, -0.5 / half_height, 0.5, 0],
+            [0, 0, 1, -1],
+            [0, 0, 1, 0],
+        ]
+    )
+    return np.asarray(ndc_from_camera @ exr_camera_from_world(world_from_camera))
+
+
+def frame_attributes(
+    *,
+    world_from_camera: Float64,
+    fov_deg: float,
+    resolution: tuple[int, int],
+    fps: float | Fraction,
+    c: int,
+    l: int | None = None,
+    software: str = "framearray",
+) -> dict[str, Attribute]:
+    """Name what belongs into the file of image [c, l], or of camera c where `l` is None.
+
+    Args:
+        world_from_camera: (4, 4), in the scene file's own coordinates; the camera looks along -z, y up.
+        fov_deg: vertical field of view, degrees.
+        resolution: (width, height), pixels.
+        fps: frames per second.
+        c: camera index.
+        l: light index.
+        software: program and version.
+    """
+    attributes: dict[str, Attribute] = {
+        "Software": software,
+        "worldToCamera": exr_camera_from_world(world_from_camera),
+        "worldToNDC": exr_ndc_from_world(world_from_camera, fov_deg, *resolution),
+        "framesPerSecond": frame_rate(fps),
+        "framearray:camera": c,
+        "framearray:fov": float(fov_deg),
+    }
+    if l is not None:
+        attributes["framearray:light"] = l
+    return attributes

@@ -1,0 +1,273 @@
+"""Read and write one image: the only door to OpenImageIO (EXR, TIFF) and Pillow (PNG, JPEG).
+
+OpenImageIO raises nothing: every return value is checked here. It also reports success for a PNG on a full disk and
+reads half a JPEG without a word, so PNG and JPEG go through Pillow, in memory.
+"""
+
+import io
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arrays import Bytes, Float32, Image
+from .colour import linear_from_srgb8, srgb8_from_linear
+from .errors import OutputError
+from .files import reason, whole_file, write_bytes
+from .imageattributes import FIXED_DATE, Attribute, Attributes
+
+Extension = Literal["exr", "png", "tif", "jpg"]
+
+HALF_MAX = 65504.0  # the largest half; what lies beyond becomes infinite
+EXR_COMPRESSIONS = ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
+FLOAT_LAYERS = ("depth", "samples")  # layers that need more than the 11 bits of a half
+_PILLOW_SUFFIXES = (".png", ".jpg", ".jpeg")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImageFormat:
+    """How images are stored.
+
+    Attributes:
+        format: exr and tif keep linear radiance; png and jpg are sRGB, 8 bits, clipped to [0, 1].
+        compression: of EXR; one of EXR_COMPRESSIONS, with a level if wanted: "zip:1" to "zip:9", "dwaa:45".
+        half: store EXR as half where all values fit (up to 65504), else as float; False: always float. TIFF is float.
+        quality: of JPEG, 1 to 100.
+        exposure: stops added to what png and jpg show; exr and tif keep the radiance as it is.
+    """
+
+    format: Extension = "exr"
+    compression: str = "zip:1"
+    half: bool = True
+    quality: int = 92
+    exposure: float = 0.0
+
+    def __post_init__(self) -> None:
+        name, _, level = self.compression.partition(":")
+        # OpenImageIO takes any name it does not know for zip.
+        if name not in EXR_COMPRESSIONS or (level and not level.isdigit()):
+            raise ValueError(f"expected one of {', '.join(EXR_COMPRESSIONS)}, got {self.compression!r}")
+        if self.format not in ("exr", "png", "tif", "jpg"):
+            raise ValueError(f"expected exr, png, tif or jpg, got {self.format!r}")
+        if not 1 <= self.quality <= 100:
+            raise ValueError(f"expected a quality from 1 to 100, got {self.quality}")
+
+
+def write_image(path: Path, image: Image, image_format: ImageFormat, attributes: Attributes | None = None) -> None:
+    """Write one image, whole or not at all; equal images give equal bytes.
+
+    Several threads may write different images at once.
+
+    Args:
+        path: the file; its suffix plays no part, `image_format.format` decides.
+        image: (h, w, 3), linear, finite.
+        image_format: format and its options.
+        attributes: EXR keeps all of them, PNG what is text or a number, TIFF the program's name, JPEG none.
+
+    Raises:
+        ValueError: the image holds NaN or infinity, or has another shape.
+        OutputError: the file cannot be written.
+    """
+    if image.ndim != 3 or image.shape[2] != 3:
+        raise ValueError(f"{path}: expected an image of shape (h, w, 3), got {image.shape}")
+    largest = _largest(str(path), image)
+    attributes = attributes or {}
+    if image_format.format in ("png", "jpg"):
+        exposed = image * np.float32(2.0**image_format.exposure) if image_format.exposure else image
+        write_bytes(path, _encode8(srgb8_from_linear(exposed), image_format, attributes))
+        return
+    if image_format.format == "exr":
+        half = image_format.half and largest <= HALF_MAX
+        spec = _spec(image.shape, ["R", "G", "B"], ["half" if half else "float"] * 3, attributes)
+        spec.attribute("compression", image_format.compression)
+        _write_oiio(path, "openexr", spec, image.astype(np.float16) if half else image)
+    else:
+        # Only plain text: other types of attribute can end the process in the TIFF writer.
+        text = {name: value for name, value in attributes.items() if isinstance(value, str)}
+        spec = _spec(image.shape, ["R", "G", "B"], ["float"] * 3, text)
+        spec.attribute("compression", "none")  # zip saves a fifth of a noisy float image and takes 20 times as long
+        spec.attribute("tiff:write_exif", 0)  # else it fails to write an empty Exif directory, and says so
+        _write_oiio(path, "tiff", spec, image)
+
+
+def write_layers(
+    path: Path, layers: Mapping[str, Float32], attributes: Attributes | None = None, compression: str = "zip:1"
+) -> None:
+    """Write a multi-channel EXR, whole or not at all.
+
+    Names follow OpenEXR's `layer.channel`: "obscurance.R", "normal.X", "depth.Z"; "samples" alone is a channel without
+    a layer. Layers named in FLOAT_LAYERS, and channels with values beyond 65504, are stored as float, others as half.
+
+    Args:
+        path: the file.
+        layers: channel name -> (h, w), finite; all of one shape, at least one.
+        attributes: as in `write_image`.
+        compression: as in `ImageFormat`.
+
+    Raises:
+        ValueError: a value is not finite, or shapes differ.
+        OutputError: the file cannot be written.
+    """
+    shapes = {layer.shape for layer in layers.values()}
+    if len(shapes) != 1 or len(next(iter(shapes))) != 2:
+        raise ValueError(f"{path}: expected channels of one shape (h, w), got {sorted(shapes)}")
+    kinds = [
+        "float" if _largest(f"{path}: {name}", layer) > HALF_MAX or name.split(".")[0] in FLOAT_LAYERS else "half"
+        for name, layer in layers.items()
+    ]
+    pixels = np.stack([np.asarray(layer, np.float32) for layer in layers.values()], axis=-1)
+    spec = _spec(pixels.shape, list(layers), kinds, attributes or {})
+    spec.attribute("compression", compression)
+    _write_oiio(path, "openexr", spec, pixels)
+
+
+def read_image(path: Path) -> Image:
+    """Read an image as linear radiance: (h, w, 3) float32; PNG and JPEG are decoded from sRGB.
+
+    Raises:
+        OutputError: the file is missing, damaged or cut short, or has no channels R, G, B.
+    """
+    if path.suffix.lower() in _PILLOW_SUFFIXES:
+        return linear_from_srgb8(read_codes(path))
+    names, pixels = _read_oiio(path)
+    if not {"R", "G", "B"} <= set(names):
+        raise OutputError(f"{path}: expected channels R, G, B, found {', '.join(names)}")
+    return np.ascontiguousarray(pixels[..., [names.index(name) for name in "RGB"]])
+
+
+def read_codes(path: Path) -> Bytes:
+    """Read the 8-bit sRGB codes of a PNG or JPEG: (h, w, 3) uint8.
+
+    Raises:
+        OutputError: the file is missing, damaged or cut short.
+    """
+    import PIL.Image
+
+    try:
+        with PIL.Image.open(path) as picture:
+            return np.asarray(picture.convert("RGB"))
+    except PIL.UnidentifiedImageError as error:
+        raise OutputError(f"{path}: not an image, or damaged") from error
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be read: {reason(error)}") from error
+    except (SyntaxError, ValueError, EOFError) as error:  # how Pillow reports some broken PNG chunks
+        raise OutputError(f"{path}: damaged: {error}") from error
+
+
+def read_layers(path: Path) -> dict[str, Float32]:
+    """Read every channel of an EXR: name -> (h, w) float32, in the order of the file (by name).
+
+    Raises:
+        OutputError: the file is missing, damaged or cut short.
+    """
+    names, pixels = _read_oiio(path)
+    return {name: np.ascontiguousarray(pixels[..., i]) for i, name in enumerate(names)}
+
+
+def _largest(label: str, values: Float32) -> float:
+    """Return the largest magnitude, after a check: NaN and infinity come through min and max."""
+    low, high = float(values.min()), float(values.max())
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise ValueError(f"{label}: not finite, {np.count_nonzero(~np.isfinite(values))} values")
+    return max(-low, high)
+
+
+def _encode8(codes: Bytes, image_format: ImageFormat, attributes: Attributes) -> memoryview:
+    """Encode (h, w, 3) 8-bit codes as PNG or JPEG in memory."""
+    import PIL.Image
+    import PIL.PngImagePlugin
+
+    buffer = io.BytesIO()
+    picture = PIL.Image.fromarray(codes)
+    if image_format.format == "jpg":
+        # No chroma subsampling: coloured edges of thin objects would bleed.
+        picture.save(buffer, "JPEG", quality=image_format.quality, subsampling=0)
+    else:
+        info = PIL.PngImagePlugin.PngInfo()
+        info.add(b"sRGB", b"\0")  # says that the codes are sRGB; 0: perceptual intent
+        for name, value in attributes.items():
+            if isinstance(value, str | int | float | Fraction):
+                info.add_text(name, str(value))
+        picture.save(buffer, "PNG", compress_level=1, pnginfo=info)
+    return buffer.getbuffer()
+
+
+@cache
+def _oiio() -> Any:
+    """Import OpenImageIO, with its own threads off: callers write several files at once instead."""
+    import OpenImageIO
+
+    OpenImageIO.attribute("threads", 1)
+    OpenImageIO.attribute("exr_threads", -1)  # -1: compress in the calling thread; 1 would hand it to another
+    return OpenImageIO
+
+
+def _spec(shape: tuple[int, ...], names: list[str], kinds: list[str], attributes: Attributes) -> Any:
+    """Describe an image of `shape` (h, w, channels) with "half" or "float" for each channel."""
+    oiio = _oiio()
+    height, width, channels = shape
+    spec = oiio.ImageSpec(width, height, channels, "float" if "float" in kinds else "half")
+    spec.channelnames = names
+    if len(set(kinds)) > 1:
+        spec.channelformats = kinds
+    for name, value in {"DateTime": FIXED_DATE, **attributes}.items():
+        _set_attribute(spec, name, value)
+    return spec
+
+
+def _set_attribute(spec: Any, name: str, value: Attribute) -> None:
+    oiio = _oiio()
+    if isinstance(value, np.ndarray):
+        rows = np.asarray(value.T, np.float32)  # row vectors in the file, see imageattributes.py
+        spec.attribute(name, oiio.TypeDesc("matrix44"), tuple(rows.ravel().tolist()))
+    elif isinstance(value, Fraction):
+        spec.attribute(name, oiio.TypeDesc("rational"), (value.numerator, value.denominator))
+    elif isinstance(value, tuple):
+        spec.attribute(name, oiio.TypeDesc("vector"), tuple(float(x) for x in value))
+    else:
+        spec.attribute(name, value)
+
+
+def _write_oiio(path: Path, format_name: str, spec: Any, pixels: NDArray[Any]) -> None:
+    """Write pixels (h, w, channels) through OpenImageIO, by format name: a temporary file has no suffix of its own."""
+    oiio = _oiio()
+    pixels = np.ascontiguousarray(pixels)  # a strided array can be stored wrongly without an error
+    with whole_file(path) as part:
+        output = oiio.ImageOutput.create(format_name)
+        if output is None:
+            raise OutputError(f"{path}: OpenImageIO cannot write {format_name}: {oiio.geterror()}")
+        # All three run in turn; the file is good only if none fails and no error was left behind.
+        done = output.open(str(part), spec) and output.write_image(pixels)
+        done = output.close() and done
+        message = output.geterror()
+        if not done or message:
+            raise OutputError(f"{path}: cannot be written: {_first_line(message, part)}")
+
+
+def _read_oiio(path: Path) -> tuple[list[str], Float32]:
+    """Read all channels as float32: names and (h, w, channels)."""
+    oiio = _oiio()
+    if not path.is_file():
+        raise OutputError(f"{path}: no such file")
+    source = oiio.ImageInput.open(str(path))
+    if source is None:
+        raise OutputError(f"{path}: not an image, or damaged: {_first_line(oiio.geterror(), path)}")
+    spec = source.spec()
+    pixels = source.read_image(oiio.FLOAT)
+    message = source.geterror()
+    source.close()
+    if pixels is None or message:
+        raise OutputError(f"{path}: damaged or cut short: {_first_line(message, path)}")
+    return list(spec.channelnames), np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
+
+
+def _first_line(message: str, path: Path) -> str:
+    """Shorten an OpenImageIO error to one line, without the path that the message around it already names."""
+    lines = [line.strip() for line in message.replace(str(path), path.name).splitlines() if line.strip()]
+    return lines[0] if lines else "no reason given"

@@ -1,0 +1,372 @@
+import io
+import resource
+import signal
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import PIL.Image
+import pytest
+
+from framearray_cli.colour import linear_from_srgb, linear_from_srgb8, srgb8_from_linear, srgb_from_linear
+from framearray_cli.errors import OutputError
+from framearray_cli.files import whole_file, write_bytes
+from framearray_cli.framerate import frame_rate
+from framearray_cli.imageattributes import exr_camera_from_world, exr_ndc_from_world, frame_attributes
+from framearray_cli.images import HALF_MAX, ImageFormat, read_image, read_layers, write_image, write_layers
+
+FORMATS = ("exr", "png", "tif", "jpg")
+
+
+def noisy(height: int = 12, width: int = 17, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(0, 1.5, (height, width, 3)).astype(np.float32)
+
+
+def smooth(height: int = 24, width: int = 40) -> np.ndarray:
+    y, x = np.mgrid[0:height, 0:width]
+    return np.stack([x / width, y / height, (x + y) / (width + height)], axis=-1).astype(np.float32)
+
+
+# colour
+
+
+def test_srgb_formula_at_known_points() -> None:
+    linear = np.array([-1.0, 0.0, 0.0031308, 0.18, 0.5, 1.0, 7.0])
+    expected = np.array([0.0, 0.0, 0.040449936, 0.461356, 0.735357, 1.0, 1.0])
+    np.testing.assert_allclose(srgb_from_linear(linear), expected, atol=1e-6)
+
+
+def test_srgb_decode_is_the_inverse() -> None:
+    x = np.linspace(0, 1, 10001)
+    np.testing.assert_allclose(linear_from_srgb(srgb_from_linear(x)), x, atol=1e-7)  # the two branches meet to 1e-8
+
+
+def test_srgb_keeps_the_dtype() -> None:
+    assert srgb_from_linear(np.float32([0.2])).dtype == np.float32
+    assert linear_from_srgb(np.float32([0.2])).dtype == np.float32
+
+
+def test_8_bit_code_is_within_a_rounding_of_the_exact_value() -> None:
+    x = np.concatenate([np.linspace(0, 1, 200001), np.geomspace(1e-9, 1, 100001)]).astype(np.float32)
+    error = np.abs(srgb8_from_linear(x) - 255 * srgb_from_linear(x.astype(np.float64)))
+    assert error.max() <= 0.5 + 168 * 2**-12  # 168: codes per unit of light at 0.5, where a half is 2^-12 off at most
+
+
+def test_8_bit_codes_survive_a_round_trip() -> None:
+    codes = np.arange(256, dtype=np.uint8)
+    np.testing.assert_array_equal(srgb8_from_linear(linear_from_srgb8(codes)), codes)
+
+
+def test_8_bit_code_clips() -> None:
+    np.testing.assert_array_equal(srgb8_from_linear(np.float32([-5, -0.0, 1, 2, 1e6])), [0, 0, 255, 255, 255])
+
+
+# files that appear whole or not at all
+
+
+def test_whole_file_replaces_only_on_success(tmp_path: Path) -> None:
+    target = tmp_path / "deep" / "a.txt"
+    write_bytes(target, b"old")
+    for failure in (RuntimeError, KeyboardInterrupt):
+        with pytest.raises(failure), whole_file(target) as part:
+            part.write_bytes(b"half of the ne")
+            raise failure
+        assert target.read_bytes() == b"old"
+        assert list(target.parent.iterdir()) == [target]
+    write_bytes(target, b"new")
+    assert target.read_bytes() == b"new"
+
+
+def test_whole_file_names_the_target_and_the_reason(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    with pytest.raises(OutputError, match="file: a file of that name is in the way"):
+        write_bytes(tmp_path / "file" / "a.txt", b"x")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(OutputError, match="folder: cannot be written: Is a directory"):
+        write_bytes(tmp_path / "folder", b"x")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "folder"]
+
+
+# one image
+
+
+def test_exr_keeps_half_values_exactly(tmp_path: Path) -> None:
+    image = noisy()
+    write_image(tmp_path / "a.exr", image, ImageFormat())
+    np.testing.assert_array_equal(read_image(tmp_path / "a.exr"), image.astype(np.float16).astype(np.float32))
+
+
+def test_exr_is_float_where_asked(tmp_path: Path) -> None:
+    image = noisy()
+    write_image(tmp_path / "a.exr", image, ImageFormat(half=False))
+    np.testing.assert_array_equal(read_image(tmp_path / "a.exr"), image)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_exr_is_float_where_a_half_would_be_infinite(tmp_path: Path, sign: int) -> None:
+    image = noisy()
+    image[3, 4, 1] = sign * HALF_MAX
+    write_image(tmp_path / "fits.exr", image, ImageFormat())
+    image[3, 4, 1] = sign * 70000
+    write_image(tmp_path / "beyond.exr", image, ImageFormat())
+    kinds = [str(oiio.ImageInput.open(str(tmp_path / f"{name}.exr")).spec().format) for name in ("fits", "beyond")]
+    assert kinds == ["half", "float"]
+    assert read_image(tmp_path / "fits.exr")[3, 4, 1] == sign * HALF_MAX
+    np.testing.assert_array_equal(read_image(tmp_path / "beyond.exr"), image)
+
+
+def test_tif_keeps_float_values(tmp_path: Path) -> None:
+    image = noisy() * 1e5
+    write_image(tmp_path / "a.tif", image, ImageFormat(format="tif"))
+    np.testing.assert_array_equal(read_image(tmp_path / "a.tif"), image)
+
+
+def test_png_holds_srgb_codes(tmp_path: Path) -> None:
+    image = noisy()
+    write_image(tmp_path / "a.png", image, ImageFormat(format="png"), {"framearray:camera": 3})
+    with PIL.Image.open(tmp_path / "a.png") as picture:
+        np.testing.assert_array_equal(np.asarray(picture), srgb8_from_linear(image))
+        assert picture.info["srgb"] == 0
+        assert picture.info["framearray:camera"] == "3"
+    np.testing.assert_array_equal(srgb8_from_linear(read_image(tmp_path / "a.png")), srgb8_from_linear(image))
+
+
+def test_jpg_is_close(tmp_path: Path) -> None:
+    image = smooth()
+    write_image(tmp_path / "a.jpg", image, ImageFormat(format="jpg", quality=95))
+    codes = srgb8_from_linear(read_image(tmp_path / "a.jpg")).astype(int)
+    assert np.abs(codes - srgb8_from_linear(image)).mean() < 1.5
+
+
+def test_exposure_brightens_the_screen_formats_alone(tmp_path: Path) -> None:
+    image = smooth() / 8
+    write_image(tmp_path / "a.png", image, ImageFormat(format="png", exposure=1.0))
+    np.testing.assert_array_equal(srgb8_from_linear(read_image(tmp_path / "a.png")), srgb8_from_linear(2 * image))
+    write_image(tmp_path / "a.exr", image, ImageFormat(exposure=1.0, half=False))
+    np.testing.assert_array_equal(read_image(tmp_path / "a.exr"), image)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_equal_images_are_equal_files(tmp_path: Path, name: str) -> None:
+    attributes = frame_attributes(world_from_camera=np.eye(4), fov_deg=60, resolution=(17, 12), fps=24, c=1, l=2)
+    for file in ("a", "b"):
+        write_image(tmp_path / file, noisy(), ImageFormat(format=name), attributes)
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+    assert b"2000:01:01" in (tmp_path / "a").read_bytes() or name in ("png", "jpg")
+
+
+@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_non_finite_values_are_refused(tmp_path: Path, name: str, bad: float) -> None:
+    image = noisy()
+    image[0, 0, 0] = image[5, 5, 1] = bad
+    with pytest.raises(ValueError, match="2 values"):
+        write_image(tmp_path / "a", image, ImageFormat(format=name))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_shapes_are_refused(tmp_path: Path) -> None:
+    for shape in ((4, 4), (4, 4, 4)):
+        with pytest.raises(ValueError, match="shape"):
+            write_image(tmp_path / "a.exr", np.zeros(shape, np.float32), ImageFormat())
+
+
+def test_a_strided_image_is_written_right(tmp_path: Path) -> None:
+    image = noisy(24, 34)[::2, ::-2]
+    for name in ("exr", "tif", "png"):
+        write_image(tmp_path / f"a.{name}", image, ImageFormat(format=name, half=False))
+        back = read_image(tmp_path / f"a.{name}")
+        np.testing.assert_array_equal(srgb8_from_linear(back), srgb8_from_linear(image))
+
+
+@pytest.mark.parametrize(
+    "options", [{"compression": "lzw"}, {"compression": "zip:fast"}, {"format": "gif"}, {"quality": 0}]
+)
+def test_unknown_options_are_refused(options: dict) -> None:
+    with pytest.raises(ValueError, match="expected"):
+        ImageFormat(**options)
+
+
+@pytest.mark.parametrize("compression", ["none", "rle", "zips", "zip:9", "piz"])
+def test_lossless_compressions(tmp_path: Path, compression: str) -> None:
+    image = noisy()
+    write_image(tmp_path / "a.exr", image, ImageFormat(compression=compression))
+    assert oiio.ImageInput.open(str(tmp_path / "a.exr")).spec()["compression"] == compression.split(":")[0]
+    np.testing.assert_array_equal(read_image(tmp_path / "a.exr"), image.astype(np.float16).astype(np.float32))
+
+
+def test_threads_write_different_images(tmp_path: Path) -> None:
+    images = [noisy(seed=k) for k in range(12)]
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda k: write_image(tmp_path / f"{k}.exr", images[k], ImageFormat(half=False)), range(12)))
+    for k, image in enumerate(images):
+        np.testing.assert_array_equal(read_image(tmp_path / f"{k}.exr"), image)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path: Path, name: str) -> None:
+    """A limit on the size of a file stands for the full disk: the same calls fail, with EFBIG for ENOSPC."""
+    write_image(tmp_path / "warm", noisy(), ImageFormat(format=name))
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
+    try:
+        with pytest.raises(OutputError, match=r"image: cannot be written") as caught:
+            write_image(tmp_path / "image", noisy(200, 200), ImageFormat(format=name))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, before)
+    assert "\n" not in str(caught.value)
+    assert [p.name for p in tmp_path.iterdir()] == ["warm"]
+
+
+# damaged files
+
+
+@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("kept", [0.0, 0.02, 0.5, 0.95])
+def test_a_file_cut_short_is_an_error(tmp_path: Path, name: str, kept: float) -> None:
+    path = tmp_path / f"a.{name}"
+    write_image(path, noisy(60, 80), ImageFormat(format=name))
+    path.write_bytes(path.read_bytes()[: int(kept * path.stat().st_size)])
+    with pytest.raises(OutputError, match=rf"a\.{name}: "):
+        read_image(path)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_missing_and_foreign_files_are_errors(tmp_path: Path, name: str) -> None:
+    with pytest.raises(OutputError, match=r"(?i)no such file"):
+        read_image(tmp_path / f"a.{name}")
+    (tmp_path / f"b.{name}").write_text("not a picture at all, not at all")
+    with pytest.raises(OutputError, match="not an image"):
+        read_image(tmp_path / f"b.{name}")
+    (tmp_path / f"c.{name}").mkdir()
+    with pytest.raises(OutputError, match=rf"c\.{name}: "):
+        read_image(tmp_path / f"c.{name}")
+
+
+def test_an_exr_without_rgb_is_an_error(tmp_path: Path) -> None:
+    write_layers(tmp_path / "a.exr", {"depth.Z": np.ones((3, 4), np.float32)})
+    with pytest.raises(OutputError, match=r"expected channels R, G, B, found depth\.Z"):
+        read_image(tmp_path / "a.exr")
+
+
+# layers
+
+
+def test_layers_round_trip(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    names = ["obscurance.R", "obscurance.G", "obscurance.B", "normal.X", "depth.Z", "samples", "indirect.R"]
+    layers = {name: rng.uniform(0, 1, (5, 6)).astype(np.float32) for name in names}
+    layers["samples"][:] = 100001  # not a half
+    layers["indirect.R"][2, 2] = 1e6  # beyond a half
+    write_layers(tmp_path / "a.exr", layers, {"framearray:camera": 7})
+    back = read_layers(tmp_path / "a.exr")
+    assert set(back) == set(names)
+    for name in ("depth.Z", "samples", "indirect.R"):
+        np.testing.assert_array_equal(back[name], layers[name])
+    for name in ("obscurance.R", "obscurance.B", "normal.X"):
+        np.testing.assert_array_equal(back[name], layers[name].astype(np.float16).astype(np.float32))
+
+
+def test_layers_of_different_shapes_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="one shape"):
+        write_layers(tmp_path / "a.exr", {"a": np.zeros((2, 3), np.float32), "b": np.zeros((3, 2), np.float32)})
+    with pytest.raises(ValueError, match=r"depth\.Z"):
+        write_layers(tmp_path / "a.exr", {"depth.Z": np.full((2, 3), np.inf, np.float32)})
+
+
+# attributes
+
+
+def looking_down_x() -> np.ndarray:
+    """A camera at (10, 2, 3) that looks along +x, y up: its -z is x, so its x is z."""
+    world_from_camera = np.eye(4)
+    world_from_camera[:3, 0] = [0, 0, 1]
+    world_from_camera[:3, 1] = [0, 1, 0]
+    world_from_camera[:3, 2] = [-1, 0, 0]
+    world_from_camera[:3, 3] = [10, 2, 3]
+    return world_from_camera
+
+
+def test_world_to_camera_is_left_handed_along_plus_z() -> None:
+    camera_from_world = exr_camera_from_world(looking_down_x())
+    # 5 ahead, 1 to the right, 2 up
+    np.testing.assert_allclose(camera_from_world @ [15, 4, 4, 1], [1, 2, 5, 1], atol=1e-12)
+    assert np.linalg.det(camera_from_world[:3, :3]) == pytest.approx(-1)
+
+
+@pytest.mark.parametrize("corner", [(0, 0), (1, 0), (0, 1), (1, 1), (0.5, 0.5)])
+def test_world_to_ndc_finds_the_corners_of_the_image(corner: tuple[float, float]) -> None:
+    ndc_from_world = exr_ndc_from_world(looking_down_x(), 60.0, 400, 300)
+    half_height = np.tan(np.radians(30))
+    half_width = half_height * 400 / 300
+    x, y = 2 * corner[0] - 1, 1 - 2 * corner[1]  # NDC has y downwards
+    for distance in (0.5, 20):
+        point = looking_down_x() @ [distance * x * half_width, distance * y * half_height, -distance, 1]
+        ndc = ndc_from_world @ point
+        np.testing.assert_allclose(ndc[:2] / ndc[3], corner, atol=1e-12)
+        assert ndc[3] == pytest.approx(distance)
+
+
+def test_exr_attributes_have_standard_names_types_and_row_vectors(tmp_path: Path) -> None:
+    attributes = frame_attributes(
+        world_from_camera=looking_down_x(), fov_deg=60, resolution=(17, 12), fps=23.976, c=3, l=5
+    )
+    attributes["framearray:ambient"] = (0.1, 0.2, 0.3)
+    write_image(tmp_path / "a.exr", noisy(), ImageFormat(), attributes)
+    spec = oiio.ImageInput.open(str(tmp_path / "a.exr")).spec()
+    kept = {item.name: (str(item.type), item.value) for item in spec.extra_attribs}
+    assert kept["framesPerSecond"] == ("rational", (24000, 1001))
+    assert kept["framearray:camera"] == ("int", 3)
+    assert kept["framearray:light"] == ("int", 5)
+    assert kept["framearray:fov"] == ("float", 60)
+    assert kept["framearray:ambient"][1] == pytest.approx((0.1, 0.2, 0.3))
+    kind, rows = kept["worldToCamera"]
+    assert kind == "matrix"
+    point = np.array([15, 4, 4, 1]) @ np.reshape(rows, (4, 4))  # rows from the left, as Imath does
+    np.testing.assert_allclose(point, [1, 2, 5, 1], atol=1e-5)
+    kind, rows = kept["worldToNDC"]
+    assert kind == "matrix"
+    np.testing.assert_allclose(
+        np.reshape(rows, (4, 4)).T, exr_ndc_from_world(looking_down_x(), 60, 17, 12), rtol=1e-6, atol=1e-5
+    )
+
+
+@pytest.mark.parametrize(
+    ("fps", "expected"),
+    [
+        (24, "24"),
+        (25.0, "25"),
+        (23.976, "24000/1001"),
+        (23.98, "24000/1001"),
+        (29.97, "30000/1001"),
+        (59.94, "60000/1001"),
+        (12.5, "25/2"),
+        (Fraction(24000, 1001), "24000/1001"),
+    ],
+)
+def test_frame_rates_are_exact(fps: float, expected: str) -> None:
+    assert frame_rate(fps) == Fraction(expected)
+
+
+@pytest.mark.parametrize("fps", [0, -24, float("nan"), float("inf")])
+def test_impossible_frame_rates_are_refused(fps: float) -> None:
+    with pytest.raises(ValueError, match="positive"):
+        frame_rate(fps)
+
+
+def test_comparisons_can_fail(tmp_path: Path) -> None:
+    """One code of one pixel changed in a PNG is seen."""
+    image = noisy()
+    write_image(tmp_path / "a.png", image, ImageFormat(format="png"))
+    with PIL.Image.open(tmp_path / "a.png") as picture:
+        codes = np.array(picture)
+    codes[0, 0, 0] ^= 1
+    buffer = io.BytesIO()
+    PIL.Image.fromarray(codes).save(buffer, "PNG")
+    (tmp_path / "a.png").write_bytes(buffer.getvalue())
+    with pytest.raises(AssertionError):
+        np.testing.assert_array_equal(srgb8_from_linear(read_image(tmp_path / "a.png")), srgb8_from_linear(image))
