@@ -1,0 +1,55 @@
+"""How the files of a frame array are named: patterns for `str.format` with {camera} and {light}."""
+
+import re
+import string
+from collections.abc import Mapping
+from pathlib import PurePosixPath
+
+_FIELD = re.compile(r"\{[^{}]*\}")  # one field with its format, whose colon is no part of a name
+
+
+def file_patterns(name: str, n_cameras: int, n_lights: int, extension: str) -> tuple[str, str]:
+    """Name the files of an array so that they sort: patterns of images and of layers, both in one folder.
+
+    A `glob` of "name.c0007.*" finds the images of camera 7 alone, "name.layers.*" all layers.
+    """
+    safe = name.replace("{", "{{").replace("}", "}}")
+    c_digits = max(4, len(str(n_cameras - 1)))
+    l_digits = max(3, len(str(n_lights - 1)))
+    camera = f"c{{camera:0{c_digits}d}}"
+    return f"{safe}.{camera}.l{{light:0{l_digits}d}}.{extension}", f"{safe}.layers.{camera}.exr"
+
+
+def check_pattern(key: str, pattern: str, fields: Mapping[str, bool]) -> None:
+    """Refuse a file pattern that leads out of its folder, or that does more than number files.
+
+    Args:
+        key: what the pattern is called.
+        pattern: for `str.format`.
+        fields: name -> whether the pattern must have it.
+
+    Raises:
+        ValueError: the pattern is refused.
+    """
+    path = PurePosixPath(pattern)
+    # Backslash and colon lead out of a folder on Windows; a reader there must not follow them either.
+    if (
+        path.is_absolute()
+        or ".." in path.parts
+        or not path.name
+        or re.search(r"[\\:\x00-\x1f]", _FIELD.sub("", pattern))
+    ):
+        raise ValueError(f"{key}: expected file names inside the folder, got {pattern!r}")
+    try:
+        parts = [(name, spec, conversion) for _, name, spec, conversion in string.Formatter().parse(pattern)]
+    except ValueError as error:
+        raise ValueError(f"{key}: broken pattern {pattern!r}: {error}") from error
+    names = [name for name, _, _ in parts if name is not None]
+    for name, spec, conversion in parts:
+        # Anything else, such as {camera.__class__}, would let a manifest look into this program.
+        if name is not None and (name not in fields or conversion or not re.fullmatch(r"(0?[1-9]d)?", spec or "")):
+            allowed = " and ".join(f"{{{known}:04d}}" for known in fields)
+            raise ValueError(f"{key}: expected no other fields than {allowed}, got {pattern!r}")
+    for name, must in fields.items():
+        if must and name not in names:
+            raise ValueError(f"{key}: expected {{{name}}} in {pattern!r}")

@@ -1,0 +1,215 @@
+import dataclasses
+import time
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from framearray_cli.errors import OutputError
+from framearray_cli.filepatterns import file_patterns
+from framearray_cli.fingerprint import fingerprint
+from framearray_cli.manifest import (
+    Manifest,
+    ManifestCamera,
+    ManifestLight,
+    image_path,
+    layers_path,
+    matrix_rows,
+    read_manifest,
+    to_toml,
+    write_manifest,
+)
+
+
+def make_manifest(n_cameras: int = 3, n_lights: int = 2, **changes: Any) -> Manifest:
+    rng = np.random.default_rng(0)
+    images, layers = file_patterns("kitchen", n_cameras, n_lights, "exr")
+    known: dict[str, Any] = {
+        "version": "0.1.0",
+        "name": "kitchen",
+        "fingerprint": fingerprint(b"job", b"scene"),
+        "images": images,
+        "layers": layers,
+        "resolution": (400, 300),
+        "fps": 23.976,
+        "cameras": tuple(
+            ManifestCamera(world_from_camera=matrix_rows(rng.normal(0, 1e5, (4, 4))), fov=60.0)
+            for _ in range(n_cameras)
+        ),
+        "lights": tuple(
+            ManifestLight(
+                ambient=(0.1 + l, 1e-17, 3e20),
+                ambient_error=(0.001, 0.0, 0.002),
+                sources=(
+                    {"type": "point", "position": [1.0, 2.0, -0.3], "intensity": [10.0, 10.0, 9.0]},
+                    {"type": "directional", "direction": [0.0, -1.0, 0.0], "irradiance": [3.0, 3.0, 3.0]},
+                ),
+            )
+            for l in range(n_lights)
+        ),
+        "job": {"name": "kitchen", "seed": 0, "camera": {"keys": [{"frame": 0, "eye": [0.0, 1.6, 3.0]}]}},
+        "scene": {"triangles": 12, "notes": ['a "quoted" note\nof two lines'], "dropped": {"non-finite": 3}},
+        "summary": {"seconds": 12.5, "rays": 10**10},
+    }
+    return Manifest(**(known | changes))
+
+
+def test_round_trip(tmp_path: Path) -> None:
+    manifest = make_manifest()
+    path = write_manifest(tmp_path, manifest)
+    assert path == tmp_path / "manifest.toml"
+    for place in (tmp_path, path):
+        back = read_manifest(place)
+        assert back == manifest
+        assert back.directory == tmp_path
+    assert read_manifest(tmp_path) != make_manifest(fps=24)
+
+
+def test_the_file_says_what_the_contract_asks(tmp_path: Path) -> None:
+    """What a program reads that knows docs/manifest.md alone."""
+    manifest = make_manifest()
+    table = tomllib.loads(write_manifest(tmp_path, manifest).read_text(encoding="utf-8"))
+    assert table["format"] == 1
+    assert table["version"] == "0.1.0"
+    assert table["fingerprint"].startswith("sha256:")
+    assert table["images"].format(camera=2, light=1) == "kitchen.c0002.l001.exr"
+    assert table["layers"].format(camera=2) == "kitchen.layers.c0002.exr"
+    assert table["resolution"] == [400, 300]
+    assert (table["n_cameras"], table["n_lights"]) == (3, 2)
+    assert table["job"] == manifest.job
+    np.testing.assert_array_equal(table["cameras"][2]["world_from_camera"], manifest.cameras[2].matrix)
+    assert table["cameras"][0]["fov"] == 60.0
+    assert table["lights"][1]["ambient"] == [1.1, 1e-17, 3e20]
+    assert [source["type"] for source in table["lights"][1]["sources"]] == ["point", "directional"]
+
+
+def test_a_matrix_stands_on_one_line() -> None:
+    lines = to_toml(make_manifest()).splitlines()
+    assert sum(line.startswith("world_from_camera = [[") for line in lines) == 3
+
+
+def test_numpy_values_paths_and_none_are_written(tmp_path: Path) -> None:
+    summary = {"seconds": np.float64(0.5), "rays": np.int64(3), "mean": np.ones(2), "file": Path("a/b"), "none": None}
+    light = dataclasses.replace(make_manifest().lights[0], sources=({"type": "point", "position": np.zeros(3)},))
+    write_manifest(tmp_path, make_manifest(summary=summary, lights=(light, light)))
+    back = read_manifest(tmp_path)
+    assert back.summary == {"seconds": 0.5, "rays": 3, "mean": [1.0, 1.0], "file": "a/b"}
+    assert back.lights[0].sources[0]["position"] == [0.0, 0.0, 0.0]
+
+
+def test_a_full_array_is_written_fast(tmp_path: Path) -> None:
+    manifest = make_manifest(192, 48)
+    start = time.perf_counter()
+    write_manifest(tmp_path, manifest)
+    middle = time.perf_counter()
+    assert read_manifest(tmp_path) == manifest
+    assert middle - start < 0.1
+    assert time.perf_counter() - middle < 1.0
+
+
+def test_image_and_layers_paths(tmp_path: Path) -> None:
+    manifest = make_manifest(directory=tmp_path)
+    assert image_path(manifest, 2, 1) == tmp_path / "kitchen.c0002.l001.exr"
+    assert layers_path(manifest, 0) == tmp_path / "kitchen.layers.c0000.exr"
+    for c, l in ((3, 0), (0, 2), (-1, 0), (0, -1)):
+        with pytest.raises(OutputError, match=r"no (camera|light)"):
+            image_path(manifest, c, l)
+    with pytest.raises(OutputError, match="no camera 3; the frame array has 0 to 2"):
+        layers_path(manifest, 3)
+    with pytest.raises(OutputError, match="without layers"):
+        layers_path(make_manifest(layers=""), 0)
+
+
+def test_file_names_sort_and_widen() -> None:
+    images, layers = file_patterns("a{b}", 12000, 1200, "png")
+    assert images.format(camera=7, light=3) == "a{b}.c00007.l0003.png"
+    assert layers.format(camera=11999) == "a{b}.layers.c11999.exr"
+    names = [images.format(camera=c, light=l) for c in (0, 9, 10, 11999) for l in (0, 9, 10, 1199)]
+    assert names == sorted(names)
+
+
+def test_fingerprint_knows_content_not_names(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(b"scene")
+    (tmp_path / "b").write_bytes(b"scene")
+    assert fingerprint(b"job", tmp_path / "a") == fingerprint(b"job", tmp_path / "b") == fingerprint(b"job", b"scene")
+    different = {fingerprint(b"job", b"scene"), fingerprint(b"jobs", b"cene"), fingerprint(b"jobscene"), fingerprint()}
+    assert len(different) == 4
+    with pytest.raises(OutputError, match=r"missing: cannot be read for its fingerprint: No such file"):
+        fingerprint(tmp_path / "missing")
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        "../a.c{camera:04d}.l{light:03d}.exr",
+        "/tmp/a.c{camera:04d}.l{light:03d}.exr",
+        "a/../../b.c{camera:04d}.l{light:03d}.exr",
+        "..\\a.c{camera:04d}.l{light:03d}.exr",
+        "C:a.c{camera:04d}.l{light:03d}.exr",
+        "a.c{camera.__class__}.l{light:03d}.exr",
+        "a.c{camera!r}.l{light:03d}.exr",
+        "a.c{camera:>9999999999d}.l{light:03d}.exr",
+        "a.c{0}.l{light:03d}.exr",
+        "a.c{camera:04d.exr",
+        "a.c{camera:04d}.exr",
+        "a.l{light:04d}.exr",
+        "",
+    ],
+)
+def test_patterns_that_do_more_than_number_files_are_refused(tmp_path: Path, pattern: str) -> None:
+    with pytest.raises(ValueError, match="images: "):
+        make_manifest(images=pattern)
+    text = to_toml(make_manifest()).replace('"kitchen.c{camera:04d}.l{light:03d}.exr"', repr(pattern))
+    (tmp_path / "manifest.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(OutputError, match=r"manifest\.toml: images: "):
+        read_manifest(tmp_path)
+
+
+def test_a_pattern_may_leave_out_an_axis_of_length_one() -> None:
+    assert make_manifest(1, 2, images="sub/a.{light}.png").images == "sub/a.{light}.png"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("format = 1", "format = 2", "format: expected 1, got 2; use a newer framearray"),
+        ("format = 1", "", "format: expected 1, got None"),
+        ("fps = 23.976", "fps = 0", "fps: expected a positive number, got 0"),
+        ("fps = 23.976", "fps = nan", "fps: expected a positive number, got nan"),
+        ("fps = 23.976", "", "expected the keys fps, found none"),
+        ("n_cameras = 3", "n_cameras = 4", "n_cameras: says 4, but 3 are listed"),
+        ("resolution = [\n    400,\n    300,\n]", "resolution = 3", "resolution: expected 2 positive whole numbers"),
+        ("fov = 60.0", "fov = 180.0", r"cameras\[0\]: fov: expected degrees in \(0, 180\), got 180.0"),
+        ("fov = 60.0", "", r"cameras\[0\]: expected the keys fov, found none"),
+        ("world_from_camera = [[", "world_from_camera = [[1.0, ", r"cameras\[0\]: world_from_camera: expected 4 rows"),
+        ("ambient = [0.1, ", "ambient = [inf, ", r"lights\[0\]: ambient: expected 3 finite numbers"),
+        ('type = "point"', 'kind = "point"', r"lights\[0\]: sources: expected tables with a type"),
+        ("[job]", "[[job]]", "job: expected a table"),
+        ("name = ", "name ", "not valid TOML"),
+    ],
+)
+def test_broken_manifests_say_what_is_wrong(tmp_path: Path, old: str, new: str, message: str) -> None:
+    text = to_toml(make_manifest())
+    assert old in text
+    (tmp_path / "manifest.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(OutputError, match=rf"manifest\.toml: {message}") as caught:
+        read_manifest(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_and_unreadable_manifests(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match=r"manifest\.toml: no such file; expected the output folder"):
+        read_manifest(tmp_path)
+    with pytest.raises(OutputError, match="no such file"):
+        read_manifest(tmp_path / "nowhere")
+    (tmp_path / "manifest.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(OutputError, match="not valid TOML"):
+        read_manifest(tmp_path)
+
+
+def test_unknown_keys_are_left_alone(tmp_path: Path) -> None:
+    text = to_toml(make_manifest()).replace("format = 1", 'format = 1\nlater = "addition"')
+    (tmp_path / "manifest.toml").write_text(text, encoding="utf-8")
+    assert read_manifest(tmp_path) == make_manifest()
