@@ -1,0 +1,257 @@
+"""Job and its tables: what a job file may say. Each key is typed, bounded and described once, here or in `jobkeys.py`.
+
+Attributes follow the keys of the file: `job.camera.keys[0].eye` is `keys = [{ eye = ... }]` under `[camera]`.
+What a file leaves out is filled in while the job is read, so that a Job has no open ends.
+"""
+
+import re
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
+
+from .jobkeys import CameraTable, LightTable
+from .jobvalues import Emission, FileName, Reflectivity, Table, Triple, absolute, computed, fail, fill, shown
+
+Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; every other format is taken as y up
+
+
+class MaterialTable(Table):
+    """Replaces parts of one material of the scene, by its name."""
+
+    reflectivity: Reflectivity | None = Field(
+        default=None,
+        description="Diffuse reflectivity, linear, Rec. 709. Replaces the material's colour, "
+        "texture and vertex colours.",
+        json_schema_extra=computed("as in the scene"),
+    )
+    specular: Reflectivity | None = Field(
+        default=None,
+        description="Mirror reflectivity, linear. Above 0 the material reflects like a mirror. "
+        "Diffuse plus mirror reflectivity is at most 1 in each channel.",
+        json_schema_extra=computed("as in the scene"),
+    )
+
+    @field_validator("specular")
+    @classmethod
+    def _conserves_energy(cls, specular: Triple | None, info: ValidationInfo) -> Triple | None:
+        diffuse = info.data.get("reflectivity")
+        for channel, a, b in zip(("red", "green", "blue"), diffuse or (), specular or (), strict=False):
+            if a + b > 1 + 1e-9:  # 0.1 + 0.9 may round to just above 1
+                fail([((), f"expected reflectivity + specular of at most 1, got {a + b:g} in {channel}")])
+        return specular
+
+
+class SceneTable(Table):
+    """The model."""
+
+    file: FileName = Field(description="Scene file: GLB, glTF, OBJ, PLY, STL or anything else trimesh reads.")
+    up: Literal["y", "z"] = Field(
+        default="y",
+        description="Axis that points up. Says how cameras without `up` are held; the model is not turned.",
+        json_schema_extra=computed('"z" for STL, PLY and 3MF, else "y"'),
+    )
+    background: Emission = Field(
+        default=(0.0, 0.0, 0.0),
+        description="Radiance of what lies outside the scene, W/(m2 sr); one number means grey.",
+    )
+    materials: dict[str, MaterialTable] = Field(
+        default_factory=dict, description="Materials to override, by their names in the scene file."
+    )
+
+    @model_validator(mode="after")
+    def _fill_up(self) -> "SceneTable":
+        if "up" not in self.model_fields_set:
+            fill(self, "up", "z" if self.file.suffix.lower() in Z_UP_FORMATS else "y")
+        return self
+
+
+class SamplesTable(Table):
+    """How many samples a picture is made of."""
+
+    hits: int = Field(
+        default=2,
+        ge=1,
+        le=65535,
+        description="Native hits of a pixel in a frame. With reuse a pixel averages up to (2 n_r + 1) times as many.",
+    )
+    obscurance: int = Field(default=5, ge=1, le=65535, description="Obscurance rays of a hit.")
+
+
+class ReuseTable(Table):
+    """How far the samples of one eye serve its neighbours."""
+
+    n_r: int = Field(
+        default=3, ge=0, le=64, description="Frames before and frames after that share their hits, N_r. 0: no reuse."
+    )
+    weights: Literal["average", "balance"] = Field(
+        default="balance",
+        description='"average": all hits of a pixel count the same. "balance": each counts by how densely its eye '
+        "sees the place, which removes the error at silhouettes and texture edges and costs more rays.",
+    )
+
+
+class ObscuranceTable(Table):
+    """Indirect light: how far surfaces see each other."""
+
+    range: float = Field(
+        gt=0,
+        le=1e12,
+        description="Distance d_max beyond which a surface no longer obscures another, in scene units. "
+        "About half the height of a room is a good start.",
+    )
+    falloff: Literal["sqrt", "linear", "cbrt", "exponential", "constant"] = Field(
+        default="sqrt",
+        description="How the openness rho rises from 0 at distance 0 to 1 at `range`. "
+        '"constant" is 0 below `range`: plain ambient occlusion.',
+    )
+    tau: float = Field(
+        default=3.0,
+        ge=1e-3,
+        le=100,
+        description='Steepness of "exponential": rho = (1 - exp(-tau d / d_max)) / (1 - exp(-tau)). '
+        "Other falloffs ignore it.",
+    )
+    outside: Literal["average", "background"] = Field(
+        default="average",
+        description='What a ray brings that meets nothing within `range`. "average": the average reflectivity times '
+        'the ambient light. "background": rays are traced on, and those that leave the scene bring its background.',
+    )
+
+
+class AmbientTable(Table):
+    """The ambient light I_A of each light position, the level of all indirect light."""
+
+    intensity: Emission | None = Field(
+        default=None,
+        description="Fixes I_A for every light position, as a radiance, W/(m2 sr), instead of `method` and `paths`.",
+        json_schema_extra=computed("measured"),
+    )
+    method: Literal["eye", "light"] = Field(
+        default="eye",
+        description='"eye": walks from what the cameras see gather the light that arrives there. '
+        '"light": particles from the light spread over the scene.',
+    )
+    paths: int | None = Field(
+        default=None,
+        ge=1,
+        le=2**24,
+        description='Walks ("eye") or particles a light position ("light").',
+        json_schema_extra=computed("as many as a standard error of 1 % needs"),
+    )
+
+    @field_validator("method", "paths")
+    @classmethod
+    def _not_fixed(cls, value: object, info: ValidationInfo) -> object:
+        if value is not None and info.data.get("intensity") is not None:
+            fail([((), "expected no value, because `intensity` fixes the ambient light; remove one of the two")])
+        return value
+
+
+class SpecularTable(Table):
+    """Mirror reflection."""
+
+    depth: int = Field(default=4, ge=0, le=64, description="Longest chain of mirror reflections. 0: mirrors are black.")
+    hits: int = Field(
+        default=0,
+        ge=1,
+        le=65535 * 129,  # the default with the largest samples.hits and n_r
+        description="Native hits of a pixel that sees a mirror; what a mirror shows is never reused.",
+        json_schema_extra=computed("(2 n_r + 1) times `samples.hits`"),
+    )
+
+
+class OutputTable(Table):
+    """What is written."""
+
+    directory: FileName = Field(
+        default=Path(),
+        description="Folder for images and manifest.",
+        json_schema_extra=computed('"../out/" and the job\'s name'),
+    )
+    format: Literal["exr", "png", "tif", "jpg"] = Field(
+        default="exr",
+        description="Image format. EXR and TIFF hold linear radiance; PNG and JPEG are sRGB, clipped to 0..1.",
+    )
+    fps: float = Field(
+        default=24.0, ge=0.01, le=1000, description="Frames a second, kept in the images and used for movies."
+    )
+    compression: Literal["none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"] = Field(
+        default="zips", description="Compression of EXR. pxr24, b44, b44a, dwaa and dwab lose precision."
+    )
+    half: Literal["auto", "always", "never"] = Field(
+        default="auto",
+        description='EXR with 16 bit a channel. "auto": 32 bit for an image with values above 65504, which 16 bit '
+        'cannot hold. "always": such values are cut to 65504. "never": always 32 bit.',
+    )
+    quality: int = Field(default=95, ge=1, le=100, description="Quality of JPEG.")
+    exposure: float = Field(
+        default=0.0,
+        ge=-64,
+        le=64,
+        description="Brightens PNG and JPEG by 2 to this power (stops). EXR and TIFF stay as they are.",
+    )
+    layers: bool = Field(
+        default=True,
+        description="Also write one multi-channel EXR a camera: obscurance, indirect, reflectivity, normal, depth, "
+        "sample count.",
+    )
+
+
+class RenderTable(Table):
+    """How the machine is used; no image depends on it."""
+
+    threads: int | None = Field(
+        default=None, ge=1, le=1024, description="Threads that render.", json_schema_extra=computed("one for each core")
+    )
+
+
+def _file_stem(name: str) -> str:
+    """Check that a name can start file names on every system."""
+    if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}", name):
+        wanted = 'at most 100 letters, digits, ".", "_" or "-", the first a letter, digit or "_"'
+        fail([((), f"expected {wanted}, got {shown(name)}")])
+    return name
+
+
+class Job(Table):
+    """Everything a job file says, with all defaults filled in and all file names absolute."""
+
+    name: Annotated[str, AfterValidator(_file_stem)] = Field(
+        description='Starts every file name. Letters, digits, ".", "_" and "-".',
+        json_schema_extra={"pattern": "^[A-Za-z0-9_][A-Za-z0-9._-]{0,99}$"},
+    )
+    seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of all random numbers.")
+    scene: SceneTable
+    camera: CameraTable
+    light: LightTable
+    samples: SamplesTable = Field(default_factory=SamplesTable)
+    reuse: ReuseTable = Field(default_factory=ReuseTable)
+    obscurance: ObscuranceTable
+    ambient: AmbientTable = Field(default_factory=AmbientTable)
+    specular: SpecularTable = Field(default_factory=SpecularTable)
+    output: OutputTable = Field(default_factory=OutputTable)
+    render: RenderTable = Field(default_factory=RenderTable)
+
+    _file: Path | None = PrivateAttr(None)
+
+    @property
+    def file(self) -> Path | None:
+        """The job file this was read from, for messages."""
+        return self._file
+
+    def __eq__(self, other: object) -> bool:
+        """Two jobs are equal if they say the same, whatever file they come from."""
+        return isinstance(other, Job) and self.__dict__ == other.__dict__
+
+    @model_validator(mode="after")
+    def _fill_defaults(self, info: ValidationInfo) -> "Job":
+        job_file = (info.context or {}).get("job_file")
+        self._file = job_file
+        if "hits" not in self.specular.model_fields_set:
+            hits = (2 * self.reuse.n_r + 1) * self.samples.hits
+            fill(self, "specular", self.specular.model_copy(update={"hits": hits}))
+        if "directory" not in self.output.model_fields_set:
+            directory = absolute(Path("..") / "out" / self.name, job_file)
+            fill(self, "output", self.output.model_copy(update={"directory": directory}))
+        return self

@@ -1,0 +1,203 @@
+"""The tables of a job that hold key frames: the camera and the light sources."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from math import hypot
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
+
+from .jobvalues import Direction, Emission, FileName, Place, Point, Size, Table, Triple, computed, fail, fill, shown
+
+MOST_EYES = 100_000  # an hour at 24 frames a second; more is a typing error
+
+
+class CameraKey(Table):
+    """Where the camera is at one frame."""
+
+    frame: int = Field(ge=0, lt=MOST_EYES, description="Camera frame, counted from 0.")
+    eye: Point = Field(description="Position of the eye, in the coordinates of the scene file.")
+    target: Point = Field(description="Point that the eye looks at, in the coordinates of the scene file.")
+    up: Direction | None = Field(
+        default=None,
+        description="Direction that is up in the picture. Given at every key or at none.",
+        json_schema_extra=computed("the scene's up axis"),
+    )
+
+    @field_validator("target")
+    @classmethod
+    def _differs_from_eye(cls, target: Triple, info: ValidationInfo) -> Triple:
+        if target == info.data.get("eye"):
+            fail([((), f"expected a point other than the eye, got {shown(target)}, the eye itself")])
+        return target
+
+
+class PointKey(Table):
+    """A point source at one light frame."""
+
+    frame: int = Field(ge=0, lt=MOST_EYES, description="Light frame, counted from 0.")
+    position: Point = Field(description="Position, in the coordinates of the scene file.")
+    intensity: Emission = Field(description="Radiant intensity, W/sr; one number means white.")
+    color: Emission | None = Field(
+        default=None,
+        description="Multiplies `intensity` by channel. Given at every key of a source or at none.",
+        json_schema_extra=computed("1"),
+    )
+
+
+class DirectionalKey(Table):
+    """A directional source, such as the sun, at one light frame."""
+
+    frame: int = Field(ge=0, lt=MOST_EYES, description="Light frame, counted from 0.")
+    direction: Direction = Field(description="The way the light travels: from the sun to the scene. Any length.")
+    irradiance: Emission = Field(
+        description="Irradiance of a surface that faces the light, W/m2; one number means white."
+    )
+    color: Emission | None = Field(
+        default=None,
+        description="Multiplies `irradiance` by channel. Given at every key of a source or at none.",
+        json_schema_extra=computed("1"),
+    )
+
+
+Key: TypeAlias = CameraKey | PointKey | DirectionalKey
+
+
+def _key_problems(keys: Sequence[Key], directions: str, optional: str) -> list[tuple[Place, str]]:
+    """Check keys against each other: their order, what they leave out, and directions that turn half a circle."""
+    problems: list[tuple[Place, str]] = []
+    for i, (before, key) in enumerate(pairwise(keys), start=1):
+        if key.frame <= before.frame:
+            text = f"expected more than {before.frame}, the frame of the key before, got {key.frame}"
+            problems.append(((i, "frame"), text))
+        a, b = getattr(before, directions, None), getattr(key, directions, None)
+        if a and b and _opposite(a, b):
+            text = "expected less than half a turn from the key before, got the opposite direction; add a key between"
+            problems.append(((i, directions), text))
+    given = [i for i, key in enumerate(keys) if getattr(key, optional) is not None]
+    if given and len(given) < len(keys):
+        missing = next(i for i in range(len(keys)) if i not in given)
+        problems.append(((missing, optional), f"missing; keys[{given[0]}] gives it, so every key of this list must"))
+    return problems
+
+
+def _opposite(a: Triple, b: Triple) -> bool:
+    """Whether two directions are so close to opposite that no shortest way leads from one to the other."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] <= -hypot(*a) * hypot(*b) * (1 - 1e-8)  # 1e-8: within 0.01 degrees
+
+
+def _late_keys(keys: Sequence[Key], frames: int) -> list[tuple[Place, str]]:
+    """Check that no key lies beyond the last frame; `frames` 0 means that the keys decide."""
+    late = [(i, key.frame) for i, key in enumerate(keys) if frames and key.frame >= frames]
+    return [((i, "frame"), f"expected at most {frames - 1} (frames = {frames}), got {frame}") for i, frame in late]
+
+
+class CameraTable(Table):
+    """The eyes."""
+
+    resolution: Size = Field(default=(400, 300), description="Width and height of every image, pixels.")
+    fov: float = Field(default=60.0, ge=1e-3, le=179.9, description="Vertical field of view, degrees.")
+    frames: int = Field(
+        default=0,
+        ge=1,
+        le=MOST_EYES,
+        description="Number of eyes, N_c.",
+        json_schema_extra=computed("the last key's frame + 1, or the eyes in `file`"),
+    )
+    file: FileName | None = Field(
+        default=None,
+        description="CSV or JSON file with one eye a frame, instead of `keys`.",
+        json_schema_extra=computed("none"),
+    )
+    keys: tuple[CameraKey, ...] = Field(
+        default=(),
+        strict=False,
+        validate_default=True,
+        description="Where the eye is at some frames; between them it moves smoothly, before the first and after "
+        "the last it stands still. One key: a fixed camera.",
+        json_schema_extra=computed("the eyes in `file`"),
+    )
+
+    @field_validator("keys")
+    @classmethod
+    def _consistent(cls, keys: tuple[CameraKey, ...], info: ValidationInfo) -> tuple[CameraKey, ...]:
+        has_file = info.data.get("file") is not None
+        if has_file and keys:
+            fail([((), "expected either `keys` or `file`, got both")])
+        if not keys and not has_file and "file" in info.data:
+            fail([((), "expected a list of at least 1 table, got none; give `keys` or `file`")])
+        if problems := _key_problems(keys, "up", "up") + _late_keys(keys, info.data.get("frames", 0)):
+            fail(problems)
+        return keys
+
+    @model_validator(mode="after")
+    def _fill_frames(self) -> "CameraTable":
+        if "frames" not in self.model_fields_set and self.keys:
+            fill(self, "frames", self.keys[-1].frame + 1)
+        return self
+
+
+def _consistent_light_keys(keys: Any) -> Any:
+    """Check the keys of one source against each other."""
+    if problems := _key_problems(keys, "direction", "color"):
+        fail(problems)
+    return keys
+
+
+class PointSource(Table):
+    """A small lamp that shines equally in all directions."""
+
+    type: Literal["point"] = Field(description="Kind of source.")
+    keys: Annotated[tuple[PointKey, ...], AfterValidator(_consistent_light_keys)] = Field(
+        strict=False,
+        min_length=1,
+        description="The source at some light frames; between them all its values change smoothly, before the first "
+        "and after the last they stay as they are.",
+    )
+
+
+class DirectionalSource(Table):
+    """A source infinitely far away, such as the sun."""
+
+    type: Literal["directional"] = Field(description="Kind of source.")
+    keys: Annotated[tuple[DirectionalKey, ...], AfterValidator(_consistent_light_keys)] = Field(
+        strict=False,
+        min_length=1,
+        description="The source at some light frames; between them all its values change smoothly, before the first "
+        "and after the last they stay as they are.",
+    )
+
+
+Source: TypeAlias = Annotated[PointSource | DirectionalSource, Field(discriminator="type")]
+
+
+class LightTable(Table):
+    """The light positions."""
+
+    frames: int = Field(
+        default=0,
+        ge=1,
+        le=MOST_EYES,
+        description="Number of light positions, N_l.",
+        json_schema_extra=computed("the last key's frame + 1"),
+    )
+    sources: tuple[Source, ...] = Field(
+        strict=False, min_length=1, description="One or more sources; all of them shine together at each light index."
+    )
+
+    @field_validator("sources")
+    @classmethod
+    def _within_frames(cls, sources: tuple[Source, ...], info: ValidationInfo) -> tuple[Source, ...]:
+        frames = info.data.get("frames", 0)
+        late = [
+            ((i, "keys", *place), text) for i, s in enumerate(sources) for place, text in _late_keys(s.keys, frames)
+        ]
+        if late:
+            fail(late)
+        return sources
+
+    @model_validator(mode="after")
+    def _fill_frames(self) -> "LightTable":
+        if "frames" not in self.model_fields_set:
+            fill(self, "frames", max(source.keys[-1].frame for source in self.sources) + 1)
+        return self

@@ -1,0 +1,160 @@
+"""What a job file is made of: points, directions, colours, sizes, file names, and the base of its tables.
+
+Each kind checks itself and says in plain words what it expected and what it found.
+"""
+
+import json
+import math
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Any, NoReturn, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationError, ValidationInfo, WithJsonSchema
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+Place: TypeAlias = tuple[int | str, ...]  # keys and list positions from the value at hand down to the problem
+Triple: TypeAlias = tuple[float, float, float]
+
+FARTHEST = 1e12  # scene units; squares and cubes of it still fit in float32 (3e38)
+BRIGHTEST = 1e20  # W/sr, W/m2 or radiance; times any reflectivity and over any squared distance it stays finite
+SHORTEST = 1e-12  # scene units; a shorter direction is taken for zero
+LONGEST_SHOWN = 40  # characters of a found value in a message
+
+
+def fail(problems: Sequence[tuple[Place, str]]) -> NoReturn:
+    """Raise every problem of one value at once, each at its own place below that value."""
+    details = [
+        InitErrorDetails(type=PydanticCustomError("job", "{text}", {"text": text}), loc=place, input=None)
+        for place, text in problems
+    ]
+    raise ValidationError.from_exception_data("job", details)
+
+
+def shown(value: object) -> str:
+    """Describe a found value as it would stand in a TOML file, shortened."""
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, list | tuple):
+        whole = f"[{', '.join(shown(item) for item in value[:4])}{', ...' if len(value) > 4 else ''}]"
+        kind = "tables" if value and isinstance(value[0], dict) else "values"
+        return whole if kind == "values" and len(whole) <= LONGEST_SHOWN else f"a list of {len(value)} {kind}"
+    if isinstance(value, bool | str):
+        text = json.dumps(value[:1000] if isinstance(value, str) else value, ensure_ascii=False)
+    elif isinstance(value, int) and value.bit_length() > 64:
+        return "a number beyond 64 bits"
+    else:
+        text = str(value)
+    return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 4] + "..." + text[-1]
+
+
+def between(low: float, high: float) -> str:
+    """Say a range of numbers, "from 0 to 1"; bounds that only protect the arithmetic are left out."""
+    if high >= FARTHEST:
+        return "" if low <= -FARTHEST else f"of at least {low:g}"
+    return f"from {low:g} to {high:g}"
+
+
+def _number_problem(value: object, low: float, high: float, whole: bool) -> str | None:
+    """Say what is wrong with one number, or nothing."""
+    right_type = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
+    if right_type and low <= value <= high:  # type: ignore[operator]
+        return None
+    beyond = right_type and (value < -FARTHEST or value > FARTHEST)  # type: ignore[operator]
+    wanted = f"from {low:g} to {high:g}" if beyond else between(low, high)
+    kind = "a whole number" if whole else "a number"
+    return f"expected {kind} {wanted}".rstrip() + f", got {shown(value)}"
+
+
+def _vector(
+    count: int, low: float, high: float, *, grey: bool = False, whole: bool = False
+) -> Callable[[object], tuple[Any, ...]]:
+    """Make a check for `count` numbers within bounds; with `grey` one number stands for all of them."""
+    kind = "whole numbers" if whole else "numbers"
+
+    def check(value: object) -> tuple[Any, ...]:
+        if grey and not isinstance(value, list | tuple):
+            if isinstance(value, str | dict):
+                fail([((), f"expected a number or {count} numbers, got {shown(value)}")])
+            if problem := _number_problem(value, low, high, whole):
+                fail([((), problem)])
+            value = [value] * count
+        if not isinstance(value, list | tuple):
+            fail([((), f"expected {count} {kind}, got {shown(value)}")])
+        if len(value) != count:
+            fail([((), f"expected {count} {kind}, got {len(value)}")])
+        found = [((i,), _number_problem(item, low, high, whole)) for i, item in enumerate(value)]
+        if problems := [(place, text) for place, text in found if text]:
+            fail(problems)
+        return tuple(item if whole else float(item) for item in value)
+
+    return check
+
+
+def _direction(value: object) -> tuple[Any, ...]:
+    """Check three numbers that are not all zero."""
+    vector = _vector(3, -FARTHEST, FARTHEST)(value)
+    if math.hypot(*vector) < SHORTEST:
+        fail([((), f"expected a direction, got the zero vector {shown(value)}")])
+    return vector
+
+
+def _file_name(value: object, info: ValidationInfo) -> Path:
+    """Make a path absolute; a relative one starts at the folder of the job file."""
+    if not isinstance(value, str | Path) or not str(value).strip() or "\0" in str(value):
+        fail([((), f"expected a file name, got {shown(value)}")])
+    job_file = (info.context or {}).get("job_file")
+    return absolute(Path(value), job_file)
+
+
+def absolute(path: Path, job_file: Path | None) -> Path:
+    """Resolve a path against the folder of the job file, or the working directory.
+
+    Links on the way are followed, so that `..` means what the file system means; a link at the end
+    stays, because a scene's textures lie beside its name.
+    """
+    whole = (Path(job_file).parent if job_file else Path.cwd()) / path
+    if path.name in ("", ".."):
+        return Path(os.path.realpath(whole))
+    return Path(os.path.realpath(whole.parent)) / path.name
+
+
+def _vector_schema(count: int, *, grey: bool = False, whole: bool = False, **bounds: float) -> WithJsonSchema:
+    """Describe `count` numbers, or one grey number, in JSON Schema."""
+    number = {"type": "integer" if whole else "number", **bounds}
+    vector = {"type": "array", "items": number, "minItems": count, "maxItems": count}
+    return WithJsonSchema({"anyOf": [number, vector]} if grey else vector)
+
+
+Point: TypeAlias = Annotated[Triple, PlainValidator(_vector(3, -FARTHEST, FARTHEST)), _vector_schema(3)]
+Direction: TypeAlias = Annotated[Triple, PlainValidator(_direction), _vector_schema(3)]
+Emission: TypeAlias = Annotated[
+    Triple, PlainValidator(_vector(3, 0.0, BRIGHTEST, grey=True)), _vector_schema(3, grey=True, minimum=0)
+]
+Reflectivity: TypeAlias = Annotated[
+    Triple, PlainValidator(_vector(3, 0.0, 1.0, grey=True)), _vector_schema(3, grey=True, minimum=0, maximum=1)
+]
+Size: TypeAlias = Annotated[
+    tuple[int, int],
+    PlainValidator(_vector(2, 1, 16384, whole=True)),
+    _vector_schema(2, whole=True, minimum=1, maximum=16384),
+]
+FileName: TypeAlias = Annotated[
+    Path, PlainValidator(_file_name), WithJsonSchema({"type": "string", "minLength": 1, "x-words": "a file name"})
+]
+
+
+class Table(BaseModel):
+    """Base of all tables: unknown keys, loose types and non-finite numbers are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+def fill(table: Table, key: str, value: object) -> None:
+    """Set what the file left out; only while a table is being made."""
+    object.__setattr__(table, key, value)
+
+
+def computed(text: str) -> dict[str, Any]:
+    """Describe a default that depends on other keys; it replaces the stored default in schema and docs."""
+    return {"x-default": text}
