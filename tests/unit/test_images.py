@@ -100,7 +100,7 @@ def test_exr_keeps_half_values_exactly(tmp_path: Path) -> None:
 
 def test_exr_is_float_where_asked(tmp_path: Path) -> None:
     image = noisy()
-    write_image(tmp_path / "a.exr", image, ImageFormat(half=False))
+    write_image(tmp_path / "a.exr", image, ImageFormat(half="never"))
     np.testing.assert_array_equal(read_image(tmp_path / "a.exr"), image)
 
 
@@ -115,6 +115,14 @@ def test_exr_is_float_where_a_half_would_be_infinite(tmp_path: Path, sign: int) 
     assert kinds == ["half", "float"]
     assert read_image(tmp_path / "fits.exr")[3, 4, 1] == sign * HALF_MAX
     np.testing.assert_array_equal(read_image(tmp_path / "beyond.exr"), image)
+
+
+def test_exr_cuts_to_half_where_asked(tmp_path: Path) -> None:
+    image = noisy()
+    image[3, 4] = [65505, 1e30, -70000]
+    write_image(tmp_path / "a.exr", image, ImageFormat(half="always"))
+    assert str(oiio.ImageInput.open(str(tmp_path / "a.exr")).spec().format) == "half"
+    np.testing.assert_array_equal(read_image(tmp_path / "a.exr")[3, 4], [HALF_MAX, HALF_MAX, -HALF_MAX])
 
 
 def test_tif_keeps_float_values(tmp_path: Path) -> None:
@@ -144,7 +152,7 @@ def test_exposure_brightens_the_screen_formats_alone(tmp_path: Path) -> None:
     image = smooth() / 8
     write_image(tmp_path / "a.png", image, ImageFormat(format="png", exposure=1.0))
     np.testing.assert_array_equal(srgb8_from_linear(read_image(tmp_path / "a.png")), srgb8_from_linear(2 * image))
-    write_image(tmp_path / "a.exr", image, ImageFormat(exposure=1.0, half=False))
+    write_image(tmp_path / "a.exr", image, ImageFormat(exposure=1.0, half="never"))
     np.testing.assert_array_equal(read_image(tmp_path / "a.exr"), image)
 
 
@@ -176,13 +184,21 @@ def test_other_shapes_are_refused(tmp_path: Path) -> None:
 def test_a_strided_image_is_written_right(tmp_path: Path) -> None:
     image = noisy(24, 34)[::2, ::-2]
     for name in ("exr", "tif", "png"):
-        write_image(tmp_path / f"a.{name}", image, ImageFormat(format=name, half=False))
+        write_image(tmp_path / f"a.{name}", image, ImageFormat(format=name, half="never"))
         back = read_image(tmp_path / f"a.{name}")
         np.testing.assert_array_equal(srgb8_from_linear(back), srgb8_from_linear(image))
 
 
 @pytest.mark.parametrize(
-    "options", [{"compression": "lzw"}, {"compression": "zip:fast"}, {"format": "gif"}, {"quality": 0}]
+    "options",
+    [
+        {"compression": "lzw"},
+        {"compression": "zip:"},
+        {"compression": "zip:fast"},
+        {"half": True},
+        {"format": "gif"},
+        {"quality": 0},
+    ],
 )
 def test_unknown_options_are_refused(options: dict) -> None:
     with pytest.raises(ValueError, match="expected"):
@@ -200,7 +216,7 @@ def test_lossless_compressions(tmp_path: Path, compression: str) -> None:
 def test_threads_write_different_images(tmp_path: Path) -> None:
     images = [noisy(seed=k) for k in range(12)]
     with ThreadPoolExecutor(4) as pool:
-        list(pool.map(lambda k: write_image(tmp_path / f"{k}.exr", images[k], ImageFormat(half=False)), range(12)))
+        list(pool.map(lambda k: write_image(tmp_path / f"{k}.exr", images[k], ImageFormat(half="never")), range(12)))
     for k, image in enumerate(images):
         np.testing.assert_array_equal(read_image(tmp_path / f"{k}.exr"), image)
 
