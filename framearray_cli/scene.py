@@ -1,8 +1,33 @@
 """Scene: plain arrays, centred in float64 and only then float32; what the kernels read."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
-from .arrays import Bytes, CornerUvs, Corners, Float32, Float64, Int32, Rgb
+import numpy as np
+from numpy.typing import NDArray
+
+from .arrays import Bytes, Corners, CornerUvs, Float32, Float64, Int32, Rgb
+from .errors import SceneError
+from .meshes import (
+    Material,
+    Merged,
+    Meshes,
+    Notes,
+    Override,
+    finite,
+    has_area,
+    merge,
+    near_uvs,
+    overridden,
+    read_meshes,
+    repeated,
+    unit_normals,
+    untextured_variants,
+)
+
+# Sizes between which tracing was measured to be right; far below, float32 falls into denormals, above, nothing is hit.
+SMALLEST_SCENE, LARGEST_SCENE = 1e-12, 1e12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +67,8 @@ class Scene:
         alpha: (m,) opacity factor, multiplied with the alpha of `alpha_texture`.
         alpha_texture: (m,) texture whose alpha is the mask, or -1.
         alpha_cutoff: (m,) a point of a masked triangle is absent where alpha < cutoff.
-        texels: (n_texels, 4) uint8 RGBA of all textures one after another; colours sRGB encoded, alpha linear; row 0 on top.
+        texels: (n_texels, 4) uint8 RGBA of all textures one after another; colours sRGB encoded, alpha linear;
+            row 0 on top.
         textures: (n_textures, 3) int32 first texel, width, height.
         n_opaque: number of triangles without alpha mask.
     """
@@ -70,3 +96,146 @@ class Scene:
     def has_mirrors(self) -> bool:
         """Whether any material reflects specularly; without one the specular code never runs."""
         return bool((self.specular > 0).any())
+
+
+def load_scene(file: Path, overrides: Mapping[str, Override] | None = None) -> Scene:
+    """Read a scene file, clean it and move it to its own centre.
+
+    Args:
+        file: any format that trimesh reads.
+        overrides: by material name; a value replaces factor, texture and corner colours of that part.
+
+    Raises:
+        SceneError: a file that cannot be read, holds nothing to render, or lacks an overridden material.
+    """
+    meshes = read_meshes(file)
+    try:
+        return build_scene(meshes, overrides or {})
+    except SceneError as error:
+        raise SceneError(f"{file}: {error}") from error
+    except MemoryError as error:
+        raise SceneError(f"{file}: does not fit into memory") from error
+
+
+def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
+    """Turn what a file holds into the arrays that kernels read."""
+    notes = Notes()
+    parts, materials = untextured_variants(meshes.parts, meshes.materials, notes)
+    materials = overridden(materials, overrides, notes)
+    plain = {name for name, override in overrides.items() if override.reflectivity is not None}
+    parts = [replace(p, colours=None) if materials[p.material].name in plain else p for p in parts]
+    merged = merge(parts)
+    dropped = dict(meshes.dropped)
+    keep, centre, corners = _kept(merged, materials, dropped, meshes.notes)
+    material = merged.material[keep]
+    normals, uvs, colours = _none(3), _none(2), _none(3)
+    if merged.normals is not None and merged.has_normals[keep].any():
+        normals = unit_normals(merged.normals[keep], merged.has_normals[keep], corners, notes)
+    textured = max((max(m.texture, m.specular_texture, m.alpha_texture) for m in materials), default=-1) >= 0
+    if merged.uvs is not None and textured:
+        uvs = near_uvs(merged.uvs[keep], notes)
+    if merged.colours is not None:
+        colours = merged.colours[keep]
+    cutoff = np.array([m.alpha_cutoff for m in materials], dtype=np.float32)
+    sizes = np.array([t.shape[:2] for t in meshes.textures], dtype=np.int64).reshape(-1, 2)
+    starts = np.cumsum(sizes.prod(axis=1)) - sizes.prod(axis=1)
+    texels = [t.reshape(-1, 4) for t in meshes.textures]
+    return Scene(
+        centre=centre,
+        corners=corners,
+        normals=normals,
+        uvs=uvs,
+        colours=colours,
+        material=material,
+        material_names=tuple(m.name for m in materials),
+        reflectivity=np.array([m.reflectivity for m in materials], dtype=np.float32),
+        specular=np.array([m.specular for m in materials], dtype=np.float32),
+        reflectivity_texture=np.array([m.texture for m in materials], dtype=np.int32),
+        specular_texture=np.array([m.specular_texture for m in materials], dtype=np.int32),
+        alpha=np.array([m.alpha for m in materials], dtype=np.float32),
+        alpha_texture=np.array([m.alpha_texture for m in materials], dtype=np.int32),
+        alpha_cutoff=cutoff,
+        texels=np.concatenate(texels) if texels else np.zeros((0, 4), dtype=np.uint8),
+        textures=np.column_stack([starts, sizes[:, 1], sizes[:, 0]]).astype(np.int32),
+        n_opaque=int((cutoff[material] == 0).sum()),
+        report=SceneReport(
+            triangles=len(corners),
+            materials=len(np.unique(material)),
+            textures=len(meshes.textures),
+            dropped=dropped,
+            notes=meshes.notes + notes.lines(),
+        ),
+    )
+
+
+def _none(width: int) -> Float32:
+    return np.zeros((0, 3, width), dtype=np.float32)
+
+
+def _kept(
+    merged: Merged, materials: Sequence[Material], dropped: dict[str, int], notes: Sequence[str]
+) -> tuple[NDArray[np.int64], Float64, Corners]:
+    """Decide which triangles stay, and centre them.
+
+    Args:
+        merged: all triangles of the file.
+        materials: what `merged.material` points to.
+        dropped: reasons are added, with the numbers of triangles.
+        notes: repeated in the error when nothing stays.
+
+    Returns:
+        Rows of `merged` that stay, opaque ones first; the centre (3,); their corners (n, 3, 3), centred.
+
+    Raises:
+        SceneError: nothing stays, or a size that cannot be traced.
+    """
+    left_out = np.array([material.left_out for material in materials])[merged.material]
+    rows = np.arange(len(merged.corners))
+    rows = _drop(rows, ~finite(merged.corners), "non-finite", dropped)
+    for reason in sorted({material.left_out for material in materials} - {""}):
+        rows = _drop(rows, left_out[rows] == reason, reason, dropped)
+    rows = _drop(rows, ~has_area(merged.corners[rows]), "degenerate", dropped)
+    _check_left(rows, dropped, notes)
+    low, high = merged.corners[rows].min(axis=(0, 1)), merged.corners[rows].max(axis=(0, 1))
+    centre = low / 2 + high / 2
+    size = float((high / 2 - low / 2).max()) * 2
+    if not SMALLEST_SCENE <= size <= LARGEST_SCENE:
+        raise SceneError(
+            f"the scene is {size:.3g} units wide; expected {SMALLEST_SCENE:g} to {LARGEST_SCENE:g}; scale the model"
+        )
+    corners = (merged.corners[rows] - centre).astype(np.float32)
+    flat = ~has_area(corners)
+    rows, corners = _drop(rows, flat, "degenerate", dropped), corners[~flat]
+    cutoff = np.array([material.alpha_cutoff for material in materials])
+    masked = cutoff[merged.material[rows]] > 0
+    order = np.argsort(masked, kind="stable")
+    rows, corners, masked = rows[order], corners[order], masked[order]
+    # opaque triangles hide one another whatever their material; a cut-out one shows what coincides with it
+    again = repeated(corners, np.where(masked, merged.material[rows] + 1, 0))
+    rows, corners = _drop(rows, again, "duplicate", dropped), corners[~again]
+    _check_left(rows, dropped, notes)
+    return rows, centre, corners
+
+
+def _drop(rows: NDArray[np.int64], bad: NDArray[np.bool_], reason: str, dropped: dict[str, int]) -> NDArray[np.int64]:
+    count = int(bad.sum())
+    if count:
+        dropped[reason] = dropped.get(reason, 0) + count
+    return rows[~bad] if count else rows
+
+
+def _check_left(rows: NDArray[np.int64], dropped: Mapping[str, int], notes: Sequence[str]) -> None:
+    if len(rows) == 0:
+        found = "; ".join((_dropped_text(dropped), *notes))
+        raise SceneError(f"no triangle is left to render: {found}")
+
+
+def _dropped_text(dropped: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} {reason}" for reason, count in dropped.items())
+
+
+def report_lines(report: SceneReport, file: Path | str) -> list[str]:
+    """What the user sees of a scene: one line of numbers, then a line a note."""
+    left_out = f"; left out: {_dropped_text(report.dropped)}" if report.dropped else ""
+    numbers = f"{report.triangles:,} triangles, {report.materials} materials, {report.textures} textures"
+    return [f"{file}: {numbers}{left_out}", *(f"  note: {note}" for note in report.notes)]

@@ -1,0 +1,172 @@
+"""GLB or glTF bytes <-> a JSON tree and one block of binary data."""
+
+import base64
+import json
+import struct
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .assets import Assets
+
+Tree = dict[str, Any]
+
+MAGIC = b"glTF"
+JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
+COMPONENTS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+
+
+@dataclass(slots=True)
+class Gltf:
+    """A glTF file in memory: its JSON, which may be edited, and all its buffers as one block."""
+
+    tree: Tree
+    blob: bytes
+    extra: list[bytes] = field(default_factory=list)  # data appended behind `blob`
+    extra_size: int = 0
+
+    def items(self, key: str) -> list[Tree]:
+        """A top-level list of the JSON, empty where it is missing."""
+        found: list[Tree] = self.tree.get(key) or []
+        return found
+
+    def view_bytes(self, index: int) -> bytes:
+        """The bytes of a buffer view."""
+        view = self.tree["bufferViews"][index]
+        start = view.get("byteOffset", 0)
+        return self.blob[start : start + view["byteLength"]]
+
+    def append_accessor(self, values: NDArray[Any], component: int, kind: str) -> int:
+        """Store an array behind the file's data; return the index of its new accessor."""
+        data = np.ascontiguousarray(values, dtype=COMPONENTS[component]).tobytes()
+        view = {"buffer": 0, "byteOffset": len(self.blob) + self.extra_size, "byteLength": len(data)}
+        padded = data + b"\0" * (-len(data) % 4)
+        self.extra.append(padded)
+        self.extra_size += len(padded)
+        self.tree.setdefault("bufferViews", []).append(view)
+        accessor = {
+            "bufferView": len(self.tree["bufferViews"]) - 1,
+            "componentType": component,
+            "count": len(values),
+            "type": kind,
+        }
+        self.tree.setdefault("accessors", []).append(accessor)
+        return len(self.tree["accessors"]) - 1
+
+    def read_accessor(self, index: int) -> NDArray[Any]:
+        """(count, width) values of an accessor; normalised integers become floats, sparse values are filled in."""
+        accessor = self.tree["accessors"][index]
+        dtype = np.dtype(COMPONENTS[accessor["componentType"]]).newbyteorder("<")
+        width, count = WIDTHS[accessor["type"]], int(accessor["count"])
+        values = np.zeros((count, width), dtype=dtype)
+        if "bufferView" in accessor:
+            values = self._rows(accessor["bufferView"], accessor.get("byteOffset", 0), dtype, count, width)
+        sparse = accessor.get("sparse")
+        if sparse is not None:
+            where, what = sparse["indices"], sparse["values"]
+            place_type = np.dtype(COMPONENTS[where["componentType"]]).newbyteorder("<")
+            n = int(sparse["count"])
+            places = self._rows(where["bufferView"], where.get("byteOffset", 0), place_type, n, 1)[:, 0]
+            values = values.copy()
+            values[places] = self._rows(what["bufferView"], what.get("byteOffset", 0), dtype, n, width)
+        if accessor.get("normalized") and dtype.kind in "iu":
+            largest = 2.0 ** (8 * dtype.itemsize - (dtype.kind == "i")) - 1.0
+            return np.asarray(np.maximum(values.astype(np.float64) / largest, -1.0))
+        return np.asarray(values)
+
+    def to_glb(self) -> bytes:
+        """Serialise as one GLB with one binary chunk."""
+        blob = b"".join([self.blob, *self.extra])
+        self.tree["buffers"] = [{"byteLength": len(blob)}]
+        text = json.dumps(self.tree).encode()
+        text += b" " * (-len(text) % 4)
+        chunks = struct.pack("<II", len(text), JSON_CHUNK) + text
+        chunks += struct.pack("<II", len(blob), BIN_CHUNK)
+        return MAGIC + struct.pack("<II", 2, 12 + len(chunks) + len(blob)) + chunks + blob
+
+    def _rows(self, view_index: int, offset: int, dtype: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
+        """(count, width) copy of strided data; raises ValueError where the view is too short."""
+        row = width * dtype.itemsize
+        stride = int(self.tree["bufferViews"][view_index].get("byteStride") or row)
+        data = np.frombuffer(self.view_bytes(view_index), dtype=np.uint8)[offset:]
+        if count == 0:
+            return np.zeros((0, width), dtype=dtype)
+        if (count - 1) * stride + row > len(data):
+            raise ValueError(f"bufferViews[{view_index}] is too short for {count} elements")
+        rows = np.lib.stride_tricks.as_strided(data, (count, row), (stride, 1))
+        return np.ascontiguousarray(rows).view(dtype).reshape(count, width)
+
+
+def open_gltf(data: bytes, assets: Assets) -> Gltf:
+    """Read the JSON and all buffers of a GLB or glTF file.
+
+    Raises:
+        ValueError: not glTF 2, cut short, or a buffer shorter than it says.
+        AssetError: a buffer file that is missing.
+    """
+    text, binary = _split_glb(data) if data[:4] == MAGIC else (data, None)
+    tree = json.loads(text.decode("utf-8-sig"))
+    if not isinstance(tree, dict):
+        raise ValueError(f"expected a JSON object, got {type(tree).__name__}")
+    version = str(tree.get("asset", {}).get("version", "2.0"))
+    if not version.startswith("2"):
+        raise ValueError(f"expected glTF 2, got version {version}; convert it")
+    starts, blocks, size = [], [], 0
+    for index, buffer in enumerate(tree.get("buffers") or []):
+        block = _buffer(buffer, index, binary, assets)
+        padded = block + b"\0" * (-len(block) % 4)
+        starts.append(size)
+        blocks.append(padded)
+        size += len(padded)
+    for view in tree.get("bufferViews") or []:
+        view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
+        view["buffer"] = 0
+    return Gltf(tree, b"".join(blocks))
+
+
+def _split_glb(data: bytes) -> tuple[bytes, bytes | None]:
+    """The JSON and the binary chunk of a GLB."""
+    if len(data) < 20:
+        raise ValueError(f"cut short: {len(data)} bytes")
+    version, length = struct.unpack_from("<II", data, 4)
+    if version != 2:
+        raise ValueError(f"expected GLB version 2, got {version}; convert it")
+    if length > len(data):
+        raise ValueError(f"cut short: expected {length} bytes, got {len(data)}")
+    text, binary, at = None, None, 12
+    while at + 8 <= length:
+        size, kind = struct.unpack_from("<II", data, at)
+        chunk = data[at + 8 : at + 8 + size]
+        if len(chunk) < size:
+            raise ValueError("cut short inside a chunk")
+        if kind == JSON_CHUNK and text is None:
+            text = chunk
+        elif kind == BIN_CHUNK and binary is None:
+            binary = chunk
+        at += 8 + size
+    if text is None:
+        raise ValueError("no JSON chunk")
+    return text, binary
+
+
+def _buffer(buffer: Tree, index: int, binary: bytes | None, assets: Assets) -> bytes:
+    uri = buffer.get("uri")
+    if uri is None:
+        if index > 0 or binary is None:
+            raise ValueError(f"buffers[{index}] has no data")
+        block = binary
+    else:
+        block = uri_bytes(uri, assets)
+    if len(block) < buffer["byteLength"]:
+        raise ValueError(f"buffers[{index}]: expected {buffer['byteLength']} bytes, got {len(block)}")
+    return block[: buffer["byteLength"]]
+
+
+def uri_bytes(uri: str, assets: Assets) -> bytes:
+    """The bytes behind a URI: embedded data, or a file beside the scene."""
+    if uri.startswith("data:"):
+        return base64.b64decode(uri.split(",", 1)[1])
+    return assets.read(uri)

@@ -1,0 +1,223 @@
+"""glTF materials -> a diffuse part, a mirror part, opacity and a transform of the texture coordinates."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Float64
+from .assets import AssetError, Assets
+from .container import Gltf, Tree, uri_bytes
+from .model import Material, Notes
+from .mtl import Rgb3, limited
+from .opacity import CUTOFF, Opacity, blended, masked
+from .textures import TextureTable
+
+MIRROR_ROUGHNESS = 0.1  # up to it a metal is a mirror
+GLOSSY_SPECULAR = 0.2  # specular factor (old extension) above which a surface counts as metal; dielectrics have 0.04
+KNOWN = {"KHR_materials_transmission", "KHR_materials_pbrSpecularGlossiness"}
+SILENT = {"KHR_materials_ior", "KHR_materials_volume"}  # they matter inside glass only, which is left out
+REPEAT = 10497
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GltfMaterial:
+    """A material and how meshes that use it find their texture coordinates.
+
+    Attributes:
+        uv_set: number of the TEXCOORD attribute; -1 without texture.
+        uv_matrix: (2, 3) transform of (u, v down, 1), or None.
+        repeats: whether the sampler repeats in both directions.
+    """
+
+    material: Material
+    uv_set: int = -1
+    uv_matrix: Float64 | None = None
+    repeats: bool = True
+
+
+def read_materials(
+    gltf: Gltf, used: set[int], assets: Assets, textures: TextureTable, notes: Notes
+) -> list[GltfMaterial]:
+    """Map every material; textures are read only for those that some primitive uses."""
+    found = []
+    for index, entry in enumerate(gltf.items("materials")):
+        name = str(entry.get("name") or f"material {index}")
+        found.append(_material(name, entry, index in used, gltf, assets, textures, notes))
+    return found
+
+
+def _material(
+    name: str, entry: Tree, used: bool, gltf: Gltf, assets: Assets, textures: TextureTable, notes: Notes
+) -> GltfMaterial:
+    extensions: Tree = entry.get("extensions") or {}
+    gloss: Tree | None = extensions.get("KHR_materials_pbrSpecularGlossiness")
+    pbr: Tree = entry.get("pbrMetallicRoughness") or {}
+    if not used:  # no triangle has it: the name is kept for overrides, its images are not read
+        return GltfMaterial(material=Material(name=name))
+    source = Source(name, gltf, assets, textures)
+    info: Tree | None = pbr.get("baseColorTexture") if gloss is None else gloss.get("diffuseTexture")
+    factor = pbr.get("baseColorFactor") if gloss is None else gloss.get("diffuseFactor")
+    base = np.array([1.0, 1.0, 1.0, 1.0] if factor is None else factor, dtype=np.float64)
+    texture = source.index(info)
+    if gloss is None:
+        diffuse, specular = _metal(name, base, pbr, source, notes)
+    else:
+        diffuse, specular = _glossy(name, base, gloss, notes)
+    opacity = _opacity(name, entry, float(base[3]), texture, source, notes)
+    _note_ignored(name, entry, notes)
+    reflectivity, specular = limited(name, diffuse, specular, notes)
+    material = Material(
+        name=name,
+        reflectivity=reflectivity,
+        specular=specular,
+        texture=texture,
+        specular_texture=texture if max(specular) > 0 and gloss is None else -1,
+        alpha=opacity.alpha,
+        alpha_texture=opacity.alpha_texture,
+        alpha_cutoff=opacity.alpha_cutoff,
+        left_out=opacity.left_out,
+    )
+    if texture < 0 or info is None:
+        return GltfMaterial(material=material)
+    transform: Tree = (info.get("extensions") or {}).get("KHR_texture_transform") or {}
+    return GltfMaterial(
+        material=material,
+        uv_set=int(transform.get("texCoord", info.get("texCoord", 0))),
+        uv_matrix=uv_matrix(transform),
+        repeats=source.repeats(info),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Finds the images that a material's texture infos point to."""
+
+    name: str
+    gltf: Gltf
+    assets: Assets
+    textures: TextureTable
+
+    def index(self, info: Tree | None) -> int:
+        """Index in the texture table, or -1; what cannot be read becomes a note."""
+        image = self._image(info)
+        if image is None:
+            return -1
+        return self.textures.index(("image", image), f"material {self.name}", self._reader(image))
+
+    def mean(self, info: Tree) -> Float64 | None:
+        """(4,) mean of an image's raw channels, or None where it cannot be read."""
+        image = self._image(info)
+        return None if image is None else self.textures.mean(f"material {self.name}", self._reader(image))
+
+    def _image(self, info: Tree | None) -> int | None:
+        """Number of the image behind a texture info."""
+        if info is None:
+            return None
+        texture = self.gltf.tree["textures"][info["index"]]
+        extensions: Tree = texture.get("extensions") or {}
+        image = texture.get("source", extensions.get("EXT_texture_webp", {}).get("source"))
+        if image is None:
+            kinds = ", ".join(extensions) or "no source"
+            self.textures.notes.add(f"textures in a form that cannot be read ({kinds}) are left out", self.name)
+            return None
+        number: int = image
+        return number
+
+    def repeats(self, info: Tree) -> bool:
+        """Whether the texture repeats in both directions, as glTF's default sampler does."""
+        sampler = self.gltf.tree["textures"][info["index"]].get("sampler")
+        entry: Tree = {} if sampler is None else self.gltf.tree["samplers"][sampler]
+        return bool(entry.get("wrapS", REPEAT) == REPEAT and entry.get("wrapT", REPEAT) == REPEAT)
+
+    def _reader(self, image: int) -> Callable[[], bytes]:
+        def read() -> bytes:
+            entry = self.gltf.tree["images"][image]
+            if entry.get("mimeType") == "image/ktx2":
+                raise AssetError(f"images[{image}]: KTX2 cannot be read; export PNG or JPEG")
+            if "bufferView" in entry:
+                return self.gltf.view_bytes(entry["bufferView"])
+            return uri_bytes(entry["uri"], self.assets)
+
+        return read
+
+
+def _metal(name: str, base: Float64, pbr: Tree, source: Source, notes: Notes) -> tuple[Rgb3, Rgb3]:
+    """Diffuse and mirror part: the smooth metal share of the base colour mirrors, all else is diffuse."""
+    metallic, roughness = float(pbr.get("metallicFactor", 1.0)), float(pbr.get("roughnessFactor", 1.0))
+    if pbr.get("metallicRoughnessTexture") is not None and metallic > 0:
+        mean = source.mean(pbr["metallicRoughnessTexture"])
+        if mean is not None:
+            metallic, roughness = metallic * float(mean[2]), roughness * float(mean[1])
+            notes.add("metallic-roughness textures count by their mean", name)
+    metallic = min(max(metallic, 0.0), 1.0)
+    mirror = metallic if roughness <= MIRROR_ROUGHNESS else 0.0
+    if metallic > 0 and mirror == 0:
+        notes.add("rough metals are taken as diffuse", name)
+    return _rgb(base * (1.0 - mirror)), _rgb(base * mirror)
+
+
+def _glossy(name: str, base: Float64, gloss: Tree, notes: Notes) -> tuple[Rgb3, Rgb3]:
+    """The same from the older specular-glossiness description."""
+    specular = np.array(gloss.get("specularFactor", [1.0, 1.0, 1.0]), dtype=np.float64)
+    if gloss.get("specularGlossinessTexture") is not None:
+        notes.add("specular-glossiness textures, and the mirror part they describe, are left out", name)
+        return _rgb(base), (0.0, 0.0, 0.0)
+    if specular.max() <= GLOSSY_SPECULAR:
+        return _rgb(base), (0.0, 0.0, 0.0)
+    if 1.0 - float(gloss.get("glossinessFactor", 1.0)) <= MIRROR_ROUGHNESS:
+        return _rgb(base), _rgb(specular)
+    notes.add("rough metals are taken as diffuse", name)
+    return _rgb(base[:3] + specular), (0.0, 0.0, 0.0)
+
+
+def _opacity(name: str, entry: Tree, alpha: float, texture: int, source: Source, notes: Notes) -> Opacity:
+    transmission: Tree = (entry.get("extensions") or {}).get("KHR_materials_transmission") or {}
+    passed = float(transmission.get("transmissionFactor", 0.0))
+    if transmission.get("transmissionTexture") is not None and passed > 0:
+        notes.add("transmission textures are left out, their factor counts", name)
+    if passed > 0:
+        through = blended(name, 1.0 - passed, -1, source.textures, notes)
+        if through.left_out:
+            return through
+    mode = entry.get("alphaMode", "OPAQUE")
+    if mode == "MASK":
+        opacity = masked(alpha, texture, float(entry.get("alphaCutoff", CUTOFF)), source.textures)
+        if opacity.left_out:
+            notes.add("materials that their alpha mask removes everywhere are left out", name)
+        return opacity
+    if mode == "BLEND":
+        return blended(name, alpha, texture, source.textures, notes)
+    return Opacity()
+
+
+def uv_matrix(transform: Tree) -> Float64 | None:
+    """(2, 3) matrix of KHR_texture_transform, for (u, v, 1) with v downwards; None where it changes nothing."""
+    offset = np.array(transform.get("offset", [0.0, 0.0]), dtype=np.float64)
+    scale = np.array(transform.get("scale", [1.0, 1.0]), dtype=np.float64)
+    angle = float(transform.get("rotation", 0.0))
+    if not offset.any() and (scale == 1).all() and angle == 0:
+        return None
+    turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+    return np.column_stack([turn * scale, offset])
+
+
+def _note_ignored(name: str, entry: Tree, notes: Notes) -> None:
+    emissive = entry.get("emissiveFactor")
+    if emissive is not None and max(emissive) > 0:
+        notes.add("emission is left out", name)
+    if entry.get("normalTexture") is not None:
+        notes.add("normal maps are left out", name)
+    if entry.get("occlusionTexture") is not None:
+        notes.add("occlusion maps are left out (obscurances are computed)", name)
+    for extension in sorted(set(entry.get("extensions") or {}) - KNOWN - SILENT):
+        if extension == "KHR_materials_unlit":
+            notes.add("unlit materials are lit like any other", name)
+        else:
+            notes.add(f"{extension} is left out", name)
+
+
+def _rgb(values: Any) -> Rgb3:
+    return (float(values[0]), float(values[1]), float(values[2]))

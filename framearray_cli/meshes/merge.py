@@ -1,0 +1,131 @@
+"""Parts -> one array each of corners, normals, texture coordinates, colours and materials."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Corners, CornerUvs, Float64
+from .model import Material, Notes, Part
+
+FAR_UV = 16.0  # beyond it float32 texture coordinates lose texels, so whole repeats are taken off
+
+
+def untextured_variants(
+    parts: Sequence[Part], materials: Sequence[Material], notes: Notes
+) -> tuple[list[Part], list[Material]]:
+    """Give parts without texture coordinates a variant of their material that has no texture."""
+    variants: dict[int, int] = {}
+    new_parts, new_materials = [], list(materials)
+    for part in parts:
+        material = materials[part.material]
+        textured = max(material.texture, material.specular_texture, material.alpha_texture) >= 0
+        if part.uvs is None and textured:
+            notes.add("meshes without texture coordinates show no texture", material.name)
+            if part.material not in variants:
+                variants[part.material] = len(new_materials)
+                new_materials.append(
+                    replace(material, texture=-1, specular_texture=-1, alpha_texture=-1, alpha_cutoff=0.0)
+                )
+            part = replace(part, material=variants[part.material])
+        new_parts.append(part)
+    return new_parts, new_materials
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Merged:
+    """All triangles of all parts; optional data is None where no part has it, and filled in where some have.
+
+    Attributes:
+        corners: (n, 3, 3) in file coordinates.
+        normals: (n, 3, 3) NaN where a part has none.
+        has_normals: (n,) whether the file gives normals.
+        uvs: (n, 3, 2).
+        colours: (n, 3, 3) white where a part has none.
+        material: (n,).
+    """
+
+    corners: Float64
+    normals: Corners | None
+    has_normals: NDArray[np.bool_]
+    uvs: Float64 | None
+    colours: Corners | None
+    material: NDArray[np.int32]
+
+
+def merge(parts: Sequence[Part]) -> Merged:
+    """Join parts, in order."""
+    counts = [len(part.corners) for part in parts]
+    n = sum(counts)
+    ends = np.cumsum(counts)
+    normals = np.full((n, 3, 3), np.nan, dtype=np.float32) if any(p.normals is not None for p in parts) else None
+    uvs = np.zeros((n, 3, 2)) if any(p.uvs is not None for p in parts) else None
+    colours = np.ones((n, 3, 3), dtype=np.float32) if any(p.colours is not None for p in parts) else None
+    has_normals = np.zeros(n, dtype=np.bool_)
+    for part, end, count in zip(parts, ends, counts, strict=True):
+        rows = slice(end - count, end)
+        if normals is not None and part.normals is not None:
+            normals[rows] = _bounded(part.normals)
+            has_normals[rows] = True
+        if uvs is not None and part.uvs is not None:
+            uvs[rows] = part.uvs
+        if colours is not None and part.colours is not None:
+            colours[rows] = part.colours
+    return Merged(
+        corners=np.concatenate([part.corners for part in parts]),
+        normals=normals,
+        has_normals=has_normals,
+        uvs=uvs,
+        colours=colours,
+        material=np.repeat(np.array([part.material for part in parts], dtype=np.int32), counts),
+    )
+
+
+def _bounded(normals: Float64) -> Float64:
+    """Normals scaled so that their largest component is 1; a tiny node scale must not make them vanish in float32."""
+    with np.errstate(all="ignore"):
+        return np.asarray(normals / np.abs(normals).max(axis=-1, keepdims=True))
+
+
+def unit_normals(normals: Corners, has_normals: NDArray[np.bool_], corners: Corners, notes: Notes) -> Corners:
+    """Unit shading normals; the geometric one where the file has none, zero, or not a number.
+
+    Args:
+        normals: (n, 3, 3) of any length.
+        has_normals: (n,) whether the file gives normals for a triangle.
+        corners: (n, 3, 3) positions of triangles that have an area.
+        notes: takes how many normals are broken.
+    """
+    with np.errstate(all="ignore"):
+        lengths = np.linalg.norm(normals, axis=-1, keepdims=True)
+        unit = normals / lengths
+    bad = ~np.isfinite(unit).all(axis=-1)  # (n, 3)
+    broken = int((bad & has_normals[:, None]).sum())
+    if broken:
+        notes.add(f"{broken} corner normals are zero, missing or not numbers; geometric normals stand in")
+    rows = np.flatnonzero(bad.any(axis=1))
+    unit[bad] = np.repeat(geometric_normals(corners[rows])[:, None], 3, axis=1)[bad[rows]]
+    return np.asarray(unit, dtype=np.float32)
+
+
+def geometric_normals(corners: Corners) -> Corners:
+    """(n, 3) unit normals by winding, for triangles that have an area."""
+    first = corners[:, 1].astype(np.float64) - corners[:, 0]
+    second = corners[:, 2].astype(np.float64) - corners[:, 0]
+    first /= np.abs(first).max(axis=1, keepdims=True)
+    second /= np.abs(second).max(axis=1, keepdims=True)
+    normal = np.cross(first, second)
+    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True), dtype=np.float32)
+
+
+def near_uvs(uvs: Float64, notes: Notes) -> CornerUvs:
+    """Texture coordinates in float32; textures repeat, so far ones are moved back by whole repeats."""
+    bad = np.asarray(~np.isfinite(uvs).all(axis=-1))
+    if bad.any():
+        notes.add(f"{int(bad.sum())} texture coordinates are missing or not numbers, taken as 0")
+        uvs = np.where(bad[..., None], 0.0, uvs)
+    far = np.abs(uvs).max(axis=(1, 2)) > FAR_UV
+    if far.any():
+        uvs = np.where(far[:, None, None], uvs - np.floor(uvs.min(axis=1, keepdims=True)), uvs)
+    return np.asarray(uvs, dtype=np.float32)

@@ -1,0 +1,92 @@
+"""What every reader of scene files hands over: parts, materials, textures and notes, in the file's own coordinates."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from ..arrays import Bytes, Float32, Float64
+
+GREY = 0.5  # reflectivity of surfaces without any material: neither black nor a white that hides all shading
+NAMES_IN_A_NOTE = 6  # names that one note lists before it says "and n more"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Material:
+    """One material as the renderer sees it; textures are indices into `Meshes.textures`, or -1.
+
+    Attributes:
+        reflectivity: diffuse part, linear RGB in [0, 1].
+        specular: mirror part, linear RGB in [0, 1].
+        texture: base colour texture; multiplies `reflectivity`.
+        specular_texture: multiplies `specular`.
+        alpha: opacity factor, multiplied with the alpha of `alpha_texture`.
+        alpha_cutoff: a point is absent where alpha is below it; 0 for an opaque material.
+        left_out: why its triangles are left out ("transmissive", "cut out"), or "".
+    """
+
+    name: str
+    reflectivity: tuple[float, float, float] = (GREY, GREY, GREY)
+    specular: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    texture: int = -1
+    specular_texture: int = -1
+    alpha: float = 1.0
+    alpha_texture: int = -1
+    alpha_cutoff: float = 0.0
+    left_out: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Part:
+    """n triangles of one material, one row a corner, in file coordinates.
+
+    Attributes:
+        corners: (n, 3, 3) positions; may hold non-finite values.
+        normals: (n, 3, 3) normals from the file, of any length, or None where the file has none.
+        uvs: (n, 3, 2) texture coordinates, v upwards, or None.
+        colours: (n, 3, 3) linear colours, or None.
+    """
+
+    material: int
+    corners: Float64
+    normals: Float64 | None = None
+    uvs: Float64 | None = None
+    colours: Float32 | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Meshes:
+    """All that a scene file holds.
+
+    Attributes:
+        textures: (height, width, 4) RGBA each, row 0 on top, colours sRGB encoded, alpha linear.
+        dropped: reason -> number of triangles that could not even be read.
+    """
+
+    parts: tuple[Part, ...]
+    materials: tuple[Material, ...]
+    textures: tuple[Bytes, ...]
+    dropped: dict[str, int]
+    notes: tuple[str, ...]
+
+
+@dataclass(slots=True)
+class Notes:
+    """Collects what the user should know; one sentence a kind of finding, with the names it concerns."""
+
+    found: dict[str, list[str]] = field(default_factory=dict)
+
+    def add(self, sentence: str, name: str = "") -> None:
+        """Note a finding; the same sentence with several names becomes one line."""
+        names = self.found.setdefault(sentence, [])
+        if name and name not in names:
+            names.append(name)
+
+    def lines(self) -> tuple[str, ...]:
+        """One line a finding, in the order found."""
+        return tuple(f"{sentence}: {listed(names)}" if names else sentence for sentence, names in self.found.items())
+
+
+def listed(names: Sequence[str], limit: int = NAMES_IN_A_NOTE) -> str:
+    """Join names for a sentence; a long list is cut short."""
+    shown = ", ".join(names[:limit])
+    more = len(names) - limit
+    return f"{shown} and {more} more" if more > 0 else shown

@@ -1,0 +1,212 @@
+"""MTL text -> materials. Read here because trimesh knows no map options, Windows paths, `d` or `illum`."""
+
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from .assets import Assets
+from .model import GREY, Material, Notes
+from .opacity import Opacity, blended
+from .textures import TextureTable
+
+MIRROR_MODELS = (3, 5)  # illum: ray traced reflection, without and with Fresnel
+GLASS_MODELS = (4, 6, 7, 9)
+# The lowest Ns of a mirror. Exporters write Ns = 1000 (1 - roughness)^2, and a mirror's roughness is at most 0.1.
+MIRROR_NS = 810.0
+MAP_OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-texres": 1, "-clamp": 1, "-bm": 1, "-imfchan": 1}
+MAP_OPTIONS |= {"-type": 1, "-cc": 1, "-o": 3, "-s": 3, "-t": 3}
+IGNORED_MAPS: tuple[str, ...] = (
+    "map_ks",
+    "map_ns",
+    "map_ke",
+    "map_ka",
+    "map_bump",
+    "bump",
+    "norm",
+    "disp",
+    "refl",
+    "map_refl",
+)
+IGNORED_MAPS += ("map_pr", "map_pm", "map_ps", "map_tr")
+
+Rgb3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapUse:
+    """A texture of a material: file name, and uv' = scale * uv + offset."""
+
+    file: str
+    scale: tuple[float, float] = (1.0, 1.0)
+    offset: tuple[float, float] = (0.0, 0.0)
+    clamp: bool = False
+
+
+@dataclass(slots=True)
+class MtlEntry:
+    """The lines of one `newmtl` block: lower-case key -> the rest of the line."""
+
+    name: str
+    values: dict[str, str] = field(default_factory=dict)
+
+
+def parse_mtl(text: str) -> dict[str, MtlEntry]:
+    """Split the text of a material library into its materials; the first of a name counts."""
+    entries: dict[str, MtlEntry] = {}
+    entry: MtlEntry | None = None
+    for line in text.splitlines():
+        words = line.strip().split(None, 1)
+        if len(words) < 2 or words[0].startswith("#"):
+            continue
+        key, value = words[0].lower(), words[1].strip()
+        if key == "newmtl":
+            entry = MtlEntry(value)
+            entries.setdefault(value, entry)
+        elif entry is not None:
+            entry.values[key] = value if key.startswith("map") else value.split("#", 1)[0].strip()
+    return entries
+
+
+def to_material(
+    entry: MtlEntry, assets: Assets, textures: TextureTable, notes: Notes
+) -> tuple[Material, MapUse | None]:
+    """Map one MTL material to a diffuse part, a mirror part and an opacity.
+
+    Returns:
+        The material, and the use of its base texture, whose scale and offset the reader applies.
+    """
+    name, values = entry.name, entry.values
+    use = _map_use(values.get("map_kd"))
+    texture = -1
+    if use is not None:
+        file = use.file
+        texture = textures.index(("file", file), f"material {name}", lambda: assets.read(file))
+    kd, ks = _base_colour(name, values, use is not None, notes), _rgb(values, "ks")
+    specular: Rgb3 = (0.0, 0.0, 0.0)
+    if int(_number(values, "illum", 2)) in MIRROR_MODELS and ks is not None and max(ks) > 0:
+        if _number(values, "ns", 1000.0) >= MIRROR_NS:
+            specular = ks
+        else:
+            kd = (kd[0] + ks[0], kd[1] + ks[1], kd[2] + ks[2])
+            notes.add("rough metals are taken as diffuse", name)
+    opacity = _opacity(name, values, texture, assets, textures, notes)
+    _note_ignored(name, values, use, notes)
+    reflectivity, specular = limited(name, kd, specular, notes)
+    material = Material(
+        name=name,
+        reflectivity=reflectivity,
+        specular=specular,
+        texture=texture,
+        alpha=opacity.alpha,
+        alpha_texture=opacity.alpha_texture,
+        alpha_cutoff=opacity.alpha_cutoff,
+        left_out=opacity.left_out,
+    )
+    return material, use if texture >= 0 else None
+
+
+def limited(name: str, reflectivity: Rgb3, specular: Rgb3, notes: Notes) -> tuple[Rgb3, Rgb3]:
+    """Bring both parts into [0, 1], and their sum to at most 1: no surface reflects more than it receives."""
+    diffuse = [0.0 if value != value else max(value, 0.0) for value in reflectivity]
+    mirror = [0.0 if value != value else max(value, 0.0) for value in specular]
+    scale = [1.0 / max(d + s, 1.0) for d, s in zip(diffuse, mirror, strict=True)]
+    if diffuse != list(reflectivity) or mirror != list(specular) or min(scale) < 1 - 1e-6:
+        notes.add("reflectivities outside 0 to 1 are brought into it", name)
+    d = [value * factor for value, factor in zip(diffuse, scale, strict=True)]
+    s = [value * factor for value, factor in zip(mirror, scale, strict=True)]
+    return (d[0], d[1], d[2]), (s[0], s[1], s[2])
+
+
+def _base_colour(name: str, values: Mapping[str, str], textured: bool, notes: Notes) -> Rgb3:
+    """Kd; white beneath a texture where Kd is missing or black, as such exporters mean the texture alone."""
+    kd = _rgb(values, "kd")
+    if "kd" in values and kd is None:
+        notes.add("Kd is not three numbers, taken as grey", name)
+    if textured and kd == (0.0, 0.0, 0.0):
+        notes.add("black Kd under a texture is taken as white", name)
+    if textured and (kd is None or kd == (0.0, 0.0, 0.0)):
+        return (1.0, 1.0, 1.0)
+    return (GREY, GREY, GREY) if kd is None else kd
+
+
+def _opacity(
+    name: str, values: Mapping[str, str], texture: int, assets: Assets, textures: TextureTable, notes: Notes
+) -> Opacity:
+    transparency = _number(values, "tr", 0.0)
+    if "d" not in values and transparency == 1.0:
+        notes.add("Tr 1 without d is taken as opaque: many exporters mean that", name)
+        transparency = 0.0
+    alpha = _number(values, "d", 1.0 - transparency)
+    use = _map_use(values.get("map_d"))
+    if use is not None:
+        file = use.file
+        texture = textures.cutout(("file", file), f"material {name}", lambda: assets.read(file))
+    opacity = blended(name, alpha, texture, textures, notes)
+    if not opacity.left_out and int(_number(values, "illum", 2)) in GLASS_MODELS:
+        notes.add("glass that is not nearly clear (d from 0.25) is taken as opaque", name)
+    return opacity
+
+
+def _note_ignored(name: str, values: Mapping[str, str], use: MapUse | None, notes: Notes) -> None:
+    ke = _rgb(values, "ke")
+    if ke is not None and max(ke) > 0:
+        notes.add("emission is left out", name)
+    for key in IGNORED_MAPS:
+        if key in values:
+            notes.add(f"{key} maps are left out", name)
+    if "pm" in values or "pr" in values:
+        notes.add("Pm and Pr (metalness and roughness) of an MTL file are left out", name)
+    if use is not None and use.clamp:
+        notes.add("textures that clamp at their edges repeat", name)
+
+
+def _map_use(value: str | None) -> MapUse | None:
+    """Parse `[-option values ...] file name`, where the name may hold spaces."""
+    if value is None:
+        return None
+    words = shlex.split(value, posix=False) if '"' in value else value.split()
+    found: dict[str, list[str]] = {}
+    at = 0
+    while at < len(words) - 1 and words[at].lower() in MAP_OPTIONS:
+        option = words[at].lower()
+        last = min(at + 1 + MAP_OPTIONS[option], len(words) - 1)
+        end = at + 1
+        while end < last and (option not in ("-o", "-s", "-t") or _is_number(words[end])):
+            end += 1
+        found[option] = words[at + 1 : end]
+        at = end
+    scale = [float(word) for word in found.get("-s", [])] + [1.0, 1.0]
+    offset = [float(word) for word in found.get("-o", [])] + [0.0, 0.0]
+    if len(found.get("-s", [])) == 1:
+        scale[1] = 1.0
+    file = value.strip() if at == 0 else " ".join(words[at:])
+    clamp = found.get("-clamp", [""])[:1] == ["on"]
+    return MapUse(file=file, scale=(scale[0], scale[1]), offset=(offset[0], offset[1]), clamp=clamp)
+
+
+def _rgb(values: Mapping[str, str], key: str) -> Rgb3 | None:
+    """Three numbers, or one for all three; None where the key is missing or something else."""
+    words = values.get(key, "").split()
+    if not words or not all(_is_number(word) for word in words[:3]):
+        return None
+    numbers = [float(word) for word in words[:3]]
+    if len(numbers) < 3:
+        numbers = [numbers[0]] * 3
+    return (numbers[0], numbers[1], numbers[2])
+
+
+def _number(values: Mapping[str, str], key: str, default: float) -> float:
+    """The last word as a number (`d -halo 0.5` has an option first)."""
+    words = values.get(key, "").split()
+    if not words or not _is_number(words[-1]):
+        return default
+    number = float(words[-1])
+    return number if abs(number) < float("inf") else default
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

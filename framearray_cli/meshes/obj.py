@@ -1,0 +1,256 @@
+"""OBJ text -> parts.
+
+Read here and not by trimesh, which takes relative indices from the end of the file, skips "v<TAB>x", reads
+only the first material library, fans concave polygons, and drops colours and normals that only some lines have.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Float32, Float64
+from .assets import AssetError, Assets
+from .defaults import clean_colours, default_material
+from .model import Material, Meshes, Notes, Part
+from .mtl import MapUse, MtlEntry, parse_mtl, to_material
+from .polygons import triangulate
+from .textures import TextureTable
+
+Indices = NDArray[np.int64]
+
+
+@dataclass(slots=True)
+class ObjText:
+    """The lines of an OBJ file sorted by keyword; one entry a line."""
+
+    v: list[str] = field(default_factory=list)
+    vt: list[str] = field(default_factory=list)
+    vn: list[str] = field(default_factory=list)
+    faces: list[str] = field(default_factory=list)
+    seen: list[tuple[int, int, int]] = field(default_factory=list)  # v, vt, vn lines above a face
+    face_material: list[int] = field(default_factory=list)  # place in `materials`, or -1
+    materials: list[str] = field(default_factory=list)  # names after usemtl
+    libraries: list[str] = field(default_factory=list)
+    others: set[str] = field(default_factory=set)  # keywords that hold points, lines or curved surfaces
+
+
+def read_obj(data: bytes, assets: Assets) -> Meshes:
+    """Read an OBJ file and its material libraries.
+
+    Raises:
+        ValueError: a line that holds something else than numbers.
+        SceneError: an image too large to read.
+    """
+    notes = Notes()
+    text = split_lines(decode_text(data))
+    for keyword in sorted(text.others):
+        notes.add(f"'{keyword}' lines (points, lines or curved surfaces) are left out")
+    if text.v and not text.faces:
+        notes.add("points without faces are left out")
+    positions, colours = _vertices(text.v, notes)
+    uvs, normals = _columns(text.vt, 2, "vt"), _columns(text.vn, 3, "vn")
+    corners, face = _triangles(text, positions, notes)  # (n, 3, 3) indices v, vt, vn, and (n,) face line
+    inside = ((corners[..., 0] >= 0) & (corners[..., 0] < len(positions))).all(axis=1)
+    dropped = {"index out of range": int((~inside).sum())} if not inside.all() else {}
+    corners, face = corners[inside], face[inside]
+    material_of = np.array(text.face_material, dtype=np.int64)[face] if len(face) else np.zeros(0, dtype=np.int64)
+
+    textures = TextureTable(notes)
+    library = _libraries(text.libraries, assets, notes)
+    materials: list[Material] = []
+    parts: list[Part] = []
+    for place in np.unique(material_of):
+        rows = corners[material_of == place]
+        material, use = _material(text, int(place), colours is not None, library, assets, textures, notes)
+        part_uvs = _pick(uvs, rows[..., 1]) if use is not None else None
+        if use is not None and part_uvs is not None:
+            part_uvs = part_uvs * np.array(use.scale) + np.array(use.offset)
+        parts.append(
+            Part(
+                material=len(materials),
+                corners=positions[rows[..., 0]],
+                normals=_pick(normals, rows[..., 2]),
+                uvs=part_uvs,
+                colours=None if colours is None else colours[rows[..., 0]],
+            )
+        )
+        materials.append(material)
+    return Meshes(
+        parts=tuple(parts),
+        materials=tuple(materials),
+        textures=tuple(textures.textures),
+        dropped=dropped,
+        notes=notes.lines(),
+    )
+
+
+def decode_text(data: bytes) -> str:
+    """Decode text in UTF-8, UTF-16 (told by its mark or its zero bytes) or Latin-1."""
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return data.decode("utf-16")
+    head = data[:64]
+    if head[1::2].count(0) > len(head) // 4:
+        return data.decode("utf-16-le")
+    if head[::2].count(0) > len(head) // 4:
+        return data.decode("utf-16-be")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def split_lines(text: str) -> ObjText:
+    """Sort the lines of an OBJ file by their keyword; a backslash joins a line with the next."""
+    out = ObjText()
+    places: dict[str, int] = {}
+    material = -1
+    tables = {"v": out.v, "vt": out.vt, "vn": out.vn}
+    for line in re.sub(r"\\\r?\n", " ", text).splitlines():
+        words = line.split(None, 1)
+        if len(words) < 2 or words[0][0] == "#":
+            continue
+        key, rest = words
+        if key in tables:
+            tables[key].append(rest if "#" not in rest else rest.split("#", 1)[0])
+        elif key == "f":
+            out.faces.append(rest if "#" not in rest else rest.split("#", 1)[0])
+            out.seen.append((len(out.v), len(out.vt), len(out.vn)))
+            out.face_material.append(material)
+        elif key == "usemtl":
+            name = rest.strip()
+            material = places.setdefault(name, len(places))
+        elif key == "mtllib":
+            out.libraries.append(rest.strip())
+        elif key in {"p", "l", "curv", "curv2", "surf"}:
+            out.others.add(key)
+    out.materials = list(places)
+    return out
+
+
+def _columns(lines: Sequence[str], n: int, keyword: str) -> Float64:
+    """(lines, n) numbers; a line with fewer is filled with 0, more are cut off."""
+    rows = [line.split() for line in lines]
+    widths = np.array([len(row) for row in rows], dtype=np.int64)
+    out = np.zeros((len(rows), n))
+    for width in np.unique(widths):
+        at = np.flatnonzero(widths == width)
+        some = rows if len(at) == len(rows) else [rows[i] for i in at]
+        keep = min(int(width), n)
+        try:
+            out[at, :keep] = np.array(some, dtype=np.float64)[:, :keep]
+        except ValueError:
+            out[at, :keep] = np.array([[_number(word, keyword) for word in row] for row in some])[:, :keep]
+    return out
+
+
+def _number(word: str, keyword: str) -> float:
+    """A number, also with the sign of its exponent in the wrong place: 3.1-e2 is 3.1e-2."""
+    try:
+        return float(re.sub(r"([+-])[eE](\d)", r"e\1\2", word))
+    except ValueError as error:
+        raise ValueError(f"'{keyword}' line: expected a number, got '{word}'") from error
+
+
+def _vertices(lines: Sequence[str], notes: Notes) -> tuple[Float64, Float32 | None]:
+    """(n, 3) positions, and (n, 3) colours where any vertex has one; white for the others."""
+    table = _columns(lines, 6, "v")
+    widths = np.array([len(line.split()) for line in lines], dtype=np.int64)
+    if len(widths) and widths.min() < 3:
+        raise ValueError(f"'v' line: expected 3 numbers, got {int(widths.min())}")
+    coloured = widths >= 6
+    if not coloured.any():
+        return table[:, :3].copy(), None
+    colours = table[:, 3:]
+    if not coloured.all():
+        notes.add("vertices without a colour beside coloured ones are white")
+        colours[~coloured] = 1.0
+    return table[:, :3].copy(), clean_colours(colours, notes)
+
+
+def _triangles(text: ObjText, positions: Float64, notes: Notes) -> tuple[Indices, Indices]:
+    """Triangulate every face.
+
+    Returns:
+        (n, 3, 3) zero-based v, vt, vn indices a corner (-1: none), and (n,) face line, both in file order.
+    """
+    rows = [line.split() for line in text.faces]
+    sizes = np.array([len(row) for row in rows], dtype=np.int64)
+    if (sizes < 3).any():
+        notes.add(f"{int((sizes < 3).sum())} faces with fewer than 3 corners are left out")
+    fill = {0: "/0/0", 1: "/0", 2: ""}
+    try:
+        tokens = [word.rstrip("/").replace("//", "/0/") for row in rows for word in row]
+        flat = np.array([(word + fill[word.count("/")]).split("/") for word in tokens], dtype=np.int64)
+    except (ValueError, KeyError) as error:
+        raise ValueError(f"'f' line: expected indices like 1, 1/2, 1//3 or 1/2/3 ({error})") from error
+    flat = flat.reshape(-1, 3)
+    seen = np.repeat(np.array(text.seen, dtype=np.int64).reshape(-1, 3), sizes, axis=0)
+    flat = np.where(flat < 0, np.maximum(flat + seen, -1), flat - 1)  # relative indices count back from the face
+    starts = np.cumsum(sizes) - sizes
+    triangles, faces = [np.zeros((0, 3, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    for size in np.unique(sizes[sizes >= 3]):
+        at = np.flatnonzero(sizes == size)
+        corners = flat[starts[at][:, None] + np.arange(size)]  # (m, size, 3)
+        place = np.clip(corners[..., 0], 0, max(len(positions) - 1, 0))
+        local = triangulate(positions[place]) if len(positions) else np.zeros((0, 0, 3), dtype=np.int64)
+        m, t = local.shape[:2]
+        triangles.append(corners[np.arange(m)[:, None, None], local].reshape(m * t, 3, 3))
+        faces.append(np.repeat(at[:m], t))
+    face = np.concatenate(faces)
+    order = np.argsort(face, kind="stable")
+    return np.concatenate(triangles)[order], face[order]
+
+
+def _pick(table: Float64, index: Indices) -> Float64 | None:
+    """Rows of a table by (n, 3) index; NaN for an index that is missing; None where all are."""
+    known = (index >= 0) & (index < len(table))
+    if not known.any():
+        return None
+    picked = table[np.where(known, index, 0)]
+    picked[~known] = np.nan
+    return picked
+
+
+def _libraries(names: Sequence[str], assets: Assets, notes: Notes) -> dict[str, MtlEntry]:
+    """All materials of all `mtllib` lines; the first of a name counts."""
+    entries: dict[str, MtlEntry] = {}
+    for name in names:
+        plain = name.split("#", 1)[0].strip()
+        for data in _first_readable(([name], [plain], plain.split()), assets, notes):
+            for key, entry in parse_mtl(decode_text(data)).items():
+                entries.setdefault(key, entry)
+    return entries
+
+
+def _first_readable(readings: Sequence[list[str]], assets: Assets, notes: Notes) -> list[bytes]:
+    """The files of the first reading of a line (one name with spaces, or several names) whose files all exist."""
+    reason: AssetError | None = None
+    for names in readings:
+        try:
+            return [assets.read(name) for name in names]
+        except AssetError as error:
+            reason = reason or error
+    notes.add(f"material library left out, {reason}")
+    return []
+
+
+def _material(
+    text: ObjText,
+    place: int,
+    coloured: bool,
+    library: dict[str, MtlEntry],
+    assets: Assets,
+    textures: TextureTable,
+    notes: Notes,
+) -> tuple[Material, MapUse | None]:
+    """The material at a place of `usemtl` names, or a default one for faces without."""
+    name = text.materials[place] if place >= 0 else ""
+    entry = library.get(name) or library.get(name.split("#", 1)[0].strip())
+    if entry is not None:
+        return to_material(entry, assets, textures, notes)
+    if name:
+        notes.add("materials not found in any material library", name)
+    return default_material(coloured, notes, name), None

@@ -1,0 +1,140 @@
+"""PLY, STL and whatever else trimesh reads -> parts."""
+
+import io
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Float32
+from ..errors import SceneError
+from .assets import Assets
+from .defaults import clean_colours, default_material
+from .model import Material, Meshes, Notes, Part
+from .mtl import limited
+from .opacity import blended
+from .textures import TextureTable, rgba
+from .walk import instances, place
+
+BYTE = 255.0
+HINT = "; install it (for COLLADA: pip install pycollada), or convert the file to GLB"
+
+
+class Folder:
+    """Gives trimesh's loaders the files beside the scene, and no others."""
+
+    def __init__(self, assets: Assets) -> None:
+        self.assets = assets
+
+    def get(self, name: str) -> bytes:
+        """The bytes of a named file."""
+        return self.assets.read(name)
+
+    def __getitem__(self, name: str) -> bytes:
+        return self.get(name)
+
+
+def readable_formats() -> set[str]:
+    """File extensions of meshes that trimesh knows, without the dot; some need a further package."""
+    from trimesh.exchange.load import mesh_loaders
+
+    return set(mesh_loaders) - {"dict", "dict64", "json", "msgpack", "stl_ascii"}
+
+
+def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
+    """Read a file of any format that trimesh knows."""
+    import trimesh
+
+    notes = Notes()
+    folder: Any = Folder(assets)  # it has what loaders use of trimesh's own resolvers
+    if extension == "ply":
+        data = _without_blank_lines(data)
+    try:
+        scene = trimesh.load_scene(io.BytesIO(data), file_type=extension, resolver=folder, process=False)
+    except ImportError as error:
+        raise SceneError(f"trimesh needs a further package for this format ({error}){HINT}") from error
+    textures = TextureTable(notes)
+    materials: list[Material] = []
+    numbers: dict[Any, int] = {}
+    parts: list[Part] = []
+    outside = 0
+    if any(not isinstance(geometry, trimesh.Trimesh) for geometry in scene.geometry.values()):
+        notes.add("points and lines are left out")
+    for mesh, world_from_mesh in instances(scene):
+        vertex_colours, face_colours = _colours(mesh, notes)
+        coloured = vertex_colours is not None or face_colours is not None
+        textured = mesh.visual.kind == "texture"
+        key = id(mesh.visual.material) if textured else coloured
+        if key not in numbers:
+            numbers[key] = len(materials)
+            materials.append(
+                _material(mesh.visual.material, len(materials), textures, notes)
+                if textured
+                else default_material(coloured, notes)
+            )
+        uv = mesh.visual.uv if textured and materials[numbers[key]].texture >= 0 else None
+        part, lost = place(
+            mesh,
+            world_from_mesh,
+            numbers[key],
+            uvs=None if uv is None else np.array(uv, dtype=np.float64),
+            colours=vertex_colours,
+            face_colours=face_colours,
+        )
+        parts.append(part)
+        outside += lost
+    return Meshes(
+        parts=tuple(parts),
+        materials=tuple(materials),
+        textures=tuple(textures.textures),
+        dropped={"index out of range": outside} if outside else {},
+        notes=notes.lines(),
+    )
+
+
+def _without_blank_lines(data: bytes) -> bytes:
+    """ASCII PLY without its empty lines, on which trimesh fails; other data as it is."""
+    if b"format ascii" not in data[:200].lower():
+        return data
+    return b"\n".join(line for line in data.splitlines() if line.strip()) + b"\n"
+
+
+def _colours(mesh: Any, notes: Notes) -> tuple[Float32 | None, Float32 | None]:
+    """(v, 3) vertex colours and (f, 3) face colours; at most one of them is there."""
+    visual = mesh.visual
+    kind = visual.kind
+    found = {"vertex": lambda: visual.vertex_colors, "face": lambda: visual.face_colors}
+    if kind in found:
+        colours = np.array(found[kind](), dtype=np.float64) / BYTE
+    else:
+        attributes = getattr(visual, "vertex_attributes", None)
+        colours = np.array([] if attributes is None else attributes.data.get("color", []), dtype=np.float64)
+        if len(colours) == 0 or len(colours) != len(mesh.vertices):
+            return None, None
+        kind = "vertex"
+    if colours.shape[1] > 3 and (colours[:, 3] < 1).any():
+        notes.add("the opacity of vertex colours is left out")
+    clean = clean_colours(colours[:, :3], notes)
+    return (clean, None) if kind == "vertex" else (None, clean)
+
+
+def _material(source: Any, number: int, textures: TextureTable, notes: Notes) -> Material:
+    """Map a trimesh material: its main colour and its image."""
+    name = str(getattr(source, "name", None) or f"material {number}")
+    image = getattr(source, "baseColorTexture", None) or getattr(source, "image", None)
+    texture = -1 if image is None else textures.add(("trimesh", id(image)), rgba(image))
+    colour = np.asarray(source.main_color, dtype=np.float64) / BYTE
+    if texture >= 0 and getattr(source, "diffuse", None) is not None:
+        colour = np.array([1.0, 1.0, 1.0, colour[3]])  # trimesh's default grey must not darken an image
+    opacity = blended(name, float(colour[3]), texture, textures, notes)
+    base = (float(colour[0]), float(colour[1]), float(colour[2]))
+    reflectivity, specular = limited(name, base, (0.0, 0.0, 0.0), notes)
+    return Material(
+        name=name,
+        reflectivity=reflectivity,
+        specular=specular,
+        texture=texture,
+        alpha=opacity.alpha,
+        alpha_texture=opacity.alpha_texture,
+        alpha_cutoff=opacity.alpha_cutoff,
+        left_out=opacity.left_out,
+    )

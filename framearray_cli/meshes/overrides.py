@@ -1,0 +1,60 @@
+"""The job's own values for materials of the scene, by name."""
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Protocol
+
+from ..errors import SceneError
+from .model import Material, Notes, listed
+
+NAMES_IN_AN_ERROR = 12
+
+
+class Override(Protocol):
+    """What a job may say about one material; None keeps what the file says."""
+
+    @property
+    def reflectivity(self) -> Sequence[float] | None:
+        """Diffuse reflectivity, linear RGB."""
+
+    @property
+    def specular(self) -> Sequence[float] | None:
+        """Mirror reflectivity, linear RGB."""
+
+
+def overridden(materials: Sequence[Material], overrides: Mapping[str, Override], notes: Notes) -> list[Material]:
+    """Materials with the job's values; an overridden glass is shown, as whoever sets its colour wants to see it."""
+    names = sorted({material.name for material in materials})
+    unknown = [name for name in overrides if name not in names]
+    if unknown:
+        raise SceneError("; ".join(_unknown_material(name, names) for name in unknown))
+    found = []
+    for material in materials:
+        override = overrides.get(material.name)
+        if override is not None and (override.reflectivity is not None or override.specular is not None):
+            if material.left_out == "transmissive":
+                material = replace(material, left_out="")
+                notes.add("transmissive materials with an override are shown after all", material.name)
+            if override.reflectivity is not None:
+                material = replace(material, reflectivity=_rgb(override.reflectivity), texture=-1)
+            if override.specular is not None:
+                material = replace(material, specular=_rgb(override.specular), specular_texture=-1)
+            if any(d + s > 1 for d, s in zip(material.reflectivity, material.specular, strict=True)):
+                notes.add("overridden materials reflect more than they receive", material.name)
+        found.append(material)
+    return found
+
+
+def _rgb(values: Sequence[float]) -> tuple[float, float, float]:
+    return (float(values[0]), float(values[1]), float(values[2]))
+
+
+def _unknown_material(name: str, names: Sequence[str]) -> str:
+    """Say which materials there are, the nearest name first."""
+
+    def likeness(known: str) -> float:
+        return difflib.SequenceMatcher(None, name.lower(), known.lower()).ratio()
+
+    nearest = sorted(names, key=likeness, reverse=True)
+    return f'scene.materials."{name}": no such material in the scene; it has {listed(nearest, NAMES_IN_AN_ERROR)}'
