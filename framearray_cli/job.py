@@ -14,6 +14,7 @@ from .jobkeys import CameraTable, LightTable
 from .jobvalues import Emission, FileName, Reflectivity, Table, Triple, absolute, computed, fail, fill, shown
 
 Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; every other format is taken as y up
+NAME = "[A-Za-z0-9_][A-Za-z0-9._-]{0,99}"  # what can start a file name on every system
 
 
 class MaterialTable(Table):
@@ -208,7 +209,7 @@ class RenderTable(Table):
 
 def _file_stem(name: str) -> str:
     """Check that a name can start file names on every system."""
-    if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,99}", name):
+    if not re.fullmatch(NAME, name):
         wanted = 'at most 100 letters, digits, ".", "_" or "-", the first a letter, digit or "_"'
         fail([((), f"expected {wanted}, got {shown(name)}")])
     return name
@@ -219,9 +220,9 @@ class Job(Table):
 
     name: Annotated[str, AfterValidator(_file_stem)] = Field(
         description='Starts every file name. Letters, digits, ".", "_" and "-".',
-        json_schema_extra={"pattern": "^[A-Za-z0-9_][A-Za-z0-9._-]{0,99}$"},
+        json_schema_extra={"pattern": f"^{NAME}$", "x-words": "a name"},
     )
-    seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of all random numbers.")
+    seed: int = Field(default=0, ge=0, le=2**32 - 1, description="Seed of all random numbers.")
     scene: SceneTable
     camera: CameraTable
     light: LightTable

@@ -1,12 +1,78 @@
-"""TOML text -> Job, or one JobError with every problem."""
+"""TOML text -> Job, or one JobError with every problem; and Job -> plain tables."""
 
 import tomllib
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from .errors import JobError
+from .eyefile import EyeFileError, read_eyes
+from .job import Job
+from .jobschema import job_schema
+from .jobvalues import absolute, shown
+from .problems import problems_of
+
+__all__ = ["job_schema", "job_table", "load_toml", "problems_of", "read_job"]
 
 LARGEST_FILE = 4 * 1024 * 1024  # bytes; a hand-written job is a thousand times smaller, so more is the wrong file
+MOST_PROBLEMS = 50  # more would scroll away what matters
+
+
+def read_job(path: Path) -> Job:
+    """Read a job file; names of files in it start at its folder.
+
+    Raises:
+        JobError: the file cannot be read, or has problems; all of them are told at once.
+    """
+    table = load_toml(path)
+    job_file = path.absolute()
+    table, problems = _with_eyes(table, job_file)
+    try:
+        job = Job.model_validate(table, context={"job_file": job_file})
+    except ValidationError as error:
+        problems = problems_of(error, Job) + problems
+    if problems:
+        more = [f"and {len(problems) - MOST_PROBLEMS} more problems"] if len(problems) > MOST_PROBLEMS else []
+        raise JobError(path, problems[:MOST_PROBLEMS] + more)
+    return job
+
+
+def job_table(job: Job) -> dict[str, Any]:
+    """Write a job as plain tables, complete, with absolute file names; reading them gives an equal job."""
+    table: dict[str, Any] = _plain(job.model_dump(exclude_none=True))
+    if job.ambient.intensity is not None:  # it stands instead of the other two
+        table["ambient"] = {"intensity": table["ambient"]["intensity"]}
+    return table
+
+
+def _plain(value: Any) -> Any:
+    """Turn tuples into lists and paths into text."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return str(value) if isinstance(value, Path) else value
+
+
+def _with_eyes(table: dict[str, Any], job_file: Path) -> tuple[dict[str, Any], list[str]]:
+    """Replace `camera.file` by the keys it holds, so that a job is complete without it."""
+    camera = table.get("camera")
+    if not isinstance(camera, dict) or not isinstance(camera.get("file"), str) or "keys" in camera:
+        return table, []  # nothing to replace, or a problem that the check of the whole job tells
+    name = camera["file"]
+    if not name.strip() or "\0" in name:
+        return table, []
+    try:
+        keys = read_eyes(absolute(Path(name), job_file))
+    except EyeFileError as error:
+        return table, [f"camera.file: {shown(name)}: {problem}" for problem in error.args]
+    rest = {key: value for key, value in camera.items() if key != "file"}
+    frames, problems = rest.get("frames"), []
+    if isinstance(frames, int) and frames != len(keys):
+        problems = [f"camera.frames: expected {len(keys)}, the number of eyes in {shown(name)}, got {shown(frames)}"]
+        del rest["frames"]
+    return {**table, "camera": {**rest, "keys": keys}}, problems
 
 
 def load_toml(path: Path) -> dict[str, Any]:
@@ -23,6 +89,8 @@ def load_toml(path: Path) -> dict[str, Any]:
         raise JobError(path, [f"not valid TOML: {error}"]) from error
     except RecursionError as error:
         raise JobError(path, ["tables or lists are nested too deeply"]) from error
+    except ValueError as error:  # a number of more digits than Python reads
+        raise JobError(path, ["a number has too many digits"]) from error
 
 
 def _read_bytes(path: Path) -> bytes:

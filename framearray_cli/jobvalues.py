@@ -36,9 +36,12 @@ def shown(value: object) -> str:
     if isinstance(value, dict):
         return "a table"
     if isinstance(value, list | tuple):
-        whole = f"[{', '.join(shown(item) for item in value[:4])}{', ...' if len(value) > 4 else ''}]"
-        kind = "tables" if value and isinstance(value[0], dict) else "values"
-        return whole if kind == "values" and len(whole) <= LONGEST_SHOWN else f"a list of {len(value)} {kind}"
+        if 0 < len(value) <= 4 and not any(isinstance(item, dict | list | tuple) for item in value):
+            whole = f"[{', '.join(shown(item) for item in value)}]"
+            if len(whole) <= LONGEST_SHOWN:
+                return whole
+        kind = "table" if value and isinstance(value[0], dict) else "value"
+        return f"a list of {len(value)} {kind}{'s' if len(value) != 1 else ''}"
     if isinstance(value, bool | str):
         text = json.dumps(value[:1000] if isinstance(value, str) else value, ensure_ascii=False)
     elif isinstance(value, int) and value.bit_length() > 64:
@@ -51,8 +54,13 @@ def shown(value: object) -> str:
 def between(low: float, high: float) -> str:
     """Say a range of numbers, "from 0 to 1"; bounds that only protect the arithmetic are left out."""
     if high >= FARTHEST:
-        return "" if low <= -FARTHEST else f"of at least {low:g}"
-    return f"from {low:g} to {high:g}"
+        return "" if low <= -FARTHEST else f"of at least {number(low)}"
+    return f"from {number(low)} to {number(high)}"
+
+
+def number(value: float) -> str:
+    """Write a bound: whole numbers in full where they are short."""
+    return str(int(value)) if value == int(value) and abs(value) < FARTHEST else f"{value:g}"
 
 
 def _number_problem(value: object, low: float, high: float, whole: bool) -> str | None:
@@ -121,9 +129,9 @@ def absolute(path: Path, job_file: Path | None) -> Path:
 
 def _vector_schema(count: int, *, grey: bool = False, whole: bool = False, **bounds: float) -> WithJsonSchema:
     """Describe `count` numbers, or one grey number, in JSON Schema."""
-    number = {"type": "integer" if whole else "number", **bounds}
-    vector = {"type": "array", "items": number, "minItems": count, "maxItems": count}
-    return WithJsonSchema({"anyOf": [number, vector]} if grey else vector)
+    item = {"type": "integer" if whole else "number", **bounds}
+    vector = {"type": "array", "items": item, "minItems": count, "maxItems": count}
+    return WithJsonSchema({"anyOf": [item, vector]} if grey else vector)
 
 
 Point: TypeAlias = Annotated[Triple, PlainValidator(_vector(3, -FARTHEST, FARTHEST)), _vector_schema(3)]

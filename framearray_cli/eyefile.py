@@ -1,0 +1,128 @@
+"""`camera.file`: a CSV or JSON file with one eye a frame -> camera keys.
+
+CSV: a first row that names the columns eye_x, eye_y, eye_z, target_x, target_y, target_z and, if wanted,
+up_x, up_y, up_z, in any order; then one row a frame. JSON: a list with one `{"eye": [...], "target": [...]}`
+a frame, with `"up"` if wanted.
+"""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from .jobkeys import MOST_EYES, CameraKey
+from .problems import problems_of
+
+LARGEST_FILE = 64 * 1024 * 1024  # bytes; MOST_EYES rows of nine long numbers are 20 MB
+MOST_PROBLEMS = 10  # a column that is wrong is wrong in every row
+
+EYE = ("eye_x", "eye_y", "eye_z")
+TARGET = ("target_x", "target_y", "target_z")
+UP = ("up_x", "up_y", "up_z")
+
+
+class EyeFileError(Exception):
+    """A file of eyes that cannot be used; the arguments are its problems, each with its row."""
+
+
+def read_eyes(path: Path) -> list[dict[str, Any]]:
+    """Read a file of eyes into key tables, frame 0, 1, 2 and so on.
+
+    Raises:
+        EyeFileError: the file is missing, is neither CSV nor JSON, or has rows that are no eyes.
+    """
+    text = _read_text(path)
+    match path.suffix.lower():
+        case ".csv":
+            first, rows = 2, _csv_rows(text)
+        case ".json":
+            first, rows = 1, _json_rows(text)
+        case _:
+            raise EyeFileError(f'expected a file name that ends in .csv or .json, got "{path.suffix}"')
+    if not 1 <= len(rows) <= MOST_EYES:
+        raise EyeFileError(f"expected 1 to {MOST_EYES} eyes, got {len(rows)}")
+    problems = _row_problems(rows, first)
+    if problems:
+        more = [f"and {len(problems) - MOST_PROBLEMS} more problems"] if len(problems) > MOST_PROBLEMS else []
+        raise EyeFileError(*problems[:MOST_PROBLEMS], *more)
+    return [{"frame": frame, **row} for frame, row in enumerate(rows)]
+
+
+def _row_problems(rows: list[dict[str, Any]], first: int) -> list[str]:
+    """Check each row by itself; `first` is the number that the first one has for a reader of the file."""
+    problems = []
+    for frame, row in enumerate(rows):
+        place = f"row {frame + first}" if first == 2 else f"entry {frame + first}"
+        if "up" in row and "up" not in rows[0]:
+            problems.append(f"{place}: up: the first eye does not give it, so no eye may")
+        try:
+            CameraKey.model_validate({"frame": frame, **row})
+        except ValidationError as error:
+            problems += [f"{place}: {problem}" for problem in problems_of(error, CameraKey)]
+    return problems
+
+
+def _read_text(path: Path) -> str:
+    """Read a whole UTF-8 file whose size is checked first."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(LARGEST_FILE + 1)
+    except FileNotFoundError:
+        raise EyeFileError("no such file") from None
+    except OSError as error:
+        raise EyeFileError(f"cannot be read: {error.strerror}") from error
+    if len(data) > LARGEST_FILE:
+        raise EyeFileError(f"expected at most {LARGEST_FILE >> 20} MB, got a bigger file")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise EyeFileError("expected UTF-8 text, got another encoding; save the file as UTF-8") from error
+
+
+def _csv_rows(text: str) -> list[dict[str, Any]]:
+    """Read the named columns of a CSV file; a cell that is no number is left for the check of its row."""
+    try:
+        lines = [line for line in csv.reader(text.splitlines(), strict=True) if line]
+    except csv.Error as error:
+        raise EyeFileError(f"not valid CSV: {error}") from error
+    header = [name.strip().lower() for name in lines[0]] if lines else []
+    with_up = any(name in header for name in UP)
+    wanted = EYE + TARGET + (UP if with_up else ())
+    if sorted(header) != sorted(wanted):
+        raise EyeFileError(
+            f"row 1: expected the column names {', '.join(wanted)}, got {', '.join(header)[:200] or 'none'}"
+        )
+    rows = []
+    for number, line in enumerate(lines[1:], start=2):
+        if len(line) != len(header):
+            raise EyeFileError(f"row {number}: expected {len(header)} cells, got {len(line)}")
+        cells = dict(zip(header, map(_number, line), strict=True))
+        row = {"eye": [cells[name] for name in EYE], "target": [cells[name] for name in TARGET]}
+        rows.append({**row, "up": [cells[name] for name in UP]} if with_up else row)
+    return rows
+
+
+def _number(cell: str) -> float | str:
+    """Read one cell."""
+    try:
+        return float(cell)
+    except ValueError:
+        return cell.strip()
+
+
+def _json_rows(text: str) -> list[dict[str, Any]]:
+    """Read a list of tables from a JSON file."""
+    try:
+        rows = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise EyeFileError(f"not valid JSON: {error}") from error
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise EyeFileError('expected a list of {"eye": [...], "target": [...]}, got something else')
+    for number, row in enumerate(rows, start=1):
+        if "frame" in row:
+            raise EyeFileError(
+                f'entry {number}: unknown key "frame"; the first entry is frame 0, the next 1, and so on'
+            )
+    return rows

@@ -1,0 +1,172 @@
+"""JSON Schema of a file format, and the same schema in words: for messages and for the reference page."""
+
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from pydantic import BaseModel
+
+from .job import Job
+from .jobvalues import Place, between, number
+
+Schema: TypeAlias = dict[str, Any]
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def job_schema() -> Schema:
+    """Make the JSON Schema (2020-12) of the job file, for editors."""
+    schema = _published(file_schema(Job))
+    return {"$schema": DIALECT, **schema, "title": "framearray job"}
+
+
+def file_schema(model: type[BaseModel]) -> Schema:
+    """Make the schema of what a file may hold: TOML has no null, so no key may be null.
+
+    The keyword `x-default` tells in words a default that depends on other keys.
+    """
+    schema: Schema = _without_null(model.model_json_schema())
+    return schema
+
+
+def _without_null(node: Any) -> Any:
+    """Remove the null options, and defaults that are null or told in words."""
+    if isinstance(node, list):
+        return [_without_null(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    node = {key: _without_null(value) for key, value in node.items()}
+    options = [option for option in node.get("anyOf", ()) if option != {"type": "null"}]
+    if len(options) == 1:
+        node = {**options[0], **{key: value for key, value in node.items() if key != "anyOf"}}
+    elif options:
+        node["anyOf"] = options
+    if "x-default" in node or ("default" in node and node["default"] is None):
+        node.pop("default", None)
+    return node
+
+
+def _published(node: Any) -> Any:
+    """Turn our own keywords into descriptions that every editor shows."""
+    if isinstance(node, list):
+        return [_published(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    node = {key: _published(value) for key, value in node.items()}
+    node.pop("x-words", None)
+    if (text := node.pop("x-default", None)) is not None:
+        node["description"] = f"{node['description']} Default: {text}."
+    return node
+
+
+def resolved(root: Schema, node: Schema) -> Schema:
+    """Follow a reference; what stands beside it wins."""
+    while "$ref" in node:
+        target = root["$defs"][node["$ref"].rsplit("/", 1)[1]]
+        node = {**target, **{key: value for key, value in node.items() if key != "$ref"}}
+    return node
+
+
+def variants(root: Schema, node: Schema) -> dict[str, Schema]:
+    """List the kinds of a table that a `type` key tells apart; empty for every other table."""
+    kinds = {ref: kind for kind, ref in node.get("discriminator", {}).get("mapping", {}).items()}
+    return {kinds[option["$ref"]]: resolved(root, option) for option in node.get("oneOf", ()) if kinds}
+
+
+def find(root: Schema, place: Place) -> tuple[str, Schema]:
+    """Find the schema of one place in a file, and write the place as a dotted key: `camera.keys[3].eye`.
+
+    The schema is empty for a place that no file has.
+    """
+    path, node = "", root
+    for step in place:
+        node = resolved(root, node)
+        if step in (kinds := variants(root, node)):  # names the kind of table, is no key of the file
+            node = kinds[str(step)]
+        elif isinstance(step, int):
+            path += f"[{step}]"
+            node = next((option["items"] for option in (node, *node.get("anyOf", ())) if "items" in option), {})
+        else:
+            path += ("." if path else "") + dotted(step)
+            extra = node.get("additionalProperties") or {}
+            node = node.get("properties", {}).get(step, extra)
+    return path, resolved(root, node)
+
+
+def dotted(key: str) -> str:
+    """Write a key as TOML does: bare where that is possible, else quoted."""
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else json.dumps(key[:100], ensure_ascii=False)
+
+
+def words(root: Schema, node: Schema) -> str:
+    """Say which values a schema allows: "a whole number from 1 to 65535", "3 numbers", "a table"."""
+    node = resolved(root, node)
+    if "x-words" in node:
+        return str(node["x-words"])
+    if choices := node.get("enum", [node["const"]] if "const" in node else list(variants(root, node))):
+        return "a table" if "oneOf" in node else _either([f'"{choice}"' for choice in choices])
+    if "anyOf" in node:
+        grey, vector = node["anyOf"]
+        return f"a number or {vector['minItems']} numbers {_range(grey)}".rstrip()
+    match node.get("type"):
+        case "integer":
+            return f"a whole number {_range(node)}".rstrip()
+        case "number":
+            return f"a number {_range(node)}".rstrip()
+        case "boolean":
+            return "true or false"
+        case "string":
+            return "a text"
+        case "object":
+            return "a table"
+        case "array" if "maxItems" in node:
+            kind = "whole numbers" if node["items"]["type"] == "integer" else "numbers"
+            return f"{node['minItems']} {kind} {_range(node['items'])}".rstrip()
+        case "array":
+            return "a list of tables"
+    return "another value"
+
+
+def _range(node: Schema) -> str:
+    """Say the bounds of a number."""
+    low = node.get("minimum", float("-inf"))
+    high = node.get("maximum", node["exclusiveMaximum"] - 1 if "exclusiveMaximum" in node else float("inf"))
+    if "exclusiveMinimum" in node:
+        return f"above {number(node['exclusiveMinimum'])}"
+    return between(low, high)
+
+
+def _either(options: list[str]) -> str:
+    """Join options as a sentence does."""
+    return options[0] if len(options) == 1 else f"{', '.join(options[:-1])} or {options[-1]}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Section:
+    """One table of a file: its place, such as `light.sources[].keys[]`, the kind its `type` names, and its schema."""
+
+    place: str
+    kind: str | None
+    schema: Schema
+
+    @property
+    def keys(self) -> dict[str, Schema]:
+        """Schema of each key that holds a value or a list."""
+        return dict(self.schema.get("properties", {}))
+
+
+def sections(root: Schema, node: Schema | None = None, place: str = "", kind: str | None = None) -> Iterator[Section]:
+    """List all tables of a file, each before the tables it holds."""
+    node = resolved(root, node if node is not None else root)
+    for name, variant in variants(root, node).items():
+        yield from sections(root, variant, place, name)
+    if "properties" in node:
+        yield Section(place=place, kind=kind, schema=node)
+        for key, value in node["properties"].items():
+            yield from sections(root, value, f"{place}.{key}".lstrip("."), kind)
+    elif node.get("type") == "array":
+        yield from sections(root, node["items"], f"{place}[]", kind)
+    elif isinstance(node.get("additionalProperties"), dict):
+        yield from sections(root, node["additionalProperties"], f'{place}."NAME"', kind)

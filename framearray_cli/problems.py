@@ -1,0 +1,106 @@
+"""What is wrong with a file, in plain words, each problem with its place: `camera.fov: expected ..., got ...`."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from .jobschema import Schema, dotted, file_schema, find, sections, variants, words
+from .jobvalues import FARTHEST, shown
+
+# Words from other programs, for keys whose spelling is too far from ours to be found as a typing error.
+SYNONYMS = {
+    "intensity": ("irradiance",),
+    "irradiance": ("intensity",),
+    "position": ("direction", "eye"),
+    "direction": ("position",),
+    "dir": ("direction",),
+    "power": ("intensity", "irradiance"),
+    "look_at": ("target",),
+    "lookat": ("target",),
+    "to": ("target",),
+    "origin": ("eye",),
+    "from": ("eye",),
+    "spp": ("hits",),
+    "samples": ("hits",),
+    "albedo": ("reflectivity",),
+    "base_color": ("reflectivity",),
+    "mirror": ("specular",),
+    "d_max": ("range",),
+    "distance": ("range",),
+    "folder": ("directory",),
+    "size": ("resolution",),
+    "bounces": ("depth",),
+}
+
+
+def problems_of(error: ValidationError, model: type[BaseModel]) -> list[str]:
+    """Translate every problem that pydantic found in a table of type `model`, in the order of the file's keys."""
+    root = file_schema(model)
+    return [_problem(root, details) for details in error.errors(include_url=False) if not _is_echo(details)]
+
+
+def _is_echo(details: ErrorDetails) -> bool:
+    """Whether a list is called too short only because its wrong items, which have their own problems, do not count."""
+    return details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]
+
+
+def _problem(root: Schema, details: ErrorDetails) -> str:
+    """Say one problem: its place, what was expected, what was found."""
+    place, kind, found = details["loc"], details["type"], details["input"]
+    context: dict[str, Any] = details.get("ctx", {})
+    path, node = find(root, place)
+    match kind:
+        case "job":  # a rule of our own, with its own words
+            text = context["text"]
+        case "missing":
+            text = f"missing; expected {words(root, node)}"
+        case "extra_forbidden":
+            text = _unknown_key(root, place)
+        case "union_tag_not_found" if isinstance(found, dict):
+            path, text = f"{path}.type", f"missing; expected {_kinds(root, node)}"
+        case "union_tag_invalid":
+            path, text = f"{path}.type", f"expected {_kinds(root, node)}, got {shown(found.get('type'))}"
+        case "too_short":
+            text = f"expected {words(root, node)}, at least {context['min_length']}, got {context['actual_length']}"
+        case "less_than_equal" if context["le"] >= FARTHEST:
+            text = f"expected at most {context['le']:g}, got {shown(found)}"
+        case "invalid_key":
+            text = f"expected a key that is a text, got {shown(found)}"
+        case _:
+            text = f"expected {words(root, node)}, got {shown(found)}"
+    return f"{path}: {text}" if path else text
+
+
+def _kinds(root: Schema, node: Schema) -> str:
+    """List the values of the `type` key of a table."""
+    return " or ".join(f'"{kind}"' for kind in variants(root, node))
+
+
+def _unknown_key(root: Schema, place: tuple[int | str, ...]) -> str:
+    """Name the key of the same table that was probably meant, or else the table where such a key belongs."""
+    key = str(place[-1])
+    known = find(root, place[:-1])[1].get("properties", {})
+    if meant := _nearest(key, known):
+        return f'unknown key; did you mean "{meant}"?'
+    homes: dict[str, list[str]] = {}
+    for section in sections(root):
+        for name in section.keys:
+            homes.setdefault(name, []).append(f"[{section.place}]" if section.place else "the top of the file")
+    if meant := _nearest(key, homes):
+        places = " or ".join(dict.fromkeys(homes[meant]))
+        return f'unknown key here; "{meant}" belongs in {places}'
+    return f"unknown key; known here: {', '.join(dotted(name) for name in known)}"
+
+
+def _nearest(key: str, known: Iterable[str]) -> str | None:
+    """Find the known key that was probably meant."""
+    names = {name.lower(): name for name in known}
+    lower = key.lower().replace("-", "_")[:50]
+    for other in (lower, *SYNONYMS.get(lower, ())):
+        if other in names:
+            return names[other]
+    close = get_close_matches(lower, names, n=1, cutoff=0.7)
+    return names[close[0]] if close else None
