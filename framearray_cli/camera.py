@@ -1,0 +1,76 @@
+"""Eye rays through pixels, and their inverse: points to pixels of an eye.
+
+A pixel's filter is its own box. Pixel (0, 0) is the top left one; images are (height, width).
+"""
+
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+
+from .arrays import Directions, Float64, Points
+from .paths import Eyes
+
+Triple = tuple[float, float, float]
+
+OUTSIDE = -1  # the "pixel" of a point that an eye does not see
+
+
+class Cameras(NamedTuple):
+    """All eyes of a job for kernels.
+
+    Attributes:
+        position: (n_c, 3) centred like the scene.
+        right, up, forward: (n_c, 3) unit axes of each eye.
+        focal: focal length in pixels.
+        width, height: resolution in pixels.
+    """
+
+    position: Points
+    right: Directions
+    up: Directions
+    forward: Directions
+    focal: float
+    width: int
+    height: int
+
+
+def cameras(eyes: Eyes, resolution: tuple[int, int], centre: Float64) -> Cameras:
+    """Gather what kernels read of the eyes; the cast to float32 happens here, after centring."""
+    world_from_camera = eyes.world_from_camera
+    width, height = resolution
+    return Cameras(
+        position=(world_from_camera[:, :3, 3] - centre).astype(np.float32),
+        right=np.ascontiguousarray(world_from_camera[:, :3, 0], np.float32),
+        up=np.ascontiguousarray(world_from_camera[:, :3, 1], np.float32),
+        forward=np.ascontiguousarray(-world_from_camera[:, :3, 2], np.float32),
+        focal=float(0.5 * height / np.tan(np.radians(eyes.fov_deg) / 2)),
+        width=width,
+        height=height,
+    )
+
+
+@nb.njit(nogil=True, cache=True)
+def eye_ray(cams: Cameras, c: int, x: float, y: float) -> Triple:
+    """Direction from eye c through image position (x, y) in pixels; its component along the optical axis is 1."""
+    a = np.float32((x - 0.5 * cams.width) / cams.focal)
+    b = np.float32((0.5 * cams.height - y) / cams.focal)
+    r, u, f = cams.right[c], cams.up[c], cams.forward[c]
+    return a * r[0] + b * u[0] + f[0], a * r[1] + b * u[1] + f[1], a * r[2] + b * u[2] + f[2]
+
+
+@nb.njit(nogil=True, cache=True)
+def project(cams: Cameras, c: int, x: float, y: float, z: float) -> tuple[int, float]:
+    """The pixel of eye c that sees the vector (x, y, z) from the eye, and the vector's length along the optical axis.
+
+    The pixel is OUTSIDE where the vector points behind the eye or out of the image.
+    """
+    r, u, f = cams.right[c], cams.up[c], cams.forward[c]
+    depth = x * f[0] + y * f[1] + z * f[2]
+    if not depth > 0.0:
+        return OUTSIDE, depth
+    column = 0.5 * cams.width + cams.focal * (x * r[0] + y * r[1] + z * r[2]) / depth
+    row = 0.5 * cams.height - cams.focal * (x * u[0] + y * u[1] + z * u[2]) / depth
+    if not (0.0 <= column < cams.width and 0.0 <= row < cams.height):
+        return OUTSIDE, depth
+    return int(row) * cams.width + int(column), depth

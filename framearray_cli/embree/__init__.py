@@ -1,0 +1,55 @@
+"""The door to Embree: build a scene, find first hits, test visibility.
+
+A kernel traces packets through a `Tracer`, which holds nothing but addresses; that keeps compiled kernels cacheable
+and lets two engines serve the same kernels:
+
+- `packets`: Embree's C functions `rtcIntersect16` and `rtcOccluded16`, 16 rays a call. The default.
+- `embreex`: the public API of embreex, which calls Embree once a ray. The fallback where the symbols cannot be
+  reached, and the twin that tests compare with.
+"""
+
+from types import TracebackType
+from typing import Literal, Self
+
+from ..errors import SceneError
+from ..scene import Scene
+from .fallback import EmbreexScene
+from .native import NativeScene, embree_library
+from .packets import Tracer
+
+__all__ = ["EmbreeScene", "Engine", "Tracer"]
+
+Engine = Literal["auto", "packets", "embreex"]
+
+
+class EmbreeScene:
+    """A scene that rays can be traced through; owns Embree's structures and frees them on `close`."""
+
+    def __init__(self, scene: Scene, engine: Engine = "auto") -> None:
+        """Build the acceleration structure.
+
+        Args:
+            scene: the triangles; opaque ones become geometry 0, those with an alpha mask geometry 1.
+            engine: "auto" takes packets where Embree's symbols can be reached, else embreex.
+
+        Raises:
+            SceneError: Embree refuses the scene, or `engine="packets"` cannot be had.
+        """
+        library = None if engine == "embreex" else embree_library()
+        if engine == "packets" and library is None:
+            raise SceneError("embree: the C functions of the embreex wheel cannot be reached; use the engine 'embreex'")
+        self.engine: Engine = "packets" if library else "embreex"
+        self._built = NativeScene(scene, library) if library else EmbreexScene(scene)
+        self.tracer: Tracer = self._built.tracer
+
+    def close(self) -> None:
+        """Free Embree's memory; tracing afterwards is an error."""
+        self._built.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

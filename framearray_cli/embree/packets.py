@@ -1,0 +1,145 @@
+"""Rays in packets, and how kernels trace them.
+
+Rays live in structure-of-arrays blocks of 16 in Embree's own layout (RTCRay16, RTCRayHit16), so that kernels write
+rays where Embree reads them. A packet is (rows, 16) float32: 12 rows of ray (origin xyz, tnear, direction xyz, time,
+tfar, mask, id, flags) and, for first hits, the hit (Ng xyz, u, v, triangle, geometry, instance) with room to spare.
+A lane with tfar < 0 is idle.
+"""
+
+from typing import Any, NamedTuple
+
+import numba as nb
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from ..arrays import Float32
+
+LANES = 16
+RAY_ROWS = 12
+HIT_ROWS = 24  # RTCRayHit16 needs 20 to 22 rows, by how Embree was built; the rest is padding to whole cache lines
+ORIGIN, DIRECTION, TFAR, MASK, NORMAL, U, V, TRIANGLE, GEOMETRY = 0, 4, 8, 9, 12, 15, 16, 17, 18
+
+MISS = -1
+OPAQUE, MASKED = 0, 1  # geometry numbers
+ALL_RAYS = -1  # a ray mask with every bit set; Embree skips geometry whose mask shares no bit with the ray's
+
+
+class Tracer(NamedTuple):
+    """What a kernel needs to trace rays: addresses, and nothing that would keep it from being cached.
+
+    Attributes:
+        batch: 0 where the functions take one packet, as Embree's do: `(valid, scene, packet, arguments)`;
+            1 where they take many: `(n_packets, scene, packets, unused)`.
+        first_masked: number of the first triangle with an alpha mask; those are a geometry of their own.
+    """
+
+    scene: int
+    intersect: int
+    occluded: int
+    batch: int
+    first_masked: int
+
+
+@intrinsic
+def _call(typingctx: Any, function: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
+    """Call the C function `void (intptr, intptr, intptr, intptr)` at an address that is only known at run time."""
+    signature = types.void(*[types.intp] * 5)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        word = ir.IntType(64)
+        pointer = ir.FunctionType(ir.VoidType(), [word] * 4).as_pointer()
+        builder.call(builder.inttoptr(args[0], pointer), list(args[1:]))
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@nb.njit(nogil=True, cache=True)
+def _trace(tracer: Tracer, function: int, packets: Float32, n_packets: int) -> None:
+    if tracer.batch:
+        _call(function, n_packets, tracer.scene, packets.ctypes.data, 0)
+        return
+    valid = np.full(2 * LANES, -1, np.int32)
+    lanes = valid.ctypes.data + (-valid.ctypes.data) % 64
+    for p in range(n_packets):
+        _call(function, lanes, tracer.scene, packets[p].ctypes.data, 0)
+
+
+@nb.njit(nogil=True, cache=True)
+def empty_packets(n_packets: int, rows: int) -> Float32:
+    """Room for packets, (n, rows, 16) float32, aligned to cache lines as Embree demands; all rays allowed."""
+    block = np.zeros(n_packets * rows * LANES + LANES, np.float32)
+    start = ((-block.ctypes.data) % 64) // 4
+    packets = block[start : start + n_packets * rows * LANES].reshape(n_packets, rows, LANES)
+    bits = packets.view(np.int32)
+    for i in range(n_packets):
+        for lane in range(LANES):
+            bits[i, MASK, lane] = ALL_RAYS
+    return packets
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def set_ray(
+    packets: Float32, i: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, tfar: float
+) -> None:
+    """Write ray i of a packet array; it reaches from its origin (tnear 0) to tfar, in lengths of the direction."""
+    p, lane = i >> 4, i & 15
+    packets[p, ORIGIN, lane] = ox
+    packets[p, ORIGIN + 1, lane] = oy
+    packets[p, ORIGIN + 2, lane] = oz
+    packets[p, DIRECTION, lane] = dx
+    packets[p, DIRECTION + 1, lane] = dy
+    packets[p, DIRECTION + 2, lane] = dz
+    packets[p, TFAR, lane] = tfar
+
+
+@nb.njit(nogil=True, cache=True)
+def intersect(tracer: Tracer, packets: Float32, n_rays: int) -> None:
+    """Find the first hits of rays 0 to n_rays - 1; afterwards the bits of row TRIANGLE hold the triangle or MISS.
+
+    tnear, mask and geometry are set here; lanes after the last ray are made idle.
+    """
+    n_packets = (n_rays + LANES - 1) // LANES
+    bits = packets.view(np.int32)
+    for p in range(n_packets):
+        for lane in range(LANES):
+            packets[p, 3, lane] = 0.0
+            bits[p, MASK, lane] = ALL_RAYS
+            bits[p, TRIANGLE, lane] = MISS
+            bits[p, GEOMETRY, lane] = MISS
+    for i in range(n_rays, n_packets * LANES):
+        set_ray(packets, i, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0)
+    _trace(tracer, tracer.intersect, packets, n_packets)
+
+
+@nb.njit(nogil=True, cache=True)
+def occlude(tracer: Tracer, packets: Float32, n_rays: int) -> None:
+    """Test rays 0 to n_rays - 1; afterwards row TFAR is -inf where something blocks the ray (`is_blocked`)."""
+    n_packets = (n_rays + LANES - 1) // LANES
+    bits = packets.view(np.int32)
+    for p in range(n_packets):
+        for lane in range(LANES):
+            packets[p, 3, lane] = 0.0
+            bits[p, MASK, lane] = ALL_RAYS
+    for i in range(n_rays, n_packets * LANES):
+        set_ray(packets, i, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0)
+    _trace(tracer, tracer.occluded, packets, n_packets)
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def is_blocked(packets: Float32, i: int) -> bool:
+    """Whether ray i met something, after `occlude`."""
+    return packets[i >> 4, TFAR, i & 15] < 0.0  # type: ignore[no-any-return]
+
+
+@nb.njit(nogil=True, cache=True, inline="always")
+def hit_triangle(tracer: Tracer, packets: Float32, i: int) -> int:
+    """The scene's triangle that ray i met, or MISS, after `intersect`."""
+    bits = packets.view(np.int32)
+    p, lane = i >> 4, i & 15
+    triangle = bits[p, TRIANGLE, lane]
+    if bits[p, GEOMETRY, lane] == MASKED:
+        triangle += tracer.first_masked
+    return triangle  # type: ignore[no-any-return]

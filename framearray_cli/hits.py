@@ -1,0 +1,213 @@
+"""Hits: the surface points that terms are estimated at, and the eye rays that find them.
+
+A batch of hits is a few thousand points in arrays that stay in the cache while every term is computed from them.
+"""
+
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+
+from .arrays import Bytes, Directions, Float32, Int32, Points, Rgb
+from .camera import Cameras, eye_ray
+from .embree.packets import DIRECTION, MISS, Tracer, U, V, hit_triangle, intersect, set_ray
+from .sampling import PIXEL, PIXEL_SAMPLE, r2, stream, word
+from .surface import (
+    Surfaces,
+    geometric_normal,
+    position_at,
+    reflectivity_at,
+    shading_normal,
+    specular_at,
+)
+
+ESCAPED, SURFACE = 0, 1
+
+
+class Hits(NamedTuple):
+    """Room for n hits.
+
+    Attributes:
+        kind: (n,) SURFACE, or ESCAPED for a ray that left the scene.
+        position: (n, 3) the point, centred; for an escaped ray its unit direction.
+        geometric: (n, 3) unit normal of the triangle, on the viewer's side: offsets, reprojection, sides.
+        shading: (n, 3) unit interpolated normal on that same side: direct light, hemisphere, mirror.
+        offset: (n,) how far rays start above the triangle.
+        reflectivity, specular: (n, 3) diffuse and mirror part; specular is left alone in scenes without mirrors.
+        incoming: (n, 3) direction of the ray that found the hit, not normalised.
+        key: (n,) random stream.
+        pixel: (n,) the pixel of the eye that found the hit.
+    """
+
+    kind: Bytes
+    position: Points
+    geometric: Directions
+    shading: Directions
+    offset: Float32
+    reflectivity: Rgb
+    specular: Rgb
+    incoming: Float32
+    key: Float32
+    pixel: Int32
+
+
+def empty_hits(n: int) -> Hits:
+    """Room for n hits; contents are arbitrary."""
+
+    def vectors() -> Float32:
+        return np.empty((n, 3), np.float32)
+
+    return Hits(
+        kind=np.empty(n, np.uint8),
+        position=vectors(),
+        geometric=vectors(),
+        shading=vectors(),
+        offset=np.empty(n, np.float32),
+        reflectivity=vectors(),
+        specular=vectors(),
+        incoming=vectors(),
+        key=np.empty(n, np.uint64),
+        pixel=np.empty(n, np.int32),
+    )
+
+
+@nb.njit(nogil=True, cache=True)
+def record_hits(surfaces: Surfaces, tracer: Tracer, packets: Float32, n: int, mirrors: bool, hits: Hits) -> None:
+    """Turn traced rays 0 to n - 1 into hits; key and pixel are left alone."""
+    for i in range(n):
+        p, lane = i >> 4, i & 15
+        dx, dy, dz = packets[p, DIRECTION, lane], packets[p, DIRECTION + 1, lane], packets[p, DIRECTION + 2, lane]
+        hits.incoming[i, 0], hits.incoming[i, 1], hits.incoming[i, 2] = dx, dy, dz
+        triangle = hit_triangle(tracer, packets, i)
+        if triangle == MISS:
+            scale = np.float32(1.0) / np.sqrt(dx * dx + dy * dy + dz * dz)
+            hits.kind[i] = ESCAPED
+            hits.position[i, 0], hits.position[i, 1], hits.position[i, 2] = dx * scale, dy * scale, dz * scale
+            hits.reflectivity[i, :] = 0.0
+            hits.specular[i, :] = 0.0
+            continue
+        u, v = packets[p, U, lane], packets[p, V, lane]
+        hits.kind[i] = SURFACE
+        hits.position[i, 0], hits.position[i, 1], hits.position[i, 2] = position_at(surfaces, triangle, u, v)
+        gx, gy, gz = geometric_normal(surfaces, triangle, dx, dy, dz)
+        hits.geometric[i, 0], hits.geometric[i, 1], hits.geometric[i, 2] = gx, gy, gz
+        nx, ny, nz = shading_normal(surfaces, triangle, u, v, gx, gy, gz)
+        hits.shading[i, 0], hits.shading[i, 1], hits.shading[i, 2] = nx, ny, nz
+        hits.offset[i] = surfaces.offset[triangle]
+        red, green, blue = reflectivity_at(surfaces, triangle, u, v)
+        hits.reflectivity[i, 0], hits.reflectivity[i, 1], hits.reflectivity[i, 2] = red, green, blue
+        if mirrors:
+            red, green, blue = specular_at(surfaces, triangle, u, v)
+            hits.specular[i, 0], hits.specular[i, 1], hits.specular[i, 2] = red, green, blue
+
+
+@nb.njit(nogil=True, cache=True)
+def pixel_order(width: int, height: int) -> Int32:
+    """All pixels, in 4 x 4 blocks within 32 x 32 tiles.
+
+    16 neighbours make a coherent packet, and a tile's triangles stay in the cache.
+    """
+    order = np.empty(width * height, np.int32)
+    n = 0
+    for ty in range(0, height, 32):
+        for tx in range(0, width, 32):
+            for by in range(ty, min(ty + 32, height), 4):
+                for bx in range(tx, min(tx + 32, width), 4):
+                    for y in range(by, min(by + 4, height)):
+                        for x in range(bx, min(bx + 4, width)):
+                            order[n] = y * width + x
+                            n += 1
+    return order
+
+
+@nb.njit(nogil=True, cache=True)
+def _shoot(cams: Cameras, c: int, pixel: int, jx: float, jy: float, i: int, packets: Float32, hits: Hits) -> None:
+    """Write eye ray i, through (jx, jy) within the box of a pixel."""
+    dx, dy, dz = eye_ray(cams, c, pixel % cams.width + jx, pixel // cams.width + jy)
+    o = cams.position[c]
+    set_ray(packets, i, o[0], o[1], o[2], dx, dy, dz, np.float32(np.inf))
+    hits.pixel[i] = pixel
+
+
+@nb.njit(nogil=True, cache=True)
+def _shoot_sample(
+    cams: Cameras, c: int, seed: int, pixel: int, sample: int, i: int, packets: Float32, hits: Hits
+) -> None:
+    """Write the eye ray of one sample; the samples of a pixel are spread by the golden ratio sequence."""
+    jx, jy = r2(word(stream(seed, c, pixel, PIXEL_SAMPLE), PIXEL), sample)
+    _shoot(cams, c, pixel, jx, jy, i, packets, hits)
+    hits.key[i] = stream(seed, c, pixel, sample)
+
+
+@nb.njit(nogil=True, cache=True)
+def native_hits(
+    cams: Cameras,
+    c: int,
+    seed: int,
+    order: Int32,
+    per_pixel: int,
+    first: int,
+    n: int,
+    surfaces: Surfaces,
+    tracer: Tracer,
+    mirrors: bool,
+    packets: Float32,
+    hits: Hits,
+) -> None:
+    """Find native hits first to first + n - 1 of eye c.
+
+    A frame's hits are numbered by groups of 16 pixels of `order`, within a group by sample, then by pixel.
+    """
+    n_pixels = order.shape[0]
+    for i in range(n):
+        group, rest = divmod(first + i, 16 * per_pixel)
+        members = min(16, n_pixels - 16 * group)
+        sample, member = divmod(rest, members)
+        _shoot_sample(cams, c, seed, order[16 * group + member], sample, i, packets, hits)
+    intersect(tracer, packets, n)
+    record_hits(surfaces, tracer, packets, n, mirrors, hits)
+
+
+@nb.njit(nogil=True, cache=True)
+def extra_hits(
+    cams: Cameras,
+    c: int,
+    seed: int,
+    pixels: Int32,
+    first_sample: int,
+    per_pixel: int,
+    first: int,
+    n: int,
+    surfaces: Surfaces,
+    tracer: Tracer,
+    packets: Float32,
+    hits: Hits,
+) -> None:
+    """Find hits first to first + n - 1 of those that mirror pixels have beyond the others, `per_pixel` each."""
+    for i in range(n):
+        at, sample = divmod(first + i, per_pixel)
+        _shoot_sample(cams, c, seed, pixels[at], first_sample + sample, i, packets, hits)
+    intersect(tracer, packets, n)
+    record_hits(surfaces, tracer, packets, n, True, hits)
+
+
+@nb.njit(nogil=True, cache=True)
+def pilot_hits(
+    cams: Cameras,
+    c: int,
+    order: Int32,
+    first: int,
+    n: int,
+    surfaces: Surfaces,
+    tracer: Tracer,
+    packets: Float32,
+    hits: Hits,
+) -> None:
+    """Look through the centres of pixels order[first : first + n].
+
+    What they show decides how many samples a pixel gets; no sample's place depends on them, so that is unbiased.
+    """
+    for i in range(n):
+        _shoot(cams, c, order[first + i], 0.5, 0.5, i, packets, hits)
+    intersect(tracer, packets, n)
+    record_hits(surfaces, tracer, packets, n, True, hits)

@@ -1,0 +1,104 @@
+"""Random numbers keyed by (seed, camera, pixel, sample, dimension), and the maps from them to directions.
+
+A number depends on its key alone, never on order: images are the same for any number of threads and any split of the
+job. Lights are not part of the key, so that all lights share hits and directions and movies do not flicker.
+"""
+
+import numba as nb
+import numpy as np
+
+Triple = tuple[float, float, float]
+
+# Dimensions: one stream a purpose.
+PIXEL, HEMISPHERE, CHOICE = 0, 1, 2
+PIXEL_SAMPLE = (1 << 16) - 1  # the sample index, which no hit has, of what all samples of a pixel share
+
+# The two-dimensional golden ratio sequence (Roberts 2018): multiples of (1/g, 1/g^2), g = 1.3247..., in units of 2^-32.
+R2_X = np.uint32(3242174889)
+R2_Y = np.uint32(2447445414)
+
+_U32 = np.float32(2.0**-24)
+
+
+@nb.njit(nogil=True, cache=True)
+def mix(z: np.uint64) -> np.uint64:
+    """SplitMix64's finaliser: a bijection of 64 bits that leaves no visible structure."""
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return z ^ (z >> np.uint64(31))
+
+
+@nb.njit(nogil=True, cache=True)
+def stream(seed: int, c: int, pixel: int, sample: int) -> np.uint64:
+    """The 64-bit key of one sample: c below 2^20, pixel below 2^28, sample below 2^16."""
+    place = (np.uint64(c) << np.uint64(44)) | (np.uint64(pixel) << np.uint64(16)) | np.uint64(sample)
+    return mix(place ^ mix(np.uint64(seed) + np.uint64(0x9E3779B97F4A7C15)))
+
+
+@nb.njit(nogil=True, cache=True)
+def word(key: np.uint64, dimension: int) -> np.uint64:
+    """64 random bits: dimension `dimension` of a stream."""
+    return mix(key + np.uint64(dimension) * np.uint64(0x9E3779B97F4A7C15))
+
+
+@nb.njit(nogil=True, cache=True)
+def r2(bits: np.uint64, i: int) -> tuple[float, float]:
+    """Point i of the golden ratio sequence, shifted by the random bits: uniform in [0, 1)^2, well spread over i."""
+    x = np.uint32(bits & np.uint64(0xFFFFFFFF)) + np.uint32(i) * R2_X
+    y = np.uint32(bits >> np.uint64(32)) + np.uint32(i) * R2_Y
+    x, y = np.uint32(x) >> np.uint32(8), np.uint32(y) >> np.uint32(8)  # 24 bits: what float32 holds below 1
+    return np.float32(x) * _U32, np.float32(y) * _U32
+
+
+@nb.njit(nogil=True, cache=True)
+def disc(u: float, v: float) -> tuple[float, float]:
+    """Uniform point of the unit disc by Shirley and Chiu's concentric map.
+
+    Its angles stay within pi/4, so short series do for cosine and sine.
+    """
+    a, b = np.float32(2.0) * u - np.float32(1.0), np.float32(2.0) * v - np.float32(1.0)
+    if a == 0.0 and b == 0.0:
+        return np.float32(0.0), np.float32(0.0)
+    steep = abs(b) > abs(a)
+    radius = b if steep else a
+    angle = np.float32(np.pi / 4) * (a / b if steep else b / a)
+    square = angle * angle
+    # Taylor series of cosine and sine; the first terms left out are below 3e-8 for angles up to pi/4
+    cosine = np.float32(1.0) + square * (
+        np.float32(-1 / 2)
+        + square * (np.float32(1 / 24) + square * (np.float32(-1 / 720) + square * np.float32(1 / 40320)))
+    )
+    sine = angle * (
+        np.float32(1.0)
+        + square * (np.float32(-1 / 6) + square * (np.float32(1 / 120) + square * np.float32(-1 / 5040)))
+    )
+    if steep:
+        return radius * sine, radius * cosine
+    return radius * cosine, radius * sine
+
+
+@nb.njit(nogil=True, cache=True)
+def cosine_direction(nx: float, ny: float, nz: float, u: float, v: float) -> Triple:
+    """Unit direction about the unit normal n with density cos(theta) / pi; the frame is Duff et al.'s (2017)."""
+    x, y = disc(u, v)
+    z = np.sqrt(max(np.float32(0.0), np.float32(1.0) - x * x - y * y))
+    sign = np.float32(1.0) if nz >= 0.0 else np.float32(-1.0)
+    a = np.float32(-1.0) / (sign + nz)
+    b = nx * ny * a
+    return (
+        x * (np.float32(1.0) + sign * nx * nx * a) + y * b + z * nx,
+        x * sign * b + y * (sign + ny * ny * a) + z * ny,
+        -x * sign * nx - y * ny + z * nz,
+    )
+
+
+@nb.njit(nogil=True, cache=True)
+def above(x: float, y: float, z: float, gx: float, gy: float, gz: float) -> Triple:
+    """A direction mirrored into the half-space of g where it points below the surface.
+
+    Interpolated normals tilt the hemisphere; what falls below the triangle would only meet the triangle itself.
+    """
+    height = x * gx + y * gy + z * gz
+    if height < 0.0:
+        return x - np.float32(2.0) * height * gx, y - np.float32(2.0) * height * gy, z - np.float32(2.0) * height * gz
+    return x, y, z

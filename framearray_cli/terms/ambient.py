@@ -1,0 +1,253 @@
+"""Average ambient intensity I_A[l] = E[l] / pi, found before the first frame [FA eq. 2].
+
+E[l] is the average irradiance, all bounces counted, over the surface sides that light on its way to the eye comes
+from. `method = "eye"` walks from eye hits of the whole camera path: E[l] is its mean over the first vertices after the
+eye hit, which is what obscurance rays see. The same walks serve every light position, so I_A does not flicker.
+`method = "light"` is in `ambient_light.py`.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numba as nb
+import numpy as np
+
+from ..arrays import Float32, Float64, Rgb
+from ..camera import Cameras, eye_ray
+from ..embree.packets import HIT_ROWS, LANES, RAY_ROWS, Tracer, empty_packets, intersect, set_ray
+from ..hits import ESCAPED, SURFACE, Hits, empty_hits, record_hits
+from ..lights import LightArrays
+from ..sampling import PIXEL, PIXEL_SAMPLE, r2, stream, word
+from ..surface import Surfaces
+from .direct import direct
+from .walks import DIFFUSE, MAX_BOUNCES, MIRROR, Walkers, advance, choose_step, deposit, empty_walkers
+
+BATCH = 4096
+# Automatic number of walks: as many batches as it takes to reach this standard error, within bounds.
+TARGET_ERROR = 0.01
+FEWEST, MOST = BATCH, 64 * BATCH
+# No walk of a frame uses this camera index, so that ambient walks are independent of every frame's samples.
+AMBIENT_STREAM = (1 << 20) - 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Ambient:
+    """The ambient estimate of a job.
+
+    Attributes:
+        intensity: (n_lights, 3) I_A, radiance.
+        standard_error: (n_lights,) of I_A, relative to it, of the mean of the channels; 0 where I_A is 0 or given.
+        reflectivity: (3,) average reflectivity over the surfaces that E averages.
+        paths: walks or particles a light position that were spent.
+        rays: rays that were traced.
+        notes: what the user should know, e.g. that the target error was not reached.
+    """
+
+    intensity: Rgb
+    standard_error: Float64
+    reflectivity: Rgb
+    paths: int
+    rays: int
+    notes: tuple[str, ...] = ()
+
+
+class Workspace:
+    """Arrays for one batch of walks, kept from batch to batch."""
+
+    def __init__(self, lights: LightArrays) -> None:
+        self.hit_packets = empty_packets(BATCH // LANES, HIT_ROWS)
+        self.shadow_packets = empty_packets(BATCH // LANES, RAY_ROWS)
+        self.hits = [empty_hits(BATCH), empty_hits(BATCH)]
+        self.walkers = [empty_walkers(BATCH), empty_walkers(BATCH)]
+        self.irradiance = np.empty((BATCH, lights.channels, lights.n_lights), np.float32)
+        self.sums = np.empty((BATCH, 3, lights.n_lights), np.float32)
+        self.rays = 0
+
+    def advance(self, n: int, surfaces: Surfaces, tracer: Tracer) -> int:
+        """Move all walks on; `hits[0]` and `walkers[0]` are the current ones before and after."""
+        n = advance(self.hits[0], self.walkers[0], n, surfaces, tracer, self.hit_packets, self.hits[1], self.walkers[1])
+        self.hits.reverse()
+        self.walkers.reverse()
+        self.rays += n
+        return n
+
+    def direct(self, where: Rgb, n: int, lights: LightArrays, tracer: Tracer) -> Float32:
+        """Direct irradiance at the first n current hits, (n, channels, n_lights); 0 where `where` (n, 3) is 0."""
+        hits = self.hits[0]._replace(reflectivity=where)
+        self.rays += direct(hits, n, lights, tracer, self.shadow_packets, self.irradiance)
+        return self.irradiance[:n]
+
+    def gather(self, n: int, lights: LightArrays, tracer: Tracer) -> None:
+        """Add the direct irradiance at every current hit that its walk leaves diffusely to the walk's sums."""
+        leaves = self.walkers[0].step[:n, None] == DIFFUSE
+        where = np.ascontiguousarray(np.broadcast_to(leaves, (n, 3)), np.float32)
+        deposit(self.walkers[0], n, self.direct(where, n, lights, tracer), self.sums)
+
+
+@nb.njit(nogil=True, cache=True)
+def _start_at_eyes(
+    cams: Cameras,
+    seed: int,
+    first: int,
+    n: int,
+    surfaces: Surfaces,
+    tracer: Tracer,
+    packets: Float32,
+    hits: Hits,
+    walkers: Walkers,
+) -> None:
+    """Shoot eye rays first to first + n - 1, spread over all images of the camera path by the golden ratio sequence."""
+    start = word(stream(seed, AMBIENT_STREAM, 0, PIXEL_SAMPLE), PIXEL)
+    n_c = cams.position.shape[0]
+    for i in range(n):
+        a, b = r2(start, first + i)
+        # which eye: the golden section, a third sequence that does not march in step with the other two
+        e = ((first + i + 0.5) * 0.6180339887498949) % 1.0
+        c = min(int(e * n_c), n_c - 1)
+        dx, dy, dz = eye_ray(cams, c, a * cams.width, b * cams.height)
+        o = cams.position[c]
+        set_ray(packets, i, o[0], o[1], o[2], dx, dy, dz, np.float32(np.inf))
+        hits.key[i] = stream(seed, AMBIENT_STREAM, (first + i) & ((1 << 28) - 1), 0)
+        walkers.walk[i] = i
+        walkers.throughput[i, :] = 1.0
+    intersect(tracer, packets, n)
+    record_hits(surfaces, tracer, packets, n, True, hits)
+
+
+@nb.njit(nogil=True, cache=True)
+def choose_all(hits: Hits, walkers: Walkers, n: int, must_go_on: bool) -> None:
+    """Choose the next step of walks 0 to n - 1; see `choose_step`."""
+    for i in range(n):
+        choose_step(hits, walkers, i, must_go_on)
+
+
+@nb.njit(nogil=True, cache=True)
+def _see_background(hits: Hits, walkers: Walkers, n: int, background: Rgb, sums: Float32) -> None:
+    """A walk that leaves the scene brings the background's irradiance: pi times its radiance."""
+    for i in range(n):
+        if hits.kind[i] == ESCAPED:
+            for channel in range(3):
+                t = walkers.throughput[i, channel]
+                sums[walkers.walk[i], channel] += t * np.float32(np.pi) * background[channel]
+
+
+def _to_first_vertices(work: Workspace, n: int, surfaces: Surfaces, tracer: Tracer) -> int:
+    """From eye hits, through mirrors, to the diffuse hit that the eye sees, and on to the vertex after it.
+
+    Walks that wait there while others still pass mirrors are set aside.
+    """
+    done_hits, done_walkers, found = [], [], 0
+    for _ in range(MAX_BOUNCES):
+        hits, walkers = work.hits[0], work.walkers[0]
+        choose_all(hits, walkers, n, True)
+        n = work.advance(n, surfaces, tracer)
+        hits, walkers = work.hits[0], work.walkers[0]
+        arrived = (walkers.step[:n] == DIFFUSE) & (hits.kind[:n] == SURFACE)
+        done_hits.append(Hits(*(a[:n][arrived] for a in hits)))
+        done_walkers.append(Walkers(*(a[:n][arrived] for a in walkers)))
+        found += int(arrived.sum())
+        rest = (walkers.step[:n] == MIRROR) & (hits.kind[:n] == SURFACE)
+        n = int(rest.sum())
+        for array in (*hits, *walkers):
+            array[:n] = array[: len(rest)][rest]
+        if n == 0:
+            break
+    for target, parts in (
+        *zip(work.hits[0], zip(*done_hits, strict=True), strict=True),
+        *zip(work.walkers[0], zip(*done_walkers, strict=True), strict=True),
+    ):
+        target[:found] = np.concatenate(parts)
+    return found
+
+
+def ambient_by_eye(
+    cams: Cameras,
+    seed: int,
+    paths: int | None,
+    surfaces: Surfaces,
+    tracer: Tracer,
+    lights: LightArrays,
+    background: Rgb,
+) -> Ambient:
+    """Estimate I_A[l] and the average reflectivity by walks from the eyes.
+
+    Args:
+        paths: number of walks; None: as many as a standard error of 1 % takes, at most `MOST`.
+        background: (3,) radiance outside the scene; it lights the surfaces too.
+    """
+    work = Workspace(lights)
+    count, spent, reflectivity = 0, 0, np.zeros(3)
+    total, squares = np.zeros((3, lights.n_lights)), np.zeros(lights.n_lights)
+    limit = paths or MOST
+    while spent < limit:
+        n = min(BATCH, limit - spent)
+        _start_at_eyes(cams, seed, spent, n, surfaces, tracer, work.hit_packets, work.hits[0], work.walkers[0])
+        work.rays += n
+        spent += n
+        n = _to_first_vertices(work, n, surfaces, tracer)
+        work.sums[:] = 0.0
+        hits, walkers = work.hits[0], work.walkers[0]
+        reflectivity += (hits.reflectivity[:n] + hits.specular[:n]).sum(axis=0, dtype=np.float64)
+        walkers.throughput[:n] = 1.0
+        walkers.step[:n] = DIFFUSE
+        first = walkers.walk[:n].copy()
+        for _ in range(MAX_BOUNCES):
+            work.gather(n, lights, tracer)
+            n = work.advance(n, surfaces, tracer)
+            if background.any():
+                _see_background(work.hits[0], work.walkers[0], n, background, work.sums)
+            choose_all(work.hits[0], work.walkers[0], n, False)
+            if n == 0:
+                break
+        gathered = work.sums[first].astype(np.float64) * lights.colour.T  # (n, 3, n_lights)
+        count += len(first)
+        total += gathered.sum(axis=0)
+        squares += (gathered.mean(axis=1) ** 2).sum(axis=0)
+        if paths is None and spent >= FEWEST and count and relative_error(total, squares, count).max() <= TARGET_ERROR:
+            break
+    return summarise(total, squares, count, reflectivity, spent, work.rays, paths is None)
+
+
+def relative_error(total: Float64, squares: Float64, count: int) -> Float64:
+    """Standard error of the mean over the channels' mean, per light position; 0 where nothing arrives."""
+    mean = total.mean(axis=0) / count
+    variance = np.maximum(squares / count - mean**2, 0.0) / max(count - 1, 1)
+    return np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
+
+
+def summarise(
+    total: Float64,
+    squares: Float64,
+    count: int,
+    reflectivity: Float64,
+    spent: int,
+    rays: int,
+    automatic: bool,
+    more_variance: Float64 | float = 0.0,
+) -> Ambient:
+    """Means and standard errors of `count` walks; `more_variance` is relative and adds to theirs."""
+    n_lights = total.shape[1]
+    if count == 0:
+        return Ambient(
+            intensity=np.zeros((n_lights, 3), np.float32),
+            standard_error=np.zeros(n_lights),
+            reflectivity=np.zeros(3, np.float32),
+            paths=spent,
+            rays=rays,
+            notes=("no walk from the eyes met a second surface: the ambient intensity is 0",),
+        )
+    error = np.sqrt(relative_error(total, squares, count) ** 2 + more_variance)
+    notes = ()
+    if automatic and error.max() > TARGET_ERROR:
+        notes = (
+            f"ambient: standard error {error.max():.1%} at light {int(error.argmax())} after {spent} walks, "
+            f"the most that are spent by themselves; set ambient.paths for more",
+        )
+    return Ambient(
+        intensity=(total.T / count / math.pi).astype(np.float32),
+        standard_error=error,
+        reflectivity=(reflectivity / count).astype(np.float32),
+        paths=spent,
+        rays=rays,
+        notes=notes,
+    )

@@ -1,0 +1,178 @@
+"""The window of frames under way, and composing one frame from it.
+
+What is kept of a frame is its list of hits, not sums: a hit with its irradiance under every light is stored once and
+read by the 2 N_r + 1 frames that use it, where buffers of sums would be read and written once a frame that
+contributes (docs/decisions/window.md). A frame is composed as soon as the last frame that can reach it is found, and
+what no frame can need any more is dropped: never more than 2 N_r + 1 frames are held.
+"""
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import numba as nb
+import numpy as np
+
+from .arrays import Float32, Images, Int32
+from .compose import INDIRECT, OBSCURANCE, Band, accumulate, begin, empty_band, finish, normalise
+from .frame import Crew, Frame, Placed, Records, Scratch, Work
+from .terms.ambient import Ambient
+
+# Pixels composed together: their sums over all lights fit a core's cache.
+BAND_PIXELS = 1024
+_NOTHING = np.empty(0, np.float32)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Layers:
+    """What a frame shows whatever the light, per pixel; (height, width, channels) or (height, width).
+
+    Attributes:
+        obscurance, indirect, reflectivity: W, R W and R, averaged over all hits.
+        normal, depth: shading normal and distance along the optical axis, averaged over native hits; 0 if all escape.
+        samples: hits that the pixel rests on, native and outer.
+    """
+
+    obscurance: Float32
+    indirect: Float32
+    reflectivity: Float32
+    normal: Float32
+    depth: Float32
+    samples: Float32
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Composed:
+    """One finished frame.
+
+    Attributes:
+        images: (n_lights, height, width, 3) radiance.
+        layers: None unless the job keeps them.
+        samples: mean number of hits a pixel.
+        bad: number of values that were not finite or negative; each was replaced by 0.
+        first_bad: light index and pixel of the first of them, or None.
+    """
+
+    c: int
+    images: Images
+    layers: Layers | None
+    samples: float
+    bad: int
+    first_bad: tuple[int, int] | None
+
+
+class Window:
+    """At most 2 N_r + 1 frames, and the crew that composes from them."""
+
+    def __init__(self, work: Work, ambient: Ambient, crew: Crew) -> None:
+        self._work = work
+        self._ambient = ambient
+        self._crew = crew
+        self._frames: dict[int, Frame] = {}
+        self._bands = [empty_band(BAND_PIXELS, work.lights.n_lights) for _ in range(crew.threads)]
+
+    def add(self, frame: Frame) -> None:
+        """Take in a frame's hits and drop the frame that is out of reach now."""
+        self._frames.pop(frame.c - 2 * self._work.n_r - 1, None)
+        self._frames[frame.c] = frame
+
+    def compose(self, j: int, images: Images) -> Composed:
+        """Compose frame j, once all frames of its window were added.
+
+        Args:
+            images: (n_lights, height, width, 3), overwritten.
+        """
+        work = self._work
+        flat = images.reshape(work.lights.n_lights, work.n_pixels, 3)
+        maps = np.empty((work.n_pixels, 9), np.float32) if work.layers else None
+        own = np.empty((work.n_pixels, 4), np.float32) if work.layers else None
+        samples = np.empty(work.n_pixels, np.int32)
+
+        def band(first: int, scratch: Scratch) -> tuple[int, int, int]:
+            started = perf_counter()
+            n = min(BAND_PIXELS, work.n_pixels - first)
+            sums = self._bands.pop()
+            try:
+                self._sum_hits(j, first, n, sums)
+                samples[first : first + n] = sums.hits[:n]
+                if maps is not None and own is not None:
+                    maps[first : first + n, :3] = sums.rest[:n, OBSCURANCE : OBSCURANCE + 3]
+                    maps[first : first + n, 3:6] = sums.rest[:n, INDIRECT : INDIRECT + 3]
+                    maps[first : first + n, 6:] = sums.reflectivity[:n]
+                    frame = self._frames[j]
+                    place = frame.places[j]
+                    average_native(place.start, place.order, frame.normal, frame.depth, first, n, own)
+                self._sum_mirrored(j, first, n, sums)
+                bad = finish(sums, first, n, work.lights.colour, self._ambient.intensity, flat)
+            finally:
+                self._bands.append(sums)
+            scratch.seconds["compose"] += perf_counter() - started
+            return bad
+
+        results = self._crew.run(band, range(0, work.n_pixels, BAND_PIXELS))
+        bad = sum(result[0] for result in results)
+        shape = images.shape[1:3]
+        return Composed(
+            c=j,
+            images=images,
+            layers=_layers(maps, own, samples, shape) if maps is not None and own is not None else None,
+            samples=float(samples.mean()),
+            bad=bad,
+            first_bad=next(((l, pixel) for count, l, pixel in results if count), None),
+        )
+
+    def _sum_hits(self, j: int, first: int, n: int, sums: Band) -> None:
+        """Weighed means over all hits of frame j in a band."""
+        begin(sums, n)
+        for k in self._work.frames_around(j, self._work.n_r):
+            frame = self._frames[k]
+            _add(sums, first, n, frame.places[j], frame.records, frame.weights[j], _NOTHING)
+        normalise(sums, n)
+
+    def _sum_mirrored(self, j: int, first: int, n: int, sums: Band) -> None:
+        """Add what the mirrors of frame j show: a mean over its native hits alone."""
+        frame = self._frames[j]
+        if frame.mirrored is not None and frame.mirror_places is not None:
+            _add(sums, first, n, frame.mirror_places, frame.mirrored, _NOTHING, frame.mirror_scale)
+
+
+def _add(sums: Band, first: int, n: int, place: Placed, records: Records, weight: Float32, scale: Float32) -> None:
+    accumulate(
+        sums, first, n, place.start, place.order, weight, scale,
+        records.reflectivity, records.obscurance, records.constant, records.irradiance,
+    )  # fmt: skip
+
+
+@nb.njit(nogil=True, cache=True)
+def average_native(
+    start: Int32, order: Int32, normal: Float32, depth: Float32, first: int, n: int, out: Float32
+) -> None:
+    """Mean normal and depth of the native hits of pixels first to first + n - 1 that are on a surface.
+
+    Args:
+        start, order: native hits sorted by pixel; hits of other frames among them do not exist.
+        out: (n_pixels, 4) written: normal, depth; 0 where no native hit is on a surface.
+    """
+    for pixel in range(first, first + n):
+        out[pixel, :] = 0.0
+        found = 0
+        for entry in range(start[pixel], start[pixel + 1]):
+            hit = order[entry]
+            if depth[hit] > 0.0:
+                found += 1
+                out[pixel, 3] += depth[hit]
+                for axis in range(3):
+                    out[pixel, axis] += normal[hit, axis]
+        if found:
+            for value in range(4):
+                out[pixel, value] /= np.float32(found)
+
+
+def _layers(maps: Float32, own: Float32, samples: Int32, shape: tuple[int, ...]) -> Layers:
+    return Layers(
+        obscurance=maps[:, :3].reshape(*shape, 3),
+        indirect=maps[:, 3:6].reshape(*shape, 3),
+        reflectivity=maps[:, 6:].reshape(*shape, 3),
+        normal=own[:, :3].reshape(*shape, 3),
+        depth=own[:, 3].reshape(shape),
+        samples=samples.astype(np.float32).reshape(shape),
+    )
