@@ -1,0 +1,170 @@
+"""Key frames -> eyes[c] and lights[l], in float64 and in the scene file's own coordinates.
+
+Numbers and positions follow monotone cubic curves (PCHIP): they pass through their keys, never leave the span
+between two neighbouring keys, and rest where two keys are equal. Directions follow the like of it on the sphere.
+Before the first and after the last key everything rests.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from .arrays import Float64, WorldPoints
+from .errors import JobError
+from .job import Job
+from .jobkeys import CameraKey, DirectionalKey, PointKey
+from .sphere import directions_between, unit
+
+# Look and up closer to parallel than this (radians) leave no digits to tell what is right of the picture.
+PARALLEL = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Eyes:
+    """The camera at every frame c.
+
+    Attributes:
+        position: (n, 3), scene units.
+        world_from_camera: (n, 4, 4), right-handed and orthonormal; the camera looks along -z, y is up in the picture.
+        fov_deg: vertical field of view, degrees.
+    """
+
+    position: WorldPoints
+    world_from_camera: Float64
+    fov_deg: float
+
+    @property
+    def n(self) -> int:
+        """Number of eyes, N_c."""
+        return len(self.position)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LightPath:
+    """One source at every light index l.
+
+    Attributes:
+        kind: "point" or "directional".
+        vector: (n, 3) position in scene units, or unit direction in which the light travels.
+        intensity: (n, 3) linear RGB, times the source's colour: W/sr of a point, W/m2 of a directional source.
+    """
+
+    kind: Literal["point", "directional"]
+    vector: Float64
+    intensity: Float64
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Lights:
+    """All sources; those of one light index l shine together."""
+
+    sources: tuple[LightPath, ...]
+
+    @property
+    def n(self) -> int:
+        """Number of light positions, N_l."""
+        return len(self.sources[0].vector)
+
+
+def eyes(job: Job) -> Eyes:
+    """Place the camera at every frame of a job.
+
+    Raises:
+        JobError: between two keys the eye comes to where it looks.
+    """
+    keys = job.camera.keys
+    frames = [key.frame for key in keys]
+    position = between_keys(frames, [key.eye for key in keys], job.camera.frames)
+    target = between_keys(frames, [key.target for key in keys], job.camera.frames)
+    look_vec = target - position
+    if (met := np.flatnonzero(np.linalg.norm(look_vec, axis=1) <= _rounding(position))).size:
+        problem = f"camera.keys: expected a target away from the eye, got the same point at frame {met[0]}; move a key"
+        raise JobError(job.file or job.name, [problem])
+    look_dir = unit(look_vec)
+    right_dir = _right(look_dir, _ups(keys, job), job.camera.keys[0].up is None)
+    matrix = np.zeros((len(position), 4, 4))
+    matrix[:, :3, 0] = right_dir
+    matrix[:, :3, 1] = unit(np.cross(right_dir, look_dir))
+    matrix[:, :3, 2] = -look_dir
+    matrix[:, :3, 3] = position
+    matrix[:, 3, 3] = 1.0
+    return Eyes(position=position, world_from_camera=matrix, fov_deg=job.camera.fov)
+
+
+def lights(job: Job) -> Lights:
+    """Place and set every source at every light index of a job."""
+    return Lights(
+        sources=tuple(_light_path(source.type, source.keys, job.light.frames) for source in job.light.sources)
+    )
+
+
+def _light_path(
+    kind: Literal["point", "directional"], keys: Sequence[PointKey | DirectionalKey], n_lights: int
+) -> LightPath:
+    """Place and set one source."""
+    frames = [key.frame for key in keys]
+    places = [key.position if isinstance(key, PointKey) else key.direction for key in keys]
+    powers = [key.intensity if isinstance(key, PointKey) else key.irradiance for key in keys]
+    vector = (between_keys if kind == "point" else directions_between)(frames, places, n_lights)
+    colors = [key.color if key.color is not None else (1.0, 1.0, 1.0) for key in keys]
+    intensity = between_keys(frames, powers, n_lights) * between_keys(frames, colors, n_lights)
+    return LightPath(kind=kind, vector=vector, intensity=intensity)
+
+
+def between_keys(frames: Sequence[int], values: Sequence[Sequence[float]], n: int) -> Float64:
+    """Interpolate key values to frames 0 .. n - 1.
+
+    Edge cases: one key is constant, two are a straight line; equal neighbours stay equal to the last bit.
+
+    Args:
+        frames: frame of each key, strictly increasing.
+        values: (n_keys, k) value of each key.
+        n: number of frames.
+
+    Returns:
+        (n, k)
+    """
+    keyed = np.asarray(values, dtype=np.float64)
+    if len(frames) == 1:
+        return np.repeat(keyed, n, axis=0)
+    from scipy.interpolate import PchipInterpolator
+
+    at = np.clip(np.arange(n), frames[0], frames[-1])
+    before = np.searchsorted(frames, at, side="right").clip(max=len(frames) - 1) - 1  # (n,) key before each frame
+    ends = np.stack([keyed[before], keyed[before + 1]])
+    curve: Float64 = PchipInterpolator(frames, keyed, axis=0)(at)
+    curve = np.clip(curve, ends.min(axis=0), ends.max(axis=0))  # the last bits, too, stay between the keys
+    for key, frame in enumerate(frames):
+        curve[at == frame] = keyed[key]
+    return curve
+
+
+def _ups(keys: Sequence[CameraKey], job: Job) -> Float64:
+    """Find the up direction of each frame, (n_c, 3): of the keys, else of the scene."""
+    axis = (0.0, 0.0, 1.0) if job.scene.up == "z" else (0.0, 1.0, 0.0)
+    return directions_between([key.frame for key in keys], [key.up or axis for key in keys], job.camera.frames)
+
+
+def _right(look_dir: Float64, up_dir: Float64, up_is_axis: bool) -> Float64:
+    """Find what is right in the picture, (n, 3) unit vectors normal to the look.
+
+    A frame that looks along up takes its right from the nearest frame that does not, so that a camera that tilts
+    to the zenith arrives without a turn. Where there is none, right is x, or for a given up some axis normal to it.
+    """
+    right_vec = np.cross(look_dir, up_dir)
+    steep = np.linalg.norm(right_vec, axis=1) <= PARALLEL
+    good = np.flatnonzero(~steep)
+    for c in np.flatnonzero(steep):
+        choices = [right_vec[good[np.abs(good - c).argmin()]]] if good.size else []
+        choices += [np.eye(3)[0]] if up_is_axis else []
+        choices += [np.eye(3)[np.abs(look_dir[c]).argmin()]]
+        level = [choice - (choice @ look_dir[c]) * look_dir[c] for choice in choices]
+        right_vec[c] = next(vector for vector in level if np.linalg.norm(vector) > PARALLEL)
+    return unit(right_vec)
+
+
+def _rounding(position: Float64) -> Float64:
+    """Distance below which two points cannot be told apart, (n,): some last bits of the largest coordinate."""
+    return np.asarray(16 * np.finfo(np.float64).eps * np.abs(position).max(axis=1))
