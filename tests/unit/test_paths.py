@@ -1,0 +1,240 @@
+"""Eyes and lights between their keys: they pass through keys, stay between them, and rest where keys are equal."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from framearray_cli.errors import JobError
+from framearray_cli.job import Job
+from framearray_cli.paths import between_keys, eyes, lights
+from framearray_cli.sphere import directions_between, slerp, turn, unit
+
+FEW = settings(max_examples=60, deadline=None)
+numbers = st.floats(-1e6, 1e6)
+vectors = st.tuples(numbers, numbers, numbers)
+frame_lists = st.lists(st.integers(0, 60), min_size=1, max_size=6, unique=True).map(sorted)
+
+
+def job_of(camera_keys, *, scene=None, light=None, frames=None):
+    """Make a job around some camera keys."""
+    camera = {"keys": camera_keys} if frames is None else {"keys": camera_keys, "frames": frames}
+    lamp = {"type": "point", "keys": [{"frame": 0, "position": [0, 2, 0], "intensity": 1}]}
+    table = {
+        "name": "test",
+        "scene": {"file": "a.glb", **(scene or {})},
+        "camera": camera,
+        "light": light or {"sources": [lamp]},
+        "obscurance": {"range": 1},
+    }
+    return Job.model_validate(table)
+
+
+def fixed(eye, target, **more):
+    """Place one camera and give its matrix."""
+    return eyes(job_of([{"frame": 0, "eye": eye, "target": target, **more}])).world_from_camera[0]
+
+
+@FEW
+@given(frames=frame_lists, data=st.data())
+def test_numbers_pass_through_keys_and_stay_between_neighbours(frames, data):
+    values = np.array(data.draw(st.lists(vectors, min_size=len(frames), max_size=len(frames))))
+    n = frames[-1] + 5
+    curve = between_keys(frames, values, n)
+    assert curve.shape == (n, 3)
+    assert (curve[frames] == values).all()
+    assert (curve[: frames[0]] == values[0]).all()
+    assert (curve[frames[-1] :] == values[-1]).all()
+    for k in range(len(frames) - 1):
+        span = curve[frames[k] : frames[k + 1] + 1]
+        assert (span >= np.minimum(values[k], values[k + 1])).all()
+        assert (span <= np.maximum(values[k], values[k + 1])).all()
+
+
+def test_equal_neighbours_stay_equal_bit_for_bit():
+    curve = between_keys([0, 7, 19, 30], [[0.1], [0.7], [0.7], [0.3]], 31)
+    assert (curve[7:20] == 0.7).all()
+    assert len(np.unique(curve[:8])) == 8
+
+
+def test_two_keys_are_a_straight_line():
+    curve = between_keys([2, 12], [[0.0, 5.0], [1.0, -5.0]], 13)[:, 0]
+    np.testing.assert_allclose(curve[2:], np.linspace(0, 1, 11), rtol=0, atol=1e-15)
+
+
+def test_a_path_through_keys_has_no_corner():
+    curve = between_keys([0, 100, 250], [[0.0], [1.0], [4.0]], 251)[:, 0]
+    steps = np.diff(curve)
+    assert np.abs(np.diff(steps)).max() < 0.05 * steps.max()  # a broken line would jump by half of its largest step
+
+
+@FEW
+@given(frames=frame_lists, seed=st.integers(0, 2**32 - 1))
+def test_directions_pass_through_keys_and_stay_unit(frames, seed):
+    keys = np.random.default_rng(seed).normal(size=(len(frames), 3))
+    path = directions_between(frames, keys, frames[-1] + 4)
+    np.testing.assert_allclose(np.linalg.norm(path, axis=1), 1, rtol=0, atol=1e-12)
+    assert (path[frames] == unit(keys)).all()
+    assert (path[frames[-1] :] == path[frames[-1]]).all()
+
+
+def test_two_directions_turn_at_constant_speed():
+    path = directions_between([0, 10], [[1, 0, 0], [-1, 1e-3, 0]], 11)
+    whole = np.pi - 1e-3
+    angles = np.arctan2(path[:, 1], path[:, 0])
+    np.testing.assert_allclose(angles, np.linspace(0, whole, 11), rtol=0, atol=1e-6)
+    assert (path[:, 2] == 0).all()
+
+
+def test_directions_on_a_great_circle_stay_on_it_without_turning_back():
+    angles = np.array([0.0, 0.2, 0.3, 1.7, 1.8])
+    keys = np.stack([np.cos(angles), np.zeros(5), np.sin(angles)], axis=1)
+    path = directions_between([0, 20, 25, 60, 90], keys, 91)
+    np.testing.assert_allclose(path[:, 1], 0, atol=1e-15)
+    assert (np.diff(np.arctan2(path[:, 2], path[:, 0])) > 0).all()
+
+
+def test_direction_path_has_no_corner_at_a_key():
+    path = directions_between([0, 200, 400], [[1, 0, 0], [0.6, 0.7, 0.2], [0, 0.2, 1]], 401)
+    steps = turn(path[:-1], path[1:])
+    length = np.linalg.norm(steps, axis=1)
+    bend = np.linalg.norm(np.diff(steps, axis=0), axis=1)
+    assert bend.max() < 0.05 * length.max()
+
+
+def test_equal_directions_of_any_length_rest():
+    path = directions_between([0, 5, 9, 12], [[0, -1, 0.3], [1, -1, 0], [3, -3, 0], [1, 0, 0]], 13)
+    assert (path[5:10] == path[5]).all()
+    assert not (path[4] == path[5]).all()
+
+
+def test_directions_do_not_depend_on_axes():
+    rotation = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    keys = np.array([[1, 0.1, 0], [0.2, 1, 0.4], [-1, 0.3, 1], [-1, -1, 1]])
+    plain = directions_between([0, 4, 11, 20], keys, 21)
+    turned = directions_between([0, 4, 11, 20], keys @ rotation.T, 21)
+    np.testing.assert_allclose(turned, plain @ rotation.T, rtol=0, atol=1e-12)
+
+
+def test_slerp_of_opposite_directions_stays_unit():
+    start = np.array([[0.0, 0.0, 1.0]])
+    half = slerp(start, -start, np.array([[0.5]]))
+    assert abs(half[0] @ start[0]) < 1e-12
+    assert abs(np.linalg.norm(half) - 1) < 1e-12
+
+
+def test_camera_looks_along_minus_z_with_y_up():
+    matrix = fixed([1, 2, 3], [1, 2, -7])
+    expected = np.eye(4)
+    expected[:3, 3] = [1, 2, 3]
+    assert (matrix == expected).all()
+
+
+@FEW
+@given(seed=st.integers(0, 2**32 - 1))
+def test_matrices_are_right_handed_and_look_at_the_target(seed):
+    random = np.random.default_rng(seed)
+    keys = [
+        {"frame": f, "eye": list(random.normal(size=3)), "target": list(np.add(random.normal(size=3), [5, 0, 0]))}
+        for f in (0, 9, 14)
+    ]
+    placed = eyes(job_of(keys))
+    rotation = placed.world_from_camera[:, :3, :3]
+    np.testing.assert_allclose(
+        rotation.transpose(0, 2, 1) @ rotation, np.broadcast_to(np.eye(3), (15, 3, 3)), atol=1e-12
+    )
+    np.testing.assert_allclose(np.linalg.det(rotation), 1, atol=1e-12)
+    assert (rotation[:, 1, 0] == 0).all() or np.abs(rotation[:, 1, 0]).max() < 1e-15  # the horizon is level
+    assert (rotation[:, 1, 1] > 0).all()
+    for key in keys:
+        look = unit(np.subtract(key["target"], key["eye"]))
+        np.testing.assert_allclose(-rotation[key["frame"], :, 2], look, atol=1e-14)
+        assert (placed.position[key["frame"]] == key["eye"]).all()
+    assert (placed.world_from_camera[:, 3] == [0, 0, 0, 1]).all()
+    assert placed.n == 15
+
+
+def test_z_up_scene_holds_the_camera_by_z():
+    job = job_of([{"frame": 0, "eye": [0, 0, 0], "target": [0, 5, 0]}], scene={"file": "part.STL"})
+    np.testing.assert_array_equal(eyes(job).world_from_camera[0, :3, 1], [0, 0, 1])
+
+
+@pytest.mark.parametrize(
+    ("up", "target", "picture_up"),
+    [
+        ("y", [0, -1, 0], [0, 0, -1]),
+        ("y", [0, 1, 0], [0, 0, 1]),
+        ("z", [0, 0, -1], [0, 1, 0]),
+        ("z", [0, 0, 1], [0, -1, 0]),
+    ],
+)
+def test_looking_along_up_is_a_tilted_camera(up, target, picture_up):
+    job = job_of([{"frame": 0, "eye": [0, 0, 0], "target": target}], scene={"up": up})
+    np.testing.assert_array_equal(eyes(job).world_from_camera[0, :3, 1], picture_up)
+
+
+def test_arriving_at_the_zenith_keeps_right_where_it_was():
+    keys = [
+        {"frame": 0, "eye": [0, 0, 0], "target": [3, 0, 4]},
+        {"frame": 10, "eye": [0, 0, 0], "target": [0, 5, 0]},
+        {"frame": 15, "eye": [0, 0, 0], "target": [0, 7, 0]},
+    ]
+    right = eyes(job_of(keys)).world_from_camera[:, :3, 0]
+    np.testing.assert_allclose(right, np.broadcast_to([-0.8, 0, 0.6], (16, 3)), atol=1e-12)
+
+
+def test_up_of_the_keys_rolls_the_picture():
+    matrix = fixed([0, 0, 0], [0, 0, -1], up=[5, 0, 0])
+    np.testing.assert_allclose(matrix[:3, :2].T, [[0, -1, 0], [1, 0, 0]], atol=1e-15)
+    along = fixed([0, 0, 0], [0, 0, -1], up=[0, 0, 2])
+    assert abs(np.linalg.det(along[:3, :3]) - 1) < 1e-12
+
+
+def test_equal_keys_give_the_same_eye_bit_for_bit():
+    still = {"eye": [0.1, 1.7, 3.3], "target": [0.7, 0.2, -1.1]}
+    placed = eyes(job_of([{"frame": 3, **still}, {"frame": 40, **still}], frames=50))
+    assert placed.n == 50
+    assert (placed.world_from_camera == placed.world_from_camera[0]).all()
+
+
+def test_far_from_the_origin_the_eye_keeps_its_digits():
+    near = fixed([0.5, 1.5, 2.5], [0.25, 1.0, -1.0])
+    far = fixed([5e6 + 0.5, 1.5, 2.5 - 5e6], [5e6 + 0.25, 1.0, -1.0 - 5e6])
+    np.testing.assert_array_equal(near[:3, :3], far[:3, :3])
+
+
+def test_an_eye_that_meets_its_target_is_told():
+    keys = [{"frame": 0, "eye": [0, 0, 0], "target": [2, 0, 0]}, {"frame": 4, "eye": [2, 0, 0], "target": [0, 0, 0]}]
+    with pytest.raises(JobError, match="got the same point at frame 2"):
+        eyes(job_of(keys))
+
+
+def test_lights_multiply_intensity_and_colour():
+    keys = [
+        {"frame": 0, "position": [0, 0, 0], "intensity": 10, "color": [1, 0.5, 0]},
+        {"frame": 10, "position": [0, 4, 0], "intensity": [20, 10, 4], "color": [1, 0.5, 1]},
+    ]
+    sun = {"type": "directional", "keys": [{"frame": 3, "direction": [0, -9, 0], "irradiance": 2}]}
+    placed = lights(
+        job_of(
+            [{"frame": 0, "eye": [0, 0, 0], "target": [1, 0, 0]}],
+            light={"sources": [{"type": "point", "keys": keys}, sun]},
+        )
+    )
+    lamp, sun = placed.sources
+    assert placed.n == 11
+    np.testing.assert_allclose(lamp.vector[5], [0, 2, 0], atol=1e-15)
+    np.testing.assert_array_equal(lamp.intensity[[0, 10]], [[10, 5, 0], [20, 5, 4]])
+    np.testing.assert_allclose(lamp.intensity[5], [15, 5, 3.5], atol=1e-14)
+    assert (sun.kind, lamp.kind) == ("directional", "point")
+    np.testing.assert_array_equal(sun.vector, np.broadcast_to([0, -1, 0], (11, 3)))
+    np.testing.assert_array_equal(sun.intensity, np.full((11, 3), 2.0))
+
+
+@FEW
+@given(values=st.lists(st.floats(0, 1e20), min_size=2, max_size=5))
+def test_intensity_is_never_negative(values):
+    keys = [{"frame": 7 * i, "position": [0, 0, 0], "intensity": value} for i, value in enumerate(values)]
+    camera = [{"frame": 0, "eye": [0, 0, 0], "target": [1, 0, 0]}]
+    placed = lights(job_of(camera, light={"sources": [{"type": "point", "keys": keys}]}))
+    assert (placed.sources[0].intensity >= 0).all()
