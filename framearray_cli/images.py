@@ -262,6 +262,22 @@ def _write_oiio(path: Path, format_name: str, spec: Any, pixels: NDArray[Any]) -
         message = output.geterror()
         if not done or message:
             raise OutputError(f"{path}: cannot be written: {_first_line(message, part)}")
+        _check_end(path, part)
+
+
+def _check_end(path: Path, part: Path) -> None:
+    """Read the last row back (0.15 ms): a disk that is full when the last buffer is flushed goes unreported."""
+    oiio = _oiio()
+    source = oiio.ImageInput.open(str(part))
+    if source is not None:
+        spec = source.spec()
+        last = source.read_scanlines(spec.height - 1, spec.height, 0, 0, spec.nchannels, oiio.UNKNOWN)
+        message = source.geterror()
+        source.close()
+        if last is not None and not message:
+            return
+    oiio.geterror()  # clears what the failed opening left behind
+    raise OutputError(f"{path}: cannot be written: the file is cut short; is the disk full?")
 
 
 def _read_oiio(path: Path) -> tuple[list[str], Float32]:

@@ -5,57 +5,74 @@ Notation: a position is a camera or light index that need not be whole; n is the
 
 import math
 import re
-from difflib import get_close_matches
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema, field_validator, model_validator
 
 from .errors import JobError
 from .framerate import frame_rate
 from .jobfile import load_toml
+from .jobvalues import Table, fail, shown
 from .manifest import Manifest
+from .problems import problems_of
 
 # An index (negative: from the end), "first", "last", or a percentage of the way from first to last.
-Place: TypeAlias = int | str
+IndexPlace: TypeAlias = int | str
+
+MOST_FRAMES = 1_000_000  # eleven hours at 24 frames a second; more is a typing error
+MOST_SECONDS = 40_000.0
 
 
-def _as_span(value: object) -> object:
-    """Read one place as a span that stays there."""
-    return value if isinstance(value, list) else [value, value]
+def _span(value: object) -> tuple[IndexPlace, IndexPlace]:
+    """Check a span; one place alone is a span that stays there."""
+    ends: list[Any] = value if isinstance(value, list) else [value, value]
+    if len(ends) != 2:
+        fail([((), f"expected a place, or [from, to], got {shown(value)}")])
+    wanted = 'expected an index, "first", "last" or a percentage such as "50%"'
+    bad = [((k,), f"{wanted}, got {shown(end)}") for k, end in enumerate(ends) if not _is_place(end)]
+    if bad:
+        fail(bad if isinstance(value, list) else [((), bad[0][1])])
+    return ends[0], ends[1]
 
 
-def _check_place(value: object) -> object:
-    if isinstance(value, int) and not isinstance(value, bool):
-        return value
-    if isinstance(value, str) and (value in ("first", "last") or _percent(value) is not None):
-        return value
-    raise ValueError(f'expected an index, "first", "last" or a percentage such as "50%", got {value!r}')
+def _is_place(value: object) -> bool:
+    if isinstance(value, str):
+        return value in ("first", "last") or _percent(value) is not None
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
+_PLACE_SCHEMA: dict[str, Any] = {
+    "anyOf": [{"type": "integer"}, {"type": "string", "pattern": r"^(first|last|\d{1,3}(\.\d{1,9})? ?%)$"}]
+}
 Span: TypeAlias = Annotated[
-    tuple[Annotated[Place, BeforeValidator(_check_place)], Annotated[Place, BeforeValidator(_check_place)]],
-    BeforeValidator(_as_span),
+    tuple[IndexPlace, IndexPlace],
+    PlainValidator(_span),
+    WithJsonSchema(
+        {"anyOf": [*_PLACE_SCHEMA["anyOf"], {"type": "array", "items": _PLACE_SCHEMA, "minItems": 2, "maxItems": 2}]}
+    ),
 ]
 
 
-class Segment(BaseModel):
+class Segment(Table):
     """A stretch of the movie in which camera and light each stay or move evenly."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    frames: int | None = Field(
-        None, ge=1, le=1_000_000, strict=True, description="Number of frames; or give `seconds`."
+    frames: int | None = Field(default=None, ge=1, le=MOST_FRAMES, description="Number of frames; or give `seconds`.")
+    seconds: float | None = Field(
+        default=None, gt=0, le=MOST_SECONDS, description="Length, rounded to whole frames, at least one."
     )
-    seconds: float | None = Field(None, gt=0, le=86400, description="Length, rounded to whole frames, at least one.")
-    camera: Span | None = Field(None, description="A place, or [from, to]. Left out: stays where it was, at first 0.")
-    light: Span | None = Field(None, description="A place, or [from, to]. Left out: stays where it was, at first 0.")
+    camera: Span | None = Field(
+        default=None, description="A place, or [from, to]. Left out: stays where it was, at first 0."
+    )
+    light: Span | None = Field(
+        default=None, description="A place, or [from, to]. Left out: stays where it was, at first 0."
+    )
 
     @model_validator(mode="after")
     def _one_length(self) -> "Segment":
         if (self.frames is None) == (self.seconds is None):
-            raise ValueError("expected either frames or seconds")
+            fail([((), f"expected either frames or seconds, got {'neither' if self.frames is None else 'both'}")])
         return self
 
     def n_frames(self, fps: Fraction) -> int:
@@ -63,13 +80,20 @@ class Segment(BaseModel):
         return self.frames if self.frames is not None else max(1, round(Fraction(self.seconds or 0) * fps))
 
 
-class MoviePath(BaseModel):
+class MoviePath(Table):
     """What a path file holds."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    fps: float | None = Field(
+        default=None, ge=0.01, le=1000, description="Frames per second; left out: those of the frame array."
+    )
+    segments: tuple[Segment, ...] = Field(strict=False, description="Played one after another; at least one.")
 
-    fps: float | None = Field(None, gt=0, le=1000, description="Frames per second; left out: those of the frame array.")
-    segments: tuple[Segment, ...] = Field(min_length=1, description="Played one after another.")
+    @field_validator("segments")
+    @classmethod
+    def _some(cls, segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
+        if not segments:
+            fail([((), "expected a list of at least 1 table, got none")])
+        return segments
 
 
 def load_movie_path(file: Path) -> MoviePath:
@@ -81,7 +105,7 @@ def load_movie_path(file: Path) -> MoviePath:
     try:
         return MoviePath.model_validate(load_toml(file))
     except ValidationError as error:
-        raise JobError(file, [_problem(detail) for detail in error.errors()]) from error
+        raise JobError(file, problems_of(error, MoviePath)) from error
 
 
 def movie_fps(movie: MoviePath, manifest: Manifest) -> Fraction:
@@ -140,7 +164,7 @@ def _nearest(position: float) -> int:
 
 
 def _positions(
-    key: str, span: tuple[Place, Place] | None, now: float, n: int, noun: str, problems: list[str]
+    key: str, span: tuple[IndexPlace, IndexPlace] | None, now: float, n: int, noun: str, problems: list[str]
 ) -> tuple[float, float]:
     """Resolve the two ends of a span; what lies outside of the array is added to `problems`."""
     if span is None:
@@ -150,13 +174,15 @@ def _positions(
         position = _position(place, n)
         if not 0 <= position <= n - 1:
             indices = f"0 to {n - 1}, or -{n} to -1" if n > 1 else "0 or -1"
-            problems.append(f"{key}: expected one of {n} {noun} ({indices}), got {place}")
+            problem = f"{key}: expected one of {n} {noun} ({indices}), got {place}"
+            if problem not in problems:  # a place that stands for both ends of a span
+                problems.append(problem)
             position = 0.0
         ends.append(position)
     return ends[0], ends[1]
 
 
-def _position(place: Place, n: int) -> float:
+def _position(place: IndexPlace, n: int) -> float:
     """Resolve a place on an axis of n indices; the result may lie outside."""
     if isinstance(place, int):
         return float(place + n if place < 0 else place)
@@ -169,17 +195,3 @@ def _percent(text: str) -> float | None:
     found = re.fullmatch(r"(\d{1,3}(?:\.\d{1,9})?) ?%", text)
     value = float(found[1]) if found else None
     return value if value is not None and value <= 100 else None
-
-
-def _problem(detail: Any) -> str:
-    """Say one problem as `key.path: expected ..., got ...`."""
-    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in detail["loc"]).lstrip(".")
-    if detail["type"] == "extra_forbidden":
-        known = MoviePath.model_fields if len(detail["loc"]) == 1 else Segment.model_fields
-        near = get_close_matches(str(detail["loc"][-1]), list(known), 1)
-        return f"{place}: unknown key; " + (f'did you mean "{near[0]}"?' if near else f"known are {', '.join(known)}")
-    if detail["type"] == "missing":
-        return f"{place}: expected, but not there"
-    message = detail["msg"].removeprefix("Value error, ").replace("Input should", "should")
-    got = "" if ", got " in message or isinstance(detail["input"], dict) else f", got {detail['input']!r}"
-    return f"{place}: {message}{got}"

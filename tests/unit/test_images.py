@@ -222,20 +222,39 @@ def test_threads_write_different_images(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize(("size", "limit"), [(200, 4096), (40, 300), (40, 0)])
+def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path: Path, name: str, size: int, limit: int) -> None:
     """A limit on the size of a file stands for the full disk: the same calls fail, with EFBIG for ENOSPC."""
     write_image(tmp_path / "warm", noisy(), ImageFormat(format=name))
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
     try:
         with pytest.raises(OutputError, match=r"image: cannot be written") as caught:
-            write_image(tmp_path / "image", noisy(200, 200), ImageFormat(format=name))
+            write_image(tmp_path / "image", noisy(size, size), ImageFormat(format=name))
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
         signal.signal(signal.SIGXFSZ, before)
     assert "\n" not in str(caught.value)
     assert [p.name for p in tmp_path.iterdir()] == ["warm"]
+
+
+@pytest.mark.parametrize("name", ["exr", "tif"])
+def test_a_last_buffer_that_is_lost_is_an_error(tmp_path: Path, name: str) -> None:
+    """The disk fills up just before the end of the file."""
+    image = noisy(64, 64)
+    write_image(tmp_path / "whole", image, ImageFormat(format=name))
+    size = (tmp_path / "whole").stat().st_size
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        for missing in (100, 1000, 5000):
+            resource.setrlimit(resource.RLIMIT_FSIZE, (size - missing, hard))
+            with pytest.raises(OutputError, match="cannot be written"):
+                write_image(tmp_path / "image", image, ImageFormat(format=name))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, before)
 
 
 # damaged files
