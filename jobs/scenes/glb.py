@@ -5,7 +5,7 @@ A part is a list of (material name, mesh). A part placed more than once is store
 
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -151,7 +151,8 @@ def _primitive(
     meshes: Sequence[Mesh], textured: bool, metres: float
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
     """Points, normals, texture coordinates (all a vertex) and faces of several meshes of one material."""
-    corners = np.round(np.vstack([mesh.points[mesh.faces].reshape(-1, 3) for mesh in meshes]), DECIMALS) + 0.0
+    meshes = [_rounded(mesh) for mesh in meshes]
+    corners = np.vstack([mesh.points[mesh.faces].reshape(-1, 3) for mesh in meshes])
     owner = np.repeat(np.arange(len(meshes)), [3 * len(mesh.faces) for mesh in meshes])
     cos_crease = np.repeat(np.cos(np.radians([mesh.crease_deg for mesh in meshes])), [3 * len(m.faces) for m in meshes])
     normals = np.round(_corner_normals(corners, owner, cos_crease), 4) + 0.0
@@ -168,6 +169,14 @@ def _primitive(
     vertices = vertices[order].astype(np.float32)
     unit = vertices[:, 3:6] / np.linalg.norm(vertices[:, 3:6], axis=1, keepdims=True)
     return vertices[:, :3], unit, vertices[:, 6:], rank[index.ravel()].reshape(-1, 3)
+
+
+def _rounded(mesh: Mesh) -> Mesh:
+    """The mesh with rounded points, without the triangles that lose their area by it."""
+    points = np.round(mesh.points, DECIMALS) + 0.0
+    p = points[mesh.faces]
+    area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+    return replace(mesh, points=points, faces=mesh.faces[area > 1e-9])
 
 
 def _corner_normals(corners: Array, owner: NDArray[np.int64], cos_crease: Array) -> Array:

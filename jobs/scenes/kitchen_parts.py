@@ -429,13 +429,13 @@ def hanging(rng: np.random.Generator, width: float) -> Part:
     return part
 
 
-def picture(width: float, height: float, view: str) -> Part:
+def picture(width: float, height: float, view: str, frame: str = "Walnut") -> Part:
     """A framed picture in the x-y plane that looks along +z; its texture fills it once."""
     corners = np.array([[[0, 0, 0.008], [width, 0, 0.008]], [[0, height, 0.008], [width, height, 0.008]]], dtype=float)
     canvas = surface(corners.transpose(1, 0, 2), np.array([[[0, 1], [1, 1]], [[0, 0], [1, 0]]], dtype=float).transpose(1, 0, 2))
     ring = np.array([[0, 0, 0], [width, 0, 0], [width, height, 0], [0, height, 0]], dtype=float)
     moulding = [(-0.012, 0.0), (0.028, 0.0), (0.028, 0.018), (0.012, 0.024), (-0.006, 0.012), (-0.012, 0.012)]
-    return [(view, canvas), ("Walnut", sweep(ring, moulding, closed=True, up=(0, 0, 1), crease_deg=30.0))]
+    return [(view, canvas), (frame, sweep(ring, moulding, closed=True, up=(0, 0, 1), crease_deg=30.0))]
 
 
 def rug(width: float, depth: float) -> Mesh:
