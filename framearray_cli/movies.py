@@ -76,7 +76,7 @@ class MovieWriter:
             codes = np.pad(codes, ((0, odd_rows), (0, odd_columns), (0, 0)), mode="edge")
         frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(codes), format="rgb24")
         # The default matrix is that of Rec. 601, which would shift greens and reds.
-        frame = frame.reformat(format="yuv420p", dst_colorspace=_BT709, dst_color_range="MPEG")
+        frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
         frame.pts = self._n
         frame.time_base = 1 / self._stream.codec_context.framerate
         self._n += 1

@@ -19,6 +19,7 @@ from framearray_cli.manifest import Manifest, ManifestCamera, ManifestLight, ima
 av = pytest.importorskip("av")
 
 N_CAMERAS, N_LIGHTS = 5, 4
+MATRICES = {1: "ITU709", 2: "DEFAULT", 5: "ITU624", 6: "SMPTE170M"}  # number in the file -> its name in PyAV
 ROWS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 
 
@@ -81,7 +82,7 @@ def decoded(movie: Path) -> tuple[list[np.ndarray], Any]:
             off = frame.pts * frame.time_base - len(frames) / stream.average_rate
             # Matroska counts milliseconds; the others hold the time exactly.
             assert abs(off) <= (frame.time_base / 2 if frame.time_base == Fraction(1, 1000) else 0)
-            rgb = frame.reformat(format="rgb24", src_colorspace=frame.colorspace, dst_color_range="JPEG")
+            rgb = frame.reformat(format="rgb24", src_colorspace=MATRICES[int(frame.colorspace)], dst_color_range="JPEG")
             frames.append(rgb.to_ndarray())
         return frames, stream
 
