@@ -354,7 +354,9 @@ def test_exr_attributes_have_standard_names_types_and_row_vectors(tmp_path: Path
     write_image(tmp_path / "a.exr", noisy(), ImageFormat(), attributes)
     spec = oiio.ImageInput.open(str(tmp_path / "a.exr")).spec()
     kept = {item.name: (str(item.type), item.value) for item in spec.extra_attribs}
-    assert kept["framesPerSecond"] == ("rational", (24000, 1001))
+    kind, rate = kept["framesPerSecond"]
+    assert kind.startswith("rational")  # older releases print it as rational2i
+    assert rate == (24000, 1001)
     assert kept["framearray:camera"] == ("int", 3)
     assert kept["framearray:light"] == ("int", 5)
     assert kept["framearray:fov"] == ("float", 60)
