@@ -8,7 +8,7 @@ a frame, with `"up"` if wanted.
 import csv
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from pydantic import ValidationError
 
@@ -21,6 +21,9 @@ MOST_PROBLEMS = 10  # a column that is wrong is wrong in every row
 EYE = ("eye_x", "eye_y", "eye_z")
 TARGET = ("target_x", "target_y", "target_z")
 UP = ("up_x", "up_y", "up_z")
+
+
+PlacedRow: TypeAlias = tuple[str, dict[str, Any]]  # where a reader of the file finds it, and a camera key's table
 
 
 class EyeFileError(Exception):
@@ -36,27 +39,25 @@ def read_eyes(path: Path) -> list[dict[str, Any]]:
     text = _read_text(path)
     match path.suffix.lower():
         case ".csv":
-            first, rows = 2, _csv_rows(text)
+            rows = _csv_rows(text)
         case ".json":
-            first, rows = 1, _json_rows(text)
+            rows = _json_rows(text)
         case _:
             raise EyeFileError(f'expected a file name that ends in .csv or .json, got "{path.suffix}"')
     if not 1 <= len(rows) <= MOST_EYES:
         raise EyeFileError(f"expected 1 to {MOST_EYES} eyes, got {len(rows)}")
-    problems = _row_problems(rows, first)
-    if problems:
+    if problems := _row_problems(rows):
         more = [f"and {len(problems) - MOST_PROBLEMS} more problems"] if len(problems) > MOST_PROBLEMS else []
         raise EyeFileError(*problems[:MOST_PROBLEMS], *more)
-    return [{"frame": frame, **row} for frame, row in enumerate(rows)]
+    return [{"frame": frame, **row} for frame, (_, row) in enumerate(rows)]
 
 
-def _row_problems(rows: list[dict[str, Any]], first: int) -> list[str]:
-    """Check each row by itself; `first` is the number that the first one has for a reader of the file."""
+def _row_problems(rows: list[PlacedRow]) -> list[str]:
+    """Check each row by itself, and that all of them give the same values."""
     problems = []
-    for frame, row in enumerate(rows):
-        place = f"row {frame + first}" if first == 2 else f"entry {frame + first}"
-        if "up" in row and "up" not in rows[0]:
-            problems.append(f"{place}: up: the first eye does not give it, so no eye may")
+    for frame, (place, row) in enumerate(rows):
+        if ("up" in row) != ("up" in rows[0][1]):
+            problems.append(f"{place}: up: expected in every row or in none")
         try:
             CameraKey.model_validate({"frame": frame, **row})
         except ValidationError as error:
@@ -81,13 +82,14 @@ def _read_text(path: Path) -> str:
         raise EyeFileError("expected UTF-8 text, got another encoding; save the file as UTF-8") from error
 
 
-def _csv_rows(text: str) -> list[dict[str, Any]]:
+def _csv_rows(text: str) -> list[PlacedRow]:
     """Read the named columns of a CSV file; a cell that is no number is left for the check of its row."""
     try:
-        lines = [line for line in csv.reader(text.splitlines(), strict=True) if line]
+        reader = csv.reader(text.splitlines(), strict=True)
+        lines = [(f"row {reader.line_num}", line) for line in reader if line]
     except csv.Error as error:
         raise EyeFileError(f"not valid CSV: {error}") from error
-    header = [name.strip().lower() for name in lines[0]] if lines else []
+    header = [name.strip().lower() for name in lines[0][1]] if lines else []
     with_up = any(name in header for name in UP)
     wanted = EYE + TARGET + (UP if with_up else ())
     if sorted(header) != sorted(wanted):
@@ -95,12 +97,12 @@ def _csv_rows(text: str) -> list[dict[str, Any]]:
             f"row 1: expected the column names {', '.join(wanted)}, got {', '.join(header)[:200] or 'none'}"
         )
     rows = []
-    for number, line in enumerate(lines[1:], start=2):
+    for place, line in lines[1:]:
         if len(line) != len(header):
-            raise EyeFileError(f"row {number}: expected {len(header)} cells, got {len(line)}")
+            raise EyeFileError(f"{place}: expected {len(header)} cells, got {len(line)}")
         cells = dict(zip(header, map(_number, line), strict=True))
         row = {"eye": [cells[name] for name in EYE], "target": [cells[name] for name in TARGET]}
-        rows.append({**row, "up": [cells[name] for name in UP]} if with_up else row)
+        rows.append((place, {**row, "up": [cells[name] for name in UP]} if with_up else row))
     return rows
 
 
@@ -112,7 +114,7 @@ def _number(cell: str) -> float | str:
         return cell.strip()
 
 
-def _json_rows(text: str) -> list[dict[str, Any]]:
+def _json_rows(text: str) -> list[PlacedRow]:
     """Read a list of tables from a JSON file."""
     try:
         rows = json.loads(text)
@@ -125,4 +127,4 @@ def _json_rows(text: str) -> list[dict[str, Any]]:
             raise EyeFileError(
                 f'entry {number}: unknown key "frame"; the first entry is frame 0, the next 1, and so on'
             )
-    return rows
+    return [(f"entry {number}", row) for number, row in enumerate(rows, start=1)]

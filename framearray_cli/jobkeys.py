@@ -115,7 +115,7 @@ class CameraTable(Table):
         validate_default=True,
         description="Where the eye is at some frames; between them it moves smoothly, before the first and after "
         "the last it stands still. One key: a fixed camera.",
-        json_schema_extra=computed("the eyes in `file`"),
+        json_schema_extra={**computed("the eyes in `file`"), "minItems": 1},
     )
 
     @field_validator("keys")

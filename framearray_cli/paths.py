@@ -134,7 +134,8 @@ def between_keys(frames: Sequence[int], values: Sequence[Sequence[float]], n: in
     at = np.clip(np.arange(n), frames[0], frames[-1])
     before = np.searchsorted(frames, at, side="right").clip(max=len(frames) - 1) - 1  # (n,) key before each frame
     ends = np.stack([keyed[before], keyed[before + 1]])
-    curve: Float64 = PchipInterpolator(frames, keyed, axis=0)(at)
+    with np.errstate(over="ignore"):  # the inverse of a slope below 1e-308 is infinite, its own inverse 0, as it should
+        curve: Float64 = PchipInterpolator(frames, keyed, axis=0)(at)
     curve = np.clip(curve, ends.min(axis=0), ends.max(axis=0))  # the last bits, too, stay between the keys
     for key, frame in enumerate(frames):
         curve[at == frame] = keyed[key]

@@ -1,0 +1,133 @@
+"""Reference page and JSON Schema of the job file, made from the job: `python -m framearray_cli.jobdocs docs/`."""
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from .job import Job
+from .jobschema import Schema, Section, file_schema, job_schema, sections, words
+
+EXAMPLE = """\
+#:schema job.schema.json
+name = "room"
+
+[scene]
+file = "scenes/room.glb"
+
+[camera]
+resolution = [400, 300]
+fov = 60.0
+keys = [
+  { frame = 0,  eye = [0.0, 1.6, 3.0], target = [0.0, 1.2, 0.0] },
+  { frame = 95, eye = [2.0, 1.6, 0.5], target = [0.0, 1.2, 0.0] },
+]
+
+[[light.sources]]
+type = "point"
+keys = [
+  { frame = 0,  position = [1.0, 2.2, 0.0],  intensity = [10.0, 10.0, 9.0] },
+  { frame = 47, position = [-1.0, 2.2, 0.0], intensity = [10.0, 10.0, 9.0] },
+]
+
+[obscurance]
+range = 1.5
+"""
+
+INTRODUCTION = f"""\
+# The job file
+
+<!-- Made by `python -m framearray_cli.jobdocs docs/` from framearray_cli/job.py; edit there. -->
+
+A job file says what to render: a scene, a camera path, a light path, and how. It is written in [TOML](https://toml.io).
+This is a whole job of 96 eyes and 48 light positions:
+
+```toml
+{EXAMPLE}```
+
+File names start at the folder of the job file. Positions and directions are in the coordinates of the scene file.
+Colours are linear, with Rec. 709 primaries. An unknown key is an error, and all problems of a file are told at once.
+
+[job.schema.json](job.schema.json) is the same reference for editors: an editor with a TOML plugin, such as Taplo,
+completes and checks a job file whose first line names it, as above.
+"""
+
+EYE_FILE = """\
+A `file` of eyes replaces `keys`. As CSV it starts with a row that names the columns, in any order; the `up_`
+columns may be left out:
+
+```csv
+eye_x,eye_y,eye_z,target_x,target_y,target_z,up_x,up_y,up_z
+0.0,1.6,3.0,0.0,1.2,0.0,0.0,1.0,0.0
+0.1,1.6,2.9,0.0,1.2,0.0,0.0,1.0,0.0
+```
+
+As JSON it is a list: `[{"eye": [0.0, 1.6, 3.0], "target": [0.0, 1.2, 0.0]}, ...]`, with `"up"` where wanted.
+The first eye is frame 0, the next frame 1, and so on.
+"""
+
+
+def reference() -> str:
+    """Write the reference page, in Markdown."""
+    root = file_schema(Job)
+    return "\n".join([INTRODUCTION, *(_section(root, section) for section in sections(root))])
+
+
+def schema_text() -> str:
+    """Write the JSON Schema as it is published."""
+    return json.dumps(job_schema(), indent=2, ensure_ascii=False) + "\n"
+
+
+def _section(root: Schema, section: Section) -> str:
+    """Describe one table: heading, meaning, and a row for each key that is no table itself."""
+    rows = list(_rows(root, section))
+    if not rows:
+        return ""
+    about = section.schema.get("description", "") if section.place else "The keys before the first table."
+    table = ["| key | value | default | meaning |", "|---|---|---|---|", *rows]
+    more = [EYE_FILE] if section.place == "camera" else []
+    return "\n".join([f"## {_heading(section)}", "", about, "", *table, "", *more])
+
+
+def _heading(section: Section) -> str:
+    """Write a table's place as it stands in a file."""
+    kind = f', `type = "{section.kind}"`' if section.kind else ""
+    place = section.place
+    if not place:
+        return "At the top"
+    if place.endswith(".keys[]"):
+        owner = place.removesuffix(".keys[]")
+        return f"One of `keys` in `{_bracketed(owner)}`{kind}"
+    return f"`{_bracketed(place)}`{kind}"
+
+
+def _bracketed(place: str) -> str:
+    """Write a place as a TOML table header: [camera], or [[light.sources]] for a list of tables."""
+    return f"[[{place.removesuffix('[]')}]]" if place.endswith("[]") else f"[{place}]"
+
+
+def _rows(root: Schema, section: Section) -> Iterator[str]:
+    """Describe each key of a table that holds a value."""
+    required = section.schema.get("required", ())
+    for key, node in section.keys.items():
+        values = words(root, node)
+        if values == "a table":
+            continue
+        default = "required" if key in required else node.get("x-default", _toml(node.get("default")))
+        cells = (f"`{key}`", values, default, node.get("description", ""))
+        yield f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |"
+
+
+def _toml(value: object) -> str:
+    """Write a default as it would stand in a file."""
+    return f"`{json.dumps(value)}`"
+
+
+def main(folder: Path) -> None:
+    """Write both files into a folder."""
+    (folder / "job-file.md").write_text(reference(), encoding="utf-8", newline="\n")
+    (folder / "job.schema.json").write_text(schema_text(), encoding="utf-8", newline="\n")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,313 @@
+"""The job of the design's job file section, its defaults, and the rules that tie keys to each other."""
+
+import copy
+import tomllib
+from pathlib import Path
+
+import pytest
+from pydantic import ValidationError
+
+from framearray_cli.job import Job
+from framearray_cli.jobfile import job_schema, job_table, problems_of
+
+EXAMPLE = """
+name = "cabin"                    # starts every file name
+seed = 0
+
+[scene]
+file = "scenes/cabin.glb"         # anything trimesh reads, relative to the job file
+up = "y"                          # "y" or "z"; default by format (glTF: y)
+background = [0.0, 0.0, 0.0]      # radiance of what lies outside
+[scene.materials."Chrome"]        # overrides by material name
+reflectivity = [0.1, 0.1, 0.1]
+specular = [0.8, 0.8, 0.8]
+
+[camera]
+resolution = [400, 300]
+fov = 60.0                        # vertical, degrees
+frames = 192                      # N_c
+keys = [                          # interpolated smoothly; one key: a fixed camera
+  { frame = 0,   eye = [0.0, 1.6, 3.0], target = [0.0, 1.2, 0.0] },
+  { frame = 191, eye = [2.0, 1.6, 0.5], target = [0.0, 1.2, 0.0] },
+]
+
+[light]
+frames = 48                       # N_l
+[[light.sources]]                 # one or more; all of them shine together at light index l
+type = "point"                    # "point": intensity, W/sr; "directional": irradiance, W/m2, and direction
+keys = [
+  { frame = 0,  position = [1.0, 2.2, 0.0], intensity = [10.0, 10.0, 9.0] },
+  { frame = 47, position = [-1.0, 2.2, 0.0], intensity = [10.0, 10.0, 9.0] },
+]
+
+[samples]
+hits = 2                          # native hits a pixel a frame
+obscurance = 5                    # obscurance rays a hit
+
+[reuse]
+n_r = 3
+weights = "balance"               # or "average"
+
+[obscurance]
+range = 1.5                       # d_max, in scene units
+falloff = "sqrt"
+outside = "average"               # or "background"
+
+[ambient]
+method = "eye"                    # or "light"
+paths = 1024                      # walks, or particles a light position
+
+[specular]
+depth = 4
+
+[output]
+directory = "../out/cabin"        # relative to the job file
+format = "exr"                    # exr | png | tif | jpg
+fps = 24
+"""
+
+
+@pytest.fixture
+def table():
+    return tomllib.loads(EXAMPLE)
+
+
+def read(table, job_file=Path("/jobs/cabin.toml")):
+    return Job.model_validate(table, context={"job_file": job_file})
+
+
+def problems(table):
+    """Collect the problems of a table that has some."""
+    with pytest.raises(ValidationError) as caught:
+        read(table)
+    return problems_of(caught.value, Job)
+
+
+def replaced(table, place, value):
+    """Copy a table with one key set: replaced(table, "light.sources.0.type", "point")."""
+    whole = copy.deepcopy(table)
+    *steps, last = [int(step) if step.isdigit() else step for step in place.split(".")]
+    node = whole
+    for step in steps:
+        node = node.setdefault(step, {}) if isinstance(node, dict) else node[step]
+    node[last] = value
+    return whole
+
+
+def test_every_key_of_the_example_arrives(table):
+    job = read(table)
+    assert (job.name, job.seed, job.file) == ("cabin", 0, Path("/jobs/cabin.toml"))
+    assert job.scene.file == Path("/jobs/scenes/cabin.glb")
+    assert job.scene.background == (0.0, 0.0, 0.0)
+    assert job.scene.materials["Chrome"].reflectivity == (0.1, 0.1, 0.1)
+    assert job.scene.materials["Chrome"].specular == (0.8, 0.8, 0.8)
+    assert (job.camera.resolution, job.camera.fov, job.camera.frames) == ((400, 300), 60.0, 192)
+    assert [(key.frame, key.eye, key.target) for key in job.camera.keys] == [
+        (0, (0.0, 1.6, 3.0), (0.0, 1.2, 0.0)),
+        (191, (2.0, 1.6, 0.5), (0.0, 1.2, 0.0)),
+    ]
+    assert (job.light.frames, job.light.sources[0].type) == (48, "point")
+    assert job.light.sources[0].keys[1].position == (-1.0, 2.2, 0.0)
+    assert job.light.sources[0].keys[1].intensity == (10.0, 10.0, 9.0)
+    assert (job.samples.hits, job.samples.obscurance, job.reuse.n_r, job.reuse.weights) == (2, 5, 3, "balance")
+    assert (job.obscurance.range, job.obscurance.falloff, job.obscurance.outside) == (1.5, "sqrt", "average")
+    assert (job.ambient.method, job.ambient.paths, job.ambient.intensity) == ("eye", 1024, None)
+    assert job.specular.depth == 4
+    assert (job.output.directory, job.output.format, job.output.fps) == (Path("/out/cabin"), "exr", 24.0)
+
+
+def test_defaults_follow_the_other_keys(table):
+    for section, key in [("camera", "frames"), ("light", "frames"), ("scene", "up"), ("output", "directory")]:
+        del table[section][key]
+    for section in ["samples", "reuse", "ambient", "specular", "output"]:
+        del table[section]
+    table["obscurance"] = {"range": 2}
+    job = read(table)
+    assert (job.camera.frames, job.light.frames) == (192, 48)
+    assert (job.specular.hits, job.specular.depth) == (14, 4)
+    assert job.output.directory == Path("/out/cabin")
+    assert job.ambient.paths is None
+    assert job.render.threads is None
+    assert job.obscurance.range == 2.0
+
+
+@pytest.mark.parametrize(("n_r", "hits", "mirror"), [(0, 1, 1), (5, 3, 33), (64, 65535, 65535 * 129)])
+def test_mirror_pixels_get_the_total_of_their_neighbours(table, n_r, hits, mirror):
+    table["reuse"]["n_r"], table["samples"]["hits"] = n_r, hits
+    job = read(table)
+    assert job.specular.hits == mirror
+    assert read(job_table(job)) == job
+
+
+@pytest.mark.parametrize(("file", "up"), [("a.glb", "y"), ("a.OBJ", "y"), ("a.stl", "z"), ("a.PLY", "z"), ("a", "y")])
+def test_up_follows_the_format(table, file, up):
+    table["scene"] = {"file": file}
+    assert read(table).scene.up == up
+
+
+def test_two_jobs_do_not_share_their_defaults(table):
+    del table["specular"], table["output"]
+    first = read(table)
+    read({**table, "name": "other", "samples": {"hits": 7}})
+    assert first.specular.hits == 14
+    assert first.output.directory == Path("/out/cabin")
+
+
+def test_a_job_is_frozen(table):
+    with pytest.raises(ValidationError):
+        read(table).seed = 3
+
+
+def test_one_number_is_grey(table):
+    table["scene"]["background"] = 2
+    table["ambient"] = {"intensity": 0.5}
+    job = read(table)
+    assert job.scene.background == (2.0, 2.0, 2.0)
+    assert job.ambient.intensity == (0.5, 0.5, 0.5)
+
+
+RGB = "a number or 3 numbers of at least 0"
+WRONG = [
+    ("name", "a/b", 'name: expected at most 100 letters, digits, ".", "_" or "-", the first a letter, digit or "_", '
+     'got "a/b"'),
+    ("name", 3, "name: expected a name, got 3"),
+    ("seed", -1, "seed: expected a whole number from 0 to 4294967295, got -1"),
+    ("seed", True, "seed: expected a whole number from 0 to 4294967295, got true"),
+    ("seed", 10**30, "seed: expected a whole number from 0 to 4294967295, got a number beyond 64 bits"),
+    ("scene.file", "", 'scene.file: expected a file name, got ""'),
+    ("scene.up", "x", 'scene.up: expected "y" or "z", got "x"'),
+    ("scene.background", [1, 2], "scene.background: expected 3 numbers, got 2"),
+    ("scene.background", "red", 'scene.background: expected a number or 3 numbers, got "red"'),
+    ("scene.background", -1, "scene.background: expected a number of at least 0, got -1"),
+    ("scene.materials.Chrome", 1, "scene.materials.Chrome: expected a table, got 1"),
+    ("scene.materials.Chrome.specular", [0.1, 0.95, 0.1],
+     "scene.materials.Chrome.specular: expected reflectivity + specular of at most 1, got 1.05 in green"),
+    ("scene.materials.Chrome.reflectivity", [0, 0, 1.5],
+     "scene.materials.Chrome.reflectivity[2]: expected a number from 0 to 1, got 1.5"),
+    ("camera", 3, "camera: expected a table, got 3"),
+    ("camera", [{}], "camera: expected a table, got a list of 1 table"),
+    ("camera.resolution", [400, 300.0], "camera.resolution[1]: expected a whole number from 1 to 16384, got 300.0"),
+    ("camera.resolution", [1, 16385], "camera.resolution[1]: expected a whole number from 1 to 16384, got 16385"),
+    ("camera.fov", 180, "camera.fov: expected a number from 0.001 to 179.9, got 180"),
+    ("camera.fov", float("nan"), "camera.fov: expected a number from 0.001 to 179.9, got nan"),
+    ("camera.fov", False, "camera.fov: expected a number from 0.001 to 179.9, got false"),
+    ("camera.frames", 0, "camera.frames: expected a whole number from 1 to 100000, got 0"),
+    ("camera.frames", 100, "camera.keys[1].frame: expected at most 99 (frames = 100), got 191"),
+    ("camera.keys", [], "camera.keys: expected a list of at least 1 table, got none; give `keys` or `file`"),
+    ("camera.file", "eyes.csv", "camera.keys: expected either `keys` or `file`, got both"),
+    ("camera.keys.1.frame", 0, "camera.keys[1].frame: expected more than 0, the frame of the key before, got 0"),
+    ("camera.keys.1.eye", [1, 2, "3"], 'camera.keys[1].eye[2]: expected a number, got "3"'),
+    ("camera.keys.1.eye", [1, 2, True], "camera.keys[1].eye[2]: expected a number, got true"),
+    ("camera.keys.1.eye", [1, 2, 1e13],
+     "camera.keys[1].eye[2]: expected a number from -1e+12 to 1e+12, got 10000000000000.0"),
+    ("camera.keys.1.eye", [0.0, 1.2, 0.0],
+     "camera.keys[1].target: expected a point other than the eye, got [0.0, 1.2, 0.0], the eye itself"),
+    ("camera.keys.0.up", [0, 0, 0], "camera.keys[0].up: expected a direction, got the zero vector [0, 0, 0]"),
+    ("camera.keys.1.up", [0, 1, 0],
+     "camera.keys[0].up: missing; keys[1] gives it, so every key of this list must"),
+    ("light.frames", 47, "light.sources[0].keys[1].frame: expected at most 46 (frames = 47), got 47"),
+    ("light.sources", [], "light.sources: expected a list of tables, at least 1, got 0"),
+    ("light.sources", {}, "light.sources: expected a list of tables, got a table"),
+    ("light.sources.0.type", "spot", 'light.sources[0].type: expected "point" or "directional", got "spot"'),
+    ("light.sources.0", {"keys": []}, 'light.sources[0].type: missing; expected "point" or "directional"'),
+    ("light.sources.0.keys", [], "light.sources[0].keys: expected a list of tables, at least 1, got 0"),
+    ("light.sources.0.keys.0.color", 1,
+     "light.sources[0].keys[1].color: missing; keys[0] gives it, so every key of this list must"),
+    ("samples.hits", 0, "samples.hits: expected a whole number from 1 to 65535, got 0"),
+    ("reuse.n_r", 65, "reuse.n_r: expected a whole number from 0 to 64, got 65"),
+    ("obscurance.range", 0, "obscurance.range: expected a number above 0, got 0"),
+    ("obscurance.range", float("inf"), "obscurance.range: expected a number above 0, got inf"),
+    ("obscurance.range", 1e13, "obscurance.range: expected at most 1e+12, got 10000000000000.0"),
+    ("obscurance.falloff", "cubic",
+     'obscurance.falloff: expected "sqrt", "linear", "cbrt", "exponential" or "constant", got "cubic"'),
+    ("output.fps", "24", 'output.fps: expected a number from 0.01 to 1000, got "24"'),
+    ("output.layers", 1, "output.layers: expected true or false, got 1"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("place", "value", "message"), WRONG, ids=[f"{place}={value}" for place, value, _ in WRONG])
+def test_wrong_value_is_told(table, place, value, message):
+    assert problems(replaced(table, place, value)) == [message]
+
+
+def test_fixed_ambient_light_excludes_method_and_paths(table):
+    table["ambient"]["intensity"] = [1, 1, 1]
+    text = "expected no value, because `intensity` fixes the ambient light; remove one of the two"
+    assert problems(table) == [f"ambient.method: {text}", f"ambient.paths: {text}"]
+
+
+def test_opposite_directions_need_a_key_between(table):
+    keys = [{"frame": f, "direction": d, "irradiance": 1} for f, d in [(0, [1, 0, 0]), (9, [-3, 0, 0])]]
+    table["light"] = {"sources": [{"type": "directional", "keys": keys}]}
+    assert problems(table) == [
+        "light.sources[0].keys[1].direction: expected less than half a turn from the key before, "
+        "got the opposite direction; add a key between"
+    ]
+
+
+UNKNOWN = [
+    ("samples.obscurence", 'samples.obscurence: unknown key; did you mean "obscurance"?'),
+    ("reuse.N_R", 'reuse.N_R: unknown key; did you mean "n_r"?'),
+    ("camera.hits", 'camera.hits: unknown key here; "hits" belongs in [samples] or [specular]'),
+    ("fov", 'fov: unknown key here; "fov" belongs in [camera]'),
+    ("camera.keys.0.look_at", 'camera.keys[0].look_at: unknown key; did you mean "target"?'),
+    ("light.sources.0.keys.0.irradiance",
+     'light.sources[0].keys[0].irradiance: unknown key; did you mean "intensity"?'),
+    ("specular.qqq", "specular.qqq: unknown key; known here: depth, hits"),
+    ("specular.a b", 'specular."a b": unknown key; known here: depth, hits'),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("place", "message"), UNKNOWN)
+def test_unknown_key_is_told_with_the_nearest_known(table, place, message):
+    assert problems(replaced(table, place, 1)) == [message]
+
+
+def test_directional_source_with_the_keys_of_a_point(table):
+    table["light"]["sources"][0]["type"] = "directional"
+    del table["light"]["sources"][0]["keys"][1]
+    assert problems(table) == [
+        "light.sources[0].keys[0].direction: missing; expected 3 numbers",
+        "light.sources[0].keys[0].irradiance: missing; expected " + RGB,
+        'light.sources[0].keys[0].position: unknown key; did you mean "direction"?',
+        'light.sources[0].keys[0].intensity: unknown key; did you mean "irradiance"?',
+    ]
+
+
+def test_an_empty_file_tells_what_a_job_needs():
+    assert problems({}) == [
+        "name: missing; expected a name",
+        "scene: missing; expected a table",
+        "camera: missing; expected a table",
+        "light: missing; expected a table",
+        "obscurance: missing; expected a table",
+    ]
+
+
+# What JSON Schema cannot say: rules between keys, numbers that JSON lacks, and 300.0, which is an integer there.
+NOT_IN_SCHEMA = [
+    "scene.materials.Chrome.specular=[0.1, 0.95, 0.1]",
+    "camera.resolution=[400, 300.0]",
+    "camera.fov=nan",
+    "camera.frames=100",
+    "camera.file=eyes.csv",
+    "camera.keys.1.frame=0",
+    "camera.keys.1.eye=[1, 2, 10000000000000.0]",
+    "camera.keys.1.eye=[0.0, 1.2, 0.0]",
+    "camera.keys.0.up=[0, 0, 0]",
+    "camera.keys.1.up=[0, 1, 0]",
+    "light.frames=47",
+    "light.sources.0.keys.0.color=1",
+]
+
+
+def test_schema_accepts_what_the_job_accepts_and_refuses_the_rest(table):
+    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema.Draft202012Validator.check_schema(job_schema())
+    validator = jsonschema.Draft202012Validator(job_schema())
+    validator.validate(table)
+    validator.validate(job_table(read(table)))
+    missed = [f"{place}={value}" for place, value, _ in WRONG if validator.is_valid(replaced(table, place, value))]
+    assert missed == NOT_IN_SCHEMA
+    for place, _ in UNKNOWN:
+        assert not validator.is_valid(replaced(table, place, 1)), place

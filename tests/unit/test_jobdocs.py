@@ -1,0 +1,39 @@
+"""The published reference page and schema are those of the job."""
+
+import re
+import tomllib
+from pathlib import Path
+
+from framearray_cli.job import Job
+from framearray_cli.jobdocs import EXAMPLE, reference, schema_text
+from framearray_cli.jobschema import file_schema, sections
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+REMEDY = "out of date: run `python -m framearray_cli.jobdocs docs/`"
+
+
+def test_published_files_are_up_to_date():
+    assert (DOCS / "job-file.md").read_text(encoding="utf-8") == reference(), REMEDY
+    assert (DOCS / "job.schema.json").read_text(encoding="utf-8") == schema_text(), REMEDY
+
+
+def test_the_example_is_a_job():
+    job = Job.model_validate(tomllib.loads(EXAMPLE))
+    assert (job.camera.frames, job.light.frames) == (96, 48)
+    assert EXAMPLE in reference()
+
+
+def test_every_key_is_described():
+    for section in sections(file_schema(Job)):
+        assert section.schema["description"].endswith(".")
+        for key, node in section.keys.items():
+            if "$ref" not in node:
+                assert node["description"].endswith("."), f"{section.place}.{key}"
+
+
+def test_every_key_has_its_row():
+    page = reference()
+    for section in sections(file_schema(Job)):
+        for key, node in section.keys.items():
+            if "$ref" not in node and key != "materials":
+                assert re.search(rf"^\| `{key}` \| \S.* \| \S.* \| \S.* \|$", page, re.MULTILINE), key

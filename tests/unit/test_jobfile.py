@@ -1,0 +1,288 @@
+"""Reading job files: what is not a job file, all problems at once, file names, files of eyes, the round trip."""
+
+import json
+from pathlib import Path
+
+import pytest
+import tomli_w
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from framearray_cli.errors import JobError
+from framearray_cli.job import Job
+from framearray_cli.jobfile import job_table, load_toml, read_job
+from framearray_cli.jobvalues import shown
+
+JOB = """
+name = "room"
+scene.file = "scenes/room.glb"
+obscurance.range = 1.5
+[camera]
+{camera}
+[[light.sources]]
+type = "point"
+keys = [{{ frame = 0, position = [1, 2, 0], intensity = 10 }}]
+"""
+KEYS = "keys = [{ frame = 0, eye = [0, 0, 5], target = [0, 0, 0] }]"
+
+
+def write(folder, camera=KEYS, name="job.toml"):
+    """Write a small job around some camera lines."""
+    path = folder / name
+    path.write_text(JOB.format(camera=camera), encoding="utf-8")
+    return path
+
+
+def problems(path):
+    """Collect the problems of a job file that has some; each message starts with the file."""
+    with pytest.raises(JobError) as caught:
+        read_job(path)
+    assert caught.value.exit_code == 2
+    assert str(caught.value) == "\n".join(f"{path}: {problem}" for problem in caught.value.problems)
+    return list(caught.value.problems)
+
+
+BROKEN = [
+    (b"name = ", "not valid TOML: Invalid value (at end of document)"),
+    (b'a = 1\nb = "x\n', "not valid TOML: Illegal character '\\n' (at line 2, column 7)"),
+    (b"a = 1\na = 2\n", "not valid TOML: Cannot overwrite a value (at line 2, column 6)"),
+    (b'# hello\nname = "caf\xe9"\n', "expected UTF-8 text, got byte 0xe9 in line 2; save the file as UTF-8"),
+    ("name = 1".encode("utf-16"), "expected UTF-8 text, got UTF-16; save the file as UTF-8"),
+    (b"glTF\x02\0\0\0", "expected UTF-8 text, got a binary file"),
+    (b"a = " + b"[" * 20000, "tables or lists are nested too deeply"),
+    (b"a = " + b"9" * 5000, "a number has too many digits"),
+    (b"#" * (4 * 1024 * 1024 + 1), "expected a TOML file of at most 4 MB, got a bigger one"),
+]
+
+
+@pytest.mark.parametrize(("data", "message"), BROKEN, ids=[message[:40] for _, message in BROKEN])
+def test_what_is_no_toml_file_is_told(tmp_path, data, message):
+    path = tmp_path / "job.toml"
+    path.write_bytes(data)
+    assert problems(path) == [message]
+
+
+def test_missing_file_and_folder_are_told(tmp_path):
+    assert problems(tmp_path / "none.toml") == ["no such file"]
+    assert problems(tmp_path) == ["expected a TOML file, got a folder"]
+    assert problems(tmp_path / "job.toml" / "x") == ["no such file"]
+    assert problems(Path("a\0b")) == ["cannot be read: embedded null byte"]
+
+
+def test_mark_of_windows_editors_is_read(tmp_path):
+    path = tmp_path / "job.toml"
+    path.write_bytes(b"\xef\xbb\xbfa = 1\r\n")
+    assert load_toml(path) == {"a": 1}
+
+
+def test_all_problems_are_told_at_once_in_the_order_of_the_keys(tmp_path):
+    path = write(
+        tmp_path, 'fov = "wide"\nframes = 5\nkeys = [{ frame = 7, eye = [0, 0, 5], target = [0, 0, 0], fov = 3 }]'
+    )
+    path.write_text(path.read_text().replace("range = 1.5", "rnage = 1.5") + "[samples]\nhits = 0\n")
+    assert problems(path) == [
+        'camera.fov: expected a number from 0.001 to 179.9, got "wide"',
+        'camera.keys[0].fov: unknown key here; "fov" belongs in [camera]',
+        "samples.hits: expected a whole number from 1 to 65535, got 0",
+        "obscurance.range: missing; expected a number above 0",
+        'obscurance.rnage: unknown key; did you mean "range"?',
+    ]
+
+
+def test_rules_between_keys_are_told_beside_other_problems(tmp_path):
+    path = write(tmp_path, f"fov = 0\nframes = 5\n{KEYS.replace('frame = 0', 'frame = 7')}")
+    assert problems(path) == [
+        "camera.fov: expected a number from 0.001 to 179.9, got 0",
+        "camera.keys[0].frame: expected at most 4 (frames = 5), got 7",
+    ]
+
+
+def test_a_flood_of_problems_is_cut(tmp_path):
+    path = write(tmp_path, KEYS + "\n" + "\n".join(f"zz{i} = 1" for i in range(80)))
+    found = problems(path)
+    assert len(found) == 51
+    assert found[-1] == "and 30 more problems"
+
+
+def test_file_names_start_at_the_job_file(tmp_path, monkeypatch):
+    (tmp_path / "jobs").mkdir()
+    write(tmp_path / "jobs")
+    monkeypatch.chdir(tmp_path)
+    job = read_job(Path("jobs/job.toml"))
+    assert job.scene.file == tmp_path / "jobs/scenes/room.glb"
+    assert job.output.directory == tmp_path / "out/room"
+    assert job.file == tmp_path / "jobs/job.toml"
+
+
+def test_a_linked_scene_keeps_its_name(tmp_path):
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes" / "room.glb").symlink_to(tmp_path / "store")
+    assert read_job(write(tmp_path)).scene.file == tmp_path / "scenes/room.glb"
+
+
+def eyes_of(tmp_path, name, text, more=""):
+    """Read a job whose eyes are in a file."""
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    return write(tmp_path, f'file = "{name}"\n{more}')
+
+
+CSV = "target_x, target_y,target_z,eye_x,eye_y,eye_z\n0,0,0,1,2,3\n\n0,0,0,1.5,2,3e0\n"
+
+
+def test_eyes_of_a_csv_file(tmp_path):
+    job = read_job(eyes_of(tmp_path, "eyes.csv", CSV))
+    assert job.camera.frames == 2
+    assert [(key.frame, key.eye, key.target) for key in job.camera.keys] == [
+        (0, (1.0, 2.0, 3.0), (0.0, 0.0, 0.0)),
+        (1, (1.5, 2.0, 3.0), (0.0, 0.0, 0.0)),
+    ]
+    assert job.camera.file is None
+
+
+def test_eyes_of_a_json_file(tmp_path):
+    rows = [{"eye": [i, 0, 0], "target": [9, 0, 0], "up": [0, 0, 1]} for i in range(3)]
+    job = read_job(eyes_of(tmp_path, "eyes.json", json.dumps(rows), "frames = 3"))
+    assert job.camera.frames == 3
+    assert job.camera.keys[2].up == (0.0, 0.0, 1.0)
+
+
+HEADER = "eye_x,eye_y,eye_z,target_x,target_y,target_z\n"
+BAD_EYES = [
+    ("e.csv", HEADER + "0,0,0,0,0,1\n\n0,abc,0,0,0,1\n", 'row 4: eye[1]: expected a number, got "abc"'),
+    ("e.csv", HEADER + "0,0,0,0,0,nan\n", "row 2: target[2]: expected a number, got nan"),
+    ("e.csv", HEADER + "0,0,0,0,0\n", "row 2: expected 6 cells, got 5"),
+    ("e.csv", HEADER + "1,1,1,1,1,1\n",
+     "row 2: target: expected a point other than the eye, got [1.0, 1.0, 1.0], the eye itself"),
+    ("e.csv", HEADER, "expected 1 to 100000 eyes, got 0"),
+    ("e.csv", "", "row 1: expected the column names eye_x, eye_y, eye_z, target_x, target_y, target_z, got none"),
+    ("e.csv", "eye_x,up_x\n1,2\n", "row 1: expected the column names eye_x, eye_y, eye_z, target_x, target_y, "
+     "target_z, up_x, up_y, up_z, got eye_x, up_x"),
+    ("e.txt", HEADER, 'expected a file name that ends in .csv or .json, got ".txt"'),
+    ("e.json", "[", "not valid JSON: Expecting value: line 1 column 2 (char 1)"),
+    ("e.json", "3", 'expected a list of {"eye": [...], "target": [...]}, got something else'),
+    ("e.json", '[{"eye": [0, 0, 0]}]', "entry 1: target: missing; expected 3 numbers"),
+    ("e.json", '[{"frame": 0}]',
+     'entry 1: unknown key "frame"; the first entry is frame 0, the next 1, and so on'),
+    ("e.json", '[{"eye": [0,0,0], "target": [0,0,1]}, {"eye": [0,0,0], "target": [0,0,1], "up": [0,1,0]}]',
+     "entry 2: up: expected in every row or in none"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "text", "message"), BAD_EYES)
+def test_what_is_no_file_of_eyes_is_told_with_its_row(tmp_path, name, text, message):
+    path = eyes_of(tmp_path, name, text)
+    assert problems(path) == [f'camera.file: "{name}": {message}']
+
+
+def test_a_missing_file_of_eyes_is_told_beside_other_problems(tmp_path):
+    path = write(tmp_path, 'file = "gone.csv"\nfov = 0')
+    assert problems(path) == [
+        "camera.fov: expected a number from 0.001 to 179.9, got 0",
+        'camera.file: "gone.csv": no such file',
+    ]
+
+
+def test_frames_must_be_the_number_of_eyes(tmp_path):
+    path = eyes_of(tmp_path, "eyes.csv", CSV, "frames = 3")
+    assert problems(path) == ['camera.frames: expected 2, the number of eyes in "eyes.csv", got 3']
+
+
+def test_a_wrong_column_is_told_only_a_few_times(tmp_path):
+    found = problems(eyes_of(tmp_path, "eyes.csv", HEADER + "x,0,0,0,0,1\n" * 100))
+    assert len(found) == 11
+    assert found[-1] == 'camera.file: "eyes.csv": and 90 more problems'
+
+
+def again(job, folder):
+    """Write a job and read it again."""
+    path = folder / "again.toml"
+    path.write_text(tomli_w.dumps(job_table(job)), encoding="utf-8")
+    return read_job(path)
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        "",
+        "[ambient]\nintensity = 0.5\n",
+        "[ambient]\npaths = 7\nmethod = 'light'\n",
+        "[render]\nthreads = 3\n[output]\ndirectory = '/x/y'\nformat = 'png'\nexposure = 2\n",
+        "[scene.materials.'a b.\"c']\nspecular = 1\n",
+    ],
+)
+def test_a_job_survives_the_round_trip(tmp_path, more):
+    path = write(tmp_path)
+    path.write_text(path.read_text().replace("scene.file", 'scene.file = "s.stl"\n#') + more)
+    job = read_job(path)
+    (tmp_path / "elsewhere").mkdir()
+    assert again(job, tmp_path / "elsewhere") == job
+
+
+def test_a_job_with_a_file_of_eyes_survives_without_the_file(tmp_path):
+    job = read_job(eyes_of(tmp_path, "eyes.csv", CSV))
+    (tmp_path / "eyes.csv").unlink()
+    assert again(job, tmp_path) == job
+
+
+def test_jobs_that_differ_are_not_equal(tmp_path):
+    job = read_job(write(tmp_path))
+    other = read_job(write(tmp_path, KEYS.replace("[0, 0, 5]", "[0, 0, 5.0000001]")))
+    assert job != other
+    assert job == read_job(write(tmp_path, name="copy.toml"))
+
+
+values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | st.dates(),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
+    max_leaves=12,
+)
+tables = ["scene", "camera", "light", "samples", "ambient", "output", "sources", "keys", "type", "file", "frames"]
+
+
+@settings(max_examples=300, deadline=None)
+@given(data=st.data())
+def test_no_content_gives_anything_but_a_job_or_a_job_error(data):
+    """Put rubbish anywhere into a good job: every way it fails has words, and none of them are pydantic's."""
+    from pydantic import ValidationError
+
+    from framearray_cli.jobfile import problems_of
+
+    key = {"frame": 0, "eye": [0, 0, 5], "target": [0, 0, 0]}
+    lamp = {"type": "point", "keys": [{"frame": 0, "position": [1, 2, 0], "intensity": 10}]}
+    table = {
+        "name": "a",
+        "scene": {"file": "a.glb"},
+        "camera": {"keys": [key]},
+        "light": {"sources": [lamp]},
+        "obscurance": {"range": 1},
+    }
+    node = table
+    while isinstance(node, dict | list):
+        name = data.draw(st.sampled_from([*(node if isinstance(node, dict) else range(len(node)))]))
+        if data.draw(st.booleans()) or not isinstance(node[name], dict | list):
+            node[name] = data.draw(values)
+            break
+        node = node[name]
+    table |= data.draw(st.dictionaries(st.sampled_from(tables), values, max_size=2))
+    try:
+        job = Job.model_validate(table)
+    except ValidationError as error:
+        for problem in problems_of(error, Job):
+            assert not any(word in problem.lower() for word in ("input", "pydantic", "validat", "http"))
+    else:
+        assert Job.model_validate(job_table(job)) == job
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ("x" * 100, '"' + "x" * 35 + '..."'),
+        ([1, [2]], "a list of 2 values"),
+        ([], "a list of 0 values"),
+        ([1.5, "a"], '[1.5, "a"]'),
+        ({"a": 1}, "a table"),
+        (True, "true"),
+    ],
+)
+def test_found_values_are_shown_short(value, text):
+    assert shown(value) == text
