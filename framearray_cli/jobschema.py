@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, TypeAlias
 
 from pydantic import BaseModel
@@ -22,8 +23,9 @@ def job_schema() -> Schema:
     return {"$schema": DIALECT, **schema, "title": "framearray job"}
 
 
+@cache  # a file of eyes may have a problem in each of its rows
 def file_schema(model: type[BaseModel]) -> Schema:
-    """Make the schema of what a file may hold: TOML has no null, so no key may be null.
+    """Make the schema of what a file may hold: TOML has no null, so no key may be null. Not to be changed.
 
     The keyword `x-default` tells in words a default that depends on other keys.
     """
@@ -108,8 +110,10 @@ def words(root: Schema, node: Schema) -> str:
     if choices := node.get("enum", [node["const"]] if "const" in node else list(variants(root, node))):
         return "a table" if "oneOf" in node else _either([f'"{choice}"' for choice in choices])
     if "anyOf" in node:
-        grey, vector = node["anyOf"]
-        return f"a number or {vector['minItems']} numbers {_range(grey)}".rstrip()
+        first, *others = node["anyOf"]
+        if others and others[0].get("items") == first:  # grey or RGB: the bounds are said once
+            return f"a number or {others[0]['minItems']} numbers {_range(first)}".rstrip()
+        return _either([words(root, option) for option in node["anyOf"]])
     match node.get("type"):
         case "integer":
             return f"a whole number {_range(node)}".rstrip()
@@ -122,8 +126,9 @@ def words(root: Schema, node: Schema) -> str:
         case "object":
             return "a table"
         case "array" if "maxItems" in node:
-            kind = "whole numbers" if node["items"]["type"] == "integer" else "numbers"
-            return f"{node['minItems']} {kind} {_range(node['items'])}".rstrip()
+            kinds = {"integer": "whole numbers", "number": "numbers"}
+            kind = kinds.get(node["items"].get("type"), "values")
+            return f"{node['maxItems']} {kind} {_range(node['items'])}".rstrip()
         case "array":
             return "a list of tables"
     return "another value"

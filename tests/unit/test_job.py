@@ -4,6 +4,7 @@ import copy
 import tomllib
 from pathlib import Path
 
+import jsonschema
 import pytest
 from pydantic import ValidationError
 
@@ -302,7 +303,6 @@ NOT_IN_SCHEMA = [
 
 
 def test_schema_accepts_what_the_job_accepts_and_refuses_the_rest(table):
-    jsonschema = pytest.importorskip("jsonschema")
     jsonschema.Draft202012Validator.check_schema(job_schema())
     validator = jsonschema.Draft202012Validator(job_schema())
     validator.validate(table)

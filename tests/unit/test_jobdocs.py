@@ -6,7 +6,7 @@ from pathlib import Path
 
 from framearray_cli.job import Job
 from framearray_cli.jobdocs import EXAMPLE, reference, schema_text
-from framearray_cli.jobschema import file_schema, sections
+from framearray_cli.jobschema import file_schema, find, sections, words
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 REMEDY = "out of date: run `python -m framearray_cli.jobdocs docs/`"
@@ -21,6 +21,15 @@ def test_the_example_is_a_job():
     job = Job.model_validate(tomllib.loads(EXAMPLE))
     assert (job.camera.frames, job.light.frames) == (96, 48)
     assert EXAMPLE in reference()
+
+
+def test_words_of_schemas_other_files_may_use():
+    place = {"anyOf": [{"type": "integer"}, {"type": "string"}]}
+    span = {"anyOf": [*place["anyOf"], {"type": "array", "items": place, "minItems": 2, "maxItems": 2}]}
+    assert words({}, span) == "a whole number, a text or 2 values"
+    assert words({}, {}) == "another value"
+    assert find(span, (1,)) == ("[1]", place)
+    assert find({}, ("a b", "c", 3)) == ('"a b".c[3]', {})
 
 
 def test_every_key_is_described():
