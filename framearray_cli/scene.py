@@ -189,11 +189,11 @@ def _kept(
     Raises:
         SceneError: nothing stays, or a size that cannot be traced.
     """
-    left_out = np.array([material.left_out for material in materials])[merged.material]
     rows = np.arange(len(merged.corners))
     rows = _drop(rows, ~finite(merged.corners), "non-finite", dropped)
     for reason in sorted({material.left_out for material in materials} - {""}):
-        rows = _drop(rows, left_out[rows] == reason, reason, dropped)
+        absent = np.array([material.left_out == reason for material in materials])
+        rows = _drop(rows, absent[merged.material[rows]], reason, dropped)
     rows = _drop(rows, ~has_area(merged.corners[rows]), "degenerate", dropped)
     _check_left(rows, dropped, notes)
     low, high = merged.corners[rows].min(axis=(0, 1)), merged.corners[rows].max(axis=(0, 1))

@@ -25,11 +25,12 @@ def has_area(corners: Float64 | Corners) -> Mask:
         corners: (n, 3, 3) finite positions.
     """
     # float64 holds differences and products of float32 coordinates exactly, so flat means flat
-    first = corners[:, 1].astype(np.float64) - corners[:, 0]
-    second = corners[:, 2].astype(np.float64) - corners[:, 0]
-    longest = np.maximum(np.abs(first).max(axis=1), np.abs(second).max(axis=1))
-    scale = 1.0 / np.where(longest > 0, longest, 1.0)
-    area = np.cross(first * scale[:, None], second * scale[:, None])
+    with np.errstate(all="ignore"):  # beyond float64's range a triangle compares false, and is left out
+        first = corners[:, 1].astype(np.float64) - corners[:, 0]
+        second = corners[:, 2].astype(np.float64) - corners[:, 0]
+        longest = np.maximum(np.abs(first).max(axis=1), np.abs(second).max(axis=1))
+        scale = 1.0 / np.where(longest > 0, longest, 1.0)
+        area = np.cross(first * scale[:, None], second * scale[:, None])
     return np.asarray((longest > 0) & (np.abs(area).max(axis=1) > SLIVER))
 
 

@@ -83,9 +83,10 @@ def _material(
     if texture < 0 or info is None:
         return GltfMaterial(material=material)
     transform: Tree = (info.get("extensions") or {}).get("KHR_texture_transform") or {}
+    uv_set: int = {"texCoord": 0, **info, **transform}["texCoord"]  # the transform's own set wins
     return GltfMaterial(
         material=material,
-        uv_set=int(transform.get("texCoord", info.get("texCoord", 0))),
+        uv_set=uv_set,
         uv_matrix=uv_matrix(transform),
         repeats=source.repeats(info),
     )

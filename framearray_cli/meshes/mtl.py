@@ -15,19 +15,8 @@ GLASS_MODELS = (4, 6, 7, 9)
 MIRROR_NS = 810.0
 MAP_OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-texres": 1, "-clamp": 1, "-bm": 1, "-imfchan": 1}
 MAP_OPTIONS |= {"-type": 1, "-cc": 1, "-o": 3, "-s": 3, "-t": 3}
-IGNORED_MAPS: tuple[str, ...] = (
-    "map_ks",
-    "map_ns",
-    "map_ke",
-    "map_ka",
-    "map_bump",
-    "bump",
-    "norm",
-    "disp",
-    "refl",
-    "map_refl",
-)
-IGNORED_MAPS += ("map_pr", "map_pm", "map_ps", "map_tr")
+IGNORED_MAPS = [f"map_{what}" for what in ("ks", "ns", "ke", "ka", "bump", "refl", "pr", "pm", "ps", "tr")]
+IGNORED_MAPS += ["bump", "norm", "disp", "refl"]
 
 Rgb3 = tuple[float, float, float]
 

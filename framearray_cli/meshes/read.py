@@ -35,7 +35,8 @@ def read_meshes(file: Path) -> Meshes:
         except SceneError as error:
             raise SceneError(f"{file}: {error}") from error
         except ImportError as error:
-            raise SceneError(f"{file}: reading it needs {error.name}; pip install {error.name}") from error
+            package = "Pillow" if (error.name or "").startswith("PIL") else error.name
+            raise SceneError(f"{file}: reading it needs {package}; pip install {package}") from error
         except MemoryError as error:
             raise SceneError(f"{file}: does not fit into memory, or its header claims more than it holds") from error
         except AssetError as error:
