@@ -18,7 +18,6 @@ from shapes import Array, Mesh
 Part = list[tuple[str, Mesh]]
 
 FLOAT, USHORT, UINT = 5126, 5123, 5125  # glTF component types
-DECIMALS = 5  # points are rounded to 0.01 mm, so that the last bits of sin and cos leave no trace in a file
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -33,9 +32,16 @@ class Material:
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Model:
-    """What a generator collects: materials, and parts with the places they stand in."""
+    """What a generator collects: materials, and parts with the places they stand in.
+
+    Attributes:
+        normals: whether the file gets vertex normals; without them every triangle is flat.
+        decimals: points are rounded to that many, so that the last bits of sin and cos leave no trace in a file.
+    """
 
     materials: dict[str, Material]
+    normals: bool = True
+    decimals: int = 5
     placed: list[tuple[str, Part, list[Array]]] = field(default_factory=list)
 
     def add(self, name: str, part: Part, places: Iterable[Array] | None = None) -> None:
@@ -63,9 +69,11 @@ def write(model: Model, file: Path) -> None:
         primitives = []
         for material in dict.fromkeys(m for m, _ in part):
             textured = model.materials[material].texture is not None
-            points, normals, uvs, faces = _primitive([mesh for m, mesh in part if m == material], textured,
-                                                     model.materials[material].metres)
-            attributes = {"POSITION": out.floats(points, limits=True), "NORMAL": out.floats(normals)}
+            meshes_here = [_rounded(mesh, model.decimals) for m, mesh in part if m == material]
+            points, normals, uvs, faces = _primitive(meshes_here, model.normals, textured, model.materials[material].metres)
+            attributes = {"POSITION": out.floats(points, limits=True)}
+            if model.normals:
+                attributes["NORMAL"] = out.floats(normals)
             if textured:
                 attributes["TEXCOORD_0"] = out.floats(uvs)
             primitives.append(
@@ -148,14 +156,15 @@ def _material_table(materials: dict[str, Material]) -> list[dict[str, Any]]:
 
 
 def _primitive(
-    meshes: Sequence[Mesh], textured: bool, metres: float
+    meshes: Sequence[Mesh], smooth: bool, textured: bool, metres: float
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
     """Points, normals, texture coordinates (all a vertex) and faces of several meshes of one material."""
-    meshes = [_rounded(mesh) for mesh in meshes]
     corners = np.vstack([mesh.points[mesh.faces].reshape(-1, 3) for mesh in meshes])
     owner = np.repeat(np.arange(len(meshes)), [3 * len(mesh.faces) for mesh in meshes])
     cos_crease = np.repeat(np.cos(np.radians([mesh.crease_deg for mesh in meshes])), [3 * len(m.faces) for m in meshes])
-    normals = np.round(_corner_normals(corners, owner, cos_crease), 4) + 0.0
+    normals = np.tile([0.0, 0.0, 1.0], (len(corners), 1))
+    if smooth:
+        normals = np.round(_corner_normals(corners, owner, cos_crease), 4) + 0.0
     uvs = np.zeros((len(corners), 2))
     if textured:
         uvs = np.round(np.vstack([_corner_uvs(mesh) for mesh in meshes]) / metres, 5) + 0.0
@@ -171,9 +180,9 @@ def _primitive(
     return vertices[:, :3], unit, vertices[:, 6:], rank[index.ravel()].reshape(-1, 3)
 
 
-def _rounded(mesh: Mesh) -> Mesh:
+def _rounded(mesh: Mesh, decimals: int) -> Mesh:
     """The mesh with rounded points, without the triangles that lose their area by it."""
-    points = np.round(mesh.points, DECIMALS) + 0.0
+    points = np.round(mesh.points, decimals) + 0.0
     p = points[mesh.faces]
     area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
     return replace(mesh, points=points, faces=mesh.faces[area > 1e-9])

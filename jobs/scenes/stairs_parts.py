@@ -15,7 +15,7 @@ RAIL = [(-0.05, -0.045), (0.05, -0.045), (0.085, -0.015), (0.095, 0.015), (0.075
 
 def baluster() -> Part:
     """A turned marble baluster 0.66 high."""
-    return [("Marble", lathe(BALUSTER, 9))]
+    return [("Marble", lathe(BALUSTER, 8))]
 
 
 def rail(path: list[tuple[float, float, float]]) -> Mesh:
@@ -217,7 +217,7 @@ def palm(rng: np.random.Generator) -> Part:
     urn = [(0.0, 0.0), (0.20, 0.0), (0.20, 0.05), (0.11, 0.09), (0.10, 0.15), (0.20, 0.26), (0.29, 0.42), (0.30, 0.52), (0.27, 0.56),
            (0.33, 0.60), (0.33, 0.64), (0.27, 0.64), (0.25, 0.56), (0.0, 0.55)]  # fmt: skip
     part: Part = [("MarbleRose", lathe(urn, 24))]
-    for i in range(11):
+    for i in range(10):
         around = i * 137.5 + float(rng.uniform(-15, 15))
         lean, length = float(rng.uniform(0.25, 0.95)), float(rng.uniform(0.9, 1.35))
         spine = curve([(0.02, 0.55, 0), (0.10 + 0.25 * lean, 0.55 + 0.55 * length, 0), (0.9 * lean * length, 0.62 + length * (1.0 - 0.25 * lean), 0),
@@ -229,7 +229,7 @@ def palm(rng: np.random.Generator) -> Part:
             for s in (-1, 1):
                 reach = 0.34 * np.sin(np.pi * (0.25 + 0.65 * k / len(spine)))
                 out = 0.55 * way + [0, -0.25, s * 0.85]
-                t = np.linspace(0, 1, 4)[:, None]
+                t = np.linspace(0, 1, 3)[:, None]
                 middle = at + reach * t * out + [0, -0.10, 0] * t**2 * reach * 2
                 wide = 0.017 * np.sin(np.pi * (0.15 + 0.85 * t)) * way
                 blades.append(surface(np.stack([middle - wide, middle + wide])))
