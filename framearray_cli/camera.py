@@ -5,10 +5,10 @@ A pixel's filter is its own box. Pixel (0, 0) is the top left one; images are (h
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
 from .arrays import Directions, Float64, Points
+from .kernel import inlined
 from .paths import Eyes
 
 Triple = tuple[float, float, float]
@@ -50,27 +50,31 @@ def cameras(eyes: Eyes, resolution: tuple[int, int], centre: Float64) -> Cameras
     )
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def eye_ray(cams: Cameras, c: int, x: float, y: float) -> Triple:
     """Direction from eye c through image position (x, y) in pixels; its component along the optical axis is 1."""
     a = np.float32((x - 0.5 * cams.width) / cams.focal)
     b = np.float32((0.5 * cams.height - y) / cams.focal)
-    r, u, f = cams.right[c], cams.up[c], cams.forward[c]
-    return a * r[0] + b * u[0] + f[0], a * r[1] + b * u[1] + f[1], a * r[2] + b * u[2] + f[2]
+    r, u, f = cams.right, cams.up, cams.forward
+    return (
+        a * r[c, 0] + b * u[c, 0] + f[c, 0],
+        a * r[c, 1] + b * u[c, 1] + f[c, 1],
+        a * r[c, 2] + b * u[c, 2] + f[c, 2],
+    )
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def project(cams: Cameras, c: int, x: float, y: float, z: float) -> tuple[int, float]:
     """The pixel of eye c that sees the vector (x, y, z) from the eye, and the vector's length along the optical axis.
 
     The pixel is OUTSIDE where the vector points behind the eye or out of the image.
     """
-    r, u, f = cams.right[c], cams.up[c], cams.forward[c]
-    depth = x * f[0] + y * f[1] + z * f[2]
+    r, u, f = cams.right, cams.up, cams.forward
+    depth = x * f[c, 0] + y * f[c, 1] + z * f[c, 2]
     if not depth > 0.0:
         return OUTSIDE, depth
-    column = 0.5 * cams.width + cams.focal * (x * r[0] + y * r[1] + z * r[2]) / depth
-    row = 0.5 * cams.height - cams.focal * (x * u[0] + y * u[1] + z * u[2]) / depth
+    column = 0.5 * cams.width + cams.focal * (x * r[c, 0] + y * r[c, 1] + z * r[c, 2]) / depth
+    row = 0.5 * cams.height - cams.focal * (x * u[c, 0] + y * u[c, 1] + z * u[c, 2]) / depth
     if not (0.0 <= column < cams.width and 0.0 <= row < cams.height):
         return OUTSIDE, depth
     return int(row) * cams.width + int(column), depth

@@ -9,10 +9,10 @@ images do not depend on the number of threads.
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
 from .arrays import Float32, Images, Int32, Rgb
+from .kernel import kernel
 
 INVERSE_PI = np.float32(1.0 / np.pi)
 
@@ -46,16 +46,20 @@ def empty_band(n_pixels: int, n_lights: int) -> Band:
     )
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def begin(band: Band, n: int) -> None:
     """Set the sums of pixels 0 to n - 1 of a band to zero."""
-    band.direct[:n] = 0.0
-    band.rest[:n] = 0.0
-    band.reflectivity[:n] = 0.0
-    band.hits[:n] = 0
+    for i in range(n):
+        band.hits[i] = 0
+        for value in range(band.rest.shape[1]):
+            band.rest[i, value] = 0.0
+        for channel in range(3):
+            band.reflectivity[i, channel] = 0.0
+            for l in range(band.direct.shape[2]):
+                band.direct[i, channel, l] = 0.0
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def accumulate(
     band: Band,
     first_pixel: int,
@@ -105,7 +109,7 @@ def accumulate(
                     direct[l] += r * e[l]
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def normalise(band: Band, n: int) -> None:
     """Turn sums into means over the weights; a pixel without hits stays zero."""
     for i in range(n):
@@ -122,7 +126,7 @@ def normalise(band: Band, n: int) -> None:
             band.rest[i, value] *= inverse
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def finish(band: Band, first_pixel: int, n: int, colour: Rgb, ambient: Rgb, images: Images) -> tuple[int, int, int]:
     """Write the pixels of a band into all images of the frame.
 

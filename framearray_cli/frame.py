@@ -16,10 +16,11 @@ import numpy as np
 
 from .arrays import Float32, Int32, Rgb
 from .camera import Cameras
-from .embree.packets import HIT_ROWS, LANES, RAY_ROWS, Tracer, empty_packets
+from .embree.packets import Tracer
 from .hits import ESCAPED, SURFACE, Hits, empty_hits, extra_hits, native_hits, pilot_hits, pixel_order
 from .lights import LightArrays
 from .plan import flag_mirrors
+from .rays import room_for_hits, room_for_tests
 from .reuse import balance_weights, outer_hits, sort_by_pixel
 from .surface import Surfaces
 from .terms.direct import direct
@@ -130,8 +131,8 @@ class Scratch:
     def __init__(self, work: Work) -> None:
         n_eyes = 4 * work.n_r + 1
         rays = max(RAYS, work.obscurance.n_rays)
-        self.hit_packets = empty_packets(-(-rays // LANES), HIT_ROWS)
-        self.shadow_packets = empty_packets(RAYS // LANES, RAY_ROWS)
+        self.hit_rays = room_for_hits(rays)
+        self.test_rays = room_for_tests(RAYS, work.lights.n_lights)
         self.hits = empty_hits(BATCH)
         self.reflected = [empty_hits(BATCH), empty_hits(BATCH)] if work.depth else []
         self.throughput = [np.empty((BATCH, 3), np.float32) for _ in self.reflected]
@@ -251,7 +252,7 @@ def _native(work: Work, c: int, first: int, n: int, scratch: Scratch) -> None:
     started = perf_counter()
     native_hits(
         work.cams, c, work.seed, work.order, int(work.per_pixel[c]), first, n, work.surfaces, work.tracer,
-        work.depth > 0, scratch.hit_packets, scratch.hits,
+        work.depth > 0, scratch.hit_rays.packets, scratch.hits,
     )  # fmt: skip
     scratch.rays["native"] += n
     scratch.seconds["native"] += perf_counter() - started
@@ -270,10 +271,10 @@ def _terms(
     """Estimate W, the constant part and E[l] of hits 0 to n - 1."""
     started = perf_counter()
     scratch.rays[obscurance_kind] += obscurance(
-        hits, n, work.obscurance, work.surfaces, work.tracer, scratch.hit_packets, out.obscurance, scratch.skylight
+        hits, n, work.obscurance, work.surfaces, work.tracer, scratch.hit_rays, out.obscurance, scratch.skylight
     )
     middle = perf_counter()
-    scratch.rays[shadow_kind] += direct(hits, n, work.lights, work.tracer, scratch.shadow_packets, out.irradiance)
+    scratch.rays[shadow_kind] += direct(hits, n, work.lights, work.tracer, scratch.test_rays, out.irradiance)
     out.reflectivity[:n] = hits.reflectivity[:n]
     if work.has_constant:
         seen = (hits.kind[:n, None] == ESCAPED) * work.background
@@ -292,7 +293,7 @@ def _place(work: Work, c: int, n: int, scratch: Scratch, frames: range, pixel: I
     eyes = work.frames_around(c, 2 * work.n_r) if work.balance else frames
     seen, density = scratch.pixel[: len(eyes)], scratch.density[: len(eyes)]
     scratch.rays["visibility"] += outer_hits(
-        work.cams, c, eyes.start, scratch.hits, n, work.tracer, scratch.shadow_packets, seen, density
+        work.cams, c, eyes.start, scratch.hits, n, work.tracer, scratch.test_rays, seen, density
     )
     first = frames.start - eyes.start
     pixel[:] = seen[first : first + len(frames), :n]
@@ -311,7 +312,7 @@ def _mirror_paths(work: Work, hits: Hits, n: int, scratch: Scratch) -> list[tupl
         if m == 0:
             break
         reflected, next_throughput = scratch.reflected[bounce % 2], scratch.throughput[bounce % 2]
-        reflect(hits, n, throughput, work.surfaces, work.tracer, scratch.hit_packets, reflected, next_throughput)
+        reflect(hits, n, throughput, work.surfaces, work.tracer, scratch.hit_rays.packets, reflected, next_throughput)
         scratch.rays["mirror"] += m
         hits, n, throughput = reflected, m, next_throughput
         records = _empty_records(work, m)
@@ -332,7 +333,7 @@ def _extra_mirror_hits(work: Work, c: int, crew: Crew) -> tuple[list[tuple[Int32
     def look(first: int, scratch: Scratch) -> None:
         n = min(BATCH, work.n_pixels - first)
         hits = scratch.hits
-        pilot_hits(work.cams, c, work.order, first, n, work.surfaces, work.tracer, scratch.hit_packets, hits)
+        pilot_hits(work.cams, c, work.order, first, n, work.surfaces, work.tracer, scratch.hit_rays.packets, hits)
         scratch.rays["pilot"] += n
         flag_mirrors(hits, n, work.cams.width, work.cams.height, flags)
 
@@ -340,7 +341,7 @@ def _extra_mirror_hits(work: Work, c: int, crew: Crew) -> tuple[list[tuple[Int32
         n = min(BATCH, len(pixels) * extra - first)
         extra_hits(
             work.cams, c, work.seed, pixels, base, extra, first, n, work.surfaces, work.tracer,
-            scratch.hit_packets, scratch.hits,
+            scratch.hit_rays.packets, scratch.hits,
         )  # fmt: skip
         scratch.rays["mirror"] += n
         return _mirror_paths(work, scratch.hits, n, scratch)

@@ -11,6 +11,7 @@ import numpy as np
 from .arrays import Bytes, Directions, Float32, Int32, Points, Rgb
 from .camera import Cameras, eye_ray
 from .embree.packets import DIRECTION, MISS, Tracer, U, V, hit_triangle, intersect, set_ray
+from .kernel import inlined, kernel
 from .sampling import PIXEL, PIXEL_SAMPLE, r2, stream, word
 from .surface import (
     Surfaces,
@@ -71,7 +72,21 @@ def empty_hits(n: int) -> Hits:
     )
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
+def reflects(hits: Hits, i: int) -> bool:
+    """Whether hit i is on a surface that reflects diffusely; elsewhere no light needs to be known."""
+    r = hits.reflectivity
+    return hits.kind[i] == SURFACE and (r[i, 0] > 0.0 or r[i, 1] > 0.0 or r[i, 2] > 0.0)
+
+
+@inlined
+def ray_origin(hits: Hits, i: int) -> tuple[float, float, float]:
+    """Where rays that leave hit i start: above the triangle, on the viewer's side."""
+    p, g, e = hits.position, hits.geometric, hits.offset[i]
+    return p[i, 0] + e * g[i, 0], p[i, 1] + e * g[i, 1], p[i, 2] + e * g[i, 2]
+
+
+@kernel
 def record_hits(surfaces: Surfaces, tracer: Tracer, packets: Float32, n: int, mirrors: bool, hits: Hits) -> None:
     """Turn traced rays 0 to n - 1 into hits; key and pixel are left alone."""
     for i in range(n):
@@ -83,8 +98,8 @@ def record_hits(surfaces: Surfaces, tracer: Tracer, packets: Float32, n: int, mi
             scale = np.float32(1.0) / np.sqrt(dx * dx + dy * dy + dz * dz)
             hits.kind[i] = ESCAPED
             hits.position[i, 0], hits.position[i, 1], hits.position[i, 2] = dx * scale, dy * scale, dz * scale
-            hits.reflectivity[i, :] = 0.0
-            hits.specular[i, :] = 0.0
+            for channel in range(3):
+                hits.reflectivity[i, channel] = hits.specular[i, channel] = 0.0
             continue
         u, v = packets[p, U, lane], packets[p, V, lane]
         hits.kind[i] = SURFACE
@@ -101,7 +116,7 @@ def record_hits(surfaces: Surfaces, tracer: Tracer, packets: Float32, n: int, mi
             hits.specular[i, 0], hits.specular[i, 1], hits.specular[i, 2] = red, green, blue
 
 
-@nb.njit(nogil=True, cache=True)
+@nb.njit(cache=True)
 def pixel_order(width: int, height: int) -> Int32:
     """All pixels, in 4 x 4 blocks within 32 x 32 tiles.
 
@@ -120,16 +135,16 @@ def pixel_order(width: int, height: int) -> Int32:
     return order
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def _shoot(cams: Cameras, c: int, pixel: int, jx: float, jy: float, i: int, packets: Float32, hits: Hits) -> None:
     """Write eye ray i, through (jx, jy) within the box of a pixel."""
     dx, dy, dz = eye_ray(cams, c, pixel % cams.width + jx, pixel // cams.width + jy)
-    o = cams.position[c]
-    set_ray(packets, i, o[0], o[1], o[2], dx, dy, dz, np.float32(np.inf))
+    o = cams.position
+    set_ray(packets, i, o[c, 0], o[c, 1], o[c, 2], dx, dy, dz, np.float32(np.inf))
     hits.pixel[i] = pixel
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def _shoot_sample(
     cams: Cameras, c: int, seed: int, pixel: int, sample: int, i: int, packets: Float32, hits: Hits
 ) -> None:
@@ -139,7 +154,7 @@ def _shoot_sample(
     hits.key[i] = stream(seed, c, pixel, sample)
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def native_hits(
     cams: Cameras,
     c: int,
@@ -168,7 +183,7 @@ def native_hits(
     record_hits(surfaces, tracer, packets, n, mirrors, hits)
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def extra_hits(
     cams: Cameras,
     c: int,
@@ -191,7 +206,7 @@ def extra_hits(
     record_hits(surfaces, tracer, packets, n, True, hits)
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def pilot_hits(
     cams: Cameras,
     c: int,

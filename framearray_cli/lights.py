@@ -7,10 +7,9 @@ different colours shine together does a hit store three channels.
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
-from .arrays import Float32, Float64
+from .arrays import Bytes, Float32, Float64, Int32
 from .paths import Lights
 
 POINT, DIRECTIONAL = 0, 1
@@ -21,25 +20,27 @@ class LightArrays(NamedTuple):
 
     Attributes:
         kind: (n_sources,) POINT or DIRECTIONAL.
-        vector: (n_sources, n_lights, 3) position, centred, or the unit direction that light travels.
-        strength: (n_sources, n_lights, channels) W/sr or W/m2 in units of `colour`; 1 or 3 channels.
+        vector: (n_sources, 3, n_lights) position, centred, or the unit direction that light travels.
+        strength: (n_sources, channels, n_lights) W/sr or W/m2 in units of `colour`; 1 or 3 channels.
+        lit: (n_sources, n_lights) 1 where a source shines at all.
         colour: (n_lights, 3) what a stored irradiance is multiplied with; ones where there are 3 channels.
     """
 
-    kind: Float32
+    kind: Int32
     vector: Float32
     strength: Float32
+    lit: Bytes
     colour: Float32
 
     @property
     def channels(self) -> int:
         """1 where all sources of each light position share a colour, else 3."""
-        return int(self.strength.shape[2])
+        return int(self.strength.shape[1])
 
     @property
     def n_lights(self) -> int:
         """Number of light positions N_l."""
-        return int(self.vector.shape[1])
+        return int(self.vector.shape[2])
 
 
 def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
@@ -59,28 +60,8 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
     kind = [POINT if source.kind == "point" else DIRECTIONAL for source in lights.sources]
     return LightArrays(
         kind=np.array(kind, np.int32),
-        vector=np.ascontiguousarray(vector, np.float32),
-        strength=np.ascontiguousarray(strength, np.float32),
+        vector=np.ascontiguousarray(vector.transpose(0, 2, 1), np.float32),
+        strength=np.ascontiguousarray(strength.transpose(0, 2, 1), np.float32),
+        lit=(intensity > 0).any(axis=-1).astype(np.uint8),
         colour=np.ascontiguousarray(colour, np.float32),
     )
-
-
-@nb.njit(nogil=True, cache=True)
-def towards(
-    lights: LightArrays, s: int, l: int, px: float, py: float, pz: float
-) -> tuple[float, float, float, float, float]:
-    """The vector from a point to source s at light index l, the reach of a ray along it, and the geometry factor.
-
-    Irradiance = strength * factor * (normal . vector). A point source's vector ends at the source (reach 1) and its
-    factor is 1 / d^3; a directional source's vector is a unit vector without end and its factor is 1.
-    A point exactly at the source gets no light: the factor is 0.
-    """
-    v = lights.vector[s, l]
-    if lights.kind[s] == DIRECTIONAL:
-        return -v[0], -v[1], -v[2], np.float32(np.inf), np.float32(1.0)
-    x, y, z = v[0] - px, v[1] - py, v[2] - pz
-    square = x * x + y * y + z * z
-    if not square > 0.0:
-        return x, y, z, np.float32(1.0), np.float32(0.0)
-    inverse = np.float32(1.0) / np.sqrt(square)
-    return x, y, z, np.float32(1.0), inverse * inverse * inverse

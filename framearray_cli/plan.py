@@ -5,11 +5,11 @@ neighbours: the frames that are missing are thought to be the path's own first o
 and their native hits are given to those. So frame 0 of N_r = 3 has twice the hits, and so do frames 1 and 2.
 """
 
-import numba as nb
 import numpy as np
 
 from .arrays import Bytes, Int32
 from .hits import Hits
+from .kernel import kernel
 
 
 def frame_hits(n_c: int, n_r: int, hits: int) -> Int32:
@@ -25,7 +25,7 @@ def frame_hits(n_c: int, n_r: int, hits: int) -> Int32:
     return counts
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def flag_mirrors(hits: Hits, n: int, width: int, height: int, flags: Bytes) -> None:
     """Flag the pixels of mirror hits and their neighbours: a mirror's edge may pass beside the one ray that looked.
 

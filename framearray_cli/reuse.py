@@ -12,25 +12,26 @@ f^2 / z_k^3, the d_k being 1. It is zero where P is hidden from k, behind it, ou
 p_j / sum of n_k p_k over the eyes k of the window of j (balance heuristic, [Veach95]).
 """
 
-import numba as nb
 import numpy as np
 
 from .arrays import Float32, Float64, Int32
 from .camera import OUTSIDE, Cameras, project
 from .embree.packets import LANES, Tracer, is_blocked, occlude, set_ray
 from .hits import SURFACE, Hits
+from .kernel import inlined, kernel
+from .rays import Rays
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def _seen(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[int, float]:
     """The pixel of eye k that hit i falls into, were nothing in between, and the density p_k; OUTSIDE and 0 if none."""
-    o, p, g = cams.position[k], hits.position[i], hits.geometric[i]
+    o, p, g = cams.position, hits.position, hits.geometric
     if hits.kind[i] != SURFACE:
-        pixel, z = project(cams, k, p[0], p[1], p[2])
+        pixel, z = project(cams, k, p[i, 0], p[i, 1], p[i, 2])
         facing = 1.0
     else:
-        x, y, z = p[0] - o[0], p[1] - o[1], p[2] - o[2]
-        facing = -(np.float64(x) * g[0] + np.float64(y) * g[1] + np.float64(z) * g[2])
+        x, y, z = p[i, 0] - o[k, 0], p[i, 1] - o[k, 1], p[i, 2] - o[k, 2]
+        facing = -(np.float64(x) * g[i, 0] + np.float64(y) * g[i, 1] + np.float64(z) * g[i, 2])
         if not facing > 0.0:
             return OUTSIDE, 0.0
         pixel, z = project(cams, k, x, y, z)
@@ -40,29 +41,29 @@ def _seen(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[int, float]:
     return pixel, cams.focal * cams.focal * facing / (depth * depth * depth)
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def _aim(cams: Cameras, k: int, hits: Hits, i: int, packets: Float32, ray: int) -> None:
     """Write the visibility ray between hit i and eye k; for an escaped ray, from the eye out of the scene."""
-    o, p = cams.position[k], hits.position[i]
+    o, p = cams.position, hits.position
     if hits.kind[i] != SURFACE:
-        set_ray(packets, ray, o[0], o[1], o[2], p[0], p[1], p[2], np.float32(np.inf))
-        return
-    g, e = hits.geometric[i], hits.offset[i]
-    x, y, z = p[0] + e * g[0], p[1] + e * g[1], p[2] + e * g[2]
-    set_ray(packets, ray, x, y, z, o[0] - x, o[1] - y, o[2] - z, np.float32(1.0))
+        set_ray(packets, ray, o[k, 0], o[k, 1], o[k, 2], p[i, 0], p[i, 1], p[i, 2], np.float32(np.inf))
+    else:
+        g, e = hits.geometric, hits.offset[i]
+        x, y, z = p[i, 0] + e * g[i, 0], p[i, 1] + e * g[i, 1], p[i, 2] + e * g[i, 2]
+        set_ray(packets, ray, x, y, z, o[k, 0] - x, o[k, 1] - y, o[k, 2] - z, np.float32(1.0))
 
 
-@nb.njit(nogil=True, cache=True)
-def _confirm(tracer: Tracer, packets: Float32, n: int, place: Int32, pixel: Int32, density: Float64) -> None:
+@kernel
+def _confirm(tracer: Tracer, rays: Rays, n: int, pixel: Int32, density: Float64) -> None:
     """Trace the waiting visibility rays; what is hidden is forgotten."""
-    occlude(tracer, packets, n)
+    occlude(tracer, rays.packets, n)
     for ray in range(n):
-        if is_blocked(packets, ray):
-            pixel[place[ray, 0], place[ray, 1]] = OUTSIDE
-            density[place[ray, 0], place[ray, 1]] = 0.0
+        if is_blocked(rays.packets, ray):
+            row, i = rays.place[ray, 0], rays.place[ray, 1]
+            pixel[row, i], density[row, i] = OUTSIDE, 0.0
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def outer_hits(
     cams: Cameras,
     c: int,
@@ -70,7 +71,7 @@ def outer_hits(
     hits: Hits,
     n: int,
     tracer: Tracer,
-    packets: Float32,
+    rays: Rays,
     pixel: Int32,
     density: Float64,
 ) -> int:
@@ -83,8 +84,7 @@ def outer_hits(
     Returns:
         number of visibility rays.
     """
-    capacity = packets.shape[0] * LANES
-    place = np.empty((capacity, 2), np.int32)
+    capacity = rays.packets.shape[0] * LANES
     waiting = total = 0
     for row in range(pixel.shape[0]):
         k = first_eye + row
@@ -95,16 +95,16 @@ def outer_hits(
                 density[row, i] = max(density[row, i], 1e-30)
             elif pixel[row, i] != OUTSIDE:
                 if waiting == capacity:
-                    _confirm(tracer, packets, waiting, place, pixel, density)
+                    _confirm(tracer, rays, waiting, pixel, density)
                     total, waiting = total + waiting, 0
-                _aim(cams, k, hits, i, packets, waiting)
-                place[waiting, 0], place[waiting, 1] = row, i
+                _aim(cams, k, hits, i, rays.packets, waiting)
+                rays.place[waiting, 0], rays.place[waiting, 1] = row, i
                 waiting += 1
-    _confirm(tracer, packets, waiting, place, pixel, density)
+    _confirm(tracer, rays, waiting, pixel, density)
     return total + waiting
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def balance_weights(
     per_pixel: Int32,
     n_r: int,
@@ -135,7 +135,7 @@ def balance_weights(
             weight[row, i] = density[j - first_eye, i] / total
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def sort_by_pixel(pixel: Int32, n_pixels: int, start: Int32, order: Int32) -> None:
     """Counting sort of hits by the pixel they fall into; hits of one pixel stay in their order.
 
@@ -144,7 +144,8 @@ def sort_by_pixel(pixel: Int32, n_pixels: int, start: Int32, order: Int32) -> No
         start: (n_pixels + 1,) overwritten: hits order[start[p] : start[p + 1]] fall into pixel p.
         order: (n,) overwritten up to start[n_pixels].
     """
-    start[:] = 0
+    for p in range(n_pixels + 1):
+        start[p] = 0
     for i in range(pixel.shape[0]):
         if pixel[i] != OUTSIDE:
             start[pixel[i] + 1] += 1

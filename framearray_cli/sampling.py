@@ -4,8 +4,9 @@ A number depends on its key alone, never on order: images are the same for any n
 job. Lights are not part of the key, so that all lights share hits and directions and movies do not flicker.
 """
 
-import numba as nb
 import numpy as np
+
+from .kernel import inlined
 
 Triple = tuple[float, float, float]
 
@@ -20,7 +21,7 @@ R2_Y = np.uint32(2447445414)
 _U32 = np.float32(2.0**-24)
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def mix(z: np.uint64) -> np.uint64:
     """SplitMix64's finaliser: a bijection of 64 bits that leaves no visible structure."""
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -28,20 +29,20 @@ def mix(z: np.uint64) -> np.uint64:
     return z ^ (z >> np.uint64(31))
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def stream(seed: int, c: int, pixel: int, sample: int) -> np.uint64:
     """The 64-bit key of one sample: c below 2^20, pixel below 2^28, sample below 2^16."""
     place = (np.uint64(c) << np.uint64(44)) | (np.uint64(pixel) << np.uint64(16)) | np.uint64(sample)
     return mix(place ^ mix(np.uint64(seed) + np.uint64(0x9E3779B97F4A7C15)))
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def word(key: np.uint64, dimension: int) -> np.uint64:
     """64 random bits: dimension `dimension` of a stream."""
     return mix(key + np.uint64(dimension) * np.uint64(0x9E3779B97F4A7C15))
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def r2(bits: np.uint64, i: int) -> tuple[float, float]:
     """Point i of the golden ratio sequence, shifted by the random bits: uniform in [0, 1)^2, well spread over i."""
     x = np.uint32(bits & np.uint64(0xFFFFFFFF)) + np.uint32(i) * R2_X
@@ -50,7 +51,7 @@ def r2(bits: np.uint64, i: int) -> tuple[float, float]:
     return np.float32(x) * _U32, np.float32(y) * _U32
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def disc(u: float, v: float) -> tuple[float, float]:
     """Uniform point of the unit disc by Shirley and Chiu's concentric map.
 
@@ -77,7 +78,7 @@ def disc(u: float, v: float) -> tuple[float, float]:
     return radius * cosine, radius * sine
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def cosine_direction(nx: float, ny: float, nz: float, u: float, v: float) -> Triple:
     """Unit direction about the unit normal n with density cos(theta) / pi; the frame is Duff et al.'s (2017)."""
     x, y = disc(u, v)
@@ -92,7 +93,7 @@ def cosine_direction(nx: float, ny: float, nz: float, u: float, v: float) -> Tri
     )
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def above(x: float, y: float, z: float, gx: float, gy: float, gz: float) -> Triple:
     """A direction mirrored into the half-space of g where it points below the surface.
 

@@ -6,10 +6,10 @@
 import math
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
 from .arrays import Bytes, Corners, CornerUvs, Float32, Int32, Rgb
+from .kernel import inlined
 from .scene import Scene
 
 Triple = tuple[float, float, float]
@@ -58,7 +58,7 @@ def surfaces(scene: Scene) -> Surfaces:
     )
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def texture_at(s: Surfaces, texture: int, u: float, v: float) -> tuple[float, float, float, float]:
     """Bilinear, repeating look-up: linear red, green, blue, and alpha; texel centres at half-integers, v upwards."""
     first, width, height = s.textures[texture, 0], s.textures[texture, 1], s.textures[texture, 2]
@@ -80,48 +80,52 @@ def texture_at(s: Surfaces, texture: int, u: float, v: float) -> tuple[float, fl
     return red, green, blue, alpha / 255.0
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def _texture_coordinates(s: Surfaces, triangle: int, u: float, v: float) -> tuple[float, float]:
     w = 1.0 - u - v
-    a, b, c = s.uvs[triangle, 0], s.uvs[triangle, 1], s.uvs[triangle, 2]
-    return w * a[0] + u * b[0] + v * c[0], w * a[1] + u * b[1] + v * c[1]
+    uv = s.uvs
+    return (
+        w * uv[triangle, 0, 0] + u * uv[triangle, 1, 0] + v * uv[triangle, 2, 0],
+        w * uv[triangle, 0, 1] + u * uv[triangle, 1, 1] + v * uv[triangle, 2, 1],
+    )
 
 
-@nb.njit(nogil=True, cache=True)
-def _tinted(s: Surfaces, factor: Rgb, texture: int, triangle: int, u: float, v: float) -> Triple:
+@inlined
+def _tinted(
+    s: Surfaces, red: float, green: float, blue: float, texture: int, triangle: int, u: float, v: float
+) -> Triple:
     """A material's factor times texture and corner colour."""
-    red, green, blue = factor[0], factor[1], factor[2]
     if texture >= 0:
         tu, tv = _texture_coordinates(s, triangle, u, v)
         r, g, b, _ = texture_at(s, texture, tu, tv)
         red, green, blue = red * np.float32(r), green * np.float32(g), blue * np.float32(b)
     if s.colours.shape[0] > 0:
-        w = np.float32(1.0) - u - v
-        p, q, r3 = s.colours[triangle, 0], s.colours[triangle, 1], s.colours[triangle, 2]
-        red *= w * p[0] + u * q[0] + v * r3[0]
-        green *= w * p[1] + u * q[1] + v * r3[1]
-        blue *= w * p[2] + u * q[2] + v * r3[2]
+        w, k = np.float32(1.0) - u - v, s.colours
+        red *= w * k[triangle, 0, 0] + u * k[triangle, 1, 0] + v * k[triangle, 2, 0]
+        green *= w * k[triangle, 0, 1] + u * k[triangle, 1, 1] + v * k[triangle, 2, 1]
+        blue *= w * k[triangle, 0, 2] + u * k[triangle, 1, 2] + v * k[triangle, 2, 2]
     return red, green, blue
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def reflectivity_at(s: Surfaces, triangle: int, u: float, v: float) -> Triple:
     """Diffuse reflectivity, RGB 0 to 1, at barycentric (u, v) of a triangle."""
     m = s.material[triangle]
-    return _tinted(s, s.reflectivity[m], s.reflectivity_texture[m], triangle, u, v)
+    red, green, blue = s.reflectivity[m, 0], s.reflectivity[m, 1], s.reflectivity[m, 2]
+    return _tinted(s, red, green, blue, s.reflectivity_texture[m], triangle, u, v)
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def specular_at(s: Surfaces, triangle: int, u: float, v: float) -> Triple:
     """Mirror reflectivity, RGB 0 to 1, at barycentric (u, v) of a triangle."""
     m = s.material[triangle]
-    factor = s.specular[m]
-    if factor[0] == 0.0 and factor[1] == 0.0 and factor[2] == 0.0:
-        return np.float32(0.0), np.float32(0.0), np.float32(0.0)
-    return _tinted(s, factor, s.specular_texture[m], triangle, u, v)
+    red, green, blue = s.specular[m, 0], s.specular[m, 1], s.specular[m, 2]
+    if red > 0.0 or green > 0.0 or blue > 0.0:
+        red, green, blue = _tinted(s, red, green, blue, s.specular_texture[m], triangle, u, v)
+    return red, green, blue
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def is_cut_out(s: Surfaces, triangle: int, u: float, v: float) -> bool:
     """Whether the alpha mask of a triangle removes the point (u, v)."""
     m = s.material[triangle]
@@ -132,28 +136,28 @@ def is_cut_out(s: Surfaces, triangle: int, u: float, v: float) -> bool:
     return alpha < s.alpha_cutoff[m]
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def position_at(s: Surfaces, triangle: int, u: float, v: float) -> Triple:
     """The point itself, from the corners: nearer to the triangle than origin + t * direction is."""
-    a, b, c = s.corners[triangle, 0], s.corners[triangle, 1], s.corners[triangle, 2]
-    u64, v64 = np.float64(u), np.float64(v)
+    p, u64, v64 = s.corners, np.float64(u), np.float64(v)
     w64 = 1.0 - u64 - v64
     return (
-        np.float32(w64 * a[0] + u64 * b[0] + v64 * c[0]),
-        np.float32(w64 * a[1] + u64 * b[1] + v64 * c[1]),
-        np.float32(w64 * a[2] + u64 * b[2] + v64 * c[2]),
+        np.float32(w64 * p[triangle, 0, 0] + u64 * p[triangle, 1, 0] + v64 * p[triangle, 2, 0]),
+        np.float32(w64 * p[triangle, 0, 1] + u64 * p[triangle, 1, 1] + v64 * p[triangle, 2, 1]),
+        np.float32(w64 * p[triangle, 0, 2] + u64 * p[triangle, 1, 2] + v64 * p[triangle, 2, 2]),
     )
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def geometric_normal(s: Surfaces, triangle: int, dx: float, dy: float, dz: float) -> Triple:
     """Unit normal of the triangle, on the side that a ray of direction (dx, dy, dz) comes from.
 
     In float64: the cross product of edges of 1e-12 would underflow in float32.
     """
-    a, b, c = s.corners[triangle, 0], s.corners[triangle, 1], s.corners[triangle, 2]
-    e1x, e1y, e1z = np.float64(b[0]) - a[0], np.float64(b[1]) - a[1], np.float64(b[2]) - a[2]
-    e2x, e2y, e2z = np.float64(c[0]) - a[0], np.float64(c[1]) - a[1], np.float64(c[2]) - a[2]
+    p = s.corners
+    ax, ay, az = np.float64(p[triangle, 0, 0]), np.float64(p[triangle, 0, 1]), np.float64(p[triangle, 0, 2])
+    e1x, e1y, e1z = p[triangle, 1, 0] - ax, p[triangle, 1, 1] - ay, p[triangle, 1, 2] - az
+    e2x, e2y, e2z = p[triangle, 2, 0] - ax, p[triangle, 2, 1] - ay, p[triangle, 2, 2] - az
     nx, ny, nz = e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x
     scale = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz)
     if nx * dx + ny * dy + nz * dz > 0.0:
@@ -161,14 +165,15 @@ def geometric_normal(s: Surfaces, triangle: int, dx: float, dy: float, dz: float
     return np.float32(nx * scale), np.float32(ny * scale), np.float32(nz * scale)
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def shading_normal(s: Surfaces, triangle: int, u: float, v: float, gx: float, gy: float, gz: float) -> Triple:
     """Interpolated unit normal on the side of the geometric normal (gx, gy, gz), or that one where there is none."""
     if s.normals.shape[0] == 0:
         return gx, gy, gz
-    a, b, c = s.normals[triangle, 0], s.normals[triangle, 1], s.normals[triangle, 2]
-    w = np.float32(1.0) - u - v
-    x, y, z = w * a[0] + u * b[0] + v * c[0], w * a[1] + u * b[1] + v * c[1], w * a[2] + u * b[2] + v * c[2]
+    w, k = np.float32(1.0) - u - v, s.normals
+    x = w * k[triangle, 0, 0] + u * k[triangle, 1, 0] + v * k[triangle, 2, 0]
+    y = w * k[triangle, 0, 1] + u * k[triangle, 1, 1] + v * k[triangle, 2, 1]
+    z = w * k[triangle, 0, 2] + u * k[triangle, 1, 2] + v * k[triangle, 2, 2]
     square = x * x + y * y + z * z
     if square < 1e-12:  # corner normals that cancel give no direction
         return gx, gy, gz

@@ -9,12 +9,12 @@ what no frame can need any more is dropped: never more than 2 N_r + 1 frames are
 from dataclasses import dataclass
 from time import perf_counter
 
-import numba as nb
 import numpy as np
 
 from .arrays import Float32, Images, Int32
 from .compose import INDIRECT, OBSCURANCE, Band, accumulate, begin, empty_band, finish, normalise
 from .frame import Crew, Frame, Placed, Records, Scratch, Work
+from .kernel import kernel
 from .terms.ambient import Ambient
 
 # Pixels composed together: their sums over all lights fit a core's cache.
@@ -142,7 +142,7 @@ def _add(sums: Band, first: int, n: int, place: Placed, records: Records, weight
     )  # fmt: skip
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def average_native(
     start: Int32, order: Int32, normal: Float32, depth: Float32, first: int, n: int, out: Float32
 ) -> None:
@@ -153,7 +153,8 @@ def average_native(
         out: (n_pixels, 4) written: normal, depth; 0 where no native hit is on a surface.
     """
     for pixel in range(first, first + n):
-        out[pixel, :] = 0.0
+        for value in range(4):
+            out[pixel, value] = 0.0
         found = 0
         for entry in range(start[pixel], start[pixel + 1]):
             hit = order[entry]

@@ -10,7 +10,7 @@ from ..arrays import Float32
 from ..errors import SceneError
 from ..scene import Scene
 from .masks import MaskTable
-from .packets import MASKED, OPAQUE, Tracer
+from .packets import LANES, MASKED, OPAQUE, Tracer, aligned
 
 _TRIANGLES = 0  # RTC_GEOMETRY_TYPE_TRIANGLE
 _INDEX_BUFFER, _VERTEX_BUFFER = 0, 1
@@ -84,8 +84,15 @@ class NativeScene:
         problem = library.rtcGetDeviceError(self._device)
         if problem:
             raise SceneError(f"embree: building {n} triangles failed with error {problem}")
+        self._lanes = aligned(LANES).view(np.int32)
+        self._lanes[:] = -1
         self.tracer = Tracer(
-            self._scene, _address(library.rtcIntersect16), _address(library.rtcOccluded16), 0, scene.n_opaque
+            self._scene,
+            _address(library.rtcIntersect16),
+            _address(library.rtcOccluded16),
+            0,
+            self._lanes.ctypes.data,
+            scene.n_opaque,
         )
 
     def _attach(self, vertices: Float32, start: int, stop: int, masks: "MaskTable | None") -> None:

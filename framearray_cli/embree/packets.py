@@ -8,13 +8,13 @@ A lane with tfar < 0 is idle.
 
 from typing import Any, NamedTuple
 
-import numba as nb
 import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
 from ..arrays import Float32
+from ..kernel import inlined, kernel
 
 LANES = 16
 RAY_ROWS = 12
@@ -32,6 +32,7 @@ class Tracer(NamedTuple):
     Attributes:
         batch: 0 where the functions take one packet, as Embree's do: `(valid, scene, packet, arguments)`;
             1 where they take many: `(n_packets, scene, packets, unused)`.
+        lanes: where 16 words of -1 stand: the mask of a packet whose lanes all count.
         first_masked: number of the first triangle with an alpha mask; those are a geometry of their own.
     """
 
@@ -39,6 +40,7 @@ class Tracer(NamedTuple):
     intersect: int
     occluded: int
     batch: int
+    lanes: int
     first_masked: int
 
 
@@ -56,31 +58,30 @@ def _call(typingctx: Any, function: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
     return signature, codegen
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def _trace(tracer: Tracer, function: int, packets: Float32, n_packets: int) -> None:
+    address = packets.ctypes.data
     if tracer.batch:
-        _call(function, n_packets, tracer.scene, packets.ctypes.data, 0)
+        _call(function, n_packets, tracer.scene, address, 0)
         return
-    valid = np.full(2 * LANES, -1, np.int32)
-    lanes = valid.ctypes.data + (-valid.ctypes.data) % 64
+    size = 4 * LANES * packets.shape[1]
     for p in range(n_packets):
-        _call(function, lanes, tracer.scene, packets[p].ctypes.data, 0)
+        _call(function, tracer.lanes, tracer.scene, address + p * size, 0)
 
 
-@nb.njit(nogil=True, cache=True)
-def empty_packets(n_packets: int, rows: int) -> Float32:
-    """Room for packets, (n, rows, 16) float32, aligned to cache lines as Embree demands; all rays allowed."""
-    block = np.zeros(n_packets * rows * LANES + LANES, np.float32)
+def aligned(n_words: int) -> Float32:
+    """(n,) zeros that start at a cache line, as Embree demands."""
+    block = np.zeros(n_words + LANES, np.float32)
     start = ((-block.ctypes.data) % 64) // 4
-    packets = block[start : start + n_packets * rows * LANES].reshape(n_packets, rows, LANES)
-    bits = packets.view(np.int32)
-    for i in range(n_packets):
-        for lane in range(LANES):
-            bits[i, MASK, lane] = ALL_RAYS
-    return packets
+    return block[start : start + n_words]
 
 
-@nb.njit(nogil=True, cache=True, inline="always")
+def empty_packets(n_packets: int, rows: int) -> Float32:
+    """Room for packets, (n, rows, 16) float32."""
+    return aligned(n_packets * rows * LANES).reshape(n_packets, rows, LANES)
+
+
+@inlined
 def set_ray(
     packets: Float32, i: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, tfar: float
 ) -> None:
@@ -95,7 +96,7 @@ def set_ray(
     packets[p, TFAR, lane] = tfar
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def intersect(tracer: Tracer, packets: Float32, n_rays: int) -> None:
     """Find the first hits of rays 0 to n_rays - 1; afterwards the bits of row TRIANGLE hold the triangle or MISS.
 
@@ -114,7 +115,7 @@ def intersect(tracer: Tracer, packets: Float32, n_rays: int) -> None:
     _trace(tracer, tracer.intersect, packets, n_packets)
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def occlude(tracer: Tracer, packets: Float32, n_rays: int) -> None:
     """Test rays 0 to n_rays - 1; afterwards row TFAR is -inf where something blocks the ray (`is_blocked`)."""
     n_packets = (n_rays + LANES - 1) // LANES
@@ -128,13 +129,13 @@ def occlude(tracer: Tracer, packets: Float32, n_rays: int) -> None:
     _trace(tracer, tracer.occluded, packets, n_packets)
 
 
-@nb.njit(nogil=True, cache=True, inline="always")
+@inlined
 def is_blocked(packets: Float32, i: int) -> bool:
     """Whether ray i met something, after `occlude`."""
     return packets[i >> 4, TFAR, i & 15] < 0.0  # type: ignore[no-any-return]
 
 
-@nb.njit(nogil=True, cache=True, inline="always")
+@inlined
 def hit_triangle(tracer: Tracer, packets: Float32, i: int) -> int:
     """The scene's triangle that ray i met, or MISS, after `intersect`."""
     bits = packets.view(np.int32)

@@ -9,14 +9,15 @@ eye hit, which is what obscurance rays see. The same walks serve every light pos
 import math
 from dataclasses import dataclass
 
-import numba as nb
 import numpy as np
 
 from ..arrays import Float32, Float64, Rgb
 from ..camera import Cameras, eye_ray
-from ..embree.packets import HIT_ROWS, LANES, RAY_ROWS, Tracer, empty_packets, intersect, set_ray
+from ..embree.packets import Tracer, intersect, set_ray
 from ..hits import ESCAPED, SURFACE, Hits, empty_hits, record_hits
+from ..kernel import kernel
 from ..lights import LightArrays
+from ..rays import room_for_hits, room_for_tests
 from ..sampling import PIXEL, PIXEL_SAMPLE, r2, stream, word
 from ..surface import Surfaces
 from .direct import direct
@@ -55,8 +56,8 @@ class Workspace:
     """Arrays for one batch of walks, kept from batch to batch."""
 
     def __init__(self, lights: LightArrays) -> None:
-        self.hit_packets = empty_packets(BATCH // LANES, HIT_ROWS)
-        self.shadow_packets = empty_packets(BATCH // LANES, RAY_ROWS)
+        self.hit_packets = room_for_hits(BATCH).packets
+        self.test_rays = room_for_tests(BATCH, lights.n_lights)
         self.hits = [empty_hits(BATCH), empty_hits(BATCH)]
         self.walkers = [empty_walkers(BATCH), empty_walkers(BATCH)]
         self.irradiance = np.empty((BATCH, lights.channels, lights.n_lights), np.float32)
@@ -74,7 +75,7 @@ class Workspace:
     def direct(self, where: Rgb, n: int, lights: LightArrays, tracer: Tracer) -> Float32:
         """Direct irradiance at the first n current hits, (n, channels, n_lights); 0 where `where` (n, 3) is 0."""
         hits = self.hits[0]._replace(reflectivity=where)
-        self.rays += direct(hits, n, lights, tracer, self.shadow_packets, self.irradiance)
+        self.rays += direct(hits, n, lights, tracer, self.test_rays, self.irradiance)
         return self.irradiance[:n]
 
     def gather(self, n: int, lights: LightArrays, tracer: Tracer) -> None:
@@ -84,7 +85,7 @@ class Workspace:
         deposit(self.walkers[0], n, self.direct(where, n, lights, tracer), self.sums)
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def _start_at_eyes(
     cams: Cameras,
     seed: int,
@@ -105,23 +106,24 @@ def _start_at_eyes(
         e = ((first + i + 0.5) * 0.6180339887498949) % 1.0
         c = min(int(e * n_c), n_c - 1)
         dx, dy, dz = eye_ray(cams, c, a * cams.width, b * cams.height)
-        o = cams.position[c]
-        set_ray(packets, i, o[0], o[1], o[2], dx, dy, dz, np.float32(np.inf))
+        o = cams.position
+        set_ray(packets, i, o[c, 0], o[c, 1], o[c, 2], dx, dy, dz, np.float32(np.inf))
         hits.key[i] = stream(seed, AMBIENT_STREAM, (first + i) & ((1 << 28) - 1), 0)
         walkers.walk[i] = i
-        walkers.throughput[i, :] = 1.0
+        for channel in range(3):
+            walkers.throughput[i, channel] = 1.0
     intersect(tracer, packets, n)
     record_hits(surfaces, tracer, packets, n, True, hits)
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def choose_all(hits: Hits, walkers: Walkers, n: int, must_go_on: bool) -> None:
     """Choose the next step of walks 0 to n - 1; see `choose_step`."""
     for i in range(n):
         choose_step(hits, walkers, i, must_go_on)
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def _see_background(hits: Hits, walkers: Walkers, n: int, background: Rgb, sums: Float32) -> None:
     """A walk that leaves the scene brings the background's irradiance: pi times its radiance."""
     for i in range(n):

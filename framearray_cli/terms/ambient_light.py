@@ -8,15 +8,15 @@ counts if a random walk from it meets light of position l. In a room with window
 makes E[l] too small or too large there; `method = "eye"` does not have that fault.
 """
 
-import numba as nb
 import numpy as np
 
 from ..arrays import Float32, Float64, Int32
 from ..embree.packets import Tracer, intersect, set_ray
 from ..hits import SURFACE, Hits, record_hits
+from ..kernel import kernel
 from ..lights import DIRECTIONAL, LightArrays
 from ..sampling import HEMISPHERE, PIXEL, r2, stream, word
-from ..surface import Surfaces, reflectivity_at, specular_at
+from ..surface import Surfaces, geometric_normal, position_at, reflectivity_at, specular_at
 from .ambient import AMBIENT_STREAM, BATCH, TARGET_ERROR, Ambient, Workspace, choose_all, relative_error, summarise
 from .walks import DIFFUSE, MAX_BOUNCES, Walkers
 
@@ -29,7 +29,7 @@ MOST = 16 * BATCH
 _PARTICLES, _POINTS = 1, 2  # sample numbers that keep the two uses apart
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def _emit(
     lights: LightArrays,
     s: int,
@@ -49,7 +49,7 @@ def _emit(
     A directional source sends them through a disc as wide as the scene, placed before it.
     """
     start = word(stream(seed, AMBIENT_STREAM, 0, _PARTICLES), PIXEL)
-    v = lights.vector[s, l]
+    v = lights.vector[s, 0, l], lights.vector[s, 1, l], lights.vector[s, 2, l]
     for i in range(n):
         a, b = r2(start, first + i)
         angle = 2.0 * np.pi * a
@@ -74,12 +74,13 @@ def _emit(
         set_ray(packets, i, ox, oy, oz, dx, dy, dz, np.float32(np.inf))
         hits.key[i] = stream(seed, AMBIENT_STREAM, (first + i) & ((1 << 28) - 1), _PARTICLES)
         walkers.walk[i] = i
-        walkers.throughput[i, :] = 1.0
+        for channel in range(3):
+            walkers.throughput[i, channel] = 1.0
     intersect(tracer, packets, n)
     record_hits(surfaces, tracer, packets, n, True, hits)
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def _land(hits: Hits, walkers: Walkers, n: int, power: Float32, l: int, sums: Float32) -> None:
     """Leave the power of every particle that met a surface with its walk."""
     for i in range(n):
@@ -88,7 +89,7 @@ def _land(hits: Hits, walkers: Walkers, n: int, power: Float32, l: int, sums: Fl
                 sums[walkers.walk[i], channel, l] += walkers.throughput[i, channel] * power[channel]
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def _stand_on(surfaces: Surfaces, triangle: Int32, seed: int, first: int, n: int, hits: Hits, walkers: Walkers) -> None:
     """Place 2 n hits on both sides of n points, uniform on the given triangles."""
     for i in range(n):
@@ -97,14 +98,8 @@ def _stand_on(surfaces: Surfaces, triangle: Int32, seed: int, first: int, n: int
         root = np.sqrt(a)
         u, v = root * (np.float32(1.0) - b), root * b
         t = triangle[i]
-        p = (
-            surfaces.corners[t, 0]
-            + u * (surfaces.corners[t, 1] - surfaces.corners[t, 0])
-            + v * (surfaces.corners[t, 2] - surfaces.corners[t, 0])
-        )
-        e1, e2 = surfaces.corners[t, 1] - surfaces.corners[t, 0], surfaces.corners[t, 2] - surfaces.corners[t, 0]
-        normal = np.cross(e1.astype(np.float64), e2.astype(np.float64))
-        normal /= np.sqrt((normal**2).sum())
+        p = position_at(surfaces, t, u, v)
+        normal = geometric_normal(surfaces, t, 0.0, 0.0, 0.0)
         for side in range(2):
             h = 2 * i + side
             hits.kind[h] = SURFACE
@@ -202,7 +197,7 @@ def _trace_particles(
 ) -> tuple[Float64, int]:
     """Follow n particles of source s at light index l to their ends; returns summed reflectivity of hits, and hits."""
     flow = np.pi * radius**2 if lights.kind[s] == DIRECTIONAL else 4 * np.pi
-    power = (flow * lights.strength[s, l] * lights.colour[l]).astype(np.float32)
+    power = (flow * lights.strength[s, :, l] * lights.colour[l]).astype(np.float32)
     reflectivity, landed = np.zeros(3), 0
     _emit(lights, s, l, seed, first, n, radius, surfaces, tracer, work.hit_packets, work.hits[0], work.walkers[0])
     work.rays += n

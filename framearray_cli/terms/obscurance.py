@@ -9,12 +9,13 @@ Cosine-distributed rays cancel cos(theta) / pi, so W is the mean of R(Q) rho(d) 
 import math
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
-from ..arrays import Float32, Rgb
+from ..arrays import Rgb
 from ..embree.packets import LANES, MISS, TFAR, Tracer, U, V, hit_triangle, intersect, set_ray
-from ..hits import SURFACE, Hits
+from ..hits import Hits, ray_origin, reflects
+from ..kernel import inlined, kernel
+from ..rays import Rays
 from ..sampling import HEMISPHERE, above, cosine_direction, r2, word
 from ..surface import Surfaces, reflectivity_at, specular_at
 
@@ -44,7 +45,7 @@ class ObscuranceSettings(NamedTuple):
     background: Rgb
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def rho(falloff: int, tau: float, x: float) -> float:
     """The falloff curve at x = d / d_max, rising from 0 (0 for `constant`) at 0 to 1 at 1."""
     if falloff == SQRT:
@@ -58,82 +59,84 @@ def rho(falloff: int, tau: float, x: float) -> float:
     return np.float32(0.0)
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def _gather(
     surfaces: Surfaces,
     tracer: Tracer,
-    packets: Float32,
+    rays: Rays,
     n: int,
-    owner: Float32,
     settings: ObscuranceSettings,
     result: Rgb,
     skylight: Rgb,
 ) -> None:
     """Trace the waiting hemisphere rays and add their R(Q) rho(d), or the background, to their hits."""
+    packets = rays.packets
     intersect(tracer, packets, n)
     share = np.float32(1.0 / settings.n_rays)
     d_max = np.float32(settings.d_max)
     for i in range(n):
-        w = result[owner[i]]
+        owned = rays.place[i, 0]
         triangle = hit_triangle(tracer, packets, i)
         distance = packets[i >> 4, TFAR, i & 15]
         if triangle == MISS and settings.sky:
             for channel in range(3):
-                skylight[owner[i], channel] += share * settings.background[channel]
+                skylight[owned, channel] += share * settings.background[channel]
         elif triangle == MISS or distance >= d_max:
             for channel in range(3):
-                w[channel] += share * settings.average[channel]
+                result[owned, channel] += share * settings.average[channel]
         elif settings.falloff != CONSTANT:
             u, v = packets[i >> 4, U, i & 15], packets[i >> 4, V, i & 15]
             near = share * rho(settings.falloff, settings.tau, distance / d_max)
             diffuse, mirror = reflectivity_at(surfaces, triangle, u, v), specular_at(surfaces, triangle, u, v)
             for channel in range(3):
-                w[channel] += near * (diffuse[channel] + mirror[channel])
+                result[owned, channel] += near * (diffuse[channel] + mirror[channel])
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def obscurance(
     hits: Hits,
     n: int,
     settings: ObscuranceSettings,
     surfaces: Surfaces,
     tracer: Tracer,
-    packets: Float32,
+    rays: Rays,
     result: Rgb,
     skylight: Rgb,
 ) -> int:
     """Estimate W of hits 0 to n - 1 [FA eq. 1]; hits that reflect nothing get 0.
 
     Args:
-        packets: room for rays; as many as fit are traced together.
+        rays: room for rays; as many as fit are traced together.
         result: (n, 3) W, 0 to 1, overwritten.
         skylight: (n, 3) mean background radiance of escaping rays, overwritten; (0, 3) unless `settings.sky`.
 
     Returns:
         number of rays.
     """
-    result[:n] = 0.0
-    skylight[:n] = 0.0
-    capacity = packets.shape[0] * LANES
-    owner = np.empty(capacity, np.int32)
+    for i in range(n):
+        for channel in range(3):
+            result[i, channel] = 0.0
+            if settings.sky:
+                skylight[i, channel] = 0.0
+    capacity = rays.packets.shape[0] * LANES
     reach = np.float32(np.inf if settings.sky else settings.d_max)
     waiting = total = 0
     for i in range(n):
-        r = hits.reflectivity[i]
-        if hits.kind[i] != SURFACE or (r[0] <= 0.0 and r[1] <= 0.0 and r[2] <= 0.0):
+        if not reflects(hits, i):
             continue
         if waiting > capacity - settings.n_rays:
-            _gather(surfaces, tracer, packets, waiting, owner, settings, result, skylight)
+            _gather(surfaces, tracer, rays, waiting, settings, result, skylight)
             total, waiting = total + waiting, 0
-        g, m, e, p = hits.geometric[i], hits.shading[i], hits.offset[i], hits.position[i]
-        ox, oy, oz = p[0] + e * g[0], p[1] + e * g[1], p[2] + e * g[2]
+        ox, oy, oz = ray_origin(hits, i)
+        gx, gy, gz = hits.geometric[i, 0], hits.geometric[i, 1], hits.geometric[i, 2]
+        mx, my, mz = hits.shading[i, 0], hits.shading[i, 1], hits.shading[i, 2]
         bits = word(hits.key[i], HEMISPHERE)
         for ray in range(settings.n_rays):
             a, b = r2(bits, ray)
-            x, y, z = cosine_direction(m[0], m[1], m[2], a, b)
-            x, y, z = above(x, y, z, g[0], g[1], g[2])
-            set_ray(packets, waiting, ox, oy, oz, x, y, z, reach)
-            owner[waiting] = i
+            x, y, z = cosine_direction(mx, my, mz, a, b)
+            x, y, z = above(x, y, z, gx, gy, gz)
+            set_ray(rays.packets, waiting, ox, oy, oz, x, y, z, reach)
+            rays.place[waiting, 0] = i
             waiting += 1
-    _gather(surfaces, tracer, packets, waiting, owner, settings, result, skylight)
+    _gather(surfaces, tracer, rays, waiting, settings, result, skylight)
     return total + waiting

@@ -4,23 +4,23 @@ A reflected hit is a hit like any other, seen through a tint: it gets direct lig
 obscurance. So what a mirror pixel needs is a list of reflected hits, each with throughput times reflectivity.
 """
 
-import numba as nb
 import numpy as np
 
 from ..arrays import Float32, Rgb
 from ..embree.packets import Tracer, intersect, set_ray
 from ..hits import SURFACE, Hits, record_hits
+from ..kernel import inlined, kernel
 from ..sampling import mix
 from ..surface import Surfaces
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def _is_mirror(hits: Hits, i: int) -> bool:
     s = hits.specular[i]
     return hits.kind[i] == SURFACE and (s[0] > 0.0 or s[1] > 0.0 or s[2] > 0.0)
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def count_mirrors(hits: Hits, n: int) -> int:
     """Number of hits 0 to n - 1 that reflect specularly."""
     total = 0
@@ -29,7 +29,7 @@ def count_mirrors(hits: Hits, n: int) -> int:
     return total
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def reflect(
     hits: Hits,
     n: int,

@@ -6,12 +6,12 @@ with probabilities that keep the throughput at most 1.
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
 from ..arrays import Float32, Int32, Rgb
 from ..embree.packets import Tracer, intersect, set_ray
 from ..hits import SURFACE, Hits, record_hits
+from ..kernel import inlined, kernel
 from ..sampling import CHOICE, HEMISPHERE, above, cosine_direction, mix, r2, word
 from ..surface import Surfaces
 
@@ -39,7 +39,7 @@ def empty_walkers(n: int) -> Walkers:
     return Walkers(np.empty(n, np.int32), np.empty((n, 3), np.float32), np.empty(n, np.int32))
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def choose_step(hits: Hits, walkers: Walkers, i: int, must_go_on: bool) -> None:
     """Choose how walk i leaves its hit, and weigh its throughput accordingly.
 
@@ -70,7 +70,7 @@ def choose_step(hits: Hits, walkers: Walkers, i: int, must_go_on: bool) -> None:
             walkers.throughput[i, channel] *= s[channel] / mirror
 
 
-@nb.njit(nogil=True, cache=True)
+@inlined
 def _leave(hits: Hits, i: int, step: int) -> tuple[float, float, float]:
     """Direction in which a walk leaves hit i."""
     g, m = hits.geometric[i], hits.shading[i]
@@ -83,7 +83,7 @@ def _leave(hits: Hits, i: int, step: int) -> tuple[float, float, float]:
     return above(d[0] - along * m[0], d[1] - along * m[1], d[2] - along * m[2], g[0], g[1], g[2])
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def advance(
     hits: Hits,
     walkers: Walkers,
@@ -113,7 +113,7 @@ def advance(
     return m
 
 
-@nb.njit(nogil=True, cache=True)
+@kernel
 def deposit(walkers: Walkers, n: int, irradiance: Float32, sums: Float32) -> None:
     """Add throughput times irradiance of each walk's hit to the walk's sums.
 
