@@ -6,6 +6,7 @@ contributes (docs/decisions/window.md). A frame is composed as soon as the last 
 what no frame can need any more is dropped: never more than 2 N_r + 1 frames are held.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -68,12 +69,20 @@ class Window:
         self._ambient = ambient
         self._crew = crew
         self._frames: dict[int, Frame] = {}
+        self._next = 0
         self._bands = [empty_band(BAND_PIXELS, work.lights.n_lights) for _ in range(crew.threads)]
 
     def add(self, frame: Frame) -> None:
-        """Take in a frame's hits and drop the frame that is out of reach now."""
-        self._frames.pop(frame.c - 2 * self._work.n_r - 1, None)
+        """Take in the hits of the next frame of the path."""
         self._frames[frame.c] = frame
+
+    def complete(self) -> Iterator[int]:
+        """Frames that can be composed now, one after another; what no later frame needs is dropped in between."""
+        last = max(self._frames)
+        while self._next < self._work.n_frames and self._work.frames_around(self._next, self._work.n_r)[-1] <= last:
+            yield self._next
+            self._frames.pop(self._next - self._work.n_r, None)
+            self._next += 1
 
     def compose(self, j: int, images: Images) -> Composed:
         """Compose frame j, once all frames of its window were added.

@@ -7,7 +7,7 @@ eye hit, which is what obscurance rays see. The same walks serve every light pos
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -129,8 +129,9 @@ def _see_background(hits: Hits, walkers: Walkers, n: int, background: Rgb, sums:
     for i in range(n):
         if hits.kind[i] == ESCAPED:
             for channel in range(3):
-                t = walkers.throughput[i, channel]
-                sums[walkers.walk[i], channel] += t * np.float32(np.pi) * background[channel]
+                light = walkers.throughput[i, channel] * np.float32(np.pi) * background[channel]
+                for l in range(sums.shape[2]):
+                    sums[walkers.walk[i], channel, l] += light
 
 
 def _to_first_vertices(work: Workspace, n: int, surfaces: Surfaces, tracer: Tracer) -> int:
@@ -208,6 +209,26 @@ def ambient_by_eye(
         if paths is None and spent >= FEWEST and count and relative_error(total, squares, count).max() <= TARGET_ERROR:
             break
     return summarise(total, squares, count, reflectivity, spent, work.rays, paths is None)
+
+
+def fixed_ambient(
+    cams: Cameras,
+    seed: int,
+    paths: int | None,
+    surfaces: Surfaces,
+    tracer: Tracer,
+    lights: LightArrays,
+    background: Rgb,
+    intensity: Rgb,
+) -> Ambient:
+    """Take I_A from the job, (3,); only the average reflectivity is estimated, by a few walks."""
+    walked = ambient_by_eye(cams, seed, paths or FEWEST, surfaces, tracer, lights, background)
+    return replace(
+        walked,
+        intensity=np.tile(intensity, (lights.n_lights, 1)),
+        standard_error=np.zeros(lights.n_lights),
+        notes=(),
+    )
 
 
 def relative_error(total: Float64, squares: Float64, count: int) -> Float64:

@@ -1,0 +1,5 @@
+"""`python -m framearray_cli` is `framearray`."""
+
+from .cli import main
+
+main()

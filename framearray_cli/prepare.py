@@ -1,0 +1,130 @@
+"""From a job to everything that is known before the first frame: scene, eyes, lights, ambient light, plan."""
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import Float32
+from .camera import cameras
+from .embree import EmbreeScene, Engine
+from .fingerprint import fingerprint
+from .frame import Work
+from .job import Job
+from .jobfile import job_table
+from .lights import LightArrays, light_arrays
+from .paths import Eyes, Lights, eyes, lights
+from .plan import frame_hits
+from .scene import Scene, load_scene
+from .surface import Surfaces, surfaces
+from .terms.ambient import Ambient, ambient_by_eye, fixed_ambient
+from .terms.ambient_light import ambient_by_light
+from .terms.obscurance import FALLOFFS, ObscuranceSettings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Prepared:
+    """A job whose inputs were read and checked; no ray was cast yet.
+
+    Attributes:
+        still: the camera never moves; its hits are found once and serve all frames [FA section 3.2].
+    """
+
+    job: Job
+    scene: Scene
+    eyes: Eyes
+    lights: Lights
+    light_arrays: LightArrays
+    surfaces: Surfaces
+    still: bool
+
+    @property
+    def n_cameras(self) -> int:
+        """N_c."""
+        return self.eyes.n
+
+    @property
+    def n_lights(self) -> int:
+        """N_l."""
+        return self.lights.n
+
+
+def prepare(job: Job) -> Prepared:
+    """Read the scene of a job and place its eyes and lights.
+
+    Raises:
+        JobError: a path that cannot be followed.
+        SceneError: a scene that cannot be read or rendered.
+    """
+    job_eyes, job_lights = eyes(job), lights(job)
+    scene = load_scene(job.scene.file, job.scene.materials)
+    moved = job_eyes.world_from_camera != job_eyes.world_from_camera[:1]
+    return Prepared(
+        job=job,
+        scene=scene,
+        eyes=job_eyes,
+        lights=job_lights,
+        light_arrays=light_arrays(job_lights, scene.centre),
+        surfaces=surfaces(scene),
+        still=not moved.any(),
+    )
+
+
+def open_embree(prepared: Prepared, engine: Engine = "auto") -> EmbreeScene:
+    """Build the acceleration structure of a prepared job; close it after use."""
+    return EmbreeScene(prepared.scene, engine)
+
+
+def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
+    """Estimate the ambient light and put together what every frame needs."""
+    job, scene = prepared.job, prepared.scene
+    cams = cameras(prepared.eyes, job.camera.resolution, scene.centre)
+    background = np.array(job.scene.background, np.float32)
+    ambient = _ambient(prepared, embree, background)
+    n_r = job.reuse.n_r
+    if prepared.still:  # one frame, with the hits that its whole window would have
+        cams = cams._replace(**{name: getattr(cams, name)[:1] for name in ("position", "right", "up", "forward")})
+    mirrors = scene.has_mirrors and job.specular.depth > 0
+    work = Work(
+        cams=cams,
+        surfaces=prepared.surfaces,
+        tracer=embree.tracer,
+        lights=prepared.light_arrays,
+        obscurance=ObscuranceSettings(
+            d_max=job.obscurance.range,
+            falloff=FALLOFFS[job.obscurance.falloff],
+            tau=job.obscurance.tau,
+            n_rays=job.samples.obscurance,
+            sky=job.obscurance.outside == "background",
+            average=ambient.reflectivity,
+            background=background,
+        ),
+        seed=job.seed,
+        n_r=0 if prepared.still else n_r,
+        per_pixel=frame_hits(len(cams.position), n_r, job.samples.hits),
+        mirror_hits=job.specular.hits if mirrors else 0,
+        depth=job.specular.depth if mirrors else 0,
+        balance=job.reuse.weights == "balance" and not prepared.still,
+        background=background,
+        layers=job.output.layers,
+    )
+    return work, ambient
+
+
+def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Ambient:
+    job, seed = prepared.job, prepared.job.seed
+    if job.ambient.method == "light" and job.ambient.intensity is None:
+        return ambient_by_light(seed, job.ambient.paths, prepared.surfaces, embree.tracer, prepared.light_arrays)
+    cams = cameras(prepared.eyes, job.camera.resolution, prepared.scene.centre)
+    args = (cams, seed, job.ambient.paths, prepared.surfaces, embree.tracer, prepared.light_arrays, background)
+    if job.ambient.intensity is not None:
+        return fixed_ambient(*args, intensity=np.array(job.ambient.intensity, np.float32))
+    return ambient_by_eye(*args)
+
+
+def job_fingerprint(prepared: Prepared) -> str:
+    """Hash whatever the pixels depend on: the job without its output and machine, and the scene as it was read."""
+    table = {key: value for key, value in job_table(prepared.job).items() if key not in ("output", "render")}
+    arrays = [np.ascontiguousarray(array).data.cast("B") if array.size else b"" for array in prepared.surfaces]
+    centre = prepared.scene.centre.tobytes()
+    return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), centre, *map(bytes, arrays))

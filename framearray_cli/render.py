@@ -1,0 +1,204 @@
+"""The frame loop [FA alg. 1]: from a job to images and a manifest."""
+
+import os
+import time
+from dataclasses import dataclass
+
+from . import __version__
+from .embree import Engine
+from .filepatterns import file_patterns
+from .files import make_folder
+from .frame import Crew, Work, find_frame
+from .images import ImageFormat
+from .job import Job
+from .jobfile import job_table
+from .manifest import Manifest, ManifestCamera, ManifestLight, matrix_rows, write_manifest
+from .memory import peak_memory
+from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
+from .terms.ambient import Ambient
+from .window import Window
+from .writer import ArrayWriter
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Summary:
+    """How a render went.
+
+    Attributes:
+        images: written.
+        seconds: of the whole command so far, and `tracing`: without waiting for files.
+        rays: number by kind.
+        pixels: of one image.
+        hits: mean accepted hits a pixel of a frame, native and outer.
+        peak_memory: bytes.
+        notes: what the user should know.
+    """
+
+    images: int
+    seconds: float
+    rays: dict[str, int]
+    stages: dict[str, float]
+    pixels: int
+    hits: float
+    peak_memory: int
+    notes: tuple[str, ...]
+
+    @property
+    def rays_per_pixel_image(self) -> dict[str, float]:
+        """Rays a pixel an image, by kind."""
+        return {kind: n / (self.pixels * max(self.images, 1)) for kind, n in self.rays.items()}
+
+
+class Listener:
+    """What a render tells while it runs; override what you want to hear. Calls may come from any thread."""
+
+    def prepared(self, prepared: Prepared) -> None:
+        """Inputs were read."""
+
+    def planned(self, ambient: Ambient) -> None:
+        """The ambient light is known."""
+
+    def written(self, images: int) -> None:
+        """That many more images are on disk."""
+
+
+def render(job: Job, listener: Listener | None = None, *, engine: Engine = "auto") -> Summary:
+    """Render a whole frame array.
+
+    Raises:
+        JobError, SceneError: before any ray is cast.
+        OutputError: something could not be written; what was finished stays.
+    """
+    listener = listener or Listener()
+    started = time.perf_counter()
+    prepared = prepare(job)
+    listener.prepared(prepared)
+    make_folder(job.output.directory)
+    with open_embree(prepared, engine) as embree:
+        work, ambient = plan_work(prepared, embree)
+        listener.planned(ambient)
+        manifest = _manifest(prepared, ambient)
+        write_manifest(job.output.directory, manifest)
+        summary = _frames(prepared, work, ambient, listener, started)
+    write_manifest(job.output.directory, _with_summary(manifest, summary))
+    return summary
+
+
+def _frames(prepared: Prepared, work: Work, ambient: Ambient, listener: Listener, started: float) -> Summary:
+    """Find every frame's hits, compose each frame as soon as its window is complete, write it, forget it."""
+    job, n_lights = prepared.job, prepared.n_lights
+    threads = job.render.threads or os.cpu_count() or 1
+    notes, hits = list(ambient.notes), 0.0
+    crew = Crew(work, threads)
+    window = Window(work, ambient, crew)
+    writer = ArrayWriter(
+        job.output.directory,
+        _patterns(prepared),
+        prepared.eyes,
+        job.camera.resolution,
+        job.output.fps,
+        image_format(job),
+        n_lights,
+        threads,
+        listener.written,
+    )
+    try:
+        with writer:
+            for c in range(work.n_frames):
+                window.add(find_frame(work, c, crew))
+                for j in window.complete():
+                    composed = window.compose(j, writer.block())
+                    hits += composed.samples
+                    if composed.bad:
+                        notes.append(_bad_values(composed.bad, j, composed.first_bad, job.camera.resolution[0]))
+                    writer.write(composed, range(prepared.n_cameras) if prepared.still else range(j, j + 1))
+            writer.finish()
+    finally:
+        crew.close()
+    return Summary(
+        images=prepared.n_cameras * n_lights,
+        seconds=time.perf_counter() - started,
+        rays={"ambient": ambient.rays, **crew.rays()},
+        stages=dict(crew.seconds()),
+        pixels=work.n_pixels,
+        hits=hits / work.n_frames,
+        peak_memory=peak_memory(),
+        notes=tuple(notes),
+    )
+
+
+def image_format(job: Job) -> ImageFormat:
+    """How the job wants its images stored."""
+    out = job.output
+    return ImageFormat(
+        format=out.format, compression=out.compression, half=out.half, quality=out.quality, exposure=out.exposure
+    )
+
+
+def _bad_values(count: int, c: int, first: tuple[int, int] | None, width: int) -> str:
+    l, pixel = first or (0, 0)
+    where = f"camera {c}, light {l}, pixel ({pixel % width}, {pixel // width})"
+    return f"{count} values of camera {c} were not finite and were set to 0; the first: {where}"
+
+
+def _patterns(prepared: Prepared) -> tuple[str, str]:
+    return file_patterns(prepared.job.name, prepared.n_cameras, prepared.n_lights, prepared.job.output.format)
+
+
+def _manifest(prepared: Prepared, ambient: Ambient) -> Manifest:
+    """What a program needs that has never seen this one; everything but how the run went."""
+    job, report = prepared.job, prepared.scene.report
+    images, layers = _patterns(prepared)
+    place = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
+    lights = []
+    for l in range(prepared.n_lights):
+        sources = [
+            {"type": s.kind, place[s.kind][0]: s.vector[l].tolist(), place[s.kind][1]: s.intensity[l].tolist()}
+            for s in prepared.lights.sources
+        ]
+        i_a = ambient.intensity[l].astype(float)
+        error = i_a * float(ambient.standard_error[l])
+        lights.append(
+            ManifestLight(ambient=tuple(i_a.tolist()), ambient_error=tuple(error.tolist()), sources=tuple(sources))
+        )
+    return Manifest(
+        version=__version__,
+        name=job.name,
+        fingerprint=job_fingerprint(prepared),
+        images=images,
+        layers=layers if job.output.layers else "",
+        resolution=job.camera.resolution,
+        fps=job.output.fps,
+        cameras=tuple(
+            ManifestCamera(world_from_camera=matrix_rows(matrix), fov=prepared.eyes.fov_deg)
+            for matrix in prepared.eyes.world_from_camera
+        ),
+        lights=tuple(lights),
+        job=job_table(job),
+        scene={
+            "triangles": report.triangles,
+            "materials": report.materials,
+            "textures": report.textures,
+            "dropped": report.dropped,
+            "notes": list(report.notes),
+        },
+        summary={"finished": False, "ambient_paths": ambient.paths},
+        directory=job.output.directory,
+    )
+
+
+def _with_summary(manifest: Manifest, summary: Summary) -> Manifest:
+    from dataclasses import replace
+
+    table = {
+        "finished": True,
+        "ambient_paths": manifest.summary["ambient_paths"],
+        "images": summary.images,
+        "seconds": round(summary.seconds, 3),
+        "hits_per_pixel": round(summary.hits, 3),
+        "rays": summary.rays,
+        "rays_per_pixel_image": {kind: round(n, 5) for kind, n in summary.rays_per_pixel_image.items()},
+        "peak_memory": summary.peak_memory,
+        "notes": list(summary.notes),
+    }
+    return replace(manifest, summary=table)

@@ -1,0 +1,131 @@
+"""Writes finished frames while the next ones are traced."""
+
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from queue import SimpleQueue
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from .arrays import Float32, Images
+from .imageattributes import Attributes, frame_attributes
+from .images import ImageFormat, write_image, write_layers
+from .paths import Eyes
+from .window import Composed, Layers
+
+# Blocks of images in memory: one is filled while the other is written.
+BLOCKS = 2
+
+
+class ArrayWriter:
+    """A few threads that write images; hands out blocks of memory for frames and takes them back when written.
+
+    An error in a thread stops the render at the next frame.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        patterns: tuple[str, str],
+        eyes: Eyes,
+        resolution: tuple[int, int],
+        fps: float,
+        image_format: ImageFormat,
+        n_lights: int,
+        threads: int,
+        written: Callable[[int], None],
+    ) -> None:
+        """Start the threads.
+
+        Args:
+            patterns: file patterns of images and of layers.
+            written: called with 1 after each image, from any thread.
+        """
+        self._directory, self._patterns, self._eyes = directory, patterns, eyes
+        self._resolution, self._fps, self._format = resolution, fps, image_format
+        self._written = written
+        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="write")
+        self._free: SimpleQueue[Images | BaseException] = SimpleQueue()
+        width, height = resolution
+        for _ in range(BLOCKS):
+            self._free.put(np.empty((n_lights, height, width, 3), np.float32))
+        self._pending: list[Future[None]] = []
+
+    def block(self) -> Images:
+        """A block to compose a frame into, (n_lights, height, width, 3); waits until one is free.
+
+        Raises:
+            OutputError: an earlier frame could not be written.
+        """
+        block = self._free.get()
+        if isinstance(block, BaseException):
+            raise block
+        return block
+
+    def write(self, composed: Composed, cameras: range) -> None:
+        """Write a composed frame as that of each of the given cameras; its block is free when that is done."""
+        n_lights = len(composed.images)
+        tasks = [self._pool.submit(self._write_image, composed, c, l) for c in cameras for l in range(n_lights)]
+        if composed.layers is not None:
+            tasks += [self._pool.submit(self._write_layers, composed.layers, c) for c in cameras]
+        remaining = SimpleQueue[None]()
+        for _ in tasks[1:]:
+            remaining.put(None)
+
+        def done(task: Future[None]) -> None:
+            error = None if task.cancelled() else task.exception()
+            if error is not None:
+                self._free.put(error)
+            elif remaining.empty():
+                self._free.put(composed.images)
+            else:
+                remaining.get()
+
+        for task in tasks:
+            task.add_done_callback(done)
+
+    def _attributes(self, c: int, l: int | None) -> Attributes:
+        return frame_attributes(
+            world_from_camera=self._eyes.world_from_camera[c],
+            fov_deg=self._eyes.fov_deg,
+            resolution=self._resolution,
+            fps=self._fps,
+            c=c,
+            l=l,
+        )
+
+    def _write_image(self, composed: Composed, c: int, l: int) -> None:
+        path = self._directory / self._patterns[0].format(camera=c, light=l)
+        write_image(path, composed.images[l], self._format, self._attributes(c, l))
+        self._written(1)
+
+    def _write_layers(self, layers: Layers, c: int) -> None:
+        path = self._directory / self._patterns[1].format(camera=c)
+        channels: dict[str, Float32] = {"depth.Z": layers.depth, "samples": layers.samples}
+        for name, letters, values in (
+            ("obscurance", "RGB", layers.obscurance),
+            ("indirect", "RGB", layers.indirect),
+            ("reflectivity", "RGB", layers.reflectivity),
+            ("normal", "XYZ", layers.normal),
+        ):
+            channels |= {f"{name}.{letter}": values[..., i] for i, letter in enumerate(letters)}
+        write_layers(path, channels, self._attributes(c, None))
+
+    def finish(self) -> None:
+        """Wait until everything is written.
+
+        Raises:
+            OutputError: something could not be written.
+        """
+        for _ in range(BLOCKS):
+            self.block()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._pool.shutdown(wait=True, cancel_futures=error is not None)
