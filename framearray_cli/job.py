@@ -178,7 +178,7 @@ class OutputTable(Table):
         default=24.0, ge=0.01, le=1000, description="Frames a second, kept in the images and used for movies."
     )
     compression: Literal["none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"] = Field(
-        default="zips", description="Compression of EXR. pxr24, b44, b44a, dwaa and dwab lose precision."
+        default="zip", description="Compression of EXR. pxr24, b44, b44a, dwaa and dwab lose precision."
     )
     half: Literal["auto", "always", "never"] = Field(
         default="auto",
