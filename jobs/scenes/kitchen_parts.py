@@ -55,7 +55,7 @@ def base_cupboard(width: float, paint: str, kind: str) -> Part:
     """A floor cupboard 0.6 deep, its front at z = 0, without worktop; kind: "doors", "drawers", "door"."""
     part: Part = [
         (paint, between((0.002, 0.10, -0.6), (width - 0.002, 0.872, -0.001))),
-        ("Plinth", between((0, -0.01, -0.6), (width, 0.11, -0.05))),
+        ("Plinth", between((0.001, -0.01, -0.6), (width - 0.001, 0.11, -0.05))),
     ]
     if kind == "drawers":
         y = 0.105

@@ -89,14 +89,12 @@ def column(height: float, radius: float, flutes: int = 16) -> Part:
 
 
 def arch_infill(width: float, depth: float) -> Part:
-    """The two corners between a half circle and its square head; the spring line at y = 0, from z = -depth to 0."""
-    radius = width / 2
-    angle = np.linspace(0, np.pi / 2, 10)
-    arc = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
-    margin = 0.02
-    outline = np.vstack([[(radius + margin, 0.0)], [(radius + margin, radius + margin)], [(0.0, radius + margin)], arc[::-1]])
-    right = move(extrude(outline, depth - 0.006, 20.0), 0, 0, -depth + 0.003)
-    return [("Plaster", right), ("Plaster", mirror_x(right))]
+    """What is left of a square head above a half circle; the spring line at y = 0, from z = -depth to 0."""
+    radius, edge = width / 2, width / 2 + 0.02
+    angle = np.linspace(np.pi, 0, 19)
+    arc = np.stack([radius * np.cos(angle), radius * np.sin(angle).round(9)], axis=-1)
+    outline = np.vstack([[(edge, 0.0), (edge, edge), (-edge, edge), (-edge, 0.0)], arc])
+    return [("Plaster", move(extrude(outline, depth - 0.006, 20.0), 0, 0, -depth + 0.003))]
 
 
 def arched_window(width: float, spring: float) -> Part:
