@@ -1,0 +1,55 @@
+# Every target sets up what it needs in .venv first. `make` alone explains itself.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+JOB := jobs/kitchen-small.toml
+OUT := out/kitchen-small
+
+.DEFAULT_GOAL := help
+.PHONY: help install render test test-all smoke format check docs clean
+
+help: ## Show this list
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+
+$(VENV)/installed: pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "framearray needs Python 3.11 or newer; say make PYTHON=python3.12, for example"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[movie]'
+	@touch $@
+
+$(VENV)/installed-dev: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[movie,dev]'
+	@touch $@
+
+install: $(VENV)/installed ## Set up the program in .venv
+
+render: $(VENV)/installed ## Render a small kitchen and cut a movie out of it
+	$(BIN)/framearray render $(JOB)
+	$(BIN)/framearray assemble $(OUT) jobs/first-movie.toml --output $(OUT)/first-movie.mp4
+	@echo "pictures: $(OUT)/*.exr   movie: $(OUT)/first-movie.mp4"
+
+test: $(VENV)/installed-dev ## Run the tests
+	$(BIN)/python -m pytest
+
+test-all: $(VENV)/installed-dev ## Run all tests, the slow ones too
+	$(BIN)/python -m pytest -m 'not bench'
+
+smoke: $(VENV)/installed ## Render the smallest job
+	$(BIN)/framearray render jobs/smoke.toml
+	$(BIN)/framearray assemble out/smoke jobs/first-movie.toml --output out/smoke/first-movie.mp4
+
+format: $(VENV)/installed-dev ## Format the code
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+check: $(VENV)/installed-dev ## Check format, style and types
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+docs: $(VENV)/installed-dev ## Write the generated pages of docs/
+	$(BIN)/python -m framearray_cli.jobdocs docs/
+
+clean: ## Remove what was built and rendered
+	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache
