@@ -24,14 +24,14 @@ def materials() -> dict[str, Material]:
     """Linear reflectivities, mostly 0.2 to 0.8."""
     white = (1.0, 1.0, 1.0)
     return {
-        "Carpet": Material(colour=white, metres=0.6, texture=tex.pile([(0.16, 0.20, 0.32), (0.30, 0.36, 0.50), (0.48, 0.40, 0.24)], 1, 512)),
-        "AisleCarpet": Material(colour=white, metres=0.5, texture=tex.lozenges((0.17, 0.21, 0.34), (0.46, 0.40, 0.28), (0.12, 0.14, 0.24), 2)),
-        "SeatCloth": Material(colour=white, metres=0.10, texture=tex.cloth((0.20, 0.30, 0.52), 3, 256, 32, 0.4)),
-        "SeatShell": Material(colour=(0.46, 0.47, 0.50)),
+        "Carpet": Material(colour=white, metres=0.6, texture=tex.pile([(0.22, 0.27, 0.40), (0.36, 0.42, 0.56), (0.54, 0.47, 0.30)], 1, 512)),
+        "AisleCarpet": Material(colour=white, metres=0.5, texture=tex.lozenges((0.23, 0.28, 0.42), (0.54, 0.48, 0.35), (0.16, 0.19, 0.31), 2)),
+        "SeatCloth": Material(colour=white, metres=0.10, texture=tex.cloth((0.28, 0.42, 0.66), 3, 256, 32, 0.4)),
+        "SeatShell": Material(colour=(0.60, 0.60, 0.61)),
         "Antimacassar": Material(colour=(0.80, 0.78, 0.72)),
         "Trim": Material(colour=(0.24, 0.25, 0.28)),
         "Tray": Material(colour=(0.62, 0.61, 0.58)),
-        "Net": Material(colour=(0.20, 0.22, 0.28)),
+        "Net": Material(colour=(0.30, 0.33, 0.40)),
         "Magazine": Material(colour=(0.70, 0.26, 0.16)),
         "Leaflet": Material(colour=(0.76, 0.76, 0.72)),
         "Screen": Material(colour=white, texture=tex.landscape(4, (0.30, 0.42, 0.60), [(0.22, 0.24, 0.34), (0.16, 0.24, 0.16), (0.30, 0.24, 0.10)])),
@@ -42,7 +42,7 @@ def materials() -> dict[str, Material]:
         "Panel": Material(colour=(0.80, 0.78, 0.73)),
         "WindowRim": Material(colour=(0.72, 0.71, 0.68)),
         "Blind": Material(colour=(0.70, 0.68, 0.62)),
-        "Dado": Material(colour=(0.40, 0.41, 0.44)),
+        "Dado": Material(colour=(0.52, 0.53, 0.55)),
         "Bin": Material(colour=(0.80, 0.79, 0.76)),
         "Ceiling": Material(colour=(0.83, 0.83, 0.82)),
         "Cove": Material(colour=(0.62, 0.70, 0.80)),

@@ -26,7 +26,7 @@ SIDE_Z = -2.5  # front edge of the side flights
 GALLERY = LANDING + N_SIDE * RISE
 GALLERY_X = LANDING_HALF + (N_SIDE - 1) * TREAD  # inner edge of the galleries
 WINDOW_X = np.arange(-3, 4) * 1.60
-WINDOW_WIDTH, WINDOW_FOOT, WINDOW_SPRING = 1.24, 0.62, 5.6  # the spring line is that far above the foot
+WINDOW_WIDTH, WINDOW_FOOT, WINDOW_SPRING = 1.32, 0.40, 5.85  # the spring line is that far above the foot
 COLUMN_Z = (-1.7, 1.3, 4.3, 7.3)
 RAIL_HEIGHT = 0.84  # of the rail's middle above the curb's top, at a baluster of 0.66 and more on the slope
 
@@ -91,8 +91,7 @@ def shell() -> Part:
         part += moved(kit.arch_infill(WINDOW_WIDTH, WALL), c, WINDOW_FOOT + WINDOW_SPRING, FRONT + WALL)
         part += moved(kit.arched_window(WINDOW_WIDTH, WINDOW_SPRING), c, WINDOW_FOOT, FRONT + 0.22)
         part.append(("Plaster", move(kit.architrave(WINDOW_WIDTH, WINDOW_SPRING), c, WINDOW_FOOT, FRONT)))
-        part.append(("Marble", between((c - half - 0.16, WINDOW_FOOT - 0.06, FRONT - 0.12), (c + half + 0.16, WINDOW_FOOT + 0.004, FRONT + 0.2), 0.012)))
-        part += moved(kit.panel_moulding(0.9, 0.22), c + 0.45, 0.24, FRONT - 0.035, turn_y=180)
+        part.append(("Marble", between((c - half - 0.12, WINDOW_FOOT - 0.06, FRONT - 0.12), (c + half + 0.12, WINDOW_FOOT + 0.004, FRONT + 0.2), 0.012)))
     return part
 
 

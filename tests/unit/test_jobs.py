@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Iterator
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 
@@ -21,7 +22,7 @@ from framearray_cli.scene import Scene, load_scene
 JOBS = Path(__file__).resolve().parents[2] / "jobs"
 ROOMS = ("cabin", "kitchen", "stairs")
 SCENES = (*ROOMS, "furnace")
-WALKS = tuple(f"{room}{size}" for room in ROOMS for size in ("", "-small")) + ("smoke",)
+WALKS = ("smoke", *(f"{room}{size}" for room in ROOMS for size in ("", "-small")))
 FURNACES = ("furnace-20", "furnace-50", "furnace-80")
 CLEARANCE = 0.15  # metres between an eye and the nearest surface
 LAMP_CLEARANCE = 0.25  # a lamp nearer to a surface than this would burn a white spot into it
@@ -95,7 +96,7 @@ def test_a_generator_makes_the_same_file_each_time(
     for file in files:
         generators[name].write(generators[name].build(), file)
     assert files[0].read_bytes() == files[1].read_bytes()
-    # the last bits of sines and the coding of pictures differ between machines, so the committed file is compared by value
+    # sines and coded pictures differ between machines in their last bits: the committed file is compared by value
     made, committed = load_scene(files[0]), scene(name)
     assert made.material_names == committed.material_names
     np.testing.assert_array_equal(made.material, committed.material)
@@ -162,7 +163,7 @@ def test_the_lamp_hangs_free_and_is_seen_from_the_aisle(name: str) -> None:
     corners = load_room(name)
     lamp = lights(job(name)).sources[0].vector
     assert min(distance(position, corners) for position in lamp) > LAMP_CLEARANCE
-    assert not any(blocked(a, b, corners) for a, b in zip(lamp, lamp[1:], strict=False))
+    assert not any(blocked(a, b, corners) for a, b in pairwise(lamp))
     eye = eyes(job(name)).position[0]
     assert not any(blocked(eye, position, corners) for position in lamp[:: max(1, len(lamp) // 8)])
 
