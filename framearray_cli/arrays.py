@@ -13,6 +13,10 @@ Float64: TypeAlias = NDArray[np.float64]
 Int32: TypeAlias = NDArray[np.int32]
 Bytes: TypeAlias = NDArray[np.uint8]
 
+# What kernels pass by value: Python's float where it does not matter, float32 where it is to stay that.
+Real: TypeAlias = float | np.float32
+Triple: TypeAlias = tuple[Real, Real, Real]
+
 Points: TypeAlias = Float32  # (n, 3), scene units, centred
 WorldPoints: TypeAlias = Float64  # (n, 3), scene units, in the scene file's own coordinates
 Directions: TypeAlias = Float32  # (n, 3), unit length

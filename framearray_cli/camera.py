@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Directions, Float64, Points
+from .arrays import Directions, Float64, Points, Real, Triple
 from .kernel import inlined
 from .paths import Eyes
 
-Triple = tuple[float, float, float]
 
 OUTSIDE = -1  # the "pixel" of a point that an eye does not see
 
@@ -51,7 +50,7 @@ def cameras(eyes: Eyes, resolution: tuple[int, int], centre: Float64) -> Cameras
 
 
 @inlined
-def eye_ray(cams: Cameras, c: int, x: float, y: float) -> Triple:
+def eye_ray(cams: Cameras, c: int, x: Real, y: Real) -> Triple:
     """Direction from eye c through image position (x, y) in pixels; its component along the optical axis is 1."""
     a = np.float32((x - 0.5 * cams.width) / cams.focal)
     b = np.float32((0.5 * cams.height - y) / cams.focal)
@@ -64,7 +63,7 @@ def eye_ray(cams: Cameras, c: int, x: float, y: float) -> Triple:
 
 
 @inlined
-def project(cams: Cameras, c: int, x: float, y: float, z: float) -> tuple[int, float]:
+def project(cams: Cameras, c: int, x: Real, y: Real, z: Real) -> tuple[int, Real]:
     """The pixel of eye c that sees the vector (x, y, z) from the eye, and the vector's length along the optical axis.
 
     The pixel is OUTSIDE where the vector points behind the eye or out of the image.

@@ -4,7 +4,7 @@ The hits of a frame are found in batches, each by one thread, each into its own 
 depends on which thread takes which batch.
 """
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -140,7 +140,7 @@ class Scratch:
         self.density = np.empty((n_eyes, BATCH), np.float64)
         self.skylight = np.empty((BATCH if work.obscurance.sky else 0, 3), np.float32)
         self.rays: Counter[str] = Counter()
-        self.seconds: Counter[str] = Counter()
+        self.seconds: defaultdict[str, float] = defaultdict(float)
 
 
 class Crew:
@@ -176,9 +176,10 @@ class Crew:
         """Rays traced so far, by kind."""
         return sum((scratch.rays for scratch in self._all), Counter())
 
-    def seconds(self) -> Counter[str]:
+    def seconds(self) -> dict[str, float]:
         """Thread seconds spent so far, by stage."""
-        return sum((scratch.seconds for scratch in self._all), Counter())
+        stages = dict.fromkeys(stage for scratch in self._all for stage in scratch.seconds)
+        return {stage: sum(scratch.seconds[stage] for scratch in self._all) for stage in stages}
 
     def close(self) -> None:
         """Wait for running tasks and end the threads."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from .arrays import Bytes, Directions, Float32, Int32, Points, Rgb
+from .arrays import Bytes, Directions, Float32, Int32, Points, Real, Rgb, Triple
 from .camera import Cameras, eye_ray
 from .embree.packets import DIRECTION, MISS, Tracer, U, V, hit_triangle, intersect, set_ray
 from .kernel import inlined, kernel
@@ -76,11 +76,11 @@ def empty_hits(n: int) -> Hits:
 def reflects(hits: Hits, i: int) -> bool:
     """Whether hit i is on a surface that reflects diffusely; elsewhere no light needs to be known."""
     r = hits.reflectivity
-    return hits.kind[i] == SURFACE and (r[i, 0] > 0.0 or r[i, 1] > 0.0 or r[i, 2] > 0.0)
+    return bool(hits.kind[i] == SURFACE and (r[i, 0] > 0.0 or r[i, 1] > 0.0 or r[i, 2] > 0.0))
 
 
 @inlined
-def ray_origin(hits: Hits, i: int) -> tuple[float, float, float]:
+def ray_origin(hits: Hits, i: int) -> Triple:
     """Where rays that leave hit i start: above the triangle, on the viewer's side."""
     p, g, e = hits.position, hits.geometric, hits.offset[i]
     return p[i, 0] + e * g[i, 0], p[i, 1] + e * g[i, 1], p[i, 2] + e * g[i, 2]
@@ -136,7 +136,7 @@ def pixel_order(width: int, height: int) -> Int32:
 
 
 @inlined
-def _shoot(cams: Cameras, c: int, pixel: int, jx: float, jy: float, i: int, packets: Float32, hits: Hits) -> None:
+def _shoot(cams: Cameras, c: int, pixel: int, jx: Real, jy: Real, i: int, packets: Float32, hits: Hits) -> None:
     """Write eye ray i, through (jx, jy) within the box of a pixel."""
     dx, dy, dz = eye_ray(cams, c, pixel % cams.width + jx, pixel // cams.width + jy)
     o = cams.position

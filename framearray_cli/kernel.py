@@ -8,10 +8,24 @@ releases the GIL and is compiled once for all runs.
 `inlined` is for the small functions that kernels are written with.
 """
 
-from functools import partial
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numba as nb
 
-kernel: Any = partial(nb.njit, nogil=True, cache=True, error_model="numpy", _nrt=False)()
-inlined: Any = partial(nb.njit, nogil=True, cache=True, error_model="numpy", _nrt=False, inline="always")()
+F = TypeVar("F", bound=Callable[..., Any])
+
+_njit: Any = nb.njit  # its stubs do not know `_nrt`
+_OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy", "_nrt": False}
+
+
+def kernel(function: F) -> F:
+    """Compile a hot loop; it must not allocate."""
+    compiled: F = _njit(**_OPTIONS)(function)
+    return compiled
+
+
+def inlined(function: F) -> F:
+    """Compile a function into every kernel that calls it."""
+    compiled: F = _njit(inline="always", **_OPTIONS)(function)
+    return compiled

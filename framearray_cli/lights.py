@@ -62,6 +62,6 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
         kind=np.array(kind, np.int32),
         vector=np.ascontiguousarray(vector.transpose(0, 2, 1), np.float32),
         strength=np.ascontiguousarray(strength.transpose(0, 2, 1), np.float32),
-        lit=(intensity > 0).any(axis=-1).astype(np.uint8),
+        lit=np.asarray((intensity > 0).any(axis=-1), np.uint8),
         colour=np.ascontiguousarray(colour, np.float32),
     )

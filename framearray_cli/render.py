@@ -119,7 +119,7 @@ def _frames(prepared: Prepared, work: Work, ambient: Ambient, listener: Listener
         images=prepared.n_cameras * n_lights,
         seconds=time.perf_counter() - started,
         rays={"ambient": ambient.rays, **crew.rays()},
-        stages=dict(crew.seconds()),
+        stages=crew.seconds(),
         pixels=work.n_pixels,
         hits=hits / work.n_frames,
         peak_memory=peak_memory(),

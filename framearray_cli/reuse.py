@@ -14,7 +14,7 @@ p_j / sum of n_k p_k over the eyes k of the window of j (balance heuristic, [Vea
 
 import numpy as np
 
-from .arrays import Float32, Float64, Int32
+from .arrays import Float32, Float64, Int32, Real
 from .camera import OUTSIDE, Cameras, project
 from .embree.packets import LANES, Tracer, is_blocked, occlude, set_ray
 from .hits import SURFACE, Hits
@@ -23,7 +23,7 @@ from .rays import Rays
 
 
 @inlined
-def _seen(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[int, float]:
+def _seen(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[int, Real]:
     """The pixel of eye k that hit i falls into, were nothing in between, and the density p_k; OUTSIDE and 0 if none."""
     o, p, g = cams.position, hits.position, hits.geometric
     if hits.kind[i] != SURFACE:

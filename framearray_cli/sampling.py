@@ -6,9 +6,9 @@ job. Lights are not part of the key, so that all lights share hits and direction
 
 import numpy as np
 
+from .arrays import Real, Triple
 from .kernel import inlined
 
-Triple = tuple[float, float, float]
 
 # Dimensions: one stream a purpose.
 PIXEL, HEMISPHERE, CHOICE = 0, 1, 2
@@ -43,7 +43,7 @@ def word(key: np.uint64, dimension: int) -> np.uint64:
 
 
 @inlined
-def r2(bits: np.uint64, i: int) -> tuple[float, float]:
+def r2(bits: np.uint64, i: int) -> tuple[Real, Real]:
     """Point i of the golden ratio sequence, shifted by the random bits: uniform in [0, 1)^2, well spread over i."""
     x = np.uint32(bits & np.uint64(0xFFFFFFFF)) + np.uint32(i) * R2_X
     y = np.uint32(bits >> np.uint64(32)) + np.uint32(i) * R2_Y
@@ -52,7 +52,7 @@ def r2(bits: np.uint64, i: int) -> tuple[float, float]:
 
 
 @inlined
-def disc(u: float, v: float) -> tuple[float, float]:
+def disc(u: Real, v: Real) -> tuple[Real, Real]:
     """Uniform point of the unit disc by Shirley and Chiu's concentric map.
 
     Its angles stay within pi/4, so short series do for cosine and sine.
@@ -79,7 +79,7 @@ def disc(u: float, v: float) -> tuple[float, float]:
 
 
 @inlined
-def cosine_direction(nx: float, ny: float, nz: float, u: float, v: float) -> Triple:
+def cosine_direction(nx: Real, ny: Real, nz: Real, u: Real, v: Real) -> Triple:
     """Unit direction about the unit normal n with density cos(theta) / pi; the frame is Duff et al.'s (2017)."""
     x, y = disc(u, v)
     z = np.sqrt(max(np.float32(0.0), np.float32(1.0) - x * x - y * y))
@@ -94,7 +94,7 @@ def cosine_direction(nx: float, ny: float, nz: float, u: float, v: float) -> Tri
 
 
 @inlined
-def above(x: float, y: float, z: float, gx: float, gy: float, gz: float) -> Triple:
+def above(x: Real, y: Real, z: Real, gx: Real, gy: Real, gz: Real) -> Triple:
     """A direction mirrored into the half-space of g where it points below the surface.
 
     Interpolated normals tilt the hemisphere; what falls below the triangle would only meet the triangle itself.

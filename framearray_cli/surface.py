@@ -8,11 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Bytes, Corners, CornerUvs, Float32, Int32, Rgb
+from .arrays import Bytes, CornerUvs, Corners, Float32, Int32, Real, Rgb, Triple
 from .kernel import inlined
 from .scene import Scene
 
-Triple = tuple[float, float, float]
 
 # Ray offsets: 16 units in the last place of the largest coordinate of the triangle. Of the rules tried it alone had
 # no self-hits and no leaks at every scale (docs/decisions/ray-offsets.md).
@@ -51,15 +50,13 @@ def surfaces(scene: Scene) -> Surfaces:
     largest = np.abs(scene.corners).max(axis=(1, 2), initial=0.0)
     code = np.arange(256) / 255.0
     linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
-    return Surfaces(
-        *(getattr(scene, name) for name in Surfaces._fields[:-2]),
-        offset=(OFFSET_ULPS * ULP * largest).astype(np.float32),
-        linear=linear.astype(np.float32),
-    )
+    arrays = {name: getattr(scene, name) for name in Surfaces._fields[:-2]}
+    arrays["offset"] = (OFFSET_ULPS * ULP * largest).astype(np.float32)
+    return Surfaces(**arrays, linear=linear.astype(np.float32))
 
 
 @inlined
-def texture_at(s: Surfaces, texture: int, u: float, v: float) -> tuple[float, float, float, float]:
+def texture_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real, Real, Real]:
     """Bilinear, repeating look-up: linear red, green, blue, and alpha; texel centres at half-integers, v upwards."""
     first, width, height = s.textures[texture, 0], s.textures[texture, 1], s.textures[texture, 2]
     x = (u - math.floor(u)) * width - 0.5
@@ -81,7 +78,7 @@ def texture_at(s: Surfaces, texture: int, u: float, v: float) -> tuple[float, fl
 
 
 @inlined
-def _texture_coordinates(s: Surfaces, triangle: int, u: float, v: float) -> tuple[float, float]:
+def _texture_coordinates(s: Surfaces, triangle: int, u: Real, v: Real) -> tuple[Real, Real]:
     w = 1.0 - u - v
     uv = s.uvs
     return (
@@ -91,9 +88,7 @@ def _texture_coordinates(s: Surfaces, triangle: int, u: float, v: float) -> tupl
 
 
 @inlined
-def _tinted(
-    s: Surfaces, red: float, green: float, blue: float, texture: int, triangle: int, u: float, v: float
-) -> Triple:
+def _tinted(s: Surfaces, red: Real, green: Real, blue: Real, texture: int, triangle: int, u: Real, v: Real) -> Triple:
     """A material's factor times texture and corner colour."""
     if texture >= 0:
         tu, tv = _texture_coordinates(s, triangle, u, v)
@@ -108,7 +103,7 @@ def _tinted(
 
 
 @inlined
-def reflectivity_at(s: Surfaces, triangle: int, u: float, v: float) -> Triple:
+def reflectivity_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
     """Diffuse reflectivity, RGB 0 to 1, at barycentric (u, v) of a triangle."""
     m = s.material[triangle]
     red, green, blue = s.reflectivity[m, 0], s.reflectivity[m, 1], s.reflectivity[m, 2]
@@ -116,7 +111,7 @@ def reflectivity_at(s: Surfaces, triangle: int, u: float, v: float) -> Triple:
 
 
 @inlined
-def specular_at(s: Surfaces, triangle: int, u: float, v: float) -> Triple:
+def specular_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
     """Mirror reflectivity, RGB 0 to 1, at barycentric (u, v) of a triangle."""
     m = s.material[triangle]
     red, green, blue = s.specular[m, 0], s.specular[m, 1], s.specular[m, 2]
@@ -126,18 +121,18 @@ def specular_at(s: Surfaces, triangle: int, u: float, v: float) -> Triple:
 
 
 @inlined
-def is_cut_out(s: Surfaces, triangle: int, u: float, v: float) -> bool:
+def is_cut_out(s: Surfaces, triangle: int, u: Real, v: Real) -> bool:
     """Whether the alpha mask of a triangle removes the point (u, v)."""
     m = s.material[triangle]
     alpha = s.alpha[m]
     if s.alpha_texture[m] >= 0:
         tu, tv = _texture_coordinates(s, triangle, u, v)
         alpha *= texture_at(s, s.alpha_texture[m], tu, tv)[3]
-    return alpha < s.alpha_cutoff[m]
+    return bool(alpha < s.alpha_cutoff[m])
 
 
 @inlined
-def position_at(s: Surfaces, triangle: int, u: float, v: float) -> Triple:
+def position_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
     """The point itself, from the corners: nearer to the triangle than origin + t * direction is."""
     p, u64, v64 = s.corners, np.float64(u), np.float64(v)
     w64 = 1.0 - u64 - v64
@@ -149,7 +144,7 @@ def position_at(s: Surfaces, triangle: int, u: float, v: float) -> Triple:
 
 
 @inlined
-def geometric_normal(s: Surfaces, triangle: int, dx: float, dy: float, dz: float) -> Triple:
+def geometric_normal(s: Surfaces, triangle: int, dx: Real, dy: Real, dz: Real) -> Triple:
     """Unit normal of the triangle, on the side that a ray of direction (dx, dy, dz) comes from.
 
     In float64: the cross product of edges of 1e-12 would underflow in float32.
@@ -166,7 +161,7 @@ def geometric_normal(s: Surfaces, triangle: int, dx: float, dy: float, dz: float
 
 
 @inlined
-def shading_normal(s: Surfaces, triangle: int, u: float, v: float, gx: float, gy: float, gz: float) -> Triple:
+def shading_normal(s: Surfaces, triangle: int, u: Real, v: Real, gx: Real, gy: Real, gz: Real) -> Triple:
     """Interpolated unit normal on the side of the geometric normal (gx, gy, gz), or that one where there is none."""
     if s.normals.shape[0] == 0:
         return gx, gy, gz

@@ -47,7 +47,7 @@ class EmbreexScene:
         self._mesh = TriangleMesh(self._scene, scene.corners)
         self._callbacks = (_CALLBACK(self._intersect), _CALLBACK(self._occlude))
         addresses = [ctypes.cast(callback, ctypes.c_void_p).value or 0 for callback in self._callbacks]
-        self.tracer = Tracer(0, *addresses, 1, 0, scene.n_opaque)
+        self.tracer = Tracer(0, addresses[0], addresses[1], 1, 0, scene.n_opaque)
 
     def close(self) -> None:
         """Drop embreex's scene."""
@@ -117,7 +117,7 @@ class EmbreexScene:
 
 def _view(address: int, n_packets: int, rows: int) -> Float32:
     block = (ctypes.c_float * (n_packets * rows * LANES)).from_address(address)
-    return np.frombuffer(block, np.float32).reshape(n_packets, rows, LANES)
+    return np.ctypeslib.as_array(block).reshape(n_packets, rows, LANES)
 
 
 def _rays(packets: Float32) -> tuple[Any, tuple[Float32, Float32, Float32]]:

@@ -19,8 +19,7 @@ _VALID, _USER, _HIT = 0, 1, 4
 _HIT_U, _HIT_V, _HIT_TRIANGLE = 3, 4, 5  # rows of RTCHitN
 
 
-@intrinsic
-def _pointer(typingctx: Any, address: Any) -> Any:
+def _pointer_to(typingctx: Any, address: Any) -> Any:
     """An integer address as a pointer that `carray` takes."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -29,20 +28,25 @@ def _pointer(typingctx: Any, address: Any) -> Any:
     return types.voidptr(types.intp), codegen
 
 
+_pointer: Any = intrinsic(_pointer_to)
+_numba: Any = nb  # its stubs know neither of these two
+_carray, _cfunc = _numba.carray, _numba.cfunc
+
+
 @nb.njit(cache=True)
 def _surfaces_at(table: Any) -> Surfaces:
     """Rebuild `Surfaces` from the addresses and lengths that `MaskTable` wrote down."""
     n, m, n_texels, n_textures = table[0], table[1], table[2], table[3]
-    none3 = nb.carray(_pointer(table[4]), (0, 3, 3), np.float32)
-    uvs = nb.carray(_pointer(table[5]), (n, 3, 2), np.float32)
-    material = nb.carray(_pointer(table[6]), (n,), np.int32)
-    alpha = nb.carray(_pointer(table[7]), (m,), np.float32)
-    alpha_texture = nb.carray(_pointer(table[8]), (m,), np.int32)
-    alpha_cutoff = nb.carray(_pointer(table[9]), (m,), np.float32)
-    texels = nb.carray(_pointer(table[10]), (n_texels, 4), np.uint8)
-    textures = nb.carray(_pointer(table[11]), (n_textures, 3), np.int32)
-    linear = nb.carray(_pointer(table[12]), (256,), np.float32)
-    none1 = nb.carray(_pointer(table[4]), (0, 3), np.float32)
+    none3 = _carray(_pointer(table[4]), (0, 3, 3), np.float32)
+    uvs = _carray(_pointer(table[5]), (n, 3, 2), np.float32)
+    material = _carray(_pointer(table[6]), (n,), np.int32)
+    alpha = _carray(_pointer(table[7]), (m,), np.float32)
+    alpha_texture = _carray(_pointer(table[8]), (m,), np.int32)
+    alpha_cutoff = _carray(_pointer(table[9]), (m,), np.float32)
+    texels = _carray(_pointer(table[10]), (n_texels, 4), np.uint8)
+    textures = _carray(_pointer(table[11]), (n_textures, 3), np.int32)
+    linear = _carray(_pointer(table[12]), (256,), np.float32)
+    none1 = _carray(_pointer(table[4]), (0, 3), np.float32)
     return Surfaces(
         none3, none3, uvs, none3, material, none1, none1, alpha_texture, alpha_texture,
         alpha, alpha_texture, alpha_cutoff, texels, textures, alpha, linear,
@@ -53,14 +57,14 @@ def _surfaces_at(table: Any) -> Surfaces:
 def _filter() -> Any:
     """The compiled callback `void (RTCFilterFunctionNArguments*)`."""
 
-    @nb.cfunc(types.void(types.intp), nopython=True, cache=True)
+    @_cfunc(types.void(types.intp), nopython=True, cache=True)
     def filter_masked(address: int) -> None:
-        arguments = nb.carray(_pointer(address), (6,), np.int64)
-        n = nb.carray(_pointer(address + 40), (1,), np.uint32)[0]
-        valid = nb.carray(_pointer(arguments[_VALID]), (n,), np.int32)
-        table = nb.carray(_pointer(arguments[_USER]), (16,), np.int64)
-        hits = nb.carray(_pointer(arguments[_HIT]), (8, n), np.float32)
-        triangles = nb.carray(_pointer(arguments[_HIT]), (8, n), np.uint32)
+        arguments = _carray(_pointer(address), (6,), np.int64)
+        n = _carray(_pointer(address + 40), (1,), np.uint32)[0]
+        valid = _carray(_pointer(arguments[_VALID]), (n,), np.int32)
+        table = _carray(_pointer(arguments[_USER]), (16,), np.int64)
+        hits = _carray(_pointer(arguments[_HIT]), (8, n), np.float32)
+        triangles = _carray(_pointer(arguments[_HIT]), (8, n), np.uint32)
         s = _surfaces_at(table)
         first_masked = table[13]
         for lane in range(n):

@@ -13,7 +13,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from ..arrays import Float32
+from ..arrays import Float32, Real
 from ..kernel import inlined, kernel
 
 LANES = 16
@@ -44,8 +44,7 @@ class Tracer(NamedTuple):
     first_masked: int
 
 
-@intrinsic
-def _call(typingctx: Any, function: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
+def _call_at(typingctx: Any, function: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
     """Call the C function `void (intptr, intptr, intptr, intptr)` at an address that is only known at run time."""
     signature = types.void(*[types.intp] * 5)
 
@@ -56,6 +55,9 @@ def _call(typingctx: Any, function: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
         return context.get_dummy_value()
 
     return signature, codegen
+
+
+_call: Any = intrinsic(_call_at)
 
 
 @kernel
@@ -82,9 +84,7 @@ def empty_packets(n_packets: int, rows: int) -> Float32:
 
 
 @inlined
-def set_ray(
-    packets: Float32, i: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, tfar: float
-) -> None:
+def set_ray(packets: Float32, i: int, ox: Real, oy: Real, oz: Real, dx: Real, dy: Real, dz: Real, tfar: Real) -> None:
     """Write ray i of a packet array; it reaches from its origin (tnear 0) to tfar, in lengths of the direction."""
     p, lane = i >> 4, i & 15
     packets[p, ORIGIN, lane] = ox

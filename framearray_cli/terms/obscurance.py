@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Rgb
+from ..arrays import Real, Rgb
 from ..embree.packets import LANES, MISS, TFAR, Tracer, U, V, hit_triangle, intersect, set_ray
 from ..hits import Hits, ray_origin, reflects
 from ..kernel import inlined, kernel
@@ -46,14 +46,14 @@ class ObscuranceSettings(NamedTuple):
 
 
 @inlined
-def rho(falloff: int, tau: float, x: float) -> float:
+def rho(falloff: int, tau: Real, x: Real) -> Real:
     """The falloff curve at x = d / d_max, rising from 0 (0 for `constant`) at 0 to 1 at 1."""
     if falloff == SQRT:
-        return np.sqrt(x)
+        return np.float32(np.sqrt(x))
     if falloff == LINEAR:
         return x
     if falloff == CBRT:
-        return x ** np.float32(1.0 / 3.0)
+        return np.float32(x ** np.float32(1.0 / 3.0))
     if falloff == EXPONENTIAL:
         return np.float32(math.expm1(-tau * x) / math.expm1(-tau))
     return np.float32(0.0)

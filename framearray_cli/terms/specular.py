@@ -16,8 +16,8 @@ from ..surface import Surfaces
 
 @inlined
 def _is_mirror(hits: Hits, i: int) -> bool:
-    s = hits.specular[i]
-    return hits.kind[i] == SURFACE and (s[0] > 0.0 or s[1] > 0.0 or s[2] > 0.0)
+    s = hits.specular
+    return bool(hits.kind[i] == SURFACE and (s[i, 0] > 0.0 or s[i, 1] > 0.0 or s[i, 2] > 0.0))
 
 
 @kernel
