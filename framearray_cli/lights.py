@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Bytes, Float32, Float64, Int32
+from .arrays import Float32, Float64, Int32
 from .paths import Lights
 
 POINT, DIRECTIONAL = 0, 1
@@ -22,14 +22,14 @@ class LightArrays(NamedTuple):
         kind: (n_sources,) POINT or DIRECTIONAL.
         vector: (n_sources, 3, n_lights) position, centred, or the unit direction that light travels.
         strength: (n_sources, channels, n_lights) W/sr or W/m2 in units of `colour`; 1 or 3 channels.
-        lit: (n_sources, n_lights) 1 where a source shines at all.
+        lit: (n_sources, n_lights) 1 where a source shines at all, else 0.
         colour: (n_lights, 3) what a stored irradiance is multiplied with; ones where there are 3 channels.
     """
 
     kind: Int32
     vector: Float32
     strength: Float32
-    lit: Bytes
+    lit: Float32
     colour: Float32
 
     @property
@@ -62,6 +62,6 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
         kind=np.array(kind, np.int32),
         vector=np.ascontiguousarray(vector.transpose(0, 2, 1), np.float32),
         strength=np.ascontiguousarray(strength.transpose(0, 2, 1), np.float32),
-        lit=np.asarray((intensity > 0).any(axis=-1), np.uint8),
+        lit=np.asarray((intensity > 0).any(axis=-1), np.float32),
         colour=np.ascontiguousarray(colour, np.float32),
     )

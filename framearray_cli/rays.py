@@ -13,9 +13,9 @@ class Rays(NamedTuple):
 
     Attributes:
         packets: (n_packets, rows, 16).
-        place: (n_rays, 2) what a ray belongs to: two indices, by use.
-        value: (n_rays, 3) what a ray carries if it arrives.
-        row: (5, n) one row of candidates: see `terms/direct.py`.
+        place: (n_rays,) what a ray belongs to: an index, by use.
+        value: (3, n_rays) what a ray carries if it arrives.
+        row: (6, n) candidates for rays from one point: see `terms/direct.py`.
     """
 
     packets: Float32
@@ -29,9 +29,9 @@ def _room(n_rays: int, rows: int, row_length: int) -> Rays:
     capacity = n_packets * LANES
     return Rays(
         packets=empty_packets(n_packets, rows),
-        place=np.empty((capacity, 2), np.int32),
-        value=np.empty((capacity, 3), np.float32),
-        row=np.empty((5, row_length), np.float32),
+        place=np.empty(capacity, np.int32),
+        value=np.empty((3, capacity), np.float32),
+        row=np.empty((6, row_length), np.float32),
     )
 
 

@@ -57,10 +57,10 @@ def _aim(cams: Cameras, k: int, hits: Hits, i: int, packets: Float32, ray: int) 
 def _confirm(tracer: Tracer, rays: Rays, n: int, pixel: Int32, density: Float64) -> None:
     """Trace the waiting visibility rays; what is hidden is forgotten."""
     occlude(tracer, rays.packets, n)
+    flat_pixel, flat_density = pixel.reshape(pixel.size), density.reshape(density.size)
     for ray in range(n):
         if is_blocked(rays.packets, ray):
-            row, i = rays.place[ray, 0], rays.place[ray, 1]
-            pixel[row, i], density[row, i] = OUTSIDE, 0.0
+            flat_pixel[rays.place[ray]], flat_density[rays.place[ray]] = OUTSIDE, 0.0
 
 
 @kernel
@@ -98,7 +98,7 @@ def outer_hits(
                     _confirm(tracer, rays, waiting, pixel, density)
                     total, waiting = total + waiting, 0
                 _aim(cams, k, hits, i, rays.packets, waiting)
-                rays.place[waiting, 0], rays.place[waiting, 1] = row, i
+                rays.place[waiting] = row * pixel.shape[1] + i
                 waiting += 1
     _confirm(tracer, rays, waiting, pixel, density)
     return total + waiting

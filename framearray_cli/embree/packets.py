@@ -79,8 +79,10 @@ def aligned(n_words: int) -> Float32:
 
 
 def empty_packets(n_packets: int, rows: int) -> Float32:
-    """Room for packets, (n, rows, 16) float32."""
-    return aligned(n_packets * rows * LANES).reshape(n_packets, rows, LANES)
+    """Room for packets, (n, rows, 16) float32; tnear 0 and the mask of all rays are set for good."""
+    packets = aligned(n_packets * rows * LANES).reshape(n_packets, rows, LANES)
+    packets.view(np.int32)[:, MASK] = ALL_RAYS
+    return packets
 
 
 @inlined
@@ -96,37 +98,31 @@ def set_ray(packets: Float32, i: int, ox: Real, oy: Real, oz: Real, dx: Real, dy
     packets[p, TFAR, lane] = tfar
 
 
+@inlined
+def _idle_from(packets: Float32, n_rays: int) -> int:
+    """Make the lanes after the last ray idle; returns the number of packets."""
+    n_packets = (n_rays + LANES - 1) // LANES
+    for i in range(n_rays, n_packets * LANES):
+        set_ray(packets, i, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0)
+    return n_packets
+
+
 @kernel
 def intersect(tracer: Tracer, packets: Float32, n_rays: int) -> None:
-    """Find the first hits of rays 0 to n_rays - 1; afterwards the bits of row TRIANGLE hold the triangle or MISS.
-
-    tnear, mask and geometry are set here; lanes after the last ray are made idle.
-    """
-    n_packets = (n_rays + LANES - 1) // LANES
+    """Find the first hits of rays 0 to n_rays - 1; see `hit_triangle`."""
+    n_packets = _idle_from(packets, n_rays)
     bits = packets.view(np.int32)
     for p in range(n_packets):
         for lane in range(LANES):
-            packets[p, 3, lane] = 0.0
-            bits[p, MASK, lane] = ALL_RAYS
             bits[p, TRIANGLE, lane] = MISS
             bits[p, GEOMETRY, lane] = MISS
-    for i in range(n_rays, n_packets * LANES):
-        set_ray(packets, i, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0)
     _trace(tracer, tracer.intersect, packets, n_packets)
 
 
 @kernel
 def occlude(tracer: Tracer, packets: Float32, n_rays: int) -> None:
     """Test rays 0 to n_rays - 1; afterwards row TFAR is -inf where something blocks the ray (`is_blocked`)."""
-    n_packets = (n_rays + LANES - 1) // LANES
-    bits = packets.view(np.int32)
-    for p in range(n_packets):
-        for lane in range(LANES):
-            packets[p, 3, lane] = 0.0
-            bits[p, MASK, lane] = ALL_RAYS
-    for i in range(n_rays, n_packets * LANES):
-        set_ray(packets, i, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0)
-    _trace(tracer, tracer.occluded, packets, n_packets)
+    _trace(tracer, tracer.occluded, packets, _idle_from(packets, n_rays))
 
 
 @inlined

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..arrays import Float32
-from ..embree.packets import LANES, Tracer, is_blocked, occlude, set_ray
+from ..arrays import Float32, Real, Triple
+from ..embree.packets import DIRECTION, LANES, ORIGIN, TFAR, Tracer, is_blocked, occlude
 from ..hits import Hits, ray_origin, reflects
 from ..kernel import inlined, kernel
 from ..lights import DIRECTIONAL, LightArrays
@@ -11,16 +11,17 @@ from ..rays import Rays
 
 # A shadow ray ends this share of its length before the light, so that a light on a surface is not hidden by it.
 FAR_END = np.float32(1.0 - 1e-4)
-X, Y, Z, COSINE, VALUE = range(5)
+# Rows of candidates: vector to the light, geometry factor, and the light index it belongs to.
+X, Y, Z, VALUE, LIGHT = range(5)
 
 
 @inlined
 def _look(hits: Hits, i: int, lights: LightArrays, s: int, row: Float32) -> None:
-    """Compute, for every light position, the vector from hit i to source s, its cosine and its geometry factor.
+    """Compute, for every light position, the vector from hit i to source s and the geometry factor of its irradiance.
 
-    Irradiance is strength * row[VALUE]: cos(theta) / d^2 of a point source, whose vector ends at the source;
-    cos(theta) of a directional one, whose vector is a unit vector. 0 where the source is behind either normal, or
-    exactly at the hit.
+    The factor is cos(theta) / d^2 for a point source, whose vector ends at the source, and cos(theta) for a
+    directional one, whose vector has length 1. It is 0 where the source does not shine, is behind either normal, or
+    is exactly at the hit.
     """
     px, py, pz = hits.position[i, 0], hits.position[i, 1], hits.position[i, 2]
     gx, gy, gz = hits.geometric[i, 0], hits.geometric[i, 1], hits.geometric[i, 2]
@@ -30,27 +31,65 @@ def _look(hits: Hits, i: int, lights: LightArrays, s: int, row: Float32) -> None
         for l in range(row.shape[1]):
             x, y, z = -lights.vector[s, 0, l], -lights.vector[s, 1, l], -lights.vector[s, 2, l]
             cosine = mx * x + my * y + mz * z
+            in_front = (cosine > nothing) & (gx * x + gy * y + gz * z > nothing)
             row[X, l], row[Y, l], row[Z, l] = x, y, z
-            row[VALUE, l] = cosine if cosine > nothing and gx * x + gy * y + gz * z > nothing else nothing
+            row[VALUE, l] = cosine * lights.lit[s, l] if in_front else nothing
     else:
         for l in range(row.shape[1]):
             x, y, z = lights.vector[s, 0, l] - px, lights.vector[s, 1, l] - py, lights.vector[s, 2, l] - pz
-            square = x * x + y * y + z * z
-            inverse = one / np.sqrt(square)
+            inverse = one / np.sqrt(x * x + y * y + z * z)
             cosine = mx * x + my * y + mz * z
-            value = cosine * inverse * inverse * inverse
+            in_front = (cosine > nothing) & (gx * x + gy * y + gz * z > nothing)
             row[X, l], row[Y, l], row[Z, l] = x, y, z
-            row[VALUE, l] = value if cosine > nothing and gx * x + gy * y + gz * z > nothing else nothing
+            row[VALUE, l] = cosine * inverse * inverse * inverse * lights.lit[s, l] if in_front else nothing
+
+
+@inlined
+def _keep_lit(row: Float32) -> int:
+    """Move the candidates whose factor is not 0 to the front, with the light index of each; returns their number."""
+    n_lights = row.shape[1]
+    m = 0
+    for l in range(n_lights):
+        m += row[VALUE, l] > 0.0
+    index = row.view(np.int32)
+    if m == n_lights:
+        for l in range(n_lights):
+            index[LIGHT, l] = l
+        return m
+    k = 0
+    for l in range(n_lights):
+        if row[VALUE, l] > 0.0:
+            row[X, k], row[Y, k], row[Z, k], row[VALUE, k] = row[X, l], row[Y, l], row[Z, l], row[VALUE, l]
+            index[LIGHT, k] = l
+            k += 1
+    return m
+
+
+@inlined
+def _queue(row: Float32, first: int, m: int, origin: Triple, reach: Real, rays: Rays, waiting: int) -> None:
+    """Write candidates first to first + m - 1 as waiting rays; they fit one packet, so each loop is one vector store."""
+    p, lane = waiting >> 4, waiting & 15
+    ox, oy, oz = origin
+    for k in range(m):
+        rays.packets[p, ORIGIN, lane + k] = ox
+        rays.packets[p, ORIGIN + 1, lane + k] = oy
+        rays.packets[p, ORIGIN + 2, lane + k] = oz
+        rays.packets[p, DIRECTION, lane + k] = row[X, first + k]
+        rays.packets[p, DIRECTION + 1, lane + k] = row[Y, first + k]
+        rays.packets[p, DIRECTION + 2, lane + k] = row[Z, first + k]
+        rays.packets[p, TFAR, lane + k] = reach
 
 
 @kernel
 def _settle(tracer: Tracer, rays: Rays, n: int, irradiance: Float32) -> None:
     """Trace the waiting shadow rays and add what is not blocked."""
     occlude(tracer, rays.packets, n)
-    for ray in range(n):
-        if not is_blocked(rays.packets, ray):
-            for channel in range(irradiance.shape[1]):
-                irradiance[rays.place[ray, 0], channel, rays.place[ray, 1]] += rays.value[ray, channel]
+    channels, n_lights = irradiance.shape[1], irradiance.shape[2]
+    flat = irradiance.reshape(irradiance.size)
+    for channel in range(channels):
+        for ray in range(n):
+            value = np.float32(0.0) if is_blocked(rays.packets, ray) else rays.value[channel, ray]
+            flat[rays.place[ray] + channel * n_lights] += value
 
 
 @kernel
@@ -62,35 +101,38 @@ def direct(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, 
     Args:
         rays: room for rays; as many as fit are traced together.
         irradiance: (n, channels, n_lights), overwritten; in units of `lights.colour`.
-
     Returns:
         number of shadow rays.
     """
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]
     capacity = rays.packets.shape[0] * LANES
+    index = rays.row.view(np.int32)
     waiting = total = 0
     for i in range(n):
         for channel in range(channels):
             for l in range(n_lights):
                 irradiance[i, channel, l] = 0.0
-    for i in range(n):
         if not reflects(hits, i):
             continue
-        ox, oy, oz = ray_origin(hits, i)
+        origin = ray_origin(hits, i)
         for s in range(lights.kind.shape[0]):
             _look(hits, i, lights, s, rays.row)
             reach = np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END
-            for l in range(n_lights):
-                value = rays.row[VALUE, l]
-                if not (value > 0.0 and lights.lit[s, l]):
-                    continue
+            m = _keep_lit(rays.row)
+            k = 0
+            while k < m:
                 if waiting == capacity:
                     _settle(tracer, rays, waiting, irradiance)
                     total, waiting = total + waiting, 0
-                set_ray(rays.packets, waiting, ox, oy, oz, rays.row[X, l], rays.row[Y, l], rays.row[Z, l], reach)
-                rays.place[waiting, 0], rays.place[waiting, 1] = i, l
+                fit = min(LANES - (waiting & 15), m - k)
+                _queue(rays.row, k, fit, origin, reach, rays, waiting)
+                for ray in range(fit):
+                    rays.place[waiting + ray] = i * channels * n_lights + index[LIGHT, k + ray]
                 for channel in range(channels):
-                    rays.value[waiting, channel] = value * lights.strength[s, channel, l]
-                waiting += 1
+                    for ray in range(fit):
+                        strength = lights.strength[s, channel, index[LIGHT, k + ray]]
+                        rays.value[channel, waiting + ray] = rays.row[VALUE, k + ray] * strength
+                waiting += fit
+                k += fit
     _settle(tracer, rays, waiting, irradiance)
     return total + waiting

@@ -75,7 +75,7 @@ def _gather(
     share = np.float32(1.0 / settings.n_rays)
     d_max = np.float32(settings.d_max)
     for i in range(n):
-        owned = rays.place[i, 0]
+        owned = rays.place[i]
         triangle = hit_triangle(tracer, packets, i)
         distance = packets[i >> 4, TFAR, i & 15]
         if triangle == MISS and settings.sky:
@@ -136,7 +136,7 @@ def obscurance(
             x, y, z = cosine_direction(mx, my, mz, a, b)
             x, y, z = above(x, y, z, gx, gy, gz)
             set_ray(rays.packets, waiting, ox, oy, oz, x, y, z, reach)
-            rays.place[waiting, 0] = i
+            rays.place[waiting] = i
             waiting += 1
     _gather(surfaces, tracer, rays, waiting, settings, result, skylight)
     return total + waiting
