@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .arrays import Float32, Images, Int32, Rgb
-from .kernel import kernel
+from .kernel import kernel, prefetch_row
 
 INVERSE_PI = np.float32(1.0 / np.pi)
 
@@ -34,6 +34,9 @@ class Band(NamedTuple):
 
 
 WEIGHT, INDIRECT, STEADY, OBSCURANCE = 0, 1, 4, 7
+
+# How many hits ahead irradiance is fetched: memory answers in about the time that this many hits take to sum.
+AHEAD = 8
 
 
 def empty_band(n_pixels: int, n_lights: int) -> Band:
@@ -83,30 +86,45 @@ def accumulate(
         irradiance: (n_hits, 1 or 3, n_lights).
     """
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]
+    weighed, scaled, steady = weight.shape[0] > 0, scale.shape[0] > 0, constant.shape[0] > 0
+    rest = band.rest
+    last = start[first_pixel + n]
     for i in range(n):
         pixel = first_pixel + i
-        rest, mean_reflectivity = band.rest[i], band.reflectivity[i]
+        factor = scale[pixel] if scaled else np.float32(1.0)
+        band.hits[i] += start[pixel + 1] - start[pixel]
         for entry in range(start[pixel], start[pixel + 1]):
+            if entry + AHEAD < last:  # hits lie wherever they were found: fetch one while others are summed
+                prefetch_row(irradiance, order[entry + AHEAD])
             hit = order[entry]
-            w = weight[hit] if weight.shape[0] > 0 else np.float32(1.0)
-            if scale.shape[0] > 0:
-                w *= scale[pixel]
-            band.hits[i] += 1
-            rest[WEIGHT] += w
-            if constant.shape[0] > 0:
+            w = factor * weight[hit] if weighed else factor
+            rest[i, WEIGHT] += w
+            if steady:
                 for channel in range(3):
-                    rest[STEADY + channel] += w * constant[hit, channel]
+                    rest[i, STEADY + channel] += w * constant[hit, channel]
+            red, green, blue = w * reflectivity[hit, 0], w * reflectivity[hit, 1], w * reflectivity[hit, 2]
+            if not (red > 0.0 or green > 0.0 or blue > 0.0):
+                continue
+            band.reflectivity[i, 0] += red
+            band.reflectivity[i, 1] += green
+            band.reflectivity[i, 2] += blue
+            rest[i, INDIRECT] += red * obscurance[hit, 0]
+            rest[i, INDIRECT + 1] += green * obscurance[hit, 1]
+            rest[i, INDIRECT + 2] += blue * obscurance[hit, 2]
             for channel in range(3):
-                r = w * reflectivity[hit, channel]
-                if r == 0.0:
-                    continue
-                mean_reflectivity[channel] += r
-                rest[INDIRECT + channel] += r * obscurance[hit, channel]
-                rest[OBSCURANCE + channel] += w * obscurance[hit, channel]
-                r *= INVERSE_PI
-                e, direct = irradiance[hit, channel if channels == 3 else 0], band.direct[i, channel]
+                rest[i, OBSCURANCE + channel] += w * obscurance[hit, channel]
+            red, green, blue = red * INVERSE_PI, green * INVERSE_PI, blue * INVERSE_PI
+            if channels == 1:
                 for l in range(n_lights):
-                    direct[l] += r * e[l]
+                    e = irradiance[hit, 0, l]
+                    band.direct[i, 0, l] += red * e
+                    band.direct[i, 1, l] += green * e
+                    band.direct[i, 2, l] += blue * e
+            else:
+                for l in range(n_lights):
+                    band.direct[i, 0, l] += red * irradiance[hit, 0, l]
+                    band.direct[i, 1, l] += green * irradiance[hit, 1, l]
+                    band.direct[i, 2, l] += blue * irradiance[hit, 2, l]
 
 
 @kernel
@@ -128,30 +146,34 @@ def normalise(band: Band, n: int) -> None:
 
 @kernel
 def finish(band: Band, first_pixel: int, n: int, colour: Rgb, ambient: Rgb, images: Images) -> tuple[int, int, int]:
-    """Write the pixels of a band into all images of the frame.
+    """Write the pixels of a band into all images of the frame; the band's direct sums are used up.
 
     Args:
-        colour: (n_lights, 3) what the direct sums are in units of.
-        ambient: (n_lights, 3) I_A, radiance.
+        colour: (3, n_lights) what the direct sums are in units of.
+        ambient: (3, n_lights) I_A, radiance.
         images: (n_lights, n_pixels of the image, 3), written.
-
     Returns:
         number of values that were not finite or below zero, written as 0; light index and pixel of the first.
     """
     bad, bad_light, bad_pixel = 0, -1, -1
+    n_lights, sums = images.shape[0], band.direct
     for i in range(n):
-        rest = band.rest[i]
-        for l in range(images.shape[0]):
-            for channel in range(3):
-                value = (
-                    colour[l, channel] * band.direct[i, channel, l]
-                    + ambient[l, channel] * rest[INDIRECT + channel]
-                    + rest[STEADY + channel]
-                )
-                if not (value >= 0.0 and value < np.inf):
+        for channel in range(3):
+            indirect, steady = band.rest[i, INDIRECT + channel], band.rest[i, STEADY + channel]
+            wrong = 0
+            for l in range(n_lights):
+                value = colour[channel, l] * sums[i, channel, l] + ambient[channel, l] * indirect + steady
+                wrong += not (value >= 0.0 and value < np.inf)
+                sums[i, channel, l] = value
+            for l in range(n_lights if wrong else 0):
+                if not (sums[i, channel, l] >= 0.0 and sums[i, channel, l] < np.inf):
+                    sums[i, channel, l] = 0.0
                     if bad == 0:
                         bad_light, bad_pixel = l, first_pixel + i
                     bad += 1
-                    value = np.float32(0.0)
-                images[l, first_pixel + i, channel] = value
+    for block in range(0, n, 16):  # 16 pixels of one image are neighbours in memory, and so are all lights of a pixel
+        for l in range(n_lights):
+            for i in range(block, min(block + 16, n)):
+                for channel in range(3):
+                    images[l, first_pixel + i, channel] = sums[i, channel, l]
     return bad, bad_light, bad_pixel

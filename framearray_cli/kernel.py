@@ -12,9 +12,14 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba as nb
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+_LINE = 64  # bytes
 _njit: Any = nb.njit  # its stubs do not know `_nrt`
 _OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy", "_nrt": False}
 
@@ -29,3 +34,25 @@ def inlined(function: F) -> F:
     """Compile a function into every kernel that calls it."""
     compiled: F = _njit(inline="always", **_OPTIONS)(function)
     return compiled
+
+
+def _prefetch_row_of(typingctx: Any, array: Any, i: Any) -> Any:
+    """Ask for array[i], (n, 1 or 3, m), to be brought into the cache, one request a cache line; nothing waits for it."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        view = context.make_array(signature.args[0])(context, builder, args[0])
+        word, byte = ir.IntType(64), ir.IntType(8).as_pointer()
+        row_bytes = builder.extract_value(view.strides, 0)
+        first = builder.bitcast(view.data, byte)
+        row = builder.gep(first, [builder.mul(args[1], row_bytes)])
+        kind = ir.FunctionType(ir.VoidType(), [byte, ir.IntType(32), ir.IntType(32), ir.IntType(32)])
+        fetch = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
+        flags = [ir.Constant(ir.IntType(32), value) for value in (0, 3, 1)]  # to read, keep in all levels, data
+        with cgutils.for_range_slice(builder, word(0), row_bytes, word(_LINE), word) as (offset, _):
+            builder.call(fetch, [builder.gep(row, [offset]), *flags])
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp), codegen
+
+
+prefetch_row: Any = intrinsic(_prefetch_row_of)

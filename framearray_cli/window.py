@@ -66,7 +66,9 @@ class Window:
 
     def __init__(self, work: Work, ambient: Ambient, crew: Crew) -> None:
         self._work = work
-        self._ambient = ambient
+        # by channel, as the sums are
+        self._colour = np.ascontiguousarray(work.lights.colour.T)
+        self._ambient = np.ascontiguousarray(ambient.intensity.T)
         self._crew = crew
         self._frames: dict[int, Frame] = {}
         self._next = 0
@@ -111,7 +113,7 @@ class Window:
                     place = frame.places[j]
                     average_native(place.start, place.order, frame.normal, frame.depth, first, n, own)
                 self._sum_mirrored(j, first, n, sums)
-                bad = finish(sums, first, n, work.lights.colour, self._ambient.intensity, flat)
+                bad = finish(sums, first, n, self._colour, self._ambient, flat)
             finally:
                 self._bands.append(sums)
             scratch.seconds["compose"] += perf_counter() - started
