@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from parts import Part
 from PIL import Image
 from shapes import Array, Mesh
-
-Part = list[tuple[str, Mesh]]
 
 FLOAT, USHORT, UINT = 5126, 5123, 5125  # glTF component types
 
@@ -70,7 +69,9 @@ def write(model: Model, file: Path) -> None:
         for material in dict.fromkeys(m for m, _ in part):
             textured = model.materials[material].texture is not None
             meshes_here = [_rounded(mesh, model.decimals) for m, mesh in part if m == material]
-            points, normals, uvs, faces = _primitive(meshes_here, model.normals, textured, model.materials[material].metres)
+            points, normals, uvs, faces = _primitive(
+                meshes_here, model.normals, textured, model.materials[material].metres
+            )
             attributes = {"POSITION": out.floats(points, limits=True)}
             if model.normals:
                 attributes["NORMAL"] = out.floats(normals)
@@ -87,19 +88,23 @@ def write(model: Model, file: Path) -> None:
             nodes.append(node)
     images = [_jpeg(m.texture) for m in model.materials.values() if m.texture is not None]
     image_views = [out.view(data) for data in images]
-    _write_glb(file, {
-        "asset": {"version": "2.0", "generator": "framearray scenes"},
-        "scene": 0,
-        "scenes": [{"nodes": list(range(len(nodes)))}],
-        "nodes": nodes,
-        "meshes": meshes,
-        "materials": _material_table(model.materials),
-        "textures": [{"source": i} for i in range(len(images))],
-        "images": [{"bufferView": view, "mimeType": "image/jpeg"} for view in image_views],
-        "accessors": out.accessors,
-        "bufferViews": out.views,
-        "buffers": [{"byteLength": len(out.data)}],
-    }, bytes(out.data))
+    _write_glb(
+        file,
+        {
+            "asset": {"version": "2.0", "generator": "framearray scenes"},
+            "scene": 0,
+            "scenes": [{"nodes": list(range(len(nodes)))}],
+            "nodes": nodes,
+            "meshes": meshes,
+            "materials": _material_table(model.materials),
+            "textures": [{"source": i} for i in range(len(images))],
+            "images": [{"bufferView": view, "mimeType": "image/jpeg"} for view in image_views],
+            "accessors": out.accessors,
+            "bufferViews": out.views,
+            "buffers": [{"byteLength": len(out.data)}],
+        },
+        bytes(out.data),
+    )
 
 
 class _Buffers:
@@ -130,12 +135,14 @@ class _Buffers:
 
     def indices(self, faces: NDArray[np.int64]) -> int:
         small = faces.max() < 65535
-        self.accessors.append({
-            "bufferView": self.view(faces.astype("<u2" if small else "<u4").tobytes()),
-            "componentType": USHORT if small else UINT,
-            "count": faces.size,
-            "type": "SCALAR",
-        })
+        self.accessors.append(
+            {
+                "bufferView": self.view(faces.astype("<u2" if small else "<u4").tobytes()),
+                "componentType": USHORT if small else UINT,
+                "count": faces.size,
+                "type": "SCALAR",
+            }
+        )
         return len(self.accessors) - 1
 
 

@@ -1,7 +1,7 @@
 """Make furnace.glb: the inside of a finely tessellated sphere with the surface area of a sphere of radius 1.
 
-Run `python jobs/scenes/make_furnace.py [FILE]`. Needs numpy. Each of 20 faces of an icosahedron is halved six times along
-its edges: 81,920 triangles, whose corners and middles lie within 6e-5 of the mean distance from the centre.
+Run `python jobs/scenes/make_furnace.py [FILE]`. Needs numpy. The edges of an icosahedron are halved six times:
+81,920 triangles, whose corners and middles lie within 6e-5 of the mean distance from the centre.
 """
 
 import sys
@@ -20,9 +20,17 @@ def icosphere(subdivisions: int) -> Mesh:
     points = np.array([[0, s, t * golden] for s in (-1, 1) for t in (-1, 1)], dtype=float)
     points = np.vstack([points, np.roll(points, 1, axis=1), np.roll(points, 2, axis=1)])
     near = np.isclose(np.linalg.norm(points[:, None] - points[None], axis=-1), 2.0)
-    faces = np.array([[i, j, k] for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[i, k]])
-    inwards = np.einsum("ij,ij->i", np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]]),
-                        points[faces].mean(axis=1)) < 0  # fmt: skip
+    faces = np.array(
+        [[i, j, k] for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[i, k]]
+    )
+    inwards = (
+        np.einsum(
+            "ij,ij->i",
+            np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]]),
+            points[faces].mean(axis=1),
+        )
+        < 0
+    )
     faces = np.where(inwards[:, None], faces, faces[:, ::-1])  # the inside is what is seen
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     for _ in range(subdivisions):

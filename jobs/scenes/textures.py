@@ -17,7 +17,7 @@ def encode(linear: Array) -> Image.Image:
     """An sRGB picture of linear colours (height, width, 3), row 0 at the top."""
     x = np.clip(linear, 0.0, 1.0)
     encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
-    return Image.fromarray(np.round(encoded * 255).astype(np.uint8), "RGB")
+    return Image.fromarray(np.round(encoded * 255).astype(np.uint8))
 
 
 def noise(height: int, width: int, seed: int, stretch: tuple[float, float] = (1.0, 1.0), slope: float = 1.2) -> Array:
@@ -57,7 +57,12 @@ def wood(light: Colour, dark: Colour, seed: int, size: int = 512, planks: int = 
 
 
 def tiles(
-    colours: Sequence[Colour], grout: Colour, seed: int, size: int = 512, count: int = 4, joint: float = 0.03,
+    colours: Sequence[Colour],
+    grout: Colour,
+    seed: int,
+    size: int = 512,
+    count: int = 4,
+    joint: float = 0.03,
     spread: float = 0.08,
 ) -> Image.Image:
     """count x count square tiles, colours in turn along the diagonals, each a little different."""
@@ -70,7 +75,7 @@ def tiles(
     colour = colour * (1 + 0.05 * noise(size, size, seed + 1, slope=1.1))[..., None]
     inside = np.minimum(at % 1, 1 - at % 1)
     gap = np.minimum(inside[:, None], inside[None, :])
-    return encode(mix(grout, (0, 0, 0), 0 * gap) * (gap < joint / 2)[..., None] + colour * (gap >= joint / 2)[..., None])
+    return encode(np.where((gap < joint / 2)[..., None], np.asarray(grout, dtype=float), colour))
 
 
 def marble(light: Colour, vein: Colour, seed: int, size: int = 512, checks: Colour | None = None) -> Image.Image:
@@ -138,7 +143,9 @@ def leaves(colours: Sequence[Colour], seed: int, size: int = 512) -> Image.Image
     colour = np.broadcast_to(np.asarray(colours[0], dtype=float), (size, size, 3)).copy()
     for i, other in enumerate(colours[1:]):
         t = 0.5 + 0.8 * noise(size, size, seed + i, slope=1.0)
-        colour = colour * (1 - np.clip(t, 0, 1))[..., None] + np.asarray(other, dtype=float) * np.clip(t, 0, 1)[..., None]
+        colour = (
+            colour * (1 - np.clip(t, 0, 1))[..., None] + np.asarray(other, dtype=float) * np.clip(t, 0, 1)[..., None]
+        )
     return encode(colour)
 
 

@@ -123,7 +123,6 @@ def test_a_room_has_what_the_paper_asks_for(name: str) -> None:
 @pytest.mark.parametrize("name", ROOMS)
 def test_reflectivities_are_believable(name: str) -> None:
     room = scene(name)
-    assert float((room.reflectivity + room.specular).max()) <= 0.9 + 1e-6 or room.report.textures
     plain = (room.reflectivity_texture < 0) & (room.specular.max(axis=1) == 0)
     assert float(room.reflectivity[plain].max()) <= 0.9
     assert float(room.reflectivity[plain].min()) >= 0.02
