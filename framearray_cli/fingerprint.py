@@ -7,7 +7,7 @@ from .errors import OutputError
 from .files import reason
 
 
-def fingerprint(*parts: bytes | Path) -> str:
+def fingerprint(*parts: bytes | memoryview | Path) -> str:
     """Hash the job and the scene: "sha256:" and 64 hexadecimal digits.
 
     Each part counts with its length, so that moving bytes from one part to the next changes the result. The content

@@ -111,7 +111,7 @@ class Frame:
         mirrored, mirror_places: reflected hits of the frame's own mirror pixels; None in a scene without mirrors.
         mirror_scale: (n_pixels,) one over the native hits of each pixel.
         normal, depth: (n, 3) and (n,) of native hits, for the layers; (0, 3) and (0,) without.
-        surface: (n,) uint8 whether each native hit is on a surface.
+        kept: the large arrays of the above, by name, for the shelf.
     """
 
     c: int
@@ -123,6 +123,32 @@ class Frame:
     mirror_scale: Float32
     normal: Float32
     depth: Float32
+    kept: dict[str, Any]
+
+    def put_back(self, shelf: "Shelf") -> None:
+        """Give the frame's memory to the next one; the frame is of no use afterwards."""
+        for name, array in self.kept.items():
+            shelf.give(name, array)
+
+
+class Shelf:
+    """Arrays of frames that were dropped, for the next frame to use: fresh memory costs the system a page at a time."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, list[Any]] = {}
+
+    def take(self, name: str, shape: tuple[int, ...], dtype: Any) -> Any:
+        """An array of a shape, contents arbitrary; kept ones of that name and another shape are let go."""
+        kept = self._kept.get(name, [])
+        while kept:
+            array = kept.pop()
+            if array.shape == shape:
+                return array
+        return np.empty(shape, dtype)
+
+    def give(self, name: str, array: Any) -> None:
+        """Put an array back that nobody reads any more."""
+        self._kept.setdefault(name, []).append(array)
 
 
 class Scratch:
@@ -148,6 +174,7 @@ class Crew:
 
     def __init__(self, work: Work, threads: int) -> None:
         self.threads = threads
+        self.shelf = Shelf()
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="trace")
         self._scratch: SimpleQueue[Scratch] = SimpleQueue()
         self._all = [Scratch(work) for _ in range(threads)]
@@ -190,9 +217,12 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
     """Find the native hits of eye c, estimate their terms, and place them in the frames that see them."""
     n = work.n_pixels * int(work.per_pixel[c])
     frames = work.frames_around(c, work.n_r)
-    records = _empty_records(work, n)
-    pixel = np.empty((len(frames), n), np.int32)
-    weight = np.empty((len(frames), n if work.balance else 0), np.float32)
+    take = crew.shelf.take
+    irradiance = take("irradiance", (n, work.lights.channels, work.lights.n_lights), np.float32)
+    records = _empty_records(work, n, irradiance)
+    pixel = take("pixel", (len(frames), n), np.int32)
+    order = take("order", (len(frames), n), np.int32)
+    weight = take("weight", (len(frames), n if work.balance else 0), np.float32)
     kept = n if work.layers else 0
     normal, depth = np.empty((kept, 3), np.float32), np.empty(kept, np.float32)
 
@@ -214,15 +244,17 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
         mirrored += extra
 
     def sort(row: int, _scratch: Scratch) -> Placed:
-        return _placed(pixel[row], work.n_pixels)
+        return _placed(pixel[row], work.n_pixels, order[row])
 
     places = dict(zip(frames, crew.run(sort, range(len(frames))), strict=True))
+    crew.shelf.give("pixel", pixel)
     all_mirrored = _joined(work, mirrored) if work.depth else None
     return Frame(
         c=c,
         records=records,
         places=places,
         weights={j: weight[row] for row, j in enumerate(frames)},
+        kept={"irradiance": irradiance, "order": order, "weight": weight},
         mirrored=all_mirrored[1] if all_mirrored else None,
         mirror_places=_placed(all_mirrored[0], work.n_pixels) if all_mirrored else None,
         mirror_scale=scale,
@@ -231,12 +263,14 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
     )
 
 
-def _empty_records(work: Work, n: int) -> Records:
+def _empty_records(work: Work, n: int, irradiance: Float32 | None = None) -> Records:
+    if irradiance is None:
+        irradiance = np.empty((n, work.lights.channels, work.lights.n_lights), np.float32)
     return Records(
         reflectivity=np.empty((n, 3), np.float32),
         obscurance=np.empty((n, 3), np.float32),
         constant=np.empty((n if work.has_constant else 0, 3), np.float32),
-        irradiance=np.empty((n, work.lights.channels, work.lights.n_lights), np.float32),
+        irradiance=irradiance,
     )
 
 
@@ -368,7 +402,9 @@ def _joined(work: Work, parts: list[tuple[Int32, Records]]) -> tuple[Int32, Reco
     )
 
 
-def _placed(pixel: Int32, n_pixels: int) -> Placed:
-    placed = Placed(start=np.empty(n_pixels + 1, np.int32), order=np.empty(len(pixel), np.int32))
+def _placed(pixel: Int32, n_pixels: int, order: Int32 | None = None) -> Placed:
+    if order is None:
+        order = np.empty(len(pixel), np.int32)
+    placed = Placed(start=np.empty(n_pixels + 1, np.int32), order=order)
     sort_by_pixel(pixel, n_pixels, placed.start, placed.order)
     return placed

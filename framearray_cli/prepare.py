@@ -125,6 +125,6 @@ def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Am
 def job_fingerprint(prepared: Prepared) -> str:
     """Hash whatever the pixels depend on: the job without its output and machine, and the scene as it was read."""
     table = {key: value for key, value in job_table(prepared.job).items() if key not in ("output", "render")}
-    arrays = [np.ascontiguousarray(array).data.cast("B") if array.size else b"" for array in prepared.surfaces]
+    arrays = (np.ascontiguousarray(array).reshape(-1).view(np.uint8).data for array in prepared.surfaces)
     centre = prepared.scene.centre.tobytes()
-    return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), centre, *map(bytes, arrays))
+    return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), centre, *arrays)

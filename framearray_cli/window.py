@@ -83,7 +83,9 @@ class Window:
         last = max(self._frames)
         while self._next < self._work.n_frames and self._work.frames_around(self._next, self._work.n_r)[-1] <= last:
             yield self._next
-            self._frames.pop(self._next - self._work.n_r, None)
+            passed = self._frames.pop(self._next - self._work.n_r, None)
+            if passed is not None:
+                passed.put_back(self._crew.shelf)
             self._next += 1
 
     def compose(self, j: int, images: Images) -> Composed:
