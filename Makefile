@@ -27,7 +27,7 @@ install: $(VENV)/installed ## Set up the program in .venv
 render: $(VENV)/installed ## Render a small kitchen and cut a movie out of it
 	$(BIN)/framearray render $(JOB)
 	$(BIN)/framearray assemble $(OUT) jobs/first-movie.toml --output $(OUT)/first-movie.mp4
-	@echo "pictures: $(OUT)/*.exr   movie: $(OUT)/first-movie.mp4"
+	@echo "pictures: $(OUT)   movie: $(OUT)/first-movie.mp4"
 
 test: $(VENV)/installed-dev ## Run the tests
 	$(BIN)/python -m pytest

@@ -108,7 +108,7 @@ def _frames(prepared: Prepared, work: Work, ambient: Ambient, listener: Listener
                 window.add(find_frame(work, c, crew))
                 for j in window.complete():
                     composed = window.compose(j, writer.block())
-                    hits += composed.samples
+                    hits += float(composed.hits.mean())
                     if composed.bad:
                         notes.append(_bad_values(composed.bad, j, composed.first_bad, job.camera.resolution[0]))
                     writer.write(composed, range(prepared.n_cameras) if prepared.still else range(j, j + 1))

@@ -48,7 +48,7 @@ class Composed:
     Attributes:
         images: (n_lights, height, width, 3) radiance.
         layers: None unless the job keeps them.
-        samples: mean number of hits a pixel.
+        hits: (n_pixels,) number of hits that each pixel rests on, native and outer.
         bad: number of values that were not finite or negative; each was replaced by 0.
         first_bad: light index and pixel of the first of them, or None.
     """
@@ -56,7 +56,7 @@ class Composed:
     c: int
     images: Images
     layers: Layers | None
-    samples: float
+    hits: Int32
     bad: int
     first_bad: tuple[int, int] | None
 
@@ -64,14 +64,15 @@ class Composed:
 class Window:
     """At most 2 N_r + 1 frames, and the crew that composes from them."""
 
-    def __init__(self, work: Work, ambient: Ambient, crew: Crew) -> None:
+    def __init__(self, work: Work, ambient: Ambient, crew: Crew, first: int = 0) -> None:
+        """Make ready to compose frames `first`, `first` + 1, ..."""
         self._work = work
         # by channel, as the sums are
         self._colour = np.ascontiguousarray(work.lights.colour.T)
         self._ambient = np.ascontiguousarray(ambient.intensity.T)
         self._crew = crew
         self._frames: dict[int, Frame] = {}
-        self._next = 0
+        self._next = first
         self._bands = [empty_band(BAND_PIXELS, work.lights.n_lights) for _ in range(crew.threads)]
 
     def add(self, frame: Frame) -> None:
@@ -128,7 +129,7 @@ class Window:
             c=j,
             images=images,
             layers=_layers(maps, own, samples, shape) if maps is not None and own is not None else None,
-            samples=float(samples.mean()),
+            hits=samples,
             bad=bad,
             first_bad=next(((l, pixel) for count, l, pixel in results if count), None),
         )

@@ -64,6 +64,10 @@ class ArrayWriter:
             raise block
         return block
 
+    def give_back(self, block: Images) -> None:
+        """Take a block back that is not to be written."""
+        self._free.put(block)
+
     def write(self, composed: Composed, cameras: range) -> None:
         """Write a composed frame as that of each of the given cameras; its block is free when that is done."""
         n_lights = len(composed.images)
@@ -114,13 +118,13 @@ class ArrayWriter:
         write_layers(path, channels, self._attributes(c, None))
 
     def finish(self) -> None:
-        """Wait until everything is written.
+        """Wait until everything is written; all blocks are free again.
 
         Raises:
             OutputError: something could not be written.
         """
-        for _ in range(BLOCKS):
-            self.block()
+        for block in [self.block() for _ in range(BLOCKS)]:
+            self._free.put(block)
 
     def __enter__(self) -> Self:
         return self
