@@ -24,6 +24,7 @@ from .rays import room_for_hits, room_for_tests
 from .reuse import balance_weights, outer_hits, sort_by_pixel
 from .surface import Surfaces
 from .terms.direct import direct
+from .terms.direct_steps import direct_by_steps, room_for_steps
 from .terms.obscurance import ObscuranceSettings, obscurance
 from .terms.specular import count_mirrors, reflect
 
@@ -43,6 +44,7 @@ class Work:
         depth: mirror bounces that are followed; 0 in a scene without mirrors.
         balance: weights of hits by the balance heuristic, else all alike.
         background: (3,) radiance outside the scene.
+        shadow_step, shadow_unbiased: see `terms/direct_steps.py`; step 1 tests every light position.
         layers: whether normals and depths are kept.
     """
 
@@ -58,6 +60,8 @@ class Work:
     depth: int
     balance: bool
     background: Rgb
+    shadow_step: int
+    shadow_unbiased: bool
     layers: bool
     order: Int32 = field(init=False)
 
@@ -162,6 +166,7 @@ class Scratch:
         self.hits = empty_hits(BATCH)
         self.reflected = [empty_hits(BATCH), empty_hits(BATCH)] if work.depth else []
         self.throughput = [np.empty((BATCH, 3), np.float32) for _ in self.reflected]
+        self.steps = room_for_steps(work.lights.n_lights) if work.shadow_step > 1 else None
         self.pixel = np.empty((n_eyes, BATCH), np.int32)
         self.density = np.empty((n_eyes, BATCH), np.float64)
         self.skylight = np.empty((BATCH if work.obscurance.sky else 0, 3), np.float32)
@@ -309,7 +314,14 @@ def _terms(
         hits, n, work.obscurance, work.surfaces, work.tracer, scratch.hit_rays, out.obscurance, scratch.skylight
     )
     middle = perf_counter()
-    scratch.rays[shadow_kind] += direct(hits, n, work.lights, work.tracer, scratch.test_rays, out.irradiance)
+    if scratch.steps is None:
+        rays = direct(hits, n, work.lights, work.tracer, scratch.test_rays, out.irradiance)
+    else:
+        rays = direct_by_steps(
+            hits, n, work.lights, work.shadow_step, work.shadow_unbiased, work.tracer, scratch.test_rays,
+            scratch.steps, out.irradiance,
+        )  # fmt: skip
+    scratch.rays[shadow_kind] += rays
     out.reflectivity[:n] = hits.reflectivity[:n]
     if work.has_constant:
         seen = (hits.kind[:n, None] == ESCAPED) * work.background

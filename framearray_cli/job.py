@@ -77,6 +77,18 @@ class SamplesTable(Table):
         description="Native hits of a pixel in a frame. With reuse a pixel averages up to (2 n_r + 1) times as many.",
     )
     obscurance: int = Field(default=5, ge=1, le=65535, description="Obscurance rays of a hit.")
+    shadow_step: int = Field(
+        default=1,
+        ge=1,
+        le=1024,
+        description="Test shadows at every so many-th light position of a hit, and between two where they differ. "
+        "1: at every position. What hides a light between two tests alone is overlooked.",
+    )
+    shadow_unbiased: bool = Field(
+        default=False,
+        description="With `shadow_step`: check one random position of every interval that was taken for granted, and "
+        "count a disagreement for all of them. The mean is then right; single hits are noisier.",
+    )
 
 
 class ReuseTable(Table):

@@ -106,6 +106,8 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
         depth=job.specular.depth if mirrors else 0,
         balance=job.reuse.weights == "balance" and not prepared.still,
         background=background,
+        shadow_step=job.samples.shadow_step,
+        shadow_unbiased=job.samples.shadow_unbiased,
         layers=job.output.layers,
     )
     return work, ambient

@@ -16,7 +16,7 @@ X, Y, Z, VALUE, LIGHT = range(5)
 
 
 @inlined
-def _look(hits: Hits, i: int, lights: LightArrays, s: int, row: Float32) -> None:
+def look(hits: Hits, i: int, lights: LightArrays, s: int, row: Float32) -> None:
     """Compute, for every light position, the vector from hit i to source s and the geometry factor of its irradiance.
 
     The factor is cos(theta) / d^2 for a point source, whose vector ends at the source, and cos(theta) for a
@@ -116,7 +116,7 @@ def direct(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, 
             continue
         origin = ray_origin(hits, i)
         for s in range(lights.kind.shape[0]):
-            _look(hits, i, lights, s, rays.row)
+            look(hits, i, lights, s, rays.row)
             reach = np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END
             m = _keep_lit(rays.row)
             k = 0
