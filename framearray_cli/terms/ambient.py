@@ -18,7 +18,7 @@ from ..hits import ESCAPED, SURFACE, Hits, empty_hits, record_hits
 from ..kernel import kernel
 from ..lights import LightArrays
 from ..rays import room_for_hits, room_for_tests
-from ..sampling import PIXEL, PIXEL_SAMPLE, r2, stream, word
+from ..sampling import CHOICE, PIXEL, PIXEL_SAMPLE, r2, stream, word
 from ..surface import Surfaces
 from .direct import direct
 from .walks import DIFFUSE, MAX_BOUNCES, MIRROR, Walkers, advance, choose_step, deposit, empty_walkers
@@ -38,7 +38,8 @@ class Ambient:
     Attributes:
         intensity: (n_lights, 3) I_A, radiance.
         standard_error: (n_lights,) of I_A, relative to it, of the mean of the channels; 0 where I_A is 0 or given.
-        reflectivity: (3,) average reflectivity over the surfaces that E averages.
+        reflectivity: (3,) average reflectivity over the surfaces that E averages; where there are none, over those
+            that the eyes see.
         paths: walks or particles a light position that were spent.
         rays: rays that were traced.
         notes: what the user should know, e.g. that the target error was not reached.
@@ -72,17 +73,17 @@ class Workspace:
         self.rays += n
         return n
 
-    def direct(self, where: Rgb, n: int, lights: LightArrays, tracer: Tracer) -> Float32:
-        """Direct irradiance at the first n current hits, (n, channels, n_lights); 0 where `where` (n, 3) is 0."""
+    def diffuse_direct(self, n: int, lights: LightArrays, tracer: Tracer) -> Float32:
+        """Direct irradiance at the first n current hits, (n, channels, n_lights); 0 where no walk goes on diffusely."""
+        leaves = self.walkers[0].step[:n, None] == DIFFUSE
+        where = np.ascontiguousarray(np.broadcast_to(leaves, (n, 3)), np.float32)
         hits = self.hits[0]._replace(reflectivity=where)
         self.rays += direct(hits, n, lights, tracer, self.test_rays, self.irradiance)
         return self.irradiance[:n]
 
     def gather(self, n: int, lights: LightArrays, tracer: Tracer) -> None:
         """Add the direct irradiance at every current hit that its walk leaves diffusely to the walk's sums."""
-        leaves = self.walkers[0].step[:n, None] == DIFFUSE
-        where = np.ascontiguousarray(np.broadcast_to(leaves, (n, 3)), np.float32)
-        deposit(self.walkers[0], n, self.direct(where, n, lights, tracer), self.sums)
+        deposit(self.walkers[0], n, self.diffuse_direct(n, lights, tracer), lights.colour, self.sums)
 
 
 @kernel
@@ -98,12 +99,14 @@ def _start_at_eyes(
     walkers: Walkers,
 ) -> None:
     """Shoot eye rays first to first + n - 1, spread over all images of the camera path by the golden ratio sequence."""
-    start = word(stream(seed, AMBIENT_STREAM, 0, PIXEL_SAMPLE), PIXEL)
+    key = stream(seed, AMBIENT_STREAM, 0, PIXEL_SAMPLE)
+    start = word(key, PIXEL)
+    turn, _ = r2(word(key, CHOICE), 0)
     n_c = cams.position.shape[0]
     for i in range(n):
         a, b = r2(start, first + i)
         # which eye: the golden section, a third sequence that does not march in step with the other two
-        e = ((first + i + 0.5) * 0.6180339887498949) % 1.0
+        e = (turn + (first + i) * 0.6180339887498949) % 1.0
         c = min(int(e * n_c), n_c - 1)
         dx, dy, dz = eye_ray(cams, c, a * cams.width, b * cams.height)
         o = cams.position
@@ -155,11 +158,10 @@ def _to_first_vertices(work: Workspace, n: int, surfaces: Surfaces, tracer: Trac
             array[:n] = array[: len(rest)][rest]
         if n == 0:
             break
-    for target, parts in (
-        *zip(work.hits[0], zip(*done_hits, strict=True), strict=True),
-        *zip(work.walkers[0], zip(*done_walkers, strict=True), strict=True),
-    ):
-        target[:found] = np.concatenate(parts)
+    for k, hit_array in enumerate(work.hits[0]):
+        hit_array[:found] = np.concatenate([part[k] for part in done_hits])
+    for k, walker_array in enumerate(work.walkers[0]):
+        walker_array[:found] = np.concatenate([part[k] for part in done_walkers])
     return found
 
 
@@ -180,6 +182,7 @@ def ambient_by_eye(
     """
     work = Workspace(lights)
     count, spent, reflectivity = 0, 0, np.zeros(3)
+    seen, seen_reflectivity = 0, np.zeros(3)
     total, squares = np.zeros((3, lights.n_lights)), np.zeros(lights.n_lights)
     limit = paths or MOST
     while spent < limit:
@@ -187,10 +190,12 @@ def ambient_by_eye(
         _start_at_eyes(cams, seed, spent, n, surfaces, tracer, work.hit_packets, work.hits[0], work.walkers[0])
         work.rays += n
         spent += n
+        seen += int((work.hits[0].kind[:n] == SURFACE).sum())
+        seen_reflectivity += total_reflectivity(work.hits[0], n)
         n = _to_first_vertices(work, n, surfaces, tracer)
         work.sums[:] = 0.0
         hits, walkers = work.hits[0], work.walkers[0]
-        reflectivity += (hits.reflectivity[:n] + hits.specular[:n]).sum(axis=0, dtype=np.float64)
+        reflectivity += total_reflectivity(hits, n)
         walkers.throughput[:n] = 1.0
         walkers.step[:n] = DIFFUSE
         first = walkers.walk[:n].copy()
@@ -202,13 +207,14 @@ def ambient_by_eye(
             choose_all(work.hits[0], work.walkers[0], n, False)
             if n == 0:
                 break
-        gathered = work.sums[first].astype(np.float64) * lights.colour.T  # (n, 3, n_lights)
+        gathered = work.sums[first].astype(np.float64)  # (n, 3, n_lights)
         count += len(first)
         total += gathered.sum(axis=0)
         squares += (gathered.mean(axis=1) ** 2).sum(axis=0)
         if paths is None and spent >= FEWEST and count and relative_error(total, squares, count).max() <= TARGET_ERROR:
             break
-    return summarise(total, squares, count, reflectivity, spent, work.rays, paths is None)
+    average = reflectivity / count if count else seen_reflectivity / max(seen, 1)
+    return summarise(total, squares, count, average, spent, work.rays, paths is None)
 
 
 def fixed_ambient(
@@ -231,11 +237,18 @@ def fixed_ambient(
     )
 
 
+def total_reflectivity(hits: Hits, n: int) -> Float64:
+    """Sum of diffuse and mirror reflectivity over hits 0 to n - 1, (3,); escaped rays have none."""
+    total: Float64 = (hits.reflectivity[:n] + hits.specular[:n]).sum(axis=0, dtype=np.float64)
+    return total
+
+
 def relative_error(total: Float64, squares: Float64, count: int) -> Float64:
     """Standard error of the mean over the channels' mean, per light position; 0 where nothing arrives."""
     mean = total.mean(axis=0) / count
     variance = np.maximum(squares / count - mean**2, 0.0) / max(count - 1, 1)
-    return np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
+    error: Float64 = np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
+    return error
 
 
 def summarise(
@@ -248,19 +261,26 @@ def summarise(
     automatic: bool,
     more_variance: Float64 | float = 0.0,
 ) -> Ambient:
-    """Means and standard errors of `count` walks; `more_variance` is relative and adds to theirs."""
+    """Means and standard errors of `count` walks.
+
+    Args:
+        total, squares: (3, n_lights) and (n_lights,) sums over walks of irradiance, and of its channels' mean squared.
+        reflectivity: (3,) average.
+        automatic: whether the number of walks was left to the program.
+        more_variance: relative, adds to that of the walks.
+    """
     n_lights = total.shape[1]
     if count == 0:
         return Ambient(
             intensity=np.zeros((n_lights, 3), np.float32),
             standard_error=np.zeros(n_lights),
-            reflectivity=np.zeros(3, np.float32),
+            reflectivity=reflectivity.astype(np.float32),
             paths=spent,
             rays=rays,
-            notes=("no walk from the eyes met a second surface: the ambient intensity is 0",),
+            notes=("ambient: no walk from the eyes met a second surface, so the ambient intensity is 0",),
         )
     error = np.sqrt(relative_error(total, squares, count) ** 2 + more_variance)
-    notes = ()
+    notes: tuple[str, ...] = ()
     if automatic and error.max() > TARGET_ERROR:
         notes = (
             f"ambient: standard error {error.max():.1%} at light {int(error.argmax())} after {spent} walks, "
@@ -269,7 +289,7 @@ def summarise(
     return Ambient(
         intensity=(total.T / count / math.pi).astype(np.float32),
         standard_error=error,
-        reflectivity=(reflectivity / count).astype(np.float32),
+        reflectivity=reflectivity.astype(np.float32),
         paths=spent,
         rays=rays,
         notes=notes,

@@ -1,0 +1,54 @@
+"""The formulas themselves: closed forms against quadrature, and statistics that must be able to say no."""
+
+import closed_forms as forms
+import numpy as np
+import pytest
+import ztests
+
+from framearray_cli.terms.obscurance import FALLOFFS
+
+
+@pytest.mark.parametrize("k", [0.1, 0.4, 1.0, 3.0, 200.0])
+@pytest.mark.parametrize("falloff", FALLOFFS)
+def test_chords_of_a_sphere(falloff: str, k: float) -> None:
+    closed = forms.sphere_obscurance(falloff, 0.7, k)
+    assert closed == pytest.approx(forms.sphere_obscurance_numerically(falloff, 0.7, k), rel=1e-7, abs=1e-12)
+
+
+def test_the_sphere_has_the_form_that_the_design_gives() -> None:
+    r, d_max = 1.3, 4.0
+    assert forms.sphere_obscurance("sqrt", 0.5, 2 * r / d_max) == pytest.approx(0.8 * 0.5 * (2 * r / d_max) ** 0.5)
+
+
+@pytest.mark.parametrize("s", [0.1, 0.5, 0.9])
+def test_wall_and_disc_by_linear_falloff(s: float) -> None:
+    assert forms.wall_obscurance("linear", 0.7, 0.4, s) == pytest.approx(forms.wall_obscurance_linear(0.7, 0.4, s))
+    numeric = forms.disc_obscurance("linear", 0.7, 0.4, 0.8, s, 1.5)
+    assert numeric == pytest.approx(forms.disc_obscurance_linear(0.7, 0.4, 0.8, s, 1.5))
+
+
+def test_limits_of_wall_and_disc() -> None:
+    assert forms.wall_share(1.0) == 0  # a wall at d_max is not met within it
+    assert forms.wall_share(1e-9) == pytest.approx(0.5)  # one at the foot hides half the sky
+    assert forms.disc_share(1.0, 1e-6) == pytest.approx(1.0)
+
+
+def test_sidak_keeps_the_chance_of_a_family() -> None:
+    assert 1 - (1 - ztests.sidak(500)) ** 500 == pytest.approx(ztests.CHANCE)
+    assert ztests.sidak_z(1) == pytest.approx(3.0)
+    assert ztests.sidak_z(1000) > 4.5
+
+
+def test_differing_finds_what_differs_and_nothing_else() -> None:
+    random = np.random.default_rng(1)
+    a, b = random.normal(size=(20, 300)), random.normal(size=(30, 300))
+    assert ztests.differing(a, b).max() < 1
+    b[:, 7] += 3.0  # some ten standard errors
+    assert (ztests.differing(a, b) > 1).nonzero()[0].tolist() == [7]
+    assert ztests.differing(np.zeros((5, 1)), np.ones((5, 1)))[0] == np.inf
+
+
+def test_z_of_an_estimate_without_error() -> None:
+    sure = ztests.estimate(np.ones(10))
+    assert sure.z(1.0) == 0
+    assert sure.z(1.1) == -np.inf
