@@ -21,7 +21,7 @@ from ..kernel import inlined, kernel
 from ..lights import DIRECTIONAL, LightArrays
 from ..rays import Rays
 from ..sampling import STEPS, mix, word
-from .direct import FAR_END, VALUE, look
+from .direct import FAR_END, VALUE, X, Y, Z, look
 
 # Hits that are worked on together: enough to fill packets in the later, sparser rounds.
 BLOCK = 128
@@ -33,7 +33,7 @@ class Steps(NamedTuple):
     Attributes:
         factor: (BLOCK, n_lights) geometry factor of the irradiance, 0 where the source is not in front.
         visible: (BLOCK, n_lights) what of the source is seen: 0 or 1, or beyond where a correction was made.
-        intervals: (2, n, 2) ends of intervals whose ends differ, as places b * n_lights + l: of this round, and the next.
+        intervals: (2, n, 2) ends of intervals whose ends differ, as places b * n_lights + l: this round's, the next's.
         checks: (n, 2) places under test, and the number of positions each stands for.
         in_front: (BLOCK,) number of positions in front of each hit.
     """
@@ -58,9 +58,9 @@ def room_for_steps(n_lights: int) -> Steps:
 
 
 @inlined
-def _next(l: int, last: int, step: int, phase: int) -> int:
-    """The position tested after l in a run that ends at `last`."""
-    return min(l + 1 + (phase - l - 1) % step, last)
+def _second(l: int, step: int, phase: int) -> int:
+    """The position tested after the first one, l, of a run; the others follow `step` apart, and the run's end."""
+    return l + 1 + (phase - l - 1) % step
 
 
 @inlined
@@ -120,25 +120,32 @@ def _test_every(
     hits: Hits, first: int, n: int, lights: LightArrays, s: int, step: int, tracer: Tracer, rays: Rays, room: Steps
 ) -> int:
     """Test the ends of every run of positions, and every step-th position between; returns the number of rays."""
-    n_lights, capacity = room.factor.shape[1], rays.packets.shape[0] * LANES
+    n_lights, capacity, row = room.factor.shape[1], rays.packets.shape[0] * LANES, rays.row
+    reach = np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END
     waiting = total = 0
     for b in range(n):
+        _start(hits, first + b, lights, s, row, b, room)
+        if room.in_front[b] == 0:
+            continue
+        ox, oy, oz = ray_origin(hits, first + b)
         phase = np.int64(word(hits.key[first + b], STEPS) % np.uint64(step))
-        l = 0 if room.in_front[b] > 0 else n_lights
+        l = 0
         while l < n_lights:
             if not room.factor[b, l] > 0.0:
                 l += 1
                 continue
             last = _run_end(room, b, l)
+            following = _second(l, step, phase)
             while True:
                 if waiting == capacity:
                     _learn(tracer, rays, waiting, room.visible)
                     total, waiting = total + waiting, 0
-                _aim(hits, first, lights, s, b * n_lights + l, rays, waiting)
+                set_ray(rays.packets, waiting, ox, oy, oz, row[X, l], row[Y, l], row[Z, l], reach)
+                rays.place[waiting] = b * n_lights + l
                 waiting += 1
                 if l == last:
                     break
-                l = _next(l, last, step, phase)
+                l, following = min(following, last), following + step
             l = last + 1
     _learn(tracer, rays, waiting, room.visible)
     return total + waiting
@@ -158,8 +165,9 @@ def _compare(hits: Hits, first: int, n: int, step: int, unbiased: bool, room: St
                 l += 1
                 continue
             last = _run_end(room, b, l)
+            following = _second(l, step, phase)
             while l < last:
-                other = _next(l, last, step, phase)
+                other, following = min(following, last), following + step
                 between = other - l - 1
                 if room.visible[b, l] != room.visible[b, other]:
                     if between > 0:
@@ -256,8 +264,6 @@ def direct_by_steps(
     for first in range(0, n, BLOCK):
         size = min(BLOCK, n - first)
         for s in range(lights.kind.shape[0]):
-            for b in range(size):
-                _start(hits, first + b, lights, s, rays.row, b, room)
             total += _test_every(hits, first, size, lights, s, step, tracer, rays, room)
             n_intervals, n_checks = _compare(hits, first, size, step, unbiased, room)
             total += _bisect(hits, first, n_intervals, lights, s, tracer, rays, room)
