@@ -1,0 +1,132 @@
+"""Native hits: which pixels, which streams, which order."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import tiny
+from oracle import Oracle
+
+from framearray_cli.frame import Work
+from framearray_cli.hits import ESCAPED, SURFACE, Hits, empty_hits, extra_hits, native_hits, pilot_hits, pixel_order
+from framearray_cli.rays import room_for_hits
+
+
+def native(work: Work, c: int, per_pixel: int, batch: int = 2048) -> Hits:
+    """All native hits of a frame, found in batches."""
+    n, packets, parts = work.n_pixels * per_pixel, room_for_hits(batch).packets, []
+    for first in range(0, n, batch):
+        hits, m = empty_hits(batch), min(batch, n - first)
+        native_hits(
+            work.cams, c, work.seed, work.order, per_pixel, first, m, work.surfaces, work.tracer, True, packets, hits
+        )
+        parts.append([array[:m] for array in hits])
+    return Hits(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+@pytest.mark.parametrize(("width", "height"), [(400, 300), (24, 18), (1, 1), (33, 5), (7, 40)])
+def test_every_pixel_once(width: int, height: int) -> None:
+    order = pixel_order(width, height)
+    np.testing.assert_array_equal(np.sort(order), np.arange(width * height))
+
+
+def test_packets_are_blocks_of_pixels() -> None:
+    """Coherent packets: 16 pixels in turn are a block of 4 x 4."""
+    order = pixel_order(64, 32).reshape(-1, 16)
+    for axis in (order % 64, order // 64):
+        assert (np.ptp(axis, axis=1) == 3).all()
+
+
+@pytest.mark.parametrize(("resolution", "per_pixel"), [([24, 18], 1), ([24, 18], 3), ([5, 7], 2), ([1, 1], 4)])
+def test_every_pixel_has_its_hits_inside_its_box(resolution: Any, per_pixel: int) -> None:
+    inputs = tiny.prepared(tiny.job(camera={"resolution": resolution}))
+    with tiny.planned(inputs) as (work, _):
+        hits = native(work, 0, per_pixel, batch=48)
+    assert (np.bincount(hits.pixel, minlength=work.n_pixels) == per_pixel).all()
+    assert len(np.unique(hits.key)) == len(hits.key)
+    frame = np.stack([work.cams.right[0], work.cams.up[0], work.cams.forward[0]])
+    a, b, forward = (hits.incoming @ frame.T).astype(np.float64).T
+    np.testing.assert_allclose(forward, 1, rtol=1e-6)
+    x = a * work.cams.focal + resolution[0] / 2 - hits.pixel % resolution[0]
+    y = resolution[1] / 2 - b * work.cams.focal - hits.pixel // resolution[0]
+    assert min(x.min(), y.min()) > -1e-4 and max(x.max(), y.max()) < 1 + 1e-4
+
+
+def test_batches_of_any_size_find_the_same_hits() -> None:
+    with tiny.planned(tiny.prepared(tiny.job(scene={"background": 1.0}))) as (work, _):
+        one, other = native(work, 0, 3), native(work, 0, 3, batch=37)
+    surface = one.kind == SURFACE
+    assert surface.any() and not surface.all()
+    for name in ("kind", "key", "pixel", "position", "incoming", "reflectivity", "specular"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    for name in ("geometric", "shading", "offset"):
+        np.testing.assert_array_equal(getattr(one, name)[surface], getattr(other, name)[surface])
+
+
+def test_hits_are_those_of_the_twin() -> None:
+    inputs = tiny.prepared(tiny.job())
+    with tiny.planned(inputs) as (work, ambient):
+        hits = native(work, 0, 2)
+    twin = Oracle(inputs, ambient).native(0)
+    here = {key: i for i, key in enumerate(hits.key.tolist())}
+    order = [here[key] for key in twin.key]
+    np.testing.assert_array_equal(hits.kind[order] == SURFACE, twin.surface)
+    np.testing.assert_array_equal(hits.pixel[order], twin.pixel)
+    surface = np.flatnonzero(twin.surface)
+    order = [order[i] for i in surface]
+    # 2e-6: some tens of roundings of 2^-24, of a room that is 4 wide
+    for name in ("position", "geometric", "shading", "reflectivity", "specular"):
+        np.testing.assert_allclose(getattr(hits, name)[order], getattr(twin, name)[surface], rtol=0, atol=5e-6)
+    np.testing.assert_allclose(hits.offset[order], twin.lift[surface], rtol=1e-6)
+
+
+def test_normals_are_on_the_side_that_is_seen() -> None:
+    with tiny.planned(tiny.prepared(tiny.job())) as (work, _):
+        hits = native(work, 0, 2)
+    surface = hits.kind == SURFACE
+    way, geometric, shading = hits.incoming[surface], hits.geometric[surface], hits.shading[surface]
+    assert ((way * geometric).sum(axis=1) <= 0).all()
+    assert ((geometric * shading).sum(axis=1) >= 0).all()
+    assert (geometric != shading).any()
+
+
+def test_an_escaped_ray_is_a_unit_direction_and_reflects_nothing() -> None:
+    with tiny.planned(tiny.prepared(tiny.job())) as (work, _):
+        hits = native(work, 0, 2)
+    gone = hits.kind == ESCAPED
+    np.testing.assert_allclose(np.linalg.norm(hits.position[gone], axis=1), 1, rtol=3e-7)
+    assert not hits.reflectivity[gone].any() and not hits.specular[gone].any()
+
+
+def test_extra_hits_go_on_where_the_pixels_own_hits_end() -> None:
+    """Hits beyond the first two of some pixels are hits 2, 3 and 4 of a frame that has five of each."""
+    with tiny.planned(tiny.prepared(tiny.job())) as (work, _):
+        all_hits = native(work, 0, 5)
+        pixels = np.array([3, 100, 431], np.int32)
+        more, packets = empty_hits(9), room_for_hits(16).packets
+        extra_hits(work.cams, 0, work.seed, pixels, 2, 3, 0, 9, work.surfaces, work.tracer, packets, more)
+        fewer = empty_hits(2)
+        extra_hits(work.cams, 0, work.seed, pixels, 2, 3, 4, 2, work.surfaces, work.tracer, packets, fewer)
+    assert more.pixel.tolist() == [3] * 3 + [100] * 3 + [431] * 3
+    here = {key: i for i, key in enumerate(all_hits.key.tolist())}
+    order = [here[key] for key in more.key.tolist()]
+    np.testing.assert_array_equal(more.position, all_hits.position[order])
+    np.testing.assert_array_equal(fewer.position, more.position[4:6])
+    own = set(native_keys(all_hits, 3, 5)) - set(more.key.tolist())
+    assert len(own) == 2
+
+
+def native_keys(hits: Hits, pixel: int, n: int) -> list[int]:
+    keys: list[int] = hits.key[hits.pixel == pixel].tolist()
+    assert len(keys) == n
+    return keys
+
+
+def test_pilot_rays_pass_through_pixel_centres() -> None:
+    with tiny.planned(tiny.prepared(tiny.job())) as (work, _):
+        hits, packets = empty_hits(432), room_for_hits(432).packets
+        pilot_hits(work.cams, 0, work.order, 0, 432, work.surfaces, work.tracer, packets, hits)
+    frame = np.stack([work.cams.right[0], work.cams.up[0], work.cams.forward[0]])
+    a, b, _ = (hits.incoming @ frame.T).astype(np.float64).T
+    np.testing.assert_allclose(a * work.cams.focal + 12, hits.pixel % 24 + 0.5, atol=1e-4)
+    np.testing.assert_allclose(9 - b * work.cams.focal, hits.pixel // 24 + 0.5, atol=1e-4)
