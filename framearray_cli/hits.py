@@ -179,7 +179,7 @@ def native_hits(
         members = min(16, n_pixels - 16 * group)
         sample, member = divmod(rest, members)
         _shoot_sample(cams, c, seed, order[16 * group + member], sample, i, packets, hits)
-    intersect(tracer, packets, n)
+    intersect(tracer, packets, n, True)
     record_hits(surfaces, tracer, packets, n, mirrors, hits)
 
 
@@ -202,7 +202,7 @@ def extra_hits(
     for i in range(n):
         at, sample = divmod(first + i, per_pixel)
         _shoot_sample(cams, c, seed, pixels[at], first_sample + sample, i, packets, hits)
-    intersect(tracer, packets, n)
+    intersect(tracer, packets, n, True)
     record_hits(surfaces, tracer, packets, n, True, hits)
 
 
@@ -224,5 +224,5 @@ def pilot_hits(
     """
     for i in range(n):
         _shoot(cams, c, order[first + i], 0.5, 0.5, i, packets, hits)
-    intersect(tracer, packets, n)
+    intersect(tracer, packets, n, True)
     record_hits(surfaces, tracer, packets, n, True, hits)

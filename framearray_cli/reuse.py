@@ -56,7 +56,7 @@ def _aim(cams: Cameras, k: int, hits: Hits, i: int, packets: Float32, ray: int) 
 @kernel
 def _confirm(tracer: Tracer, rays: Rays, n: int, pixel: Int32, density: Float64) -> None:
     """Trace the waiting visibility rays; what is hidden is forgotten."""
-    occlude(tracer, rays.packets, n)
+    occlude(tracer, rays.packets, n, True)
     flat_pixel, flat_density = pixel.reshape(pixel.size), density.reshape(density.size)
     for ray in range(n):
         if is_blocked(rays.packets, ray):

@@ -47,7 +47,7 @@ class EmbreexScene:
         self._mesh = TriangleMesh(self._scene, scene.corners)
         self._callbacks = (_CALLBACK(self._intersect), _CALLBACK(self._occlude))
         addresses = [ctypes.cast(callback, ctypes.c_void_p).value or 0 for callback in self._callbacks]
-        self.tracer = Tracer(0, addresses[0], addresses[1], 1, 0, scene.n_opaque)
+        self.tracer = Tracer(0, addresses[0], addresses[1], 1, 0, 0, scene.n_opaque)
 
     def close(self) -> None:
         """Drop embreex's scene."""

@@ -15,6 +15,8 @@ from .packets import LANES, MASKED, OPAQUE, Tracer, aligned
 _TRIANGLES = 0  # RTC_GEOMETRY_TYPE_TRIANGLE
 _INDEX_BUFFER, _VERTEX_BUFFER = 0, 1
 _UINT3, _FLOAT3 = 0x5003, 0x9003
+_COHERENT = 1 << 16  # RTC_RAY_QUERY_FLAG_COHERENT
+_ALL_FEATURES = 0xFFFFFFFF
 _ROBUST = 1 << 2  # RTC_SCENE_FLAG_ROBUST: no ray slips between neighbouring triangles
 
 
@@ -86,11 +88,15 @@ class NativeScene:
             raise SceneError(f"embree: building {n} triangles failed with error {problem}")
         self._lanes = aligned(LANES).view(np.int32)
         self._lanes[:] = -1
+        # RTCIntersectArguments and RTCOccludedArguments: flags, features; pointers to context, filter and function
+        self._arguments = np.zeros(8, np.uint64)
+        self._arguments.view(np.uint32)[:2] = _COHERENT, _ALL_FEATURES
         self.tracer = Tracer(
             self._scene,
             _address(library.rtcIntersect16),
             _address(library.rtcOccluded16),
             0,
+            self._arguments.ctypes.data,
             self._lanes.ctypes.data,
             scene.n_opaque,
         )

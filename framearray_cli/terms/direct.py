@@ -83,7 +83,7 @@ def _queue(row: Float32, first: int, m: int, origin: Triple, reach: Real, rays: 
 @kernel
 def _settle(tracer: Tracer, rays: Rays, n: int, irradiance: Float32) -> None:
     """Trace the waiting shadow rays and add what is not blocked."""
-    occlude(tracer, rays.packets, n)
+    occlude(tracer, rays.packets, n, True)
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]
     flat = irradiance.reshape(irradiance.size)
     for channel in range(channels):

@@ -77,7 +77,7 @@ def _run_end(room: Steps, b: int, l: int) -> int:
 @kernel
 def _learn(tracer: Tracer, rays: Rays, n: int, visible: Float32) -> None:
     """Trace the waiting rays and note what they see."""
-    occlude(tracer, rays.packets, n)
+    occlude(tracer, rays.packets, n, True)
     flat = visible.reshape(visible.size)
     for ray in range(n):
         flat[rays.place[ray]] = np.float32(0.0) if is_blocked(rays.packets, ray) else np.float32(1.0)
@@ -229,7 +229,7 @@ def _check(hits: Hits, first: int, n: int, lights: LightArrays, s: int, tracer: 
         m = min(capacity, n - start)
         for i in range(m):
             _aim(hits, first, lights, s, room.checks[start + i, 0], rays, i)
-        occlude(tracer, rays.packets, m)
+        occlude(tracer, rays.packets, m, True)
         for i in range(m):
             place, positions = room.checks[start + i, 0], room.checks[start + i, 1]
             seen = np.float32(0.0) if is_blocked(rays.packets, i) else np.float32(1.0)

@@ -71,7 +71,7 @@ def _gather(
 ) -> None:
     """Trace the waiting hemisphere rays and add their R(Q) rho(d), or the background, to their hits."""
     packets = rays.packets
-    intersect(tracer, packets, n)
+    intersect(tracer, packets, n, False)
     share = np.float32(1.0 / settings.n_rays)
     d_max = np.float32(settings.d_max)
     for i in range(n):

@@ -68,6 +68,6 @@ def reflect(
         reflected.key[m] = mix(hits.key[i])
         reflected.pixel[m] = hits.pixel[i]
         m += 1
-    intersect(tracer, packets, m)
+    intersect(tracer, packets, m, True)
     record_hits(surfaces, tracer, packets, m, True, reflected)
     return m
