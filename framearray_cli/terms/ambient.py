@@ -8,8 +8,10 @@ eye hit, which is what obscurance rays see. The same walks serve every light pos
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Float32, Float64, Rgb
 from ..camera import Cameras, eye_ray
@@ -115,7 +117,7 @@ def _start_at_eyes(
         walkers.walk[i] = i
         for channel in range(3):
             walkers.throughput[i, channel] = 1.0
-    intersect(tracer, packets, n)
+    intersect(tracer, packets, n, False)
     record_hits(surfaces, tracer, packets, n, True, hits)
 
 
@@ -154,14 +156,15 @@ def _to_first_vertices(work: Workspace, n: int, surfaces: Surfaces, tracer: Trac
         found += int(arrived.sum())
         rest = (walkers.step[:n] == MIRROR) & (hits.kind[:n] == SURFACE)
         n = int(rest.sum())
-        for array in (*hits, *walkers):
+        arrays: tuple[NDArray[Any], ...] = (*hits, *walkers)
+        for array in arrays:
             array[:n] = array[: len(rest)][rest]
         if n == 0:
             break
-    for k, hit_array in enumerate(work.hits[0]):
-        hit_array[:found] = np.concatenate([part[k] for part in done_hits])
-    for k, walker_array in enumerate(work.walkers[0]):
-        walker_array[:found] = np.concatenate([part[k] for part in done_walkers])
+    targets: tuple[NDArray[Any], ...] = (*work.hits[0], *work.walkers[0])
+    batches: list[tuple[NDArray[Any], ...]] = [(*h, *w) for h, w in zip(done_hits, done_walkers, strict=True)]
+    for k, target in enumerate(targets):
+        target[:found] = np.concatenate([batch[k] for batch in batches])
     return found
 
 

@@ -84,7 +84,7 @@ def _emit(
         walkers.walk[i] = i
         for channel in range(3):
             walkers.throughput[i, channel] = 1.0
-    intersect(tracer, packets, n)
+    intersect(tracer, packets, n, False)
     record_hits(surfaces, tracer, packets, n, True, hits)
 
 

@@ -108,7 +108,7 @@ def advance(
         for channel in range(3):
             next_walkers.throughput[m, channel] = walkers.throughput[i, channel]
         m += 1
-    intersect(tracer, packets, m)
+    intersect(tracer, packets, m, False)
     record_hits(surfaces, tracer, packets, m, True, next_hits)
     return m
 
