@@ -1,0 +1,140 @@
+"""Makes the pictures of README and docs/ with the program itself: `python docs/make_pictures.py`.
+
+Each picture comes from a job of this project, cut down to the eyes and light positions that are shown. An eye keeps
+the N_r eyes before and after it, so that it has the samples that it would have in the whole array.
+"""
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from framearray_cli.arrays import Float32
+from framearray_cli.colour import srgb8_from_linear
+from framearray_cli.images import read_image, read_layers
+from framearray_cli.job import Job
+from framearray_cli.jobfile import job_table, read_job
+from framearray_cli.manifest import Manifest, image_path, layers_path, read_manifest
+from framearray_cli.paths import eyes, lights
+from framearray_cli.render import render
+
+ROOT = Path(__file__).resolve().parents[1]
+PICTURES = ROOT / "docs" / "pictures"
+GAP = 4  # pixels between the images of a sheet
+QUALITY = 80  # of JPEG: a sheet of twelve stays below 150 kB
+PLACES = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
+
+
+def cut(job: Job, cameras: Sequence[int], light_positions: Sequence[int], folder: Path, n_r: int = 3) -> Job:
+    """Cut a job down to some eyes, each with the n_r before and after it, and to some light positions."""
+    all_eyes, all_lights = eyes(job), lights(job)
+    around = [k for c in cameras for k in range(c - n_r, c + n_r + 1)]
+    table = job_table(job)
+    table["camera"] |= {
+        "frames": len(around),
+        "keys": [
+            {"frame": i, "eye": matrix[:3, 3].tolist(), "target": (matrix[:3, 3] - matrix[:3, 2]).tolist()}
+            for i, matrix in enumerate(all_eyes.world_from_camera[around])
+        ],
+    }
+    table["light"]["frames"] = len(light_positions)
+    for source, path in zip(table["light"]["sources"], all_lights.sources, strict=True):
+        place, power = PLACES[path.kind]
+        source["keys"] = [
+            {"frame": i, place: path.vector[l].tolist(), power: path.intensity[l].tolist()}
+            for i, l in enumerate(light_positions)
+        ]
+    table["reuse"]["n_r"] = n_r
+    table["specular"].pop("hits", None)  # follows n_r
+    table["output"] |= {"directory": str(folder), "format": "exr"}
+    return Job.model_validate(table)
+
+
+def shown_eye(i: int, n_r: int = 3) -> int:
+    """Where eye i of those given to `cut` stands in the cut job."""
+    return i * (2 * n_r + 1) + n_r
+
+
+def array(name: str, cameras: Sequence[int], light_positions: Sequence[int], folder: Path, n_r: int = 3) -> Manifest:
+    """Render jobs/NAME.toml, cut down."""
+    render(cut(read_job(ROOT / "jobs" / f"{name}.toml"), cameras, light_positions, folder, n_r))
+    return read_manifest(folder)
+
+
+def picture(radiance: Float32, width: int) -> Image.Image:
+    """Show radiance (h, w, 3) as the program's PNG would, scaled to a width."""
+    full = Image.fromarray(srgb8_from_linear(radiance))
+    return full.resize((width, round(full.height * width / full.width)), Image.Resampling.LANCZOS)
+
+
+def sheet(rows: Sequence[Sequence[Image.Image]]) -> Image.Image:
+    """Paste pictures of one size side by side, row below row."""
+    width, height = rows[0][0].size
+    size = len(rows[0]) * (width + GAP) - GAP, len(rows) * (height + GAP) - GAP
+    pasted = Image.new("RGB", size, "white")
+    for y, row in enumerate(rows):
+        for x, image in enumerate(row):
+            pasted.paste(image, (x * (width + GAP), y * (height + GAP)))
+    return pasted
+
+
+def array_sheet(
+    name: str, cameras: Sequence[int], light_positions: Sequence[int], width: int, folder: Path
+) -> Image.Image:
+    """Eyes from left to right, light positions from top to bottom."""
+    rendered = array(name, cameras, light_positions, folder)
+    return sheet(
+        [
+            [picture(read_image(image_path(rendered, shown_eye(i), l)), width) for i in range(len(cameras))]
+            for l in range(len(light_positions))
+        ]
+    )
+
+
+def terms(width: int, folder: Path) -> Image.Image:
+    """What an image is made of: reflectivity, obscurance W, indirect light I_A R W, and the image."""
+    rendered = array("kitchen", [150], [14], folder)
+    c = shown_eye(0)
+    layers = read_layers(layers_path(rendered, c))
+
+    def layer(part: str) -> Float32:
+        return np.stack([layers[f"{part}.{channel}"] for channel in "RGB"], axis=-1)
+
+    indirect = layer("indirect") * np.array(rendered.lights[0].ambient, np.float32)
+    image = read_image(image_path(rendered, c, 0))
+    return sheet([[picture(part, width) for part in (layer("reflectivity"), layer("obscurance"), indirect, image)]])
+
+
+def reuse(width: int, folder: Path) -> Image.Image:
+    """The same two native hits a pixel without and with the hits of the neighbours; a detail, enlarged."""
+    parts = []
+    for n_r in (0, 3):
+        rendered = array("kitchen", [150], [14], folder / str(n_r), n_r)
+        radiance = read_image(image_path(rendered, shown_eye(0, n_r), 0))
+        detail = Image.fromarray(srgb8_from_linear(radiance)).crop((120, 110, 280, 230))
+        parts.append(detail.resize((width, width * 3 // 4), Image.Resampling.NEAREST))
+    return sheet([parts])
+
+
+def main() -> None:
+    """Make all pictures again."""
+    PICTURES.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        made = {
+            "kitchen": array_sheet("kitchen", [20, 90, 170, 280], [4, 20, 40], 280, out / "kitchen"),
+            "cabin": array_sheet("cabin", [20, 80, 150], [6, 24, 40], 280, out / "cabin"),
+            "stairs": array_sheet("stairs", [10, 70, 130], [6, 24, 40], 280, out / "stairs"),
+            "terms": terms(280, out / "terms"),
+            "reuse": reuse(420, out / "reuse"),
+        }
+        for name, image in made.items():
+            file = PICTURES / f"{name}.jpg"
+            image.save(file, "JPEG", quality=QUALITY, optimize=True)
+            print(f"{file}: {image.width} x {image.height}, {file.stat().st_size:,} bytes")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,203 @@
+"""README and docs/: every link, file, target, job, command and reference in them exists, and README's example runs."""
+
+import ast
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import Glb
+from typer.testing import CliRunner
+
+from framearray_cli.cli import app
+from framearray_cli.images import read_codes
+from framearray_cli.manifest import image_path, layers_path, read_manifest
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PACKAGE = ROOT / "framearray_cli"
+PAGES = (ROOT / "README.md", *sorted(DOCS.rglob("*.md")))
+LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
+FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+KEY = re.compile(r"\[(FA|[A-Z][a-z]+[0-9]{2})(?: [a-z]+\.? [0-9.]+)?\]")
+
+
+def text(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
+
+
+def prose(page: Path) -> str:
+    """A page without its fenced blocks."""
+    return FENCED.sub("", text(page))
+
+
+def links(page: Path) -> list[str]:
+    return [link for link in LINK.findall(prose(page)) if not re.match(r"[a-z]+:", link)]
+
+
+def anchors(page: Path) -> set[str]:
+    """The anchors of a page's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.*)$", prose(page), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_links_lead_somewhere():
+    broken = []
+    for page in PAGES:
+        for link in links(page):
+            name, _, anchor = link.partition("#")
+            target = (page.parent / name).resolve() if name else page
+            if not target.is_file() or (anchor and anchor not in anchors(target)):
+                broken.append(f"{page.relative_to(ROOT)}: {link}")
+    assert not broken
+
+
+def test_a_broken_link_is_found(tmp_path: Path):
+    page = tmp_path / "page.md"
+    page.write_text(
+        "# A `b` c\n[x](other.md) ![y](y.png)\n```\n[no](link.md)\n```\n[z](https://a.b)\n", encoding="utf-8"
+    )
+    assert links(page) == ["other.md", "y.png"]
+    assert anchors(page) == {"a-b-c"}
+
+
+def test_every_page_and_picture_is_reachable_from_the_index():
+    reached, todo = set(), [DOCS / "index.md"]
+    while todo:
+        page = todo.pop()
+        if page in reached:
+            continue
+        reached.add(page)
+        if page.suffix == ".md":
+            todo += [(page.parent / link.partition("#")[0]).resolve() for link in links(page) if link[0] != "#"]
+    files = {*DOCS.rglob("*.md"), *(DOCS / "pictures").iterdir()}
+    assert files - reached == set()
+
+
+def test_pictures_are_small():
+    sizes = {file.name: file.stat().st_size for file in (DOCS / "pictures").iterdir()}
+    assert max(sizes.values()) <= 150_000, sizes
+    assert sum(sizes.values()) < 1_500_000
+
+
+def test_make_targets_exist():
+    targets = set(re.findall(r"^([a-z-]+):", text(ROOT / "Makefile"), re.MULTILINE))
+    for page in PAGES:
+        found = re.findall(r"(?:`|^)make ([a-z-]+)", text(page), re.MULTILINE)
+        assert set(found) <= targets, page
+    named = set(re.findall(r"`make ([a-z-]+)`", text(DOCS / "contributing.md")))
+    assert named | {"help"} == targets, "docs/contributing.md names every target"
+
+
+def test_commands_exist():
+    commands = {command.callback.__name__ for command in app.registered_commands if command.callback}
+    for page in PAGES:
+        shown = "\n".join(f"`{line}" for _, block in FENCED.findall(text(page)) for line in block.splitlines())
+        found = re.findall(r"(?:`|^    )framearray ([a-z]+)", f"{prose(page)}\n{shown}", re.MULTILINE)
+        assert set(found) <= commands, page
+    assert commands <= set(re.findall(r"`framearray ([a-z]+)`", text(DOCS / "changelog.md")))
+
+
+def test_named_files_exist():
+    """Jobs, files of the package and tests that a page names, and pages that code names."""
+    place = re.compile(r"\b((?:jobs|framearray_cli|tests|docs)/[\w./-]*[\w/])")
+    missing = []
+    for page in (*PAGES, *PACKAGE.rglob("*.py"), *ROOT.glob("jobs/*.toml")):
+        for name in place.findall(text(page)):
+            if not (ROOT / name).exists():
+                missing.append(f"{page.relative_to(ROOT)}: {name}")
+    assert not missing
+
+
+def test_references_are_listed():
+    listed = re.findall(r"^\| \[(\w+)\] \|", text(DOCS / "references.md"), re.MULTILINE)
+    assert len(listed) == len(set(listed))
+    for file in (*PAGES, *PACKAGE.rglob("*.py")):
+        assert set(KEY.findall(text(file))) <= set(listed), file
+
+
+def groups() -> list[list[str]]:
+    """The groups of modules in contributing.md, from the first on; "meshes/" is all files in that folder."""
+    table = text(DOCS / "contributing.md").split("| Group |")[1].split("\n\n")[0]
+    rows = [re.findall(r"`([\w/.]+)`", row) for row in table.splitlines()[2:]]
+    return [[file for name in row for file in members(name)] for row in rows]
+
+
+def members(name: str) -> list[str]:
+    files = sorted((PACKAGE / name).rglob("*.py")) if name.endswith("/") else [PACKAGE / name]
+    return [file.relative_to(PACKAGE).as_posix() for file in files if file.name != "__init__.py" or text(file)]
+
+
+def imports(file: Path) -> set[str]:
+    """Files of the package that a file imports, anywhere in it."""
+    found = set()
+    for node in ast.walk(ast.parse(text(file))):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            start = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            for name in [""] if node.module else [alias.name for alias in node.names]:
+                for target in ((start / name).with_suffix(".py"), start / name / "__init__.py"):
+                    if target.is_file() and target != PACKAGE / "__init__.py":
+                        found.add(target.relative_to(PACKAGE).as_posix())
+    return found
+
+
+def test_the_layout_is_complete():
+    listed = [name for group in groups() for name in group]
+    assert {*members("./")} - {"__init__.py"} == set(listed), "docs/contributing.md lists every file of the package"
+    assert len(listed) == len(set(listed))
+
+
+def test_files_import_from_above():
+    assert imports(PACKAGE / "window.py") >= {"compose.py", "frame.py", "terms/ambient.py"}
+    rank = {name: i for i, group in enumerate(groups()) for name in group}
+    pairs = [(name, other) for name in rank for other in sorted(imports(PACKAGE / name)) if other in rank]
+    assert not [f"{name} imports {other}" for name, other in pairs if rank[other] > rank[name]]
+
+
+def box(file: Path) -> None:
+    """A room of 4 x 2.5 x 6 that README's eyes and lamps are in, with a table."""
+    corners, faces = [], []
+    for low, high in (([-2, 0, -3], [2, 2.5, 3]), ([-0.5, 0, -0.5], [0.5, 0.7, 0.5])):
+        first = len(corners)
+        corners += [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+        quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+        faces += [first + i for a, b, c, d in quads for i in (a, b, c, a, c, d)]
+    glb = Glb()
+    paint = glb.material("Paint", {"baseColorFactor": [0.8, 0.7, 0.6, 1.0]})
+    glb.node(glb.mesh(paint, positions=np.array(corners, np.float32), faces=np.array(faces, np.uint16)))
+    glb.save(file)
+
+
+def readme_files() -> dict[str, str]:
+    """The files that README tells to save: name -> the TOML block after it."""
+    return dict(re.findall(r"`(\w+\.toml)`[^`]*```toml\n(.*?)```", text(ROOT / "README.md"), re.DOTALL))
+
+
+def readme_commands() -> list[str]:
+    blocks = [block for language, block in FENCED.findall(text(ROOT / "README.md")) if language == "sh"]
+    return [line for block in blocks for line in block.splitlines() if line.startswith("framearray ")]
+
+
+def test_the_example_of_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Its files are saved, and its commands typed, as they stand there."""
+    files, commands = readme_files(), readme_commands()
+    assert list(files) == ["room.toml", "walk.toml"]
+    assert [command.split()[1] for command in commands] == ["check", "render", "assemble"]
+    box(tmp_path / "room.glb")
+    for name, content in files.items():
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    for command in commands:
+        result = CliRunner().invoke(app, shlex.split(command)[1:], catch_exceptions=False)
+        assert result.exit_code == 0, result.output
+    rendered = read_manifest(tmp_path / "array")
+    listed = re.findall(r"^array/(\S+)", text(ROOT / "README.md"), re.MULTILINE)
+    paths = [image_path(rendered, 0, 0), image_path(rendered, 0, 1), layers_path(rendered, 0)]
+    assert listed == ["manifest.toml", *(path.name for path in paths)]
+    images = len(list((tmp_path / "array").glob("*.png")))
+    assert f"{rendered.n_cameras} x {rendered.n_lights} = {images} images" in text(ROOT / "README.md")
+    first, last = (read_codes(image_path(rendered, 12, l)).astype(float) for l in (0, rendered.n_lights - 1))
+    assert 20 < first.mean() < 235, "neither black nor burnt out"
+    assert np.abs(first - last).mean() > 2, "the lamp moved"
+    assert (tmp_path / "walk.mp4").stat().st_size > 10_000
