@@ -114,7 +114,8 @@ def room_meshes(*, mirrors: bool = True, textured: bool = True, at: Any = (0.0, 
         for p in parts
     )
     textures = (checks(),) if textured else ()
-    return Meshes(parts=moved, materials=MATERIALS, textures=textures, dropped={}, notes=())
+    materials = MATERIALS if mirrors else MATERIALS[:MIRROR]
+    return Meshes(parts=moved, materials=materials, textures=textures, dropped={}, notes=())
 
 
 def room(**options: Any) -> Scene:

@@ -1,0 +1,74 @@
+"""How many native hits each frame gets, and which pixels get more."""
+
+import numpy as np
+import pytest
+import tiny
+
+from framearray_cli.hits import empty_hits
+from framearray_cli.plan import flag_mirrors, frame_hits
+
+PATHS = [(n_c, n_r) for n_c in (1, 2, 3, 4, 5, 7, 12, 24) for n_r in (0, 1, 2, 3, 5, 8, 30, 64)]
+
+
+@pytest.mark.parametrize(("n_c", "n_r"), PATHS)
+def test_every_window_has_enough_hits(n_c: int, n_r: int) -> None:
+    for hits in (1, 2, 5):
+        counts = frame_hits(n_c, n_r, hits)
+        windows = [counts[max(c - n_r, 0) : c + n_r + 1].sum() for c in range(n_c)]
+        assert counts.shape == (n_c,) and (counts >= hits).all()
+        assert min(windows) >= (2 * n_r + 1) * hits
+        assert counts.sum() == (n_c + 2 * n_r) * hits, "not one hit more than the frames that are missing"
+
+
+@pytest.mark.parametrize(("n_c", "n_r"), [(n_c, n_r) for n_c, n_r in PATHS if n_c > 4 * n_r])
+def test_windows_in_the_interior_have_exactly_that_many(n_c: int, n_r: int) -> None:
+    counts = frame_hits(n_c, n_r, 2)
+    for c in range(2 * n_r, n_c - 2 * n_r):
+        assert counts[c - n_r : c + n_r + 1].tolist() == [2] * (2 * n_r + 1)
+
+
+def test_the_first_frames_take_over_what_is_missing_before_them() -> None:
+    assert frame_hits(12, 3, 2).tolist() == [4, 4, 4, 2, 2, 2, 2, 2, 2, 4, 4, 4]
+    assert frame_hits(1, 3, 2).tolist() == [14]
+    assert frame_hits(4, 0, 2).tolist() == [2, 2, 2, 2]
+
+
+def test_both_ends_are_alike() -> None:
+    for n_c, n_r in PATHS:
+        np.testing.assert_array_equal(frame_hits(n_c, n_r, 3), frame_hits(n_c, n_r, 3)[::-1])
+
+
+@pytest.mark.parametrize(
+    ("pixel", "near"),
+    [
+        (9, [2, 3, 4, 8, 9, 10, 14, 15, 16]),  # column 3, row 1
+        (0, [0, 1, 6, 7]),
+        (5, [4, 5, 10, 11]),
+        (23, [16, 17, 22, 23]),
+    ],
+)
+def test_a_mirror_is_flagged_with_its_neighbours(pixel: int, near: list[int]) -> None:
+    hits, flags = empty_hits(24), np.zeros(24, np.uint8)
+    hits.pixel[:] = np.arange(24)[::-1]
+    hits.specular[:] = 0.0
+    hits.specular[23 - pixel, 1] = 0.5
+    flag_mirrors(hits, 24, 6, 4, flags)
+    assert np.flatnonzero(flags).tolist() == near
+    assert set(flags.tolist()) == {0, 1}
+
+
+def test_a_still_camera_has_the_hits_of_its_whole_window_and_no_reuse() -> None:
+    inputs = tiny.prepared(tiny.job(camera={"frames": 9}, reuse={"n_r": 3}))
+    assert inputs.still
+    with tiny.planned(inputs) as (work, _):
+        assert work.per_pixel.tolist() == [14]
+        assert (work.n_r, work.n_frames, work.balance) == (0, 1, False)
+
+
+def test_features_that_a_scene_lacks_are_off() -> None:
+    with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}), tiny.room(mirrors=False))) as (work, _):
+        assert work.depth == 0 and work.mirror_hits == 0 and not work.has_constant
+    with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}, specular={"depth": 0}))) as (work, _):
+        assert work.depth == 0 and work.mirror_hits == 0
+    with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}))) as (work, _):
+        assert work.depth == 4 and work.mirror_hits == 10

@@ -1,0 +1,127 @@
+"""Mirrors: what they show, how deep, and that scenes without them do not pay."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import tiny
+from test_hits import native
+
+from framearray_cli.frame import Work
+from framearray_cli.hits import SURFACE, Hits, empty_hits
+from framearray_cli.meshes import Material, Meshes, Part
+from framearray_cli.rays import room_for_hits
+from framearray_cli.scene import Scene, build_scene
+from framearray_cli.terms.specular import count_mirrors, reflect
+
+TINT = np.float32([0.9, 0.8, 0.7])
+
+
+def behind_mirror() -> Scene:
+    """A mirror in the plane z = -1 that fills the view, and a coloured box and ball between it and the eye."""
+    corners, normals = tiny.ball((0.8, 0.2, 1.5), 0.5)
+    parts = (
+        Part(material=0, corners=tiny.quad((-9, -9, -1), (9, -9, -1), (9, 9, -1), (-9, 9, -1))),
+        Part(material=1, corners=tiny.box((-1.5, -0.5, 0.4), (-0.6, 0.6, 1.2), 0.4)),
+        Part(material=2, corners=corners, normals=normals),
+        Part(material=1, corners=tiny.box((-9, -9, 6), (9, 9, 9))),
+    )
+    materials = (
+        Material(name="Mirror", reflectivity=(0, 0, 0), specular=tuple(float(t) for t in TINT)),
+        Material(name="Box", reflectivity=(0.8, 0.3, 0.2)),
+        Material(name="Ball", reflectivity=(0.2, 0.4, 0.9)),
+    )
+    return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
+
+
+def work_of(scene: Scene, **changes: Any) -> Any:
+    keys = [{"frame": 0, "eye": [0.0, 0.1, 3.0], "target": [0.0, 0.1, -1.0]}]
+    return tiny.planned(tiny.prepared(tiny.job(camera={"keys": keys, "fov": 60.0}, **changes), scene))
+
+
+def reflected(work: Work, hits: Hits, throughput: Any = None) -> tuple[Hits, Any, int]:
+    n = len(hits.kind)
+    out, through = empty_hits(n), np.empty((n, 3), np.float32)
+    throughput = np.ones((n, 3), np.float32) if throughput is None else throughput
+    packets = room_for_hits(n).packets
+    m = reflect(hits, n, throughput, work.surfaces, work.tracer, packets, out, through)
+    return Hits(*(array[:m] for array in out)), through[:m], m
+
+
+def test_a_mirror_shows_the_mirrored_scene() -> None:
+    """A ray to a point of the mirror goes on as a ray of the mirrored eye through the same point would."""
+    with work_of(behind_mirror()) as (work, _):
+        hits = native(work, 0, 2)
+        mirrors = (hits.specular > 0).any(axis=1)
+        assert 50 < mirrors.sum() == count_mirrors(hits, len(hits.kind))
+        seen, through, m = reflected(work, hits)
+        assert m == mirrors.sum()
+        plane = hits.position[mirrors][:, 2].mean()
+        flip = np.float32([1, 1, -1])
+        eye = work.cams.position[0] * flip + np.float32([0, 0, 2 * plane])
+        way = hits.position[mirrors] - eye
+        np.testing.assert_allclose(seen.incoming, hits.incoming[mirrors] * flip, atol=1e-6)
+        surface = seen.kind == SURFACE
+        assert surface.sum() > 50
+        # what the mirrored eye sees lies on the line from it through the mirror's point
+        line = way[surface] / np.linalg.norm(way[surface], axis=1, keepdims=True)
+        beyond = seen.position[surface] - eye
+        off = beyond - (beyond * line).sum(axis=1, keepdims=True) * line
+        assert abs(off).max() < 1e-5  # 2^-24 of coordinates up to 9, some roundings
+        assert ((beyond * line).sum(axis=1) > np.linalg.norm(way[surface], axis=1)).all()
+        assert len(np.unique(seen.reflectivity[surface], axis=0)) >= 2, "box and ball are both seen"
+    np.testing.assert_array_equal(through, np.tile(TINT, (m, 1)))
+    np.testing.assert_array_equal(seen.pixel, hits.pixel[mirrors])
+
+
+def test_throughput_multiplies() -> None:
+    with work_of(behind_mirror()) as (work, _):
+        hits = native(work, 0, 1)
+        before = np.random.default_rng(1).random((len(hits.kind), 3)).astype(np.float32)
+        _, through, _ = reflected(work, hits, before)
+    np.testing.assert_allclose(through, before[(hits.specular > 0).any(axis=1)] * TINT, rtol=1e-7)
+
+
+def test_random_streams_move_on() -> None:
+    """Else a reflected hit would use the very directions of the hit before it."""
+    with work_of(behind_mirror()) as (work, _):
+        hits = native(work, 0, 3)
+        seen, _, m = reflected(work, hits)
+    assert len(np.unique(np.concatenate([hits.key, seen.key]))) == len(hits.key) + m
+
+
+def corridor(depth: int) -> Any:
+    """Two mirrors that face each other; every path goes on to the depth of the job."""
+    plates = [tiny.quad((-99, -99, z), (99, -99, z), (99, 99, z), (-99, 99, z)) for z in (-1, 1)]
+    scene = tiny.scene_of(
+        np.concatenate(plates), Material(name="M", reflectivity=(0.0, 0.0, 0.0), specular=(0.5, 0.5, 0.5))
+    )
+    keys = [{"frame": 0, "eye": [0, 0, 0.5], "target": [0.01, 0.02, -1.0]}]
+    job = tiny.job(
+        camera={"keys": keys, "fov": 40.0}, specular={"depth": depth}, scene={"background": 1.0}, ambient={"paths": 64}
+    )
+    return tiny.render_frames(tiny.prepared(job, scene))
+
+
+@pytest.mark.parametrize("depth", [1, 2, 5])
+def test_paths_end_at_the_depth(depth: int) -> None:
+    rendered = corridor(depth)
+    assert rendered.rays["mirror"] == depth * 2 * 24 * 18
+    assert not rendered.images.any(), "nothing but mirrors: no light, whatever the depth"
+
+
+def test_a_mirror_shows_the_background() -> None:
+    """A mirror that sees nothing but sky is the sky, tinted; what is beside the mirror is the sky itself."""
+    plate = tiny.quad((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0))
+    scene = tiny.scene_of(plate, Material(name="M", reflectivity=(0.0, 0.0, 0.0), specular=(0.5, 0.25, 1.0)))
+    keys = [{"frame": 0, "eye": [0, 0, 3], "target": [0, 0, 0]}]
+    job = tiny.job(camera={"keys": keys, "fov": 60.0}, scene={"background": [2.0, 2.0, 3.0]}, samples={"hits": 4})
+    image = tiny.render_frames(tiny.prepared(job, scene)).images[0, 0]
+    np.testing.assert_allclose(image[9, 12], [1.0, 0.5, 3.0], rtol=1e-6)
+    np.testing.assert_allclose(image[0, 0], [2.0, 2.0, 3.0], rtol=1e-6)
+
+
+def test_without_mirrors_no_mirror_ray_is_traced() -> None:
+    for scene, depth in ((tiny.room(mirrors=False), 4), (tiny.room(), 0)):
+        rendered = tiny.render_frames(tiny.prepared(tiny.job(specular={"depth": depth, "hits": 9}), scene))
+        assert not {"mirror", "pilot", "mirror shadow", "mirror obscurance"} & rendered.rays.keys()
