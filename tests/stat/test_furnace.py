@@ -1,0 +1,101 @@
+"""The inside of a sphere: direct plus indirect light is known at every point, wherever the light is.
+
+jobs/furnace-*.toml through the whole program, for independent seeds: the files are read back, the direct light of
+every pixel is subtracted, and what is left must be the indirect light R / pi R E.
+"""
+
+from functools import cache
+from pathlib import Path
+
+import closed_forms as forms
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from stages import result_of
+from ztests import chi2_bounds, estimate
+
+from framearray_cli.job import Job
+from framearray_cli.jobfile import read_job
+from framearray_cli.paths import eyes, lights
+
+JOBS = Path(__file__).resolve().parents[2] / "jobs"
+SEEDS = 6
+FINE = 8  # places along each edge of a pixel that its expected direct light is averaged over
+
+
+def furnace_job(reflectivity: float, out: Path, seed: int = 0, method: str = "eye") -> Job:
+    """A job of jobs/ with another seed and method, and files that hold float."""
+    job = read_job(JOBS / f"furnace-{round(100 * reflectivity)}.toml")
+    output = {"directory": out, "half": "never", "compression": "none", "layers": False}
+    tables = {
+        "seed": seed,
+        "ambient": job.ambient.model_copy(update={"method": method}),
+        "output": job.output.model_copy(update=output),
+    }
+    return job.model_copy(update=tables)
+
+
+@cache
+def expected_direct(reflectivity: float) -> NDArray[np.float64]:
+    """Mean direct radiance of every pixel of the furnace job, (n_c, n_l, h, w): eye rays met with the unit sphere."""
+    job = read_job(JOBS / f"furnace-{round(100 * reflectivity)}.toml")
+    width, height = job.camera.resolution
+    focal = 0.5 * height / np.tan(np.radians(job.camera.fov) / 2)
+    x = (np.arange(width * FINE) + 0.5) / FINE - 0.5 * width
+    y = 0.5 * height - (np.arange(height * FINE) + 0.5) / FINE
+    image = np.stack([*np.meshgrid(x / focal, y / focal), np.full((height * FINE, width * FINE), -1.0)], axis=-1)
+    frames = []
+    for matrix in eyes(job).world_from_camera:
+        way = image.reshape(-1, 3) @ matrix[:3, :3].T
+        way /= np.linalg.norm(way, axis=1, keepdims=True)
+        eye = matrix[:3, 3]
+        along = way @ eye
+        points = eye + (np.sqrt(along**2 - eye @ eye + 1) - along)[:, None] * way
+        per_light = [forms.point_irradiance(points, -points, place, 1.0) for place in lights(job).sources[0].vector]
+        fine = np.array(per_light).reshape(-1, height, FINE, width, FINE)
+        frames.append(reflectivity / np.pi * fine.mean(axis=(2, 4)))
+    return np.array(frames)
+
+
+@pytest.mark.parametrize("method", ["eye", "light"])
+@pytest.mark.parametrize("reflectivity", [0.2, 0.5, 0.8])
+def test_furnace(reflectivity: float, method: str, tmp_path: Path) -> None:
+    found, predicted = [], []
+    for seed in range(SEEDS):
+        result = result_of(furnace_job(reflectivity, tmp_path / str(seed), seed, method))
+        rest = result.images.mean(axis=-1) - expected_direct(reflectivity)  # (n_c, n_l, h, w)
+        found.append(rest.mean(axis=(0, 2, 3)))
+        predicted.append(result.ambient.standard_error)
+    right = forms.furnace_indirect(reflectivity)
+    by_light = np.array(found)  # (seeds, n_l); the same random numbers serve all lights, so each is tested alone
+    whole = expected_direct(reflectivity).mean(axis=(0, 2, 3)) + right
+    for l in range(by_light.shape[1]):
+        got = estimate(by_light[:, l])
+        assert abs(got.z(right)) < 3
+        assert abs(got.mean - right) < 0.01 * whole[l]
+        assert got.error < 0.01 * right
+        # the spread over seeds is what the program said its error would be, or less where walks are well spread
+        spread = ((by_light[:, l] - got.mean) ** 2).sum() / (right * np.mean(predicted)) ** 2
+        assert spread < chi2_bounds(SEEDS - 1)[1]
+        assert abs(got.z(1.05 * right)) > 3  # the test can fail
+
+
+def test_every_pixel_of_the_furnace(tmp_path: Path) -> None:
+    """With the light in the middle every pixel is the same, but for the flatness of the triangles.
+
+    Of equilateral triangles of circumradius rho on the unit sphere, the middles are nearer to the light than the corners
+    by the sag rho^2 / 2, so that irradiance cos / d^2 varies by 3 rho^2 / 2. Neighbours are tilted against each other
+    by the angle rho. Only rays below that meet a neighbour within the range of 0.01: a share of rho^2 of all; and a
+    pixel has 14 * 5 rays.
+    """
+    result = result_of(furnace_job(0.5, tmp_path))
+    image = result.images[0, 0].mean(axis=-1)
+    square = 1.5 * 4 / (3 * 3**0.5) * 4 * np.pi / 81920  # rho^2; the largest triangles are 1.5 times the mean area
+    off = np.abs(image / np.median(image) - 1)
+    assert (off < 1.5 * square).mean() > 1 - 70 * square
+    assert (np.abs(image / (1.01 * np.median(image)) - 1) < 1.5 * square).mean() < 0.01  # the test can fail
+
+
+def test_sunlit_sphere_has_a_mean_too() -> None:
+    """The expected direct light itself: the light's power over the sphere, seen from its middle."""
+    assert expected_direct(0.5)[:, 0].mean() == pytest.approx(0.5 / np.pi, rel=0.005)  # light at the centre: E = 1
