@@ -14,14 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Float32, Int32, Rgb
+from .arrays import Float32, Float64, Int32, Rgb
 from .camera import Cameras
 from .embree.packets import Tracer
 from .hits import ESCAPED, SURFACE, Hits, empty_hits, extra_hits, native_hits, pilot_hits, pixel_order
 from .lights import LightArrays
-from .plan import flag_mirrors
+from .plan import Pass, flag_mirrors, passes
 from .rays import room_for_hits, room_for_tests
 from .reuse import balance_weights, outer_hits, sort_by_pixel
+from .sampling import HOLE_SAMPLE
 from .surface import Surfaces
 from .terms.direct import direct
 from .terms.direct_steps import direct_by_steps, room_for_steps
@@ -55,7 +56,7 @@ class Work:
     obscurance: ObscuranceSettings
     seed: int
     n_r: int
-    per_pixel: Int32
+    per_pixel: Float64
     mirror_hits: int
     depth: int
     balance: bool
@@ -220,7 +221,8 @@ class Crew:
 
 def find_frame(work: Work, c: int, crew: Crew) -> Frame:
     """Find the native hits of eye c, estimate their terms, and place them in the frames that see them."""
-    n = work.n_pixels * int(work.per_pixel[c])
+    parts = passes(work.order, work.cams.width, c, float(work.per_pixel[c]))
+    n = sum(part.n for part in parts)
     frames = work.frames_around(c, work.n_r)
     take = crew.shelf.take
     irradiance = take("irradiance", (n, work.lights.channels, work.lights.n_lights), np.float32)
@@ -231,10 +233,11 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
     kept = n if work.layers else 0
     normal, depth = np.empty((kept, 3), np.float32), np.empty(kept, np.float32)
 
-    def batch(first: int, scratch: Scratch) -> list[tuple[Int32, Records]]:
-        m = min(BATCH, n - first)
-        span = slice(first, first + m)
-        _native(work, c, first, m, scratch)
+    def batch(task: tuple[Pass, int], scratch: Scratch) -> list[tuple[Int32, Records]]:
+        part, first = task
+        m = min(BATCH, part.n - first)
+        span = slice(part.first_hit + first, part.first_hit + first + m)
+        _native(work, c, part, first, m, scratch)
         hits = scratch.hits
         if work.layers:
             normal[span], depth[span] = hits.shading[:m], _depths(work.cams, c, hits, m)
@@ -242,10 +245,11 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
         _place(work, c, m, scratch, frames, pixel[:, span], weight[:, span])
         return _mirror_paths(work, hits, m, scratch) if work.depth else []
 
-    mirrored = [part for parts in crew.run(batch, range(0, n, BATCH)) for part in parts]
+    tasks = [(part, first) for part in parts for first in range(0, part.n, BATCH)]
+    mirrored = [path for paths in crew.run(batch, tasks) for path in paths]
     scale = np.empty(0, np.float32)
     if work.depth:
-        extra, scale = _extra_mirror_hits(work, c, crew)
+        extra, scale = _extra_mirror_hits(work, c, parts, crew)
         mirrored += extra
 
     def sort(row: int, _scratch: Scratch) -> Placed:
@@ -288,10 +292,33 @@ def _slice(records: Records, span: slice) -> Records:
     )
 
 
-def _native(work: Work, c: int, first: int, n: int, scratch: Scratch) -> None:
+def fill_holes(work: Work, c: int, pixels: Int32, crew: Crew) -> list[tuple[Placed, Records]]:
+    """One native hit for each of some pixels of eye c that nothing else reaches; then what mirrors show there."""
+    n = len(pixels)
+    records = _empty_records(work, n)
+
+    def batch(first: int, scratch: Scratch) -> list[tuple[Int32, Records]]:
+        m = min(BATCH, n - first)
+        extra_hits(
+            work.cams, c, work.seed, pixels, HOLE_SAMPLE, 1, first, m, work.surfaces, work.tracer,
+            scratch.hit_rays.packets, scratch.hits,
+        )  # fmt: skip
+        scratch.rays["native"] += m
+        _terms(work, scratch.hits, m, scratch, _slice(records, slice(first, first + m)), "obscurance", "shadow")
+        return _mirror_paths(work, scratch.hits, m, scratch) if work.depth else []
+
+    mirrored = [path for paths in crew.run(batch, range(0, n, BATCH)) for path in paths]
+    found = [(_placed(pixels, work.n_pixels), records)]
+    if mirrored:
+        where, reflected = _joined(work, mirrored)
+        found.append((_placed(where, work.n_pixels), reflected))
+    return found
+
+
+def _native(work: Work, c: int, part: Pass, first: int, n: int, scratch: Scratch) -> None:
     started = perf_counter()
     native_hits(
-        work.cams, c, work.seed, work.order, int(work.per_pixel[c]), first, n, work.surfaces, work.tracer,
+        work.cams, c, work.seed, part.pixels, part.per_pixel, part.first_sample, first, n, work.surfaces, work.tracer,
         work.depth > 0, scratch.hit_rays.packets, scratch.hits,
     )  # fmt: skip
     scratch.rays["native"] += n
@@ -371,10 +398,12 @@ def _mirror_paths(work: Work, hits: Hits, n: int, scratch: Scratch) -> list[tupl
     return found
 
 
-def _extra_mirror_hits(work: Work, c: int, crew: Crew) -> tuple[list[tuple[Int32, Records]], Float32]:
+def _extra_mirror_hits(
+    work: Work, c: int, parts: tuple[Pass, ...], crew: Crew
+) -> tuple[list[tuple[Int32, Records]], Float32]:
     """Follow the native hits that only mirror pixels have; returns them and one over the native hits of each pixel."""
-    base = int(work.per_pixel[c])
-    extra = max(work.mirror_hits - base, 0)
+    most = sum(part.per_pixel for part in parts)
+    extra = max(work.mirror_hits - most, 0)
     flags = np.zeros(work.n_pixels, np.uint8)
 
     def look(first: int, scratch: Scratch) -> None:
@@ -387,7 +416,7 @@ def _extra_mirror_hits(work: Work, c: int, crew: Crew) -> tuple[list[tuple[Int32
     def follow(first: int, scratch: Scratch) -> list[tuple[Int32, Records]]:
         n = min(BATCH, len(pixels) * extra - first)
         extra_hits(
-            work.cams, c, work.seed, pixels, base, extra, first, n, work.surfaces, work.tracer,
+            work.cams, c, work.seed, pixels, most, extra, first, n, work.surfaces, work.tracer,
             scratch.hit_rays.packets, scratch.hits,
         )  # fmt: skip
         scratch.rays["mirror"] += n
@@ -396,9 +425,11 @@ def _extra_mirror_hits(work: Work, c: int, crew: Crew) -> tuple[list[tuple[Int32
     if extra:
         crew.run(look, range(0, work.n_pixels, BATCH))
     pixels = work.order[flags[work.order] > 0]
-    parts = crew.run(follow, range(0, len(pixels) * extra, BATCH)) if extra else []
-    scale = (1.0 / (base + extra * flags)).astype(np.float32)
-    return [part for batch in parts for part in batch], scale
+    found = crew.run(follow, range(0, len(pixels) * extra, BATCH)) if extra else []
+    own = extra * flags.astype(np.int32)
+    for part in parts:
+        own[part.pixels] += part.per_pixel
+    return [path for batch in found for path in batch], (1.0 / np.maximum(own, 1)).astype(np.float32)
 
 
 def _joined(work: Work, parts: list[tuple[Int32, Records]]) -> tuple[Int32, Records]:

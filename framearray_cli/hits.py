@@ -159,8 +159,9 @@ def native_hits(
     cams: Cameras,
     c: int,
     seed: int,
-    order: Int32,
+    pixels: Int32,
     per_pixel: int,
+    first_sample: int,
     first: int,
     n: int,
     surfaces: Surfaces,
@@ -169,16 +170,16 @@ def native_hits(
     packets: Float32,
     hits: Hits,
 ) -> None:
-    """Find native hits first to first + n - 1 of eye c.
+    """Find native hits first to first + n - 1 of eye c, `per_pixel` in each of `pixels`.
 
-    A frame's hits are numbered by groups of 16 pixels of `order`, within a group by sample, then by pixel.
+    They are numbered by groups of 16 pixels, within a group by sample, then by pixel.
     """
-    n_pixels = order.shape[0]
+    n_pixels = pixels.shape[0]
     for i in range(n):
         group, rest = divmod(first + i, 16 * per_pixel)
         members = min(16, n_pixels - 16 * group)
         sample, member = divmod(rest, members)
-        _shoot_sample(cams, c, seed, order[16 * group + member], sample, i, packets, hits)
+        _shoot_sample(cams, c, seed, pixels[16 * group + member], first_sample + sample, i, packets, hits)
     intersect(tracer, packets, n, True)
     record_hits(surfaces, tracer, packets, n, mirrors, hits)
 

@@ -4,6 +4,7 @@ Attributes follow the keys of the file: `job.camera.keys[0].eye` is `keys = [{ e
 What a file leaves out is filled in while the job is read, so that a Job has no open ends.
 """
 
+import math
 import re
 from pathlib import Path
 from typing import Annotated, Literal
@@ -11,7 +12,20 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
 from .jobkeys import CameraTable, LightTable
-from .jobvalues import Emission, FileName, Reflectivity, Table, Triple, absolute, computed, fail, fill, shown
+from .jobvalues import (
+    MOST_HITS,
+    Emission,
+    FileName,
+    HitCount,
+    Reflectivity,
+    Table,
+    Triple,
+    absolute,
+    computed,
+    fail,
+    fill,
+    shown,
+)
 
 Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; every other format is taken as y up
 NAME = "[A-Za-z0-9_][A-Za-z0-9._-]{0,99}"  # what can start a file name on every system
@@ -70,11 +84,10 @@ class SceneTable(Table):
 class SamplesTable(Table):
     """How many samples a picture is made of."""
 
-    hits: int = Field(
+    hits: HitCount = Field(
         default=2,
-        ge=1,
-        le=65535,
-        description="Native hits of a pixel in a frame. With reuse a pixel averages up to (2 n_r + 1) times as many.",
+        description="Native hits of a pixel in a frame. With reuse a pixel averages up to (2 n_r + 1) times as many. "
+        "0.5: one in every second pixel, in the others the next frame; likewise a third, down to an eighth.",
     )
     obscurance: int = Field(default=5, ge=1, le=65535, description="Obscurance rays of a hit.")
     shadow_step: int = Field(
@@ -168,7 +181,7 @@ class SpecularTable(Table):
     hits: int = Field(
         default=0,
         ge=1,
-        le=65535 * 129,  # the default with the largest samples.hits and n_r
+        le=MOST_HITS,
         description="Native hits of a pixel that sees a mirror; what a mirror shows is never reused.",
         json_schema_extra=computed("(2 n_r + 1) times `samples.hits`"),
     )
@@ -259,10 +272,12 @@ class Job(Table):
 
     @model_validator(mode="after")
     def _fill_defaults(self, info: ValidationInfo) -> "Job":
+        if (2 * self.reuse.n_r + 1) * self.samples.hits > MOST_HITS:
+            fail([(("samples", "hits"), f"expected at most {MOST_HITS // (2 * self.reuse.n_r + 1)} with this n_r")])
         job_file = (info.context or {}).get("job_file")
         self._file = job_file
         if "hits" not in self.specular.model_fields_set:
-            hits = (2 * self.reuse.n_r + 1) * self.samples.hits
+            hits = min(math.ceil((2 * self.reuse.n_r + 1) * self.samples.hits), MOST_HITS)
             fill(self, "specular", self.specular.model_copy(update={"hits": hits}))
         if "directory" not in self.output.model_fields_set:
             directory = absolute(Path("..") / "out" / self.name, job_file)

@@ -127,6 +127,21 @@ def absolute(path: Path, job_file: Path | None) -> Path:
     return Path(os.path.realpath(whole.parent)) / path.name
 
 
+MOST_HITS = 65000  # hits of one pixel in one frame; random streams tell 2^16 apart
+_SHARES = (1 / 2, 1 / 3, 1 / 4, 1 / 5, 1 / 6, 1 / 7, 1 / 8)
+
+
+def _hits(value: object) -> float:
+    """Check a number of hits a pixel: a whole number, or a unit fraction down to 1/8."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        if value >= 1 and value == int(value) and value <= MOST_HITS:
+            return float(value)
+        for share in _SHARES:
+            if abs(value - share) < 1e-3:  # 0.333 means a third
+                return share
+    fail([((), f"expected a whole number from 1 to {MOST_HITS}, or 1/2, 1/3, ... 1/8, got {shown(value)}")])
+
+
 def _vector_schema(count: int, *, grey: bool = False, whole: bool = False, **bounds: float) -> WithJsonSchema:
     """Describe `count` numbers, or one grey number, in JSON Schema."""
     item = {"type": "integer" if whole else "number", **bounds}
@@ -146,6 +161,11 @@ Size: TypeAlias = Annotated[
     tuple[int, int],
     PlainValidator(_vector(2, 1, 16384, whole=True)),
     _vector_schema(2, whole=True, minimum=1, maximum=16384),
+]
+HitCount: TypeAlias = Annotated[
+    float,
+    PlainValidator(_hits),
+    WithJsonSchema({"type": "number", "minimum": 0.125, "maximum": MOST_HITS, "x-words": "a number"}),
 ]
 FileName: TypeAlias = Annotated[
     Path, PlainValidator(_file_name), WithJsonSchema({"type": "string", "minLength": 1, "x-words": "a file name"})

@@ -106,7 +106,7 @@ def outer_hits(
 
 @kernel
 def balance_weights(
-    per_pixel: Int32,
+    per_pixel: Float64,
     n_r: int,
     first_eye: int,
     first_frame: int,

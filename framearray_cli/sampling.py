@@ -13,6 +13,7 @@ from .kernel import inlined
 # Dimensions: one stream a purpose.
 PIXEL, HEMISPHERE, CHOICE, STEPS = 0, 1, 2, 3
 PIXEL_SAMPLE = (1 << 16) - 1  # the sample index, which no hit has, of what all samples of a pixel share
+HOLE_SAMPLE = (1 << 16) - 2  # that of the hit of a pixel that no other hit reaches
 
 # The two-dimensional golden ratio sequence (Roberts 2018): multiples of (1/g, 1/g^2), g = 1.3247..., in units of 2^-32.
 R2_X = np.uint32(3242174889)

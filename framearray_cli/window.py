@@ -14,7 +14,7 @@ import numpy as np
 
 from .arrays import Float32, Images, Int32
 from .compose import INDIRECT, OBSCURANCE, Band, accumulate, begin, empty_band, finish, normalise
-from .frame import Crew, Frame, Placed, Records, Scratch, Work
+from .frame import Crew, Frame, Placed, Records, Scratch, Work, fill_holes
 from .kernel import kernel
 from .terms.ambient import Ambient
 
@@ -100,13 +100,14 @@ class Window:
         maps = np.empty((work.n_pixels, 9), np.float32) if work.layers else None
         own = np.empty((work.n_pixels, 4), np.float32) if work.layers else None
         samples = np.empty(work.n_pixels, np.int32)
+        holes = self._holes(j)
 
         def band(first: int, scratch: Scratch) -> tuple[int, int, int]:
             started = perf_counter()
             n = min(BAND_PIXELS, work.n_pixels - first)
             sums = self._bands.pop()
             try:
-                self._sum_hits(j, first, n, sums)
+                self._sum_hits(j, first, n, sums, holes[:1])
                 samples[first : first + n] = sums.hits[:n]
                 if maps is not None and own is not None:
                     maps[first : first + n, :3] = sums.rest[:n, OBSCURANCE : OBSCURANCE + 3]
@@ -115,7 +116,7 @@ class Window:
                     frame = self._frames[j]
                     place = frame.places[j]
                     average_native(place.start, place.order, frame.normal, frame.depth, first, n, own)
-                self._sum_mirrored(j, first, n, sums)
+                self._sum_mirrored(j, first, n, sums, holes[1:])
                 bad = finish(sums, first, n, self._colour, self._ambient, flat)
             finally:
                 self._bands.append(sums)
@@ -134,19 +135,34 @@ class Window:
             first_bad=next(((l, pixel) for count, l, pixel in results if count), None),
         )
 
-    def _sum_hits(self, j: int, first: int, n: int, sums: Band) -> None:
+    def _holes(self, j: int) -> list[tuple[Placed, Records]]:
+        """Hits for pixels of frame j that nobody reached; there are none where every pixel has hits of its own."""
+        work = self._work
+        if work.per_pixel[j] >= 1:
+            return []
+        reached = np.zeros(work.n_pixels, np.int32)
+        for k in work.frames_around(j, work.n_r):
+            reached += np.diff(self._frames[k].places[j].start)
+        missed = np.flatnonzero(reached[work.order] == 0)
+        return fill_holes(work, j, work.order[missed], self._crew) if len(missed) else []
+
+    def _sum_hits(self, j: int, first: int, n: int, sums: Band, holes: list[tuple[Placed, Records]]) -> None:
         """Weighed means over all hits of frame j in a band."""
         begin(sums, n)
         for k in self._work.frames_around(j, self._work.n_r):
             frame = self._frames[k]
             _add(sums, first, n, frame.places[j], frame.records, frame.weights[j], _NOTHING)
+        for place, records in holes:
+            _add(sums, first, n, place, records, _NOTHING, _NOTHING)
         normalise(sums, n)
 
-    def _sum_mirrored(self, j: int, first: int, n: int, sums: Band) -> None:
+    def _sum_mirrored(self, j: int, first: int, n: int, sums: Band, holes: list[tuple[Placed, Records]]) -> None:
         """Add what the mirrors of frame j show: a mean over its native hits alone."""
         frame = self._frames[j]
         if frame.mirrored is not None and frame.mirror_places is not None:
             _add(sums, first, n, frame.mirror_places, frame.mirrored, _NOTHING, frame.mirror_scale)
+        for place, records in holes:
+            _add(sums, first, n, place, records, _NOTHING, _NOTHING)
 
 
 def _add(sums: Band, first: int, n: int, place: Placed, records: Records, weight: Float32, scale: Float32) -> None:

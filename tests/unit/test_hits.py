@@ -18,7 +18,7 @@ def native(work: Work, c: int, per_pixel: int, batch: int = 2048) -> Hits:
     for first in range(0, n, batch):
         hits, m = empty_hits(batch), min(batch, n - first)
         native_hits(
-            work.cams, c, work.seed, work.order, per_pixel, first, m, work.surfaces, work.tracer, True, packets, hits
+            work.cams, c, work.seed, work.order, per_pixel, 0, first, m, work.surfaces, work.tracer, True, packets, hits
         )
         parts.append([array[:m] for array in hits])
     return Hits(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))

@@ -132,7 +132,9 @@ def test_defaults_follow_the_other_keys(table):
     assert job.obscurance.range == 2.0
 
 
-@pytest.mark.parametrize(("n_r", "hits", "mirror"), [(0, 1, 1), (5, 3, 33), (64, 65535, 65535 * 129)])
+@pytest.mark.parametrize(
+    ("n_r", "hits", "mirror"), [(0, 1, 1), (5, 3, 33), (64, 503, 503 * 129), (3, 0.5, 4), (0, 0.125, 1)]
+)
 def test_mirror_pixels_get_the_total_of_their_neighbours(table, n_r, hits, mirror):
     table["reuse"]["n_r"], table["samples"]["hits"] = n_r, hits
     job = read(table)
@@ -214,7 +216,7 @@ WRONG = [
     ("light.sources.0.keys", [], "light.sources[0].keys: expected a list of tables, at least 1, got 0"),
     ("light.sources.0.keys.0.color", 1,
      "light.sources[0].keys[1].color: missing; keys[0] gives it, so every key of this list must"),
-    ("samples.hits", 0, "samples.hits: expected a whole number from 1 to 65535, got 0"),
+    ("samples.hits", 0, "samples.hits: expected a whole number from 1 to 65000, or 1/2, 1/3, ... 1/8, got 0"),
     ("reuse.n_r", 65, "reuse.n_r: expected a whole number from 0 to 64, got 65"),
     ("obscurance.range", 0, "obscurance.range: expected a number above 0, got 0"),
     ("obscurance.range", float("inf"), "obscurance.range: expected a number above 0, got inf"),

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import tiny
 
-from framearray_cli.hits import empty_hits
-from framearray_cli.plan import flag_mirrors, frame_hits
+from framearray_cli.hits import empty_hits, pixel_order
+from framearray_cli.plan import flag_mirrors, frame_hits, passes
 
 PATHS = [(n_c, n_r) for n_c in (1, 2, 3, 4, 5, 7, 12, 24) for n_r in (0, 1, 2, 3, 5, 8, 30, 64)]
 
@@ -72,3 +72,37 @@ def test_features_that_a_scene_lacks_are_off() -> None:
         assert work.depth == 0 and work.mirror_hits == 0
     with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}))) as (work, _):
         assert work.depth == 4 and work.mirror_hits == 10
+
+
+@pytest.mark.parametrize(("hits", "m"), [(1 / 2, 2), (1 / 3, 3), (1 / 4, 4), (1 / 7, 7), (1 / 8, 8)])
+def test_a_fraction_visits_every_pixel_once_in_as_many_frames(hits: float, m: int) -> None:
+    order = pixel_order(21, 13)
+    found = [passes(order, 21, c, hits) for c in range(m)]
+    assert all(len(parts) == 1 and parts[0].per_pixel == 1 and parts[0].first_sample == 0 for parts in found)
+    np.testing.assert_array_equal(np.sort(np.concatenate([parts[0].pixels for parts in found])), np.arange(21 * 13))
+
+
+def test_whole_hits_come_first_and_then_the_fraction() -> None:
+    whole, part = passes(pixel_order(8, 8), 8, 0, 2.5)
+    assert (whole.per_pixel, whole.first_hit, whole.n, part.first_sample, part.first_hit) == (2, 0, 128, 2, 128)
+    assert part.n == 32
+    assert [p.n for p in passes(pixel_order(8, 8), 8, 0, 3.0)] == [192]
+
+
+def test_a_pixel_that_nobody_reaches_gets_a_hit() -> None:
+    """Sparse hits leave holes; they would be black."""
+    sky = {"background": [0.5, 0.5, 0.5]}
+    job = tiny.job(samples={"hits": 0.125}, camera=tiny.WALK, reuse={"n_r": 1}, scene=sky)
+    for frame in tiny.render_frames(tiny.prepared(job)).composed:
+        assert (frame.hits >= 1).all() and frame.hits.mean() < 1.5
+        assert (frame.images.max(axis=(0, 3)) > 0).all()
+
+
+def test_sparse_hits_and_a_wide_window_show_the_same_scene() -> None:
+    walk = dict(tiny.WALK)
+    images = [
+        tiny.render_frames(tiny.prepared(tiny.job(samples={"hits": hits}, camera=walk, reuse={"n_r": n_r}))).images
+        for hits, n_r in ((16, 0), (0.5, 5))
+    ]
+    means = [image.mean(axis=(2, 3)) for image in images]
+    np.testing.assert_allclose(means[1], means[0], rtol=0.05)  # the mean of 432 pixels; their noise is below 2 %
