@@ -403,7 +403,8 @@ def _extra_mirror_hits(
 ) -> tuple[list[tuple[Int32, Records]], Float32]:
     """Follow the native hits that only mirror pixels have; returns them and one over the native hits of each pixel."""
     most = sum(part.per_pixel for part in parts)
-    extra = max(work.mirror_hits - most, 0)
+    least = int(work.per_pixel[c])
+    extra = max(work.mirror_hits - least, 0)
     flags = np.zeros(work.n_pixels, np.uint8)
 
     def look(first: int, scratch: Scratch) -> None:
