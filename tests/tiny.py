@@ -263,14 +263,19 @@ class Rendered:
         return np.stack([frame.images for frame in self.composed])
 
 
-def render_frames(inputs: Prepared, threads: int = 1, engine: Engine = "auto") -> Rendered:
+def frames_of(work: Work, ambient: Ambient, crew: Crew) -> list[Composed]:
     """The frame loop without files."""
-    width, height = inputs.job.camera.resolution
-    composed = []
+    composed, window = [], Window(work, ambient, crew)
+    for c in range(work.n_frames):
+        window.add(find_frame(work, c, crew))
+        for j in window.complete():
+            shape = (work.lights.n_lights, work.cams.height, work.cams.width, 3)
+            composed.append(window.compose(j, np.empty(shape, np.float32)))
+    return composed
+
+
+def render_frames(inputs: Prepared, threads: int = 1, engine: Engine = "auto") -> Rendered:
+    """All frames of a job."""
     with planned(inputs, engine) as (work, ambient), crew_of(work, threads) as crew:
-        window = Window(work, ambient, crew)
-        for c in range(work.n_frames):
-            window.add(find_frame(work, c, crew))
-            for j in window.complete():
-                composed.append(window.compose(j, np.empty((inputs.n_lights, height, width, 3), np.float32)))
+        composed = frames_of(work, ambient, crew)
         return Rendered(composed, ambient, dict(crew.rays()))
