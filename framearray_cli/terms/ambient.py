@@ -216,8 +216,12 @@ def ambient_by_eye(
         squares += (gathered.mean(axis=1) ** 2).sum(axis=0)
         if paths is None and spent >= FEWEST and count and relative_error(total, squares, count).max() <= TARGET_ERROR:
             break
-    average = reflectivity / count if count else seen_reflectivity / max(seen, 1)
-    return summarise(total, squares, count, average, spent, work.rays, paths is None)
+    if count == 0:
+        found = summarise(total, squares, seen_reflectivity / max(seen, 1), spent, work.rays, False)
+        note = "ambient: no walk from the eyes met a second surface, so the ambient intensity is 0"
+        return replace(found, notes=(note,))
+    error = relative_error(total, squares, count)
+    return summarise(total / count, error, reflectivity / count, spent, work.rays, paths is None)
 
 
 def fixed_ambient(
@@ -254,35 +258,15 @@ def relative_error(total: Float64, squares: Float64, count: int) -> Float64:
     return error
 
 
-def summarise(
-    total: Float64,
-    squares: Float64,
-    count: int,
-    reflectivity: Float64,
-    spent: int,
-    rays: int,
-    automatic: bool,
-    more_variance: Float64 | float = 0.0,
-) -> Ambient:
-    """Means and standard errors of `count` walks.
+def summarise(mean: Float64, error: Float64, reflectivity: Float64, spent: int, rays: int, automatic: bool) -> Ambient:
+    """Put an estimate together, and note where it missed its target.
 
     Args:
-        total, squares: (3, n_lights) and (n_lights,) sums over walks of irradiance, and of its channels' mean squared.
+        mean: (3, n_lights) irradiance.
+        error: (n_lights,) its relative standard error.
         reflectivity: (3,) average.
         automatic: whether the number of walks was left to the program.
-        more_variance: relative, adds to that of the walks.
     """
-    n_lights = total.shape[1]
-    if count == 0:
-        return Ambient(
-            intensity=np.zeros((n_lights, 3), np.float32),
-            standard_error=np.zeros(n_lights),
-            reflectivity=reflectivity.astype(np.float32),
-            paths=spent,
-            rays=rays,
-            notes=("ambient: no walk from the eyes met a second surface, so the ambient intensity is 0",),
-        )
-    error = np.sqrt(relative_error(total, squares, count) ** 2 + more_variance)
     notes: tuple[str, ...] = ()
     if automatic and error.max() > TARGET_ERROR:
         notes = (
@@ -290,7 +274,7 @@ def summarise(
             f"the most that are spent by themselves; set ambient.paths for more",
         )
     return Ambient(
-        intensity=(total.T / count / math.pi).astype(np.float32),
+        intensity=(mean.T / math.pi).astype(np.float32),
         standard_error=error,
         reflectivity=reflectivity.astype(np.float32),
         paths=spent,

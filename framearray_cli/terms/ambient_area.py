@@ -27,7 +27,7 @@ AREA_BOUNCES = 16
 # Particle vertices that each vertex of a walk looks for.
 CONNECTIONS = 4
 # Particle vertices that are kept of each source, by bounce: in a house most of the early ones lie on the roof.
-KEPT_BOUNCES, KEPT_EACH = 8, 64
+KEPT_BOUNCES, KEPT_EACH = 32, 256
 _POINTS = 2  # sample number of these walks
 _CONNECT = 16  # first dimension of the choice among particle vertices, beyond those of a walk
 

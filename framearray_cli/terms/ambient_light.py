@@ -8,20 +8,23 @@ that fault.
 
 import numpy as np
 
-from ..arrays import Float32, Real, Rgb, Triple
+from ..arrays import Float32, Float64, Real, Rgb, Triple
 from ..embree.packets import Tracer, intersect, set_ray
 from ..hits import SURFACE, Hits, record_hits
 from ..kernel import inlined, kernel
 from ..lights import DIRECTIONAL, LightArrays
-from ..sampling import HEMISPHERE, PIXEL, cosine_direction, r2, stream, word
+from ..sampling import PIXEL, cosine_direction, r2, stream, word
 from ..surface import Surfaces
-from .ambient import AMBIENT_STREAM, BATCH, TARGET_ERROR, Ambient, Workspace, choose_all, relative_error, summarise
+from .ambient import AMBIENT_STREAM, BATCH, TARGET_ERROR, Ambient, Workspace, choose_all, summarise
 from .ambient_area import KEPT_BOUNCES, Pool, empty_pool, keep, reached_area
 from .walks import MAX_BOUNCES, Walkers
 
 # Particles a light position, unless the job says.
 MOST = 32 * BATCH
-_PARTICLES = 1  # sample number of these walks
+# Particles are spread so well that their mean errs less than independent ones would. So they are dealt to groups of
+# independent random numbers, and the groups' means tell the error, to 1 in sqrt(2 (GROUPS - 1)).
+GROUPS = 32
+_PARTICLES, _STARTS = 1, 3  # sample numbers of the walks, and of where they start
 
 
 @inlined
@@ -63,14 +66,14 @@ def _emit(
     A directional source sends them through a disc as wide as the scene, placed before it. The source after the last
     is the background, which sends them through a sphere around the scene.
     """
-    key = stream(seed, AMBIENT_STREAM, 0, _PARTICLES)
-    start, turn = word(key, PIXEL), word(key, HEMISPHERE)
     for i in range(n):
-        a, b = r2(start, first + i)
+        group, place = (first + i) % GROUPS, (first + i) // GROUPS
+        a, b = r2(word(stream(seed, AMBIENT_STREAM, group, _STARTS), PIXEL), place)
+        key = stream(seed, AMBIENT_STREAM, (first + i) & ((1 << 28) - 1), _PARTICLES)
         if s == lights.kind.shape[0]:
             x, y, z = _on_sphere(a, b)
             ox, oy, oz = radius * x, radius * y, radius * z
-            a, b = r2(word(turn, first + i), 0)
+            a, b = r2(word(key, PIXEL), 0)
             dx, dy, dz = cosine_direction(np.float32(-x), np.float32(-y), np.float32(-z), a, b)
         elif lights.kind[s] == DIRECTIONAL:
             dx, dy, dz = lights.vector[s, 0, l], lights.vector[s, 1, l], lights.vector[s, 2, l]
@@ -80,7 +83,7 @@ def _emit(
             ox, oy, oz = lights.vector[s, 0, l], lights.vector[s, 1, l], lights.vector[s, 2, l]
             dx, dy, dz = _on_sphere(a, b)
         set_ray(packets, i, ox, oy, oz, dx, dy, dz, np.float32(np.inf))
-        hits.key[i] = stream(seed, AMBIENT_STREAM, (first + i) & ((1 << 28) - 1), _PARTICLES)
+        hits.key[i] = key
         walkers.walk[i] = i
         for channel in range(3):
             walkers.throughput[i, channel] = 1.0
@@ -118,9 +121,9 @@ def ambient_by_light(
     sky = background is not None and bool(background.any())
     pool = empty_pool(n_lights, n_sources + sky)
     radius = float(np.sqrt((surfaces.corners.reshape(-1, 3).astype(np.float64) ** 2).sum(axis=1).max()))
-    total, squares = np.zeros((3, n_lights)), np.zeros(n_lights)
+    total, groups = np.zeros((3, n_lights)), np.zeros((GROUPS, n_lights))
+    error = area_variance = np.zeros(n_lights)
     spent, limit = 0, paths or MOST
-    area, area_variance, reflectivity = np.zeros(n_lights), np.zeros(n_lights), np.zeros(3)
     while spent < limit:
         n = min(BATCH, limit - spent)
         work.sums[:] = 0.0
@@ -135,17 +138,26 @@ def ambient_by_light(
             _follow(work, (n_sources, range(n_lights)), power, (seed, spent, n, radius), surfaces, tracer, lights, pool)
         if spent == 0:
             area, area_variance, reflectivity = reached_area(work, seed, surfaces, tracer, lights, pool, sky)
-        spent += n
         deposited = work.sums[:n].astype(np.float64)
         total += deposited.sum(axis=0)
-        squares += (deposited.mean(axis=1) ** 2).sum(axis=0)
-        error = np.sqrt(relative_error(total, squares, spent) ** 2 + area_variance)
+        for group in range(min(GROUPS, n)):  # a batch is a multiple of GROUPS
+            groups[group] += deposited[group::GROUPS].mean(axis=1).sum(axis=0)
+        spent += n
+        error = np.sqrt(_group_variance(groups, spent) + area_variance)
         if paths is None and error.max() <= TARGET_ERROR:
             break
     per_area = np.divide(1.0, area, out=np.zeros_like(area), where=area > 0)
-    return summarise(
-        total * per_area, squares * per_area**2, spent, reflectivity, spent, work.rays, paths is None, area_variance
-    )
+    return summarise(total / spent * per_area, error, reflectivity, spent, work.rays, paths is None)
+
+
+def _group_variance(groups: Float64, n: int) -> Float64:
+    """Relative variance of the mean of n particles, (n_lights,), from sums (GROUPS, n_lights) over groups of them."""
+    size = np.bincount(np.arange(n) % GROUPS, minlength=GROUPS)[:, None]
+    whole = groups.sum(axis=0)
+    used = min(n, GROUPS)
+    squares = ((groups - size / n * whole) ** 2).sum(axis=0) * used / max(used - 1, 1)
+    variance: Float64 = np.divide(squares, whole**2, out=np.zeros_like(whole), where=whole > 0)
+    return variance
 
 
 def _follow(

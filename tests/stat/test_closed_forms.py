@@ -45,7 +45,7 @@ def test_differing_finds_what_differs_and_nothing_else() -> None:
     assert ztests.differing(a, b).max() < 1
     b[:, 7] += 3.0  # some ten standard errors
     assert (ztests.differing(a, b) > 1).nonzero()[0].tolist() == [7]
-    assert ztests.differing(np.zeros((5, 1)), np.ones((5, 1)))[0] == np.inf
+    assert ztests.differing(np.zeros((5, 1)), np.ones((5, 1)))[0] > 1e4  # values without any spread
 
 
 def test_z_of_an_estimate_without_error() -> None:

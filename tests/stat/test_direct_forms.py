@@ -127,7 +127,9 @@ def test_one_spot_through_the_whole_program(kind: str, spot: str, scene: Path, t
     """A pixel of a ten-thousandth of a degree: its radiance is R / pi E to 1e-4, in each channel by itself."""
     place, normal, free = SPOTS[spot]
     colour = [1.0, 0.5, 0.25]
-    source = point(LAMP, [LAMP_POWER * c for c in colour]) if kind == "point" else sun(SUN, [SUN_POWER * c for c in colour])
+    source = (
+        point(LAMP, [LAMP_POWER * c for c in colour]) if kind == "point" else sun(SUN, [SUN_POWER * c for c in colour])
+    )
     camera = look([0.4, 0.9, 2.0], place, fov=0.003)
     image = result_of(job_of(scene, tmp_path, [source], camera)).images[0, 0]
     n = np.array([normal])

@@ -83,10 +83,10 @@ def test_furnace(reflectivity: float, method: str, tmp_path: Path) -> None:
 def test_every_pixel_of_the_furnace(tmp_path: Path) -> None:
     """With the light in the middle every pixel is the same, but for the flatness of the triangles.
 
-    Of equilateral triangles of circumradius rho on the unit sphere, the middles are nearer to the light than the corners
-    by the sag rho^2 / 2, so that irradiance cos / d^2 varies by 3 rho^2 / 2. Neighbours are tilted against each other
-    by the angle rho. Only rays below that meet a neighbour within the range of 0.01: a share of rho^2 of all; and a
-    pixel has 14 * 5 rays.
+    Of equilateral triangles of circumradius rho on the unit sphere, the middles are nearer to the light than the
+    corners by the sag rho^2 / 2, so that irradiance cos / d^2 varies by 3 rho^2 / 2. Neighbours are tilted against
+    each other by the angle rho. Only rays below that meet a neighbour within the range of 0.01: a share of rho^2 of
+    all; and a pixel has 14 * 5 rays.
     """
     result = result_of(furnace_job(0.5, tmp_path))
     image = result.images[0, 0].mean(axis=-1)

@@ -50,17 +50,18 @@ def sidak_z(n: int, chance: float = CHANCE) -> float:
     return NormalDist().inv_cdf(1 - sidak(n, chance) / 2)
 
 
-def differing(a: Array, b: Array, floor: float = 0.0) -> Array:
+def differing(a: Array, b: Array, rounding: float = 1e-6) -> Array:
     """Which columns differ between runs a (n, values) and b (m, values): Welch's test, Sidak's correction.
 
     Args:
-        floor: rounding that no sample shows: added to the standard errors.
+        rounding: relative error of float32 sums of some dozens of values, which the spread of runs need not show;
+            it is added to the standard errors.
 
     Returns:
         (values,) how many times the allowed deviation each difference is; above 1 it is significant.
     """
     va, vb = a.var(axis=0, ddof=1) / len(a), b.var(axis=0, ddof=1) / len(b)
-    error = np.sqrt(va + vb + floor**2)
+    error = np.sqrt(va + vb) + rounding * np.abs(b.mean(axis=0))
     off = np.abs(a.mean(axis=0) - b.mean(axis=0))
     with np.errstate(divide="ignore", invalid="ignore"):
         freedom = (va + vb) ** 2 / (va**2 / (len(a) - 1) + vb**2 / (len(b) - 1))

@@ -1,0 +1,98 @@
+"""Reuse leaves the mean alone with the weights `balance`, and does not with `average`.
+
+A small scene with silhouettes, a texture, the sky and a mirror; the middle frame of a short path, rendered with and
+without reuse for independent seeds, compared pixel by pixel.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from stages import box, make_job, point, quad, sun, write_scene
+from ztests import differing
+
+from framearray_cli.frame import Crew, find_frame
+from framearray_cli.job import Job
+from framearray_cli.prepare import open_embree, plan_work, prepare
+from framearray_cli.window import Window
+
+Array = NDArray[np.float64]
+
+N_R, MIDDLE = 3, 3
+FRAMES = 2 * N_R + 1
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A checkered floor, a box and a thin post before the sky, and a mirror that leans behind them."""
+    checks = np.kron(np.indices((4, 4)).sum(axis=0) % 2, np.ones((8, 8)))
+    texture = (np.stack([checks, 1 - checks, 0.5 + 0 * checks], axis=-1) * 200 + 30).astype(np.uint8)
+    parts = [
+        quad("Floor", [-2, 0, -3], [0, 0, 4], [4, 0, 0], uv=2.0),
+        *box("Box", [-0.5, 0, -1.2], [0.0, 0.7, -0.7]),
+        *box("Post", [0.35, 0, -0.6], [0.42, 1.3, -0.53]),
+        quad("Mirror", [0.5, 0.1, -1.6], [0.8, 0, 0.3], [0, 0.8, -0.2]),
+    ]
+    return write_scene(tmp_path_factory.mktemp("reuse"), parts, {"Floor": texture})
+
+
+def job_of(scene: Path, out: Path, hits: int, n_r: int, weights: str) -> Job:
+    keys = [
+        {"frame": 0, "eye": [-0.12, 0.9, 1.2], "target": [0, 0.4, -1.0]},
+        {"frame": FRAMES - 1, "eye": [0.12, 0.95, 1.1], "target": [0, 0.4, -1.0]},
+    ]
+    return make_job(
+        scene, out, materials={"Box": [0.7, 0.3, 0.2], "Post": 0.8, "Mirror": {"reflectivity": 0.1, "specular": 0.7}},
+        camera={"resolution": [24, 16], "fov": 50.0, "keys": keys}, background=[0.3, 0.5, 0.9],
+        lights=[point([0.6, 1.6, 0.3], [1.2, 1.0, 0.8]), sun([-0.5, -1.0, -0.4], 0.8)],
+        samples={"hits": hits, "obscurance": 2}, obscurance={"range": 0.6, "outside": "background"},
+        ambient={"intensity": [0.3, 0.25, 0.2]}, reuse={"n_r": n_r, "weights": weights}, specular={"hits": 24},
+    )  # fmt: skip
+
+
+def middle_frames(job: Job, seeds: range) -> Array:
+    """The middle frame for each seed, (seeds, values), by the program's own frame loop without files."""
+    images = []
+    prepared = prepare(job)
+    block = np.empty((1, job.camera.resolution[1], job.camera.resolution[0], 3), np.float32)
+    with open_embree(prepared) as embree:
+        work, ambient = plan_work(prepared, embree)
+        for seed in seeds:
+            object.__setattr__(work, "seed", seed)
+            crew = Crew(work, 1)
+            window = Window(work, ambient, crew)
+            for c in work.frames_around(MIDDLE, work.n_r):
+                window.add(find_frame(work, c, crew))
+            composed = window.compose(MIDDLE, block)
+            assert composed.bad == 0
+            images.append(block.ravel().astype(float))
+            crew.close()
+    return np.array(images)
+
+
+SEEDS = 60
+
+
+@pytest.fixture(scope="module")
+def right(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Array:
+    """Without reuse: a pixel's own hits alone."""
+    return middle_frames(job_of(scene, tmp_path_factory.mktemp("out"), 24, 0, "balance"), range(1000, 1000 + SEEDS))
+
+
+def test_balance_leaves_the_mean_alone(scene: Path, right: Array, tmp_path: Path) -> None:
+    found = middle_frames(job_of(scene, tmp_path, 4, N_R, "balance"), range(SEEDS))
+    assert differing(found, right).max() < 1
+
+
+def test_average_is_biased_at_silhouettes_and_texture_edges(scene: Path, right: Array, tmp_path: Path) -> None:
+    """The published weights fail the same comparison: it can fail."""
+    found = middle_frames(job_of(scene, tmp_path, 4, N_R, "average"), range(SEEDS))
+    off = differing(found, right).reshape(16, 24, 3).max(axis=-1)
+    assert off.max() > 1.5
+    assert 0.02 < (off > 1).mean() < 0.5  # some pixels, at edges; not the image as a whole
+
+
+def test_no_reuse_twice_is_the_same(scene: Path, right: Array, tmp_path: Path) -> None:
+    """The comparison finds nothing between two halves of one thing."""
+    assert differing(right[::2], right[1::2]).max() < 1
