@@ -114,7 +114,7 @@ class Frame:
         places: frame j -> where its pixels see them.
         weights: frame j -> (n,) weight of each hit there, or (0,) where all weigh alike.
         mirrored, mirror_places: reflected hits of the frame's own mirror pixels; None in a scene without mirrors.
-        mirror_scale: (n_pixels,) one over the native hits of each pixel.
+        mirror_hits: (n_pixels,) native hits of each pixel whose mirrors were followed; (0,) without mirrors.
         normal, depth: (n, 3) and (n,) of native hits, for the layers; (0, 3) and (0,) without.
         kept: the large arrays of the above, by name, for the shelf.
     """
@@ -125,7 +125,7 @@ class Frame:
     weights: dict[int, Float32]
     mirrored: Records | None
     mirror_places: Placed | None
-    mirror_scale: Float32
+    mirror_hits: Int32
     normal: Float32
     depth: Float32
     kept: dict[str, Any]
@@ -247,9 +247,9 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
 
     tasks = [(part, first) for part in parts for first in range(0, part.n, BATCH)]
     mirrored = [path for paths in crew.run(batch, tasks) for path in paths]
-    scale = np.empty(0, np.float32)
+    mirror_hits = np.empty(0, np.int32)
     if work.depth:
-        extra, scale = _extra_mirror_hits(work, c, parts, crew)
+        extra, mirror_hits = _extra_mirror_hits(work, c, parts, crew)
         mirrored += extra
 
     def sort(row: int, _scratch: Scratch) -> Placed:
@@ -266,7 +266,7 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
         kept={"irradiance": irradiance, "order": order, "weight": weight},
         mirrored=all_mirrored[1] if all_mirrored else None,
         mirror_places=_placed(all_mirrored[0], work.n_pixels) if all_mirrored else None,
-        mirror_scale=scale,
+        mirror_hits=mirror_hits,
         normal=normal,
         depth=depth,
     )
@@ -400,8 +400,8 @@ def _mirror_paths(work: Work, hits: Hits, n: int, scratch: Scratch) -> list[tupl
 
 def _extra_mirror_hits(
     work: Work, c: int, parts: tuple[Pass, ...], crew: Crew
-) -> tuple[list[tuple[Int32, Records]], Float32]:
-    """Follow the native hits that only mirror pixels have; returns them and one over the native hits of each pixel."""
+) -> tuple[list[tuple[Int32, Records]], Int32]:
+    """Follow the native hits that only mirror pixels have; returns them and the number of native hits of each pixel."""
     most = sum(part.per_pixel for part in parts)
     least = int(work.per_pixel[c])
     extra = max(work.mirror_hits - least, 0)
@@ -430,7 +430,7 @@ def _extra_mirror_hits(
     own = extra * flags.astype(np.int32)
     for part in parts:
         own[part.pixels] += part.per_pixel
-    return [path for batch in found for path in batch], (1.0 / np.maximum(own, 1)).astype(np.float32)
+    return [path for batch in found for path in batch], own
 
 
 def _joined(work: Work, parts: list[tuple[Int32, Records]]) -> tuple[Int32, Records]:

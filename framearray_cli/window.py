@@ -101,6 +101,7 @@ class Window:
         own = np.empty((work.n_pixels, 4), np.float32) if work.layers else None
         samples = np.empty(work.n_pixels, np.int32)
         holes = self._holes(j)
+        mirror_scale = self._mirror_scale(j, holes)
 
         def band(first: int, scratch: Scratch) -> tuple[int, int, int]:
             started = perf_counter()
@@ -116,7 +117,7 @@ class Window:
                     frame = self._frames[j]
                     place = frame.places[j]
                     average_native(place.start, place.order, frame.normal, frame.depth, first, n, own)
-                self._sum_mirrored(j, first, n, sums, holes[1:])
+                self._sum_mirrored(j, first, n, sums, holes[1:], mirror_scale)
                 bad = finish(sums, first, n, self._colour, self._ambient, flat)
             finally:
                 self._bands.append(sums)
@@ -156,13 +157,22 @@ class Window:
             _add(sums, first, n, place, records, _NOTHING, _NOTHING)
         normalise(sums, n)
 
-    def _sum_mirrored(self, j: int, first: int, n: int, sums: Band, holes: list[tuple[Placed, Records]]) -> None:
+    def _mirror_scale(self, j: int, holes: list[tuple[Placed, Records]]) -> Float32:
+        """One over the native hits of each pixel of frame j, (n_pixels,); those that fill holes count."""
+        own = self._frames[j].mirror_hits
+        for place, _ in holes[:1] if len(own) else []:
+            own = own + np.diff(place.start)
+        return (1.0 / np.maximum(own, 1)).astype(np.float32)
+
+    def _sum_mirrored(
+        self, j: int, first: int, n: int, sums: Band, holes: list[tuple[Placed, Records]], scale: Float32
+    ) -> None:
         """Add what the mirrors of frame j show: a mean over its native hits alone."""
         frame = self._frames[j]
         if frame.mirrored is not None and frame.mirror_places is not None:
-            _add(sums, first, n, frame.mirror_places, frame.mirrored, _NOTHING, frame.mirror_scale)
+            _add(sums, first, n, frame.mirror_places, frame.mirrored, _NOTHING, scale)
         for place, records in holes:
-            _add(sums, first, n, place, records, _NOTHING, _NOTHING)
+            _add(sums, first, n, place, records, _NOTHING, scale)
 
 
 def _add(sums: Band, first: int, n: int, place: Placed, records: Records, weight: Float32, scale: Float32) -> None:

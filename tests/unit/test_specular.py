@@ -121,6 +121,26 @@ def test_a_mirror_shows_the_background() -> None:
     np.testing.assert_allclose(image[0, 0], [2.0, 2.0, 3.0], rtol=1e-6)
 
 
+@pytest.mark.parametrize("n_r", [0, 1, 2])
+def test_sparse_hits_show_a_mirror_once(n_r: int) -> None:
+    """A mirror's pixel that no hit of the frame reaches is shown by its own mirror hits, and not again by another."""
+    plate = tiny.quad((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0))
+    scene = tiny.scene_of(plate, Material(name="M", reflectivity=(0.0, 0.0, 0.0), specular=(0.5, 0.25, 1.0)))
+    keys = [
+        {"frame": 0, "eye": [0, 0, 3], "target": [0, 0, 0]},
+        {"frame": 4, "eye": [0.1, 0, 3], "target": [0.1, 0, 0]},
+    ]
+    job = tiny.job(
+        camera={"frames": 5, "keys": keys, "fov": 60.0},
+        scene={"background": [2.0, 2.0, 3.0]},
+        samples={"hits": 0.125},
+        reuse={"n_r": n_r},
+    )
+    for image in tiny.render_frames(tiny.prepared(job, scene)).images[:, 0]:
+        np.testing.assert_allclose(image[8:11, 11:14], np.tile([1.0, 0.5, 3.0], (3, 3, 1)), rtol=1e-6)
+        np.testing.assert_allclose(image[0], np.tile([2.0, 2.0, 3.0], (24, 1)), rtol=1e-6)
+
+
 def test_without_mirrors_no_mirror_ray_is_traced() -> None:
     for scene, depth in ((tiny.room(mirrors=False), 4), (tiny.room(), 0)):
         rendered = tiny.render_frames(tiny.prepared(tiny.job(specular={"depth": depth, "hits": 9}), scene))
