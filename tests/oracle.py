@@ -10,6 +10,7 @@ formula. Reuse is done by brute force: every hit of every eye of the window is p
 Letters: docs/algorithm.md.
 """
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -43,10 +44,13 @@ class Oracle:
             np.add.at(total, pixel[used], weight[used, None] * self.radiance(hits[used], l))
             np.add.at(weights, pixel[used], weight[used])
             np.add.at(count, pixel[used], 1)
+        holes = self.samples(c, np.flatnonzero(count == 0), rnd.HOLE)
+        if len(holes):  # a pixel that nobody reaches gets one hit of its own
+            total[holes.pixel], weights[holes.pixel], count[holes.pixel] = self.radiance(holes, l), 1, 1
         self.count = count
         picture = total / weights[:, None]
         if self.inputs.scene.has_mirrors and self.job.specular.depth:
-            picture += self.mirrors(c, l)
+            picture += self.mirrors(c, l, holes)
         return picture.reshape(self.height, self.width, 3)
 
     # -- samples
@@ -61,11 +65,20 @@ class Oracle:
             return [0]
         return [k for k in range(self.n_c) if abs(k - c) <= self.n_r]
 
-    def per_pixel(self, k: int) -> int:
+    def per_pixel(self, k: int) -> float:
         """Native hits a pixel of frame k: the path goes on beyond its ends, back along itself."""
         there_and_back = [*range(self.n_c), *reversed(range(self.n_c))]
         beyond = range(-self.n_r, self.n_c + self.n_r)
         return self.job.samples.hits * sum(there_and_back[v % len(there_and_back)] == k for v in beyond)
+
+    def sparse_pixels(self, k: int) -> Any:
+        """Pixels that get one hit more than the others where hits a pixel are no whole number: n of every m pixels,
+        shifted by some pixels from row to row and by one from frame to frame."""
+        share = Fraction(self.per_pixel(k)).limit_denominator(8) % 1
+        n, m = share.numerator, share.denominator
+        x, y = np.meshgrid(np.arange(self.width), np.arange(self.height))
+        turn = (x + max(1, round(0.382 * m)) * y + k) % m
+        return np.flatnonzero(turn.reshape(-1) < n)
 
     def axes(self, k: int) -> tuple[Any, Any, Any, Any]:
         """Position, right, up and forward of eye k, centred like the scene."""
@@ -79,11 +92,18 @@ class Oracle:
         dirs = x[:, None] * right + y[:, None] * up + forward
         return np.broadcast_to(position, dirs.shape), dirs
 
-    def native(self, k: int, pixels: Any = None, first: int = 0, n: int | None = None) -> Points:
-        """Samples first to first + n - 1 of pixels of eye k; all pixels, all samples if not told otherwise."""
-        pixels = np.arange(self.n_pixels) if pixels is None else pixels
-        samples = np.arange(first, first + (self.per_pixel(k) if n is None else n))
-        pixel, sample = np.repeat(pixels, len(samples)), np.tile(samples, len(pixels))
+    def native(self, k: int) -> Points:
+        """All native hits of eye k."""
+        whole, pixels = int(self.per_pixel(k)), np.arange(self.n_pixels)
+        some = self.sparse_pixels(k)
+        pixel = np.concatenate([np.repeat(pixels, whole), some])
+        return self.samples(
+            k, pixel, np.concatenate([np.tile(np.arange(whole), len(pixels)), np.full(len(some), whole)])
+        )
+
+    def samples(self, k: int, pixel: Any, sample: Any) -> Points:
+        """One hit of eye k for each (pixel, sample)."""
+        sample = np.broadcast_to(sample, len(pixel))
         shared = rnd.bits(rnd.keys(self.job.seed, k, pixel, np.full(len(pixel), rnd.WHOLE_PIXEL)), rnd.PIXEL)
         corner = np.stack([pixel % self.width, pixel // self.width], axis=1)
         origins, dirs = self.rays_through(k, corner + rnd.points(shared, sample))
@@ -148,17 +168,18 @@ class Oracle:
 
     # -- mirrors
 
-    def mirrors(self, c: int, l: int) -> Any:
+    def mirrors(self, c: int, l: int, holes: Points) -> Any:
         """(n_pixels, 3): mean of what the native hits of each pixel show by reflection."""
-        base, more = self.per_pixel(c), max(self.job.specular.hits - self.per_pixel(c), 0)
+        hits = [self.native(c), holes]
         looks = self.model.look(*self.rays_through(c, self.centres), key=[0] * self.n_pixels, pixel=None)
         seen = (looks.specular > 0).any(axis=1).reshape(self.height, self.width)
         wide = np.pad(seen, 1)
         near = sum(wide[i : i + self.height, j : j + self.width] for i in range(3) for j in range(3)).reshape(-1) > 0
-        total = self.reflected(self.native(c), l)
-        if more:
-            total += self.reflected(self.native(c, np.flatnonzero(near), base, more), l)
-        return total / (base + more * near)[:, None]
+        first = int(np.ceil(self.per_pixel(c)))  # samples that no pixel has used
+        more = range(first, first + max(self.job.specular.hits - int(self.per_pixel(c)), 0))
+        hits += [self.samples(c, np.flatnonzero(near), sample) for sample in more]
+        count = sum(np.bincount(points.pixel, minlength=self.n_pixels) for points in hits)
+        return sum(self.reflected(points, l) for points in hits) / np.maximum(count, 1)[:, None]
 
     @property
     def centres(self) -> Any:

@@ -16,6 +16,7 @@ import numpy as np
 
 PIXEL, HEMISPHERE = 0, 1  # dimensions
 WHOLE_PIXEL = 65535  # the "sample" whose bits all samples of a pixel share
+HOLE = 65534  # the sample of a pixel that no other hit reaches
 GOLDEN = (isqrt(5 * 2**128) - 2**64) // 2
 MASK = 2**64 - 1
 

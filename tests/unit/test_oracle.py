@@ -57,6 +57,8 @@ NO_REUSE: dict[str, dict[str, Any]] = {
     "mirrors black": {"specular": {"depth": 0}},
     "more hits on mirrors": {"specular": {"hits": 7}, "scene": SKY},
     "fixed ambient light": {"ambient": {"intensity": [0.5, 0.7, 0.2]}},
+    "a hit in every other pixel": {"samples": {"hits": 0.5}, "scene": SKY},
+    "a hit in every eighth pixel, two on mirrors": {"samples": {"hits": 0.125}, "specular": {"hits": 2}},
     "another seed": {"seed": 2**32 - 1},
     "linear": {"obscurance": {"falloff": "linear"}},
     "cbrt": {"obscurance": {"falloff": "cbrt"}},
@@ -110,6 +112,8 @@ REUSE: dict[str, dict[str, Any]] = {
         "camera": {"frames": 2, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": 1}]},
         "reuse": {"n_r": 3},
     },
+    "a hit in every third pixel": {"camera": WALK, "reuse": {"n_r": 2}, "samples": {"hits": 1 / 3}},
+    "a hit in every eighth pixel": {"camera": WALK, "reuse": {"n_r": 1}, "samples": {"hits": 0.125}},
     "sky gathered": {
         "camera": WALK,
         "reuse": {"n_r": 2},

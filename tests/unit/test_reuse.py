@@ -38,7 +38,7 @@ def test_outer_hits_are_those_of_brute_force(walk: Any) -> None:
         hits = native(work, 2, 2)
         pixel, density, rays = outer(work, 2, hits, range(0, 6))
     twin = Oracle(walk, ambient)
-    theirs = twin.native(2, n=2)
+    theirs = twin.native(2)
     here = {key: i for i, key in enumerate(hits.key.tolist())}
     order = [here[key] for key in theirs.key]
     for k in range(6):
