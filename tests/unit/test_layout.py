@@ -1,0 +1,142 @@
+"""The package's shape: data flows one way, each library has one door, hot loops are compiled in one way."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import framearray_cli
+
+PACKAGE = Path(framearray_cli.__file__).parent
+
+# Every file, in the order in which data flows; a file imports only from those before it.
+FLOW = """
+__init__ errors arrays kernel compiling files framerate filepatterns fingerprint colour sphere
+jobvalues jobkeys job jobschema jobdocs problems eyefile jobfile
+meshes/assets meshes/container meshes/model meshes/defaults meshes/cleaning meshes/polygons meshes/merge
+meshes/overrides meshes/textures meshes/opacity meshes/mtl meshes/walk meshes/gltf_materials meshes/gltf_prepare
+meshes/gltf meshes/obj meshes/other meshes/read meshes/__init__
+scene paths camera lights sampling surface
+embree/packets embree/masks embree/native embree/fallback embree/__init__
+rays hits plan
+terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
+terms/ambient_area terms/ambient_light
+reuse frame denoise compose window
+imageattributes images manifest outfolder writer
+prepare memory render check
+moviepath movies assemble
+screen cli __main__
+"""
+ORDER = FLOW.split()
+
+# Which files may import a library; what is not here may be imported anywhere.
+DOORS = {
+    "embreex": ("embree/",),
+    "llvmlite": ("embree/", "kernel"),
+    "numba": ("embree/", "kernel", "compiling", "hits"),  # hits: one function that allocates, so no kernel
+    "trimesh": ("meshes/",),
+    "OpenImageIO": ("images",),
+    "PIL": ("meshes/", "images"),
+    "tomllib": ("jobfile", "manifest"),
+    "tomli_w": ("manifest",),
+    "typer": ("cli",),
+    "rich": ("cli", "screen"),
+    "av": ("movies",),
+    "scipy": ("paths",),
+    "psutil": ("memory", "check"),
+}
+# What takes long to import, or may be absent: `framearray --help` does without.
+HEAVY = ("numba", "llvmlite", "embreex", "trimesh", "OpenImageIO", "PIL", "scipy", "av")
+
+FILES = {path.relative_to(PACKAGE).with_suffix("").as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+def tree_of(name: str) -> ast.Module:
+    return ast.parse(FILES[name].read_text(encoding="utf-8"))
+
+
+def imported(name: str) -> set[str]:
+    """Files of the package that a file imports, wherever in it."""
+    found = set()
+    for node in ast.walk(tree_of(name)):
+        if not (isinstance(node, ast.ImportFrom) and node.level):
+            continue
+        folder = Path(name).parent
+        for _ in range(node.level - 1):
+            folder = folder.parent
+        inside = folder / (node.module or "").replace(".", "/")
+        for target in [inside] if node.module else [inside / alias.name for alias in node.names]:
+            names = (target.as_posix(), (target / "__init__").as_posix(), (target.parent / "__init__").as_posix())
+            found.add(next(name for name in names if name in FILES))
+    return found - {name}
+
+
+def libraries(name: str) -> set[str]:
+    """Libraries that a file imports, wherever in it."""
+    found = set()
+    for node in ast.walk(tree_of(name)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
+            found.add(node.module.split(".")[0])
+    return found
+
+
+def test_every_file_has_its_place() -> None:
+    assert len(set(ORDER)) == len(ORDER)
+    assert FILES.keys() <= set(ORDER), "name new files in FLOW, where their data flows"
+
+
+@pytest.mark.parametrize("name", [name for name in ORDER if name in FILES])
+def test_a_file_imports_only_from_those_before_it(name: str) -> None:
+    before = set(ORDER[: ORDER.index(name)])
+    assert imported(name) <= before
+
+
+def test_the_package_does_not_import_itself_by_name() -> None:
+    assert not [name for name in FILES if "framearray_cli" in libraries(name)]
+
+
+@pytest.mark.parametrize("library", DOORS)
+def test_each_library_has_one_door(library: str) -> None:
+    users = [name for name in FILES if library in libraries(name)]
+    strangers = [name for name in users if not name.startswith(DOORS[library])]
+    assert users or library == "av"
+    assert not strangers
+
+
+def test_imports_are_seen() -> None:
+    """The tests above can fail: what they look for is there to be found."""
+    assert {"window", "frame", "writer", "terms/ambient"} <= imported("render")
+    assert "errors" in imported("meshes/gltf_prepare") and "surface" in imported("embree/masks")
+    assert {"embreex", "ctypes"} <= libraries("embree/native")
+
+
+def test_hot_loops_are_compiled_by_the_decorators_of_kernel() -> None:
+    """numba's own decorators stand where a function allocates, or is called by Embree, and nowhere else."""
+    own = {}
+    for name in FILES:
+        for node in ast.walk(tree_of(name)):
+            if isinstance(node, ast.FunctionDef):
+                texts = [ast.unparse(decorator) for decorator in node.decorator_list]
+                if any(text.startswith(("nb.", "numba.", "njit")) for text in texts):
+                    own[f"{name}.{node.name}"] = texts
+    assert set(own) <= {"hits.pixel_order", "embree/masks._surfaces_at", "embree/masks.filter_masked"}
+
+
+@pytest.mark.parametrize("name", ["kernel", "inlined"])
+def test_kernels_say_what_they_do(name: str) -> None:
+    """Each has a docstring, or is a private step of a few lines."""
+    for file in FILES:
+        for node in ast.walk(tree_of(file)):
+            if isinstance(node, ast.FunctionDef) and name in [ast.unparse(d) for d in node.decorator_list]:
+                short = node.name.startswith("_") and len(node.body) <= 6
+                assert ast.get_docstring(node) or short, f"{file}.{node.name}"
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = f"import sys, framearray_cli.cli; print([name for name in {HEAVY!r} if name in sys.modules])"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"
