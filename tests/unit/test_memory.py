@@ -37,9 +37,10 @@ def peak(tmp_path: Path, frames: int, size: tuple[int, int], lights: int, n_r: i
     tests = str(Path(__file__).resolve().parents[1])
     code = RENDER.format(
         tests=tests, frames=frames, scene=str(scene), width=width, height=height, lights=lights, n_r=n_r,
-        out=str(tmp_path / f"out{frames}"),
+        out=str(tmp_path / f"{frames}-{n_r}"),
     )  # fmt: skip
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=600)
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600)
+    assert run.returncode == 0, run.stderr
     return int(run.stdout)
 
 
