@@ -46,7 +46,8 @@ class Work:
         balance: weights of hits by the balance heuristic, else all alike.
         background: (3,) radiance outside the scene.
         shadow_step, shadow_unbiased: see `terms/direct_steps.py`; step 1 tests every light position.
-        layers: whether normals and depths are kept.
+        layers: whether normals and depths are kept for the layers.
+        denoise: whether W is denoised in composing.
     """
 
     cams: Cameras
@@ -64,6 +65,7 @@ class Work:
     shadow_step: int
     shadow_unbiased: bool
     layers: bool
+    denoise: bool = False
     order: Int32 = field(init=False)
 
     def __post_init__(self) -> None:
@@ -230,7 +232,7 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
     pixel = take("pixel", (len(frames), n), np.int32)
     order = take("order", (len(frames), n), np.int32)
     weight = take("weight", (len(frames), n if work.balance else 0), np.float32)
-    kept = n if work.layers else 0
+    kept = n if work.layers or work.denoise else 0
     normal, depth = np.empty((kept, 3), np.float32), np.empty(kept, np.float32)
 
     def batch(task: tuple[Pass, int], scratch: Scratch) -> list[tuple[Int32, Records]]:
@@ -239,7 +241,7 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
         span = slice(part.first_hit + first, part.first_hit + first + m)
         _native(work, c, part, first, m, scratch)
         hits = scratch.hits
-        if work.layers:
+        if kept:
             normal[span], depth[span] = hits.shading[:m], _depths(work.cams, c, hits, m)
         _terms(work, hits, m, scratch, _slice(records, span), "obscurance", "shadow")
         _place(work, c, m, scratch, frames, pixel[:, span], weight[:, span])

@@ -187,6 +187,15 @@ class SpecularTable(Table):
     )
 
 
+class DenoiseTable(Table):
+    """Noise that is removed instead of sampled away; needs the extra `denoise`."""
+
+    obscurance: bool = Field(
+        default=False,
+        description="Denoise the obscurance of each camera, once for all lights, with Open Image Denoise.",
+    )
+
+
 class OutputTable(Table):
     """What is written."""
 
@@ -256,6 +265,7 @@ class Job(Table):
     obscurance: ObscuranceTable
     ambient: AmbientTable = Field(default_factory=AmbientTable)
     specular: SpecularTable = Field(default_factory=SpecularTable)
+    denoise: DenoiseTable = Field(default_factory=DenoiseTable)
     output: OutputTable = Field(default_factory=OutputTable)
     render: RenderTable = Field(default_factory=RenderTable)
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from .arrays import Float32, Images, Int32
 from .compose import INDIRECT, OBSCURANCE, Band, accumulate, begin, empty_band, finish, normalise
+from .denoise import denoised
 from .frame import Crew, Frame, Placed, Records, Scratch, Work, fill_holes
 from .kernel import kernel
 from .terms.ambient import Ambient
@@ -102,6 +103,7 @@ class Window:
         samples = np.empty(work.n_pixels, np.int32)
         holes = self._holes(j)
         mirror_scale = self._mirror_scale(j, holes)
+        smooth = self._smooth_indirect(j, holes[:1], images.shape[1:3]) if work.denoise else None
 
         def band(first: int, scratch: Scratch) -> tuple[int, int, int]:
             started = perf_counter()
@@ -110,6 +112,8 @@ class Window:
             try:
                 self._sum_hits(j, first, n, sums, holes[:1])
                 samples[first : first + n] = sums.hits[:n]
+                if smooth is not None:
+                    sums.rest[:n, INDIRECT : INDIRECT + 3] = smooth[first : first + n]
                 if maps is not None and own is not None:
                     maps[first : first + n, :3] = sums.rest[:n, OBSCURANCE : OBSCURANCE + 3]
                     maps[first : first + n, 3:6] = sums.rest[:n, INDIRECT : INDIRECT + 3]
@@ -136,6 +140,30 @@ class Window:
             first_bad=next(((l, pixel) for count, l, pixel in results if count), None),
         )
 
+    def _smooth_indirect(self, j: int, holes: list[tuple[Placed, Records]], shape: tuple[int, ...]) -> Float32:
+        """R W of every pixel of frame j with W denoised, (n_pixels, 3).
+
+        W is R W over R, so that a pixel that only partly shows a surface has that surface's W.
+        """
+        n_pixels = self._work.n_pixels
+        indirect, reflectivity = np.empty((n_pixels, 3), np.float32), np.empty((n_pixels, 3), np.float32)
+        own = np.empty((n_pixels, 4), np.float32)
+        frame = self._frames[j]
+
+        def band(first: int, _scratch: Scratch) -> None:
+            n = min(BAND_PIXELS, n_pixels - first)
+            sums = empty_band(n, 0)
+            self._sum_hits(j, first, n, sums, holes, lit=False)
+            indirect[first : first + n] = sums.rest[:n, INDIRECT : INDIRECT + 3]
+            reflectivity[first : first + n] = sums.reflectivity[:n]
+            place = frame.places[j]
+            average_native(place.start, place.order, frame.normal, frame.depth, first, n, own)
+
+        self._crew.run(band, range(0, n_pixels, BAND_PIXELS))
+        obscurance = np.divide(indirect, reflectivity, out=np.zeros_like(indirect), where=reflectivity > 0)
+        images = (array.reshape(*shape, 3) for array in (obscurance, reflectivity, own[:, :3]))
+        return reflectivity * denoised(*images).reshape(n_pixels, 3)
+
     def _holes(self, j: int) -> list[tuple[Placed, Records]]:
         """Hits for pixels of frame j that nobody reached; there are none where every pixel has hits of its own."""
         work = self._work
@@ -147,14 +175,16 @@ class Window:
         missed = np.flatnonzero(reached[work.order] == 0)
         return fill_holes(work, j, work.order[missed], self._crew) if len(missed) else []
 
-    def _sum_hits(self, j: int, first: int, n: int, sums: Band, holes: list[tuple[Placed, Records]]) -> None:
-        """Weighed means over all hits of frame j in a band."""
+    def _sum_hits(
+        self, j: int, first: int, n: int, sums: Band, holes: list[tuple[Placed, Records]], lit: bool = True
+    ) -> None:
+        """Weighed means over all hits of frame j in a band; without direct light unless `lit`."""
         begin(sums, n)
         for k in self._work.frames_around(j, self._work.n_r):
             frame = self._frames[k]
-            _add(sums, first, n, frame.places[j], frame.records, frame.weights[j], _NOTHING)
+            _add(sums, first, n, frame.places[j], frame.records, frame.weights[j], _NOTHING, lit)
         for place, records in holes:
-            _add(sums, first, n, place, records, _NOTHING, _NOTHING)
+            _add(sums, first, n, place, records, _NOTHING, _NOTHING, lit)
         normalise(sums, n)
 
     def _mirror_scale(self, j: int, holes: list[tuple[Placed, Records]]) -> Float32:
@@ -175,10 +205,20 @@ class Window:
             _add(sums, first, n, place, records, _NOTHING, scale)
 
 
-def _add(sums: Band, first: int, n: int, place: Placed, records: Records, weight: Float32, scale: Float32) -> None:
+def _add(
+    sums: Band,
+    first: int,
+    n: int,
+    place: Placed,
+    records: Records,
+    weight: Float32,
+    scale: Float32,
+    lit: bool = True,
+) -> None:
+    irradiance = records.irradiance if lit else np.empty((len(records.irradiance), 1, 0), np.float32)
     accumulate(
         sums, first, n, place.start, place.order, weight, scale,
-        records.reflectivity, records.obscurance, records.constant, records.irradiance,
+        records.reflectivity, records.obscurance, records.constant, irradiance,
     )  # fmt: skip
 
 

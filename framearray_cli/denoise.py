@@ -1,0 +1,44 @@
+"""The door to Open Image Denoise: W of a whole frame, made smooth once for all light positions.
+
+Obscurance exists once a camera, not once an image, so denoising it costs 1/N_l of what a denoised renderer pays. W is
+denoised alone and multiplied by the reflectivity afterwards, so that textures are not touched; normals and
+reflectivity tell the filter where objects end. It takes no depth.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from .arrays import Float32
+from .errors import MissingExtraError
+
+
+def require_denoiser() -> Any:
+    """Import the denoiser.
+
+    Raises:
+        MissingExtraError: pyoidn is not installed.
+    """
+    try:
+        import pyoidn
+    except ImportError as error:
+        raise MissingExtraError(
+            "denoise.obscurance needs Open Image Denoise, which is not installed; "
+            'install it with: pip install "framearray[denoise]"'
+        ) from error
+    return pyoidn
+
+
+def denoised(obscurance: Float32, reflectivity: Float32, normal: Float32) -> Float32:
+    """Remove the noise from an image of W.
+
+    Args:
+        obscurance: (height, width, 3) W, 0 to 1.
+        reflectivity: (height, width, 3), 0 to 1.
+        normal: (height, width, 3) unit, 0 where there is no surface.
+    Returns:
+        (height, width, 3), 0 to 1.
+    """
+    smooth: Float32 = require_denoiser().denoise(obscurance, albedo=np.clip(reflectivity, 0.0, 1.0), normal=normal)
+    np.clip(smooth, 0.0, 1.0, out=smooth)
+    return smooth
