@@ -7,6 +7,7 @@ import numpy as np
 
 from .arrays import Float32
 from .camera import cameras
+from .denoise import require_denoiser
 from .embree import EmbreeScene, Engine
 from .fingerprint import fingerprint
 from .frame import Work
@@ -56,6 +57,8 @@ def prepare(job: Job) -> Prepared:
         JobError: a path that cannot be followed.
         SceneError: a scene that cannot be read or rendered.
     """
+    if job.denoise.obscurance:
+        require_denoiser()
     job_eyes, job_lights = eyes(job), lights(job)
     scene = load_scene(job.scene.file, job.scene.materials)
     moved = job_eyes.world_from_camera != job_eyes.world_from_camera[:1]
@@ -109,6 +112,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
         shadow_step=job.samples.shadow_step,
         shadow_unbiased=job.samples.shadow_unbiased,
         layers=job.output.layers,
+        denoise=job.denoise.obscurance,
     )
     return work, ambient
 
@@ -125,8 +129,12 @@ def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Am
 
 
 def job_fingerprint(prepared: Prepared) -> str:
-    """Hash whatever the pixels depend on: the job without its output and machine, and the scene as it was read."""
+    """Hash whatever the pixels depend on: the job without its output and machine, and the scene as it was read.
+
+    Where the scene file lies plays no part.
+    """
     table = {key: value for key, value in job_table(prepared.job).items() if key not in ("output", "render")}
+    del table["scene"]["file"]
     arrays = (np.ascontiguousarray(array).reshape(-1).view(np.uint8).data for array in prepared.surfaces)
     centre = prepared.scene.centre.tobytes()
     return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), centre, *arrays)
