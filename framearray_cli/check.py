@@ -1,5 +1,6 @@
 """What a job will take, without rendering it: `framearray check`."""
 
+import math
 import os
 import shutil
 import tempfile
@@ -10,19 +11,25 @@ from pathlib import Path
 import numpy as np
 import psutil
 
+from .compiling import compile_clock
 from .filepatterns import file_patterns
 from .frame import Crew, Work, find_frame
 from .job import Job
-from .memory import window_memory
-from .prepare import Prepared, open_embree, plan_work, prepare
+from .jobfile import job_table
+from .memory import free_memory, window_memory
+from .outfolder import in_the_way, is_same, read_array
+from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
 from .render import image_format
 from .terms.ambient import Ambient
 from .window import Window
 from .writer import ArrayWriter
 
-# The probe renders at a resolution divided by this: coarse enough to be quick, fine enough that neighbouring rays
-# stay neighbours.
-PROBE_DIVISOR = 4
+# A probe traces about this many rays, which takes a second or two.
+PROBE_RAYS = 12_000_000
+# More pixels a frame tell nothing new; with fewer, threads and batches of hits are not busy as in a render.
+MOST_PIXELS, FEWEST_PIXELS = 12_000, 1_000
+# A first probe of this share of the pixels compiles kernels, and shows how the size of files grows with that of images.
+FIRST_SHARE = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,9 +37,10 @@ class Estimate:
     """What a job takes.
 
     Attributes:
-        memory: bytes of the frames under way; `available`: bytes the machine has free.
+        memory: bytes at most, of the whole program; `available`: bytes the machine can give it.
         disk: bytes of all images and layers; `free`: bytes free where they go.
-        seconds: from start to end, writing included.
+        seconds: from start to end, writing included, with kernels that were compiled before.
+        warnings: what would go wrong.
     """
 
     prepared: Prepared
@@ -42,16 +50,26 @@ class Estimate:
     disk: int
     free: int
     seconds: float
+    warnings: tuple[str, ...]
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What would go wrong."""
-        found = []
-        if self.memory > self.available:
-            found.append("the job needs more memory than is free; fewer lights, a smaller n_r or resolution take less")
-        if self.disk > self.free:
-            found.append("the images need more space than the disk has free")
-        return tuple(found)
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Probe:
+    """What a few small frames took.
+
+    Attributes:
+        pixels: of a frame.
+        seconds: a native hit of the path.
+        file_bytes: of a frame, all its images and layers.
+        mirrored_bytes: of memory, for what the mirrors of a frame under way show.
+        writing: seconds to write a frame and nothing else; measured for a camera that stands still only.
+    """
+
+    pixels: int
+    seconds: float
+    file_bytes: float
+    mirrored_bytes: float
+    writing: float
 
 
 def check(job: Job) -> Estimate:
@@ -59,32 +77,65 @@ def check(job: Job) -> Estimate:
 
     Raises:
         JobError, SceneError: the job cannot be rendered.
+        OutputError: the output folder holds a manifest that cannot be read.
     """
     started = time.perf_counter()
-    prepared = prepare(job)
-    with open_embree(prepared) as embree:
-        work, ambient = plan_work(prepared, embree)
-        before_first_frame = time.perf_counter() - started
-        seconds_a_hit, bytes_a_pixel = _probe(prepared, work, ambient)
+    with compile_clock() as clock:
+        prepared = prepare(job)
+        identity = job_fingerprint(prepared)
+        with open_embree(prepared) as embree:
+            work, ambient = plan_work(prepared, embree)
+            before_frames = time.perf_counter() - started - clock.seconds
+            pixels = _probe_pixels(work)
+            first, second = (_probe(prepared, work, ambient, int(p)) for p in (FIRST_SHARE * pixels, pixels))
+            resident, available = psutil.Process().memory_info().rss, free_memory()
+    scale = work.n_pixels / second.pixels
+    mirrored = second.mirrored_bytes * scale * min(2 * work.n_r + 1, work.n_frames)
+    more = window_memory(work) + int(mirrored)
+    disk = int(_frame_bytes(first, second, work.n_pixels) * prepared.n_cameras)
+    free = shutil.disk_usage(_existing(job.output.directory)).free
     hits = float(work.per_pixel.sum()) * work.n_pixels
+    copies = prepared.n_cameras - work.n_frames  # frames of a camera that stands still, which are written only
     return Estimate(
         prepared=prepared,
         ambient=ambient,
-        memory=window_memory(work),
-        available=psutil.virtual_memory().available,
-        disk=int(bytes_a_pixel * work.n_pixels * prepared.n_cameras),
-        free=shutil.disk_usage(_existing(job.output.directory)).free,
-        seconds=before_first_frame + seconds_a_hit * hits,
+        memory=resident + more,
+        available=resident + available,
+        disk=disk,
+        free=free,
+        seconds=before_frames + second.seconds * hits + second.writing * scale * copies,
+        warnings=_warnings(job, identity, memory_lacks=more > available, disk_lacks=disk > free),
     )
 
 
-def _probe(prepared: Prepared, work: Work, ambient: Ambient) -> tuple[float, float]:
-    """Render and write small frames from the middle of the path: seconds a native hit, and bytes a pixel a camera."""
+def _warnings(job: Job, identity: str, *, memory_lacks: bool, disk_lacks: bool) -> tuple[str, ...]:
+    found = []
+    if memory_lacks:
+        found.append("the job needs more memory than is free; fewer lights, a smaller n_r or resolution take less")
+    if disk_lacks:
+        found.append("the images need more space than the disk has free")
+    folder = job.output.directory
+    old = read_array(folder)
+    if old is not None and not is_same(old, job.name, identity, job_table(job)["output"]):
+        found.append(f"{folder} {in_the_way(old)}")
+    return tuple(found)
+
+
+def _probe_pixels(work: Work) -> int:
+    """Pixels a frame for the second probe."""
+    rays = 1 + work.obscurance.n_rays + work.lights.n_lights + 4 * work.n_r  # about, of a hit
+    hits = float(np.mean(work.per_pixel)) * min(2 * work.n_r + 2, work.n_frames)
+    return int(min(max(PROBE_RAYS / (rays * hits), FEWEST_PIXELS), MOST_PIXELS, work.n_pixels))
+
+
+def _small(work: Work, pixels: int) -> Work:
+    """A few frames from the middle of the path, with about that many pixels each."""
     n = min(2 * work.n_r + 2, work.n_frames)
     first = (work.n_frames - n) // 2
     cams, span = work.cams, slice(first, first + n)
-    width, height = (max(1, -(-side // PROBE_DIVISOR)) for side in (cams.width, cams.height))
-    small = replace(
+    shrink = min(math.sqrt(pixels / work.n_pixels), 1.0)
+    width, height = (max(1, round(side * shrink)) for side in (cams.width, cams.height))
+    return replace(
         work,
         cams=cams._replace(
             position=cams.position[span],
@@ -97,35 +148,66 @@ def _probe(prepared: Prepared, work: Work, ambient: Ambient) -> tuple[float, flo
         ),
         per_pixel=work.per_pixel[span],
     )
-    job = prepared.job
-    patterns = file_patterns(job.name, prepared.n_cameras, prepared.n_lights, job.output.format)
-    crew = Crew(small, job.render.threads or os.cpu_count() or 1)
+
+
+def _probe(prepared: Prepared, work: Work, ambient: Ambient, pixels: int) -> _Probe:
+    """Render and write small frames."""
+    small = _small(work, pixels)
+    n, mirrored, writing = small.n_frames, 0, 0.0
+    crew = Crew(small, prepared.job.render.threads or os.cpu_count() or 1)
     try:
-        with tempfile.TemporaryDirectory() as folder:
-            find_frame(small, 0, crew)  # compiles what is not compiled yet
+        with tempfile.TemporaryDirectory() as name:
             started = time.perf_counter()
-            with ArrayWriter(
-                Path(folder),
-                patterns,
-                prepared.eyes,
-                (width, height),
-                job.output.fps,
-                image_format(job),
-                prepared.n_lights,
-                crew.threads,
-                lambda images: None,
-            ) as writer:
+            with _writer(prepared, small, Path(name), crew.threads) as writer:
                 window = Window(small, ambient, crew)
                 for c in range(n):
-                    window.add(find_frame(small, c, crew))
+                    frame = find_frame(small, c, crew)
+                    if frame.mirrored is not None:
+                        mirrored += frame.mirrored.irradiance.nbytes + 3 * frame.mirrored.reflectivity.nbytes
+                    window.add(frame)
                     for j in window.complete():
-                        writer.write(window.compose(j, writer.block()), range(j, j + 1))
+                        composed = window.compose(j, writer.block())
+                        writer.write(composed, range(j, j + 1))
                 writer.finish()
             seconds = time.perf_counter() - started
-            written = sum(file.stat().st_size for file in Path(folder).iterdir())
+            file_bytes = sum(file.stat().st_size for file in Path(name).iterdir())
+            if prepared.still:
+                started = time.perf_counter()
+                with _writer(prepared, small, Path(name), crew.threads) as writer:
+                    writer.write(composed, range(1))
+                writing = time.perf_counter() - started
     finally:
         crew.close()
-    return seconds / (float(np.sum(small.per_pixel)) * width * height), written / (n * width * height)
+    return _Probe(
+        pixels=small.n_pixels,
+        seconds=seconds / (float(np.sum(small.per_pixel)) * small.n_pixels),
+        file_bytes=file_bytes / n,
+        mirrored_bytes=mirrored / n,
+        writing=writing,
+    )
+
+
+def _writer(prepared: Prepared, small: Work, folder: Path, threads: int) -> ArrayWriter:
+    job = prepared.job
+    return ArrayWriter(
+        folder,
+        file_patterns(job.name, prepared.n_cameras, prepared.n_lights, job.output.format),
+        prepared.eyes,
+        (small.cams.width, small.cams.height),
+        job.output.fps,
+        image_format(job),
+        prepared.n_lights,
+        threads,
+        lambda images: None,
+    )
+
+
+def _frame_bytes(first: _Probe, second: _Probe, pixels: int) -> float:
+    """Bytes of a frame's files. They grow by a power of the pixels: larger images are smoother and compress better."""
+    if first.pixels == second.pixels:
+        return second.file_bytes * pixels / second.pixels
+    power = math.log(second.file_bytes / first.file_bytes) / math.log(second.pixels / first.pixels)
+    return float(second.file_bytes * (pixels / second.pixels) ** min(max(power, 0.5), 1.0))
 
 
 def _existing(folder: Path) -> Path:

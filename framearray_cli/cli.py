@@ -1,6 +1,9 @@
 """The command line: each command parses, calls one function, prints. Only this file ends the process."""
 
+import io
+import signal
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -9,29 +12,50 @@ from rich.console import Console
 
 from . import __version__
 from .errors import FrameArrayError, JobError
-from .screen import ProgressBar, duration, say, size
+from .screen import Screen, duration, say, size
 
 if TYPE_CHECKING:
+    from types import FrameType
+
     from .job import Job
     from .prepare import Prepared
     from .render import Summary
     from .terms.ambient import Ambient
 
-INTERRUPTED = 130  # what shells expect of a program that Ctrl-C ended
+OUT_OF_MEMORY = 2  # the job asks for more than the machine has
+MOST_THREADS = 1024  # as in the job file
 
 app = typer.Typer(
     name="framearray",
     help="Render frame arrays: every image of an animated camera under every position of an animated light.",
-    no_args_is_help=True,
     pretty_exceptions_enable=False,
     add_completion=False,
+    rich_markup_mode=None,  # plain text, also in a log file
 )
 out, err = Console(), Console(stderr=True)
 
 JobFile = Annotated[Path, typer.Argument(metavar="JOB", help="Job file, TOML.", show_default=False)]
-Threads = Annotated[int | None, typer.Option(min=1, help="Threads; default: the job's, else one for each core.")]
-Output = Annotated[Path | None, typer.Option("--output", "-o", help="Folder for the images, instead of the job's.")]
+Threads = Annotated[
+    int | None,
+    typer.Option(
+        "--threads", min=1, max=MOST_THREADS, help="Threads; default: the job's, else one for each core.", metavar="N"
+    ),
+]
+Output = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", help="Folder for the images, instead of the job's.", metavar="FOLDER"),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+
+
+class Stopped(BaseException):
+    """A signal asked the program to end, as Ctrl-C does."""
+
+    def __init__(self, signum: int) -> None:
+        super().__init__(signum)
+        # what shells expect of a program that a signal ended
+        self.exit_code = 128 + signum
+        self.word = "interrupted" if signum == signal.SIGINT else "terminated"
 
 
 def _version(wanted: bool) -> None:
@@ -50,53 +74,65 @@ def _options(
 
 
 @app.command()
-def render(job_file: JobFile, threads: Threads = None, output: Output = None, quiet: Quiet = False) -> None:
+def render(
+    job_file: JobFile,
+    threads: Threads = None,
+    output: Output = None,
+    restart: Annotated[bool, typer.Option("--restart", help="Remove the frame array in the folder first.")] = False,
+    quiet: Quiet = False,
+) -> None:
     """Render every (camera, light) image of a job into a folder, with a manifest."""
-    from .render import Listener
-    from .render import render as run
-
     job = _job(job_file, threads, output)
+    with Screen(out, quiet=quiet) as screen:
+        screen.wait("reading the scene")
+        from .compiling import compile_clock
+        from .render import Listener
+        from .render import render as run
 
-    class Screen(Listener):
-        """Prints the scene, then the ambient light, then a progress bar."""
+        class Shown(Listener):
+            """Prints the scene, then the ambient light, then a progress bar."""
 
-        bar: ProgressBar | None = None
+            def prepared(self, prepared: "Prepared") -> None:
+                screen.say(_scene_lines(prepared))
+                screen.wait("estimating the ambient light")
+                self.total = prepared.n_cameras * prepared.n_lights
 
-        def prepared(self, prepared: "Prepared") -> None:
-            if not quiet:
-                say(out, _scene_lines(prepared))
-            self.total = prepared.n_cameras * prepared.n_lights
+            def removed(self, files: int) -> None:
+                if files:
+                    screen.say([f"removed {files:,} files of the frame array in {job.output.directory}"])
 
-        def planned(self, ambient: "Ambient") -> None:
-            if not quiet:
-                say(out, _ambient_lines(ambient))
-            self.bar = ProgressBar(out, "rendering", self.total, "image", quiet=quiet)
-            self.bar.__enter__()
+            def planned(self, ambient: "Ambient") -> None:
+                screen.say(_ambient_lines(ambient))
+                self.told = ambient.notes
+                screen.count("rendering", self.total, "image")
 
-        def written(self, images: int) -> None:
-            if self.bar is not None:
-                self.bar.advance(images)
+            def written(self, images: int) -> None:
+                screen.advance(images)
 
-        def close(self) -> None:
-            if self.bar is not None:
-                self.bar.__exit__(None, None, None)
-
-    screen = Screen()
-    try:
-        summary = run(job, screen)
-    finally:
-        screen.close()
+        shown = Shown()
+        try:
+            with compile_clock(screen.compiling):
+                summary = run(job, shown, restart=restart)
+        except BaseException as error:
+            if screen.total:
+                done = f"{screen.done:,} of {screen.total:,} images are in {job.output.directory}"
+                error.add_note(f"{done}; its manifest says that it is not finished")
+            raise
     if not quiet:
-        say(out, _summary_lines(summary, job))
+        say(out, _summary_lines(summary, shown.told, job))
 
 
 @app.command()
 def check(job_file: JobFile, threads: Threads = None, output: Output = None) -> None:
     """Validate a job and its scene, and tell its size, memory, disk and time, without rendering it."""
-    from .check import check as run
-
     job = _job(job_file, threads, output)
-    estimate = run(job)
+    with Screen(out) as screen:
+        screen.wait("reading the scene and rendering a few small frames")
+        from .check import check as run
+        from .compiling import compile_clock
+
+        with compile_clock(screen.compiling):
+            estimate = run(job)
     n_c, n_l = estimate.prepared.n_cameras, estimate.prepared.n_lights
     width, height = job.camera.resolution
     say(out, _scene_lines(estimate.prepared))
@@ -104,8 +140,8 @@ def check(job_file: JobFile, threads: Threads = None, output: Output = None) -> 
     say(
         out,
         [
-            f"array: {n_c} cameras x {n_l} lights = {n_c * n_l:,} images of {width} x {height}",
-            f"memory: about {size(estimate.memory)} for the frames under way, {size(estimate.available)} free",
+            f"array: {n_c:,} cameras x {n_l:,} lights = {n_c * n_l:,} images of {width} x {height}",
+            f"memory: about {size(estimate.memory)}, {size(estimate.available)} free",
             f"disk: about {size(estimate.disk)} in {job.output.directory}, {size(estimate.free)} free",
             f"time: about {duration(estimate.seconds)} on this machine",
             *(f"warning: {warning}" for warning in estimate.warnings),
@@ -120,28 +156,32 @@ def assemble(
     target: Annotated[
         Path,
         typer.Option(
-            "--output", "-o", help="movie.mp4 (.mov, .mkv, .webm) or a sequence: frame.####.png", show_default=False
+            "--output",
+            "-o",
+            help="movie.mp4 (.mov, .mkv, .webm) or a sequence: frame.####.png",
+            metavar="FILE",
+            show_default=False,
         ),
     ],
-    exposure: Annotated[float, typer.Option(help="Stops added to movies, PNG and JPEG.")] = 0.0,
+    exposure: Annotated[
+        float, typer.Option("--exposure", help="Stops added to movies, PNG and JPEG.", metavar="STOPS")
+    ] = 0.0,
     quiet: Quiet = False,
 ) -> None:
     """Cut a movie or an image sequence out of a frame array."""
     from .assemble import assemble as run
 
-    bars: list[ProgressBar] = []
+    with Screen(out, quiet=quiet) as screen:
 
-    def progress(done: int, total: int) -> None:
-        if not bars:
-            bars.append(ProgressBar(out, "assembling", total, "frame", quiet=quiet))
-            bars[0].__enter__()
-        bars[0].advance()
+        def progress(done: int, total: int) -> None:
+            if not screen.total:
+                screen.count("assembling", total, "frame")
+            screen.advance()
 
-    try:
-        result = run(array, path_file, target, exposure=exposure, progress=progress)
-    finally:
-        for bar in bars:
-            bar.__exit__(None, None, None)
+        try:
+            result = run(array, path_file, target, exposure=exposure, progress=progress)
+        except JobError as error:
+            _fail(_problems(error, "nothing was written"), error.exit_code)
     if not quiet:
         rate = f"{float(result.fps):g} frames a second"
         say(out, [f"{result.target}: {result.n_frames} frames from {result.n_images} images, {rate}"])
@@ -186,7 +226,12 @@ def _ambient_lines(ambient: "Ambient") -> list[str]:
     ]
 
 
-def _summary_lines(summary: "Summary", job: "Job") -> list[str]:
+def _summary_lines(summary: "Summary", told: Sequence[str], job: "Job") -> list[str]:
+    """What a render took.
+
+    Args:
+        told: notes that were printed before.
+    """
     kinds = summary.rays_per_pixel_image
     mirrors = sum(n for kind, n in kinds.items() if "mirror" in kind or kind == "pilot")
     rays = sum(kinds.values()) - mirrors - kinds["ambient"]
@@ -198,24 +243,48 @@ def _summary_lines(summary: "Summary", job: "Job") -> list[str]:
         f"{summary.images / summary.seconds:.1f} images a second",
         f"{rays:.2f} rays a pixel an image{beside}, {rate:.1f} Mrays/s, "
         f"{summary.hits:.1f} hits a pixel, peak memory {size(summary.peak_memory)}",
-        *(f"note: {note}" for note in summary.notes),
+        *(f"note: {note}" for note in summary.notes if note not in told),
         f"images and manifest: {job.output.directory}",
     ]
 
 
-def _fail(lines: list[str], code: int) -> NoReturn:
+def _problems(error: JobError, outcome: str) -> list[str]:
+    n = len(error.problems)
+    return [*str(error).splitlines(), f"{n} problem{'s' if n > 1 else ''}; {outcome}."]
+
+
+def _fail(lines: Sequence[str], code: int) -> NoReturn:
     say(err, lines)
     sys.exit(code)
 
 
-def main() -> None:
+def _stop(signum: int, frame: "FrameType | None") -> NoReturn:
+    """Turn a signal into an exception, so that everything is tidied up; a second signal ends the process at once."""
+    signal.signal(signum, signal.SIG_DFL)
+    raise Stopped(signum)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and turn errors into messages and exit codes."""
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):  # Windows lacks the last
+            signal.signal(getattr(signal, name), _stop)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a file name that the terminal cannot show is no reason to fail
+            stream.reconfigure(errors="backslashreplace")
+    arguments = sys.argv[1:] if arguments is None else arguments
     try:
-        app(standalone_mode=True)
+        app(list(arguments) or ["--help"], prog_name="framearray")
     except JobError as error:
-        n = len(error.problems)
-        _fail([*str(error).splitlines(), f"{n} problem{'s' if n > 1 else ''}; nothing was rendered."], error.exit_code)
+        _fail(_problems(error, "nothing was rendered"), error.exit_code)
     except FrameArrayError as error:
-        _fail(str(error).splitlines(), error.exit_code)
-    except KeyboardInterrupt:
-        _fail(["interrupted; the images that were finished are kept"], INTERRUPTED)
+        _fail([*str(error).splitlines(), *_notes(error)], error.exit_code)
+    except MemoryError as error:
+        less = "a smaller resolution, n_r or fewer lights take less; `framearray check` tells how much a job needs"
+        _fail([f"not enough memory; {less}", *_notes(error)], OUT_OF_MEMORY)
+    except Stopped as stopped:
+        _fail([stopped.word, *_notes(stopped)], stopped.exit_code)
+
+
+def _notes(error: BaseException) -> list[str]:
+    return list(getattr(error, "__notes__", ()))

@@ -2,18 +2,20 @@
 
 import os
 import time
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 from . import __version__
 from .embree import Engine
+from .errors import OutputError
 from .filepatterns import file_patterns
-from .files import make_folder
 from .frame import Crew, Work, find_frame
 from .images import ImageFormat
 from .job import Job
 from .jobfile import job_table
 from .manifest import Manifest, ManifestCamera, ManifestLight, matrix_rows, write_manifest
-from .memory import peak_memory
+from .memory import peak_memory, require_memory
+from .outfolder import claim_folder
 from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
 from .terms.ambient import Ambient
 from .window import Window
@@ -55,6 +57,9 @@ class Listener:
     def prepared(self, prepared: Prepared) -> None:
         """Inputs were read."""
 
+    def removed(self, files: int) -> None:
+        """That many files of the array that lay in the folder were removed."""
+
     def planned(self, ambient: Ambient) -> None:
         """The ambient light is known."""
 
@@ -62,30 +67,52 @@ class Listener:
         """That many more images are on disk."""
 
 
-def render(job: Job, listener: Listener | None = None, *, engine: Engine = "auto") -> Summary:
+def render(job: Job, listener: Listener | None = None, *, engine: Engine = "auto", restart: bool = False) -> Summary:
     """Render a whole frame array.
 
+    Args:
+        restart: remove the array that lies in the job's folder first; without it, another array there is an error.
+
     Raises:
-        JobError, SceneError: before any ray is cast.
-        OutputError: something could not be written; what was finished stays.
+        JobError, SceneError: the job cannot be rendered.
+        OutputError: something could not be written; images that were finished stay, and the manifest counts them.
     """
     listener = listener or Listener()
     started = time.perf_counter()
     prepared = prepare(job)
     listener.prepared(prepared)
-    make_folder(job.output.directory)
+    folder, identity = job.output.directory, job_fingerprint(prepared)
+    listener.removed(claim_folder(folder, job.name, identity, job_table(job)["output"], restart=restart))
     with open_embree(prepared, engine) as embree:
         work, ambient = plan_work(prepared, embree)
+        require_memory(work, job)
         listener.planned(ambient)
-        manifest = _manifest(prepared, ambient)
-        write_manifest(job.output.directory, manifest)
-        summary = _frames(prepared, work, ambient, listener, started)
-    write_manifest(job.output.directory, _with_summary(manifest, summary))
+        manifest = _manifest(prepared, ambient, identity)
+        write_manifest(folder, manifest)
+        written: list[int] = []
+        try:
+            summary = _frames(prepared, work, ambient, listener, started, written)
+        except BaseException:
+            with suppress(OutputError):  # what stopped the render is told; the manifest may meet the same full disk
+                write_manifest(folder, replace(manifest, summary=manifest.summary | {"images": sum(written)}))
+            raise
+    write_manifest(folder, _with_summary(manifest, summary))
     return summary
 
 
-def _frames(prepared: Prepared, work: Work, ambient: Ambient, listener: Listener, started: float) -> Summary:
-    """Find every frame's hits, compose each frame as soon as its window is complete, write it, forget it."""
+def _frames(
+    prepared: Prepared, work: Work, ambient: Ambient, listener: Listener, started: float, written: list[int]
+) -> Summary:
+    """Find every frame's hits, compose each frame as soon as its window is complete, write it, forget it.
+
+    Args:
+        written: an entry a written image is added, whatever happens afterwards.
+    """
+
+    def count(images: int) -> None:
+        written.append(images)
+        listener.written(images)
+
     job, n_lights = prepared.job, prepared.n_lights
     threads = job.render.threads or os.cpu_count() or 1
     notes, hits = list(ambient.notes), 0.0
@@ -100,7 +127,7 @@ def _frames(prepared: Prepared, work: Work, ambient: Ambient, listener: Listener
         image_format(job),
         n_lights,
         threads,
-        listener.written,
+        count,
     )
     try:
         with writer:
@@ -145,7 +172,7 @@ def _patterns(prepared: Prepared) -> tuple[str, str]:
     return file_patterns(prepared.job.name, prepared.n_cameras, prepared.n_lights, prepared.job.output.format)
 
 
-def _manifest(prepared: Prepared, ambient: Ambient) -> Manifest:
+def _manifest(prepared: Prepared, ambient: Ambient, identity: str) -> Manifest:
     """What a program needs that has never seen this one; everything but how the run went."""
     job, report = prepared.job, prepared.scene.report
     images, layers = _patterns(prepared)
@@ -164,7 +191,7 @@ def _manifest(prepared: Prepared, ambient: Ambient) -> Manifest:
     return Manifest(
         version=__version__,
         name=job.name,
-        fingerprint=job_fingerprint(prepared),
+        fingerprint=identity,
         images=images,
         layers=layers if job.output.layers else "",
         resolution=job.camera.resolution,
@@ -182,14 +209,12 @@ def _manifest(prepared: Prepared, ambient: Ambient) -> Manifest:
             "dropped": report.dropped,
             "notes": list(report.notes),
         },
-        summary={"finished": False, "ambient_paths": ambient.paths},
+        summary={"finished": False, "images": 0, "ambient_paths": ambient.paths},
         directory=job.output.directory,
     )
 
 
 def _with_summary(manifest: Manifest, summary: Summary) -> Manifest:
-    from dataclasses import replace
-
     table = {
         "finished": True,
         "ambient_paths": manifest.summary["ambient_paths"],

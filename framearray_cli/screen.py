@@ -8,6 +8,7 @@ from typing import Self
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.status import Status
 from rich.text import Text
 
 # Plain lines: a log file should tell that work goes on, not fill up.
@@ -26,32 +27,61 @@ class _Rate(ProgressColumn):
         return Text("" if rate is None else f"{rate:.1f} {self._unit}s/s")
 
 
-class ProgressBar:
-    """Counts finished units up to a total."""
+class Screen:
+    """Shows what goes on: first what is waited for, then a count of finished units up to a total.
 
-    def __init__(self, console: Console, label: str, total: int, unit: str, *, quiet: bool) -> None:
-        self._console, self._label, self._total, self._unit = console, label, total, unit
-        self._quiet = quiet
-        self._done = 0
+    On a terminal the last line moves. Elsewhere there are plain lines, rarely. If quiet, there is nothing.
+    """
+
+    def __init__(self, console: Console, *, quiet: bool = False) -> None:
+        self._console, self._quiet = console, quiet
+        self._moving = console.is_terminal and not quiet
         self._lock = threading.Lock()
-        self._started = self._last = time.monotonic()
+        self._status: Status | None = None
         self._bar: Progress | None = None
-        if console.is_terminal and not quiet:
+        self._label = self._unit = ""
+        self._started = self._last = 0.0
+        self.done = self.total = 0
+
+    def say(self, lines: Iterable[str]) -> None:
+        """Print lines, above the moving one."""
+        if not self._quiet:
+            say(self._console, lines)
+
+    def wait(self, what: str) -> None:
+        """Show that something goes on whose end is not known; on a terminal alone."""
+        if self._moving and self._bar is None:
+            if self._status is None:
+                self._status = self._console.status("")
+                self._status.start()
+            self._status.update(Text(what))
+
+    def compiling(self) -> None:
+        """Tell why the first run on a machine starts slowly."""
+        self.say(["compiling for this machine; that takes about a minute, the first time only"])
+
+    def count(self, label: str, total: int, unit: str) -> None:
+        """Start to count."""
+        self._label, self._unit, self.total = label, unit, total
+        self._started = self._last = time.monotonic()
+        self._end_wait()
+        if self._moving:
             self._bar = Progress(
                 TextColumn("{task.description}"),
                 BarColumn(),
                 MofNCompleteColumn(),
                 _Rate(unit),
                 TimeRemainingColumn(),
-                console=console,
+                console=self._console,
                 transient=True,
             )
             self._task = self._bar.add_task(label, total=total)
+            self._bar.start()
 
     def advance(self, units: int = 1) -> None:
         """Count units that were finished; from any thread."""
         with self._lock:
-            self._done += units
+            self.done += units
             if self._bar is not None:
                 self._bar.advance(self._task, units)
                 return
@@ -59,19 +89,23 @@ class ProgressBar:
             if self._quiet or now - self._last < SECONDS_BETWEEN_LINES:
                 return
             self._last = now
-            rate = self._done / (now - self._started)
-            left = duration((self._total - self._done) / rate)
-            line = f"{self._label}: {self._done} of {self._total} {self._unit}s, {rate:.1f} a second, {left} left"
-        self._console.print(line, highlight=False, soft_wrap=True)
+            rate = self.done / (now - self._started)
+            left = duration((self.total - self.done) / rate)
+            line = f"{self._label}: {self.done} of {self.total} {self._unit}s, {rate:.1f} a second, {left} left"
+        say(self._console, [line])
+
+    def _end_wait(self) -> None:
+        if self._status is not None:
+            self._status.stop()
+            self._status = None
 
     def __enter__(self) -> Self:
-        if self._bar is not None:
-            self._bar.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._end_wait()
         if self._bar is not None:
             self._bar.stop()
 

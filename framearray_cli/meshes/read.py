@@ -42,10 +42,8 @@ def read_meshes(file: Path) -> Meshes:
         except AssetError as error:
             raise SceneError(f"{file}: {error}") from error
         except Exception as error:  # readers of broken files raise whatever comes first
-            reason = " ".join(str(error).split())[:MAX_REASON]
-            raise SceneError(
-                f"{file}: broken, or not {extension.upper()}: {type(error).__name__}: {reason}; export it anew"
-            ) from error
+            reason = " ".join(f"{type(error).__name__}: {error}".split())[:MAX_REASON].rstrip(" :")
+            raise SceneError(f"{file}: broken, or not {extension.upper()} ({reason}); export it anew") from error
     if not any(len(part.corners) for part in meshes.parts):
         found = "; ".join((*meshes.notes, *(f"{n} triangles with {why}" for why, n in meshes.dropped.items())))
         raise SceneError(f"{file}: expected triangles, got none" + (f" ({found})" if found else ""))
