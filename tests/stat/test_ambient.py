@@ -1,5 +1,6 @@
 """I_A of a room with a window and the sun outside, against an independent path tracer; and the errors it reports."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -120,8 +121,7 @@ def spread_of(jobs: list[Job]) -> tuple[float, NDArray[np.float64], float]:
     found = []
     with open_embree(prepared) as embree:
         for job in jobs:
-            object.__setattr__(prepared, "job", job)
-            found.append(irradiance(plan_work(prepared, embree)[1]))
+            found.append(irradiance(plan_work(replace(prepared, job=job), embree)[1]))
     means = np.array([e.mean for e in found])
     error = float(np.sqrt(np.mean([e.error**2 for e in found])))
     return float(((means - means.mean()) ** 2).sum() / error**2), means, error

@@ -57,7 +57,7 @@ def hits_of(job: Job) -> Lit:
         work, _ = plan_work(prepared, embree)
         scratch, n = Scratch(work), 1024
         native_hits(
-            work.cams, 0, work.seed, work.order, 1, 0, n, work.surfaces, work.tracer, False,
+            work.cams, 0, work.seed, work.order, 1, 0, 0, n, work.surfaces, work.tracer, False,
             scratch.hit_rays.packets, scratch.hits,
         )  # fmt: skip
         irradiance = np.empty((n, work.lights.channels, work.lights.n_lights), np.float32)

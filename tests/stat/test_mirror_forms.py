@@ -40,10 +40,15 @@ def images_of(parts: list[Part], folder: Path, seed: int, side: float, mirror: f
     return result_of(job).images.reshape(48, -1)
 
 
-def test_a_mirror_shows_the_mirrored_scene(tmp_path: Path) -> None:
+def shown_and_mirrored(folder: Path) -> tuple[Array, Array]:
+    """Independent images of what a mirror shows, and of the mirrored scene."""
     mirror = quad("Mirror", [-3, -3, 0], [6, 0, 0], [0, 6, 0])
-    shown = images_of([*things(), mirror], tmp_path / "mirror", 1, 1.0, HALF)
-    scene = images_of([mirrored(part) for part in things()], tmp_path / "scene", 2, -1.0, None)
+    shown = images_of([*things(), mirror], folder / "mirror", 1, 1.0, HALF)
+    return shown, images_of([mirrored(part) for part in things()], folder / "scene", 2, -1.0, None)
+
+
+def test_a_mirror_shows_the_mirrored_scene(tmp_path: Path) -> None:
+    shown, scene = shown_and_mirrored(tmp_path)
     assert (scene.mean(axis=0) > 0).mean() > 0.7
     assert differing(shown, HALF * scene).max() < 1
     assert differing(shown, 0.51 * scene).max() > 1  # the test can fail: by a tint that is wrong by 2 %
@@ -52,18 +57,22 @@ def test_a_mirror_shows_the_mirrored_scene(tmp_path: Path) -> None:
 
 
 GAP, TOP, CEILING = 2.0, 1.0, 1.5  # two mirrors of height TOP stand GAP apart below a ceiling
+BOUNCES = (1, 2, 3, 5)
 TINTS = np.array([[0.9, 0.6, 0.3], [0.5, 0.8, 1.0]])
 
 
-@pytest.fixture(scope="module")
-def facing(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def facing_parts() -> list[Part]:
     """Mirrors at z = 0 and z = GAP, and a ceiling over them."""
-    parts = [
+    return [
         quad("Near", [-2, -1, 0], [4, 0, 0], [0, 1 + TOP, 0]),
         quad("Far", [-2, -1, GAP], [4, 0, 0], [0, 1 + TOP, 0]),
         quad("Ceiling", [-3, CEILING, -9], [6, 0, 0], [0, 0, 18]),
     ]
-    return write_scene(tmp_path_factory.mktemp("facing"), parts)
+
+
+@pytest.fixture(scope="module")
+def facing(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_scene(tmp_path_factory.mktemp("facing"), facing_parts())
 
 
 def unfolded(bounces: int) -> tuple[list[float], float]:
@@ -80,34 +89,37 @@ def unfolded(bounces: int) -> tuple[list[float], float]:
     return [0.0, slope, GAP / 2 - 1.0], beyond if bounces % 2 else GAP - beyond
 
 
-@pytest.mark.parametrize("bounces", [1, 2, 3, 5])
-def test_facing_mirrors(bounces: int, facing: Path, tmp_path: Path) -> None:
+def facing_image(scene: Path, out: Path, bounces: int, depth: int) -> tuple[Array, Array]:
+    """Mean radiance of a spot of the ceiling behind some mirrors, found and right; mirrors are followed to a depth."""
     target, z = unfolded(bounces)
     lamp = np.array([0.3, 1.2, 0.8])  # between the mirrors' top and the ceiling: nothing shades it
-
-    def image(depth: int) -> Array:
-        job = make_job(
-            facing, tmp_path / str(depth), camera=look([0, 0, GAP / 2], target, fov=0.001),
-            materials={
-                "Near": {"reflectivity": 0.0, "specular": TINTS[0].tolist()},
-                "Far": {"reflectivity": 0.0, "specular": TINTS[1].tolist()},
-                "Ceiling": HALF,
-            },
-            lights=[point(lamp, 2.0)], specular={"depth": depth}, ambient={"intensity": 0.0},
-        )  # fmt: skip
-        return result_of(job).images[0, 0].reshape(-1, 3)
-
+    job = make_job(
+        scene, out, camera=look([0, 0, GAP / 2], target, fov=0.001),
+        materials={
+            "Near": {"reflectivity": 0.0, "specular": TINTS[0].tolist()},
+            "Far": {"reflectivity": 0.0, "specular": TINTS[1].tolist()},
+            "Ceiling": HALF,
+        },
+        lights=[point(lamp, 2.0)], specular={"depth": depth}, ambient={"intensity": 0.0},
+    )  # fmt: skip
     place, normal = np.array([[0.0, CEILING, z]]), np.array([[0.0, -1.0, 0.0]])
     tint = TINTS[0] ** ((bounces + 1) // 2) * TINTS[1] ** (bounces // 2)
     right = tint * HALF / np.pi * float(forms.point_irradiance(place, normal, lamp, 2.0)[0])
     # a pixel sees a thousandth of a unit of the far ceiling; the mean over all pixels is that of their middle
-    assert image(bounces).mean(axis=0) == pytest.approx(right, rel=1e-4)
-    assert (image(bounces - 1) == 0).all()  # one bounce more than is followed stays black
+    return result_of(job).images[0, 0].mean(axis=(0, 1)), right
 
 
-def test_tints_multiply(facing: Path) -> None:
+@pytest.mark.parametrize("bounces", BOUNCES)
+def test_facing_mirrors(bounces: int, facing: Path, tmp_path: Path) -> None:
+    found, right = facing_image(facing, tmp_path / "all", bounces, bounces)
+    assert found == pytest.approx(right, rel=1e-4)
+    found, _ = facing_image(facing, tmp_path / "less", bounces, bounces - 1)
+    assert (found == 0).all()  # one bounce more than is followed stays black
+
+
+def test_tints_tell_depths_apart() -> None:
     """The expected values tell tints and depths apart, so the test above can fail."""
-    tints = [TINTS[0] ** ((b + 1) // 2) * TINTS[1] ** (b // 2) for b in (1, 2, 3, 5)]
+    tints = [TINTS[0] ** ((b + 1) // 2) * TINTS[1] ** (b // 2) for b in BOUNCES]
     for i, a in enumerate(tints):
         for b in tints[:i]:
             assert not np.allclose(a, b, rtol=1e-3)
