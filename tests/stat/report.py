@@ -11,6 +11,7 @@ from pathlib import Path
 import closed_forms as forms
 import numpy as np
 import test_ambient as ambient
+import test_direct_forms as direct
 import test_furnace as furnace
 import test_mirror_forms as mirrors
 import test_obscurance_forms as obscurance
@@ -80,19 +81,34 @@ def obscurance_section(folder: Folders) -> Iterator[str]:
     yield row(f'sqrt, `outside = "background"`, a sky of {obscurance.SKY}', right, found)
 
 
+def direct_section(folder: Folders) -> Iterator[str]:
+    """Direct light at each hit."""
+    yield "\n## Direct light\n"
+    yield "Irradiance at each hit of a view of a floor, a slope and a table that shades the floor."
+    yield "\n| source | hits in the light | largest relative error | hits in the shadow | largest irradiance |"
+    yield "|---|---|---|---|---|"
+    scene = write_scene(folder(), direct.table_parts())
+    for kind in ("point", "directional"):
+        lit, right, clear, dark = direct.compared(kind, scene, folder())
+        clear &= right > 0
+        got = lit.irradiance[:, 0]
+        error = np.abs(got[clear] / right[clear] - 1).max()
+        yield f"| {kind} | {clear.sum()} | {error:.1e} | {dark.sum()} | {got[dark].max():g} |"
+
+
 def furnace_section(folder: Folders) -> Iterator[str]:
     """Direct plus indirect light inside a sphere."""
     yield "\n## Furnace\n"
-    yield f"`jobs/furnace-*.toml`, {furnace.SEEDS} seeds: mean radiance of all pixels, direct plus indirect;"
+    yield f"The furnaces of `jobs/`, {furnace.SEEDS} seeds: mean radiance of all pixels, direct plus indirect;"
     yield "the light in the middle (l = 0) and off it (l = 2)."
     yield from table("R, method")
     for reflectivity in (0.2, 0.5, 0.8):
-        direct = furnace.expected_direct(reflectivity).mean(axis=(0, 2, 3))
+        lit = furnace.expected_direct(reflectivity).mean(axis=(0, 2, 3))
         for method in ("eye", "light"):
             found, _ = furnace.measured(reflectivity, method, folder())
             for l in (0, 2):
-                right = float(direct[l]) + forms.furnace_indirect(reflectivity)
-                yield row(f"{reflectivity}, {method}, l = {l}", right, estimate(found[:, l] + direct[l]))
+                right = float(lit[l]) + forms.furnace_indirect(reflectivity)
+                yield row(f"{reflectivity}, {method}, l = {l}", right, estimate(found[:, l] + lit[l]))
 
 
 def ambient_section(folder: Folders) -> Iterator[str]:
@@ -156,7 +172,7 @@ def reuse_section(folder: Folders) -> Iterator[str]:
             yield f"| {weights}, {hits:g} | {(off > 1).sum()} of {len(off)} | {np.sqrt(max(bias, 0.0)):.4f} |"
 
 
-SECTIONS = (obscurance_section, furnace_section, ambient_section, mirror_section, reuse_section)
+SECTIONS = (obscurance_section, direct_section, furnace_section, ambient_section, mirror_section, reuse_section)
 
 
 def main(page: Path) -> None:

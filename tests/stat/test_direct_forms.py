@@ -7,7 +7,7 @@ import closed_forms as forms
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from stages import look, make_job, point, quad, result_of, sun, write_scene
+from stages import Part, look, make_job, point, quad, result_of, sun, write_scene
 
 from framearray_cli.frame import Scratch
 from framearray_cli.hits import SURFACE, native_hits
@@ -23,15 +23,18 @@ LOW, HIGH, HEIGHT = np.array([-0.6, -0.5]), np.array([0.5, 0.7]), 1.1  # a table
 EDGE = 1e-4  # hits whose shadow ray passes the table's rim this closely count as either lit or not
 
 
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def table_parts() -> list[Part]:
     """A floor, a sloping board, and a table over the floor."""
-    parts = [
+    return [
         quad("Floor", [-3, 0, -3], [0, 0, 6], [6, 0, 0]),
         quad("Slope", [-3, 0, -1.5], [6, 0, 0], [0, 2, -1.5]),
         quad("Table", [LOW[0], HEIGHT, LOW[1]], [0, 0, HIGH[1] - LOW[1]], [HIGH[0] - LOW[0], 0, 0]),
     ]
-    return write_scene(tmp_path_factory.mktemp("table"), parts)
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_scene(tmp_path_factory.mktemp("table"), table_parts())
 
 
 def job_of(scene: Path, out: Path, lights: list[dict[str, object]], camera: dict[str, object]) -> Job:
@@ -82,18 +85,23 @@ def shadow(points: Array, way: Array, length: float) -> tuple[Array, Array]:
 VIEW = {"resolution": [32, 32], "fov": 60.0, "keys": [{"frame": 0, "eye": [0.4, 2.4, 2.9], "target": [0, 0.3, -0.5]}]}
 
 
-@pytest.mark.parametrize("kind", ["point", "directional"])
-def test_every_hit(kind: str, scene: Path, tmp_path: Path) -> None:
+def compared(kind: str, scene: Path, out: Path) -> tuple[Lit, Array, Array, Array]:
+    """Hits and the right irradiance without shadows; which of them are clear, and which the table shades."""
     source = point(LAMP, LAMP_POWER) if kind == "point" else sun(SUN, SUN_POWER)
-    lit = hits_of(job_of(scene, tmp_path, [source], VIEW))
+    lit = hits_of(job_of(scene, out, [source], VIEW))
     if kind == "point":
         right = forms.point_irradiance(lit.position, lit.normal, LAMP, LAMP_POWER)
         shaded, unsure = shadow(lit.position, LAMP - lit.position, 1.0)
     else:
         right = forms.directional_irradiance(lit.normal, SUN, SUN_POWER)
         shaded, unsure = shadow(lit.position, np.tile(-SUN, (len(lit.position), 1)), np.inf)
-    behind = slope_hides(lit, kind)
-    clear, dark = ~unsure & ~behind, shaded & ~behind
+    behind = slope_hides(lit)
+    return lit, right, ~unsure & ~behind, shaded & ~behind
+
+
+@pytest.mark.parametrize("kind", ["point", "directional"])
+def test_every_hit(kind: str, scene: Path, tmp_path: Path) -> None:
+    lit, right, clear, dark = compared(kind, scene, tmp_path)
     assert clear.sum() > 500
     assert dark.sum() > 50  # with and without an occluder
     got = lit.irradiance[:, 0]
@@ -103,7 +111,7 @@ def test_every_hit(kind: str, scene: Path, tmp_path: Path) -> None:
     assert not np.allclose(got[clear], 1.001 * right[clear], rtol=1e-4)  # the test can fail
 
 
-def slope_hides(lit: Lit, kind: str) -> Array:
+def slope_hides(lit: Lit) -> Array:
     """Hits behind the slope, which is left out of the formula; the lights stand before it."""
     return lit.position[:, 2] < -1.5 - 1e-3 - lit.position[:, 1] * 1.5 / 2
 
