@@ -16,6 +16,7 @@ from .jobfile import job_table
 from .lights import LightArrays, light_arrays
 from .paths import Eyes, Lights, eyes, lights
 from .plan import frame_hits
+from .sampling import lattice_steps
 from .scene import Scene, load_scene
 from .surface import Surfaces, surfaces
 from .terms.ambient import Ambient, ambient_by_eye, fixed_ambient
@@ -87,6 +88,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
     n_r = job.reuse.n_r
     if prepared.still:  # one frame, with the hits that its whole window would have
         cams = cams._replace(**{name: getattr(cams, name)[:1] for name in ("position", "right", "up", "forward")})
+    step_x, step_y = lattice_steps(job.samples.obscurance)
     mirrors = scene.has_mirrors and job.specular.depth > 0
     work = Work(
         cams=cams,
@@ -98,6 +100,8 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
             falloff=FALLOFFS[job.obscurance.falloff],
             tau=job.obscurance.tau,
             n_rays=job.samples.obscurance,
+            step_x=step_x,
+            step_y=step_y,
             sky=job.obscurance.outside == "background",
             average=ambient.reflectivity,
             background=background,

@@ -4,6 +4,8 @@ A number depends on its key alone, never on order: images are the same for any n
 job. Lights are not part of the key, so that all lights share hits and directions and movies do not flicker.
 """
 
+import math
+
 import numpy as np
 
 from .arrays import Real, Triple
@@ -44,12 +46,29 @@ def word(key: np.uint64, dimension: int) -> np.uint64:
 
 
 @inlined
-def r2(bits: np.uint64, i: int) -> tuple[Real, Real]:
-    """Point i of the golden ratio sequence, shifted by the random bits: uniform in [0, 1)^2, well spread over i."""
-    x = np.uint32(bits & np.uint64(0xFFFFFFFF)) + np.uint32(i) * R2_X
-    y = np.uint32(bits >> np.uint64(32)) + np.uint32(i) * R2_Y
+def shifted(bits: np.uint64, i: int, step_x: int, step_y: int) -> tuple[Real, Real]:
+    """Point i of a lattice, shifted by the random bits: uniform in [0, 1)^2; steps in units of 2^-32."""
+    x = np.uint32(bits & np.uint64(0xFFFFFFFF)) + np.uint32(i) * np.uint32(step_x)
+    y = np.uint32(bits >> np.uint64(32)) + np.uint32(i) * np.uint32(step_y)
     x, y = np.uint32(x) >> np.uint32(8), np.uint32(y) >> np.uint32(8)  # 24 bits: what float32 holds below 1
     return np.float32(x) * _U32, np.float32(y) * _U32
+
+
+@inlined
+def r2(bits: np.uint64, i: int) -> tuple[Real, Real]:
+    """Point i of the golden ratio sequence, shifted by the random bits: well spread however many follow."""
+    return shifted(bits, i, R2_X, R2_Y)
+
+
+def lattice_steps(n: int) -> tuple[int, int]:
+    """Steps of a lattice of n points for `shifted`: better spread than n points of the golden ratio sequence.
+
+    Point i is (i / n, a i / n) mod 1, with a next to n / golden ratio and coprime to n (a Korobov lattice). The
+    variance of a mean over 5 points is about half of that of 5 points of the sequence.
+    """
+    wanted = n / ((1 + math.sqrt(5)) / 2)
+    a = min((a for a in range(1, n + 1) if math.gcd(a, n) == 1), key=lambda a: abs(a - wanted))
+    return round(2**32 / n) % 2**32, round(a * 2**32 / n) % 2**32
 
 
 @inlined

@@ -94,8 +94,8 @@ class Scene:
 
     @property
     def has_mirrors(self) -> bool:
-        """Whether any material reflects specularly; without one the specular code never runs."""
-        return bool((self.specular > 0).any())
+        """Whether any triangle reflects specularly; without one the specular code never runs."""
+        return bool((self.specular[np.unique(self.material)] > 0).any())
 
 
 def load_scene(file: Path, overrides: Mapping[str, Override] | None = None) -> Scene:

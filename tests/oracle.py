@@ -106,7 +106,7 @@ class Oracle:
         sample = np.broadcast_to(sample, len(pixel))
         shared = rnd.bits(rnd.keys(self.job.seed, k, pixel, np.full(len(pixel), rnd.WHOLE_PIXEL)), rnd.PIXEL)
         corner = np.stack([pixel % self.width, pixel // self.width], axis=1)
-        origins, dirs = self.rays_through(k, corner + rnd.points(shared, sample))
+        origins, dirs = self.rays_through(k, corner + rnd.points(shared, sample, rnd.sequence()))
         return self.model.look(origins, dirs, rnd.keys(self.job.seed, k, pixel, sample), pixel)
 
     # -- what a hit shows
@@ -150,7 +150,7 @@ class Oracle:
         sky = self.job.obscurance.outside == "background"
         owner, ray = np.repeat(np.arange(len(hits)), n), np.tile(np.arange(n), len(hits))
         words = rnd.bits(hits.key, rnd.HEMISPHERE)
-        dirs = rnd.hemisphere(hits.shading[owner], rnd.points([words[i] for i in owner], ray))
+        dirs = rnd.hemisphere(hits.shading[owner], rnd.points([words[i] for i in owner], ray, rnd.lattice(n)))
         g = hits.geometric[owner]
         dirs -= 2 * np.minimum(dot(dirs, g), 0)[:, None] * g  # up from below the triangle
         triangle, uv, distance = self.model.first(hits.start[owner], dirs, np.inf if sky else d_max)

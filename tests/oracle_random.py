@@ -6,10 +6,11 @@ One number is a function of (seed, c, pixel, sample, dimension):
     bits     = mix(key + dimension G)
     point i  = ((low half of bits, high half of bits) / 2^32 + i (1/g, 1/g^2)) mod 1,  g the plastic number
 
+or, of n points, + i (1, a) / n with a next to n / golden ratio and coprime to n (`lattice`),
 with mix the finaliser of SplitMix64 and G = 2^64 / golden ratio. Points keep 24 bits, what float32 holds below 1.
 """
 
-from math import isqrt
+from math import gcd, isqrt
 from typing import Any
 
 import numpy as np
@@ -44,10 +45,22 @@ def bits(key: Any, dimension: int) -> Any:
     return mix(k + dimension * GOLDEN & MASK for k in key)
 
 
-def points(words: Any, indices: Any) -> Any:
-    """(n, 2) point of each pair (bits, index), in [0, 1)."""
+def sequence() -> tuple[int, int]:
+    """Steps of the golden ratio sequence in units of 2^-32."""
     g = np.roots([1, 0, -1, -1])[0].real  # g^3 = g + 1
-    steps = [round(2**32 / g), round(2**32 / g**2)]
+    return round(2**32 / g), round(2**32 / g**2)
+
+
+def lattice(n: int) -> tuple[int, int]:
+    """Steps of a lattice of n points, likewise."""
+    golden = (1 + 5**0.5) / 2
+    near = sorted(range(1, n + 1), key=lambda a: abs(a - n / golden))
+    a = next(a for a in near if gcd(a, n) == 1)
+    return round(2**32 / n), round(a * 2**32 / n)
+
+
+def points(words: Any, indices: Any, steps: tuple[int, int]) -> Any:
+    """(n, 2) point of each pair (bits, index), in [0, 1)."""
     halves = [(word & 0xFFFFFFFF, word >> 32) for word in words]
     whole = [
         [(half + int(i) * step) % 2**32 >> 8 for half, step in zip(pair, steps, strict=True)]

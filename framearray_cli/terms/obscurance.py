@@ -16,7 +16,7 @@ from ..embree.packets import LANES, MISS, TFAR, Tracer, U, V, hit_triangle, inte
 from ..hits import Hits, ray_origin, reflects
 from ..kernel import inlined, kernel
 from ..rays import Rays
-from ..sampling import HEMISPHERE, above, cosine_direction, r2, word
+from ..sampling import HEMISPHERE, above, cosine_direction, shifted, word
 from ..surface import Surfaces, reflectivity_at, specular_at
 
 SQRT, LINEAR, CBRT, EXPONENTIAL, CONSTANT = range(5)
@@ -31,6 +31,7 @@ class ObscuranceSettings(NamedTuple):
         falloff: code of the curve rho.
         tau: steepness of the exponential curve.
         n_rays: rays a hit.
+        step_x, step_y: the lattice that spreads them, see `lattice_steps`.
         sky: whether rays are traced past d_max and escaping ones see the background.
         average: (3,) reflectivity that stands in for R(Q) where a ray meets nothing.
         background: (3,) radiance outside the scene.
@@ -40,6 +41,8 @@ class ObscuranceSettings(NamedTuple):
     falloff: int
     tau: float
     n_rays: int
+    step_x: int
+    step_y: int
     sky: bool
     average: Rgb
     background: Rgb
@@ -132,7 +135,7 @@ def obscurance(
         mx, my, mz = hits.shading[i, 0], hits.shading[i, 1], hits.shading[i, 2]
         bits = word(hits.key[i], HEMISPHERE)
         for ray in range(settings.n_rays):
-            a, b = r2(bits, ray)
+            a, b = shifted(bits, ray, settings.step_x, settings.step_y)
             x, y, z = cosine_direction(mx, my, mz, a, b)
             x, y, z = above(x, y, z, gx, gy, gz)
             set_ray(rays.packets, waiting, ox, oy, oz, x, y, z, reach)

@@ -12,6 +12,7 @@ from framearray_cli.hits import ESCAPED, SURFACE, Hits, empty_hits
 from framearray_cli.kernel import kernel
 from framearray_cli.meshes import Material
 from framearray_cli.rays import room_for_hits
+from framearray_cli.sampling import lattice_steps
 from framearray_cli.scene import Scene
 from framearray_cli.surface import surfaces
 from framearray_cli.terms.obscurance import CONSTANT, FALLOFFS, SQRT, ObscuranceSettings, obscurance, rho
@@ -41,7 +42,8 @@ def gathered(scene: Scene, hits: Hits, room: int = 4096, **changes: Any) -> tupl
     """W (n, 3), S (n, 3) and the number of rays."""
     values = {"d_max": 1.0, "falloff": SQRT, "tau": 3.0, "n_rays": 5, "sky": False} | changes
     background = np.float32(values.pop("background", (0, 0, 0)))
-    settings = ObscuranceSettings(**values, average=AVERAGE, background=background)
+    step_x, step_y = lattice_steps(values["n_rays"])
+    settings = ObscuranceSettings(**values, step_x=step_x, step_y=step_y, average=AVERAGE, background=background)
     n = len(hits.kind)
     result, sky = np.full((n, 3), np.nan, np.float32), np.full((n if settings.sky else 0, 3), np.nan, np.float32)
     with EmbreeScene(scene) as embree:
