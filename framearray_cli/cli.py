@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 
 from . import __version__
-from .errors import FrameArrayError, JobError
+from .errors import FrameArrayError, JobError, OutputError
 from .screen import Screen, duration, say, size
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .terms.ambient import Ambient
 
 OUT_OF_MEMORY = 2  # the job asks for more than the machine has
+LITTLE_SPACE = 64 * 1024 * 1024  # bytes; with less, a full disk is the likely reason of an error
 MOST_THREADS = 1024  # as in the job file
 
 app = typer.Typer(
@@ -60,7 +61,7 @@ class Stopped(BaseException):
 
 def _version(wanted: bool) -> None:
     if wanted:
-        print(f"framearray {__version__}")
+        say(out, [f"framearray {__version__}"])
         raise typer.Exit
 
 
@@ -86,6 +87,7 @@ def render(
     with Screen(out, quiet=quiet) as screen:
         screen.wait("reading the scene")
         from .compiling import compile_clock
+        from .outfolder import free_space
         from .render import Listener
         from .render import render as run
 
@@ -114,7 +116,9 @@ def render(
             with compile_clock(screen.compiling):
                 summary = run(job, shown, restart=restart)
         except BaseException as error:
-            if screen.total:
+            if isinstance(error, OutputError) and (left := free_space(job.output.directory)) < LITTLE_SPACE:
+                error.add_note(f"the disk has {size(left)} free")
+            if screen.done:
                 done = f"{screen.done:,} of {screen.total:,} images are in {job.output.directory}"
                 error.add_note(f"{done}; its manifest says that it is not finished")
             raise
@@ -194,7 +198,7 @@ def schema() -> None:
 
     from .jobfile import job_schema
 
-    print(json.dumps(job_schema(), indent=2))
+    say(out, json.dumps(job_schema(), indent=2).splitlines())
 
 
 def _job(job_file: Path, threads: int | None, output: Path | None) -> "Job":

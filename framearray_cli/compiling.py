@@ -26,7 +26,7 @@ def compile_clock(begins: Callable[[], None] = lambda: None) -> Iterator[Compile
     # Numba compiles one function at a time, and those that it calls within it: only the outermost is timed.
     starts: list[float] = []
 
-    class Listener(event.Listener):  # type: ignore[misc]  # numba has no types
+    class Listener(event.Listener):
         def on_start(self, event: object) -> None:
             if not starts and clock.seconds == 0.0:
                 begins()

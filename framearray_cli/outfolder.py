@@ -1,5 +1,6 @@
 """Whose folder it is: the files of one frame array never mix with those of another."""
 
+import shutil
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -66,6 +67,13 @@ def in_the_way(old: Manifest) -> str:
         f"holds another frame array, {old.name!r} with {images}, made by a different job or from a different scene; "
         "choose another folder with --output, or remove that array with --restart"
     )
+
+
+def free_space(folder: Path) -> int:
+    """Bytes free on the disk of a folder, or of the nearest one above it that exists."""
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    return shutil.disk_usage(folder).free
 
 
 def remove_array(old: Manifest) -> int:

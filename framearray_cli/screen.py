@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Iterable
+from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
@@ -10,6 +11,9 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.status import Status
 from rich.text import Text
+
+from .errors import OutputError
+from .files import reason
 
 # Plain lines: a log file should tell that work goes on, not fill up.
 SECONDS_BETWEEN_LINES = 5.0
@@ -92,7 +96,8 @@ class Screen:
             rate = self.done / (now - self._started)
             left = duration((self.total - self.done) / rate)
             line = f"{self._label}: {self.done} of {self.total} {self._unit}s, {rate:.1f} a second, {left} left"
-        say(self._console, [line])
+        with suppress(OutputError):  # no reason to end a long render
+            say(self._console, [line])
 
     def _end_wait(self) -> None:
         if self._status is not None:
@@ -111,9 +116,18 @@ class Screen:
 
 
 def say(console: Console, lines: Iterable[str]) -> None:
-    """Print lines as they are: no wrapping, no markup, no colours."""
-    for line in lines:
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+    """Print lines as they are: no wrapping, no markup, no colours.
+
+    Raises:
+        OutputError: they cannot be printed, into a file on a full disk for instance.
+    """
+    try:
+        for line in lines:
+            console.print(line, markup=False, highlight=False, soft_wrap=True, emoji=False)
+    except BrokenPipeError:  # whoever read it has gone
+        raise
+    except OSError as error:
+        raise OutputError(f"standard output: cannot be written: {reason(error)}") from error
 
 
 def duration(seconds: float) -> str:
