@@ -17,6 +17,10 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from .kernelcache import use_own_cache
+
+use_own_cache()  # before the first kernel is declared
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 _LINE = 64  # bytes
@@ -37,7 +41,7 @@ def inlined(function: F) -> F:
 
 
 def _prefetch_row_of(typingctx: Any, array: Any, i: Any) -> Any:
-    """Ask for array[i], (n, 1 or 3, m), to be brought into the cache, one request a cache line; nothing waits for it."""
+    """Ask for array[i] of a 3-d array to be brought into the cache, a request a cache line; nothing waits for it."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         view = context.make_array(signature.args[0])(context, builder, args[0])

@@ -10,7 +10,6 @@ from .camera import cameras
 from .denoise import require_denoiser
 from .embree import EmbreeScene, Engine
 from .fingerprint import fingerprint
-from .frame import Work
 from .job import Job
 from .jobfile import job_table
 from .lights import LightArrays, light_arrays
@@ -22,6 +21,7 @@ from .surface import Surfaces, surfaces
 from .terms.ambient import Ambient, ambient_by_eye, fixed_ambient
 from .terms.ambient_light import ambient_by_light
 from .terms.obscurance import FALLOFFS, ObscuranceSettings
+from .work import Work
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -124,7 +124,9 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
 def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Ambient:
     job, seed = prepared.job, prepared.job.seed
     if job.ambient.method == "light" and job.ambient.intensity is None:
-        return ambient_by_light(seed, job.ambient.paths, prepared.surfaces, embree.tracer, prepared.light_arrays)
+        return ambient_by_light(
+            seed, job.ambient.paths, prepared.surfaces, embree.tracer, prepared.light_arrays, background
+        )
     cams = cameras(prepared.eyes, job.camera.resolution, prepared.scene.centre)
     args = (cams, seed, job.ambient.paths, prepared.surfaces, embree.tracer, prepared.light_arrays, background)
     if job.ambient.intensity is not None:

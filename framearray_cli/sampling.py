@@ -11,7 +11,6 @@ import numpy as np
 from .arrays import Real, Triple
 from .kernel import inlined
 
-
 # Dimensions: one stream a purpose.
 PIXEL, HEMISPHERE, CHOICE, STEPS = 0, 1, 2, 3
 PIXEL_SAMPLE = (1 << 16) - 1  # the sample index, which no hit has, of what all samples of a pixel share
@@ -46,7 +45,7 @@ def word(key: np.uint64, dimension: int) -> np.uint64:
 
 
 @inlined
-def shifted(bits: np.uint64, i: int, step_x: int, step_y: int) -> tuple[Real, Real]:
+def shifted(bits: np.uint64, i: int, step_x: int | np.uint32, step_y: int | np.uint32) -> tuple[Real, Real]:
     """Point i of a lattice, shifted by the random bits: uniform in [0, 1)^2; steps in units of 2^-32."""
     x = np.uint32(bits & np.uint64(0xFFFFFFFF)) + np.uint32(i) * np.uint32(step_x)
     y = np.uint32(bits >> np.uint64(32)) + np.uint32(i) * np.uint32(step_y)

@@ -14,10 +14,12 @@ import numpy as np
 
 from .arrays import Float32, Images, Int32
 from .compose import INDIRECT, OBSCURANCE, Band, accumulate, begin, empty_band, finish, normalise
+from .crew import Crew, Scratch
 from .denoise import denoised
-from .frame import Crew, Frame, Placed, Records, Scratch, Work, fill_holes
+from .frame import Frame, fill_holes
 from .kernel import kernel
 from .terms.ambient import Ambient
+from .work import Placed, Records, Work
 
 # Pixels composed together: their sums over all lights fit a core's cache.
 BAND_PIXELS = 1024

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from scenes import Glb, png
 
+from framearray_cli.crew import Crew
 from framearray_cli.embree import Engine
-from framearray_cli.frame import Crew, Work, find_frame
+from framearray_cli.frame import find_frame
 from framearray_cli.job import Job
 from framearray_cli.lights import light_arrays
 from framearray_cli.meshes import Material, Meshes, Part
@@ -20,6 +21,7 @@ from framearray_cli.scene import Scene, build_scene
 from framearray_cli.surface import surfaces
 from framearray_cli.terms.ambient import Ambient
 from framearray_cli.window import Composed, Window
+from framearray_cli.work import Work
 
 PLAIN, FLOOR, PAINTED, SMOOTH, MIRROR, GLOSSY = range(6)
 MATERIALS = (

@@ -57,7 +57,6 @@ def _surfaces_at(table: Any) -> Surfaces:
 def _filter() -> Any:
     """The compiled callback `void (RTCFilterFunctionNArguments*)`."""
 
-    @_cfunc(types.void(types.intp), nopython=True, cache=True)
     def filter_masked(address: int) -> None:
         arguments = _carray(_pointer(address), (6,), np.int64)
         n = _carray(_pointer(address + 40), (1,), np.uint32)[0]
@@ -73,7 +72,7 @@ def _filter() -> Any:
                 if is_cut_out(s, triangle, hits[_HIT_U, lane], hits[_HIT_V, lane]):
                     valid[lane] = 0
 
-    return filter_masked
+    return _cfunc(types.void(types.intp), nopython=True, cache=True)(filter_masked)
 
 
 class MaskTable:

@@ -67,7 +67,7 @@ def _keep_lit(row: Float32) -> int:
 
 @inlined
 def _queue(row: Float32, first: int, m: int, origin: Triple, reach: Real, rays: Rays, waiting: int) -> None:
-    """Write candidates first to first + m - 1 as waiting rays; they fit one packet, so each loop is one vector store."""
+    """Write candidates first to first + m - 1 as waiting rays; they fit one packet: a few vector stores."""
     p, lane = waiting >> 4, waiting & 15
     ox, oy, oz = origin
     for k in range(m):

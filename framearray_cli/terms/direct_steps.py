@@ -58,9 +58,9 @@ def room_for_steps(n_lights: int) -> Steps:
 
 
 @inlined
-def _second(l: int, step: int, phase: int) -> int:
+def _second(l: int, step: int, phase: int | np.int64) -> int:
     """The position tested after the first one, l, of a run; the others follow `step` apart, and the run's end."""
-    return l + 1 + (phase - l - 1) % step
+    return l + 1 + int((phase - l - 1) % step)
 
 
 @inlined
@@ -68,7 +68,7 @@ def _run_end(room: Steps, b: int, l: int) -> int:
     """The last of the positions from l on that are in front of hit b."""
     n_lights = room.factor.shape[1]
     if room.in_front[b] == n_lights:
-        return n_lights - 1
+        return int(n_lights - 1)
     while l + 1 < n_lights and room.factor[b, l + 1] > 0.0:
         l += 1
     return l

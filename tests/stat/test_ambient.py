@@ -170,7 +170,6 @@ def test_white_surfaces_under_a_sky(method: str, tmp_path: Path) -> None:
         assert abs(float(value) / sky - 1) < 3 * error
 
 
-@pytest.mark.xfail(strict=True, reason="prepare.py does not hand the background to ambient_by_light")
 def test_the_light_method_of_a_job_knows_the_background(tmp_path: Path) -> None:
     job = make_job(
         FURNACE, tmp_path / "out", materials={"Wall": 0.5}, background=1.0, ambient={"method": "light"},

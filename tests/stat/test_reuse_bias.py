@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from stages import box, make_job, point, quad, sun, write_scene
 from ztests import differing
 
-from framearray_cli.frame import Crew, find_frame
+from framearray_cli.crew import Crew
+from framearray_cli.frame import find_frame
 from framearray_cli.job import Job
 from framearray_cli.prepare import open_embree, plan_work, prepare
 from framearray_cli.window import Window

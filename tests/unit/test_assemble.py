@@ -2,8 +2,10 @@ import builtins
 import resource
 import shutil
 import signal
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -73,8 +75,16 @@ def path_file(tmp_path: Path) -> Path:
 FRAMES = [(0, 0), (0, 1), (0, 2), (0, 3), (1, 3), (2, 3), (3, 3), (4, 3), (1, 2), (2, 1), (3, 0)]
 
 
-def decoded(movie: Path) -> tuple[list[np.ndarray], Any]:
-    """Decode all pictures with the matrix that the file names, and its stream."""
+@dataclass(frozen=True)
+class Stream:
+    """What a movie says of itself; read while it is open, for afterwards its memory is freed."""
+
+    average_rate: Fraction
+    codec_context: SimpleNamespace
+
+
+def decoded(movie: Path) -> tuple[list[np.ndarray], Stream]:
+    """Decode all pictures with the matrix that the file names, and what the stream says."""
     with av.open(str(movie)) as container:
         stream = container.streams.video[0]
         frames = []
@@ -84,7 +94,10 @@ def decoded(movie: Path) -> tuple[list[np.ndarray], Any]:
             assert abs(off) <= (frame.time_base / 2 if frame.time_base == Fraction(1, 1000) else 0)
             rgb = frame.reformat(format="rgb24", src_colorspace=MATRICES[int(frame.colorspace)], dst_color_range="JPEG")
             frames.append(rgb.to_ndarray())
-        return frames, stream
+        context = stream.codec_context
+        names = ("color_primaries", "color_trc", "colorspace", "color_range", "pix_fmt", "width", "height", "name")
+        told = SimpleNamespace(**{name: getattr(context, name) for name in names})
+        return frames, Stream(stream.average_rate, told)
 
 
 def shows(codes: np.ndarray) -> tuple[int, int]:

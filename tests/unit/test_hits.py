@@ -7,9 +7,9 @@ import pytest
 import tiny
 from oracle import Oracle
 
-from framearray_cli.frame import Work
 from framearray_cli.hits import ESCAPED, SURFACE, Hits, empty_hits, extra_hits, native_hits, pilot_hits, pixel_order
 from framearray_cli.rays import room_for_hits
+from framearray_cli.work import Work
 
 
 def native(work: Work, c: int, per_pixel: int, batch: int = 2048) -> Hits:

@@ -13,7 +13,7 @@ PACKAGE = Path(framearray_cli.__file__).parent
 
 # Every file, in the order in which data flows; a file imports only from those before it.
 FLOW = """
-__init__ errors arrays kernel compiling files framerate filepatterns fingerprint colour sphere
+__init__ errors arrays kernelcache kernel compiling files framerate filepatterns fingerprint colour sphere
 jobvalues jobkeys job jobschema jobdocs problems eyefile jobfile
 meshes/assets meshes/container meshes/model meshes/defaults meshes/cleaning meshes/polygons meshes/merge
 meshes/overrides meshes/textures meshes/opacity meshes/mtl meshes/walk meshes/gltf_materials meshes/gltf_prepare
@@ -23,7 +23,7 @@ embree/packets embree/masks embree/native embree/fallback embree/__init__
 rays hits plan
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
 terms/ambient_area terms/ambient_light
-reuse frame denoise compose window
+reuse work crew shading mirrors frame denoise compose window
 imageattributes images manifest outfolder writer
 prepare memory render check
 moviepath movies assemble
@@ -35,7 +35,13 @@ ORDER = FLOW.split()
 DOORS = {
     "embreex": ("embree/",),
     "llvmlite": ("embree/", "kernel"),
-    "numba": ("embree/", "kernel", "compiling", "hits"),  # hits: one function that allocates, so no kernel
+    "numba": (
+        "embree/",
+        "kernelcache",
+        "kernel",
+        "compiling",
+        "hits",
+    ),  # hits: one function that allocates, so no kernel
     "trimesh": ("meshes/",),
     "OpenImageIO": ("images",),
     "PIL": ("meshes/", "images"),

@@ -7,12 +7,12 @@ import pytest
 import tiny
 from test_hits import native
 
-from framearray_cli.frame import Work
 from framearray_cli.hits import SURFACE, Hits, empty_hits
 from framearray_cli.meshes import Material, Meshes, Part
 from framearray_cli.rays import room_for_hits
 from framearray_cli.scene import Scene, build_scene
 from framearray_cli.terms.specular import count_mirrors, reflect
+from framearray_cli.work import Work
 
 TINT = np.float32([0.9, 0.8, 0.7])
 

@@ -1,0 +1,102 @@
+"""The threads that work on a frame, the arrays each of them keeps, and memory that goes from frame to frame."""
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from queue import SimpleQueue
+from typing import Any
+
+import numpy as np
+
+from .hits import empty_hits
+from .rays import room_for_hits, room_for_tests
+from .terms.direct_steps import room_for_steps
+from .work import Work
+
+# Hits of a batch: large enough that calls cost nothing, small enough that all their arrays stay in a core's cache.
+BATCH = 2048
+# Rays traced together within a batch.
+RAYS = 4096
+
+
+class Shelf:
+    """Arrays of frames that were dropped, for the next frame to use: fresh memory costs the system a page at a time."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, list[Any]] = {}
+
+    def take(self, name: str, shape: tuple[int, ...], dtype: Any) -> Any:
+        """An array of a shape, contents arbitrary; kept ones of that name and another shape are let go."""
+        kept = self._kept.get(name, [])
+        while kept:
+            array = kept.pop()
+            if array.shape == shape:
+                return array
+        return np.empty(shape, dtype)
+
+    def give(self, name: str, array: Any) -> None:
+        """Put an array back that nobody reads any more."""
+        self._kept.setdefault(name, []).append(array)
+
+
+class Scratch:
+    """One thread's arrays, kept from batch to batch."""
+
+    def __init__(self, work: Work) -> None:
+        n_eyes = 4 * work.n_r + 1
+        rays = max(RAYS, work.obscurance.n_rays)
+        self.hit_rays = room_for_hits(rays)
+        self.test_rays = room_for_tests(RAYS, work.lights.n_lights)
+        self.hits = empty_hits(BATCH)
+        self.reflected = [empty_hits(BATCH), empty_hits(BATCH)] if work.depth else []
+        self.throughput = [np.empty((BATCH, 3), np.float32) for _ in self.reflected]
+        self.steps = room_for_steps(work.lights.n_lights) if work.shadow_step > 1 else None
+        self.pixel = np.empty((n_eyes, BATCH), np.int32)
+        self.density = np.empty((n_eyes, BATCH), np.float64)
+        self.skylight = np.empty((BATCH if work.obscurance.sky else 0, 3), np.float32)
+        self.rays: Counter[str] = Counter()
+        self.seconds: defaultdict[str, float] = defaultdict(float)
+
+
+class Crew:
+    """The threads that work on a frame, and their scratch arrays."""
+
+    def __init__(self, work: Work, threads: int) -> None:
+        self.threads = threads
+        self.shelf = Shelf()
+        self._pool = ThreadPoolExecutor(threads, thread_name_prefix="trace")
+        self._scratch: SimpleQueue[Scratch] = SimpleQueue()
+        self._all = [Scratch(work) for _ in range(threads)]
+        for scratch in self._all:
+            self._scratch.put(scratch)
+
+    def run(self, task: Callable[[Any, Scratch], Any], items: Iterable[Any]) -> list[Any]:
+        """`task(item, scratch)` for every item, in any order on all threads; results in the order of the items."""
+
+        def with_scratch(item: Any) -> Any:
+            scratch = self._scratch.get()
+            try:
+                return task(item, scratch)
+            finally:
+                self._scratch.put(scratch)
+
+        futures: list[Future[Any]] = [self._pool.submit(with_scratch, item) for item in items]
+        try:
+            return [future.result() for future in futures]
+        except BaseException:
+            for future in futures:
+                future.cancel()
+            raise
+
+    def rays(self) -> Counter[str]:
+        """Rays traced so far, by kind."""
+        return sum((scratch.rays for scratch in self._all), Counter())
+
+    def seconds(self) -> dict[str, float]:
+        """Thread seconds spent so far, by stage."""
+        stages = dict.fromkeys(stage for scratch in self._all for stage in scratch.seconds)
+        return {stage: sum(scratch.seconds[stage] for scratch in self._all) for stage in stages}
+
+    def close(self) -> None:
+        """Wait for running tasks and end the threads."""
+        self._pool.shutdown(wait=True, cancel_futures=True)

@@ -1,0 +1,70 @@
+"""What mirrors show: native hits followed from mirror to mirror; a reflected hit is a hit seen through a tint."""
+
+from time import perf_counter
+
+import numpy as np
+
+from .arrays import Int32
+from .crew import BATCH, Crew, Scratch
+from .hits import Hits, extra_hits, pilot_hits
+from .plan import Pass, flag_mirrors
+from .shading import estimate_terms
+from .terms.specular import count_mirrors, reflect
+from .work import Records, Work, empty_records
+
+
+def mirror_paths(work: Work, hits: Hits, n: int, scratch: Scratch) -> list[tuple[Int32, Records]]:
+    """Follow the mirrors among hits 0 to n - 1; a (pixels, records) pair a bounce."""
+    found: list[tuple[Int32, Records]] = []
+    started = perf_counter()
+    throughput = np.ones((n, 3), np.float32)
+    for bounce in range(work.depth):
+        m = count_mirrors(hits, n)
+        if m == 0:
+            break
+        reflected, next_throughput = scratch.reflected[bounce % 2], scratch.throughput[bounce % 2]
+        reflect(hits, n, throughput, work.surfaces, work.tracer, scratch.hit_rays.packets, reflected, next_throughput)
+        scratch.rays["mirror"] += m
+        hits, n, throughput = reflected, m, next_throughput
+        records = empty_records(work, m)
+        estimate_terms(work, hits, m, scratch, records, "mirror obscurance", "mirror shadow")
+        records.reflectivity *= throughput[:m]
+        records.constant *= throughput[:m] if work.has_constant else 1.0
+        found.append((hits.pixel[:m].copy(), records))
+    scratch.seconds["mirror"] += perf_counter() - started
+    return found
+
+
+def extra_mirror_hits(
+    work: Work, c: int, parts: tuple[Pass, ...], crew: Crew
+) -> tuple[list[tuple[Int32, Records]], Int32]:
+    """Follow the native hits that only mirror pixels have; returns them and the number of native hits of each pixel."""
+    most = sum(part.per_pixel for part in parts)
+    least = int(work.per_pixel[c])
+    extra = max(work.mirror_hits - least, 0)
+    flags = np.zeros(work.n_pixels, np.uint8)
+
+    def look(first: int, scratch: Scratch) -> None:
+        n = min(BATCH, work.n_pixels - first)
+        hits = scratch.hits
+        pilot_hits(work.cams, c, work.order, first, n, work.surfaces, work.tracer, scratch.hit_rays.packets, hits)
+        scratch.rays["pilot"] += n
+        flag_mirrors(hits, n, work.cams.width, work.cams.height, flags)
+
+    def follow(first: int, scratch: Scratch) -> list[tuple[Int32, Records]]:
+        n = min(BATCH, len(pixels) * extra - first)
+        extra_hits(
+            work.cams, c, work.seed, pixels, most, extra, first, n, work.surfaces, work.tracer,
+            scratch.hit_rays.packets, scratch.hits,
+        )  # fmt: skip
+        scratch.rays["mirror"] += n
+        return mirror_paths(work, scratch.hits, n, scratch)
+
+    if extra:
+        crew.run(look, range(0, work.n_pixels, BATCH))
+    pixels = work.order[flags[work.order] > 0]
+    found = crew.run(follow, range(0, len(pixels) * extra, BATCH)) if extra else []
+    own = extra * flags.astype(np.int32)
+    for part in parts:
+        own[part.pixels] += part.per_pixel
+    return [path for batch in found for path in batch], own

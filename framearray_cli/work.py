@@ -1,0 +1,133 @@
+"""What the work on frames is given, and what it leaves: settings, records of hits, and where they fall."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .arrays import Float32, Float64, Int32, Rgb
+from .camera import Cameras
+from .embree.packets import Tracer
+from .hits import pixel_order
+from .lights import LightArrays
+from .reuse import sort_by_pixel
+from .surface import Surfaces
+from .terms.obscurance import ObscuranceSettings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Work:
+    """Everything that the terms of every frame need, as kernels take it.
+
+    Attributes:
+        per_pixel: (n_c,) native hits a pixel of every frame.
+        mirror_hits: native hits of a pixel that sees a mirror, if more; 0 in a scene without mirrors.
+        depth: mirror bounces that are followed; 0 in a scene without mirrors.
+        balance: weights of hits by the balance heuristic, else all alike.
+        background: (3,) radiance outside the scene.
+        shadow_step, shadow_unbiased: see `terms/direct_steps.py`; step 1 tests every light position.
+        layers: whether normals and depths are kept for the layers.
+        denoise: whether W is denoised in composing.
+    """
+
+    cams: Cameras
+    surfaces: Surfaces
+    tracer: Tracer
+    lights: LightArrays
+    obscurance: ObscuranceSettings
+    seed: int
+    n_r: int
+    per_pixel: Float64
+    mirror_hits: int
+    depth: int
+    balance: bool
+    background: Rgb
+    shadow_step: int
+    shadow_unbiased: bool
+    layers: bool
+    denoise: bool = False
+    order: Int32 = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "order", pixel_order(self.cams.width, self.cams.height))
+
+    @property
+    def n_frames(self) -> int:
+        return len(self.per_pixel)
+
+    @property
+    def n_pixels(self) -> int:
+        return self.cams.width * self.cams.height
+
+    @property
+    def has_constant(self) -> bool:
+        """Whether anything a pixel shows is the same under every light."""
+        return bool(self.background.any())
+
+    def frames_around(self, c: int, reach: int) -> range:
+        """The frames of the path from c - reach to c + reach."""
+        return range(max(c - reach, 0), min(c + reach, self.n_frames - 1) + 1)
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Records:
+    """What composing needs of n hits: reflectivity, W, what is the same under every light, and E of every light."""
+
+    reflectivity: Rgb
+    obscurance: Rgb
+    constant: Rgb
+    irradiance: Float32
+
+    def part(self, span: slice) -> "Records":
+        """The records of some hits; they share memory."""
+        return Records(
+            reflectivity=self.reflectivity[span],
+            obscurance=self.obscurance[span],
+            constant=self.constant[span],
+            irradiance=self.irradiance[span],
+        )
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Placed:
+    """Hits sorted by the pixel of one frame that they fall into; see `sort_by_pixel`."""
+
+    start: Int32
+    order: Int32
+
+
+def empty_records(work: Work, n: int, irradiance: Float32 | None = None) -> Records:
+    """Room for n hits; contents are arbitrary.
+
+    Args:
+        irradiance: (n, channels, n_lights) memory to use, or None.
+    """
+    if irradiance is None:
+        irradiance = np.empty((n, work.lights.channels, work.lights.n_lights), np.float32)
+    return Records(
+        reflectivity=np.empty((n, 3), np.float32),
+        obscurance=np.empty((n, 3), np.float32),
+        constant=np.empty((n if work.has_constant else 0, 3), np.float32),
+        irradiance=irradiance,
+    )
+
+
+def joined(work: Work, parts: list[tuple[Int32, Records]]) -> tuple[Int32, Records]:
+    """One list of reflected hits from those of all batches, in their order."""
+    if not parts:
+        return np.empty(0, np.int32), empty_records(work, 0)
+    pixels, records = zip(*parts, strict=True)
+    return np.concatenate(pixels), Records(
+        reflectivity=np.concatenate([r.reflectivity for r in records]),
+        obscurance=np.concatenate([r.obscurance for r in records]),
+        constant=np.concatenate([r.constant for r in records]),
+        irradiance=np.concatenate([r.irradiance for r in records]),
+    )
+
+
+def placed_by_pixel(pixel: Int32, n_pixels: int, order: Int32 | None = None) -> Placed:
+    """Sort hits by the pixel that they fall into; `order` is memory to use, (n,)."""
+    if order is None:
+        order = np.empty(len(pixel), np.int32)
+    placed = Placed(start=np.empty(n_pixels + 1, np.int32), order=order)
+    sort_by_pixel(pixel, n_pixels, placed.start, placed.order)
+    return placed
