@@ -6,10 +6,11 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from . import __version__
+from .crew import Crew
 from .embree import Engine
 from .errors import OutputError
 from .filepatterns import file_patterns
-from .frame import Crew, Work, find_frame
+from .frame import find_frame
 from .images import ImageFormat
 from .job import Job
 from .jobfile import job_table
@@ -19,6 +20,7 @@ from .outfolder import claim_folder
 from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
 from .terms.ambient import Ambient
 from .window import Window
+from .work import Work
 from .writer import ArrayWriter
 
 
@@ -81,11 +83,11 @@ def render(job: Job, listener: Listener | None = None, *, engine: Engine = "auto
     started = time.perf_counter()
     prepared = prepare(job)
     listener.prepared(prepared)
+    require_memory(prepared)
     folder, identity = job.output.directory, job_fingerprint(prepared)
     listener.removed(claim_folder(folder, job.name, identity, job_table(job)["output"], restart=restart))
     with open_embree(prepared, engine) as embree:
         work, ambient = plan_work(prepared, embree)
-        require_memory(work, job)
         listener.planned(ambient)
         manifest = _manifest(prepared, ambient, identity)
         write_manifest(folder, manifest)
