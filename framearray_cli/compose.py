@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Float32, Images, Int32, Rgb
+from .arrays import Float32, Images, Int32, Real, Rgb
 from .kernel import kernel, prefetch_row
 
 INVERSE_PI = np.float32(1.0 / np.pi)
@@ -145,15 +145,18 @@ def normalise(band: Band, n: int) -> None:
 
 
 @kernel
-def finish(band: Band, first_pixel: int, n: int, colour: Rgb, ambient: Rgb, images: Images) -> tuple[int, int, int]:
+def finish(
+    band: Band, first_pixel: int, n: int, colour: Rgb, ambient: Rgb, lowest: Real, images: Images
+) -> tuple[int, int, int]:
     """Write the pixels of a band into all images of the frame; the band's direct sums are used up.
 
     Args:
         colour: (3, n_lights) what the direct sums are in units of.
         ambient: (3, n_lights) I_A, radiance.
+        lowest: the least value that is right: 0, or minus infinity where estimates may be negative.
         images: (n_lights, n_pixels of the image, 3), written.
     Returns:
-        number of values that were not finite or below zero, written as 0; light index and pixel of the first.
+        number of values that were not finite or below `lowest`, written as 0; light index and pixel of the first.
     """
     bad, bad_light, bad_pixel = 0, -1, -1
     n_lights, sums = images.shape[0], band.direct
@@ -163,10 +166,10 @@ def finish(band: Band, first_pixel: int, n: int, colour: Rgb, ambient: Rgb, imag
             wrong = 0
             for l in range(n_lights):
                 value = colour[channel, l] * sums[i, channel, l] + ambient[channel, l] * indirect + steady
-                wrong += not (value >= 0.0 and value < np.inf)
+                wrong += not (value >= lowest and abs(value) < np.inf)
                 sums[i, channel, l] = value
             for l in range(n_lights if wrong else 0):
-                if not (sums[i, channel, l] >= 0.0 and sums[i, channel, l] < np.inf):
+                if not (sums[i, channel, l] >= lowest and abs(sums[i, channel, l]) < np.inf):
                     sums[i, channel, l] = 0.0
                     if bad == 0:
                         bad_light, bad_pixel = l, first_pixel + i

@@ -100,7 +100,8 @@ class SamplesTable(Table):
     shadow_unbiased: bool = Field(
         default=False,
         description="With `shadow_step`: check one random position of every interval that was taken for granted, and "
-        "count a disagreement for all of them. The mean is then right; single hits are noisier.",
+        "count a disagreement for all of them. The mean is then right; single hits are noisier, and dark pixels may "
+        "come out below 0.",
     )
 
 

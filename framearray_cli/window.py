@@ -74,6 +74,8 @@ class Window:
         self._colour = np.ascontiguousarray(work.lights.colour.T)
         self._ambient = np.ascontiguousarray(ambient.intensity.T)
         self._crew = crew
+        # corrections of unbiased shadows may outweigh a dark pixel; cut at 0, their mean would be wrong
+        self._lowest = np.float32(-np.inf if work.shadow_unbiased and work.shadow_step > 1 else 0.0)
         self._frames: dict[int, Frame] = {}
         self._next = first
         self._bands = [empty_band(BAND_PIXELS, work.lights.n_lights) for _ in range(crew.threads)]
@@ -124,7 +126,7 @@ class Window:
                     place = frame.places[j]
                     average_native(place.start, place.order, frame.normal, frame.depth, first, n, own)
                 self._sum_mirrored(j, first, n, sums, holes[1:], mirror_scale)
-                bad = finish(sums, first, n, self._colour, self._ambient, flat)
+                bad = finish(sums, first, n, self._colour, self._ambient, self._lowest, flat)
             finally:
                 self._bands.append(sums)
             scratch.seconds["compose"] += perf_counter() - started

@@ -88,7 +88,7 @@ def composed(case: Case, bands: Any = ((0, N_PIXELS),)) -> tuple[Any, list[tuple
         begin(band, n)
         case.add(band, first, n)
         normalise(band, n)
-        bad.append(finish(band, first, n, colour, ambient, images))
+        bad.append(finish(band, first, n, colour, ambient, np.float32(0), images))
     return images, bad
 
 
@@ -140,7 +140,7 @@ def test_a_scale_a_pixel_multiplies_all_its_hits() -> None:
     case.add(band, 0, N_PIXELS)
     normalise(band, N_PIXELS)
     other.add(band, 0, N_PIXELS, scale)
-    finish(band, 0, N_PIXELS, colour, ambient, images)
+    finish(band, 0, N_PIXELS, colour, ambient, np.float32(0), images)
     more = colour * other.sums(other.direct(), scale)
     more = more + ambient * other.sums(other.reflectivity.astype(np.float64) * other.obscurance, scale)[:, :, None]
     more = more + other.sums(other.constant, scale)[:, :, None]
