@@ -1,8 +1,10 @@
 """The command line: each command parses, calls one function, prints. Only this file ends the process."""
 
 import io
+import os
 import signal
 import sys
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -11,6 +13,7 @@ import typer
 from rich.console import Console
 
 from . import __version__
+from .compiling import compile_clock, is_compiling
 from .errors import FrameArrayError, JobError, OutputError
 from .screen import Screen, duration, say, size
 
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
 
 OUT_OF_MEMORY = 2  # the job asks for more than the machine has
 LITTLE_SPACE = 64 * 1024 * 1024  # bytes; with less, a full disk is the likely reason of an error
+PATIENCE = 1.0  # seconds that threads get to end by themselves after a signal
 MOST_THREADS = 1024  # as in the job file
 
 app = typer.Typer(
@@ -43,7 +47,7 @@ Threads = Annotated[
     ),
 ]
 Output = Annotated[
-    Path | None,
+    str | None,  # Path makes "." of an empty name, which is most often a shell variable that is not set
     typer.Option("--output", "-o", help="Folder for the images, instead of the job's.", metavar="FOLDER"),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
@@ -86,7 +90,6 @@ def render(
     job = _job(job_file, threads, output)
     with Screen(out, quiet=quiet) as screen:
         screen.wait("reading the scene")
-        from .compiling import compile_clock
         from .outfolder import free_space
         from .render import Listener
         from .render import render as run
@@ -116,8 +119,8 @@ def render(
             with compile_clock(screen.compiling):
                 summary = run(job, shown, restart=restart)
         except BaseException as error:
-            if isinstance(error, OutputError) and (left := free_space(job.output.directory)) < LITTLE_SPACE:
-                error.add_note(f"the disk has {size(left)} free")
+            if isinstance(error, OutputError) and (free := free_space(job.output.directory)) < LITTLE_SPACE:
+                error.add_note(f"{size(free)} are free on that disk")
             if screen.done:
                 done = f"{screen.done:,} of {screen.total:,} images are in {job.output.directory}"
                 error.add_note(f"{done}; its manifest says that it is not finished")
@@ -133,7 +136,6 @@ def check(job_file: JobFile, threads: Threads = None, output: Output = None) -> 
     with Screen(out) as screen:
         screen.wait("reading the scene and rendering a few small frames")
         from .check import check as run
-        from .compiling import compile_clock
 
         with compile_clock(screen.compiling):
             estimate = run(job)
@@ -201,7 +203,7 @@ def schema() -> None:
     say(out, json.dumps(job_schema(), indent=2).splitlines())
 
 
-def _job(job_file: Path, threads: int | None, output: Path | None) -> "Job":
+def _job(job_file: Path, threads: int | None, output: str | None) -> "Job":
     """Read a job file; options replace what it says."""
     from .jobfile import read_job
 
@@ -210,7 +212,9 @@ def _job(job_file: Path, threads: int | None, output: Path | None) -> "Job":
     if threads is not None:
         updates["render"] = job.render.model_copy(update={"threads": threads})
     if output is not None:
-        updates["output"] = job.output.model_copy(update={"directory": output.absolute()})
+        if not output.strip():
+            raise typer.BadParameter("expected a folder, got an empty name", param_hint="--output")
+        updates["output"] = job.output.model_copy(update={"directory": Path(output).absolute()})
     return job.model_copy(update=updates)
 
 
@@ -265,7 +269,19 @@ def _fail(lines: Sequence[str], code: int) -> NoReturn:
 def _stop(signum: int, frame: "FrameType | None") -> NoReturn:
     """Turn a signal into an exception, so that everything is tidied up; a second signal ends the process at once."""
     signal.signal(signum, signal.SIG_DFL)
-    raise Stopped(signum)
+    stopped = Stopped(signum)
+    if is_compiling():  # that cannot be stopped, and would be waited for
+        timer = threading.Timer(PATIENCE, _leave, [stopped])
+        timer.daemon = True
+        timer.start()
+    raise stopped
+
+
+def _leave(stopped: Stopped) -> None:
+    """End the process whatever its threads are doing."""
+    out.show_cursor()
+    say(err, [stopped.word])
+    os._exit(stopped.exit_code)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -1,9 +1,12 @@
-"""Notices when kernels are compiled: the first run on a machine does that for about a minute, later ones not at all."""
+"""Notices when kernels are compiled: the first run on a machine does that for up to a minute, later ones not at all."""
 
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+
+# When each function that is being compiled was begun. Numba compiles one at a time, and within it those that it calls.
+_begun: list[float] = []
 
 
 @dataclass(slots=True, kw_only=True)
@@ -23,19 +26,22 @@ def compile_clock(begins: Callable[[], None] = lambda: None) -> Iterator[Compile
     from numba.core import event
 
     clock = CompileClock()
-    # Numba compiles one function at a time, and those that it calls within it: only the outermost is timed.
-    starts: list[float] = []
 
     class Listener(event.Listener):
         def on_start(self, event: object) -> None:
-            if not starts and clock.seconds == 0.0:
+            if not _begun and clock.seconds == 0.0:
                 begins()
-            starts.append(time.perf_counter())
+            _begun.append(time.perf_counter())
 
         def on_end(self, event: object) -> None:
-            started = starts.pop()
-            if not starts:
+            started = _begun.pop()
+            if not _begun:
                 clock.seconds += time.perf_counter() - started
 
     with event.install_listener("numba:compile", Listener()):
         yield clock
+
+
+def is_compiling() -> bool:
+    """Whether a kernel is being compiled, within `compile_clock`."""
+    return bool(_begun)

@@ -62,7 +62,7 @@ class Screen:
 
     def compiling(self) -> None:
         """Tell why the first run on a machine starts slowly."""
-        self.say(["compiling for this machine; that takes about a minute, the first time only"])
+        self.say(["compiling for this machine; that takes up to a minute, the first time only"])
 
     def count(self, label: str, total: int, unit: str) -> None:
         """Start to count."""
