@@ -2,7 +2,6 @@
 
 import math
 import os
-import shutil
 import tempfile
 import time
 from dataclasses import dataclass, replace
@@ -12,16 +11,18 @@ import numpy as np
 import psutil
 
 from .compiling import compile_clock
+from .crew import Crew
 from .filepatterns import file_patterns
-from .frame import Crew, Work, find_frame
+from .frame import find_frame
 from .job import Job
 from .jobfile import job_table
-from .memory import free_memory, window_memory
-from .outfolder import in_the_way, is_same, read_array
+from .memory import ambient_memory, free_memory, require_memory, window_memory
+from .outfolder import free_space, in_the_way, is_same, read_array
 from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
 from .render import image_format
 from .terms.ambient import Ambient
 from .window import Window
+from .work import Work
 from .writer import ArrayWriter
 
 # A probe traces about this many rays, which takes a second or two.
@@ -82,6 +83,7 @@ def check(job: Job) -> Estimate:
     started = time.perf_counter()
     with compile_clock() as clock:
         prepared = prepare(job)
+        require_memory(prepared)
         identity = job_fingerprint(prepared)
         with open_embree(prepared) as embree:
             work, ambient = plan_work(prepared, embree)
@@ -91,9 +93,9 @@ def check(job: Job) -> Estimate:
             resident, available = psutil.Process().memory_info().rss, free_memory()
     scale = work.n_pixels / second.pixels
     mirrored = second.mirrored_bytes * scale * min(2 * work.n_r + 1, work.n_frames)
-    more = window_memory(work) + int(mirrored)
+    more = max(window_memory(prepared) + int(mirrored), ambient_memory(prepared))
     disk = int(_frame_bytes(first, second, work.n_pixels) * prepared.n_cameras)
-    free = shutil.disk_usage(_existing(job.output.directory)).free
+    free = free_space(job.output.directory)
     hits = float(work.per_pixel.sum()) * work.n_pixels
     copies = prepared.n_cameras - work.n_frames  # frames of a camera that stands still, which are written only
     return Estimate(
@@ -110,8 +112,8 @@ def check(job: Job) -> Estimate:
 
 def _warnings(job: Job, identity: str, *, memory_lacks: bool, disk_lacks: bool) -> tuple[str, ...]:
     found = []
-    if memory_lacks:
-        found.append("the job needs more memory than is free; fewer lights, a smaller n_r or resolution take less")
+    if memory_lacks:  # a job that is far beyond was refused
+        found.append("the job may need more memory than is free")
     if disk_lacks:
         found.append("the images need more space than the disk has free")
     folder = job.output.directory
@@ -208,10 +210,3 @@ def _frame_bytes(first: _Probe, second: _Probe, pixels: int) -> float:
         return second.file_bytes * pixels / second.pixels
     power = math.log(second.file_bytes / first.file_bytes) / math.log(second.pixels / first.pixels)
     return float(second.file_bytes * (pixels / second.pixels) ** min(max(power, 0.5), 1.0))
-
-
-def _existing(folder: Path) -> Path:
-    """The folder, or the nearest one above it that exists."""
-    while not folder.exists() and folder != folder.parent:
-        folder = folder.parent
-    return folder

@@ -5,8 +5,9 @@ import sys
 import psutil
 
 from .errors import JobError
-from .frame import Work
-from .job import Job
+from .plan import frame_hits
+from .prepare import Prepared
+from .terms.ambient import BATCH
 from .writer import BLOCKS
 
 
@@ -25,29 +26,39 @@ def free_memory() -> int:
     return int(psutil.virtual_memory().available + psutil.swap_memory().free)
 
 
-def require_memory(work: Work, job: Job) -> None:
-    """Refuse a job whose frames do not fit into memory; the system would end the program without a word.
+def require_memory(prepared: Prepared) -> None:
+    """Refuse a job that does not fit into memory; the system would end the program without a word.
 
     Raises:
-        JobError: they do not.
+        JobError: it does not.
     """
-    needed, free = window_memory(work), free_memory()
+    needed, free = max(window_memory(prepared), ambient_memory(prepared)), free_memory()
     if needed > free:
         problem = (
-            f"the frames under way need about {needed / 2**30:.1f} GiB of memory, {free / 2**30:.1f} GiB are free; "
-            "a smaller camera.resolution, reuse.n_r or samples.hits or fewer light.frames take less"
+            f"rendering needs about {needed / 2**30:.1f} GiB of memory, {free / 2**30:.1f} GiB are free; "
+            "a smaller camera.resolution, reuse.n_r or samples.hits, or fewer light.frames, take less"
         )
-        raise JobError(job.file or job.name, [problem])
+        raise JobError(prepared.job.file or prepared.job.name, [problem])
 
 
-def window_memory(work: Work) -> int:
+def ambient_memory(prepared: Prepared) -> int:
+    """Bytes that a batch of walks takes: what each gathers of every light, in float32 and twice in float64."""
+    return BATCH * prepared.n_lights * 3 * (4 + 8 + 8)
+
+
+def window_memory(prepared: Prepared) -> int:
     """Bytes that the window of frames and the images under way will take, mirrors left out.
 
     A hit takes its irradiance under every light, reflectivity, W, and its place and weight in every frame that uses it.
     """
-    held = [float(work.per_pixel[work.frames_around(j, work.n_r)].sum()) for j in range(work.n_frames)]
-    frames = min(2 * work.n_r + 1, work.n_frames)
-    per_hit = 4 * (work.lights.channels * work.lights.n_lights + 6 + 3 * work.has_constant + 4 * work.layers)
-    per_hit += frames * (8 if work.balance else 4)
-    images = BLOCKS * 12 * work.lights.n_lights * work.n_pixels
-    return int(max(held) * work.n_pixels * per_hit) + frames * frames * 4 * work.n_pixels + images
+    job, n_lights = prepared.job, prepared.n_lights
+    n_frames, n_r = (1, 0) if prepared.still else (prepared.n_cameras, job.reuse.n_r)
+    width, height = job.camera.resolution
+    per_pixel = frame_hits(n_frames, job.reuse.n_r, job.samples.hits)
+    held = max(float(per_pixel[max(j - n_r, 0) : j + n_r + 1].sum()) for j in range(n_frames))
+    frames = min(2 * n_r + 1, n_frames)
+    balance, has_constant = job.reuse.weights == "balance" and n_r > 0, any(job.scene.background)
+    per_hit = 4 * (prepared.light_arrays.channels * n_lights + 6 + 3 * has_constant + 4 * job.output.layers)
+    per_hit += frames * (8 if balance else 4)
+    per_image_pixel = frames * frames * 4 + BLOCKS * 12 * n_lights
+    return int(width * height * (held * per_hit + per_image_pixel))
