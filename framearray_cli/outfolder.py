@@ -52,7 +52,8 @@ def read_array(folder: Path) -> Manifest | None:
     try:
         return read_manifest(folder)
     except OutputError as error:
-        raise OutputError(f"{error}; or choose another folder with --output") from error
+        known = str(error).split(";")[0]
+        raise OutputError(f"{known}; remove that file, or choose another folder with --output") from error
 
 
 def is_same(old: Manifest, name: str, fingerprint: str, output: dict[str, Any]) -> bool:
