@@ -11,7 +11,6 @@ from .arrays import Directions, Float64, Points, Real, Triple
 from .kernel import inlined
 from .paths import Eyes
 
-
 OUTSIDE = -1  # the "pixel" of a point that an eye does not see
 
 

@@ -16,7 +16,7 @@ from .filepatterns import file_patterns
 from .frame import find_frame
 from .job import Job
 from .jobfile import job_table
-from .memory import ambient_memory, free_memory, require_memory, window_memory
+from .memory import ambient_memory, free_memory, light_blocks, mirror_share, require_memory, window_memory
 from .outfolder import free_space, in_the_way, is_same, read_array
 from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
 from .render import image_format
@@ -41,6 +41,7 @@ class Estimate:
         memory: bytes at most, of the whole program; `available`: bytes the machine can give it.
         disk: bytes of all images and layers; `free`: bytes free where they go.
         seconds: from start to end, writing included, with kernels that were compiled before.
+        blocks: of light positions, rendered one after the other because of the memory limit.
         warnings: what would go wrong.
     """
 
@@ -51,6 +52,7 @@ class Estimate:
     disk: int
     free: int
     seconds: float
+    blocks: int
     warnings: tuple[str, ...]
 
 
@@ -62,14 +64,12 @@ class _Probe:
         pixels: of a frame.
         seconds: a native hit of the path.
         file_bytes: of a frame, all its images and layers.
-        mirrored_bytes: of memory, for what the mirrors of a frame under way show.
         writing: seconds to write a frame and nothing else; measured for a camera that stands still only.
     """
 
     pixels: int
     seconds: float
     file_bytes: float
-    mirrored_bytes: float
     writing: float
 
 
@@ -90,10 +90,12 @@ def check(job: Job) -> Estimate:
             before_frames = time.perf_counter() - started - clock.seconds
             pixels = _probe_pixels(work)
             first, second = (_probe(prepared, work, ambient, int(p)) for p in (FIRST_SHARE * pixels, pixels))
+            mirrors = mirror_share(work)
+            blocks = light_blocks(prepared, mirrors)
             resident, available = psutil.Process().memory_info().rss, free_memory()
     scale = work.n_pixels / second.pixels
-    mirrored = second.mirrored_bytes * scale * min(2 * work.n_r + 1, work.n_frames)
-    more = max(window_memory(prepared) + int(mirrored), ambient_memory(prepared))
+    largest = max(len(block) for block in blocks)
+    more = max(window_memory(prepared, largest, mirrors), ambient_memory(prepared))
     disk = int(_frame_bytes(first, second, work.n_pixels) * prepared.n_cameras)
     free = free_space(job.output.directory)
     hits = float(work.per_pixel.sum()) * work.n_pixels
@@ -105,7 +107,8 @@ def check(job: Job) -> Estimate:
         available=resident + available,
         disk=disk,
         free=free,
-        seconds=before_frames + second.seconds * hits + second.writing * scale * copies,
+        seconds=before_frames + second.seconds * hits * _repeats(work, len(blocks)) + second.writing * scale * copies,
+        blocks=len(blocks),
         warnings=_warnings(job, identity, memory_lacks=more > available, disk_lacks=disk > free),
     )
 
@@ -123,9 +126,20 @@ def _warnings(job: Job, identity: str, *, memory_lacks: bool, disk_lacks: bool) 
     return tuple(found)
 
 
+def _rays_of_a_hit(work: Work) -> int:
+    """About how many rays a hit takes that do not depend on the lights."""
+    return 1 + work.obscurance.n_rays + (4 if work.balance else 2) * work.n_r
+
+
+def _repeats(work: Work, blocks: int) -> float:
+    """How much longer a render in blocks takes: each finds its hits again."""
+    again = _rays_of_a_hit(work)
+    return 1 + (blocks - 1) * again / (again + work.lights.n_lights)
+
+
 def _probe_pixels(work: Work) -> int:
     """Pixels a frame for the second probe."""
-    rays = 1 + work.obscurance.n_rays + work.lights.n_lights + 4 * work.n_r  # about, of a hit
+    rays = _rays_of_a_hit(work) + work.lights.n_lights
     hits = float(np.mean(work.per_pixel)) * min(2 * work.n_r + 2, work.n_frames)
     return int(min(max(PROBE_RAYS / (rays * hits), FEWEST_PIXELS), MOST_PIXELS, work.n_pixels))
 
@@ -155,7 +169,7 @@ def _small(work: Work, pixels: int) -> Work:
 def _probe(prepared: Prepared, work: Work, ambient: Ambient, pixels: int) -> _Probe:
     """Render and write small frames."""
     small = _small(work, pixels)
-    n, mirrored, writing = small.n_frames, 0, 0.0
+    n, writing = small.n_frames, 0.0
     crew = Crew(small, prepared.job.render.threads or os.cpu_count() or 1)
     try:
         with tempfile.TemporaryDirectory() as name:
@@ -163,10 +177,7 @@ def _probe(prepared: Prepared, work: Work, ambient: Ambient, pixels: int) -> _Pr
             with _writer(prepared, small, Path(name), crew.threads) as writer:
                 window = Window(small, ambient, crew)
                 for c in range(n):
-                    frame = find_frame(small, c, crew)
-                    if frame.mirrored is not None:
-                        mirrored += frame.mirrored.irradiance.nbytes + 3 * frame.mirrored.reflectivity.nbytes
-                    window.add(frame)
+                    window.add(find_frame(small, c, crew))
                     for j in window.complete():
                         composed = window.compose(j, writer.block())
                         writer.write(composed, range(j, j + 1))
@@ -184,7 +195,6 @@ def _probe(prepared: Prepared, work: Work, ambient: Ambient, pixels: int) -> _Pr
         pixels=small.n_pixels,
         seconds=seconds / (float(np.sum(small.per_pixel)) * small.n_pixels),
         file_bytes=file_bytes / n,
-        mirrored_bytes=mirrored / n,
         writing=writing,
     )
 
@@ -198,7 +208,7 @@ def _writer(prepared: Prepared, small: Work, folder: Path, threads: int) -> Arra
         (small.cams.width, small.cams.height),
         job.output.fps,
         image_format(job),
-        prepared.n_lights,
+        range(prepared.n_lights),
         threads,
         lambda images: None,
     )

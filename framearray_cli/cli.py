@@ -47,7 +47,7 @@ Threads = Annotated[
     ),
 ]
 Output = Annotated[
-    str | None,  # Path makes "." of an empty name, which is most often a shell variable that is not set
+    str | None,
     typer.Option("--output", "-o", help="Folder for the images, instead of the job's.", metavar="FOLDER"),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
@@ -147,7 +147,7 @@ def check(job_file: JobFile, threads: Threads = None, output: Output = None) -> 
         out,
         [
             f"array: {n_c:,} cameras x {n_l:,} lights = {n_c * n_l:,} images of {width} x {height}",
-            f"memory: about {size(estimate.memory)}, {size(estimate.available)} free",
+            f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_blocks(estimate.blocks)}",
             f"disk: about {size(estimate.disk)} in {job.output.directory}, {size(estimate.free)} free",
             f"time: about {duration(estimate.seconds)} on this machine",
             *(f"warning: {warning}" for warning in estimate.warnings),
@@ -160,7 +160,7 @@ def assemble(
     array: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `render` wrote.", show_default=False)],
     path_file: Annotated[Path, typer.Argument(metavar="PATH", help="Movie path, TOML.", show_default=False)],
     target: Annotated[
-        Path,
+        str,
         typer.Option(
             "--output",
             "-o",
@@ -170,7 +170,8 @@ def assemble(
         ),
     ],
     exposure: Annotated[
-        float, typer.Option("--exposure", help="Stops added to movies, PNG and JPEG.", metavar="STOPS")
+        float,
+        typer.Option("--exposure", min=-64, max=64, help="Stops added to movies, PNG and JPEG.", metavar="STOPS"),
     ] = 0.0,
     quiet: Quiet = False,
 ) -> None:
@@ -185,7 +186,7 @@ def assemble(
             screen.advance()
 
         try:
-            result = run(array, path_file, target, exposure=exposure, progress=progress)
+            result = run(array, path_file, _place(target), exposure=exposure, progress=progress)
         except JobError as error:
             _fail(_problems(error, "nothing was written"), error.exit_code)
     if not quiet:
@@ -212,10 +213,19 @@ def _job(job_file: Path, threads: int | None, output: str | None) -> "Job":
     if threads is not None:
         updates["render"] = job.render.model_copy(update={"threads": threads})
     if output is not None:
-        if not output.strip():
-            raise typer.BadParameter("expected a folder, got an empty name", param_hint="--output")
-        updates["output"] = job.output.model_copy(update={"directory": Path(output).absolute()})
+        updates["output"] = job.output.model_copy(update={"directory": _place(output).absolute()})
     return job.model_copy(update=updates)
+
+
+def _blocks(n: int) -> str:
+    return f"; the lights are rendered in {n} blocks, one after the other" if n > 1 else ""
+
+
+def _place(name: str) -> Path:
+    """A file or folder to write to."""
+    if not name.strip():  # most often a shell variable that is not set; Path would make "." of it
+        raise typer.BadParameter("expected a name, got none", param_hint="--output")
+    return Path(name)
 
 
 def _scene_lines(prepared: "Prepared") -> list[str]:

@@ -51,6 +51,8 @@ class Scratch:
         self.reflected = [empty_hits(BATCH), empty_hits(BATCH)] if work.depth else []
         self.throughput = [np.empty((BATCH, 3), np.float32) for _ in self.reflected]
         self.steps = room_for_steps(work.lights.n_lights) if work.shadow_step > 1 else None
+        full = (0 if work.keeps_all else BATCH, work.lights.channels, work.lights.n_lights)
+        self.irradiance = np.empty(full, np.float32)  # of all lights, where only some are kept
         self.pixel = np.empty((n_eyes, BATCH), np.int32)
         self.density = np.empty((n_eyes, BATCH), np.float64)
         self.skylight = np.empty((BATCH if work.obscurance.sky else 0, 3), np.float32)

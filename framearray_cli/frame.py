@@ -59,7 +59,7 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
     n = sum(part.n for part in parts)
     frames = work.frames_around(c, work.n_r)
     take = crew.shelf.take
-    irradiance = take("irradiance", (n, work.lights.channels, work.lights.n_lights), np.float32)
+    irradiance = take("irradiance", (n, work.lights.channels, len(work.kept)), np.float32)
     records = empty_records(work, n, irradiance)
     pixel = take("pixel", (len(frames), n), np.int32)
     order = take("order", (len(frames), n), np.int32)

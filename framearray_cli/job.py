@@ -14,6 +14,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_v
 from .jobkeys import CameraTable, LightTable
 from .jobvalues import (
     MOST_HITS,
+    Bytes,
     Emission,
     FileName,
     HitCount,
@@ -237,6 +238,12 @@ class OutputTable(Table):
 class RenderTable(Table):
     """How the machine is used; no image depends on it."""
 
+    memory: Bytes | None = Field(
+        default=None,
+        description='Most memory that frames under way may take, such as "8 GiB". What needs more is rendered in '
+        "blocks of light positions, one after the other; the images are the same, the time is longer.",
+        json_schema_extra=computed("two thirds of what is free"),
+    )
     threads: int | None = Field(
         default=None, ge=1, le=1024, description="Threads that render.", json_schema_extra=computed("one for each core")
     )

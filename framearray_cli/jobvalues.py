@@ -6,6 +6,7 @@ Each kind checks itself and says in plain words what it expected and what it fou
 import json
 import math
 import os
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NoReturn, TypeAlias
@@ -127,6 +128,31 @@ def absolute(path: Path, job_file: Path | None) -> Path:
     return Path(os.path.realpath(whole.parent)) / path.name
 
 
+_UNITS = {
+    "b": 1,
+    "kib": 2**10,
+    "mib": 2**20,
+    "gib": 2**30,
+    "tib": 2**40,
+    "kb": 10**3,
+    "mb": 10**6,
+    "gb": 10**9,
+    "tb": 10**12,
+}
+
+
+def _bytes(value: object) -> int:
+    """Check an amount of memory: a number of bytes, or text such as "8 GiB"."""
+    if isinstance(value, int) and not isinstance(value, bool) and value > 0:
+        return value
+    match = re.fullmatch(r"\s*([0-9.]{1,20})\s*([A-Za-z]{1,3})\s*", value) if isinstance(value, str) else None
+    if match and match[2].lower() in _UNITS and match[1].count(".") <= 1 and match[1] != ".":
+        size = int(float(match[1]) * _UNITS[match[2].lower()])
+        if size > 0:
+            return size
+    fail([((), f'expected an amount of memory such as "8 GiB" or "500 MB", got {shown(value)}')])
+
+
 MOST_HITS = 65000  # hits of one pixel in one frame; random streams tell 2^16 apart
 _SHARES = (1 / 2, 1 / 3, 1 / 4, 1 / 5, 1 / 6, 1 / 7, 1 / 8)
 
@@ -166,6 +192,13 @@ HitCount: TypeAlias = Annotated[
     float,
     PlainValidator(_hits),
     WithJsonSchema({"type": "number", "minimum": 0.125, "maximum": MOST_HITS, "x-words": "a number"}),
+]
+Bytes: TypeAlias = Annotated[
+    int,
+    PlainValidator(_bytes),
+    WithJsonSchema(
+        {"anyOf": [{"type": "string"}, {"type": "integer", "minimum": 1}], "x-words": 'text such as "8 GiB"'}
+    ),
 ]
 FileName: TypeAlias = Annotated[
     Path, PlainValidator(_file_name), WithJsonSchema({"type": "string", "minLength": 1, "x-words": "a file name"})

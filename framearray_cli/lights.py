@@ -65,3 +65,15 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
         lit=np.asarray((intensity > 0).any(axis=-1), np.float32),
         colour=np.ascontiguousarray(colour, np.float32),
     )
+
+
+def some_lights(lights: LightArrays, block: range) -> LightArrays:
+    """The light positions of a block, in the same units."""
+    span = slice(block.start, block.stop)
+    return LightArrays(
+        kind=lights.kind,
+        vector=np.ascontiguousarray(lights.vector[:, :, span]),
+        strength=np.ascontiguousarray(lights.strength[:, :, span]),
+        lit=np.ascontiguousarray(lights.lit[:, span]),
+        colour=np.ascontiguousarray(lights.colour[span]),
+    )

@@ -2,13 +2,22 @@
 
 import sys
 
+import numpy as np
 import psutil
 
 from .errors import JobError
-from .plan import frame_hits
+from .hits import empty_hits, pilot_hits
+from .plan import flag_mirrors, frame_hits
 from .prepare import Prepared
+from .rays import room_for_hits
 from .terms.ambient import BATCH
+from .work import Work
 from .writer import BLOCKS
+
+# Share of the free memory that frames under way may take unless the job says; the rest is for scene, files and others.
+FREE_SHARE = 2 / 3
+# Mirrors are looked for in this many frames of the path, this many rays at a time.
+PILOT_FRAMES, PILOT_BATCH = 8, 2048
 
 
 def peak_memory() -> int:
@@ -26,17 +35,24 @@ def free_memory() -> int:
     return int(psutil.virtual_memory().available + psutil.swap_memory().free)
 
 
+def memory_limit(prepared: Prepared) -> int:
+    """Bytes that frames under way may take: the job's limit, else a share of what is free."""
+    return prepared.job.render.memory or int(FREE_SHARE * free_memory())
+
+
 def require_memory(prepared: Prepared) -> None:
-    """Refuse a job that does not fit into memory; the system would end the program without a word.
+    """Refuse a job that does not fit into memory even light by light; the system would end it without a word.
 
     Raises:
         JobError: it does not.
     """
-    needed, free = max(window_memory(prepared), ambient_memory(prepared)), free_memory()
-    if needed > free:
+    needed, limit = window_memory(prepared, 1), memory_limit(prepared)
+    if prepared.job.render.memory is None:
+        needed, limit = max(needed, ambient_memory(prepared)), free_memory()
+    if needed > limit:
         problem = (
-            f"rendering needs about {needed / 2**30:.1f} GiB of memory, {free / 2**30:.1f} GiB are free; "
-            "a smaller camera.resolution, reuse.n_r or samples.hits, or fewer light.frames, take less"
+            f"rendering needs at least {needed / 2**30:.1f} GiB of memory, {limit / 2**30:.1f} GiB may be used; "
+            "a smaller camera.resolution, reuse.n_r or samples.hits takes less"
         )
         raise JobError(prepared.job.file or prepared.job.name, [problem])
 
@@ -46,19 +62,52 @@ def ambient_memory(prepared: Prepared) -> int:
     return BATCH * prepared.n_lights * 3 * (4 + 8 + 8)
 
 
-def window_memory(prepared: Prepared) -> int:
-    """Bytes that the window of frames and the images under way will take, mirrors left out.
+def window_memory(prepared: Prepared, n_lights: int, mirror_share: float = 0.0) -> int:
+    """Bytes that the window of frames and the images under way take for some of the lights.
 
     A hit takes its irradiance under every light, reflectivity, W, and its place and weight in every frame that uses it.
+
+    Args:
+        mirror_share: of the pixels that see a mirror; their hits are held until their frame is composed.
     """
-    job, n_lights = prepared.job, prepared.n_lights
+    job = prepared.job
     n_frames, n_r = (1, 0) if prepared.still else (prepared.n_cameras, job.reuse.n_r)
     width, height = job.camera.resolution
     per_pixel = frame_hits(n_frames, job.reuse.n_r, job.samples.hits)
     held = max(float(per_pixel[max(j - n_r, 0) : j + n_r + 1].sum()) for j in range(n_frames))
     frames = min(2 * n_r + 1, n_frames)
     balance, has_constant = job.reuse.weights == "balance" and n_r > 0, any(job.scene.background)
-    per_hit = 4 * (prepared.light_arrays.channels * n_lights + 6 + 3 * has_constant + 4 * job.output.layers)
-    per_hit += frames * (8 if balance else 4)
+    per_record = 4 * (prepared.light_arrays.channels * n_lights + 6 + 3 * has_constant)
+    per_hit = per_record + 16 * job.output.layers + frames * (8 if balance else 4)
+    # a frame's mirror hits wait for N_r frames; twice while the lists of all batches are joined, and chains add some
+    mirrored = mirror_share * job.specular.hits * (n_r + 3) * per_record
     per_image_pixel = frames * frames * 4 + BLOCKS * 12 * n_lights
-    return int(width * height * (held * per_hit + per_image_pixel))
+    return int(width * height * (held * per_hit + mirrored + per_image_pixel))
+
+
+def light_blocks(prepared: Prepared, mirror_share: float) -> list[range]:
+    """Cut the light positions into as few blocks, of about one size, as the memory limit allows.
+
+    Every block goes along the whole camera path and finds its hits again: they depend on no light.
+    """
+    n, limit = prepared.n_lights, memory_limit(prepared)
+    for count in range(1, n + 1):
+        size = -(-n // count)
+        if window_memory(prepared, size, mirror_share) <= limit:
+            break
+    return [range(first, min(first + size, n)) for first in range(0, n, size)]
+
+
+def mirror_share(work: Work) -> float:
+    """The largest share of pixels that see a mirror, over some frames of the path; from one ray a pixel."""
+    if not work.depth:
+        return 0.0
+    rays, hits, most = room_for_hits(PILOT_BATCH), empty_hits(PILOT_BATCH), 0
+    for c in np.unique(np.linspace(0, work.n_frames - 1, PILOT_FRAMES).astype(int)):
+        flags = np.zeros(work.n_pixels, np.uint8)
+        for first in range(0, work.n_pixels, PILOT_BATCH):
+            n = min(PILOT_BATCH, work.n_pixels - first)
+            pilot_hits(work.cams, int(c), work.order, first, n, work.surfaces, work.tracer, rays.packets, hits)
+            flag_mirrors(hits, n, work.cams.width, work.cams.height, flags)
+        most = max(most, int(flags.sum()))
+    return most / work.n_pixels

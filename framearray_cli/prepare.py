@@ -95,6 +95,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
         surfaces=prepared.surfaces,
         tracer=embree.tracer,
         lights=prepared.light_arrays,
+        kept=range(prepared.n_lights),
         obscurance=ObscuranceSettings(
             d_max=job.obscurance.range,
             falloff=FALLOFFS[job.obscurance.falloff],

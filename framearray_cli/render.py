@@ -2,6 +2,7 @@
 
 import os
 import time
+from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -15,7 +16,7 @@ from .images import ImageFormat
 from .job import Job
 from .jobfile import job_table
 from .manifest import Manifest, ManifestCamera, ManifestLight, matrix_rows, write_manifest
-from .memory import peak_memory, require_memory
+from .memory import light_blocks, mirror_share, peak_memory, require_memory
 from .outfolder import claim_folder
 from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
 from .terms.ambient import Ambient
@@ -93,21 +94,36 @@ def render(job: Job, listener: Listener | None = None, *, engine: Engine = "auto
         write_manifest(folder, manifest)
         written: list[int] = []
         try:
-            summary = _frames(prepared, work, ambient, listener, started, written)
+            parts = [
+                _frames(prepared, work.for_lights(block), ambient, block, listener, written)
+                for block in light_blocks(prepared, mirror_share(work))
+            ]
         except BaseException:
             with suppress(OutputError):  # what stopped the render is told; the manifest may meet the same full disk
                 write_manifest(folder, replace(manifest, summary=manifest.summary | {"images": sum(written)}))
             raise
+    summary = _summary(prepared, ambient, parts, time.perf_counter() - started)
     write_manifest(folder, _with_summary(manifest, summary))
     return summary
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Part:
+    """What one pass over the camera path cost; see `Summary`."""
+
+    rays: Counter[str]
+    stages: dict[str, float]
+    hits: float
+    notes: tuple[str, ...]
+
+
 def _frames(
-    prepared: Prepared, work: Work, ambient: Ambient, listener: Listener, started: float, written: list[int]
-) -> Summary:
+    prepared: Prepared, work: Work, ambient: Ambient, lights: range, listener: Listener, written: list[int]
+) -> _Part:
     """Find every frame's hits, compose each frame as soon as its window is complete, write it, forget it.
 
     Args:
+        work: for a block of light positions, `lights`.
         written: an entry a written image is added, whatever happens afterwards.
     """
 
@@ -115,10 +131,12 @@ def _frames(
         written.append(images)
         listener.written(images)
 
-    job, n_lights = prepared.job, prepared.n_lights
+    job = prepared.job
     threads = job.render.threads or os.cpu_count() or 1
-    notes, hits = list(ambient.notes), 0.0
+    notes, hits = [], 0.0
     crew = Crew(work, threads)
+    if work.lights.n_lights < prepared.n_lights:
+        ambient = ambient.for_lights(lights)
     window = Window(work, ambient, crew)
     writer = ArrayWriter(
         job.output.directory,
@@ -127,7 +145,7 @@ def _frames(
         job.camera.resolution,
         job.output.fps,
         image_format(job),
-        n_lights,
+        lights,
         threads,
         count,
     )
@@ -144,15 +162,22 @@ def _frames(
             writer.finish()
     finally:
         crew.close()
+    return _Part(rays=crew.rays(), stages=crew.seconds(), hits=hits / work.n_frames, notes=tuple(notes))
+
+
+def _summary(prepared: Prepared, ambient: Ambient, parts: list[_Part], seconds: float) -> Summary:
+    """Put the passes over the camera path together."""
+    rays = sum((part.rays for part in parts), Counter({"ambient": ambient.rays}))
+    width, height = prepared.job.camera.resolution
     return Summary(
-        images=prepared.n_cameras * n_lights,
-        seconds=time.perf_counter() - started,
-        rays={"ambient": ambient.rays, **crew.rays()},
-        stages=crew.seconds(),
-        pixels=work.n_pixels,
-        hits=hits / work.n_frames,
+        images=prepared.n_cameras * prepared.n_lights,
+        seconds=seconds,
+        rays=dict(rays),
+        stages={stage: sum(part.stages[stage] for part in parts) for stage in parts[0].stages},
+        pixels=width * height,
+        hits=parts[0].hits,
         peak_memory=peak_memory(),
-        notes=tuple(notes),
+        notes=(*ambient.notes, *(note for part in parts for note in part.notes)),
     )
 
 

@@ -22,10 +22,13 @@ def estimate_terms(
     if scratch.steps is None:
         rays = direct(hits, n, work.lights, work.tracer, scratch.test_rays, out.irradiance)
     else:
+        irradiance = out.irradiance if work.keeps_all else scratch.irradiance
         rays = direct_by_steps(
             hits, n, work.lights, work.shadow_step, work.shadow_unbiased, work.tracer, scratch.test_rays,
-            scratch.steps, out.irradiance,
+            scratch.steps, irradiance,
         )  # fmt: skip
+        if not work.keeps_all:
+            out.irradiance[:n] = irradiance[:n, :, work.kept.start : work.kept.stop]
     scratch.rays[shadow_kind] += rays
     out.reflectivity[:n] = hits.reflectivity[:n]
     if work.has_constant:

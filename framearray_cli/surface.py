@@ -8,10 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Bytes, CornerUvs, Corners, Float32, Int32, Real, Rgb, Triple
+from .arrays import Bytes, Corners, CornerUvs, Float32, Int32, Real, Rgb, Triple
 from .kernel import inlined
 from .scene import Scene
-
 
 # Ray offsets: 16 units in the last place of the largest coordinate of the triangle. Of the rules tried it alone had
 # no self-hits and no leaks at every scale (docs/decisions/ray-offsets.md).

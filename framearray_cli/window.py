@@ -68,17 +68,22 @@ class Window:
     """At most 2 N_r + 1 frames, and the crew that composes from them."""
 
     def __init__(self, work: Work, ambient: Ambient, crew: Crew, first: int = 0) -> None:
-        """Make ready to compose frames `first`, `first` + 1, ..."""
+        """Make ready to compose frames `first`, `first` + 1, ...
+
+        Args:
+            ambient: of all lights that `work` computes.
+        """
         self._work = work
         # by channel, as the sums are
-        self._colour = np.ascontiguousarray(work.lights.colour.T)
-        self._ambient = np.ascontiguousarray(ambient.intensity.T)
+        kept = slice(work.kept.start, work.kept.stop)
+        self._colour = np.ascontiguousarray(work.lights.colour[kept].T)
+        self._ambient = np.ascontiguousarray(ambient.intensity[kept].T)
         self._crew = crew
         # corrections of unbiased shadows may outweigh a dark pixel; cut at 0, their mean would be wrong
         self._lowest = np.float32(-np.inf if work.shadow_unbiased and work.shadow_step > 1 else 0.0)
         self._frames: dict[int, Frame] = {}
         self._next = first
-        self._bands = [empty_band(BAND_PIXELS, work.lights.n_lights) for _ in range(crew.threads)]
+        self._bands = [empty_band(BAND_PIXELS, len(work.kept)) for _ in range(crew.threads)]
 
     def add(self, frame: Frame) -> None:
         """Take in the hits of the next frame of the path."""
@@ -101,7 +106,7 @@ class Window:
             images: (n_lights, height, width, 3), overwritten.
         """
         work = self._work
-        flat = images.reshape(work.lights.n_lights, work.n_pixels, 3)
+        flat = images.reshape(len(images), work.n_pixels, 3)
         maps = np.empty((work.n_pixels, 9), np.float32) if work.layers else None
         own = np.empty((work.n_pixels, 4), np.float32) if work.layers else None
         samples = np.empty(work.n_pixels, np.int32)

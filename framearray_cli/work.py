@@ -1,6 +1,6 @@
 """What the work on frames is given, and what it leaves: settings, records of hits, and where they fall."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from .arrays import Float32, Float64, Int32, Rgb
 from .camera import Cameras
 from .embree.packets import Tracer
 from .hits import pixel_order
-from .lights import LightArrays
+from .lights import LightArrays, some_lights
 from .reuse import sort_by_pixel
 from .surface import Surfaces
 from .terms.obscurance import ObscuranceSettings
@@ -19,6 +19,7 @@ class Work:
     """Everything that the terms of every frame need, as kernels take it.
 
     Attributes:
+        lights: those whose light is computed; `kept`: which of them are stored and composed.
         per_pixel: (n_c,) native hits a pixel of every frame.
         mirror_hits: native hits of a pixel that sees a mirror, if more; 0 in a scene without mirrors.
         depth: mirror bounces that are followed; 0 in a scene without mirrors.
@@ -33,6 +34,7 @@ class Work:
     surfaces: Surfaces
     tracer: Tracer
     lights: LightArrays
+    kept: range
     obscurance: ObscuranceSettings
     seed: int
     n_r: int
@@ -62,6 +64,21 @@ class Work:
     def has_constant(self) -> bool:
         """Whether anything a pixel shows is the same under every light."""
         return bool(self.background.any())
+
+    @property
+    def keeps_all(self) -> bool:
+        """Whether all light that is computed is stored too."""
+        return len(self.kept) == self.lights.n_lights
+
+    def for_lights(self, block: range) -> "Work":
+        """The same work for some light positions; their images are the same to the last bit.
+
+        Shadow steps walk along the whole light path wherever a block ends, so all of it is computed, and some is kept.
+        """
+        layers = self.layers and block.start == 0
+        if self.shadow_step > 1:
+            return replace(self, kept=block, layers=layers)
+        return replace(self, lights=some_lights(self.lights, block), kept=range(len(block)), layers=layers)
 
     def frames_around(self, c: int, reach: int) -> range:
         """The frames of the path from c - reach to c + reach."""
@@ -102,7 +119,7 @@ def empty_records(work: Work, n: int, irradiance: Float32 | None = None) -> Reco
         irradiance: (n, channels, n_lights) memory to use, or None.
     """
     if irradiance is None:
-        irradiance = np.empty((n, work.lights.channels, work.lights.n_lights), np.float32)
+        irradiance = np.empty((n, work.lights.channels, len(work.kept)), np.float32)
     return Records(
         reflectivity=np.empty((n, 3), np.float32),
         obscurance=np.empty((n, 3), np.float32),

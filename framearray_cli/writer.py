@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Self
 
@@ -33,7 +33,7 @@ class ArrayWriter:
         resolution: tuple[int, int],
         fps: float,
         image_format: ImageFormat,
-        n_lights: int,
+        lights: range,
         threads: int,
         written: Callable[[int], None],
     ) -> None:
@@ -41,17 +41,17 @@ class ArrayWriter:
 
         Args:
             patterns: file patterns of images and of layers.
+            lights: the light positions that frames are composed for.
             written: called with 1 after each image, from any thread.
         """
         self._directory, self._patterns, self._eyes = directory, patterns, eyes
         self._resolution, self._fps, self._format = resolution, fps, image_format
-        self._written = written
+        self._written, self._lights = written, lights
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="write")
         self._free: SimpleQueue[Images | BaseException] = SimpleQueue()
         width, height = resolution
         for _ in range(BLOCKS):
-            self._free.put(np.empty((n_lights, height, width, 3), np.float32))
-        self._pending: list[Future[None]] = []
+            self._free.put(np.empty((len(lights), height, width, 3), np.float32))
 
     def block(self) -> Images:
         """A block to compose a frame into, (n_lights, height, width, 3); waits until one is free.
@@ -70,22 +70,22 @@ class ArrayWriter:
 
     def write(self, composed: Composed, cameras: range) -> None:
         """Write a composed frame as that of each of the given cameras; its block is free when that is done."""
-        n_lights = len(composed.images)
-        tasks = [self._pool.submit(self._write_image, composed, c, l) for c in cameras for l in range(n_lights)]
+        tasks = [self._pool.submit(self._write_image, composed, c, l) for c in cameras for l in self._lights]
         if composed.layers is not None:
             tasks += [self._pool.submit(self._write_layers, composed.layers, c) for c in cameras]
-        remaining = SimpleQueue[None]()
+        unfinished = SimpleQueue[None]()  # one entry fewer than tasks: who finds none left is the last
         for _ in tasks[1:]:
-            remaining.put(None)
+            unfinished.put(None)
 
         def done(task: Future[None]) -> None:
             error = None if task.cancelled() else task.exception()
             if error is not None:
                 self._free.put(error)
-            elif remaining.empty():
+                return
+            try:
+                unfinished.get_nowait()
+            except Empty:
                 self._free.put(composed.images)
-            else:
-                remaining.get()
 
         for task in tasks:
             task.add_done_callback(done)
@@ -102,7 +102,7 @@ class ArrayWriter:
 
     def _write_image(self, composed: Composed, c: int, l: int) -> None:
         path = self._directory / self._patterns[0].format(camera=c, light=l)
-        write_image(path, composed.images[l], self._format, self._attributes(c, l))
+        write_image(path, composed.images[l - self._lights.start], self._format, self._attributes(c, l))
         self._written(1)
 
     def _write_layers(self, layers: Layers, c: int) -> None:

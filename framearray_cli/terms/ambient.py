@@ -54,6 +54,11 @@ class Ambient:
     rays: int
     notes: tuple[str, ...] = ()
 
+    def for_lights(self, block: range) -> "Ambient":
+        """The estimate of some light positions."""
+        span = slice(block.start, block.stop)
+        return replace(self, intensity=self.intensity[span], standard_error=self.standard_error[span])
+
 
 class Workspace:
     """Arrays for one batch of walks, kept from batch to batch."""
