@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import tiny
 
@@ -62,3 +63,11 @@ def test_peak_memory_of_a_short_and_of_a_long_path_is_the_same(tmp_path: Path) -
     peak(tmp_path, 2, (24, 18), 3, 1)
     short, long = (peak(tmp_path, frames, (120, 90), 24, 1) for frames in (6, 24))
     assert long == pytest.approx(short, rel=0.03)
+
+
+def test_the_peak_is_that_of_this_process_alone() -> None:
+    """A process that a large one starts is not large itself."""
+    ballast = np.ones(400 * 2**20, np.uint8)
+    code = "from framearray_cli.memory import peak_memory; print(peak_memory())"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert int(run.stdout) < ballast.nbytes
