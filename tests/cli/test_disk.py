@@ -1,0 +1,96 @@
+"""Disks that are full or cannot be written to, also for what is printed."""
+
+import os
+import shutil
+import subprocess
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import tiny
+from program import finish, names, start, write_job
+
+FULL = Path("/dev/full")
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk of 2 MB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = shutil.which("mount")
+    if (
+        mount is None
+        or subprocess.run([mount, "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(folder)], capture_output=True).returncode
+    ):
+        pytest.skip("this user may not mount a small disk")
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+@pytest.mark.parametrize("file_format", ["exr", "png", "tif", "jpg"])
+def test_a_disk_that_becomes_full(file_format, disk, tmp_path):
+    camera = tiny.WALK | {"resolution": [120, 90], "frames": 40}
+    output = {"format": file_format, "directory": "disk/out"}
+    told = finish(start("render", "-q", write_job(tmp_path, camera=camera, output=output)))
+    assert (told.code, told.out) == (4, "")
+    lines = told.err.splitlines()
+    assert lines[0].startswith(f"{disk / 'out'}{os.sep}tiny.")
+    assert ": cannot be written: " in lines[0]
+    assert lines[1].endswith(" are free on that disk")
+    out = disk / "out"
+    assert not list(out.glob(".*"))
+    images = len(list(out.glob("*.l[0-9]*.*")))
+    assert lines[2].startswith(f"{images} of 120 images are in {out}; ")
+    summary = tomllib.loads((out / "manifest.toml").read_text())["summary"]
+    assert summary["finished"] is False
+    # where no space is left for a new manifest the one from the start stays
+    assert summary["images"] in (0, images)
+
+
+def test_a_disk_that_is_full(disk, tmp_path):
+    (disk / "fill").write_bytes(b"")
+    with pytest.raises(OSError, match="No space left"), (disk / "fill").open("ab", buffering=0) as file:
+        while file.write(bytes(65536)):
+            pass
+    (disk / "out").mkdir()
+    told = finish(start("render", "-q", write_job(tmp_path, output={"directory": "disk/out"})))
+    assert (told.code, told.out) == (4, "")
+    assert told.err.splitlines()[0].endswith("cannot be written: No space left on device")
+    assert not names(disk / "out")
+
+
+def test_a_disk_that_is_read_only(disk, tmp_path):
+    subprocess.run(["mount", "-o", "remount,ro", str(disk)], check=True)
+    told = finish(start("render", "-q", write_job(tmp_path, output={"directory": "disk/out"})))
+    assert (told.code, told.out) == (4, "")
+    assert told.err.startswith(f"{disk / 'out'}: cannot make the folder: Read-only file system\n")
+
+
+@pytest.mark.skipif(os.name == "nt" or (hasattr(os, "geteuid") and os.geteuid() == 0), reason="root may write anywhere")
+def test_a_folder_that_may_not_be_written_to(tmp_path):
+    (tmp_path / "out").mkdir(mode=0o555)
+    told = finish(start("render", "-q", write_job(tmp_path)))
+    assert (told.code, told.err) == (4, f"{tmp_path / 'out'}: cannot be written to: Permission denied\n")
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="no /dev/full")
+@pytest.mark.parametrize("command", [["schema"], ["--version"], ["render", "job.toml"], ["check", "job.toml"]])
+def test_output_that_cannot_be_printed(command, tmp_path):
+    write_job(tmp_path)
+    with FULL.open("w") as full:
+        told = finish(start(*command, stdout=full, cwd=tmp_path))
+    assert told.code == 4
+    assert told.err == "standard output: cannot be written: No space left on device\n"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no such pipes there")
+def test_output_that_nobody_reads(tmp_path):
+    process = start("check", write_job(tmp_path))
+    assert process.stdout is not None
+    process.stdout.close()
+    assert process.stderr is not None
+    assert process.stderr.read() == ""
+    assert process.wait(60) in (0, 1)
+    process.stderr.close()

@@ -1,0 +1,69 @@
+"""What `check` foretells, against what `render` takes."""
+
+import os
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+import tiny
+from program import Result, finish, start, write_job
+
+UNITS = {"bytes": 1, "KiB": 2**10, "MiB": 2**20, "GiB": 2**30}
+SECONDS = {"s": 1, "min": 60, "h": 3600}
+WALK = tiny.WALK | {"resolution": [200, 150], "frames": 8}
+REST = {"keys": tiny.WALK["keys"][:1], "frames": 30, "resolution": [160, 120]}
+
+
+def run(*arguments: str | Path) -> Result:
+    told = finish(start(*arguments))
+    assert (told.code, told.err) == (0, "")
+    return told
+
+
+def bytes_after(label: str, told: Result) -> float:
+    number, unit = re.search(rf"^{label}: about ([\d.]+) (\w+)", told.out, re.MULTILINE).groups()  # type: ignore[union-attr]
+    return float(number) * UNITS[unit]
+
+
+def seconds(told: Result) -> float:
+    line = re.search("^time: about (.*) on this machine", told.out, re.MULTILINE).group(1)  # type: ignore[union-attr]
+    return sum(float(number) * SECONDS[unit] for number, unit in re.findall(r"([\d.]+) (\w+)", line))
+
+
+def job(folder: Path, **changes: object) -> Path:
+    return write_job(folder, **({"light": {"frames": 16}, "output": {"format": "exr"}} | changes))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"camera": WALK, "reuse": {"n_r": 2}},
+        {"camera": REST, "reuse": {"n_r": 2}},
+        {"camera": WALK, "output": {"format": "png", "layers": False}},
+    ],
+    ids=["walk", "rest", "png"],
+)
+def test_memory_and_disk(changes, tmp_path):
+    file = job(tmp_path, **changes)
+    told = run("check", file)
+    run("render", "-q", file)
+    summary = tomllib.loads((tmp_path / "out" / "manifest.toml").read_text())["summary"]
+    images = sum(entry.stat().st_size for entry in (tmp_path / "out").iterdir() if entry.suffix != ".toml")
+    assert bytes_after("memory", told) == pytest.approx(summary["peak_memory"], rel=0.25)
+    assert bytes_after("disk", told) == pytest.approx(images, rel=0.25)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("camera", [WALK | {"frames": 24}, REST | {"frames": 120}], ids=["walk", "rest"])
+def test_time(camera, tmp_path):
+    """The best of five: others may use the machine while either of the two runs."""
+    file = job(tmp_path, camera=camera, reuse={"n_r": 2})
+    run("check", file)  # compiles
+    ratios = []
+    for _ in range(5):
+        foretold = seconds(run("check", file))
+        run("render", "-q", file)
+        taken = tomllib.loads((tmp_path / "out" / "manifest.toml").read_text())["summary"]["seconds"]
+        ratios.append(foretold / taken)
+    assert min(max(ratio, 1 / ratio) for ratio in ratios) < 1.5, f"{ratios}, load {os.getloadavg()}"

@@ -1,0 +1,160 @@
+"""Wrong input: one clear message on standard error, the exit code of its kind, no traceback, and nothing written."""
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+from program import finish, names, run, start, write_job
+
+from framearray_cli.errors import CheckError, JobError, OutputError, SceneError
+
+
+def test_exit_codes_are_those_of_the_documentation():
+    assert [error.exit_code for error in (JobError, SceneError, OutputError, CheckError)] == [2, 3, 4, 5]
+
+
+@pytest.mark.parametrize("command", ["render", "check"])
+def test_problems_of_a_job_are_told_at_once(command, tmp_path, capsys):
+    job = write_job(tmp_path, samples={"hits": 2, "obscurence": 5}, camera={"fov": "wide"})
+    told = run(capsys, command, job)
+    assert told.code == 2
+    assert told.out == ""
+    assert told.err.splitlines() == [
+        f'{job}: camera.fov: expected a number from 0.001 to 179.9, got "wide"',
+        f'{job}: samples.obscurence: unknown key; did you mean "obscurance"?',
+        "2 problems; nothing was rendered.",
+    ]
+    assert names(tmp_path) == {"job.toml", "tiny.glb"}
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("missing.toml", None, "missing.toml: no such file"),
+        ("binary.toml", b"\x00\x01\xff", "binary.toml: expected UTF-8 text, got a binary file"),
+        ("broken.toml", b"name = \n", "broken.toml: not valid TOML: Invalid value (at line 1, column 8)"),
+        ("empty.toml", b"", "empty.toml: scene: missing; expected a table"),
+        ("scene.glb", b"glTF\x02\x00\x00\x00", "scene.glb: expected UTF-8 text, got a binary file"),
+        ("folder", "folder", "folder: expected a TOML file, got a folder"),
+    ],
+)
+def test_what_is_no_job_file(name, content, message, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    if isinstance(content, bytes):
+        Path(name).write_bytes(content)
+    elif content is not None:
+        Path(name).mkdir()
+    told = run(capsys, "render", name)
+    assert (told.code, told.out) == (2, "")
+    assert message in told.err.splitlines()
+    assert re.fullmatch(r"\d problems?; nothing was rendered\.", told.err.splitlines()[-1])
+
+
+def test_a_name_of_a_job_is_no_markup(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run(capsys, "render", "[red]a[/red]:smile:.toml").err.startswith("[red]a[/red]:smile:.toml: no such file")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="file names are text there")
+def test_a_name_that_cannot_be_shown(tmp_path):
+    told = finish(start("render", os.fsdecode(b"n\xffx.toml"), cwd=tmp_path))
+    assert told.code == 2
+    assert told.err.startswith("n\\udcffx.toml: no such file")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["rendr"], "No such command 'rendr'"),
+        (["render"], "Missing argument 'JOB'"),
+        (["render", "--foo", "job.toml"], "No such option: --foo"),
+        (["render", "job.toml", "other.toml"], "unexpected extra argument"),
+        (["render", "--threads", "0", "job.toml"], "Invalid value for '--threads'"),
+        (["render", "--threads", "1025", "job.toml"], "Invalid value for '--threads'"),
+        (["render", "--threads", "two", "job.toml"], "Invalid value for '--threads'"),
+        (["render", "job.toml", "-o", ""], "expected a name, got none"),
+        (["assemble", "out", "path.toml"], "Missing option '--output'"),
+        (["assemble", "out", "path.toml", "-o", " "], "expected a name, got none"),
+        (["assemble", "out", "path.toml", "-o", "a.mp4", "--exposure", "1e9"], "Invalid value for '--exposure'"),
+    ],
+)
+def test_wrong_command_lines(arguments, message, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_job(tmp_path)
+    told = run(capsys, *arguments)
+    assert (told.code, told.out) == (2, "")
+    assert message in told.err
+    assert "Usage: framearray" in told.err
+    assert names(tmp_path) == {"job.toml", "tiny.glb"}
+
+
+@pytest.mark.parametrize(
+    ("scene", "message"),
+    [
+        ("nosuch.glb", "nosuch.glb: no such scene file; paths are relative to the job file"),
+        ("job.toml", "job.toml: expected a scene of a known format, got '.toml'; known are "),
+        ("points.obj", "points.obj: expected triangles, got none (points without faces are left out)"),
+        ("broken.glb", "broken.glb: broken, or not GLB ("),
+    ],
+)
+def test_wrong_scenes(scene, message, tmp_path, capsys):
+    (tmp_path / "points.obj").write_text("v 0 0 0\nv 1 0 0\n")
+    (tmp_path / "broken.glb").write_bytes(b"glTF" + bytes(200))
+    told = run(capsys, "render", write_job(tmp_path, scene={"file": scene}))
+    assert (told.code, told.out) == (3, "")
+    assert told.err.startswith(f"{tmp_path}{os.sep}{message}")
+    assert len(told.err.splitlines()) == 1
+    assert "out" not in names(tmp_path)
+
+
+def test_an_output_folder_that_is_a_file(tmp_path, capsys):
+    told = run(capsys, "render", "-q", write_job(tmp_path, output={"directory": "tiny.glb"}))
+    assert (told.code, told.out) == (4, "")
+    assert told.err == f"{tmp_path / 'tiny.glb'}: a file of that name is in the way of the folder\n"
+
+
+@pytest.mark.parametrize("change", [{"camera": {"resolution": [16384, 16384]}}, {"light": {"frames": 100_000}}])
+def test_a_job_beyond_memory(change, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("framearray_cli.memory.free_memory", lambda: 2**30)
+    told = run(capsys, "render", "-q", write_job(tmp_path, **change))
+    assert (told.code, told.out) == (2, "")
+    assert re.search(r"job\.toml: rendering needs at least [\d.]+ GiB of memory, 1\.0 GiB", told.err)
+    assert "out" not in names(tmp_path)
+
+
+def test_memory_that_runs_out_all_the_same(tmp_path, capsys, monkeypatch):
+    def fail(*arguments: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("framearray_cli.render.plan_work", fail)
+    told = run(capsys, "render", "-q", write_job(tmp_path))
+    assert told.code == 2
+    assert told.err.startswith("not enough memory; ")
+
+
+def test_a_movie_path_with_a_problem(tmp_path, capsys):
+    run(capsys, "render", "-q", write_job(tmp_path))
+    path = tmp_path / "path.toml"
+    path.write_text("segments = 3\n")
+    told = run(capsys, "assemble", tmp_path / "out", path, "-o", tmp_path / "walk.mp4")
+    assert (told.code, told.out) == (2, "")
+    assert told.err.endswith("1 problem; nothing was written.\n")
+    assert not (tmp_path / "walk.mp4").exists()
+
+
+def test_a_movie_of_no_array(tmp_path, capsys):
+    told = run(capsys, "assemble", tmp_path / "nosuch", tmp_path / "path.toml", "-o", tmp_path / "walk.mp4")
+    assert (told.code, told.out) == (4, "")
+    assert "no such file; expected the output folder of `framearray render`" in told.err
+
+
+def test_our_own_mistakes_keep_their_traceback(tmp_path, monkeypatch):
+    def fail(*arguments: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("framearray_cli.render.prepare", fail)
+    from framearray_cli.cli import main
+
+    with pytest.raises(ZeroDivisionError):
+        main(["render", str(write_job(tmp_path))])

@@ -1,0 +1,158 @@
+"""`render` and `check` of a small job: what they print, what they write, and whose folder it is."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+import tiny
+from program import finish, names, run, start, write_job
+
+IMAGES = {f"tiny.c0000.l{l:03d}.png" for l in range(3)}
+FILES = IMAGES | {"tiny.layers.c0000.exr", "manifest.toml"}
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.glob("*.*g")}
+
+
+def test_a_render_says_what_it_did(tmp_path, capsys):
+    told = run(capsys, "render", write_job(tmp_path))
+    assert (told.code, told.err) == (0, "")
+    lines = [line for line in told.out.splitlines() if not line.startswith("compiling")]
+    assert re.fullmatch(r".*tiny\.glb: \d+ triangles, \d+ materials, 1 textures", lines[0])
+    assert re.fullmatch(r"ambient light: I_A [\d.]+ to [\d.]+ \(standard error at most .*\)", lines[1])
+    assert re.fullmatch(r"3 images in .*: .* ms an image, .* images a second", lines[2])
+    assert re.search(r"rays a pixel an image \+ .* for mirrors, .* Mrays/s, .* hits a pixel, peak memory", lines[3])
+    assert lines[-1] == f"images and manifest: {tmp_path / 'out'}"
+    assert names(tmp_path / "out") == FILES
+    assert tomllib.loads((tmp_path / "out" / "manifest.toml").read_text())["summary"]["finished"] is True
+
+
+def test_each_note_is_told_once(tmp_path, capsys):
+    floor = tiny.quad((-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9))  # nothing for walks to meet
+    material = tiny.Material(name="Floor", reflectivity=(0.5, 0.5, 0.5))
+    part = tiny.Part(material=0, corners=floor)
+    meshes = tiny.Meshes(parts=(part,), materials=(material,), textures=(), dropped={}, notes=())
+    tiny.save_glb(meshes, tmp_path / "tiny.glb")
+    told = run(capsys, "render", write_job(tmp_path))
+    assert told.code == 0
+    assert told.out.count("met a second surface") == 1
+
+
+def test_quiet_is_silent(tmp_path, capsys):
+    told = run(capsys, "render", "--quiet", write_job(tmp_path))
+    assert (told.code, told.out, told.err) == (0, "", "")
+    assert names(tmp_path / "out") == FILES
+
+
+def test_options_stand_instead_of_the_job(tmp_path, capsys, monkeypatch):
+    job = write_job(tmp_path)
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    assert run(capsys, "render", "-q", job, "--output", "there", "--threads", "1").code == 0
+    assert names(tmp_path) == {"job.toml", "tiny.glb", "here"}
+    assert names(tmp_path / "here" / "there") == FILES
+    manifest = tomllib.loads((tmp_path / "here" / "there" / "manifest.toml").read_text())
+    assert manifest["job"]["render"]["threads"] == 1
+    assert run(capsys, "render", "-q", job).code == 0
+    assert contents(tmp_path / "out") == contents(tmp_path / "here" / "there")
+
+
+def test_the_same_job_may_be_rendered_again(tmp_path, capsys):
+    job = write_job(tmp_path)
+    assert run(capsys, "render", "-q", job).code == 0
+    before = contents(tmp_path / "out")
+    (tmp_path / "out" / "tiny.c0000.l001.png").unlink()
+    (tmp_path / "out" / "tiny.c0000.l002.png").write_bytes(b"damaged")
+    assert run(capsys, "render", "-q", job).code == 0
+    assert contents(tmp_path / "out") == before
+
+
+def test_the_place_of_the_scene_plays_no_part(tmp_path, capsys):
+    assert run(capsys, "render", "-q", write_job(tmp_path)).code == 0
+    (tmp_path / "tiny.glb").rename(tmp_path / "moved.glb")
+    assert run(capsys, "render", "-q", write_job(tmp_path, scene={"file": "moved.glb"})).code == 0
+
+
+@pytest.mark.parametrize("change", [{"seed": 6}, {"name": "other"}, {"output": {"format": "exr"}}])
+def test_another_array_is_in_the_way(change, tmp_path, capsys):
+    assert run(capsys, "render", "-q", write_job(tmp_path)).code == 0
+    before = {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()}
+    other = write_job(tmp_path, "other.toml", **change)
+    told = run(capsys, "render", "-q", other)
+    assert (told.code, told.out) == (4, "")
+    assert told.err.startswith(f"{tmp_path / 'out'}: holds another frame array, 'tiny' with 1 x 3 images")
+    assert "--output" in told.err
+    assert "--restart" in told.err
+    assert {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()} == before
+    warned = run(capsys, "check", other)
+    assert warned.code == 0
+    assert "warning: " in warned.out
+    assert "holds another frame array" in warned.out
+    assert names(tmp_path / "out") == FILES
+
+
+def test_a_changed_scene_is_another_array(tmp_path, capsys):
+    job = write_job(tmp_path)
+    assert run(capsys, "render", "-q", job).code == 0
+    tiny.save_glb(tiny.room_meshes(mirrors=False), tmp_path / "tiny.glb")
+    assert run(capsys, "render", "-q", job).code == 4
+
+
+def test_restart_removes_what_the_manifest_lists_and_nothing_else(tmp_path, capsys):
+    assert run(capsys, "render", "-q", write_job(tmp_path)).code == 0
+    out = tmp_path / "out"
+    (out / "mine.txt").write_text("keep")
+    (out / "tiny.c0007.l000.png").write_text("not in the array")
+    other = write_job(tmp_path, "other.toml", name="other", light={"frames": 4})
+    told = run(capsys, "render", other, "--restart")
+    assert (told.code, told.err) == (0, "")
+    assert f"removed {len(FILES)} files of the frame array in {out}" in told.out
+    theirs = {"mine.txt", "tiny.c0007.l000.png"}
+    ours = {f"other.c0000.l{l:03d}.png" for l in range(4)} | {"other.layers.c0000.exr", "manifest.toml"}
+    assert names(out) == theirs | ours
+    assert (out / "mine.txt").read_text() == "keep"
+
+
+def test_restart_of_a_job_with_a_problem_removes_nothing(tmp_path, capsys):
+    assert run(capsys, "render", "-q", write_job(tmp_path)).code == 0
+    broken = write_job(tmp_path, "broken.toml", seed=7, scene={"file": "nosuch.glb"})
+    assert run(capsys, "render", "-q", "--restart", broken).code == 3
+    assert names(tmp_path / "out") == FILES
+
+
+def test_a_broken_manifest_is_not_guessed_at(tmp_path, capsys):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "manifest.toml").write_text("format = \n")
+    told = run(capsys, "render", "-q", "--restart", write_job(tmp_path))
+    assert (told.code, told.out) == (4, "")
+    assert re.match(r".*manifest\.toml: not valid TOML: .*; remove that file, or choose another folder", told.err)
+    assert names(tmp_path / "out") == {"manifest.toml"}
+
+
+def test_an_array_that_leads_out_of_its_folder_is_not_removed(tmp_path, capsys):
+    assert run(capsys, "render", "-q", write_job(tmp_path)).code == 0
+    manifest = tmp_path / "out" / "manifest.toml"
+    manifest.write_text(manifest.read_text().replace('images = "tiny', 'images = "../tiny'))
+    told = run(capsys, "render", "-q", "--restart", write_job(tmp_path, seed=3))
+    assert told.code == 4
+    assert "inside the folder" in told.err
+    assert (tmp_path / "tiny.glb").exists()
+
+
+def test_check_writes_nothing(tmp_path, capsys):
+    told = run(capsys, "check", write_job(tmp_path))
+    assert (told.code, told.err) == (0, "")
+    text = told.out
+    assert "array: 1 cameras x 3 lights = 3 images of 24 x 18" in text
+    for line in ("memory: about ", f"disk: about .* in {re.escape(str(tmp_path / 'out'))}", "time: about "):
+        assert re.search(f"^{line}", text, re.MULTILINE), text
+    assert "warning" not in text
+    assert names(tmp_path) == {"job.toml", "tiny.glb"}
+
+
+def test_the_installed_command_and_the_module_are_the_same(tmp_path):
+    told = finish(start("render", "-q", write_job(tmp_path)))
+    assert (told.code, told.out, told.err) == (0, "", "")
+    assert names(tmp_path / "out") == FILES

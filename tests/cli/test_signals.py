@@ -1,0 +1,156 @@
+"""Ctrl-C and SIGTERM at every stage: a prompt end, the right exit code, one message, only whole files."""
+
+import importlib
+import os
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+import tiny
+from program import Result, finish, start, wait_for, write_job
+
+from framearray_cli.images import read_image
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of other kinds there")
+
+PROMPT = 2.0  # seconds
+# long enough to be met at every stage: a minute of walks, then hours of frames
+LONG = {
+    "ambient": {"paths": 2**24},
+    "camera": tiny.WALK | {"resolution": [160, 120], "frames": 500},
+    "light": {"frames": 16},
+    "reuse": {"n_r": 1},
+    "samples": {"hits": 16},
+    "output": {"format": "exr"},
+}
+
+
+def stop(process: subprocess.Popen[str], number: signal.Signals) -> Result:
+    """Send a signal; the process must end promptly, and say nothing but what is expected of it."""
+    started = time.monotonic()
+    process.send_signal(number)
+    told = finish(process)
+    assert time.monotonic() - started < PROMPT
+    word = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}[number]
+    assert told.code == 128 + number
+    assert told.err.splitlines()[0] == word
+    assert "Traceback" not in told.err
+    return told
+
+
+def check_files(out: Path, format_suffix: str) -> int:
+    """No half file, and the manifest tells what there is; returns the number of images."""
+    assert not list(out.glob(".*"))
+    images = sorted(out.glob(f"*.l[0-9]*.{format_suffix}"))
+    for image in images:
+        assert read_image(image).shape == (120, 160, 3)
+    summary = tomllib.loads((out / "manifest.toml").read_text())["summary"]
+    assert summary["finished"] is False
+    assert summary["images"] == len(images)
+    return len(images)
+
+
+def said(process: subprocess.Popen[str], log: Path, text: str) -> Callable[[], bool]:
+    return lambda: text in log.read_text()
+
+
+def works(process: subprocess.Popen[str]) -> Callable[[], bool]:
+    """Whether the program has loaded what it renders with, so that its signal handlers are set."""
+    maps, started = Path(f"/proc/{process.pid}/maps"), time.monotonic()
+    if not maps.exists():  # no Linux
+        return lambda: time.monotonic() > started + 3
+    return lambda: "llvmlite" in maps.read_text()
+
+
+def begun(tmp_path: Path, **changes: object) -> tuple[subprocess.Popen[str], Path]:
+    """A long render under way, and the file that its output goes to."""
+    log = tmp_path / "log"
+    with log.open("w") as file:
+        return start("render", write_job(tmp_path, **(LONG | changes)), stdout=file), log
+
+
+def test_while_loading(tmp_path):
+    tiny.save_glb(tiny.room_meshes(), tmp_path / "tiny.glb")
+    lines = "".join(f"v {i} {i * i} 0\nf -1 -2 -3\n" for i in range(600_000))  # takes some seconds to read
+    (tmp_path / "long.obj").write_text(lines)
+    process = start("render", write_job(tmp_path, **(LONG | {"scene": {"file": "long.obj"}})))
+    wait_for(works(process), process)
+    time.sleep(0.3)
+    told = stop(process, signal.SIGINT)
+    assert told.err == "interrupted\n"
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_while_the_ambient_light_is_estimated(number, tmp_path):
+    process, log = begun(tmp_path)
+    wait_for(said(process, log, "triangles"), process)
+    time.sleep(0.5)
+    assert stop(process, number).err.count("\n") == 1
+    assert not list((tmp_path / "out").iterdir())
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_while_rendering(number, tmp_path):
+    process, _ = begun(tmp_path, ambient={"paths": 64})
+    out = tmp_path / "out"
+    wait_for(lambda: len(list(out.glob("*.l[0-9]*.exr"))) > 20, process)
+    told = stop(process, number)
+    images = check_files(out, "exr")
+    message = f"{images} of 8,000 images are in {out}; its manifest says that it is not finished"
+    assert told.err.splitlines()[1:] == [message]
+
+
+def test_while_nothing_but_writing_goes_on(tmp_path):
+    """A camera at rest: its one frame is found at once, then written for 500 eyes."""
+    camera = {"keys": tiny.WALK["keys"][:1], "frames": 500, "resolution": [160, 120]}
+    process, _ = begun(tmp_path, ambient={"paths": 64}, camera=camera, output={"format": "png"})
+    wait_for(lambda: len(list((tmp_path / "out").glob("*.l[0-9]*.png"))) > 20, process)
+    stop(process, signal.SIGINT)
+    assert check_files(tmp_path / "out", "png") < 8000
+
+
+def test_a_stopped_render_can_be_rendered_to_its_end(tmp_path):
+    camera = tiny.WALK | {"resolution": [80, 60], "frames": 30}
+    process, _ = begun(tmp_path, ambient={"paths": 64}, camera=camera, light={"frames": 4}, samples={"hits": 4})
+    out = tmp_path / "out"
+    wait_for(lambda: len(list(out.glob("*.l[0-9]*.exr"))) > 2, process)
+    stop(process, signal.SIGINT)
+    assert finish(start("render", "-q", tmp_path / "job.toml")).code == 0
+    assert len(list(out.glob("*.l[0-9]*.exr"))) == 30 * 4
+    assert tomllib.loads((out / "manifest.toml").read_text())["summary"]["finished"] is True
+
+
+def test_while_checking(tmp_path):
+    process = start("check", write_job(tmp_path, **LONG))
+    wait_for(works(process), process)
+    time.sleep(0.5)
+    stop(process, signal.SIGTERM)
+    assert not (tmp_path / "out").exists()
+
+
+def test_before_the_command_line_is_loaded(monkeypatch):
+    """Ctrl-C ends the process by itself then, without the traceback of an import."""
+    seen = []
+    fake = ModuleType("framearray_cli.cli")
+    fake.main = lambda: seen.append(signal.getsignal(signal.SIGINT))
+    monkeypatch.setitem(sys.modules, "framearray_cli.cli", fake)
+    importlib.import_module("framearray_cli.__main__").main()
+    assert seen == [signal.SIG_DFL]
+
+
+@pytest.mark.slow
+def test_while_kernels_compile(tmp_path, monkeypatch):
+    """A thread that compiles cannot be stopped; it is not waited for."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    process, log = begun(tmp_path, ambient={"paths": 64})
+    wait_for(said(process, log, "ambient light"), process)
+    time.sleep(1.0)  # now the frame's threads compile
+    assert "compiling" in log.read_text()
+    assert stop(process, signal.SIGINT).err == "interrupted\n"
