@@ -1,40 +1,33 @@
 """Runs the frame loop in its steady state, and measures it.
 
-A run takes `frames` cameras from the middle of a job's path. The window is filled before the clock starts and nothing
-is compiled while it runs, so that what is measured is the cost of an interior frame.
+A run takes some cameras from the job's path. The window is filled before the clock starts and nothing is compiled
+while it runs, so that what is measured is the cost of an interior frame.
 """
 
-import os
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from threading import Lock
+from typing import Any
 
 import numpy as np
 
 from framearray_cli.arrays import Int32
-from framearray_cli.embree import EmbreeScene
+from framearray_cli.crew import Crew
 from framearray_cli.filepatterns import file_patterns
-from framearray_cli.frame import Crew, Work, find_frame
+from framearray_cli.frame import find_frame
 from framearray_cli.images import ImageFormat
-from framearray_cli.job import Job
-from framearray_cli.prepare import Prepared, open_embree, plan_work, prepare
-from framearray_cli.terms.ambient import Ambient
-from framearray_cli.window import Window
+from framearray_cli.window import Composed, Window
 from framearray_cli.writer import ArrayWriter
 
+from .cases import Case
+from .results import Table
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Case:
-    """A job, opened and planned."""
-
-    prepared: Prepared
-    embree: EmbreeScene
-    work: Work
-    ambient: Ambient
-    threads: int = field(default_factory=lambda: os.cpu_count() or 1)
+# Stages that lie within another one: their time is counted there.
+WITHIN_MIRROR = ("mirror obscurance", "mirror shadow")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,44 +36,61 @@ class Measured:
 
     Attributes:
         images: that were made while the clock ran.
-        ms: wall time an image.
-        stages: thread time an image by stage, ms.
+        ms: wall time an image, and `cpu_ms`: time of all threads an image.
+        stages: thread time an image by stage, ms; "rest" is what threads did else, waiting included. Of "writing" it
+            is processor time; it runs beside the others.
         rays: rays a pixel an image, by kind.
         hits: accepted hits a pixel of a frame: mean and 1st percentile.
     """
 
     images: int
     ms: float
+    cpu_ms: float
     stages: dict[str, float]
     rays: dict[str, float]
-    hits: tuple[float, float]
+    hits: list[float]
+
+    def table(self) -> Table:
+        """As a plain table."""
+        return asdict(self)
 
 
-@contextmanager
-def opened(job: Job) -> Iterator[Case]:
-    """Open a job for measuring."""
-    prepared = prepare(job)
-    with open_embree(prepared) as embree:
-        work, ambient = plan_work(prepared, embree)
-        yield Case(prepared=prepared, embree=embree, work=work, ambient=ambient)
+class TimedWriter(ArrayWriter):
+    """A writer that knows how much processor time its threads took."""
+
+    def __init__(self, *args: Any) -> None:
+        self.seconds = 0.0
+        self._lock = Lock()
+        super().__init__(*args)
+
+    def _write_image(self, composed: Composed, c: int, l: int) -> None:
+        started = time.thread_time()
+        super()._write_image(composed, c, l)
+        with self._lock:
+            self.seconds += time.thread_time() - started
 
 
-def interior(work: Work) -> Work:
-    """The same work with every frame an interior one: no frame is given more hits because the path ends."""
-    return replace(work, per_pixel=np.full_like(work.per_pixel, work.per_pixel[work.n_frames // 2]))
+def start_of(case: Case, frames: int, place: float) -> int:
+    """The first camera of a run whose measured cameras lie about a place of the path, 0 to 1."""
+    before = 2 * case.work.n_r + 1
+    last = case.work.n_frames - frames - before
+    if last < 0:
+        raise ValueError(f"{frames} frames with n_r = {case.work.n_r} do not fit a path of {case.work.n_frames}")
+    return min(max(round(place * case.work.n_frames) - frames // 2 - case.work.n_r - 1, 0), last)
 
 
-def steady(case: Case, frames: int, image_format: ImageFormat | None) -> Measured:
-    """Render `frames` interior frames.
+def steady(case: Case, frames: int, image_format: ImageFormat | None, place: float = 0.5) -> Measured:
+    """Make the images of `frames` interior frames.
 
     Args:
         image_format: how images are written, or None: they are composed and dropped.
+        place: where on the path, 0 to 1.
     """
-    work, n_r = interior(case.work), case.work.n_r
+    work, n_r = case.work, case.work.n_r
     before = 2 * n_r + 1  # frames that fill the window and compose one frame, so that all is compiled
-    first = max(0, (work.n_frames - frames - before) // 2)
+    first = start_of(case, frames, place)
     crew = Crew(work, case.threads)
-    window = Window(work, case.ambient, crew, first=min(first + n_r, work.n_frames - 1))
+    window = Window(work, case.ambient, crew, first=first + n_r)
     hits: list[Int32] = []
     try:
         with tempfile.TemporaryDirectory() as folder, _writer(case, Path(folder), image_format) as writer:
@@ -88,7 +98,8 @@ def steady(case: Case, frames: int, image_format: ImageFormat | None) -> Measure
                 if c == first + before:
                     writer.finish()
                     hits.clear()
-                    rays, seconds, started = crew.rays(), crew.seconds(), time.perf_counter()
+                    rays, seconds, written = crew.rays(), crew.seconds(), writer.seconds
+                    started, cpu = time.perf_counter(), time.process_time()
                 window.add(find_frame(work, c, crew))
                 for j in window.complete():
                     composed = window.compose(j, writer.block())
@@ -98,32 +109,56 @@ def steady(case: Case, frames: int, image_format: ImageFormat | None) -> Measure
                     else:
                         writer.write(composed, range(j, j + 1))
             writer.finish()
-            wall = time.perf_counter() - started
+            wall, cpu = time.perf_counter() - started, time.process_time() - cpu
+            spent = {stage: t - seconds.get(stage, 0.0) for stage, t in crew.seconds().items()}
     finally:
         crew.close()
     images = len(hits) * work.lights.n_lights
-    per_image = 1.0 / images
+    spent = {stage: t for stage, t in spent.items() if stage not in WITHIN_MIRROR}
+    spent["rest"] = case.threads * wall - sum(spent.values())
+    spent["writing"] = writer.seconds - written
     all_hits = np.concatenate(hits)
     return Measured(
         images=images,
-        ms=1e3 * wall * per_image,
-        stages={s: 1e3 * (t - seconds.get(s, 0.0)) * per_image for s, t in crew.seconds().items()},
-        rays={k: (n - rays[k]) * per_image / work.n_pixels for k, n in crew.rays().items()},
-        hits=(float(all_hits.mean()), float(np.percentile(all_hits, 1))),
+        ms=1e3 * wall / images,
+        cpu_ms=1e3 * cpu / images,
+        stages={stage: 1e3 * t / images for stage, t in spent.items()},
+        rays={kind: (n - rays[kind]) / images / work.n_pixels for kind, n in crew.rays().items()},
+        hits=[float(all_hits.mean()), float(np.percentile(all_hits, 1))],
     )
 
 
-def _writer(case: Case, folder: Path, image_format: ImageFormat | None) -> ArrayWriter:
-    job, prepared = case.prepared.job, case.prepared
+def steady_mean(cases: Sequence[Case], frames: int, image_format: ImageFormat | None, places: Sequence[float]) -> Table:
+    """Run every case at every place; returns the means over them, which all make the same number of images."""
+    runs = [steady(case, frames, image_format, place).table() for case in cases for place in places]
+    return mean(runs)
+
+
+def mean(tables: Sequence[Table]) -> Table:
+    """The mean of equal tables of numbers, number by number; `images` is their sum."""
+    total: defaultdict[str, Any] = defaultdict(float)
+    for key in dict.fromkeys(key for table in tables for key in table):
+        values = [table.get(key, 0.0) for table in tables]
+        if isinstance(values[0], dict):
+            total[key] = mean(values)
+        elif isinstance(values[0], list):
+            total[key] = [sum(column) / len(values) for column in zip(*values, strict=True)]
+        else:
+            total[key] = sum(values) if key == "images" else sum(values) / len(values)
+    return dict(total)
+
+
+def _writer(case: Case, folder: Path, image_format: ImageFormat | None) -> TimedWriter:
+    job, prepared, n_lights = case.prepared.job, case.prepared, case.work.lights.n_lights
     stored = image_format or ImageFormat()
-    return ArrayWriter(
+    return TimedWriter(
         folder,
-        file_patterns(job.name, prepared.n_cameras, prepared.n_lights, stored.format),
+        file_patterns(job.name, prepared.n_cameras, n_lights, stored.format),
         prepared.eyes,
         job.camera.resolution,
         job.output.fps,
         stored,
-        prepared.n_lights,
+        range(n_lights),
         case.threads,
         lambda images: None,
     )

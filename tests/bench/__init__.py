@@ -1,0 +1,22 @@
+"""Measures what an image costs and how far it is from right. Not part of the tests.
+
+`make bench` runs `python -m bench`, `make bench-scaling` runs `python -m bench scaling`.
+
+    cases.py      ways to make the images of a job: the frame array, its options, baselines
+    steady.py     the frame loop in its steady state, under a clock
+    floor.py      the same rays through Embree alone
+    speed.py      all of these in turn, several times
+    metrics.py    distances between images
+    reference.py  images of a thousand and more hits a pixel
+    error.py      how far each way is from them
+    processes.py  start-up time and peak memory, each in a process of its own
+    peers.py      the same images from other programs
+    rooms.py      generated scenes of any number of triangles
+    scaling.py    time an image against the size of a job
+    machine.py    what all this ran on, and how busy that was
+    results.py    results on the disk
+    markdown.py   numbers and tables as text
+    pages.py      the parts of docs/speed.md
+    table.py      results -> docs/speed.md
+    plots.py      results -> docs/plots/
+"""

@@ -1,0 +1,63 @@
+"""The command: `python -m bench`, from the folder `tests`."""
+
+import argparse
+import json
+
+from . import error, peers, processes, scaling, speed, table
+from .cases import FRAME_ARRAY, JOBS, Variant, job_named, opened, variant_named, varied, with_resolution
+from .results import folder, save
+from .steady import steady
+
+PARTS = ("speed", "error", "peers", "memory", "startup")
+
+
+def main() -> None:
+    """Measure what is asked for, and write the page."""
+    parser = argparse.ArgumentParser(prog="bench", description="Measure what an image costs, and write docs/speed.md.")
+    parser.add_argument("what", nargs="?", default="all", choices=("all", "scaling", "page", "peak", "mitsuba", *PARTS))
+    parser.add_argument("jobs", nargs="*", default=list(JOBS), help="some of the jobs")
+    parser.add_argument("--quick", action="store_true", help="a small picture, once; the page goes to out/bench/quick")
+    parser.add_argument("--runs", type=int, default=speed.RUNS, help="how often each thing is measured")
+    parser.add_argument("--variant", default=FRAME_ARRAY.name, help="for `peak`")
+    parser.add_argument("--resolution", help="for `peak`: 800x600")
+    parser.add_argument("--frames", type=int, default=2, help="for `peak`")
+    args = parser.parse_args()
+    if args.what == "peak":
+        print(json.dumps(peak(args.jobs[0], variant_named(args.variant), args)))
+        return
+    if args.what == "mitsuba":
+        print(json.dumps(peers.measure(args.jobs[0], args.quick)))
+        return
+    out = folder(args.quick)
+    todo = PARTS if args.what == "all" else (args.what,)
+    for name in args.jobs:
+        if "speed" in todo:
+            save(out, f"speed-{name}", speed.measure(name, args.quick, args.runs))
+        if "error" in todo:
+            save(out, f"error-{name}", error.measure(name, args.quick, out))
+        if "peers" in todo:
+            save(out, f"mitsuba-{name}", peers.asked(name, args.quick))
+    if "memory" in todo:
+        save(out, "memory", processes.memory(args.quick, args.jobs))
+    if "startup" in todo:
+        save(out, "startup", processes.start_up(args.quick))
+    if "scaling" in todo:
+        save(out, "scaling", scaling.measure(args.quick))
+    table.write(args.quick)
+
+
+def peak(name: str, variant: Variant, args: argparse.Namespace) -> dict[str, object]:
+    """Run a variant for a moment; what it cost, and the peak memory of this process."""
+    from framearray_cli.memory import peak_memory
+
+    job = job_named(name, args.quick)
+    if args.resolution:
+        job = with_resolution(job, (int(args.resolution.split("x")[0]), int(args.resolution.split("x")[1])))
+    with opened(job) as case:
+        before = peak_memory()
+        measured = steady(varied(case, variant), args.frames, None)
+        return {**measured.table(), "peak": peak_memory(), "before": before}
+
+
+if __name__ == "__main__":
+    main()

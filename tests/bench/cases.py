@@ -1,0 +1,189 @@
+"""Ways to make the images of a job: the frame array and its options, and what it is compared with."""
+
+import math
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from framearray_cli.embree import EmbreeScene
+from framearray_cli.job import Job
+from framearray_cli.jobfile import read_job
+from framearray_cli.lights import LightArrays
+from framearray_cli.prepare import Prepared, open_embree, plan_work, prepare
+from framearray_cli.terms.ambient import Ambient
+from framearray_cli.work import Work
+
+from .results import ROOT
+
+JOBS = ("kitchen", "stairs", "cabin")
+QUICK_RESOLUTION = (160, 120)
+# Light positions, as shares of the path, that images of one light are measured at.
+PLACES_OF_LIGHT = (1 / 6, 1 / 2, 5 / 6)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Case:
+    """A job, opened and planned."""
+
+    prepared: Prepared
+    embree: EmbreeScene
+    work: Work
+    ambient: Ambient
+    threads: int = field(default_factory=lambda: os.cpu_count() or 1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variant:
+    """One way to make the images of a job.
+
+    Attributes:
+        name: in results and tables.
+        n_r, hits, obscurance, step, unbiased, balance: as in the job file.
+        one_light: every image knows one light position alone.
+        frames: cameras of one timed run; 0: only its error is measured, with its time from one short run.
+        floor: whether its rays are replayed through Embree alone.
+        writes: whether it is timed with writing, too.
+    """
+
+    name: str
+    n_r: int = 3
+    hits: float = 2
+    obscurance: int = 5
+    step: int = 1
+    unbiased: bool = False
+    balance: bool = False
+    one_light: bool = False
+    frames: int = 0
+    floor: bool = False
+    writes: bool = False
+
+    @property
+    def rests_on(self) -> float:
+        """Native hits that a pixel would rest on if every frame of its window saw what it sees."""
+        return (2 * self.n_r + 1) * self.hits
+
+
+FRAME_ARRAY = Variant(name="frame array", frames=6, floor=True, writes=True)
+REDUCED = Variant(name="shadow_step 4", step=4, frames=6, floor=True, writes=True)
+SCRATCH = Variant(name="from scratch", n_r=0, hits=14, one_light=True, frames=2, floor=True, writes=True)
+
+VARIANTS: tuple[Variant, ...] = (
+    FRAME_ARRAY,
+    Variant(name="weights balance", balance=True, frames=6, floor=True),
+    Variant(name="shadow_step 2", step=2),
+    REDUCED,
+    Variant(name="shadow_step 8", step=8, frames=6),
+    Variant(name="shadow_step 4, unbiased", step=4, unbiased=True, frames=6),
+    Variant(name="shadow_step 8, unbiased", step=8, unbiased=True, frames=6),
+    Variant(name="hits 1, n_r 7", hits=1, n_r=7),
+    Variant(name="hits 0.5, n_r 14", hits=0.5, n_r=14, frames=6),
+    Variant(name="hits 0.5, n_r 14, balance, shadow_step 4", hits=0.5, n_r=14, balance=True, step=4),
+    Variant(name="n_r 0", n_r=0),
+    Variant(name="n_r 1", n_r=1),
+    Variant(name="n_r 7", n_r=7),
+    Variant(name="obscurance 1", obscurance=1),
+    Variant(name="obscurance 10", obscurance=10),
+    Variant(name="light reuse alone", n_r=0, hits=14, frames=2),
+    Variant(name="camera reuse alone", one_light=True, frames=8),
+    SCRATCH,
+)
+
+
+def variant_named(name: str) -> Variant:
+    """The variant of a name."""
+    return next(variant for variant in VARIANTS if variant.name == name)
+
+
+def job_named(name: str, quick: bool) -> Job:
+    """One of the jobs that come with the project, smaller for a quick run."""
+    job = read_job(ROOT / "jobs" / f"{name}.toml")
+    return with_resolution(job, QUICK_RESOLUTION) if quick else job
+
+
+def with_resolution(job: Job, resolution: tuple[int, int]) -> Job:
+    """The same job at another resolution."""
+    return job.model_copy(update={"camera": job.camera.model_copy(update={"resolution": resolution})})
+
+
+@contextmanager
+def opened(job: Job) -> Iterator[Case]:
+    """Open a job for measuring."""
+    prepared = prepare(job)
+    with open_embree(prepared) as embree:
+        work, ambient = plan_work(prepared, embree)
+        yield Case(prepared=prepared, embree=embree, work=work, ambient=ambient)
+
+
+def varied(case: Case, variant: Variant) -> Case:
+    """The same job made another way; every frame counts as an interior one of its path.
+
+    Frames at the ends of a path have more native hits than others; here none has.
+    """
+    prepared = replace(case.prepared, job=_changed(case.prepared.job, variant))
+    work, _ = plan_work(prepared, case.embree)
+    middle = work.per_pixel[work.n_frames // 2]
+    work = replace(
+        work,
+        lights=case.work.lights,
+        kept=case.work.kept,
+        per_pixel=np.full_like(work.per_pixel, middle),
+        obscurance=work.obscurance._replace(average=case.work.obscurance.average),
+    )
+    return replace(case, prepared=prepared, work=work)
+
+
+def _changed(job: Job, variant: Variant) -> Job:
+    """The job that asks for a variant; its ambient light is not estimated again."""
+    samples = job.samples.model_copy(
+        update={
+            "hits": variant.hits,
+            "obscurance": variant.obscurance,
+            "shadow_step": variant.step,
+            "shadow_unbiased": variant.unbiased,
+        }
+    )
+    weights = "balance" if variant.balance else "average"
+    return job.model_copy(
+        update={
+            "samples": samples,
+            "reuse": job.reuse.model_copy(update={"n_r": variant.n_r, "weights": weights}),
+            "specular": job.specular.model_copy(update={"hits": math.ceil(variant.rests_on)}),
+            "ambient": job.ambient.model_copy(update={"method": "eye", "intensity": (1.0, 1.0, 1.0), "paths": 1}),
+            "output": job.output.model_copy(update={"layers": False}),
+        }
+    )
+
+
+def under(case: Case, l: Sequence[int]) -> Case:
+    """The same job with light positions l alone."""
+    lights = lights_at(case.work.lights, l)
+    ambient = replace(
+        case.ambient,
+        intensity=np.ascontiguousarray(case.ambient.intensity[list(l)]),
+        standard_error=case.ambient.standard_error[list(l)],
+    )
+    return replace(case, work=replace(case.work, lights=lights, kept=range(len(l))), ambient=ambient)
+
+
+def lights_at(lights: LightArrays, l: Sequence[int]) -> LightArrays:
+    """Positions l of a light path."""
+    at = list(l)
+    return LightArrays(
+        kind=lights.kind,
+        vector=np.ascontiguousarray(lights.vector[:, :, at]),
+        strength=np.ascontiguousarray(lights.strength[:, :, at]),
+        lit=np.ascontiguousarray(lights.lit[:, at]),
+        colour=np.ascontiguousarray(lights.colour[at]),
+    )
+
+
+def parts_of(case: Case, variant: Variant) -> list[Case]:
+    """The cases that one run of a variant consists of: one, or one a light position where each image has its own."""
+    changed = varied(case, variant)
+    if not variant.one_light:
+        return [changed]
+    n = case.work.lights.n_lights
+    return [under(changed, [min(int(share * n), n - 1)]) for share in PLACES_OF_LIGHT]

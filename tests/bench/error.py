@@ -1,0 +1,190 @@
+"""How far each variant's images are from the reference, beside what they cost."""
+
+import tempfile
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+
+from framearray_cli.arrays import Images
+from framearray_cli.crew import Crew
+from framearray_cli.frame import find_frame
+from framearray_cli.images import ImageFormat, read_image, write_image
+from framearray_cli.window import Window
+
+from .cases import FRAME_ARRAY, SCRATCH, VARIANTS, Case, Variant, job_named, opened, parts_of, under, varied
+from .machine import busy
+from .metrics import errors, rmse, shadow_edges, squared_bias
+from .reference import PASSES, Reference, reference
+from .results import Table
+from .speed import tell
+from .steady import mean, steady
+
+PLACES = (0.4,)  # of the camera path
+LIGHTS = (1 / 8, 3 / 8, 5 / 8, 7 / 8)  # of the light path
+SEEDS = (101, 202)  # of the two runs that are compared with the two halves
+# Containers for images: file format, and how many bits a channel.
+FORMATS = {
+    "EXR half, none": ImageFormat(compression="none", half="always"),
+    "EXR half, zip:1": ImageFormat(compression="zip:1", half="always"),
+    "EXR half, zip": ImageFormat(compression="zip", half="always"),
+    "EXR half, zip:9": ImageFormat(compression="zip:9", half="always"),
+    "EXR half, piz": ImageFormat(compression="piz", half="always"),
+    "EXR half, pxr24": ImageFormat(compression="pxr24", half="always"),
+    "EXR half, b44a": ImageFormat(compression="b44a", half="always"),
+    "EXR half, dwaa:45": ImageFormat(compression="dwaa:45", half="always"),
+    "EXR float, none": ImageFormat(compression="none", half="never"),
+    "EXR float, zip": ImageFormat(compression="zip", half="never"),
+    "TIFF float": ImageFormat(format="tif"),
+    "PNG 8 bit": ImageFormat(format="png"),
+    "JPEG 95": ImageFormat(format="jpg"),
+}
+
+
+def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = VARIANTS) -> Table:
+    """Compare every variant of a job with references; `folder` keeps these."""
+    with opened(job_named(name, quick)) as case:
+        n_lights = case.work.lights.n_lights
+        l = [min(int(share * n_lights), n_lights - 1) for share in LIGHTS]
+        frames = [round(place * case.work.n_frames) for place in PLACES]
+        references = []
+        for c in frames:
+            started = time.perf_counter()
+            references.append(reference(case, c, l, folder, 4 if quick else PASSES))
+            tell(f"{name}: reference of camera {c}: {time.perf_counter() - started:.0f} s")
+        found: dict[str, Table] = {}
+        exact = [images(case, FRAME_ARRAY, c, l, SEEDS[0]) for c in frames]
+        for variant in variants:
+            if variant == SCRATCH:  # its images are those of light reuse alone
+                continue
+            pairs = [(images(case, variant, c, l, SEEDS[0]), images(case, variant, c, l, SEEDS[1])) for c in frames]
+            found[variant.name] = compare(case, l, pairs, references)
+            found[variant.name]["added"] = added(variant, pairs, exact, references, case, l)
+            if not variant.frames:
+                found[variant.name]["ms"] = _time(case, variant)
+            tell(f"{name}: {variant.name}: RMSE {found[variant.name]['rmse']:.2%}")
+        return {
+            "epsilon": 0.01,
+            "cameras": frames,
+            "lights": l,
+            "hits": 2 * references[0].hits,
+            "noise": noise(references, case, l),
+            "variants": found,
+            "formats": containers(case, frames[0], l),
+            "busy": busy(),
+        }
+
+
+def images(case: Case, variant: Variant, c: int, l: Sequence[int], seed: int) -> Images:
+    """Frame c made by a variant, under light positions l."""
+    changed = varied(case, variant) if not variant.one_light else under(varied(case, variant), l)
+    work = replace(changed.work, seed=seed)
+    crew = Crew(work, case.threads)
+    window = Window(work, changed.ambient, crew, first=c)
+    out = np.empty((work.lights.n_lights, work.cams.height, work.cams.width, 3), np.float32)
+    try:
+        for other in work.frames_around(c, work.n_r):
+            window.add(find_frame(work, other, crew))
+        window.compose(c, out)
+    finally:
+        crew.close()
+    return out if variant.one_light else np.ascontiguousarray(out[list(l)])
+
+
+def compare(
+    case: Case, l: Sequence[int], pairs: Sequence[tuple[Images, Images]], references: Sequence[Reference]
+) -> Table:
+    """Errors of the first run, and the squared bias from both, over the mean of the reference; means over images."""
+    tables = []
+    for pair, wanted in zip(pairs, references, strict=True):
+        for k in range(len(l)):
+            ambient = case.ambient.intensity[l[k]]
+            right = wanted.image(k, ambient)
+            edges = shadow_edges(wanted.irradiance(k), wanted.normal, wanted.depth)
+            table = asdict(errors(pair[0][k], right, edges))
+            halves = wanted.half(0, k, ambient), wanted.half(1, k, ambient)
+            square, spread = squared_bias((pair[0][k], pair[1][k]), halves)
+            scale = float(right.mean(dtype=np.float64)) ** 2
+            table["squared_bias"], table["squared_bias_error"] = square / scale, spread / scale
+            tables.append(table)
+    found = mean(tables)
+    found["squared_bias_error"] /= np.sqrt(len(tables))
+    return found
+
+
+def added(
+    variant: Variant,
+    pairs: Sequence[tuple[Images, Images]],
+    exact: Sequence[Images],
+    references: Sequence[Reference],
+    case: Case,
+    l: Sequence[int],
+) -> float:
+    """RMSE between images and those of the frame array of the same seed, over the mean of the reference.
+
+    That is what fewer shadow rays add; 0 where more than the shadows differ, as noise would be all there is.
+    """
+    if replace(variant, step=1, unbiased=False, name="", frames=0, floor=False, writes=False) != replace(
+        FRAME_ARRAY, name="", frames=0, floor=False, writes=False
+    ):
+        return 0.0
+    shares = []
+    for pair, other, wanted in zip(pairs, exact, references, strict=True):
+        for k in range(len(l)):
+            right = wanted.image(k, case.ambient.intensity[l[k]])
+            shares.append(rmse(pair[0][k], other[k]) / float(right.mean(dtype=np.float64)))
+    return sum(shares) / len(shares)
+
+
+def noise(references: Sequence[Reference], case: Case, l: Sequence[int]) -> float:
+    """RMSE of a reference itself over its mean: half of what its halves differ by."""
+    shares = []
+    for wanted in references:
+        for k in range(len(l)):
+            ambient = case.ambient.intensity[l[k]]
+            right = wanted.image(k, ambient)
+            apart = rmse(wanted.half(0, k, ambient), wanted.half(1, k, ambient))
+            shares.append(apart / 2 / float(right.mean(dtype=np.float64)))
+    return sum(shares) / len(shares)
+
+
+def _time(case: Case, variant: Variant) -> float:
+    parts = parts_of(case, variant)
+    return sum(steady(part, 2, None).ms for part in parts) / len(parts)
+
+
+def containers(case: Case, c: int, l: Sequence[int]) -> dict[str, Table]:
+    """Time, size and error of writing images, by container; 8 bit formats are left without an error."""
+    made = images(case, FRAME_ARRAY, c, l, SEEDS[0])
+    found: dict[str, Table] = {}
+    with tempfile.TemporaryDirectory() as place:
+        for name, image_format in FORMATS.items():
+            path = Path(place) / f"image.{image_format.format}"
+            write_image(path, made[0], image_format)
+            spent = []
+            for image in (*made, *made):
+                started = time.thread_time()
+                write_image(path, image, image_format)
+                spent.append(time.thread_time() - started)
+            table: Table = {"cpu_ms": 1e3 * float(np.median(spent)), "bytes": path.stat().st_size}
+            table["wall_ms"] = 1e3 * _wall(made, image_format, Path(place), case.threads)
+            if image_format.format in ("exr", "tif"):
+                back = np.asarray(read_image(path), np.float32)
+                table["rmse"] = rmse(back, made[-1]) / float(made[-1].mean(dtype=np.float64))
+            found[name] = table
+    return found
+
+
+def _wall(made: Images, image_format: ImageFormat, folder: Path, threads: int) -> float:
+    """Seconds an image where all threads write at once."""
+    n = 4 * len(made)
+    with ThreadPoolExecutor(threads) as pool:
+        started = time.perf_counter()
+        for _ in pool.map(
+            lambda i: write_image(folder / f"{i}.{image_format.format}", made[i % len(made)], image_format), range(n)
+        ):
+            pass
+        return (time.perf_counter() - started) / n

@@ -1,0 +1,125 @@
+"""Reference images: what every pixel tends to, with reuse off, in two halves of different seeds.
+
+What a pixel shows is linear in the ambient light: light + I_A[l] * indirect. Both parts are kept, so that a reference
+stays right when the estimate of I_A changes, and says what a light alone does.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+
+from framearray_cli.arrays import Float32, Float64, Image, Rgb
+from framearray_cli.crew import Crew
+from framearray_cli.fingerprint import fingerprint
+from framearray_cli.frame import find_frame
+from framearray_cli.prepare import job_fingerprint
+from framearray_cli.window import Layers, Window
+from framearray_cli.work import Work
+
+from .cases import Case, under
+
+# Native hits of a pixel in one pass: as many as memory holds easily; in all, 100 times those of the frame array.
+HITS = 28
+PASSES = 25
+# Seeds of the first and of the second half; no job uses them.
+SEEDS = (2_000_000_000, 3_000_000_000)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Reference:
+    """One frame under some light positions.
+
+    Attributes:
+        light: (2, n_lights, h, w, 3) radiance without ambient light, of each half.
+        indirect: (2, h, w, 3) radiance of an ambient light of 1, of each half.
+        reflectivity, normal: (h, w, 3) and depth: (h, w), means; see `Layers`.
+        hits: native hits of a pixel in each half.
+    """
+
+    light: Float32
+    indirect: Float32
+    reflectivity: Float32
+    normal: Float32
+    depth: Float32
+    hits: int
+
+    def half(self, i: int, l: int, ambient: Rgb) -> Image:
+        """Half i under the l-th of its light positions, with I_A of that position, (3,)."""
+        return np.asarray(self.light[i, l] + ambient * self.indirect[i], np.float32)
+
+    def image(self, l: int, ambient: Rgb) -> Image:
+        """Both halves."""
+        return np.asarray((self.half(0, l, ambient) + self.half(1, l, ambient)) / 2, np.float32)
+
+    def irradiance(self, l: int) -> Float32:
+        """What the l-th light position alone sends to each pixel, (h, w); 0 where nothing reflects diffusely."""
+        light, r = self.light[:, l].mean(axis=(0, -1)), self.reflectivity.mean(axis=-1)
+        found: Float32 = np.divide(light, r, out=np.zeros_like(light), where=r > 0.01)
+        return found
+
+
+def reference(case: Case, c: int, l: Sequence[int], folder: Path, passes: int = PASSES) -> Reference:
+    """Make the reference of frame c under light positions l, or read it where it was made before.
+
+    It is kept by what its pixels depend on, but for the program itself: delete the folder when the method changes.
+    """
+    average = case.work.obscurance.average.tobytes()
+    pixels = job_fingerprint(case.prepared).encode()  # the seed, too, which does no harm
+    key = fingerprint(pixels, average, repr((c, list(l), HITS, passes, case.work.cams.width)).encode())
+    file = folder / f"reference-{sha256(key.encode()).hexdigest()[:16]}.npz"
+    names = ("light", "indirect", "reflectivity", "normal", "depth")
+    if file.is_file():
+        with np.load(file) as kept:
+            return Reference(**{name: kept[name] for name in names}, hits=HITS * passes)
+    made = _render(under(case, l), c, passes)
+    folder.mkdir(parents=True, exist_ok=True)
+    np.savez(file, **{name: getattr(made, name) for name in names})
+    return made
+
+
+def _render(case: Case, c: int, passes: int) -> Reference:
+    work = replace(
+        case.work,
+        n_r=0,
+        per_pixel=np.full_like(case.work.per_pixel, HITS),
+        balance=False,
+        shadow_step=1,
+        layers=True,
+    )
+    shape = (work.cams.height, work.cams.width, 3)
+    light: Float64 = np.zeros((2, work.lights.n_lights, *shape))
+    indirect: Float64 = np.zeros((2, *shape))
+    for half, seed in enumerate(SEEDS):
+        for i in range(passes):
+            parts = _pass(replace(work, seed=seed + i), replace(case, work=work), c)
+            light[half] += parts[0] / passes
+            indirect[half] += parts[1] / passes
+    layers = parts[2]
+    return Reference(
+        light=light.astype(np.float32),
+        indirect=indirect.astype(np.float32),
+        reflectivity=layers.reflectivity,
+        normal=layers.normal,
+        depth=layers.depth,
+        hits=HITS * passes,
+    )
+
+
+def _pass(work: Work, case: Case, c: int) -> tuple[Float32, Float32, Layers]:
+    """One image a light position without ambient light, what an ambient light of 1 adds, and the layers."""
+    images = np.empty((2, work.lights.n_lights, work.cams.height, work.cams.width, 3), np.float32)
+    crew = Crew(work, case.threads)
+    try:
+        frame = find_frame(work, c, crew)
+        for ambient in (0, 1):
+            fixed = replace(case.ambient, intensity=np.full_like(case.ambient.intensity, ambient))
+            window = Window(work, fixed, crew, first=c)
+            window.add(frame)
+            layers = window.compose(c, images[ambient]).layers
+    finally:
+        crew.close()
+    assert layers is not None
+    return images[0], images[1, 0] - images[0, 0], layers

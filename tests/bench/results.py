@@ -1,0 +1,42 @@
+"""Results on the disk: one JSON file a part a job, so that pages can be written again without measuring again."""
+
+import json
+import statistics
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+ROOT = Path(__file__).resolve().parents[2]
+RESULTS = ROOT / "out" / "bench"  # git ignores it
+
+Table: TypeAlias = dict[str, Any]
+
+
+def folder(quick: bool) -> Path:
+    """Where results go; those of quick runs are kept apart."""
+    return RESULTS / "quick" if quick else RESULTS
+
+
+def save(directory: Path, name: str, table: Mapping[str, Any]) -> None:
+    """Write one result."""
+    directory.mkdir(parents=True, exist_ok=True)
+    (directory / f"{name}.json").write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+
+
+def load(directory: Path, name: str) -> Table | None:
+    """Read one result, or None where it was not measured."""
+    file = directory / f"{name}.json"
+    if not file.is_file():
+        return None
+    table: Table = json.loads(file.read_text(encoding="utf-8"))
+    return table
+
+
+def median(tables: Sequence[Any]) -> Any:
+    """The median of equal tables of numbers, number by number; a key that one lacks counts as 0 there."""
+    if isinstance(tables[0], Mapping):
+        keys = dict.fromkeys(key for table in tables for key in table)
+        return {key: median([table.get(key, 0.0) for table in tables]) for key in keys}
+    if isinstance(tables[0], list):
+        return [median(values) for values in zip(*tables, strict=True)]
+    return statistics.median(tables)

@@ -1,0 +1,98 @@
+"""Generated scenes of any number of triangles: a room full of spheres, and a job in it."""
+
+import math
+import time
+
+import numpy as np
+
+from framearray_cli.arrays import Float64
+from framearray_cli.job import Job
+from framearray_cli.lights import light_arrays
+from framearray_cli.meshes import Material, Meshes
+from framearray_cli.meshes.model import Part
+from framearray_cli.paths import eyes, lights
+from framearray_cli.prepare import Prepared
+from framearray_cli.scene import build_scene
+from framearray_cli.surface import surfaces
+
+SIZE = (8.0, 3.0, 8.0)  # of the room
+COUNT = (5, 2, 5)  # spheres along each axis
+RADIUS = 0.4
+
+
+def room(n_triangles: int, resolution: tuple[int, int]) -> tuple[Prepared, float]:
+    """A room of about n triangles, ready to render, and the seconds it took to make a scene of its triangles."""
+    n = n_triangles / math.prod(COUNT)
+    rings = max(3, round(math.sqrt(n / 4)))  # 2 * rings * (rings - 1) * 2 triangles a sphere
+    parts = [Part(material=0, corners=_box())]
+    sphere = _sphere(rings, 2 * rings)
+    for index in np.ndindex(*COUNT):
+        place = [(i + 0.5) / k * side for i, k, side in zip(index, COUNT, SIZE, strict=True)]
+        parts.append(Part(material=1 + sum(index) % 2, corners=sphere + place))
+    names = ("Wall", 0.7), ("Ball", 0.6), ("Other ball", 0.4)
+    materials = tuple(Material(name=name, reflectivity=(r, r, r)) for name, r in names)
+    started = time.perf_counter()
+    scene = build_scene(Meshes(parts=tuple(parts), materials=materials, textures=(), dropped={}, notes=()), {})
+    seconds = time.perf_counter() - started
+    job = _job(resolution)
+    job_lights = lights(job)
+    prepared = Prepared(
+        job=job,
+        scene=scene,
+        eyes=eyes(job),
+        lights=job_lights,
+        light_arrays=light_arrays(job_lights, scene.centre),
+        surfaces=surfaces(scene),
+        still=False,
+    )
+    return prepared, seconds
+
+
+def _sphere(rings: int, segments: int) -> Float64:
+    """A sphere about the origin, (2 * segments * (rings - 1), 3, 3)."""
+    theta, phi = np.meshgrid(np.linspace(0, np.pi, rings + 1), np.linspace(0, 2 * np.pi, segments + 1), indexing="ij")
+    p = RADIUS * np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], -1)
+    a, b, c, d = p[:-1, :-1], p[1:, :-1], p[1:, 1:], p[:-1, 1:]
+    upper = np.stack([a, b, c], 2)[1:]  # at the poles one of the two triangles has no area
+    lower = np.stack([a, c, d], 2)[:-1]
+    # the other triangle of the first row is (a, b, c), of the last row (a, c, d)
+    first, last = np.stack([a, b, c], 2)[:1], np.stack([a, c, d], 2)[-1:]
+    return np.concatenate([t.reshape(-1, 3, 3) for t in (first, upper[:-1], lower[1:], last)])
+
+
+def _box() -> Float64:
+    """The room's walls, seen from within, (12, 3, 3)."""
+    corners = np.array([[x, y, z] for x in (0, SIZE[0]) for y in (0, SIZE[1]) for z in (0, SIZE[2])])
+    quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    return np.array([corners[[a, b, c]] for q in quads for a, b, c in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))])
+
+
+def _job(resolution: tuple[int, int]) -> Job:
+    return Job.model_validate(
+        {
+            "name": "room",
+            "scene": {"file": "room.glb"},
+            "camera": {
+                "resolution": list(resolution),
+                "fov": 60.0,
+                "frames": 96,
+                "keys": [
+                    {"frame": 0, "eye": [1.0, 1.5, 7.2], "target": [4.0, 1.2, 3.0]},
+                    {"frame": 95, "eye": [3.2, 1.5, 7.2], "target": [4.5, 1.2, 3.0]},
+                ],
+            },
+            "light": {
+                "frames": 48,
+                "sources": [
+                    {
+                        "type": "point",
+                        "keys": [
+                            {"frame": 0, "position": [0.8, 2.7, 4.0], "intensity": [20.0, 20.0, 20.0]},
+                            {"frame": 47, "position": [7.2, 2.7, 4.0], "intensity": [20.0, 20.0, 20.0]},
+                        ],
+                    }
+                ],
+            },
+            "obscurance": {"range": 1.0},
+        }
+    )

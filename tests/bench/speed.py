@@ -1,0 +1,77 @@
+"""Measures every variant of a job in turn, several times; each time at another place of the camera path."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+
+from framearray_cli.images import ImageFormat
+
+from .cases import VARIANTS, Case, Variant, job_named, opened, parts_of
+from .floor import record, replay
+from .machine import busy, describe
+from .results import Table, median
+from .steady import start_of, steady_mean
+
+# How images are written where a variant is timed with writing.
+FORMATS = {
+    "zip:1": ImageFormat(compression="zip:1", half="always"),
+    "none": ImageFormat(compression="none", half="always"),
+}
+RUNS = 3
+
+
+def places_of(runs: int) -> list[float]:
+    """Where on the path, 0 to 1, each run takes its cameras."""
+    return [(r + 1) / (runs + 1) for r in range(runs)]
+
+
+def measure(name: str, quick: bool, runs: int = RUNS, variants: Sequence[Variant] = VARIANTS) -> Table:
+    """Measure a job: variant -> medians of its runs; variants without `frames` are left out."""
+    timed = [variant for variant in variants if variant.frames]
+    found: dict[str, list[Table]] = {variant.name: [] for variant in timed}
+    shares: list[float] = []
+    with opened(job_named(name, quick)) as case:
+        for place in places_of(1 if quick else runs):
+            for variant in timed:
+                shares.append(busy())
+                table = measure_once(case, replace(variant, frames=2) if quick else variant, place)
+                found[variant.name].append(table)
+                tell(f"{name}: {variant.name}: {table['ms']:.2f} ms an image, others take {shares[-1]:.0%}")
+        work, job = case.work, case.prepared.job
+        about = {
+            "triangles": len(work.surfaces.corners),
+            "resolution": list(job.camera.resolution),
+            "n_lights": work.lights.n_lights,
+            "n_cameras": case.prepared.n_cameras,
+            "mirrors": bool(work.depth),
+            "threads": case.threads,
+        }
+    return {
+        "machine": describe(),
+        "about": about,
+        "busy": shares,
+        "runs": {variant: tables for variant, tables in found.items()},
+        "median": {variant: median(tables) for variant, tables in found.items()},
+    }
+
+
+def measure_once(case: Case, variant: Variant, place: float) -> Table:
+    """Measure one variant at one place of the path, with its floor and with writing where it asks for them."""
+    parts = parts_of(case, variant)
+    table = steady_mean(parts, variant.frames, None, [place])
+    if variant.writes:
+        table["written"] = {
+            name: steady_mean(parts, variant.frames, image_format, [place]) for name, image_format in FORMATS.items()
+        }
+    if variant.floor:
+        part = parts[len(parts) // 2]
+        c = start_of(part, variant.frames, place) + 2 * part.work.n_r + 1 + variant.frames // 2
+        table["floor"] = replay(record(part, c), part.work.tracer, part.threads, table["rays"])
+        total = sum(table["floor"]["ms"].values()), sum(table["floor"]["cpu_ms"].values())
+        table["floor_ratio"] = {"ms": table["ms"] / total[0], "cpu_ms": table["cpu_ms"] / total[1]}
+    return table
+
+
+def tell(text: str) -> None:
+    """Say what was measured, at once."""
+    print(text, file=sys.stderr, flush=True)
