@@ -66,28 +66,30 @@ class Variant:
         return (2 * self.n_r + 1) * self.hits
 
 
-FRAME_ARRAY = Variant(name="frame array", frames=6, floor=True, writes=True)
-REDUCED = Variant(name="shadow_step 4", step=4, frames=6, floor=True, writes=True)
+FRAME_ARRAY = Variant(name="frame array", frames=4, floor=True, writes=True)
+REDUCED = Variant(name="shadow_step 4", step=4, frames=4, floor=True, writes=True)
 SCRATCH = Variant(name="from scratch", n_r=0, hits=14, one_light=True, frames=2, floor=True, writes=True)
+LIGHT_REUSE = Variant(name="light reuse alone", n_r=0, hits=14, frames=1)
+CAMERA_REUSE = Variant(name="camera reuse alone", one_light=True, frames=3)
 
 VARIANTS: tuple[Variant, ...] = (
     FRAME_ARRAY,
-    Variant(name="weights balance", balance=True, frames=6, floor=True),
+    Variant(name="weights balance", balance=True, frames=4, floor=True),
     Variant(name="shadow_step 2", step=2),
     REDUCED,
-    Variant(name="shadow_step 8", step=8, frames=6),
-    Variant(name="shadow_step 4, unbiased", step=4, unbiased=True, frames=6),
-    Variant(name="shadow_step 8, unbiased", step=8, unbiased=True, frames=6),
+    Variant(name="shadow_step 8", step=8, frames=4),
+    Variant(name="shadow_step 4, unbiased", step=4, unbiased=True, frames=4),
+    Variant(name="shadow_step 8, unbiased", step=8, unbiased=True),
     Variant(name="hits 1, n_r 7", hits=1, n_r=7),
-    Variant(name="hits 0.5, n_r 14", hits=0.5, n_r=14, frames=6),
+    Variant(name="hits 0.5, n_r 14", hits=0.5, n_r=14, frames=4),
     Variant(name="hits 0.5, n_r 14, balance, shadow_step 4", hits=0.5, n_r=14, balance=True, step=4),
     Variant(name="n_r 0", n_r=0),
     Variant(name="n_r 1", n_r=1),
     Variant(name="n_r 7", n_r=7),
     Variant(name="obscurance 1", obscurance=1),
     Variant(name="obscurance 10", obscurance=10),
-    Variant(name="light reuse alone", n_r=0, hits=14, frames=2),
-    Variant(name="camera reuse alone", one_light=True, frames=8),
+    LIGHT_REUSE,
+    CAMERA_REUSE,
     SCRATCH,
 )
 

@@ -15,7 +15,19 @@ from framearray_cli.frame import find_frame
 from framearray_cli.images import ImageFormat, read_image, write_image
 from framearray_cli.window import Window
 
-from .cases import FRAME_ARRAY, SCRATCH, VARIANTS, Case, Variant, job_named, opened, parts_of, under, varied
+from .cases import (
+    CAMERA_REUSE,
+    FRAME_ARRAY,
+    SCRATCH,
+    VARIANTS,
+    Case,
+    Variant,
+    job_named,
+    opened,
+    parts_of,
+    under,
+    varied,
+)
 from .machine import busy
 from .metrics import errors, rmse, shadow_edges, squared_bias
 from .reference import PASSES, Reference, reference
@@ -58,7 +70,7 @@ def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = 
         found: dict[str, Table] = {}
         exact = [images(case, FRAME_ARRAY, c, l, SEEDS[0]) for c in frames]
         for variant in variants:
-            if variant == SCRATCH:  # its images are those of light reuse alone
+            if variant in (SCRATCH, CAMERA_REUSE):  # the same pictures as light reuse alone and the frame array
                 continue
             pairs = [(images(case, variant, c, l, SEEDS[0]), images(case, variant, c, l, SEEDS[1])) for c in frames]
             found[variant.name] = compare(case, l, pairs, references)
@@ -153,7 +165,7 @@ def noise(references: Sequence[Reference], case: Case, l: Sequence[int]) -> floa
 
 def _time(case: Case, variant: Variant) -> float:
     parts = parts_of(case, variant)
-    return sum(steady(part, 2, None).ms for part in parts) / len(parts)
+    return sum(steady(part, 2)[0].ms for part in parts) / len(parts)
 
 
 def containers(case: Case, c: int, l: Sequence[int]) -> dict[str, Table]:

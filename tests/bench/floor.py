@@ -85,8 +85,11 @@ class _Marks(Counter[str]):
         self.ends.append((int(self._state[0]), kind))
 
 
-def record(case: Case, c: int) -> Recording:
+def record(case: Case, c: int, expected: float) -> Recording:
     """Record the rays of frame c; it runs on one thread.
+
+    Args:
+        expected: about how many rays there will be; room for a quarter more is made.
 
     Raises:
         RuntimeError: Embree's own functions cannot be reached, or rays were missed.
@@ -94,8 +97,7 @@ def record(case: Case, c: int) -> Recording:
     tracer = case.work.tracer
     if tracer.batch:
         raise RuntimeError("the floor needs Embree's C functions")
-    case = replace(case, threads=1)
-    capacity = _packets_of(case, c)
+    capacity = int(1.25 * expected / LANES) + 65536
     rays, flags = np.empty((capacity, KEPT_ROWS, LANES), np.float32), np.empty(capacity, np.uint8)
     state = np.array([0, capacity, rays.ctypes.data, flags.ctypes.data, tracer.intersect, tracer.occluded], np.int64)
     recorders = [_recorder(state.ctypes.data, what) for what in (_INTERSECT, _OCCLUDED)]
@@ -120,17 +122,6 @@ def record(case: Case, c: int) -> Recording:
         n_rays=dict(marks),
         n_pixels=case.work.n_pixels,
     )
-
-
-def _packets_of(case: Case, c: int) -> int:
-    """Room enough for the packets of a frame: its rays are counted by tracing them once."""
-    crew = Crew(case.work, case.threads)
-    try:
-        find_frame(case.work, c, crew)
-        rays = crew.rays()
-    finally:
-        crew.close()
-    return int(1.25 * sum(rays.values()) / LANES) + 65536
 
 
 def _recorder(state_address: int, what: int) -> Any:

@@ -108,7 +108,7 @@ def memory(quick: bool, jobs: Sequence[str] = JOBS) -> Table:
     found: Table = {}
     for name in jobs:
         found[name] = {}
-        for variant in ("frame array", "weights balance", "from scratch"):
+        for variant in ("frame array", "weights balance"):
             found[name][variant] = asked("peak", name, "--variant", variant, *(["--quick"] if quick else []))
             tell(f"{name}: {variant}: {found[name][variant]['peak'] / 2**30:.2f} GiB at most")
     return found

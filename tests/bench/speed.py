@@ -9,6 +9,7 @@ from framearray_cli.images import ImageFormat
 from .cases import VARIANTS, Case, Variant, job_named, opened, parts_of
 from .floor import record, replay
 from .machine import busy, describe
+from .markdown import total
 from .results import Table, median
 from .steady import start_of, steady_mean
 
@@ -58,17 +59,16 @@ def measure(name: str, quick: bool, runs: int = RUNS, variants: Sequence[Variant
 def measure_once(case: Case, variant: Variant, place: float) -> Table:
     """Measure one variant at one place of the path, with its floor and with writing where it asks for them."""
     parts = parts_of(case, variant)
-    table = steady_mean(parts, variant.frames, None, [place])
-    if variant.writes:
-        table["written"] = {
-            name: steady_mean(parts, variant.frames, image_format, [place]) for name, image_format in FORMATS.items()
-        }
+    names = FORMATS if variant.writes else {}
+    table, *written = steady_mean(parts, variant.frames, [None, *(FORMATS[name] for name in names)], place)
+    table["written"] = dict(zip(names, written, strict=True))
     if variant.floor:
         part = parts[len(parts) // 2]
-        c = start_of(part, variant.frames, place) + 2 * part.work.n_r + 1 + variant.frames // 2
-        table["floor"] = replay(record(part, c), part.work.tracer, part.threads, table["rays"])
-        total = sum(table["floor"]["ms"].values()), sum(table["floor"]["cpu_ms"].values())
-        table["floor_ratio"] = {"ms": table["ms"] / total[0], "cpu_ms": table["cpu_ms"] / total[1]}
+        first = start_of(part, variant.frames * (1 + len(names)), place)
+        c = first + 2 * part.work.n_r + 1 + variant.frames // 2
+        expected = total(table["rays"]) * part.work.n_pixels * part.work.lights.n_lights
+        table["floor"] = replay(record(part, c, expected), part.work.tracer, part.threads, table["rays"])
+        table["floor_ratio"] = {clock: table[clock] / total(table["floor"][clock]) for clock in ("ms", "cpu_ms")}
     return table
 
 

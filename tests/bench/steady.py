@@ -21,6 +21,7 @@ from framearray_cli.filepatterns import file_patterns
 from framearray_cli.frame import find_frame
 from framearray_cli.images import ImageFormat
 from framearray_cli.window import Composed, Window
+from framearray_cli.work import Work
 from framearray_cli.writer import ArrayWriter
 
 from .cases import Case
@@ -58,10 +59,18 @@ class Measured:
 class TimedWriter(ArrayWriter):
     """A writer that knows how much processor time its threads took."""
 
-    def __init__(self, *args: Any) -> None:
+    def __init__(self, *args: Any, writes: bool) -> None:
         self.seconds = 0.0
+        self._writes = writes
         self._lock = Lock()
         super().__init__(*args)
+
+    def take(self, composed: Composed, c: int) -> None:
+        """Write a frame, or drop it."""
+        if self._writes:
+            self.write(composed, range(c, c + 1))
+        else:
+            self.give_back(composed.images)
 
     def _write_image(self, composed: Composed, c: int, l: int) -> None:
         started = time.thread_time()
@@ -79,44 +88,45 @@ def start_of(case: Case, frames: int, place: float) -> int:
     return min(max(round(place * case.work.n_frames) - frames // 2 - case.work.n_r - 1, 0), last)
 
 
-def steady(case: Case, frames: int, image_format: ImageFormat | None, place: float = 0.5) -> Measured:
-    """Make the images of `frames` interior frames.
+def steady(
+    case: Case, frames: int, formats: Sequence[ImageFormat | None] = (None,), place: float = 0.5
+) -> list[Measured]:
+    """Make the images of `frames` interior frames, as often as there are formats, one frame after another.
 
     Args:
-        image_format: how images are written, or None: they are composed and dropped.
+        formats: how images are written, or None: they are composed and dropped.
         place: where on the path, 0 to 1.
     """
     work, n_r = case.work, case.work.n_r
     before = 2 * n_r + 1  # frames that fill the window and compose one frame, so that all is compiled
-    first = start_of(case, frames, place)
+    first = start_of(case, frames * len(formats), place)
     crew = Crew(work, case.threads)
     window = Window(work, case.ambient, crew, first=first + n_r)
-    hits: list[Int32] = []
+    found: list[Measured] = []
     try:
-        with tempfile.TemporaryDirectory() as folder, _writer(case, Path(folder), image_format) as writer:
-            for c in range(first, first + before + frames):
-                if c == first + before:
-                    writer.finish()
-                    hits.clear()
-                    rays, seconds, written = crew.rays(), crew.seconds(), writer.seconds
-                    started, cpu = time.perf_counter(), time.process_time()
-                window.add(find_frame(work, c, crew))
-                for j in window.complete():
-                    composed = window.compose(j, writer.block())
-                    hits.append(composed.hits)
-                    if image_format is None:
-                        writer.give_back(composed.images)
-                    else:
-                        writer.write(composed, range(j, j + 1))
-            writer.finish()
-            wall, cpu = time.perf_counter() - started, time.process_time() - cpu
-            spent = {stage: t - seconds.get(stage, 0.0) for stage, t in crew.seconds().items()}
+        with _writer(case, Path(), None) as nothing:
+            _pass(work, window, crew, nothing, range(first, first + before))
+        for image_format in formats:
+            first += before if not found else frames
+            found.append(_measured(case, window, crew, range(first, first + frames), image_format))
     finally:
         crew.close()
-    images = len(hits) * work.lights.n_lights
-    spent = {stage: t for stage, t in spent.items() if stage not in WITHIN_MIRROR}
-    spent["rest"] = case.threads * wall - sum(spent.values())
-    spent["writing"] = writer.seconds - written
+    return found
+
+
+def _measured(case: Case, window: Window, crew: Crew, cameras: range, image_format: ImageFormat | None) -> Measured:
+    """Put the clock to some frames."""
+    work = case.work
+    with tempfile.TemporaryDirectory() as folder, _writer(case, Path(folder), image_format) as writer:
+        rays, seconds = crew.rays(), crew.seconds()
+        started, cpu = time.perf_counter(), time.process_time()
+        hits = _pass(work, window, crew, writer, cameras)
+        wall, cpu = time.perf_counter() - started, time.process_time() - cpu
+        spent = {stage: t - seconds.get(stage, 0.0) for stage, t in crew.seconds().items()}
+        images = len(hits) * work.lights.n_lights
+        spent = {stage: t for stage, t in spent.items() if stage not in WITHIN_MIRROR}
+        spent["rest"] = case.threads * wall - sum(spent.values())
+        spent["writing"] = writer.seconds
     all_hits = np.concatenate(hits)
     return Measured(
         images=images,
@@ -128,10 +138,23 @@ def steady(case: Case, frames: int, image_format: ImageFormat | None, place: flo
     )
 
 
-def steady_mean(cases: Sequence[Case], frames: int, image_format: ImageFormat | None, places: Sequence[float]) -> Table:
-    """Run every case at every place; returns the means over them, which all make the same number of images."""
-    runs = [steady(case, frames, image_format, place).table() for case in cases for place in places]
-    return mean(runs)
+def _pass(work: Work, window: Window, crew: Crew, writer: TimedWriter, cameras: range) -> list[Int32]:
+    """Find the hits of some cameras and compose what they complete, as the program does; returns hits by pixel."""
+    hits: list[Int32] = []
+    for c in cameras:
+        window.add(find_frame(work, c, crew))
+        for j in window.complete():
+            composed = window.compose(j, writer.block())
+            hits.append(composed.hits)
+            writer.take(composed, j)
+    writer.finish()
+    return hits
+
+
+def steady_mean(cases: Sequence[Case], frames: int, formats: Sequence[ImageFormat | None], place: float) -> list[Table]:
+    """Run every case; returns, for each format, the mean over the cases, which all make the same number of images."""
+    runs = [steady(case, frames, formats, place) for case in cases]
+    return [mean([measured.table() for measured in column]) for column in zip(*runs, strict=True)]
 
 
 def mean(tables: Sequence[Table]) -> Table:
@@ -161,4 +184,5 @@ def _writer(case: Case, folder: Path, image_format: ImageFormat | None) -> Timed
         range(n_lights),
         case.threads,
         lambda images: None,
+        writes=image_format is not None,
     )
