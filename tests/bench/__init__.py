@@ -10,7 +10,7 @@
     reference.py  images of a thousand and more hits a pixel
     error.py      how far each way is from them
     processes.py  start-up time and peak memory, each in a process of its own
-    peers.py      the same images from other programs
+    peers.py      what images cost in other programs: mitsuba3.py, cycles.py
     rooms.py      generated scenes of any number of triangles
     scaling.py    time an image against the size of a job
     machine.py    what all this ran on, and how busy that was

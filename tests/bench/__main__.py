@@ -3,21 +3,23 @@
 import argparse
 import json
 
-from . import error, peers, processes, scaling, speed, table
+from . import cycles, error, mitsuba3, peers, processes, scaling, speed, table
 from .cases import FRAME_ARRAY, JOBS, Variant, job_named, opened, variant_named, varied, with_resolution
 from .results import folder, save
 from .steady import steady
 
+PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
 PARTS = ("speed", "error", "peers", "memory", "startup")
 
 
 def main() -> None:
     """Measure what is asked for, and write the page."""
     parser = argparse.ArgumentParser(prog="bench", description="Measure what an image costs, and write docs/speed.md.")
-    parser.add_argument("what", nargs="?", default="all", choices=("all", "scaling", "page", "peak", "mitsuba", *PARTS))
+    parser.add_argument("what", nargs="?", default="all", choices=("all", "scaling", "page", "peak", *PROGRAMS, *PARTS))
     parser.add_argument("jobs", nargs="*", default=list(JOBS), help="some of the jobs")
     parser.add_argument("--quick", action="store_true", help="a small picture, once; the page goes to out/bench/quick")
     parser.add_argument("--runs", type=int, default=speed.RUNS, help="how often each thing is measured")
+    parser.add_argument("--patience", type=float, default=0.0, help="seconds to wait for a busy machine, each time")
     parser.add_argument("--variant", default=FRAME_ARRAY.name, help="for `peak`")
     parser.add_argument("--resolution", help="for `peak`: 800x600")
     parser.add_argument("--frames", type=int, default=2, help="for `peak`")
@@ -25,18 +27,19 @@ def main() -> None:
     if args.what == "peak":
         print(json.dumps(peak(args.jobs[0], variant_named(args.variant), args)))
         return
-    if args.what == "mitsuba":
-        print(json.dumps(peers.measure(args.jobs[0], args.quick)))
+    if args.what in PROGRAMS:
+        print(json.dumps(PROGRAMS[args.what](args.jobs[0], args.quick)))
         return
     out = folder(args.quick)
     todo = PARTS if args.what == "all" else (args.what,)
     for name in args.jobs:
         if "speed" in todo:
-            save(out, f"speed-{name}", speed.measure(name, args.quick, args.runs))
+            save(out, f"speed-{name}", speed.measure(name, args.quick, args.runs, args.patience))
         if "error" in todo:
             save(out, f"error-{name}", error.measure(name, args.quick, out))
         if "peers" in todo:
-            save(out, f"mitsuba-{name}", peers.asked(name, args.quick))
+            for program in PROGRAMS:
+                save(out, f"{program}-{name}", peers.measure(program, name, args.quick))
     if "memory" in todo:
         save(out, "memory", processes.memory(args.quick, args.jobs))
     if "startup" in todo:

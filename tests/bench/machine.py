@@ -63,6 +63,8 @@ def _spin(n: int) -> float:
 
 
 _STEPS = 60_000_000  # about a fifth of a second
+# Where others take less of the cores than this, nobody works on the machine.
+QUIET = 0.1
 
 
 def busy() -> float:
@@ -81,3 +83,11 @@ def busy() -> float:
     for thread in threads:
         thread.join()
     return max(0.0, 1.0 - sum(shares) / len(shares))
+
+
+def quiet(patience: float) -> float:
+    """Wait until the machine has nothing else to do, or for `patience` seconds; returns what `busy` found last."""
+    started = time.perf_counter()
+    while (share := busy()) > QUIET and time.perf_counter() - started < patience:
+        time.sleep(2.0)
+    return share

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from .cases import FRAME_ARRAY, JOBS, REDUCED, SCRATCH, VARIANTS
 from .markdown import grid, number, percent, times, total
 from .results import Table
-from .speed import FORMATS, RUNS
+from .speed import FORMATS
 
 HEAD = """
 # Speed
@@ -70,15 +70,16 @@ def summary(speed: Mapping[str, Table], mitsuba: Mapping[str, Table]) -> list[st
         "job", "ms an image", "to the floor", "from scratch takes", "same, to `shadow_step` 4",
         "written, ms", "from scratch, written", "Mitsuba, written",
     ]  # fmt: skip
+    runs = min(len(tables) for table in speed.values() for tables in table["runs"].values())
     about = f"""
 The three jobs of the size that the paper used, in the steady state: some cameras from the middle of the path, with the
 window filled before the clock starts, so that reading, ambient light and path ends are left out. Weights are `average`,
-shadows are tested at every light position if nothing else is said. Everything is measured in turn, {RUNS} times at
-{RUNS} places of the camera path; figures are medians.
+shadows are tested at every light position if nothing else is said. Everything is measured in turn, {runs} times, each
+time at another place of the camera path; figures are medians.
 
 - *From scratch*: every image alone, by the same kernels and packets, with as many native hits a pixel as a pixel of
-  the frame array rests on, {SCRATCH.hits} with {SCRATCH.obscurance} obscurance rays each. It takes so many times as
-  long as the frame array.
+  the frame array rests on: {SCRATCH.hits}, with {SCRATCH.obscurance} obscurance rays each. Columns say how many
+  times as long that takes.
 - *Floor*: the rays of one frame, recorded and replayed through Embree packets on all cores; nothing but Embree's own
   calls is timed. Packets are those that the program makes, idle lanes and all.
 - *Written*: as half EXR, `zip:1`, to a temporary folder.
@@ -168,27 +169,37 @@ def writing(speed: Mapping[str, Table]) -> list[str]:
     return ["## Writing", "Half EXR to a temporary folder, beside the tracing.", grid(head, rows)]
 
 
-def peers(speed: Mapping[str, Table], mitsuba: Mapping[str, Table]) -> list[str]:
+def peers(speed: Mapping[str, Table], mitsuba: Mapping[str, Table], cycles: Mapping[str, Table]) -> list[str]:
     """Other programs."""
     rows, why = [], []
-    for name, t in mitsuba.items():
-        if "skipped" in t:
-            why.append(f"{name}: left out: {t['skipped']}.")
-            continue
-        ours = speed[name]["median"] if name in speed else {}
-        array = ours.get(FRAME_ARRAY.name, {}).get("written", {}).get("zip:1", {}).get("ms")
-        ratio = times(t["written_ms"] / array) if array else ""
-        apart = percent(abs(t["mean"] / t["our_mean"] - 1), 2)
-        rows.append([name, number(t["ms"]), number(t["written_ms"]), ratio, number(t["our_ms"]), apart])
-    version = next((f" {t['version']}" for t in mitsuba.values() if "version" in t), "")
-    head = ["", "ms", "written, ms", "to the frame array, written", "ours from scratch, ms", "means differ by"]
+    for program, tables in (("Mitsuba", mitsuba), ("Cycles", cycles)):
+        for name, t in tables.items():
+            if "skipped" in t:
+                why.append(f"- {program}, {name}: left out: {t['skipped']}.")
+                continue
+            found = speed[name]["median"] if name in speed else {}
+            array = found.get(FRAME_ARRAY.name, {}).get("ms")
+            written = found.get(FRAME_ARRAY.name, {}).get("written", {}).get("zip:1", {}).get("ms")
+            rows.append(
+                [
+                    f"{program} {t['version']}, {name}",
+                    number(t["ms"]),
+                    times(t["ms"] / array) if array else "",
+                    number(t["written_ms"]) if "written_ms" in t else "",
+                    times(t["written_ms"] / written) if written and "written_ms" in t else "",
+                    percent(abs(t["mean"] / t["our_mean"] - 1), 2) if "mean" in t else "",
+                ]
+            )
+    head = ["", "ms", "to the frame array", "written, ms", "to the frame array, written", "means differ by"]
     about = f"""
-Mitsuba{version}, LLVM backend: a small integrator of the same model on the same triangles, every image from scratch,
-{SCRATCH.hits} x (1 eye ray + {SCRATCH.obscurance} obscurance rays + 1 shadow ray) a pixel. It is spared mirrors, alpha
-masks, interpolated normals and texture filtering. The last column compares the mean of one image with the program's
-own.
+- *Mitsuba*, LLVM backend: a small integrator of the same model on the same triangles, every image from scratch,
+  {SCRATCH.hits} x (1 eye ray + {SCRATCH.obscurance} obscurance rays + 1 shadow ray) a pixel. It is spared mirrors,
+  alpha masks, interpolated normals and texture filtering. The last column compares the mean of one image with the
+  program's own.
+- *Cycles*, on the processor: path tracing with {SCRATCH.hits} samples a pixel, not denoised; another model, so another
+  picture. It takes materials and lights as they are, textures as their mean colour, and no mirrors.
 """
-    return ["## Other programs", about, *([grid(head, rows)] if rows else []), *why]
+    return ["## Other programs", about, *([grid(head, rows)] if rows else []), "\n".join(why)]
 
 
 def errors(error: Mapping[str, Table], speed: Mapping[str, Table]) -> list[str]:
@@ -298,11 +309,11 @@ SWEEPS: tuple[tuple[str, str, str, list[str], Callable[[Table], list[str]]], ...
      lambda r: [str(r["lights"])]),
     ("n_r", "Frames that share hits", "With 2 native hits a pixel a frame; more frames, more hits a pixel.",
      ["N_r", "hits a pixel"], lambda r: [str(r["n_r"]), f"{r['hits'][0]:.1f}"]),
-    ("threads", "Threads", "", ["threads"], lambda r: [str(r["threads"])]),
+    ("threads", "Threads", "As many as cores, and fewer.", ["threads"], lambda r: [str(r["threads"])]),
     ("cameras", "Cameras", "The camera path there and back, several times over.", ["N_c"],
      lambda r: [str(r["cameras"])]),
     ("triangles", "Triangles", "A generated room with 50 spheres of more and more triangles. *Scene*: cleaning and "
-     "merging, *Embree*: its acceleration structure, seconds.", ["triangles", "scene, s", "Embree, s"],
+     "merging, *Embree*: its\nacceleration structure, seconds.", ["triangles", "scene, s", "Embree, s"],
      lambda r: [f"{r['triangles']:,}", f"{r['scene_s']:.2f}", f"{r['embree_s']:.2f}"]),
     ("resolution_sweep", "Resolution", "Each in a process of its own.", ["pixels", "GiB at most"],
      lambda r: [f"{r['width']} x {r['height']}", f"{r['peak'] / 2**30:.2f}"]),

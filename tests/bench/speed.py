@@ -8,7 +8,7 @@ from framearray_cli.images import ImageFormat
 
 from .cases import VARIANTS, Case, Variant, job_named, opened, parts_of
 from .floor import record, replay
-from .machine import busy, describe
+from .machine import describe, quiet
 from .markdown import total
 from .results import Table, median
 from .steady import start_of, steady_mean
@@ -26,15 +26,21 @@ def places_of(runs: int) -> list[float]:
     return [(r + 1) / (runs + 1) for r in range(runs)]
 
 
-def measure(name: str, quick: bool, runs: int = RUNS, variants: Sequence[Variant] = VARIANTS) -> Table:
-    """Measure a job: variant -> medians of its runs; variants without `frames` are left out."""
+def measure(
+    name: str, quick: bool, runs: int = RUNS, patience: float = 0.0, variants: Sequence[Variant] = VARIANTS
+) -> Table:
+    """Measure a job: variant -> medians of its runs; variants without `frames` are left out.
+
+    Args:
+        patience: seconds to wait, before each measurement, for other programs to leave the cores alone.
+    """
     timed = [variant for variant in variants if variant.frames]
     found: dict[str, list[Table]] = {variant.name: [] for variant in timed}
     shares: list[float] = []
     with opened(job_named(name, quick)) as case:
         for place in places_of(1 if quick else runs):
             for variant in timed:
-                shares.append(busy())
+                shares.append(quiet(patience))
                 table = measure_once(case, replace(variant, frames=2) if quick else variant, place)
                 found[variant.name].append(table)
                 tell(f"{name}: {variant.name}: {table['ms']:.2f} ms an image, others take {shares[-1]:.0%}")

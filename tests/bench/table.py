@@ -22,6 +22,7 @@ def render(results: Path, plots_at: Path) -> str:
     speed = {name: table for name in JOBS if (table := load(results, f"speed-{name}"))}
     error = {name: table for name in JOBS if (table := load(results, f"error-{name}"))}
     mitsuba = {name: table for name in JOBS if (table := load(results, f"mitsuba-{name}"))}
+    cycles = {name: table for name in JOBS if (table := load(results, f"cycles-{name}"))}
     memory, startup, scaling = (load(results, name) for name in ("memory", "startup", "scaling"))
     parts = [pages.HEAD]
     if speed:
@@ -30,7 +31,7 @@ def render(results: Path, plots_at: Path) -> str:
         )
         parts += [*pages.summary(speed, mitsuba), *pages.cost(speed), *pages.stages(speed), *pages.writing(speed)]
     if mitsuba:
-        parts += pages.peers(speed, mitsuba)
+        parts += pages.peers(speed, mitsuba, cycles)
     if error:
         parts += [*pages.errors(error, speed), *pages.containers(error)]
     if memory:
