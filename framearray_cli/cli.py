@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 OUT_OF_MEMORY = 2  # the job asks for more than the machine has
 LITTLE_SPACE = 64 * 1024 * 1024  # bytes; with less, a full disk is the likely reason of an error
 PATIENCE = 1.0  # seconds that threads get to end by themselves after a signal
+# Callbacks from C and optional imports, in which every exception is caught.
+FORGETFUL = ("numba", "llvmlite", "importlib", "_frozen_importlib", "_frozen_importlib_external")
 MOST_THREADS = 1024  # as in the job file
 
 app = typer.Typer(
@@ -276,15 +278,29 @@ def _fail(lines: Sequence[str], code: int) -> NoReturn:
     sys.exit(code)
 
 
-def _stop(signum: int, frame: "FrameType | None") -> NoReturn:
+def _stop(signum: int, frame: "FrameType | None") -> None:
     """Turn a signal into an exception, so that everything is tidied up; a second signal ends the process at once."""
     signal.signal(signum, signal.SIG_DFL)
-    stopped = Stopped(signum)
     if is_compiling():  # that cannot be stopped, and would be waited for
-        timer = threading.Timer(PATIENCE, _leave, [stopped])
+        timer = threading.Timer(PATIENCE, _leave, [Stopped(signum)])
         timer.daemon = True
         timer.start()
-    raise stopped
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, lambda _, frame: _interrupt(signum, frame))
+    _interrupt(signum, frame)
+
+
+def _interrupt(signum: int, frame: "FrameType | None") -> None:
+    """Raise `Stopped`, unless that would be forgotten now; then in a moment, and again should it be forgotten."""
+    busy = False
+    while frame is not None and not busy:
+        busy = frame.f_globals.get("__name__", "").partition(".")[0] in FORGETFUL
+        frame = frame.f_back
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_REAL, 0.02 if busy else 2 * PATIENCE)
+        if busy:
+            return
+    raise Stopped(signum)
 
 
 def _leave(stopped: Stopped) -> None:
@@ -313,6 +329,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         less = "a smaller resolution, n_r or fewer lights take less; `framearray check` tells how much a job needs"
         _fail([f"not enough memory; {less}", *_notes(error)], OUT_OF_MEMORY)
     except Stopped as stopped:
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0)
         _fail([stopped.word, *_notes(stopped)], stopped.exit_code)
 
 

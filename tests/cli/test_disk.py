@@ -29,7 +29,9 @@ def disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", str(folder)], check=True)
 
 
-@pytest.mark.parametrize("file_format", ["exr", "png", "tif", "jpg"])
+@pytest.mark.parametrize(
+    "file_format", ["exr", "png", *(pytest.param(f, marks=pytest.mark.slow) for f in ("tif", "jpg"))]
+)
 def test_a_disk_that_becomes_full(file_format, disk, tmp_path):
     camera = tiny.WALK | {"resolution": [120, 90], "frames": 40}
     output = {"format": file_format, "directory": "disk/out"}

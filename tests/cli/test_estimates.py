@@ -40,7 +40,7 @@ def job(folder: Path, **changes: object) -> Path:
     [
         {"camera": WALK, "reuse": {"n_r": 2}},
         {"camera": REST, "reuse": {"n_r": 2}},
-        {"camera": WALK, "output": {"format": "png", "layers": False}},
+        pytest.param({"camera": WALK, "output": {"format": "png", "layers": False}}, marks=pytest.mark.slow),
     ],
     ids=["walk", "rest", "png"],
 )

@@ -15,6 +15,7 @@ import pytest
 import tiny
 from program import Result, finish, start, wait_for, write_job
 
+from framearray_cli import cli
 from framearray_cli.images import read_image
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of other kinds there")
@@ -154,3 +155,19 @@ def test_while_kernels_compile(tmp_path, monkeypatch):
     time.sleep(1.0)  # now the frame's threads compile
     assert "compiling" in log.read_text()
     assert stop(process, signal.SIGINT).err == "interrupted\n"
+
+
+@pytest.mark.parametrize("module", ["llvmlite.binding.executionengine", "importlib._bootstrap"])
+def test_an_exception_is_not_raised_where_it_would_be_forgotten(module):
+    """A callback from C, for instance, prints an exception and goes on; then it is raised a moment later."""
+    inside: list[object] = []
+    exec("def f(stop): stop(); inside.append(stop)", space := {"__name__": module, "inside": inside})
+
+    def arrive() -> None:
+        cli._stop(signal.SIGTERM, sys._getframe())
+
+    space["f"](arrive)
+    assert inside == [arrive]
+    with pytest.raises(cli.Stopped):
+        time.sleep(5)
+    signal.setitimer(signal.ITIMER_REAL, 0)

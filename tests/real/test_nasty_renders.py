@@ -1,0 +1,74 @@
+"""Every file of the nasty set, where it is, gives pictures or one clear error; nothing else is ever said."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+from nasty import job_table, nasty_files
+from scenes import scenes_folder
+
+from framearray_cli.cli import main
+from framearray_cli.errors import SceneError
+from framearray_cli.images import read_image
+from framearray_cli.scene import Scene, load_scene
+
+FILES = nasty_files(scenes_folder())
+RESOLUTION = (40, 30)
+BY_ITSELF = ("trimesh/fuze.obj", "assimp/invalid/OutOfMemory.off")
+
+
+def scene_of(file: Path) -> Scene | None:
+    try:
+        return load_scene(file)
+    except SceneError:
+        return None
+
+
+def write_job(name: str, folder: Path) -> tuple[Path, Scene | None]:
+    file = scenes_folder() / "nasty" / name
+    scene = scene_of(file)
+    job = folder / "job.toml"
+    job.write_text(tomli_w.dumps(job_table(file, scene, RESOLUTION, folder / "out")))
+    return job, scene
+
+
+@pytest.mark.skipif(not FILES, reason="no nasty set; set FRAMEARRAY_SCENES to the folder of scenes")
+def test_the_set_is_there():
+    assert set(BY_ITSELF) <= set(FILES)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_pictures_or_a_clear_error(name, tmp_path, capfd):
+    job, scene = write_job(name, tmp_path)
+    code = 0
+    try:
+        main(["render", "-q", str(job)])
+    except SystemExit as end:
+        code = int(end.code or 0)
+    out, err = capfd.readouterr()
+    assert out == ""
+    if scene is None:
+        assert code == 3
+        assert err.startswith(str(scenes_folder() / "nasty" / name))
+        assert err.count("\n") == 1
+        assert "Error" not in err.split("(")[0]
+        return
+    assert (code, err) == (0, "")
+    pictures = np.array([read_image(file) for file in sorted((tmp_path / "out").glob("*.png"))])
+    assert pictures.shape == (4, RESOLUTION[1], RESOLUTION[0], 3)
+    # the corner shows the background; something else is in the picture, and the lamp of every other one lights it
+    assert np.abs(pictures - pictures[:, :1, :1]).max(axis=(1, 2, 3)).min() > 0.02
+    assert pictures[1::2].mean() > pictures[::2].mean()
+
+
+@pytest.mark.parametrize("name", [name for name in BY_ITSELF if name in FILES])
+def test_as_a_command(name, tmp_path):
+    job, scene = write_job(name, tmp_path)
+    command = [sys.executable, "-m", "framearray_cli", "render", str(job)]
+    told = subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=Path(__file__).parents[2])
+    assert "Traceback" not in told.stderr
+    assert told.returncode == (3 if scene is None else 0)
+    assert told.stderr.count("\n") == (1 if scene is None else 0)
