@@ -37,12 +37,12 @@ class Levels:
 
 SKY = (0.45, 0.6, 0.9)
 LEVELS = {
-    "cornell_box": Levels(sun=3.0, lamp=3.0),
-    "country_kitchen": Levels(sun=12.0, lamp=8.0, sky=SKY),
-    "grey_white_room": Levels(sun=8.0, lamp=8.0, sky=SKY),
-    "iss_kibo_cabin": Levels(sun=12.0, lamp=5.0),
-    "modern_hall": Levels(sun=4.0, lamp=25.0, sky=SKY, height=5.6),
-    "modern_hall_obj": Levels(sun=4.0, lamp=25.0, sky=SKY, height=5.6),
+    "cornell_box": Levels(sun=3.0, lamp=1.3),
+    "country_kitchen": Levels(sun=30.0, lamp=8.0, sky=SKY),
+    "grey_white_room": Levels(sun=24.0, lamp=8.0, sky=SKY),
+    "iss_kibo_cabin": Levels(sun=30.0, lamp=6.0),
+    "modern_hall": Levels(sun=2.5, lamp=25.0, sky=SKY, height=5.6),
+    "modern_hall_obj": Levels(sun=2.5, lamp=25.0, sky=SKY, height=5.6),
     "utah_teapot": Levels(sun=3.0, lamp=1500.0, sky=SKY),
     "vr_gallery": Levels(sun=4.0, lamp=12.0, sky=SKY),
 }
@@ -54,7 +54,7 @@ def scene_names(scenes: Path) -> list[str]:
 
 
 def job_table(scenes: Path, name: str, kind: str) -> dict[str, Any]:
-    """The job of a scene as a table: `EYES` eyes, or one where no walk is noted, by `LIGHTS` lights."""
+    """The job of a scene as a table: `EYES` eyes by `LIGHTS` lights, or one of them where no more are noted."""
     notes = json.loads((scenes / name / "camera.json").read_text())
     levels = LEVELS[name]
     low, high = notes["bounds"]
@@ -77,7 +77,7 @@ def job_table(scenes: Path, name: str, kind: str) -> dict[str, Any]:
                 for frame, key in zip(_spread(len(walk), frames), walk, strict=True)
             ],
         },
-        "light": {"frames": LIGHTS, "sources": [_source(notes["lights"], kind, levels)]},
+        "light": {"sources": [_source(notes["lights"], kind, levels)]},
         "samples": {"hits": 2, "obscurance": 5},
         "reuse": {"n_r": 2},
         "obscurance": {"range": (levels.height or high[up] - low[up]) / 5},
@@ -93,7 +93,7 @@ def _source(lights: dict[str, Any], kind: str, levels: Levels) -> dict[str, Any]
     else:
         keys = [{"position": lamp["position"]} for lamp in lights["point"][:LIGHTS]]
         power = {"intensity": [levels.lamp, levels.lamp * 0.9, levels.lamp * 0.75]}
-    spread = _spread(len(keys), LIGHTS)
+    spread = _spread(len(keys), LIGHTS if len(keys) > 1 else 1)
     return {
         "type": "directional" if kind == "sun" else "point",
         "keys": [{"frame": frame} | key | power for frame, key in zip(spread, keys, strict=True)],

@@ -1,0 +1,39 @@
+"""Strips of pictures of the real scenes, as docs/real-scenes.md shows them.
+
+    python tests/real/make_strips.py FOLDER STRIPS
+
+takes the arrays that the jobs of `make_jobs.py` left in FOLDER/out, and writes STRIPS/NAME.jpg for every scene.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from framearray_cli.colour import srgb8_from_linear
+from framearray_cli.images import read_image
+from framearray_cli.manifest import image_path, read_manifest
+
+# kind, camera, light; of a scene with fewer, the last one
+CHOSEN = (("sun", 0, 0), ("sun", 3, 2), ("lamp", 2, 0), ("lamp", 5, 3))
+
+
+def strip(arrays: Path, name: str) -> Image.Image:
+    """Four images side by side."""
+    shown = []
+    for kind, c, l in CHOSEN:
+        manifest = read_manifest(arrays / f"{name}-{kind}")
+        path = image_path(manifest, min(c, manifest.n_cameras - 1), min(l, manifest.n_lights - 1))
+        shown.append(srgb8_from_linear(read_image(path)))
+    return Image.fromarray(np.concatenate(shown, axis=1))
+
+
+def main(arrays: Path, strips: Path) -> None:
+    strips.mkdir(parents=True, exist_ok=True)
+    for name in sorted(folder.name.removesuffix("-sun") for folder in arrays.glob("*-sun")):
+        strip(arrays, name).save(strips / f"{name}.jpg", quality=88, subsampling=0)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) / "out", Path(sys.argv[2]))
