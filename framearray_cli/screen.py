@@ -1,11 +1,12 @@
 """What a person sees while a render runs: a bar on a terminal, plain lines elsewhere, nothing if quiet."""
 
+import os
 import threading
 import time
 from collections.abc import Iterable
 from contextlib import suppress
 from types import TracebackType
-from typing import Self
+from typing import IO, Self
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
@@ -127,7 +128,14 @@ def say(console: Console, lines: Iterable[str]) -> None:
     except BrokenPipeError:  # whoever read it has gone
         raise
     except OSError as error:
+        _let_go(console.file)
         raise OutputError(f"standard output: cannot be written: {reason(error)}") from error
+
+
+def _let_go(stream: IO[str]) -> None:
+    """Send the rest of a stream to nowhere: what it still holds would fail again when the process ends."""
+    with suppress(OSError, ValueError):  # a stream without a file has nothing to fail
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def duration(seconds: float) -> str:
