@@ -22,7 +22,8 @@ QUAD_UVS = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], dtype=np.float32)
 def scenes_folder() -> Path:
     """The folder of real scenes."""
     default = Path(__file__).resolve().parents[2] / "shared" / "scenes"
-    return Path(os.environ.get("FRAMEARRAY_SCENES", default))
+    # as the program names files in messages: links on the way followed
+    return Path(os.environ.get("FRAMEARRAY_SCENES", default)).resolve()
 
 
 def shared_scene(name: str) -> Path:
