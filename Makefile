@@ -6,7 +6,7 @@ JOB := jobs/kitchen-small.toml
 OUT := out/kitchen-small
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-all smoke format check docs clean
+.PHONY: help install render test test-all smoke format check docs bench bench-scaling clean
 
 help: ## Show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -20,6 +20,11 @@ $(VENV)/installed: pyproject.toml
 
 $(VENV)/installed-dev: $(VENV)/installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[movie,dev]'
+	@touch $@
+
+$(VENV)/installed-bench: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[movie,bench]'
+	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
 	@touch $@
 
 install: $(VENV)/installed ## Set up the program in .venv
@@ -50,6 +55,12 @@ check: $(VENV)/installed-dev ## Check format, style and types
 
 docs: $(VENV)/installed-dev ## Write the generated pages of docs/
 	$(BIN)/python -m framearray_cli.jobdocs docs/
+
+bench: $(VENV)/installed-bench ## Measure what an image costs, and write docs/speed.md
+	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)
+
+bench-scaling: $(VENV)/installed-bench ## Measure time against the size of a job, for docs/speed.md
+	PYTHONPATH=tests $(BIN)/python -m bench scaling $(BENCH)
 
 clean: ## Remove what was built and rendered
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache
