@@ -13,8 +13,9 @@ from .rays import room_for_hits, room_for_tests
 from .terms.direct_steps import room_for_steps
 from .work import Work
 
-# Hits of a batch: large enough that calls cost nothing, small enough that all their arrays stay in a core's cache.
-BATCH = 2048
+# Hits of a batch: large enough that calls and changes of threads cost nothing, small enough that a frame has several
+# for each thread and that their arrays stay in a core's cache.
+BATCH, LARGEST_BATCH, BATCHES_A_THREAD = 2048, 8192, 16
 # Rays traced together within a batch.
 RAYS = 4096
 
@@ -42,33 +43,39 @@ class Shelf:
 class Scratch:
     """One thread's arrays, kept from batch to batch."""
 
-    def __init__(self, work: Work) -> None:
+    def __init__(self, work: Work, batch: int) -> None:
         n_eyes = 4 * work.n_r + 1
-        rays = max(RAYS, work.obscurance.n_rays)
+        rays = max(RAYS, batch, work.obscurance.n_rays)
         self.hit_rays = room_for_hits(rays)
         self.test_rays = room_for_tests(RAYS, work.lights.n_lights)
-        self.hits = empty_hits(BATCH)
-        self.reflected = [empty_hits(BATCH), empty_hits(BATCH)] if work.depth else []
-        self.throughput = [np.empty((BATCH, 3), np.float32) for _ in self.reflected]
+        self.hits = empty_hits(batch)
+        self.reflected = [empty_hits(batch), empty_hits(batch)] if work.depth else []
+        self.throughput = [np.empty((batch, 3), np.float32) for _ in self.reflected]
         self.steps = room_for_steps(work.lights.n_lights) if work.shadow_step > 1 else None
-        full = (0 if work.keeps_all else BATCH, work.lights.channels, work.lights.n_lights)
+        full = (0 if work.keeps_all else batch, work.lights.channels, work.lights.n_lights)
         self.irradiance = np.empty(full, np.float32)  # of all lights, where only some are kept
-        self.pixel = np.empty((n_eyes, BATCH), np.int32)
-        self.density = np.empty((n_eyes, BATCH), np.float64)
-        self.skylight = np.empty((BATCH if work.obscurance.sky else 0, 3), np.float32)
+        self.pixel = np.empty((n_eyes, batch), np.int32)
+        self.density = np.empty((n_eyes, batch), np.float64)
+        self.skylight = np.empty((batch if work.obscurance.sky else 0, 3), np.float32)
         self.rays: Counter[str] = Counter()
         self.seconds: defaultdict[str, float] = defaultdict(float)
 
 
 class Crew:
-    """The threads that work on a frame, and their scratch arrays."""
+    """The threads that work on a frame, and their scratch arrays.
+
+    Attributes:
+        batch: how many hits a task finds.
+    """
 
     def __init__(self, work: Work, threads: int) -> None:
         self.threads = threads
+        hits = work.n_pixels * float(work.per_pixel.max())
+        self.batch = min(max(int(hits / (BATCHES_A_THREAD * threads)) // BATCH, 1) * BATCH, LARGEST_BATCH)
         self.shelf = Shelf()
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="trace")
         self._scratch: SimpleQueue[Scratch] = SimpleQueue()
-        self._all = [Scratch(work) for _ in range(threads)]
+        self._all = [Scratch(work, self.batch) for _ in range(threads)]
         for scratch in self._all:
             self._scratch.put(scratch)
 

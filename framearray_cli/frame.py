@@ -12,7 +12,7 @@ import numpy as np
 
 from .arrays import Float32, Int32
 from .camera import Cameras
-from .crew import BATCH, Crew, Scratch, Shelf
+from .crew import Crew, Scratch, Shelf
 from .hits import ESCAPED, SURFACE, Hits, extra_hits, native_hits
 from .mirrors import extra_mirror_hits, mirror_paths
 from .plan import Pass, passes
@@ -59,8 +59,7 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
     n = sum(part.n for part in parts)
     frames = work.frames_around(c, work.n_r)
     take = crew.shelf.take
-    irradiance = take("irradiance", (n, work.lights.channels, len(work.kept)), np.float32)
-    records = empty_records(work, n, irradiance)
+    records = empty_records(work, n, take)
     pixel = take("pixel", (len(frames), n), np.int32)
     order = take("order", (len(frames), n), np.int32)
     weight = take("weight", (len(frames), n if work.balance else 0), np.float32)
@@ -69,7 +68,7 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
 
     def batch(task: tuple[Pass, int], scratch: Scratch) -> list[tuple[Int32, Records]]:
         part, first = task
-        m = min(BATCH, part.n - first)
+        m = min(crew.batch, part.n - first)
         span = slice(part.first_hit + first, part.first_hit + first + m)
         _native(work, c, part, first, m, scratch)
         hits = scratch.hits
@@ -79,7 +78,7 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
         _place(work, c, m, scratch, frames, pixel[:, span], weight[:, span])
         return mirror_paths(work, hits, m, scratch) if work.depth else []
 
-    tasks = [(part, first) for part in parts for first in range(0, part.n, BATCH)]
+    tasks = [(part, first) for part in parts for first in range(0, part.n, crew.batch)]
     mirrored = [path for paths in crew.run(batch, tasks) for path in paths]
     mirror_hits = np.empty(0, np.int32)
     if work.depth:
@@ -97,7 +96,7 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
         records=records,
         places=places,
         weights={j: weight[row] for row, j in enumerate(frames)},
-        kept={"irradiance": irradiance, "order": order, "weight": weight},
+        kept={**records.arrays, "order": order, "weight": weight},
         mirrored=all_mirrored[1] if all_mirrored else None,
         mirror_places=placed_by_pixel(all_mirrored[0], work.n_pixels) if all_mirrored else None,
         mirror_hits=mirror_hits,
@@ -112,7 +111,7 @@ def fill_holes(work: Work, c: int, pixels: Int32, crew: Crew) -> list[tuple[Plac
     records = empty_records(work, n)
 
     def batch(first: int, scratch: Scratch) -> list[tuple[Int32, Records]]:
-        m = min(BATCH, n - first)
+        m = min(crew.batch, n - first)
         extra_hits(
             work.cams, c, work.seed, pixels, HOLE_SAMPLE, 1, first, m, work.surfaces, work.tracer,
             scratch.hit_rays.packets, scratch.hits,
@@ -121,7 +120,7 @@ def fill_holes(work: Work, c: int, pixels: Int32, crew: Crew) -> list[tuple[Plac
         estimate_terms(work, scratch.hits, m, scratch, records.part(slice(first, first + m)), "obscurance", "shadow")
         return mirror_paths(work, scratch.hits, m, scratch) if work.depth else []
 
-    mirrored = [path for paths in crew.run(batch, range(0, n, BATCH)) for path in paths]
+    mirrored = [path for paths in crew.run(batch, range(0, n, crew.batch)) for path in paths]
     found = [(placed_by_pixel(pixels, work.n_pixels), records)]
     if mirrored:
         where, reflected = joined(work, mirrored)

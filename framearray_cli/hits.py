@@ -10,8 +10,9 @@ import numpy as np
 
 from .arrays import Bytes, Directions, Float32, Int32, Points, Real, Rgb, Triple
 from .camera import Cameras, eye_ray
-from .embree.packets import DIRECTION, MISS, Tracer, U, V, hit_triangle, intersect, set_ray
+from .embree.packets import DIRECTION, GEOMETRY, LANES, MISS, TRIANGLE, Tracer, U, V, intersect, scene_triangle, set_ray
 from .kernel import inlined, kernel
+from .lanes import choose, gather, lane_numbers, lanes_at, put_lanes, root, scatter
 from .sampling import PIXEL, PIXEL_SAMPLE, r2, stream, word
 from .surface import (
     Surfaces,
@@ -53,17 +54,21 @@ class Hits(NamedTuple):
 
 
 def empty_hits(n: int) -> Hits:
-    """Room for n hits; contents are arbitrary."""
+    """Room for n hits; contents are arbitrary.
+
+    Behind each array there is room to the end of a packet of rays: hits are written a packet at a time.
+    """
+    whole = -(-n // LANES) * LANES
 
     def vectors() -> Float32:
-        return np.empty((n, 3), np.float32)
+        return np.empty((whole, 3), np.float32)[:n]
 
     return Hits(
-        kind=np.empty(n, np.uint8),
+        kind=np.empty(whole, np.uint8)[:n],
         position=vectors(),
         geometric=vectors(),
         shading=vectors(),
-        offset=np.empty(n, np.float32),
+        offset=np.empty(whole, np.float32)[:n],
         reflectivity=vectors(),
         specular=vectors(),
         incoming=vectors(),
@@ -86,34 +91,52 @@ def ray_origin(hits: Hits, i: int) -> Triple:
     return p[i, 0] + e * g[i, 0], p[i, 1] + e * g[i, 1], p[i, 2] + e * g[i, 2]
 
 
+@inlined
+def _put(array: Float32, i: int, x: Real, y: Real, z: Real) -> None:
+    """Write rows i to i + 15 of an (n, 3) array."""
+    at = (lane_numbers() + np.int32(i)) * np.int32(3)
+    scatter(array, at, x)
+    scatter(array, at + np.int32(1), y)
+    scatter(array, at + np.int32(2), z)
+
+
 @kernel
 def record_hits(surfaces: Surfaces, tracer: Tracer, packets: Float32, n: int, mirrors: bool, hits: Hits) -> None:
     """Turn traced rays 0 to n - 1 into hits; key and pixel are left alone."""
-    for i in range(n):
-        p, lane = i >> 4, i & 15
-        dx, dy, dz = packets[p, DIRECTION, lane], packets[p, DIRECTION + 1, lane], packets[p, DIRECTION + 2, lane]
-        hits.incoming[i, 0], hits.incoming[i, 1], hits.incoming[i, 2] = dx, dy, dz
-        triangle = hit_triangle(tracer, packets, i)
-        if triangle == MISS:
-            scale = np.float32(1.0) / np.sqrt(dx * dx + dy * dy + dz * dz)
-            hits.kind[i] = ESCAPED
-            hits.position[i, 0], hits.position[i, 1], hits.position[i, 2] = dx * scale, dy * scale, dz * scale
-            for channel in range(3):
-                hits.reflectivity[i, channel] = hits.specular[i, channel] = 0.0
-            continue
-        u, v = packets[p, U, lane], packets[p, V, lane]
-        hits.kind[i] = SURFACE
-        hits.position[i, 0], hits.position[i, 1], hits.position[i, 2] = position_at(surfaces, triangle, u, v)
+    packet, bits = packets.shape[1] * LANES, packets.view(np.int32)
+    for i in range(0, n, LANES):
+        at = (i >> 4) * packet
+        dx, dy = lanes_at(packets, at + DIRECTION * LANES), lanes_at(packets, at + (DIRECTION + 1) * LANES)
+        dz = lanes_at(packets, at + (DIRECTION + 2) * LANES)
+        _put(hits.incoming, i, dx, dy, dz)
+        triangle = lanes_at(bits, at + TRIANGLE * LANES)
+        missed = triangle < np.int32(0)
+        triangle = choose(missed, 0, scene_triangle(tracer, triangle, lanes_at(bits, at + GEOMETRY * LANES)))
+        u, v = (
+            choose(missed, 0.0, lanes_at(packets, at + U * LANES)),
+            choose(missed, 0.0, lanes_at(packets, at + V * LANES)),
+        )
+        x, y, z = position_at(surfaces, triangle, u, v)
+        length = root(dx * dx + dy * dy + dz * dz)
+        _put(
+            hits.position,
+            i,
+            choose(missed, dx / length, x),
+            choose(missed, dy / length, y),
+            choose(missed, dz / length, z),
+        )
         gx, gy, gz = geometric_normal(surfaces, triangle, dx, dy, dz)
-        hits.geometric[i, 0], hits.geometric[i, 1], hits.geometric[i, 2] = gx, gy, gz
+        _put(hits.geometric, i, gx, gy, gz)
         nx, ny, nz = shading_normal(surfaces, triangle, u, v, gx, gy, gz)
-        hits.shading[i, 0], hits.shading[i, 1], hits.shading[i, 2] = nx, ny, nz
-        hits.offset[i] = surfaces.offset[triangle]
+        _put(hits.shading, i, nx, ny, nz)
+        put_lanes(hits.offset, i, gather(surfaces.offset, triangle))
         red, green, blue = reflectivity_at(surfaces, triangle, u, v)
-        hits.reflectivity[i, 0], hits.reflectivity[i, 1], hits.reflectivity[i, 2] = red, green, blue
+        _put(hits.reflectivity, i, choose(missed, 0.0, red), choose(missed, 0.0, green), choose(missed, 0.0, blue))
         if mirrors:
             red, green, blue = specular_at(surfaces, triangle, u, v)
-            hits.specular[i, 0], hits.specular[i, 1], hits.specular[i, 2] = red, green, blue
+            _put(hits.specular, i, choose(missed, 0.0, red), choose(missed, 0.0, green), choose(missed, 0.0, blue))
+        for ray in range(i, i + LANES):
+            hits.kind[ray] = ESCAPED if bits[i >> 4, TRIANGLE, ray & 15] == MISS else SURFACE
 
 
 @nb.njit(cache=True)

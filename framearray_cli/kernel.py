@@ -41,22 +41,23 @@ def inlined(function: F) -> F:
 
 
 def _prefetch_row_of(typingctx: Any, array: Any, i: Any) -> Any:
-    """Ask for array[i] of a 3-d array to be brought into the cache, a request a cache line; nothing waits for it."""
+    """Ask for array[i] to be brought into the cache, a request a cache line; nothing waits for it."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         view = context.make_array(signature.args[0])(context, builder, args[0])
         word, byte = ir.IntType(64), ir.IntType(8).as_pointer()
         row_bytes = builder.extract_value(view.strides, 0)
-        first = builder.bitcast(view.data, byte)
-        row = builder.gep(first, [builder.mul(args[1], row_bytes)])
+        index = context.cast(builder, args[1], signature.args[1], types.intp)
+        row = builder.add(builder.ptrtoint(view.data, word), builder.mul(index, row_bytes))
+        first_line = builder.and_(row, word(-_LINE))
         kind = ir.FunctionType(ir.VoidType(), [byte, ir.IntType(32), ir.IntType(32), ir.IntType(32)])
         fetch = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
         flags = [ir.Constant(ir.IntType(32), value) for value in (0, 3, 1)]  # to read, keep in all levels, data
-        with cgutils.for_range_slice(builder, word(0), row_bytes, word(_LINE), word) as (offset, _):
-            builder.call(fetch, [builder.gep(row, [offset]), *flags])
+        with cgutils.for_range_slice(builder, first_line, builder.add(row, row_bytes), word(_LINE), word) as (line, _):
+            builder.call(fetch, [builder.inttoptr(line, byte), *flags])
         return context.get_dummy_value()
 
-    return types.void(array, types.intp), codegen
+    return types.void(array, i), codegen
 
 
 prefetch_row: Any = intrinsic(_prefetch_row_of)

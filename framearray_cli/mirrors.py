@@ -5,7 +5,7 @@ from time import perf_counter
 import numpy as np
 
 from .arrays import Int32
-from .crew import BATCH, Crew, Scratch
+from .crew import Crew, Scratch
 from .hits import Hits, extra_hits, pilot_hits
 from .plan import Pass, flag_mirrors
 from .shading import estimate_terms
@@ -16,6 +16,8 @@ from .work import Records, Work, empty_records
 def mirror_paths(work: Work, hits: Hits, n: int, scratch: Scratch) -> list[tuple[Int32, Records]]:
     """Follow the mirrors among hits 0 to n - 1; a (pixels, records) pair a bounce."""
     found: list[tuple[Int32, Records]] = []
+    if count_mirrors(hits, n) == 0:
+        return found
     started = perf_counter()
     throughput = np.ones((n, 3), np.float32)
     for bounce in range(work.depth):
@@ -45,14 +47,14 @@ def extra_mirror_hits(
     flags = np.zeros(work.n_pixels, np.uint8)
 
     def look(first: int, scratch: Scratch) -> None:
-        n = min(BATCH, work.n_pixels - first)
+        n = min(crew.batch, work.n_pixels - first)
         hits = scratch.hits
         pilot_hits(work.cams, c, work.order, first, n, work.surfaces, work.tracer, scratch.hit_rays.packets, hits)
         scratch.rays["pilot"] += n
         flag_mirrors(hits, n, work.cams.width, work.cams.height, flags)
 
     def follow(first: int, scratch: Scratch) -> list[tuple[Int32, Records]]:
-        n = min(BATCH, len(pixels) * extra - first)
+        n = min(crew.batch, len(pixels) * extra - first)
         extra_hits(
             work.cams, c, work.seed, pixels, most, extra, first, n, work.surfaces, work.tracer,
             scratch.hit_rays.packets, scratch.hits,
@@ -61,9 +63,9 @@ def extra_mirror_hits(
         return mirror_paths(work, scratch.hits, n, scratch)
 
     if extra:
-        crew.run(look, range(0, work.n_pixels, BATCH))
+        crew.run(look, range(0, work.n_pixels, crew.batch))
     pixels = work.order[flags[work.order] > 0]
-    found = crew.run(follow, range(0, len(pixels) * extra, BATCH)) if extra else []
+    found = crew.run(follow, range(0, len(pixels) * extra, crew.batch)) if extra else []
     own = extra * flags.astype(np.int32)
     for part in parts:
         own[part.pixels] += part.per_pixel

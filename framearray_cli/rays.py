@@ -15,12 +15,14 @@ class Rays(NamedTuple):
         packets: (n_packets, rows, 16).
         place: (n_rays,) what a ray belongs to: an index, by use.
         value: (3, n_rays) what a ray carries if it arrives.
+        number: (2, n_rays) integers, by use.
         row: (6, n) candidates for rays from one point: see `terms/direct.py`.
     """
 
     packets: Float32
     place: Int32
     value: Float32
+    number: Int32
     row: Float32
 
 
@@ -31,6 +33,7 @@ def _room(n_rays: int, rows: int, row_length: int) -> Rays:
         packets=empty_packets(n_packets, rows),
         place=np.empty(capacity, np.int32),
         value=np.empty((3, capacity), np.float32),
+        number=np.empty((2, capacity), np.int32),
         row=np.empty((6, row_length), np.float32),
     )
 

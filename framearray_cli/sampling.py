@@ -2,6 +2,8 @@
 
 A number depends on its key alone, never on order: images are the same for any number of threads and any split of the
 job. Lights are not part of the key, so that all lights share hits and directions and movies do not flicker.
+
+The maps take numbers or lanes of numbers.
 """
 
 import math
@@ -10,6 +12,7 @@ import numpy as np
 
 from .arrays import Real, Triple
 from .kernel import inlined
+from .lanes import choose, root
 
 # Dimensions: one stream a purpose.
 PIXEL, HEMISPHERE, CHOICE, STEPS = 0, 1, 2, 3
@@ -20,7 +23,7 @@ HOLE_SAMPLE = (1 << 16) - 2  # that of the hit of a pixel that no other hit reac
 R2_X = np.uint32(3242174889)
 R2_Y = np.uint32(2447445414)
 
-_U32 = np.float32(2.0**-24)
+UNIT_24 = np.float32(2.0**-24)
 
 
 @inlined
@@ -50,7 +53,7 @@ def shifted(bits: np.uint64, i: int, step_x: int | np.uint32, step_y: int | np.u
     x = np.uint32(bits & np.uint64(0xFFFFFFFF)) + np.uint32(i) * np.uint32(step_x)
     y = np.uint32(bits >> np.uint64(32)) + np.uint32(i) * np.uint32(step_y)
     x, y = np.uint32(x) >> np.uint32(8), np.uint32(y) >> np.uint32(8)  # 24 bits: what float32 holds below 1
-    return np.float32(x) * _U32, np.float32(y) * _U32
+    return np.float32(x) * UNIT_24, np.float32(y) * UNIT_24
 
 
 @inlined
@@ -76,39 +79,37 @@ def disc(u: Real, v: Real) -> tuple[Real, Real]:
 
     Its angles stay within pi/4, so short series do for cosine and sine.
     """
-    a, b = np.float32(2.0) * u - np.float32(1.0), np.float32(2.0) * v - np.float32(1.0)
-    if a == 0.0 and b == 0.0:
-        return np.float32(0.0), np.float32(0.0)
-    steep = abs(b) > abs(a)
-    radius = b if steep else a
-    angle = np.float32(np.pi / 4) * (a / b if steep else b / a)
+    one = np.float32(1.0)
+    a, b = np.float32(2.0) * u - one, np.float32(2.0) * v - one
+    steep = b * b > a * a
+    radius, other = choose(steep, b, a), choose(steep, a, b)
+    angle = np.float32(np.pi / 4) * other / choose(radius * radius > np.float32(0.0), radius, one)
     square = angle * angle
     # Taylor series of cosine and sine; the first terms left out are below 3e-8 for angles up to pi/4
-    cosine = np.float32(1.0) + square * (
+    cosine = one + square * (
         np.float32(-1 / 2)
         + square * (np.float32(1 / 24) + square * (np.float32(-1 / 720) + square * np.float32(1 / 40320)))
     )
     sine = angle * (
-        np.float32(1.0)
-        + square * (np.float32(-1 / 6) + square * (np.float32(1 / 120) + square * np.float32(-1 / 5040)))
+        one + square * (np.float32(-1 / 6) + square * (np.float32(1 / 120) + square * np.float32(-1 / 5040)))
     )
-    if steep:
-        return radius * sine, radius * cosine
-    return radius * cosine, radius * sine
+    return radius * choose(steep, sine, cosine), radius * choose(steep, cosine, sine)
 
 
 @inlined
 def cosine_direction(nx: Real, ny: Real, nz: Real, u: Real, v: Real) -> Triple:
     """Unit direction about the unit normal n with density cos(theta) / pi; the frame is Duff et al.'s (2017)."""
+    nothing, one = np.float32(0.0), np.float32(1.0)
     x, y = disc(u, v)
-    z = np.sqrt(max(np.float32(0.0), np.float32(1.0) - x * x - y * y))
-    sign = np.float32(1.0) if nz >= 0.0 else np.float32(-1.0)
-    a = np.float32(-1.0) / (sign + nz)
+    height = one - x * x - y * y
+    z = root(choose(height > nothing, height, nothing))
+    sign = choose(nz >= nothing, one, -one)
+    a = -one / (sign + nz)
     b = nx * ny * a
     return (
-        x * (np.float32(1.0) + sign * nx * nx * a) + y * b + z * nx,
+        x * (one + sign * nx * nx * a) + y * b + z * nx,
         x * sign * b + y * (sign + ny * ny * a) + z * ny,
-        -x * sign * nx - y * ny + z * nz,
+        z * nz - x * sign * nx - y * ny,
     )
 
 
@@ -119,6 +120,5 @@ def above(x: Real, y: Real, z: Real, gx: Real, gy: Real, gz: Real) -> Triple:
     Interpolated normals tilt the hemisphere; what falls below the triangle would only meet the triangle itself.
     """
     height = x * gx + y * gy + z * gz
-    if height < 0.0:
-        return x - np.float32(2.0) * height * gx, y - np.float32(2.0) * height * gy, z - np.float32(2.0) * height * gz
-    return x, y, z
+    twice = choose(height < np.float32(0.0), np.float32(2.0) * height, np.float32(0.0))
+    return x - twice * gx, y - twice * gy, z - twice * gz

@@ -2,8 +2,12 @@
 
 from time import perf_counter
 
+import numpy as np
+
+from .arrays import Rgb
 from .crew import Scratch
 from .hits import ESCAPED, Hits
+from .kernel import kernel
 from .terms.direct import direct
 from .terms.direct_steps import direct_by_steps
 from .terms.obscurance import obscurance
@@ -30,9 +34,25 @@ def estimate_terms(
         if not work.keeps_all:
             out.irradiance[:n] = irradiance[:n, :, work.kept.start : work.kept.stop]
     scratch.rays[shadow_kind] += rays
-    out.reflectivity[:n] = hits.reflectivity[:n]
-    if work.has_constant:
-        seen = (hits.kind[:n, None] == ESCAPED) * work.background
-        out.constant[:n] = seen + hits.reflectivity[:n] * scratch.skylight[:n] if work.obscurance.sky else seen
+    _finish(hits, n, work.background, scratch.skylight, out.reflectivity, out.constant)
     scratch.seconds[obscurance_kind] += middle - started
     scratch.seconds[shadow_kind] += perf_counter() - middle
+
+
+@kernel
+def _finish(hits: Hits, n: int, background: Rgb, skylight: Rgb, reflectivity: Rgb, constant: Rgb) -> None:
+    """Copy the reflectivity of n hits, and work out what of their light is the same whatever the lights do.
+
+    Args:
+        background: (3,) what escaped rays see.
+        skylight: (n, 3) background that reaches each hit, or (0, 3).
+        constant: (n, 3) overwritten, or (0, 3) where nothing is constant.
+    """
+    for i in range(n):
+        for channel in range(3):
+            reflectivity[i, channel] = hits.reflectivity[i, channel]
+            if constant.shape[0]:
+                seen = background[channel] if hits.kind[i] == ESCAPED else np.float32(0.0)
+                if skylight.shape[0]:
+                    seen += hits.reflectivity[i, channel] * skylight[i, channel]
+                constant[i, channel] = seen

@@ -1,15 +1,17 @@
 """What a ray finds where it meets a triangle: point, normals, reflectivity, opacity.
 
+The functions take one triangle with numbers u and v, or sixteen with lanes of them.
+
 `Surfaces` is `Scene` as kernels take it; an array of length 0 stands for a feature that the scene does not use.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from .arrays import Bytes, Corners, CornerUvs, Float32, Int32, Real, Rgb, Triple
 from .kernel import inlined
+from .lanes import choose, count, doubles, floor, gather, integers, reals, root
 from .scene import Scene
 
 # Ray offsets: 16 units in the last place of the largest coordinate of the triangle. Of the rules tried it alone had
@@ -24,6 +26,8 @@ class Surfaces(NamedTuple):
     Attributes:
         offset: (n,) how far a ray that leaves a triangle starts above it, scene units.
         linear: (256,) sRGB code value -> linear value.
+        plain: (n_materials,) whether a material looks the same everywhere on its triangles.
+        total: (n_materials, 3) diffuse and mirror reflectivity of a plain material together; 1 of others.
     """
 
     corners: Corners
@@ -42,6 +46,8 @@ class Surfaces(NamedTuple):
     textures: Int32
     offset: Float32
     linear: Float32
+    plain: Bytes
+    total: Rgb
 
 
 def surfaces(scene: Scene) -> Surfaces:
@@ -49,73 +55,105 @@ def surfaces(scene: Scene) -> Surfaces:
     largest = np.abs(scene.corners).max(axis=(1, 2), initial=0.0)
     code = np.arange(256) / 255.0
     linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
-    arrays = {name: getattr(scene, name) for name in Surfaces._fields[:-2]}
-    arrays["offset"] = (OFFSET_ULPS * ULP * largest).astype(np.float32)
-    return Surfaces(**arrays, linear=linear.astype(np.float32))
+    arrays = {name: getattr(scene, name) for name in Surfaces._fields if hasattr(scene, name)}
+    textured = (scene.reflectivity_texture >= 0) | (scene.specular_texture >= 0)
+    plain = ~textured & (len(scene.colours) == 0)
+    return Surfaces(
+        **arrays,
+        offset=(OFFSET_ULPS * ULP * largest).astype(np.float32),
+        linear=linear.astype(np.float32),
+        plain=plain.astype(np.uint8),
+        total=np.where(plain[:, None], scene.reflectivity + scene.specular, np.float32(1.0)),
+    )
+
+
+@inlined
+def _texel(s: Surfaces, texel: int, weight: Real) -> tuple[Real, Real, Real, Real]:
+    """Linear red, green, blue, and alpha of a texel, times a weight."""
+    code, last = gather(s.texels.view(np.int32), texel), np.int32(255)
+    return (
+        weight * doubles(gather(s.linear, code & last)),
+        weight * doubles(gather(s.linear, (code >> np.int32(8)) & last)),
+        weight * doubles(gather(s.linear, (code >> np.int32(16)) & last)),
+        weight * doubles((code >> np.int32(24)) & last),
+    )
 
 
 @inlined
 def texture_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real, Real, Real]:
     """Bilinear, repeating look-up: linear red, green, blue, and alpha; texel centres at half-integers, v upwards."""
-    first, width, height = s.textures[texture, 0], s.textures[texture, 1], s.textures[texture, 2]
-    x = (u - math.floor(u)) * width - 0.5
-    y = (1.0 - (v - math.floor(v))) * height - 0.5
-    if not (abs(x) < 1e9 and abs(y) < 1e9):  # a non-finite coordinate has no texel; the first stands in
-        x = y = 0.0
-    column, row = int(math.floor(x)), int(math.floor(y))
-    fx, fy = x - column, y - row
-    red = green = blue = alpha = 0.0
-    for j in range(2):
-        for i in range(2):
-            weight = (fx if i else 1.0 - fx) * (fy if j else 1.0 - fy)
-            texel = first + ((row + j) % height) * width + (column + i) % width
-            red += weight * s.linear[s.texels[texel, 0]]
-            green += weight * s.linear[s.texels[texel, 1]]
-            blue += weight * s.linear[s.texels[texel, 2]]
-            alpha += weight * s.texels[texel, 3]
-    return red, green, blue, alpha / 255.0
+    first, width, height = (
+        gather(s.textures, texture * np.int32(3)),
+        gather(s.textures, texture * np.int32(3) + np.int32(1)),
+        gather(s.textures, texture * np.int32(3) + np.int32(2)),
+    )
+    u, v = doubles(u), doubles(v)
+    x = (u - floor(u)) * doubles(width) - 0.5
+    y = (1.0 - (v - floor(v))) * doubles(height) - 0.5
+    finite = (x * x < 1e18) & (y * y < 1e18)  # a non-finite coordinate has no texel; the first stands in
+    x, y = choose(finite, x, 0.0), choose(finite, y, 0.0)
+    fx, fy = x - floor(x), y - floor(y)
+    left, top = integers(floor(x)), integers(floor(y))  # -1 to the last
+    right, bottom = left + np.int32(1), top + np.int32(1)
+    left, top = choose(left < np.int32(0), left + width, left), choose(top < np.int32(0), top + height, top)
+    right = choose(right >= width, right - width, right)
+    bottom = choose(bottom >= height, bottom - height, bottom)
+    upper, lower = first + top * width, first + bottom * width
+    r0, g0, b0, a0 = _texel(s, upper + left, (1.0 - fx) * (1.0 - fy))
+    r1, g1, b1, a1 = _texel(s, upper + right, fx * (1.0 - fy))
+    r2, g2, b2, a2 = _texel(s, lower + left, (1.0 - fx) * fy)
+    r3, g3, b3, a3 = _texel(s, lower + right, fx * fy)
+    return r0 + r1 + r2 + r3, g0 + g1 + g2 + g3, b0 + b1 + b2 + b3, (a0 + a1 + a2 + a3) * (1.0 / 255.0)
 
 
 @inlined
-def _texture_coordinates(s: Surfaces, triangle: int, u: Real, v: Real) -> tuple[Real, Real]:
-    w = 1.0 - u - v
-    uv = s.uvs
+def _between(corners: Float32, triangle: int, stride: int, axis: int, u: Real, v: Real, w: Real) -> Real:
+    """One coordinate of what stands at the corners of a triangle, at barycentric (u, v), w = 1 - u - v."""
+    at = triangle * np.int32(3 * stride) + np.int32(axis)
     return (
-        w * uv[triangle, 0, 0] + u * uv[triangle, 1, 0] + v * uv[triangle, 2, 0],
-        w * uv[triangle, 0, 1] + u * uv[triangle, 1, 1] + v * uv[triangle, 2, 1],
+        w * gather(corners, at)
+        + u * gather(corners, at + np.int32(stride))
+        + v * gather(corners, at + np.int32(2 * stride))
     )
 
 
 @inlined
 def _tinted(s: Surfaces, red: Real, green: Real, blue: Real, texture: int, triangle: int, u: Real, v: Real) -> Triple:
     """A material's factor times texture and corner colour."""
-    if texture >= 0:
-        tu, tv = _texture_coordinates(s, triangle, u, v)
-        r, g, b, _ = texture_at(s, texture, tu, tv)
-        red, green, blue = red * np.float32(r), green * np.float32(g), blue * np.float32(b)
+    w = np.float32(1.0) - u - v
+    textured = texture >= np.int32(0)
+    if count(textured) > 0:
+        tu, tv = _between(s.uvs, triangle, 2, 0, u, v, w), _between(s.uvs, triangle, 2, 1, u, v, w)
+        r, g, b, _ = texture_at(s, choose(textured, texture, np.int32(0)), tu, tv)
+        red = choose(textured, red * reals(r), red)
+        green = choose(textured, green * reals(g), green)
+        blue = choose(textured, blue * reals(b), blue)
     if s.colours.shape[0] > 0:
-        w, k = np.float32(1.0) - u - v, s.colours
-        red *= w * k[triangle, 0, 0] + u * k[triangle, 1, 0] + v * k[triangle, 2, 0]
-        green *= w * k[triangle, 0, 1] + u * k[triangle, 1, 1] + v * k[triangle, 2, 1]
-        blue *= w * k[triangle, 0, 2] + u * k[triangle, 1, 2] + v * k[triangle, 2, 2]
+        red = red * _between(s.colours, triangle, 3, 0, u, v, w)
+        green = green * _between(s.colours, triangle, 3, 1, u, v, w)
+        blue = blue * _between(s.colours, triangle, 3, 2, u, v, w)
     return red, green, blue
 
 
 @inlined
 def reflectivity_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
     """Diffuse reflectivity, RGB 0 to 1, at barycentric (u, v) of a triangle."""
-    m = s.material[triangle]
-    red, green, blue = s.reflectivity[m, 0], s.reflectivity[m, 1], s.reflectivity[m, 2]
-    return _tinted(s, red, green, blue, s.reflectivity_texture[m], triangle, u, v)
+    m = gather(s.material, triangle)
+    at = m * np.int32(3)
+    red, green = gather(s.reflectivity, at), gather(s.reflectivity, at + np.int32(1))
+    blue = gather(s.reflectivity, at + np.int32(2))
+    return _tinted(s, red, green, blue, gather(s.reflectivity_texture, m), triangle, u, v)
 
 
 @inlined
 def specular_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
     """Mirror reflectivity, RGB 0 to 1, at barycentric (u, v) of a triangle."""
-    m = s.material[triangle]
-    red, green, blue = s.specular[m, 0], s.specular[m, 1], s.specular[m, 2]
-    if red > 0.0 or green > 0.0 or blue > 0.0:
-        red, green, blue = _tinted(s, red, green, blue, s.specular_texture[m], triangle, u, v)
+    m = gather(s.material, triangle)
+    at, nothing = m * np.int32(3), np.float32(0.0)
+    red, green = gather(s.specular, at), gather(s.specular, at + np.int32(1))
+    blue = gather(s.specular, at + np.int32(2))
+    if count((red > nothing) | (green > nothing) | (blue > nothing)) > 0:
+        red, green, blue = _tinted(s, red, green, blue, gather(s.specular_texture, m), triangle, u, v)
     return red, green, blue
 
 
@@ -125,7 +163,8 @@ def is_cut_out(s: Surfaces, triangle: int, u: Real, v: Real) -> bool:
     m = s.material[triangle]
     alpha = s.alpha[m]
     if s.alpha_texture[m] >= 0:
-        tu, tv = _texture_coordinates(s, triangle, u, v)
+        w = np.float32(1.0) - u - v
+        tu, tv = _between(s.uvs, triangle, 2, 0, u, v, w), _between(s.uvs, triangle, 2, 1, u, v, w)
         alpha *= texture_at(s, s.alpha_texture[m], tu, tv)[3]
     return bool(alpha < s.alpha_cutoff[m])
 
@@ -133,12 +172,22 @@ def is_cut_out(s: Surfaces, triangle: int, u: Real, v: Real) -> bool:
 @inlined
 def position_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
     """The point itself, from the corners: nearer to the triangle than origin + t * direction is."""
-    p, u64, v64 = s.corners, np.float64(u), np.float64(v)
+    u64, v64 = doubles(u), doubles(v)
     w64 = 1.0 - u64 - v64
+    at = triangle * np.int32(9)
     return (
-        np.float32(w64 * p[triangle, 0, 0] + u64 * p[triangle, 1, 0] + v64 * p[triangle, 2, 0]),
-        np.float32(w64 * p[triangle, 0, 1] + u64 * p[triangle, 1, 1] + v64 * p[triangle, 2, 1]),
-        np.float32(w64 * p[triangle, 0, 2] + u64 * p[triangle, 1, 2] + v64 * p[triangle, 2, 2]),
+        reals(_weighed(s.corners, at, u64, v64, w64)),
+        reals(_weighed(s.corners, at + np.int32(1), u64, v64, w64)),
+        reals(_weighed(s.corners, at + np.int32(2), u64, v64, w64)),
+    )
+
+
+@inlined
+def _weighed(corners: Float32, at: int, u: Real, v: Real, w: Real) -> Real:
+    return (
+        w * doubles(gather(corners, at))
+        + u * doubles(gather(corners, at + np.int32(3)))
+        + v * doubles(gather(corners, at + np.int32(6)))
     )
 
 
@@ -148,15 +197,17 @@ def geometric_normal(s: Surfaces, triangle: int, dx: Real, dy: Real, dz: Real) -
 
     In float64: the cross product of edges of 1e-12 would underflow in float32.
     """
-    p = s.corners
-    ax, ay, az = np.float64(p[triangle, 0, 0]), np.float64(p[triangle, 0, 1]), np.float64(p[triangle, 0, 2])
-    e1x, e1y, e1z = p[triangle, 1, 0] - ax, p[triangle, 1, 1] - ay, p[triangle, 1, 2] - az
-    e2x, e2y, e2z = p[triangle, 2, 0] - ax, p[triangle, 2, 1] - ay, p[triangle, 2, 2] - az
+    p, at = s.corners, triangle * np.int32(9)
+    ax, ay = doubles(gather(p, at)), doubles(gather(p, at + np.int32(1)))
+    az = doubles(gather(p, at + np.int32(2)))
+    e1x, e1y = doubles(gather(p, at + np.int32(3))) - ax, doubles(gather(p, at + np.int32(4))) - ay
+    e1z, e2x = doubles(gather(p, at + np.int32(5))) - az, doubles(gather(p, at + np.int32(6))) - ax
+    e2y, e2z = doubles(gather(p, at + np.int32(7))) - ay, doubles(gather(p, at + np.int32(8))) - az
     nx, ny, nz = e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x
-    scale = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz)
-    if nx * dx + ny * dy + nz * dz > 0.0:
-        scale = -scale
-    return np.float32(nx * scale), np.float32(ny * scale), np.float32(nz * scale)
+    scale = 1.0 / root(nx * nx + ny * ny + nz * nz)
+    away = nx * doubles(dx) + ny * doubles(dy) + nz * doubles(dz) > 0.0
+    scale = choose(away, -scale, scale)
+    return reals(nx * scale), reals(ny * scale), reals(nz * scale)
 
 
 @inlined
@@ -165,13 +216,10 @@ def shading_normal(s: Surfaces, triangle: int, u: Real, v: Real, gx: Real, gy: R
     if s.normals.shape[0] == 0:
         return gx, gy, gz
     w, k = np.float32(1.0) - u - v, s.normals
-    x = w * k[triangle, 0, 0] + u * k[triangle, 1, 0] + v * k[triangle, 2, 0]
-    y = w * k[triangle, 0, 1] + u * k[triangle, 1, 1] + v * k[triangle, 2, 1]
-    z = w * k[triangle, 0, 2] + u * k[triangle, 1, 2] + v * k[triangle, 2, 2]
+    x, y = _between(k, triangle, 3, 0, u, v, w), _between(k, triangle, 3, 1, u, v, w)
+    z = _between(k, triangle, 3, 2, u, v, w)
     square = x * x + y * y + z * z
-    if square < 1e-12:  # corner normals that cancel give no direction
-        return gx, gy, gz
-    scale = np.float32(1.0) / np.sqrt(square)
-    if x * gx + y * gy + z * gz < 0.0:
-        scale = -scale
-    return x * scale, y * scale, z * scale
+    none = square < np.float32(1e-12)  # corner normals that cancel give no direction
+    scale = np.float32(1.0) / root(choose(none, np.float32(1.0), square))
+    scale = choose(x * gx + y * gy + z * gz < np.float32(0.0), -scale, scale)
+    return choose(none, gx, x * scale), choose(none, gy, y * scale), choose(none, gz, z * scale)

@@ -1,6 +1,8 @@
 """What the work on frames is given, and what it leaves: settings, records of hits, and where they fall."""
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -94,6 +96,11 @@ class Records:
     constant: Rgb
     irradiance: Float32
 
+    @property
+    def arrays(self) -> dict[str, Float32]:
+        """The arrays by name."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
     def part(self, span: slice) -> "Records":
         """The records of some hits; they share memory."""
         return Records(
@@ -112,19 +119,21 @@ class Placed:
     order: Int32
 
 
-def empty_records(work: Work, n: int, irradiance: Float32 | None = None) -> Records:
+def _fresh(_name: str, shape: tuple[int, ...], dtype: Any) -> Any:
+    return np.empty(shape, dtype)
+
+
+def empty_records(work: Work, n: int, take: Callable[[str, tuple[int, ...], Any], Any] = _fresh) -> Records:
     """Room for n hits; contents are arbitrary.
 
     Args:
-        irradiance: (n, channels, n_lights) memory to use, or None.
+        take: makes an array of a name, shape and dtype.
     """
-    if irradiance is None:
-        irradiance = np.empty((n, work.lights.channels, len(work.kept)), np.float32)
     return Records(
-        reflectivity=np.empty((n, 3), np.float32),
-        obscurance=np.empty((n, 3), np.float32),
-        constant=np.empty((n if work.has_constant else 0, 3), np.float32),
-        irradiance=irradiance,
+        reflectivity=take("reflectivity", (n, 3), np.float32),
+        obscurance=take("obscurance", (n, 3), np.float32),
+        constant=take("constant", (n if work.has_constant else 0, 3), np.float32),
+        irradiance=take("irradiance", (n, work.lights.channels, len(work.kept)), np.float32),
     )
 
 

@@ -15,6 +15,7 @@ from numba.extending import intrinsic
 
 from ..arrays import Float32, Real
 from ..kernel import inlined, kernel
+from ..lanes import choose
 
 LANES = 16
 RAY_ROWS = 12
@@ -144,11 +145,14 @@ def is_blocked(packets: Float32, i: int) -> bool:
 
 
 @inlined
+def scene_triangle(tracer: Tracer, triangle: int, geometry: int) -> int:
+    """The scene's number of a triangle of a geometry; for one ray, or for lanes."""
+    return triangle + choose(geometry > np.int32(OPAQUE), np.int32(tracer.first_masked), np.int32(0))  # type: ignore[no-any-return]
+
+
+@inlined
 def hit_triangle(tracer: Tracer, packets: Float32, i: int) -> int:
     """The scene's triangle that ray i met, or MISS, after `intersect`."""
     bits = packets.view(np.int32)
     p, lane = i >> 4, i & 15
-    triangle = bits[p, TRIANGLE, lane]
-    if bits[p, GEOMETRY, lane] == MASKED:
-        triangle += tracer.first_masked
-    return triangle  # type: ignore[no-any-return]
+    return scene_triangle(tracer, bits[p, TRIANGLE, lane], bits[p, GEOMETRY, lane])

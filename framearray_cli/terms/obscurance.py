@@ -12,11 +12,25 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Real, Rgb
-from ..embree.packets import LANES, MISS, TFAR, Tracer, U, V, hit_triangle, intersect, set_ray
-from ..hits import Hits, ray_origin, reflects
+from ..embree.packets import (
+    DIRECTION,
+    GEOMETRY,
+    LANES,
+    ORIGIN,
+    TFAR,
+    TRIANGLE,
+    Tracer,
+    U,
+    V,
+    hit_triangle,
+    intersect,
+    scene_triangle,
+)
+from ..hits import Hits, reflects
 from ..kernel import inlined, kernel
+from ..lanes import choose, compress, count, gather, integers, lane_numbers, lanes_at, put_lanes, reals, scatter
 from ..rays import Rays
-from ..sampling import HEMISPHERE, above, cosine_direction, shifted, word
+from ..sampling import HEMISPHERE, UNIT_24, above, cosine_direction, word
 from ..surface import Surfaces, reflectivity_at, specular_at
 
 SQRT, LINEAR, CBRT, EXPONENTIAL, CONSTANT = range(5)
@@ -62,8 +76,118 @@ def rho(falloff: int, tau: Real, x: Real) -> Real:
     return np.float32(0.0)
 
 
+@inlined
+def _queue(hits: Hits, i: int, settings: ObscuranceSettings, rays: Rays, waiting: int) -> None:
+    """Note whose the next rays are, and where in the unit square each of them is."""
+    bits = word(hits.key[i], HEMISPHERE)
+    x, y = np.uint32(bits & np.uint64(0xFFFFFFFF)), np.uint32(bits >> np.uint64(32))
+    for ray in range(waiting, waiting + settings.n_rays):
+        rays.place[ray] = i
+        rays.number[0, ray], rays.number[1, ray] = np.int32(x), np.int32(y)
+        x, y = np.uint32(x + np.uint32(settings.step_x)), np.uint32(y + np.uint32(settings.step_y))
+
+
 @kernel
-def _gather(
+def _aim(hits: Hits, rays: Rays, n: int, reach: Real) -> None:
+    """Write the queued rays, a packet at a time."""
+    capacity, packet = rays.place.shape[0], rays.packets.shape[1] * LANES
+    for ray in range(n, (n + LANES - 1) // LANES * LANES):
+        rays.place[ray] = rays.place[n - 1]
+    for first in range(0, n, LANES):
+        hit = lanes_at(rays.place, first)
+        u = reals(lanes_at(rays.number, first) >> np.int32(8)) * UNIT_24
+        v = reals(lanes_at(rays.number, capacity + first) >> np.int32(8)) * UNIT_24
+        at = hit * np.int32(3)
+        mx, my, mz = (
+            gather(hits.shading, at),
+            gather(hits.shading, at + np.int32(1)),
+            gather(hits.shading, at + np.int32(2)),
+        )
+        gx, gy, gz = (
+            gather(hits.geometric, at),
+            gather(hits.geometric, at + np.int32(1)),
+            gather(hits.geometric, at + np.int32(2)),
+        )
+        x, y, z = cosine_direction(mx, my, mz, u, v)
+        x, y, z = above(x, y, z, gx, gy, gz)
+        e, ray = gather(hits.offset, hit), (first >> 4) * packet
+        put_lanes(rays.packets, ray + ORIGIN * LANES, gather(hits.position, at) + e * gx)
+        put_lanes(rays.packets, ray + (ORIGIN + 1) * LANES, gather(hits.position, at + np.int32(1)) + e * gy)
+        put_lanes(rays.packets, ray + (ORIGIN + 2) * LANES, gather(hits.position, at + np.int32(2)) + e * gz)
+        put_lanes(rays.packets, ray + DIRECTION * LANES, x)
+        put_lanes(rays.packets, ray + (DIRECTION + 1) * LANES, y)
+        put_lanes(rays.packets, ray + (DIRECTION + 2) * LANES, z)
+        put_lanes(rays.packets, ray + TFAR * LANES, reach)
+
+
+@kernel
+def _sort_out(rays: Rays, n: int, settings: ObscuranceSettings) -> int:
+    """Value the rays that meet nothing within d_max; list the others in `rays.number[0]`, and return how many.
+
+    `rays.number[1]` says which rays see the background.
+    """
+    capacity, packet = rays.place.shape[0], rays.packets.shape[1] * LANES
+    bits, d_max = rays.packets.view(np.int32), np.float32(settings.d_max)
+    near = 0
+    for first in range(0, n, LANES):
+        ray = (first >> 4) * packet
+        distance, triangle = lanes_at(rays.packets, ray + TFAR * LANES), lanes_at(bits, ray + TRIANGLE * LANES)
+        missed = triangle < np.int32(0)
+        within = ~missed & (distance < d_max)
+        nothing = within
+        if settings.sky:
+            nothing = within | missed
+            put_lanes(rays.number, capacity + first, choose(missed, integers(1), np.int32(0)))
+        for channel in range(3):
+            put_lanes(rays.value, channel * capacity + first, choose(nothing, reals(0.0), settings.average[channel]))
+        compress(within, lane_numbers() + np.int32(first), rays.number, near)
+        near += count(within)
+    return near
+
+
+@kernel
+def _look_up(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int, settings: ObscuranceSettings) -> None:
+    """Value listed rays 0 to n - 1 by R(Q) rho(d)."""
+    packets, d_max = rays.packets, np.float32(settings.d_max)
+    varied = 0
+    for k in range(n):
+        i = rays.number[0, k]
+        material = surfaces.material[hit_triangle(tracer, packets, i)]
+        weight = rho(settings.falloff, settings.tau, packets[i >> 4, TFAR, i & 15] / d_max)
+        for channel in range(3):
+            rays.value[channel, i] = weight * surfaces.total[material, channel]
+        rays.number[0, varied] = i
+        varied += surfaces.plain[material] == 0
+    _tint(surfaces, tracer, rays, varied)
+
+
+@kernel
+def _tint(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int) -> None:
+    """Multiply the value of listed rays 0 to n - 1 by R(Q), which depends on the place."""
+    if n == 0:
+        return
+    capacity, packet = np.int32(rays.place.shape[0]), np.int32(rays.packets.shape[1] * LANES)
+    for k in range(n, (n + LANES - 1) // LANES * LANES):
+        rays.number[0, k] = rays.number[0, n - 1]  # worked out twice at once, and written twice
+    bits = rays.packets.view(np.int32)
+    for first in range(0, n, LANES):
+        i = lanes_at(rays.number, first)
+        at = (i >> np.int32(4)) * packet + (i & np.int32(15))
+        triangle, geometry = (
+            gather(bits, at + np.int32(TRIANGLE * LANES)),
+            gather(bits, at + np.int32(GEOMETRY * LANES)),
+        )
+        triangle = scene_triangle(tracer, triangle, geometry)
+        u, v = gather(rays.packets, at + np.int32(U * LANES)), gather(rays.packets, at + np.int32(V * LANES))
+        diffuse, mirror = reflectivity_at(surfaces, triangle, u, v), specular_at(surfaces, triangle, u, v)
+        for channel in range(3):
+            place = i + np.int32(channel) * capacity
+            scatter(rays.value, place, gather(rays.value, place) * (diffuse[channel] + mirror[channel]))
+
+
+@kernel
+def _trace(
+    hits: Hits,
     surfaces: Surfaces,
     tracer: Tracer,
     rays: Rays,
@@ -72,27 +196,28 @@ def _gather(
     result: Rgb,
     skylight: Rgb,
 ) -> None:
-    """Trace the waiting hemisphere rays and add their R(Q) rho(d), or the background, to their hits."""
-    packets = rays.packets
-    intersect(tracer, packets, n, False)
+    """Trace the queued rays and give their hits the mean of R(Q) rho(d), and of the background."""
+    if n == 0:
+        return
+    _aim(hits, rays, n, np.float32(np.inf if settings.sky else settings.d_max))
+    intersect(tracer, rays.packets, n, False)
+    near = _sort_out(rays, n, settings)
+    if settings.falloff != CONSTANT:
+        _look_up(surfaces, tracer, rays, near, settings)
     share = np.float32(1.0 / settings.n_rays)
-    d_max = np.float32(settings.d_max)
-    for i in range(n):
-        owned = rays.place[i]
-        triangle = hit_triangle(tracer, packets, i)
-        distance = packets[i >> 4, TFAR, i & 15]
-        if triangle == MISS and settings.sky:
+    for first in range(0, n, settings.n_rays):
+        hit = rays.place[first]
+        for channel in range(3):
+            total = np.float32(0.0)
+            for ray in range(first, first + settings.n_rays):
+                total += rays.value[channel, ray]
+            result[hit, channel] = share * total
+        if settings.sky:
+            escaped = 0
+            for ray in range(first, first + settings.n_rays):
+                escaped += rays.number[1, ray]
             for channel in range(3):
-                skylight[owned, channel] += share * settings.background[channel]
-        elif triangle == MISS or distance >= d_max:
-            for channel in range(3):
-                result[owned, channel] += share * settings.average[channel]
-        elif settings.falloff != CONSTANT:
-            u, v = packets[i >> 4, U, i & 15], packets[i >> 4, V, i & 15]
-            near = share * rho(settings.falloff, settings.tau, distance / d_max)
-            diffuse, mirror = reflectivity_at(surfaces, triangle, u, v), specular_at(surfaces, triangle, u, v)
-            for channel in range(3):
-                result[owned, channel] += near * (diffuse[channel] + mirror[channel])
+                skylight[hit, channel] = share * np.float32(escaped) * settings.background[channel]
 
 
 @kernel
@@ -116,30 +241,19 @@ def obscurance(
     Returns:
         number of rays.
     """
-    for i in range(n):
-        for channel in range(3):
-            result[i, channel] = 0.0
-            if settings.sky:
-                skylight[i, channel] = 0.0
-    capacity = rays.packets.shape[0] * LANES
-    reach = np.float32(np.inf if settings.sky else settings.d_max)
+    capacity = rays.place.shape[0]
     waiting = total = 0
     for i in range(n):
         if not reflects(hits, i):
+            for channel in range(3):
+                result[i, channel] = 0.0
+                if settings.sky:
+                    skylight[i, channel] = 0.0
             continue
         if waiting > capacity - settings.n_rays:
-            _gather(surfaces, tracer, rays, waiting, settings, result, skylight)
+            _trace(hits, surfaces, tracer, rays, waiting, settings, result, skylight)
             total, waiting = total + waiting, 0
-        ox, oy, oz = ray_origin(hits, i)
-        gx, gy, gz = hits.geometric[i, 0], hits.geometric[i, 1], hits.geometric[i, 2]
-        mx, my, mz = hits.shading[i, 0], hits.shading[i, 1], hits.shading[i, 2]
-        bits = word(hits.key[i], HEMISPHERE)
-        for ray in range(settings.n_rays):
-            a, b = shifted(bits, ray, settings.step_x, settings.step_y)
-            x, y, z = cosine_direction(mx, my, mz, a, b)
-            x, y, z = above(x, y, z, gx, gy, gz)
-            set_ray(rays.packets, waiting, ox, oy, oz, x, y, z, reach)
-            rays.place[waiting] = i
-            waiting += 1
-    _gather(surfaces, tracer, rays, waiting, settings, result, skylight)
+        _queue(hits, i, settings, rays, waiting)
+        waiting += settings.n_rays
+    _trace(hits, surfaces, tracer, rays, waiting, settings, result, skylight)
     return total + waiting

@@ -58,7 +58,7 @@ def hits_of(job: Job) -> Lit:
     prepared = prepare(job)
     with open_embree(prepared) as embree:
         work, _ = plan_work(prepared, embree)
-        scratch, n = Scratch(work), 1024
+        scratch, n = Scratch(work, 1024), 1024
         native_hits(
             work.cams, 0, work.seed, work.order, 1, 0, 0, n, work.surfaces, work.tracer, False,
             scratch.hit_rays.packets, scratch.hits,

@@ -1,0 +1,274 @@
+"""Sixteen numbers at a time in kernels: the lanes of a ray packet, computed with one instruction each.
+
+LLVM turns plain loops into such instructions only where it can prove that no array overlaps another, which it cannot
+for loops that look things up. Kernels that write packets therefore say what they want: `Lanes` of float32, float64 or
+int32, and flags, with the operators of numbers. On processors with narrower registers LLVM splits the operations.
+
+What is written with `choose`, `gather`, `root` and the like works for single numbers, too.
+
+Sums and products may be fused (one rounding instead of two); nothing else differs from the numbers one at a time.
+"""
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.datamodel import models, register_default
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, lower_cast
+
+N = 16
+_WORD = ir.IntType(32)
+_ELEMENTS = {
+    types.float32: ir.FloatType(),
+    types.float64: ir.DoubleType(),
+    types.int32: _WORD,
+    types.boolean: ir.IntType(1),
+}
+_SUFFIX = {types.float32: "f32", types.float64: "f64", types.int32: "i32"}
+_FUSED = ("contract",)
+
+
+class Lanes(types.Type):  # type: ignore[misc]  # numba's base class has no types
+    """The type of 16 values of one dtype."""
+
+    def __init__(self, dtype: Any) -> None:
+        self.dtype = dtype
+        super().__init__(name=f"Lanes({dtype})")
+
+
+REALS, DOUBLES, INTEGERS, FLAGS = (Lanes(dtype) for dtype in _ELEMENTS)
+
+
+@register_default(Lanes)
+class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, dmm: Any, fe_type: Lanes) -> None:
+        super().__init__(dmm, fe_type, _vector(fe_type))
+
+
+def _vector(lanes: Lanes) -> Any:
+    return ir.VectorType(_ELEMENTS[lanes.dtype], N)
+
+
+@lower_cast(types.Number, Lanes)
+def _spread(context: Any, builder: Any, source: Any, target: Lanes, value: Any) -> Any:
+    """The same number in all lanes."""
+    element = context.cast(builder, value, source, target.dtype)
+    vector = _vector(target)
+    one = builder.insert_element(ir.Constant(vector, ir.Undefined), element, _WORD(0))
+    return builder.shuffle_vector(one, ir.Constant(vector, ir.Undefined), ir.Constant(ir.VectorType(_WORD, N), [0] * N))
+
+
+def _operator(function: Any, compute: Callable[..., Any], flags: bool = False) -> None:
+    """Define an operator of two lanes of one dtype, or of lanes and a number."""
+
+    class _Typed(AbstractTemplate):  # type: ignore[misc]
+        def generic(self, args: Any, kws: Any) -> Any:
+            lanes = [arg for arg in args if isinstance(arg, Lanes)]
+            rest = [arg for arg in args if not isinstance(arg, Lanes)]
+            fits = all(lane == lanes[0] for lane in lanes) and all(isinstance(arg, types.Number) for arg in rest)
+            if not lanes or not fits:
+                return None
+            return signature(FLAGS if flags else lanes[0], *([lanes[0]] * len(args)))
+
+    infer_global(function)(_Typed)
+
+    def lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return compute(builder, sig.args[0].dtype in (types.float32, types.float64), *args)
+
+    for n in (1, 2):
+        lower_builtin(function, *([Lanes] * n))(lowered)
+
+
+def _binary(of_reals: str, of_integers: str) -> Callable[..., Any]:
+    def compute(builder: Any, real: bool, a: Any, b: Any) -> Any:
+        return getattr(builder, of_reals)(a, b, flags=_FUSED) if real else getattr(builder, of_integers)(a, b)
+
+    return compute
+
+
+def _compared(sign: str) -> Callable[..., Any]:
+    def compute(builder: Any, real: bool, a: Any, b: Any) -> Any:
+        return builder.fcmp_ordered(sign, a, b) if real else builder.icmp_signed(sign, a, b)
+
+    return compute
+
+
+_operator(operator.add, _binary("fadd", "add"))
+_operator(operator.sub, _binary("fsub", "sub"))
+_operator(operator.mul, _binary("fmul", "mul"))
+_operator(operator.truediv, _binary("fdiv", "sdiv"))
+_operator(operator.and_, _binary("and_", "and_"))
+_operator(operator.or_, _binary("or_", "or_"))
+_operator(operator.rshift, _binary("lshr", "lshr"))
+_operator(operator.neg, lambda builder, real, a: builder.fneg(a) if real else builder.neg(a))
+_operator(operator.invert, lambda builder, real, a: builder.not_(a))
+for _sign, _function in (("<", operator.lt), ("<=", operator.le), (">", operator.gt), (">=", operator.ge)):
+    _operator(_function, _compared(_sign), flags=True)
+
+
+def _place(context: Any, builder: Any, array_type: Any, array: Any, offset_type: Any, offset: Any) -> Any:
+    """The address of the element at a flat offset of a contiguous array."""
+    data = context.make_array(array_type)(context, builder, array).data
+    return builder.gep(data, [context.cast(builder, offset, offset_type, types.intp)])
+
+
+def _pointer_to_lanes(builder: Any, place: Any, lanes: Lanes) -> Any:
+    return builder.bitcast(place, _vector(lanes).as_pointer())
+
+
+def _lanes_at_of(typingctx: Any, array: Any, offset: Any) -> Any:
+    """Elements offset to offset + 15 of a contiguous array, counted flat."""
+    lanes = Lanes(array.dtype)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        place = _place(context, builder, sig.args[0], args[0], sig.args[1], args[1])
+        return builder.load(_pointer_to_lanes(builder, place, lanes), align=4)
+
+    return lanes(array, offset), codegen
+
+
+def _put_lanes_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
+    """Write elements offset to offset + 15 of a contiguous array, counted flat."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        place = _place(context, builder, sig.args[0], args[0], sig.args[1], args[1])
+        value = context.cast(builder, args[2], sig.args[2], Lanes(sig.args[0].dtype))
+        builder.store(value, _pointer_to_lanes(builder, place, Lanes(sig.args[0].dtype)), align=4)
+        return context.get_dummy_value()
+
+    return types.void(array, offset, value), codegen
+
+
+def _gather_of(typingctx: Any, array: Any, offsets: Any) -> Any:
+    """The elements of a contiguous array at 16 flat offsets, or the one at one offset."""
+    if not isinstance(offsets, Lanes):
+
+        def one(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            return builder.load(_place(context, builder, sig.args[0], args[0], sig.args[1], args[1]))
+
+        return array.dtype(array, offsets), one
+    lanes = Lanes(array.dtype)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        data = context.make_array(sig.args[0])(context, builder, args[0]).data
+        result = ir.Constant(_vector(lanes), ir.Undefined)
+        for lane in range(N):
+            offset = builder.sext(builder.extract_element(args[1], _WORD(lane)), ir.IntType(64))
+            result = builder.insert_element(result, builder.load(builder.gep(data, [offset])), _WORD(lane))
+        return result
+
+    return lanes(array, offsets), codegen
+
+
+def _scatter_of(typingctx: Any, array: Any, offsets: Any, value: Any) -> Any:
+    """Write 16 values to the flat offsets of a contiguous array."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        data = context.make_array(sig.args[0])(context, builder, args[0]).data
+        for lane in range(N):
+            offset = builder.sext(builder.extract_element(args[1], _WORD(lane)), ir.IntType(64))
+            builder.store(builder.extract_element(args[2], _WORD(lane)), builder.gep(data, [offset]))
+        return context.get_dummy_value()
+
+    return types.void(array, offsets, value), codegen
+
+
+def _compress_of(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any) -> Any:
+    """Write the flagged lanes one after another to a contiguous array, from a flat offset on."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        place = _place(context, builder, sig.args[2], args[2], sig.args[3], args[3])
+        kind = ir.FunctionType(ir.VoidType(), [args[1].type, place.type, args[0].type])
+        name = f"llvm.masked.compressstore.v{N}{_SUFFIX[sig.args[1].dtype]}"
+        builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [args[1], place, args[0]])
+        return context.get_dummy_value()
+
+    return types.void(flags, value, array, offset), codegen
+
+
+def _count_of(typingctx: Any, flags: Any) -> Any:
+    """How many lanes are flagged; of a single flag 0 or 1."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        if not isinstance(sig.args[0], Lanes):
+            return builder.zext(args[0], ir.IntType(64))
+        bits = builder.zext(builder.bitcast(args[0], ir.IntType(N)), ir.IntType(64))
+        return builder.ctpop(bits)
+
+    return types.intp(flags), codegen
+
+
+def _choose_of(typingctx: Any, flags: Any, yes: Any, no: Any) -> Any:
+    """`yes` where flagged, else `no`; either may be a number. With one flag, of two numbers, without a jump."""
+    lanes = next((arg for arg in (yes, no) if isinstance(arg, Lanes)), None)
+    if lanes is None:
+        number = typingctx.unify_types(yes, no)
+        lanes = Lanes(number) if isinstance(flags, Lanes) else number
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        yes, no = (context.cast(builder, args[i], sig.args[i], lanes) for i in (1, 2))
+        return builder.select(args[0], yes, no)
+
+    return lanes(flags, yes, no), codegen
+
+
+def _function(name: str) -> Callable[..., Any]:
+    def of(typingctx: Any, value: Any) -> Any:
+        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            kind, of = ir.FunctionType(args[0].type, [args[0].type]), sig.args[0]
+            suffix = f"v{N}{_SUFFIX[of.dtype]}" if isinstance(of, Lanes) else _SUFFIX[of]
+            return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.{suffix}"), args)
+
+        return value(value), codegen
+
+    return of
+
+
+def _converted(dtype: Any) -> Callable[..., Any]:
+    lanes = Lanes(dtype)
+
+    def of(typingctx: Any, value: Any) -> Any:
+        if not isinstance(value, Lanes):
+            return dtype(value), lambda context, builder, sig, args: context.cast(builder, args[0], value, dtype)
+
+        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            source, target = sig.args[0].dtype, _vector(lanes)
+            if source == dtype:
+                return args[0]
+            if dtype == types.int32:
+                return builder.fptosi(args[0], target)
+            if source == types.int32:
+                return builder.sitofp(args[0], target)
+            return builder.fpext(args[0], target) if dtype == types.float64 else builder.fptrunc(args[0], target)
+
+        return lanes(value), codegen
+
+    return of
+
+
+def _lane_numbers_of(typingctx: Any) -> Any:
+    """0 to 15."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return ir.Constant(_vector(INTEGERS), list(range(N)))
+
+    return INTEGERS(), codegen
+
+
+lanes_at: Any = intrinsic(_lanes_at_of)
+put_lanes: Any = intrinsic(_put_lanes_of)
+gather: Any = intrinsic(_gather_of)
+scatter: Any = intrinsic(_scatter_of)
+compress: Any = intrinsic(_compress_of)
+count: Any = intrinsic(_count_of)
+choose: Any = intrinsic(_choose_of)
+root: Any = intrinsic(_function("sqrt"))
+floor: Any = intrinsic(_function("floor"))
+reals: Any = intrinsic(_converted(types.float32))
+doubles: Any = intrinsic(_converted(types.float64))
+integers: Any = intrinsic(_converted(types.int32))
+lane_numbers: Any = intrinsic(_lane_numbers_of)
