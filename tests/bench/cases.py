@@ -68,7 +68,7 @@ class Variant:
 
 FRAME_ARRAY = Variant(name="frame array", frames=4, floor=True, writes=True)
 REDUCED = Variant(name="shadow_step 4", step=4, frames=4, floor=True, writes=True)
-SCRATCH = Variant(name="from scratch", n_r=0, hits=14, one_light=True, frames=2, floor=True, writes=True)
+SCRATCH = Variant(name="from scratch", n_r=0, hits=14, one_light=True, frames=4, floor=True, writes=True)
 LIGHT_REUSE = Variant(name="light reuse alone", n_r=0, hits=14, frames=1)
 CAMERA_REUSE = Variant(name="camera reuse alone", one_light=True, frames=3)
 
