@@ -9,6 +9,7 @@ import numpy as np
 
 from .arrays import Directions, Float64, Points, Real, Triple
 from .kernel import inlined
+from .lanes import choose, doubles, integers
 from .paths import Eyes
 
 OUTSIDE = -1  # the "pixel" of a point that an eye does not see
@@ -62,17 +63,18 @@ def eye_ray(cams: Cameras, c: int, x: Real, y: Real) -> Triple:
 
 
 @inlined
-def project(cams: Cameras, c: int, x: Real, y: Real, z: Real) -> tuple[int, Real]:
-    """The pixel of eye c that sees the vector (x, y, z) from the eye, and the vector's length along the optical axis.
+def project(cams: Cameras, k: int, x: Real, y: Real, z: Real) -> tuple[int, Real]:
+    """The pixel of eye k that sees the vector (x, y, z) from the eye, and the vector's length along the optical axis.
 
-    The pixel is OUTSIDE where the vector points behind the eye or out of the image.
+    The pixel is OUTSIDE where the vector points behind the eye or out of the image. Takes numbers or lanes.
     """
     r, u, f = cams.right, cams.up, cams.forward
-    depth = x * f[c, 0] + y * f[c, 1] + z * f[c, 2]
-    if not depth > 0.0:
-        return OUTSIDE, depth
-    column = 0.5 * cams.width + cams.focal * (x * r[c, 0] + y * r[c, 1] + z * r[c, 2]) / depth
-    row = 0.5 * cams.height - cams.focal * (x * u[c, 0] + y * u[c, 1] + z * u[c, 2]) / depth
-    if not (0.0 <= column < cams.width and 0.0 <= row < cams.height):
-        return OUTSIDE, depth
-    return int(row) * cams.width + int(column), depth
+    depth = x * f[k, 0] + y * f[k, 1] + z * f[k, 2]
+    ahead = depth > np.float32(0.0)
+    scale = cams.focal / doubles(choose(ahead, depth, np.float32(1.0)))
+    column = 0.5 * cams.width + scale * doubles(x * r[k, 0] + y * r[k, 1] + z * r[k, 2])
+    row = 0.5 * cams.height - scale * doubles(x * u[k, 0] + y * u[k, 1] + z * u[k, 2])
+    inside = ahead & (column >= 0.0) & (column < cams.width) & (row >= 0.0) & (row < cams.height)
+    column, row = choose(inside, column, 0.0), choose(inside, row, 0.0)
+    pixel = integers(row) * np.int32(cams.width) + integers(column)
+    return choose(inside, pixel, np.int32(OUTSIDE)), depth

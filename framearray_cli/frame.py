@@ -153,7 +153,8 @@ def _place(work: Work, c: int, n: int, scratch: Scratch, frames: range, pixel: I
         return
     started = perf_counter()
     eyes = work.frames_around(c, 2 * work.n_r) if work.balance else frames
-    seen, density = scratch.pixel[: len(eyes)], scratch.density[: len(eyes)]
+    seen = scratch.pixel[: len(eyes)]
+    density = scratch.density[: len(eyes)]
     scratch.rays["visibility"] += outer_hits(
         work.cams, c, eyes.start, scratch.hits, n, work.tracer, scratch.test_rays, seen, density
     )

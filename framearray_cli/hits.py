@@ -72,8 +72,8 @@ def empty_hits(n: int) -> Hits:
         reflectivity=vectors(),
         specular=vectors(),
         incoming=vectors(),
-        key=np.empty(n, np.uint64),
-        pixel=np.empty(n, np.int32),
+        key=np.empty(whole, np.uint64)[:n],
+        pixel=np.empty(whole, np.int32)[:n],
     )
 
 

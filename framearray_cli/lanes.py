@@ -1,8 +1,8 @@
 """Sixteen numbers at a time in kernels: the lanes of a ray packet, computed with one instruction each.
 
 LLVM turns plain loops into such instructions only where it can prove that no array overlaps another, which it cannot
-for loops that look things up. Kernels that write packets therefore say what they want: `Lanes` of float32, float64 or
-int32, and flags, with the operators of numbers. On processors with narrower registers LLVM splits the operations.
+for loops that look things up. Kernels that write packets therefore say what they want: `Lanes` of float32, float64,
+int32 or uint8, and flags, with the operators of numbers. On processors with narrower registers LLVM splits the operations.
 
 What is written with `choose`, `gather`, `root` and the like works for single numbers, too.
 
@@ -26,6 +26,7 @@ _ELEMENTS = {
     types.float32: ir.FloatType(),
     types.float64: ir.DoubleType(),
     types.int32: _WORD,
+    types.uint8: ir.IntType(8),
     types.boolean: ir.IntType(1),
 }
 _SUFFIX = {types.float32: "f32", types.float64: "f64", types.int32: "i32"}
@@ -40,7 +41,7 @@ class Lanes(types.Type):  # type: ignore[misc]  # numba's base class has no type
         super().__init__(name=f"Lanes({dtype})")
 
 
-REALS, DOUBLES, INTEGERS, FLAGS = (Lanes(dtype) for dtype in _ELEMENTS)
+INTEGERS, FLAGS = Lanes(types.int32), Lanes(types.boolean)
 
 
 @register_default(Lanes)
@@ -106,8 +107,14 @@ _operator(operator.or_, _binary("or_", "or_"))
 _operator(operator.rshift, _binary("lshr", "lshr"))
 _operator(operator.neg, lambda builder, real, a: builder.fneg(a) if real else builder.neg(a))
 _operator(operator.invert, lambda builder, real, a: builder.not_(a))
-for _sign, _function in (("<", operator.lt), ("<=", operator.le), (">", operator.gt), (">=", operator.ge)):
-    _operator(_function, _compared(_sign), flags=True)
+for _sign, _compare in (
+    ("<", operator.lt),
+    ("<=", operator.le),
+    (">", operator.gt),
+    (">=", operator.ge),
+    ("==", operator.eq),
+):
+    _operator(_compare, _compared(_sign), flags=True)
 
 
 def _place(context: Any, builder: Any, array_type: Any, array: Any, offset_type: Any, offset: Any) -> Any:
@@ -202,6 +209,24 @@ def _count_of(typingctx: Any, flags: Any) -> Any:
     return types.intp(flags), codegen
 
 
+def _bits_of(typingctx: Any, flags: Any) -> Any:
+    """The flags as the bits of a number, lane 0 the lowest."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.zext(builder.bitcast(args[0], ir.IntType(N)), ir.IntType(64))
+
+    return types.intp(flags), codegen
+
+
+def _lowest_of(typingctx: Any, bits: Any) -> Any:
+    """The number of zeros below the lowest one of a number's bits."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.cttz(args[0], ir.Constant(ir.IntType(1), 0))
+
+    return types.intp(types.intp), codegen
+
+
 def _choose_of(typingctx: Any, flags: Any, yes: Any, no: Any) -> Any:
     """`yes` where flagged, else `no`; either may be a number. With one flag, of two numbers, without a jump."""
     lanes = next((arg for arg in (yes, no) if isinstance(arg, Lanes)), None)
@@ -265,6 +290,8 @@ gather: Any = intrinsic(_gather_of)
 scatter: Any = intrinsic(_scatter_of)
 compress: Any = intrinsic(_compress_of)
 count: Any = intrinsic(_count_of)
+bits: Any = intrinsic(_bits_of)
+lowest: Any = intrinsic(_lowest_of)
 choose: Any = intrinsic(_choose_of)
 root: Any = intrinsic(_function("sqrt"))
 floor: Any = intrinsic(_function("floor"))

@@ -5,18 +5,20 @@ colour; then a hit stores a scalar irradiance and the colour is multiplied in on
 different colours shine together does a hit store three channels.
 """
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .arrays import Float32, Float64, Int32
+from .embree.packets import LANES
 from .paths import Lights
 
 POINT, DIRECTIONAL = 0, 1
 
 
 class LightArrays(NamedTuple):
-    """All sources of a job for kernels.
+    """All sources of a job for kernels; they read it a packet of light positions at a time, see `with_room`.
 
     Attributes:
         kind: (n_sources,) POINT or DIRECTIONAL.
@@ -43,6 +45,17 @@ class LightArrays(NamedTuple):
         return int(self.vector.shape[2])
 
 
+def with_room(lights: LightArrays) -> LightArrays:
+    """The same lights, with room behind each array for what a kernel reads beyond its end, and ignores."""
+
+    def copied(array: Any) -> Any:
+        room = np.zeros(array.size + LANES, array.dtype)
+        room[: array.size] = array.ravel()
+        return room[: array.size].reshape(array.shape)
+
+    return LightArrays(*(copied(array) for array in lights))
+
+
 def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
     """Gather what kernels read of the lights, and find out whether one channel does."""
     intensity = np.stack([source.intensity for source in lights.sources])  # (n_sources, n_lights, 3)
@@ -58,22 +71,24 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
     else:
         strength, colour = intensity, np.ones_like(colour)
     kind = [POINT if source.kind == "point" else DIRECTIONAL for source in lights.sources]
-    return LightArrays(
+    found = LightArrays(
         kind=np.array(kind, np.int32),
-        vector=np.ascontiguousarray(vector.transpose(0, 2, 1), np.float32),
-        strength=np.ascontiguousarray(strength.transpose(0, 2, 1), np.float32),
+        vector=np.asarray(vector.transpose(0, 2, 1), np.float32),
+        strength=np.asarray(strength.transpose(0, 2, 1), np.float32),
         lit=np.asarray((intensity > 0).any(axis=-1), np.float32),
-        colour=np.ascontiguousarray(colour, np.float32),
+        colour=np.asarray(colour, np.float32),
     )
+    return with_room(found)
 
 
-def some_lights(lights: LightArrays, block: range) -> LightArrays:
-    """The light positions of a block, in the same units."""
-    span = slice(block.start, block.stop)
-    return LightArrays(
+def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
+    """Some of the light positions, in the same units."""
+    some = list(at)
+    found = LightArrays(
         kind=lights.kind,
-        vector=np.ascontiguousarray(lights.vector[:, :, span]),
-        strength=np.ascontiguousarray(lights.strength[:, :, span]),
-        lit=np.ascontiguousarray(lights.lit[:, span]),
-        colour=np.ascontiguousarray(lights.colour[span]),
+        vector=lights.vector[:, :, some],
+        strength=lights.strength[:, :, some],
+        lit=lights.lit[:, some],
+        colour=lights.colour[some],
     )
+    return with_room(found)

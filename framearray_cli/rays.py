@@ -13,10 +13,10 @@ class Rays(NamedTuple):
 
     Attributes:
         packets: (n_packets, rows, 16).
-        place: (n_rays,) what a ray belongs to: an index, by use.
-        value: (3, n_rays) what a ray carries if it arrives.
-        number: (2, n_rays) integers, by use.
-        row: (6, n) candidates for rays from one point: see `terms/direct.py`.
+        place: (n_rays + LANES,) what a ray belongs to: an index, by use.
+        value: (3, n_rays + LANES) what a ray carries if it arrives.
+        number: (2, n_rays + LANES) integers, by use.
+        row: (ROWS, n_rays + LANES) rays number by number, before they become packets: see `terms/direct.py`.
     """
 
     packets: Float32
@@ -26,15 +26,19 @@ class Rays(NamedTuple):
     row: Float32
 
 
-def _room(n_rays: int, rows: int, row_length: int) -> Rays:
+# Origin, direction, tfar.
+ROWS = 7
+
+
+def _room(n_rays: int, rows: int, queue: int) -> Rays:
     n_packets = -(-n_rays // LANES)
     capacity = n_packets * LANES
     return Rays(
         packets=empty_packets(n_packets, rows),
-        place=np.empty(capacity, np.int32),
-        value=np.empty((3, capacity), np.float32),
-        number=np.empty((2, capacity), np.int32),
-        row=np.empty((6, row_length), np.float32),
+        place=np.empty(capacity + LANES, np.int32),
+        value=np.empty((3, max(capacity, queue) + LANES), np.float32),
+        number=np.empty((2, capacity + LANES), np.int32),
+        row=np.empty((ROWS, queue), np.float32),
     )
 
 
@@ -45,4 +49,4 @@ def room_for_hits(n_rays: int) -> Rays:
 
 def room_for_tests(n_rays: int, n_lights: int) -> Rays:
     """Room for rays that are only tested for being blocked, from points to up to n_lights lights."""
-    return _room(n_rays, RAY_ROWS, n_lights)
+    return _room(n_rays, RAY_ROWS, max(-(-n_rays // LANES) * LANES, n_lights) + LANES)

@@ -14,53 +14,81 @@ p_j / sum of n_k p_k over the eyes k of the window of j (balance heuristic, [Vea
 
 import numpy as np
 
-from .arrays import Float32, Float64, Int32, Real
+from .arrays import Float32, Float64, Int32, Real, Triple
 from .camera import OUTSIDE, Cameras, project
-from .embree.packets import LANES, Tracer, is_blocked, occlude, set_ray
+from .embree.packets import DIRECTION, LANES, ORIGIN, TFAR, Tracer, is_blocked, occlude
 from .hits import SURFACE, Hits
 from .kernel import inlined, kernel
+from .lanes import choose, compress, count, doubles, gather, lane_numbers, lanes_at, put_lanes
 from .rays import Rays
 
 
 @inlined
-def _seen(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[int, Real]:
-    """The pixel of eye k that hit i falls into, were nothing in between, and the density p_k; OUTSIDE and 0 if none."""
-    o, p, g = cams.position, hits.position, hits.geometric
-    if hits.kind[i] != SURFACE:
-        pixel, z = project(cams, k, p[i, 0], p[i, 1], p[i, 2])
-        facing = 1.0
-    else:
-        x, y, z = p[i, 0] - o[k, 0], p[i, 1] - o[k, 1], p[i, 2] - o[k, 2]
-        facing = -(np.float64(x) * g[i, 0] + np.float64(y) * g[i, 1] + np.float64(z) * g[i, 2])
-        if not facing > 0.0:
-            return OUTSIDE, 0.0
-        pixel, z = project(cams, k, x, y, z)
-    if pixel == OUTSIDE:
-        return OUTSIDE, 0.0
-    depth = np.float64(z)
-    return pixel, cams.focal * cams.focal * facing / (depth * depth * depth)
+def _triple(array: Float32, i: int) -> Triple:
+    """Rows of an (n, 3) array."""
+    at = i * np.int32(3)
+    return gather(array, at), gather(array, at + np.int32(1)), gather(array, at + np.int32(2))
 
 
 @inlined
-def _aim(cams: Cameras, k: int, hits: Hits, i: int, packets: Float32, ray: int) -> None:
-    """Write the visibility ray between hit i and eye k; for an escaped ray, from the eye out of the scene."""
-    o, p = cams.position, hits.position
-    if hits.kind[i] != SURFACE:
-        set_ray(packets, ray, o[k, 0], o[k, 1], o[k, 2], p[i, 0], p[i, 1], p[i, 2], np.float32(np.inf))
-    else:
-        g, e = hits.geometric, hits.offset[i]
-        x, y, z = p[i, 0] + e * g[i, 0], p[i, 1] + e * g[i, 1], p[i, 2] + e * g[i, 2]
-        set_ray(packets, ray, x, y, z, o[k, 0] - x, o[k, 1] - y, o[k, 2] - z, np.float32(1.0))
+def _seen(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[int, Real, Real]:
+    """The pixel of eye k that hits i to i + 15 fall into, were nothing in between (OUTSIDE if none).
+
+    Also what the density p_k is made of: how far the surface faces the eye, and the hit's depth.
+    """
+    o, at = cams.position, lane_numbers() + np.int32(i)
+    x, y, z = _triple(hits.position, at)
+    gx, gy, gz = _triple(hits.geometric, at)
+    surface = gather(hits.kind, at) == np.uint8(SURFACE)
+    # what is infinitely far lies in one direction from all eyes
+    from_eye = choose(surface, np.float32(1.0), np.float32(0.0))
+    dx, dy, dz = x - from_eye * o[k, 0], y - from_eye * o[k, 1], z - from_eye * o[k, 2]
+    facing = -(doubles(dx) * doubles(gx) + doubles(dy) * doubles(gy) + doubles(dz) * doubles(gz))
+    facing = choose(surface, facing, 1.0)
+    pixel, depth = project(cams, k, dx, dy, dz)
+    return choose(facing > 0.0, pixel, np.int32(OUTSIDE)), facing, doubles(depth)
 
 
 @kernel
-def _confirm(tracer: Tracer, rays: Rays, n: int, pixel: Int32, density: Float64) -> None:
-    """Trace the waiting visibility rays; what is hidden is forgotten."""
+def _aim(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays, n: int) -> None:
+    """Write the queued visibility rays between hits and eyes; for an escaped ray, from the eye out of the scene."""
+    packet, one = rays.packets.shape[1] * LANES, np.float32(1.0)
+    for ray in range(n, (n + LANES - 1) // LANES * LANES):
+        rays.place[ray], rays.number[0, ray] = rays.place[n - 1], rays.number[0, n - 1]
+    for first in range(0, n, LANES):
+        place = lanes_at(rays.place, first)
+        row = lanes_at(rays.number, first)
+        i = place - row * np.int32(stride)
+        surface = gather(hits.kind, i) == np.uint8(SURFACE)
+        ox, oy, oz = _triple(cams.position, row + np.int32(first_eye))
+        px, py, pz = _triple(hits.position, i)
+        gx, gy, gz = _triple(hits.geometric, i)
+        e, at = gather(hits.offset, i), (first >> 4) * packet
+        x, y, z = px + e * gx, py + e * gy, pz + e * gz
+        put_lanes(rays.packets, at + ORIGIN * LANES, choose(surface, x, ox))
+        put_lanes(rays.packets, at + (ORIGIN + 1) * LANES, choose(surface, y, oy))
+        put_lanes(rays.packets, at + (ORIGIN + 2) * LANES, choose(surface, z, oz))
+        put_lanes(rays.packets, at + DIRECTION * LANES, choose(surface, ox - x, px))
+        put_lanes(rays.packets, at + (DIRECTION + 1) * LANES, choose(surface, oy - y, py))
+        put_lanes(rays.packets, at + (DIRECTION + 2) * LANES, choose(surface, oz - z, pz))
+        put_lanes(rays.packets, at + TFAR * LANES, choose(surface, one, np.float32(np.inf)))
+
+
+@kernel
+def _confirm(
+    cams: Cameras, first_eye: int, hits: Hits, tracer: Tracer, rays: Rays, n: int, pixel: Int32, density: Float64
+) -> None:
+    """Trace the queued visibility rays; what is hidden is forgotten."""
+    if n == 0:
+        return
+    _aim(cams, first_eye, hits, pixel.shape[1], rays, n)
     occlude(tracer, rays.packets, n, True)
     flat_pixel, flat_density = pixel.reshape(pixel.size), density.reshape(density.size)
     for ray in range(n):
         if is_blocked(rays.packets, ray):
-            flat_pixel[rays.place[ray]], flat_density[rays.place[ray]] = OUTSIDE, 0.0
+            flat_pixel[rays.place[ray]] = OUTSIDE
+            if density.size > 0:
+                flat_density[rays.place[ray]] = 0.0
 
 
 @kernel
@@ -78,29 +106,35 @@ def outer_hits(
     """Find where eyes first_eye, first_eye + 1, ... see native hits 0 to n - 1 of eye c, and how densely they do.
 
     Args:
-        pixel: (n_eyes, >= n) overwritten: the pixel of each eye that sees the hit, or OUTSIDE.
-        density: (n_eyes, >= n) overwritten: p_k, pixel samples per area.
+        pixel: (n_eyes, >= n, a multiple of LANES) overwritten: the pixel of each eye that sees the hit, or OUTSIDE.
+        density: of the same shape, overwritten: p_k, pixel samples per area; or (0, 0) where nobody asks.
 
     Returns:
         number of visibility rays.
     """
-    capacity = rays.packets.shape[0] * LANES
+    capacity, stride = rays.packets.shape[0] * LANES, pixel.shape[1]
     waiting = total = 0
     for row in range(pixel.shape[0]):
         k = first_eye + row
-        for i in range(n):
-            pixel[row, i], density[row, i] = _seen(cams, k, hits, i)
+        for i in range(0, n, LANES):
+            seen, facing, depth = _seen(cams, k, hits, i)
             if k == c:  # the eye that found the hit sees it, whatever rounding says of borders and grazing angles
-                pixel[row, i] = hits.pixel[i]
-                density[row, i] = max(density[row, i], 1e-30)
-            elif pixel[row, i] != OUTSIDE:
-                if waiting == capacity:
-                    _confirm(tracer, rays, waiting, pixel, density)
+                seen = gather(hits.pixel, lane_numbers() + np.int32(i))
+            put_lanes(pixel, row * stride + i, seen)
+            wanted = (seen >= np.int32(0)) & (lane_numbers() < np.int32(n - i))
+            if density.size > 0:
+                p = choose(seen >= np.int32(0), cams.focal * cams.focal * facing / (depth * depth * depth), 0.0)
+                if k == c:
+                    p = choose(p > 1e-30, p, 1e-30)
+                put_lanes(density, row * stride + i, p)
+            if k != c:
+                if waiting > capacity - LANES:
+                    _confirm(cams, first_eye, hits, tracer, rays, waiting, pixel, density)
                     total, waiting = total + waiting, 0
-                _aim(cams, k, hits, i, rays.packets, waiting)
-                rays.place[waiting] = row * pixel.shape[1] + i
-                waiting += 1
-    _confirm(tracer, rays, waiting, pixel, density)
+                compress(wanted, lane_numbers() + np.int32(row * stride + i), rays.place, waiting)
+                put_lanes(rays.number, waiting, np.int32(row))
+                waiting += count(wanted)
+    _confirm(cams, first_eye, hits, tracer, rays, waiting, pixel, density)
     return total + waiting
 
 

@@ -3,93 +3,97 @@
 import numpy as np
 
 from ..arrays import Float32, Real, Triple
-from ..embree.packets import DIRECTION, LANES, ORIGIN, TFAR, Tracer, is_blocked, occlude
+from ..embree.packets import DIRECTION, LANES, ORIGIN, TFAR, Tracer, occlude
 from ..hits import Hits, ray_origin, reflects
 from ..kernel import inlined, kernel
+from ..lanes import bits, choose, lane_numbers, lanes_at, lowest, put_lanes, root
 from ..lights import DIRECTIONAL, LightArrays
 from ..rays import Rays
 
 # A shadow ray ends this share of its length before the light, so that a light on a surface is not hidden by it.
 FAR_END = np.float32(1.0 - 1e-4)
-# Rows of candidates: vector to the light, geometry factor, and the light index it belongs to.
-X, Y, Z, VALUE, LIGHT = range(5)
+# Rows of queued rays: origin, vector to the light, how far along it.
+FROM, TO, REACH = 0, 3, 6
+ALL = (1 << LANES) - 1
 
 
 @inlined
-def look(hits: Hits, i: int, lights: LightArrays, s: int, row: Float32) -> None:
-    """Compute, for every light position, the vector from hit i to source s and the geometry factor of its irradiance.
+def _look(hits: Hits, i: int, lights: LightArrays, s: int, l: int) -> tuple[Real, Real, Real, Real]:
+    """Vector from hit i to source s at light positions l to l + 15, and the geometry factors of their irradiance.
 
     The factor is cos(theta) / d^2 for a point source, whose vector ends at the source, and cos(theta) for a
     directional one, whose vector has length 1. It is 0 where the source does not shine, is behind either normal, or
     is exactly at the hit.
     """
-    px, py, pz = hits.position[i, 0], hits.position[i, 1], hits.position[i, 2]
-    gx, gy, gz = hits.geometric[i, 0], hits.geometric[i, 1], hits.geometric[i, 2]
-    mx, my, mz = hits.shading[i, 0], hits.shading[i, 1], hits.shading[i, 2]
-    nothing, one = np.float32(0.0), np.float32(1.0)
+    n_lights, nothing = lights.lit.shape[1], np.float32(0.0)
+    at = 3 * s * n_lights + l
+    x, y = lanes_at(lights.vector, at), lanes_at(lights.vector, at + n_lights)
+    z = lanes_at(lights.vector, at + 2 * n_lights)
+    p, g, m = hits.position, hits.geometric, hits.shading
     if lights.kind[s] == DIRECTIONAL:
-        for l in range(row.shape[1]):
-            x, y, z = -lights.vector[s, 0, l], -lights.vector[s, 1, l], -lights.vector[s, 2, l]
-            cosine = mx * x + my * y + mz * z
-            in_front = (cosine > nothing) & (gx * x + gy * y + gz * z > nothing)
-            row[X, l], row[Y, l], row[Z, l] = x, y, z
-            row[VALUE, l] = cosine * lights.lit[s, l] if in_front else nothing
+        x, y, z = -x, -y, -z
     else:
-        for l in range(row.shape[1]):
-            x, y, z = lights.vector[s, 0, l] - px, lights.vector[s, 1, l] - py, lights.vector[s, 2, l] - pz
-            inverse = one / np.sqrt(x * x + y * y + z * z)
-            cosine = mx * x + my * y + mz * z
-            in_front = (cosine > nothing) & (gx * x + gy * y + gz * z > nothing)
-            row[X, l], row[Y, l], row[Z, l] = x, y, z
-            row[VALUE, l] = cosine * inverse * inverse * inverse * lights.lit[s, l] if in_front else nothing
+        x, y, z = x - p[i, 0], y - p[i, 1], z - p[i, 2]
+    cosine = x * m[i, 0] + y * m[i, 1] + z * m[i, 2]
+    in_front = (cosine > nothing) & (x * g[i, 0] + y * g[i, 1] + z * g[i, 2] > nothing)
+    factor = cosine * lanes_at(lights.lit, s * n_lights + l)
+    if lights.kind[s] != DIRECTIONAL:
+        square = x * x + y * y + z * z
+        factor = factor / (square * root(square))
+    return x, y, z, choose(in_front & (lane_numbers() < np.int32(n_lights - l)), factor, nothing)
 
 
 @inlined
-def _keep_lit(row: Float32) -> int:
-    """Move the candidates whose factor is not 0 to the front, with the light index of each; returns their number."""
-    n_lights = row.shape[1]
-    m = 0
-    for l in range(n_lights):
-        m += row[VALUE, l] > 0.0
-    index = row.view(np.int32)
-    if m == n_lights:
-        for l in range(n_lights):
-            index[LIGHT, l] = l
-        return m
-    k = 0
-    for l in range(n_lights):
-        if row[VALUE, l] > 0.0:
-            row[X, k], row[Y, k], row[Z, k], row[VALUE, k] = row[X, l], row[Y, l], row[Z, l], row[VALUE, l]
-            index[LIGHT, k] = l
-            k += 1
-    return m
+def look(hits: Hits, i: int, lights: LightArrays, s: int, row: Float32, value: Float32) -> None:
+    """Write vectors (rows TO of `row`) and geometry factors (row 0 of `value`) of all light positions."""
+    for l in range(0, lights.lit.shape[1], LANES):
+        x, y, z, factor = _look(hits, i, lights, s, l)
+        put_lanes(row, TO * row.shape[1] + l, x)
+        put_lanes(row, (TO + 1) * row.shape[1] + l, y)
+        put_lanes(row, (TO + 2) * row.shape[1] + l, z)
+        put_lanes(value, l, factor)
 
 
 @inlined
-def _queue(row: Float32, first: int, m: int, origin: Triple, reach: Real, rays: Rays, waiting: int) -> None:
-    """Write candidates first to first + m - 1 as waiting rays; they fit one packet: a few vector stores."""
-    p, lane = waiting >> 4, waiting & 15
-    ox, oy, oz = origin
-    for k in range(m):
-        rays.packets[p, ORIGIN, lane + k] = ox
-        rays.packets[p, ORIGIN + 1, lane + k] = oy
-        rays.packets[p, ORIGIN + 2, lane + k] = oz
-        rays.packets[p, DIRECTION, lane + k] = row[X, first + k]
-        rays.packets[p, DIRECTION + 1, lane + k] = row[Y, first + k]
-        rays.packets[p, DIRECTION + 2, lane + k] = row[Z, first + k]
-        rays.packets[p, TFAR, lane + k] = reach
+def _queue(
+    lights: LightArrays, s: int, l: int, x: Real, y: Real, z: Real, factor: Real, origin: Triple, place: int,
+    rays: Rays, waiting: int, channels: int,
+) -> None:  # fmt: skip
+    """Append rays to light positions l to l + 15; what comes next replaces those that do not count."""
+    n_lights, room, row = lights.lit.shape[1], rays.row.shape[1], rays.row
+    put_lanes(row, FROM * room + waiting, origin[0])
+    put_lanes(row, (FROM + 1) * room + waiting, origin[1])
+    put_lanes(row, (FROM + 2) * room + waiting, origin[2])
+    put_lanes(row, TO * room + waiting, x)
+    put_lanes(row, (TO + 1) * room + waiting, y)
+    put_lanes(row, (TO + 2) * room + waiting, z)
+    put_lanes(row, REACH * room + waiting, np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END)
+    put_lanes(rays.place, waiting, lane_numbers() + np.int32(place + l))
+    for channel in range(channels):
+        strength = lanes_at(lights.strength, (s * channels + channel) * n_lights + l)
+        put_lanes(rays.value, channel * rays.value.shape[1] + waiting, factor * strength)
 
 
 @kernel
 def _settle(tracer: Tracer, rays: Rays, n: int, irradiance: Float32) -> None:
-    """Trace the waiting shadow rays and add what is not blocked."""
+    """Trace the queued shadow rays and add what is not blocked."""
+    room, packet = rays.row.shape[1], rays.packets.shape[1] * LANES
+    for first in range(0, n, LANES):
+        at = (first >> 4) * packet
+        for axis in range(3):
+            put_lanes(rays.packets, at + (ORIGIN + axis) * LANES, lanes_at(rays.row, (FROM + axis) * room + first))
+            put_lanes(rays.packets, at + (DIRECTION + axis) * LANES, lanes_at(rays.row, (TO + axis) * room + first))
+        put_lanes(rays.packets, at + TFAR * LANES, lanes_at(rays.row, REACH * room + first))
     occlude(tracer, rays.packets, n, True)
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]
     flat = irradiance.reshape(irradiance.size)
     for channel in range(channels):
+        for first in range(0, n, LANES):
+            blocked = lanes_at(rays.packets, (first >> 4) * packet + TFAR * LANES) < np.float32(0.0)
+            at = channel * rays.value.shape[1] + first
+            put_lanes(rays.value, at, choose(blocked, np.float32(0.0), lanes_at(rays.value, at)))
         for ray in range(n):
-            value = np.float32(0.0) if is_blocked(rays.packets, ray) else rays.value[channel, ray]
-            flat[rays.place[ray] + channel * n_lights] += value
+            flat[rays.place[ray] + channel * n_lights] += rays.value[channel, ray]
 
 
 @kernel
@@ -106,7 +110,6 @@ def direct(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, 
     """
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]
     capacity = rays.packets.shape[0] * LANES
-    index = rays.row.view(np.int32)
     waiting = total = 0
     for i in range(n):
         for channel in range(channels):
@@ -114,25 +117,24 @@ def direct(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, 
                 irradiance[i, channel, l] = 0.0
         if not reflects(hits, i):
             continue
-        origin = ray_origin(hits, i)
+        origin, place = ray_origin(hits, i), i * channels * n_lights
         for s in range(lights.kind.shape[0]):
-            look(hits, i, lights, s, rays.row)
-            reach = np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END
-            m = _keep_lit(rays.row)
-            k = 0
-            while k < m:
-                if waiting == capacity:
-                    _settle(tracer, rays, waiting, irradiance)
-                    total, waiting = total + waiting, 0
-                fit = min(LANES - (waiting & 15), m - k)
-                _queue(rays.row, k, fit, origin, reach, rays, waiting)
-                for ray in range(fit):
-                    rays.place[waiting + ray] = i * channels * n_lights + index[LIGHT, k + ray]
-                for channel in range(channels):
-                    for ray in range(fit):
-                        strength = lights.strength[s, channel, index[LIGHT, k + ray]]
-                        rays.value[channel, waiting + ray] = rays.row[VALUE, k + ray] * strength
-                waiting += fit
-                k += fit
+            for l in range(0, n_lights, LANES):
+                x, y, z, factor = _look(hits, i, lights, s, l)
+                lit = bits(factor > np.float32(0.0))
+                while lit != 0:
+                    if waiting > capacity - LANES:
+                        _settle(tracer, rays, waiting, irradiance)
+                        total, waiting = total + waiting, 0
+                    if lit == ALL:
+                        _queue(lights, s, l, x, y, z, factor, origin, place, rays, waiting, channels)
+                        waiting, lit = waiting + LANES, 0
+                        continue
+                    start = lowest(lit)  # one run of positions after another
+                    m = lowest(~(lit >> start))
+                    x, y, z, factor = _look(hits, i, lights, s, l + start)
+                    _queue(lights, s, l + start, x, y, z, factor, origin, place, rays, waiting, channels)
+                    waiting += m
+                    lit &= ~(((1 << m) - 1) << start)
     _settle(tracer, rays, waiting, irradiance)
     return total + waiting

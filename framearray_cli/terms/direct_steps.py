@@ -21,7 +21,7 @@ from ..kernel import inlined, kernel
 from ..lights import DIRECTIONAL, LightArrays
 from ..rays import Rays
 from ..sampling import STEPS, mix, word
-from .direct import FAR_END, VALUE, X, Y, Z, look
+from .direct import FAR_END, TO, look
 
 # Hits that are worked on together: enough to fill packets in the later, sparser rounds.
 BLOCK = 128
@@ -101,16 +101,16 @@ def _aim(hits: Hits, first: int, lights: LightArrays, s: int, place: int, rays: 
 
 
 @inlined
-def _start(hits: Hits, i: int, lights: LightArrays, s: int, row: Float32, b: int, room: Steps) -> None:
+def _start(hits: Hits, i: int, lights: LightArrays, s: int, rays: Rays, b: int, room: Steps) -> None:
     """Compute the geometry factors of hit i and count the positions in front of it; nothing is seen yet."""
     n_lights = room.factor.shape[1]
     count = 0
     if reflects(hits, i):
-        look(hits, i, lights, s, row)
+        look(hits, i, lights, s, rays.row, rays.value)
         for l in range(n_lights):
-            count += row[VALUE, l] > 0.0
+            count += rays.value[0, l] > 0.0
     for l in range(n_lights):
-        room.factor[b, l] = row[VALUE, l] if count > 0 else np.float32(0.0)
+        room.factor[b, l] = rays.value[0, l] if count > 0 else np.float32(0.0)
         room.visible[b, l] = 0.0
     room.in_front[b] = count
 
@@ -124,7 +124,7 @@ def _test_every(
     reach = np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END
     waiting = total = 0
     for b in range(n):
-        _start(hits, first + b, lights, s, row, b, room)
+        _start(hits, first + b, lights, s, rays, b, room)
         if room.in_front[b] == 0:
             continue
         ox, oy, oz = ray_origin(hits, first + b)
@@ -140,7 +140,7 @@ def _test_every(
                 if waiting == capacity:
                     _learn(tracer, rays, waiting, room.visible)
                     total, waiting = total + waiting, 0
-                set_ray(rays.packets, waiting, ox, oy, oz, row[X, l], row[Y, l], row[Z, l], reach)
+                set_ray(rays.packets, waiting, ox, oy, oz, row[TO, l], row[TO + 1, l], row[TO + 2, l], reach)
                 rays.place[waiting] = b * n_lights + l
                 waiting += 1
                 if l == last:

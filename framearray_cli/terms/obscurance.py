@@ -90,13 +90,13 @@ def _queue(hits: Hits, i: int, settings: ObscuranceSettings, rays: Rays, waiting
 @kernel
 def _aim(hits: Hits, rays: Rays, n: int, reach: Real) -> None:
     """Write the queued rays, a packet at a time."""
-    capacity, packet = rays.place.shape[0], rays.packets.shape[1] * LANES
+    second, packet = rays.number.shape[1], rays.packets.shape[1] * LANES
     for ray in range(n, (n + LANES - 1) // LANES * LANES):
         rays.place[ray] = rays.place[n - 1]
     for first in range(0, n, LANES):
         hit = lanes_at(rays.place, first)
         u = reals(lanes_at(rays.number, first) >> np.int32(8)) * UNIT_24
-        v = reals(lanes_at(rays.number, capacity + first) >> np.int32(8)) * UNIT_24
+        v = reals(lanes_at(rays.number, second + first) >> np.int32(8)) * UNIT_24
         at = hit * np.int32(3)
         mx, my, mz = (
             gather(hits.shading, at),
@@ -126,7 +126,7 @@ def _sort_out(rays: Rays, n: int, settings: ObscuranceSettings) -> int:
 
     `rays.number[1]` says which rays see the background.
     """
-    capacity, packet = rays.place.shape[0], rays.packets.shape[1] * LANES
+    second, packet = rays.number.shape[1], rays.packets.shape[1] * LANES
     bits, d_max = rays.packets.view(np.int32), np.float32(settings.d_max)
     near = 0
     for first in range(0, n, LANES):
@@ -137,9 +137,13 @@ def _sort_out(rays: Rays, n: int, settings: ObscuranceSettings) -> int:
         nothing = within
         if settings.sky:
             nothing = within | missed
-            put_lanes(rays.number, capacity + first, choose(missed, integers(1), np.int32(0)))
+            put_lanes(rays.number, second + first, choose(missed, integers(1), np.int32(0)))
         for channel in range(3):
-            put_lanes(rays.value, channel * capacity + first, choose(nothing, reals(0.0), settings.average[channel]))
+            put_lanes(
+                rays.value,
+                channel * rays.value.shape[1] + first,
+                choose(nothing, reals(0.0), settings.average[channel]),
+            )
         compress(within, lane_numbers() + np.int32(first), rays.number, near)
         near += count(within)
     return near
@@ -166,7 +170,7 @@ def _tint(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int) -> None:
     """Multiply the value of listed rays 0 to n - 1 by R(Q), which depends on the place."""
     if n == 0:
         return
-    capacity, packet = np.int32(rays.place.shape[0]), np.int32(rays.packets.shape[1] * LANES)
+    stride, packet = np.int32(rays.value.shape[1]), np.int32(rays.packets.shape[1] * LANES)
     for k in range(n, (n + LANES - 1) // LANES * LANES):
         rays.number[0, k] = rays.number[0, n - 1]  # worked out twice at once, and written twice
     bits = rays.packets.view(np.int32)
@@ -181,7 +185,7 @@ def _tint(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int) -> None:
         u, v = gather(rays.packets, at + np.int32(U * LANES)), gather(rays.packets, at + np.int32(V * LANES))
         diffuse, mirror = reflectivity_at(surfaces, triangle, u, v), specular_at(surfaces, triangle, u, v)
         for channel in range(3):
-            place = i + np.int32(channel) * capacity
+            place = i + np.int32(channel) * stride
             scatter(rays.value, place, gather(rays.value, place) * (diffuse[channel] + mirror[channel]))
 
 
@@ -210,21 +214,21 @@ def _trace(
 @kernel
 def _hand_over(rays: Rays, n: int, settings: ObscuranceSettings, result: Rgb, skylight: Rgb) -> None:
     """Give each hit the mean over its rays, 16 hits at a time; what they have too many is the last one's again."""
-    capacity, last = np.int32(rays.place.shape[0]), np.int32(n - settings.n_rays)
+    stride, last = np.int32(rays.value.shape[1]), np.int32(n - settings.n_rays)
     share = np.float32(1.0 / settings.n_rays)
     for first in range(0, n, LANES * settings.n_rays):
         ray = lane_numbers() * np.int32(settings.n_rays) + np.int32(first)
         ray = choose(ray < last, ray, last)
         hit = gather(rays.place, ray)
         for channel in range(3):
-            at = ray + np.int32(channel) * capacity
+            at = ray + np.int32(channel) * stride
             total = gather(rays.value, at)
             for _ in range(1, settings.n_rays):
                 at = at + np.int32(1)
                 total = total + gather(rays.value, at)
             scatter(result, hit * np.int32(3) + np.int32(channel), total * share)
         if settings.sky:
-            at = ray + capacity
+            at = ray + np.int32(rays.number.shape[1])
             escaped = gather(rays.number, at)
             for _ in range(1, settings.n_rays):
                 at = at + np.int32(1)
@@ -255,7 +259,7 @@ def obscurance(
     Returns:
         number of rays.
     """
-    capacity = rays.place.shape[0]
+    capacity = rays.packets.shape[0] * LANES
     waiting = total = 0
     for i in range(n):
         if not reflects(hits, i):

@@ -11,7 +11,7 @@ import numpy as np
 from framearray_cli.embree import EmbreeScene
 from framearray_cli.job import Job
 from framearray_cli.jobfile import read_job
-from framearray_cli.lights import LightArrays
+from framearray_cli.lights import some_lights
 from framearray_cli.prepare import Prepared, open_embree, plan_work, prepare
 from framearray_cli.terms.ambient import Ambient
 from framearray_cli.work import Work
@@ -161,25 +161,13 @@ def _changed(job: Job, variant: Variant) -> Job:
 
 def under(case: Case, l: Sequence[int]) -> Case:
     """The same job with light positions l alone."""
-    lights = lights_at(case.work.lights, l)
+    lights = some_lights(case.work.lights, l)
     ambient = replace(
         case.ambient,
         intensity=np.ascontiguousarray(case.ambient.intensity[list(l)]),
         standard_error=case.ambient.standard_error[list(l)],
     )
     return replace(case, work=replace(case.work, lights=lights, kept=range(len(l))), ambient=ambient)
-
-
-def lights_at(lights: LightArrays, l: Sequence[int]) -> LightArrays:
-    """Positions l of a light path."""
-    at = list(l)
-    return LightArrays(
-        kind=lights.kind,
-        vector=np.ascontiguousarray(lights.vector[:, :, at]),
-        strength=np.ascontiguousarray(lights.strength[:, :, at]),
-        lit=np.ascontiguousarray(lights.lit[:, at]),
-        colour=np.ascontiguousarray(lights.colour[at]),
-    )
 
 
 def parts_of(case: Case, variant: Variant) -> list[Case]:

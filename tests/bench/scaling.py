@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.arrays import Float32, Float64
-from framearray_cli.lights import DIRECTIONAL, LightArrays
+from framearray_cli.lights import DIRECTIONAL, LightArrays, with_room
 from framearray_cli.paths import Eyes
 from framearray_cli.prepare import open_embree, plan_work
 
@@ -78,13 +78,14 @@ def resampled(lights: LightArrays, at: Float64) -> LightArrays:
     for s, kind in enumerate(lights.kind):
         if kind == DIRECTIONAL:
             vector[s] /= np.linalg.norm(vector[s], axis=0)
-    return LightArrays(
+    found = LightArrays(
         kind=lights.kind,
-        vector=np.ascontiguousarray(vector),
-        strength=np.ascontiguousarray(_between(lights.strength, at, 2)),
-        lit=np.ascontiguousarray(np.ceil(_between(lights.lit, at, 1))),
-        colour=np.ascontiguousarray(_between(lights.colour, at, 0)),
+        vector=vector,
+        strength=_between(lights.strength, at, 2),
+        lit=np.ceil(_between(lights.lit, at, 1)),
+        colour=_between(lights.colour, at, 0),
     )
+    return with_room(found)
 
 
 def _between(values: Float32, at: Float64, axis: int) -> Float32:
