@@ -108,33 +108,30 @@ def record_hits(surfaces: Surfaces, tracer: Tracer, packets: Float32, n: int, mi
         at = (i >> 4) * packet
         dx, dy = lanes_at(packets, at + DIRECTION * LANES), lanes_at(packets, at + (DIRECTION + 1) * LANES)
         dz = lanes_at(packets, at + (DIRECTION + 2) * LANES)
-        _put(hits.incoming, i, dx, dy, dz)
         triangle = lanes_at(bits, at + TRIANGLE * LANES)
         missed = triangle < np.int32(0)
         triangle = choose(missed, 0, scene_triangle(tracer, triangle, lanes_at(bits, at + GEOMETRY * LANES)))
-        u, v = (
-            choose(missed, 0.0, lanes_at(packets, at + U * LANES)),
-            choose(missed, 0.0, lanes_at(packets, at + V * LANES)),
-        )
+        u, v = lanes_at(packets, at + U * LANES), lanes_at(packets, at + V * LANES)
+        u, v = choose(missed, 0.0, u), choose(missed, 0.0, v)
+        # all is read before anything is written: the compiler then reads what is needed twice only once
         x, y, z = position_at(surfaces, triangle, u, v)
         length = root(dx * dx + dy * dy + dz * dz)
-        _put(
-            hits.position,
-            i,
-            choose(missed, dx / length, x),
-            choose(missed, dy / length, y),
-            choose(missed, dz / length, z),
-        )
         gx, gy, gz = geometric_normal(surfaces, triangle, dx, dy, dz)
-        _put(hits.geometric, i, gx, gy, gz)
         nx, ny, nz = shading_normal(surfaces, triangle, u, v, gx, gy, gz)
-        _put(hits.shading, i, nx, ny, nz)
-        put_lanes(hits.offset, i, gather(surfaces.offset, triangle))
         red, green, blue = reflectivity_at(surfaces, triangle, u, v)
-        _put(hits.reflectivity, i, choose(missed, 0.0, red), choose(missed, 0.0, green), choose(missed, 0.0, blue))
+        offset = gather(surfaces.offset, triangle)
         if mirrors:
-            red, green, blue = specular_at(surfaces, triangle, u, v)
-            _put(hits.specular, i, choose(missed, 0.0, red), choose(missed, 0.0, green), choose(missed, 0.0, blue))
+            s_red, s_green, s_blue = specular_at(surfaces, triangle, u, v)
+            _put(
+                hits.specular, i, choose(missed, 0.0, s_red), choose(missed, 0.0, s_green), choose(missed, 0.0, s_blue)
+            )
+        _put(hits.incoming, i, dx, dy, dz)
+        x, y, z = choose(missed, dx / length, x), choose(missed, dy / length, y), choose(missed, dz / length, z)
+        _put(hits.position, i, x, y, z)
+        _put(hits.geometric, i, gx, gy, gz)
+        _put(hits.shading, i, nx, ny, nz)
+        put_lanes(hits.offset, i, offset)
+        _put(hits.reflectivity, i, choose(missed, 0.0, red), choose(missed, 0.0, green), choose(missed, 0.0, blue))
         for ray in range(i, i + LANES):
             hits.kind[ray] = ESCAPED if bits[i >> 4, TRIANGLE, ray & 15] == MISS else SURFACE
 

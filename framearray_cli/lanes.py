@@ -2,9 +2,10 @@
 
 LLVM turns plain loops into such instructions only where it can prove that no array overlaps another, which it cannot
 for loops that look things up. Kernels that write packets therefore say what they want: `Lanes` of float32, float64,
-int32 or uint8, and flags, with the operators of numbers. On processors with narrower registers LLVM splits the operations.
+int32, uint8 or uint64, and flags, with the operators of numbers. On processors with narrower registers LLVM splits
+the operations.
 
-What is written with `choose`, `gather`, `root` and the like works for single numbers, too.
+What is written with `choose`, `gather`, `root` and their like works for single numbers, too.
 
 Sums and products may be fused (one rounding instead of two); nothing else differs from the numbers one at a time.
 """
@@ -27,6 +28,7 @@ _ELEMENTS = {
     types.float64: ir.DoubleType(),
     types.int32: _WORD,
     types.uint8: ir.IntType(8),
+    types.uint64: ir.IntType(64),
     types.boolean: ir.IntType(1),
 }
 _SUFFIX = {types.float32: "f32", types.float64: "f64", types.int32: "i32"}
@@ -104,6 +106,7 @@ _operator(operator.mul, _binary("fmul", "mul"))
 _operator(operator.truediv, _binary("fdiv", "sdiv"))
 _operator(operator.and_, _binary("and_", "and_"))
 _operator(operator.or_, _binary("or_", "or_"))
+_operator(operator.xor, _binary("xor", "xor"))
 _operator(operator.rshift, _binary("lshr", "lshr"))
 _operator(operator.neg, lambda builder, real, a: builder.fneg(a) if real else builder.neg(a))
 _operator(operator.invert, lambda builder, real, a: builder.not_(a))
@@ -264,6 +267,12 @@ def _converted(dtype: Any) -> Callable[..., Any]:
             source, target = sig.args[0].dtype, _vector(lanes)
             if source == dtype:
                 return args[0]
+            if isinstance(source, types.Integer) and isinstance(dtype, types.Integer):
+                return (
+                    builder.trunc(args[0], target)
+                    if source.bitwidth > dtype.bitwidth
+                    else builder.zext(args[0], target)
+                )
             if dtype == types.int32:
                 return builder.fptosi(args[0], target)
             if source == types.int32:

@@ -132,7 +132,8 @@ def direct(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, 
                         continue
                     start = lowest(lit)  # one run of positions after another
                     m = lowest(~(lit >> start))
-                    x, y, z, factor = _look(hits, i, lights, s, l + start)
+                    if start > 0:
+                        x, y, z, factor = _look(hits, i, lights, s, l + start)
                     _queue(lights, s, l + start, x, y, z, factor, origin, place, rays, waiting, channels)
                     waiting += m
                     lit &= ~(((1 << m) - 1) << start)

@@ -76,48 +76,45 @@ def rho(falloff: int, tau: Real, x: Real) -> Real:
     return np.float32(0.0)
 
 
-@inlined
-def _queue(hits: Hits, i: int, settings: ObscuranceSettings, rays: Rays, waiting: int) -> None:
-    """Note whose the next rays are, and where in the unit square each of them is."""
-    bits = word(hits.key[i], HEMISPHERE)
-    x, y = np.uint32(bits & np.uint64(0xFFFFFFFF)), np.uint32(bits >> np.uint64(32))
-    for ray in range(waiting, waiting + settings.n_rays):
-        rays.place[ray] = i
-        rays.number[0, ray], rays.number[1, ray] = np.int32(x), np.int32(y)
-        x, y = np.uint32(x + np.uint32(settings.step_x)), np.uint32(y + np.uint32(settings.step_y))
-
-
 @kernel
-def _aim(hits: Hits, rays: Rays, n: int, reach: Real) -> None:
-    """Write the queued rays, a packet at a time."""
-    second, packet = rays.number.shape[1], rays.packets.shape[1] * LANES
-    for ray in range(n, (n + LANES - 1) // LANES * LANES):
-        rays.place[ray] = rays.place[n - 1]
+def _aim(hits: Hits, rays: Rays, n: int, first_ray: int, n_rays: int, settings: ObscuranceSettings) -> int:
+    """Write rays first_ray to first_ray + n_rays - 1 of the n listed hits; returns the number of packets.
+
+    A packet holds the same ray of 16 hits, and n_rays packets in a row belong to the same hits.
+    """
+    size = rays.packets.shape[1] * LANES
+    reach, idle = np.float32(np.inf if settings.sky else settings.d_max), np.float32(-1.0)
+    step_x, step_y = np.int32(np.uint32(settings.step_x)), np.int32(np.uint32(settings.step_y))
+    for k in range(n, (n + LANES - 1) // LANES * LANES):
+        rays.place[k] = rays.place[n - 1]
+    packet = 0
     for first in range(0, n, LANES):
         hit = lanes_at(rays.place, first)
-        u = reals(lanes_at(rays.number, first) >> np.int32(8)) * UNIT_24
-        v = reals(lanes_at(rays.number, second + first) >> np.int32(8)) * UNIT_24
         at = hit * np.int32(3)
-        mx, my, mz = (
-            gather(hits.shading, at),
-            gather(hits.shading, at + np.int32(1)),
-            gather(hits.shading, at + np.int32(2)),
-        )
-        gx, gy, gz = (
-            gather(hits.geometric, at),
-            gather(hits.geometric, at + np.int32(1)),
-            gather(hits.geometric, at + np.int32(2)),
-        )
-        x, y, z = cosine_direction(mx, my, mz, u, v)
-        x, y, z = above(x, y, z, gx, gy, gz)
-        e, ray = gather(hits.offset, hit), (first >> 4) * packet
-        put_lanes(rays.packets, ray + ORIGIN * LANES, gather(hits.position, at) + e * gx)
-        put_lanes(rays.packets, ray + (ORIGIN + 1) * LANES, gather(hits.position, at + np.int32(1)) + e * gy)
-        put_lanes(rays.packets, ray + (ORIGIN + 2) * LANES, gather(hits.position, at + np.int32(2)) + e * gz)
-        put_lanes(rays.packets, ray + DIRECTION * LANES, x)
-        put_lanes(rays.packets, ray + (DIRECTION + 1) * LANES, y)
-        put_lanes(rays.packets, ray + (DIRECTION + 2) * LANES, z)
-        put_lanes(rays.packets, ray + TFAR * LANES, reach)
+        mx, my = gather(hits.shading, at), gather(hits.shading, at + np.int32(1))
+        mz, e = gather(hits.shading, at + np.int32(2)), gather(hits.offset, hit)
+        gx, gy = gather(hits.geometric, at), gather(hits.geometric, at + np.int32(1))
+        gz = gather(hits.geometric, at + np.int32(2))
+        ox, oy = gather(hits.position, at) + e * gx, gather(hits.position, at + np.int32(1)) + e * gy
+        oz = gather(hits.position, at + np.int32(2)) + e * gz
+        random = word(gather(hits.key, hit), HEMISPHERE)
+        a, b = integers(random) + np.int32(first_ray) * step_x, integers(random >> np.uint64(32))
+        b = b + np.int32(first_ray) * step_y
+        tfar = choose(lane_numbers() < np.int32(n - first), reach, idle)
+        for _ in range(n_rays):
+            u, v = reals(a >> np.int32(8)) * UNIT_24, reals(b >> np.int32(8)) * UNIT_24
+            x, y, z = cosine_direction(mx, my, mz, u, v)
+            x, y, z = above(x, y, z, gx, gy, gz)
+            ray = packet * size
+            put_lanes(rays.packets, ray + ORIGIN * LANES, ox)
+            put_lanes(rays.packets, ray + (ORIGIN + 1) * LANES, oy)
+            put_lanes(rays.packets, ray + (ORIGIN + 2) * LANES, oz)
+            put_lanes(rays.packets, ray + DIRECTION * LANES, x)
+            put_lanes(rays.packets, ray + (DIRECTION + 1) * LANES, y)
+            put_lanes(rays.packets, ray + (DIRECTION + 2) * LANES, z)
+            put_lanes(rays.packets, ray + TFAR * LANES, tfar)
+            a, b, packet = a + step_x, b + step_y, packet + 1
+    return packet
 
 
 @kernel
@@ -190,6 +187,38 @@ def _tint(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int) -> None:
 
 
 @kernel
+def _hand_over(
+    rays: Rays, n: int, first_ray: int, n_rays: int, settings: ObscuranceSettings, result: Rgb, skylight: Rgb
+) -> None:
+    """Add what was traced to the sums of the listed hits, ray by ray in their order; the last rays make them means."""
+    share, second = np.float32(1.0 / settings.n_rays), rays.number.shape[1]
+    for first in range(0, n, LANES):
+        hit = lanes_at(rays.place, first) * np.int32(3)
+        for channel in range(3):  # sums go where values were that are summed already
+            row = channel * rays.value.shape[1]
+            total = (
+                gather(result, hit + np.int32(channel)) if first_ray > 0 else reals(lane_numbers()) * np.float32(0.0)
+            )
+            for ray in range(n_rays):
+                total = total + lanes_at(rays.value, row + first * n_rays + ray * LANES)
+            put_lanes(rays.value, row + first, total)
+        if settings.sky:
+            escaped = lanes_at(rays.number, second + first * n_rays)
+            for ray in range(1, n_rays):
+                escaped = escaped + lanes_at(rays.number, second + first * n_rays + ray * LANES)
+            put_lanes(rays.number, second + first, escaped)
+    scale = share if first_ray + n_rays == settings.n_rays else np.float32(1.0)
+    for k in range(n):
+        hit = rays.place[k]
+        for channel in range(3):
+            result[hit, channel] = scale * rays.value[channel, k]
+            if settings.sky:
+                before = skylight[hit, channel] if first_ray > 0 else np.float32(0.0)
+                light = share * settings.background[channel]
+                skylight[hit, channel] = before + light * np.float32(rays.number[1, k])
+
+
+@kernel
 def _trace(
     hits: Hits,
     surfaces: Surfaces,
@@ -200,42 +229,18 @@ def _trace(
     result: Rgb,
     skylight: Rgb,
 ) -> None:
-    """Trace the queued rays and give their hits the mean of R(Q) rho(d), and of the background."""
+    """Estimate W of the n hits listed in `rays.place`; as many rays of each as fit are traced together."""
     if n == 0:
         return
-    _aim(hits, rays, n, np.float32(np.inf if settings.sky else settings.d_max))
-    intersect(tracer, rays.packets, n, False)
-    near = _sort_out(rays, n, settings)
-    if settings.falloff != CONSTANT:
-        _look_up(surfaces, tracer, rays, near, settings)
-    _hand_over(rays, n, settings, result, skylight)
-
-
-@kernel
-def _hand_over(rays: Rays, n: int, settings: ObscuranceSettings, result: Rgb, skylight: Rgb) -> None:
-    """Give each hit the mean over its rays, 16 hits at a time; what they have too many is the last one's again."""
-    stride, last = np.int32(rays.value.shape[1]), np.int32(n - settings.n_rays)
-    share = np.float32(1.0 / settings.n_rays)
-    for first in range(0, n, LANES * settings.n_rays):
-        ray = lane_numbers() * np.int32(settings.n_rays) + np.int32(first)
-        ray = choose(ray < last, ray, last)
-        hit = gather(rays.place, ray)
-        for channel in range(3):
-            at = ray + np.int32(channel) * stride
-            total = gather(rays.value, at)
-            for _ in range(1, settings.n_rays):
-                at = at + np.int32(1)
-                total = total + gather(rays.value, at)
-            scatter(result, hit * np.int32(3) + np.int32(channel), total * share)
-        if settings.sky:
-            at = ray + np.int32(rays.number.shape[1])
-            escaped = gather(rays.number, at)
-            for _ in range(1, settings.n_rays):
-                at = at + np.int32(1)
-                escaped = escaped + gather(rays.number, at)
-            for channel in range(3):
-                seen = reals(escaped) * (share * settings.background[channel])
-                scatter(skylight, hit * np.int32(3) + np.int32(channel), seen)
+    room = rays.packets.shape[0]
+    for first_ray in range(0, settings.n_rays, room):
+        n_rays = min(settings.n_rays - first_ray, room)
+        n_traced = LANES * _aim(hits, rays, n, first_ray, n_rays, settings)
+        intersect(tracer, rays.packets, n_traced, False)
+        near = _sort_out(rays, n_traced, settings)
+        if settings.falloff != CONSTANT:
+            _look_up(surfaces, tracer, rays, near, settings)
+        _hand_over(rays, n, first_ray, n_rays, settings, result, skylight)
 
 
 @kernel
@@ -259,7 +264,7 @@ def obscurance(
     Returns:
         number of rays.
     """
-    capacity = rays.packets.shape[0] * LANES
+    fit = max(rays.packets.shape[0] // settings.n_rays, 1) * LANES
     waiting = total = 0
     for i in range(n):
         if not reflects(hits, i):
@@ -268,10 +273,10 @@ def obscurance(
                 if settings.sky:
                     skylight[i, channel] = 0.0
             continue
-        if waiting > capacity - settings.n_rays:
+        if waiting == fit:
             _trace(hits, surfaces, tracer, rays, waiting, settings, result, skylight)
             total, waiting = total + waiting, 0
-        _queue(hits, i, settings, rays, waiting)
-        waiting += settings.n_rays
+        rays.place[waiting] = i
+        waiting += 1
     _trace(hits, surfaces, tracer, rays, waiting, settings, result, skylight)
-    return total + waiting
+    return (total + waiting) * settings.n_rays
