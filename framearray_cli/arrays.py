@@ -12,6 +12,7 @@ Float32: TypeAlias = NDArray[np.float32]
 Float64: TypeAlias = NDArray[np.float64]
 Int32: TypeAlias = NDArray[np.int32]
 Bytes: TypeAlias = NDArray[np.uint8]
+Keys: TypeAlias = NDArray[np.uint64]  # random streams
 
 # What kernels pass by value: Python's float where it does not matter, float32 where it is to stay that.
 Real: TypeAlias = float | np.float32

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from .arrays import Bytes, Directions, Float32, Int32, Points, Real, Rgb, Triple
+from .arrays import Bytes, Directions, Float32, Int32, Keys, Points, Real, Rgb, Triple
 from .camera import Cameras, eye_ray
-from .embree.packets import DIRECTION, GEOMETRY, LANES, MISS, TRIANGLE, Tracer, U, V, intersect, scene_triangle, set_ray
+from .embree.packets import DIRECTION, GEOMETRY, MISS, TRIANGLE, Tracer, U, V, intersect, scene_triangle, set_ray
 from .kernel import inlined, kernel
-from .lanes import choose, gather, lane_numbers, lanes_at, put_lanes, root, scatter
+from .lanes import LANES, choose, gather, lane_numbers, lanes_at, put_lanes, root, scatter
 from .sampling import PIXEL, PIXEL_SAMPLE, r2, stream, word
 from .surface import (
     Surfaces,
@@ -49,7 +49,7 @@ class Hits(NamedTuple):
     reflectivity: Rgb
     specular: Rgb
     incoming: Float32
-    key: Float32
+    key: Keys
     pixel: Int32
 
 

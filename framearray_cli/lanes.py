@@ -16,12 +16,21 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.core.datamodel import models, register_default
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.core import cgutils, datamodel
+from numba.core.typing import templates
 from numba.extending import intrinsic, lower_builtin, lower_cast
 
-N = 16
+LANES = 16  # that many numbers
+# What of numba has no types.
+_Type: Any = types.Type
+_PrimitiveModel: Any = datamodel.models.PrimitiveModel
+_Template: Any = templates.AbstractTemplate
+_register: Any = datamodel.registry.register_default
+_signature: Any = templates.signature
+_infer: Any = templates.infer_global
+_lower_builtin: Any = lower_builtin
+_lower_cast: Any = lower_cast
+_declare: Any = cgutils.get_or_insert_function
 _WORD = ir.IntType(32)
 _ELEMENTS = {
     types.float32: ir.FloatType(),
@@ -31,11 +40,12 @@ _ELEMENTS = {
     types.uint64: ir.IntType(64),
     types.boolean: ir.IntType(1),
 }
+_WHOLE = (types.int32, types.uint8, types.uint64)
 _SUFFIX = {types.float32: "f32", types.float64: "f64", types.int32: "i32"}
 _FUSED = ("contract",)
 
 
-class Lanes(types.Type):  # type: ignore[misc]  # numba's base class has no types
+class Lanes(_Type):  # type: ignore[misc]
     """The type of 16 values of one dtype."""
 
     def __init__(self, dtype: Any) -> None:
@@ -46,44 +56,46 @@ class Lanes(types.Type):  # type: ignore[misc]  # numba's base class has no type
 INTEGERS, FLAGS = Lanes(types.int32), Lanes(types.boolean)
 
 
-@register_default(Lanes)
-class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+@_register(Lanes)
+class _LanesModel(_PrimitiveModel):  # type: ignore[misc]
     def __init__(self, dmm: Any, fe_type: Lanes) -> None:
         super().__init__(dmm, fe_type, _vector(fe_type))
 
 
 def _vector(lanes: Lanes) -> Any:
-    return ir.VectorType(_ELEMENTS[lanes.dtype], N)
+    return ir.VectorType(_ELEMENTS[lanes.dtype], LANES)
 
 
-@lower_cast(types.Number, Lanes)
+@_lower_cast(types.Number, Lanes)  # type: ignore[untyped-decorator,unused-ignore]
 def _spread(context: Any, builder: Any, source: Any, target: Lanes, value: Any) -> Any:
     """The same number in all lanes."""
     element = context.cast(builder, value, source, target.dtype)
     vector = _vector(target)
     one = builder.insert_element(ir.Constant(vector, ir.Undefined), element, _WORD(0))
-    return builder.shuffle_vector(one, ir.Constant(vector, ir.Undefined), ir.Constant(ir.VectorType(_WORD, N), [0] * N))
+    return builder.shuffle_vector(
+        one, ir.Constant(vector, ir.Undefined), ir.Constant(ir.VectorType(_WORD, LANES), [0] * LANES)
+    )
 
 
 def _operator(function: Any, compute: Callable[..., Any], flags: bool = False) -> None:
     """Define an operator of two lanes of one dtype, or of lanes and a number."""
 
-    class _Typed(AbstractTemplate):  # type: ignore[misc]
+    class _Typed(_Template):  # type: ignore[misc]
         def generic(self, args: Any, kws: Any) -> Any:
             lanes = [arg for arg in args if isinstance(arg, Lanes)]
             rest = [arg for arg in args if not isinstance(arg, Lanes)]
             fits = all(lane == lanes[0] for lane in lanes) and all(isinstance(arg, types.Number) for arg in rest)
             if not lanes or not fits:
                 return None
-            return signature(FLAGS if flags else lanes[0], *([lanes[0]] * len(args)))
+            return _signature(FLAGS if flags else lanes[0], *([lanes[0]] * len(args)))
 
-    infer_global(function)(_Typed)
+    _infer(function)(_Typed)
 
     def lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return compute(builder, sig.args[0].dtype in (types.float32, types.float64), *args)
 
     for n in (1, 2):
-        lower_builtin(function, *([Lanes] * n))(lowered)
+        _lower_builtin(function, *([Lanes] * n))(lowered)
 
 
 def _binary(of_reals: str, of_integers: str) -> Callable[..., Any]:
@@ -166,7 +178,7 @@ def _gather_of(typingctx: Any, array: Any, offsets: Any) -> Any:
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         data = context.make_array(sig.args[0])(context, builder, args[0]).data
         result = ir.Constant(_vector(lanes), ir.Undefined)
-        for lane in range(N):
+        for lane in range(LANES):
             offset = builder.sext(builder.extract_element(args[1], _WORD(lane)), ir.IntType(64))
             result = builder.insert_element(result, builder.load(builder.gep(data, [offset])), _WORD(lane))
         return result
@@ -179,7 +191,7 @@ def _scatter_of(typingctx: Any, array: Any, offsets: Any, value: Any) -> Any:
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         data = context.make_array(sig.args[0])(context, builder, args[0]).data
-        for lane in range(N):
+        for lane in range(LANES):
             offset = builder.sext(builder.extract_element(args[1], _WORD(lane)), ir.IntType(64))
             builder.store(builder.extract_element(args[2], _WORD(lane)), builder.gep(data, [offset]))
         return context.get_dummy_value()
@@ -193,8 +205,8 @@ def _compress_of(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         place = _place(context, builder, sig.args[2], args[2], sig.args[3], args[3])
         kind = ir.FunctionType(ir.VoidType(), [args[1].type, place.type, args[0].type])
-        name = f"llvm.masked.compressstore.v{N}{_SUFFIX[sig.args[1].dtype]}"
-        builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [args[1], place, args[0]])
+        name = f"llvm.masked.compressstore.v{LANES}{_SUFFIX[sig.args[1].dtype]}"
+        builder.call(_declare(builder.module, kind, name), [args[1], place, args[0]])
         return context.get_dummy_value()
 
     return types.void(flags, value, array, offset), codegen
@@ -206,7 +218,7 @@ def _count_of(typingctx: Any, flags: Any) -> Any:
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         if not isinstance(sig.args[0], Lanes):
             return builder.zext(args[0], ir.IntType(64))
-        bits = builder.zext(builder.bitcast(args[0], ir.IntType(N)), ir.IntType(64))
+        bits = builder.zext(builder.bitcast(args[0], ir.IntType(LANES)), ir.IntType(64))
         return builder.ctpop(bits)
 
     return types.intp(flags), codegen
@@ -216,7 +228,7 @@ def _bits_of(typingctx: Any, flags: Any) -> Any:
     """The flags as the bits of a number, lane 0 the lowest."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.zext(builder.bitcast(args[0], ir.IntType(N)), ir.IntType(64))
+        return builder.zext(builder.bitcast(args[0], ir.IntType(LANES)), ir.IntType(64))
 
     return types.intp(flags), codegen
 
@@ -248,8 +260,8 @@ def _function(name: str) -> Callable[..., Any]:
     def of(typingctx: Any, value: Any) -> Any:
         def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             kind, of = ir.FunctionType(args[0].type, [args[0].type]), sig.args[0]
-            suffix = f"v{N}{_SUFFIX[of.dtype]}" if isinstance(of, Lanes) else _SUFFIX[of]
-            return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.{suffix}"), args)
+            suffix = f"v{LANES}{_SUFFIX[of.dtype]}" if isinstance(of, Lanes) else _SUFFIX[of]
+            return builder.call(_declare(builder.module, kind, f"llvm.{name}.{suffix}"), args)
 
         return value(value), codegen
 
@@ -267,7 +279,7 @@ def _converted(dtype: Any) -> Callable[..., Any]:
             source, target = sig.args[0].dtype, _vector(lanes)
             if source == dtype:
                 return args[0]
-            if isinstance(source, types.Integer) and isinstance(dtype, types.Integer):
+            if {source, dtype} <= set(_WHOLE):
                 return (
                     builder.trunc(args[0], target)
                     if source.bitwidth > dtype.bitwidth
@@ -288,7 +300,7 @@ def _lane_numbers_of(typingctx: Any) -> Any:
     """0 to 15."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return ir.Constant(_vector(INTEGERS), list(range(N)))
+        return ir.Constant(_vector(INTEGERS), list(range(LANES)))
 
     return INTEGERS(), codegen
 

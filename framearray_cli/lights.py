@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .arrays import Float32, Float64, Int32
-from .embree.packets import LANES
+from .lanes import LANES
 from .paths import Lights
 
 POINT, DIRECTIONAL = 0, 1

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .arrays import Float32, Int32
-from .embree.packets import HIT_ROWS, LANES, RAY_ROWS, empty_packets
+from .embree.packets import HIT_ROWS, RAY_ROWS, empty_packets
+from .lanes import LANES
 
 
 class Rays(NamedTuple):

@@ -16,10 +16,10 @@ import numpy as np
 
 from .arrays import Float32, Float64, Int32, Real, Triple
 from .camera import OUTSIDE, Cameras, project
-from .embree.packets import DIRECTION, LANES, ORIGIN, TFAR, Tracer, is_blocked, occlude
+from .embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, is_blocked, occlude
 from .hits import SURFACE, Hits
 from .kernel import inlined, kernel
-from .lanes import choose, compress, count, doubles, gather, lane_numbers, lanes_at, put_lanes
+from .lanes import LANES, choose, compress, count, doubles, gather, lane_numbers, lanes_at, put_lanes
 from .rays import Rays
 
 

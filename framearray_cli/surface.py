@@ -110,11 +110,9 @@ def texture_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real,
 def _between(corners: Float32, triangle: int, stride: int, axis: int, u: Real, v: Real, w: Real) -> Real:
     """One coordinate of what stands at the corners of a triangle, at barycentric (u, v), w = 1 - u - v."""
     at = triangle * np.int32(3 * stride) + np.int32(axis)
-    return (
-        w * gather(corners, at)
-        + u * gather(corners, at + np.int32(stride))
-        + v * gather(corners, at + np.int32(2 * stride))
-    )
+    a, b, c = gather(corners, at), gather(corners, at + np.int32(stride)), gather(corners, at + np.int32(2 * stride))
+    mixed: Real = w * a + u * b + v * c
+    return mixed
 
 
 @inlined
@@ -174,21 +172,19 @@ def position_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
     """The point itself, from the corners: nearer to the triangle than origin + t * direction is."""
     u64, v64 = doubles(u), doubles(v)
     w64 = 1.0 - u64 - v64
-    at = triangle * np.int32(9)
     return (
-        reals(_weighed(s.corners, at, u64, v64, w64)),
-        reals(_weighed(s.corners, at + np.int32(1), u64, v64, w64)),
-        reals(_weighed(s.corners, at + np.int32(2), u64, v64, w64)),
+        reals(_weighed(s.corners, triangle, 0, u64, v64, w64)),
+        reals(_weighed(s.corners, triangle, 1, u64, v64, w64)),
+        reals(_weighed(s.corners, triangle, 2, u64, v64, w64)),
     )
 
 
 @inlined
-def _weighed(corners: Float32, at: int, u: Real, v: Real, w: Real) -> Real:
-    return (
-        w * doubles(gather(corners, at))
-        + u * doubles(gather(corners, at + np.int32(3)))
-        + v * doubles(gather(corners, at + np.int32(6)))
-    )
+def _weighed(corners: Corners, triangle: int, axis: int, u: Real, v: Real, w: Real) -> Real:
+    at = triangle * np.int32(9) + np.int32(axis)
+    a, b, c = gather(corners, at), gather(corners, at + np.int32(3)), gather(corners, at + np.int32(6))
+    mixed: Real = w * doubles(a) + u * doubles(b) + v * doubles(c)
+    return mixed
 
 
 @inlined

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Float32, Int32
+from ..lanes import LANES
 from ..scene import Scene
 from ..surface import is_cut_out, surfaces
 from .packets import (
     DIRECTION,
     GEOMETRY,
     HIT_ROWS,
-    LANES,
     MASKED,
     MISS,
     NORMAL,

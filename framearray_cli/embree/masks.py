@@ -49,7 +49,7 @@ def _surfaces_at(table: Any) -> Surfaces:
     none1 = _carray(_pointer(table[4]), (0, 3), np.float32)
     return Surfaces(
         none3, none3, uvs, none3, material, none1, none1, alpha_texture, alpha_texture,
-        alpha, alpha_texture, alpha_cutoff, texels, textures, alpha, linear,
+        alpha, alpha_texture, alpha_cutoff, texels, textures, alpha, linear, texels[0], none1,
     )  # fmt: skip
 
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from ..arrays import Float32
 from ..errors import SceneError
+from ..lanes import LANES
 from ..scene import Scene
 from .masks import MaskTable
-from .packets import LANES, MASKED, OPAQUE, Tracer, aligned
+from .packets import MASKED, OPAQUE, Tracer, aligned
 
 _TRIANGLES = 0  # RTC_GEOMETRY_TYPE_TRIANGLE
 _INDEX_BUFFER, _VERTEX_BUFFER = 0, 1

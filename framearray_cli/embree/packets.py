@@ -15,9 +15,8 @@ from numba.extending import intrinsic
 
 from ..arrays import Float32, Real
 from ..kernel import inlined, kernel
-from ..lanes import choose
+from ..lanes import LANES, choose
 
-LANES = 16
 RAY_ROWS = 12
 HIT_ROWS = 24  # RTCRayHit16 needs 20 to 22 rows, by how Embree was built; the rest is padding to whole cache lines
 ORIGIN, DIRECTION, TFAR, MASK, NORMAL, U, V, TRIANGLE, GEOMETRY = 0, 4, 8, 9, 12, 15, 16, 17, 18

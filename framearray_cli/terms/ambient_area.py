@@ -10,9 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Bytes, Float32, Float64, Int32
-from ..embree.packets import LANES, Tracer, is_blocked, occlude, set_ray
+from ..embree.packets import Tracer, is_blocked, occlude, set_ray
 from ..hits import ESCAPED, SURFACE, Hits, ray_origin
 from ..kernel import kernel
+from ..lanes import LANES
 from ..lights import LightArrays
 from ..rays import Rays
 from ..sampling import HEMISPHERE, PIXEL, r2, stream, word

@@ -3,10 +3,10 @@
 import numpy as np
 
 from ..arrays import Float32, Real, Triple
-from ..embree.packets import DIRECTION, LANES, ORIGIN, TFAR, Tracer, occlude
+from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude
 from ..hits import Hits, ray_origin, reflects
 from ..kernel import inlined, kernel
-from ..lanes import bits, choose, lane_numbers, lanes_at, lowest, put_lanes, root
+from ..lanes import LANES, bits, choose, lane_numbers, lanes_at, lowest, put_lanes, root
 from ..lights import DIRECTIONAL, LightArrays
 from ..rays import Rays
 

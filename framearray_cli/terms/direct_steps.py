@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Float32, Int32
-from ..embree.packets import LANES, Tracer, is_blocked, occlude, set_ray
+from ..embree.packets import Tracer, is_blocked, occlude, set_ray
 from ..hits import Hits, ray_origin, reflects
 from ..kernel import inlined, kernel
+from ..lanes import LANES
 from ..lights import DIRECTIONAL, LightArrays
 from ..rays import Rays
 from ..sampling import STEPS, mix, word

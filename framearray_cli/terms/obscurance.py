@@ -15,7 +15,6 @@ from ..arrays import Real, Rgb
 from ..embree.packets import (
     DIRECTION,
     GEOMETRY,
-    LANES,
     ORIGIN,
     TFAR,
     TRIANGLE,
@@ -28,7 +27,7 @@ from ..embree.packets import (
 )
 from ..hits import Hits, reflects
 from ..kernel import inlined, kernel
-from ..lanes import choose, compress, count, gather, integers, lane_numbers, lanes_at, put_lanes, reals, scatter
+from ..lanes import LANES, choose, compress, count, gather, integers, lane_numbers, lanes_at, put_lanes, reals, scatter
 from ..rays import Rays
 from ..sampling import HEMISPHERE, UNIT_24, above, cosine_direction, word
 from ..surface import Surfaces, reflectivity_at, specular_at

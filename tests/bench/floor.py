@@ -26,7 +26,6 @@ from framearray_cli.embree.masks import _pointer
 from framearray_cli.embree.packets import (
     GEOMETRY,
     HIT_ROWS,
-    LANES,
     MISS,
     RAY_ROWS,
     TFAR,
@@ -37,6 +36,7 @@ from framearray_cli.embree.packets import (
     empty_packets,
 )
 from framearray_cli.frame import find_frame
+from framearray_cli.lanes import LANES
 
 from .cases import Case
 

@@ -13,7 +13,6 @@ from framearray_cli.embree.packets import (
     DIRECTION,
     GEOMETRY,
     HIT_ROWS,
-    LANES,
     MASKED,
     MISS,
     ORIGIN,
@@ -28,6 +27,7 @@ from framearray_cli.embree.packets import (
     occlude,
 )
 from framearray_cli.errors import SceneError
+from framearray_cli.lanes import LANES
 from framearray_cli.meshes import Material
 from framearray_cli.scene import Scene, load_scene
 
