@@ -25,4 +25,4 @@ Corners: TypeAlias = Float32  # (n_triangles, 3, 3), one point a corner
 CornerUvs: TypeAlias = Float32  # (n_triangles, 3, 2), v upwards
 Rgb: TypeAlias = Float32  # (n, 3), linear, Rec. 709 primaries
 Image: TypeAlias = Float32  # (height, width, 3), linear radiance, row 0 at the top
-Images: TypeAlias = Float32  # (n_lights, height, width, 3)
+Images: TypeAlias = NDArray[np.float32] | NDArray[np.float16]  # (n_lights, height, width, 3)

@@ -19,11 +19,10 @@ from .jobfile import job_table
 from .memory import ambient_memory, free_memory, light_blocks, mirror_share, require_memory, window_memory
 from .outfolder import free_space, in_the_way, is_same, read_array
 from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
-from .render import image_format
 from .terms.ambient import Ambient
 from .window import Window
 from .work import Work
-from .writer import ArrayWriter
+from .writer import ArrayWriter, image_format
 
 # A probe traces about this many rays, which takes a second or two.
 PROBE_RAYS = 12_000_000

@@ -7,14 +7,20 @@ A band of pixels is summed in arrays that stay in the cache: one `begin`, one `a
 images do not depend on the number of threads.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .arrays import Float32, Images, Int32, Real, Rgb
 from .kernel import kernel, prefetch_row
+from .lanes import LANES, compress, gather, lane_numbers, put_lanes, stored
+
+# Images as they are stored: float32, or the bits of halves; (n_lights, n_pixels, 3).
+Stored: TypeAlias = Float32 | NDArray[np.uint16]
 
 INVERSE_PI = np.float32(1.0 / np.pi)
+HALF_MAX = np.float32(65504.0)  # the largest half
 
 
 class Band(NamedTuple):
@@ -47,6 +53,11 @@ def empty_band(n_pixels: int, n_lights: int) -> Band:
         reflectivity=np.empty((n_pixels, 3), np.float32),
         hits=np.empty(n_pixels, np.int32),
     )
+
+
+def as_stored(images: Images) -> Stored:
+    """Images as `finish` takes them; shares memory."""
+    return np.asarray(images.view(np.uint16)) if images.dtype == np.float16 else np.asarray(images, np.float32)
 
 
 @kernel
@@ -146,37 +157,57 @@ def normalise(band: Band, n: int) -> None:
 
 @kernel
 def finish(
-    band: Band, first_pixel: int, n: int, colour: Rgb, ambient: Rgb, lowest: Real, images: Images
-) -> tuple[int, int, int]:
+    band: Band, first_pixel: int, n: int, colour: Rgb, ambient: Rgb, lowest: Real, images: Stored
+) -> tuple[int, int, int, int]:
     """Write the pixels of a band into all images of the frame; the band's direct sums are used up.
 
     Args:
         colour: (3, n_lights) what the direct sums are in units of.
         ambient: (3, n_lights) I_A, radiance.
         lowest: the least value that is right: 0, or minus infinity where estimates may be negative.
-        images: (n_lights, n_pixels of the image, 3), written.
+        images: (n_lights, n_pixels of the image, 3), written: float32, or uint16 for the bits of halves, what lies
+            beyond the largest half cut to that.
+
     Returns:
-        number of values that were not finite or below `lowest`, written as 0; light index and pixel of the first.
+        number of values that were not finite or below `lowest`, written as 0; light index and pixel of the first;
+        number of values beyond the largest half.
     """
-    bad, bad_light, bad_pixel = 0, -1, -1
+    bad, bad_light, bad_pixel, beyond = 0, -1, -1, 0
     n_lights, sums = images.shape[0], band.direct
     for i in range(n):
         for channel in range(3):
             indirect, steady = band.rest[i, INDIRECT + channel], band.rest[i, STEADY + channel]
-            wrong = 0
+            wrong = large = 0
             for l in range(n_lights):
                 value = colour[channel, l] * sums[i, channel, l] + ambient[channel, l] * indirect + steady
                 wrong += not (value >= lowest and abs(value) < np.inf)
+                large += HALF_MAX < abs(value) < np.inf
                 sums[i, channel, l] = value
+            beyond += large
             for l in range(n_lights if wrong else 0):
                 if not (sums[i, channel, l] >= lowest and abs(sums[i, channel, l]) < np.inf):
                     sums[i, channel, l] = 0.0
                     if bad == 0:
                         bad_light, bad_pixel = l, first_pixel + i
                     bad += 1
-    for block in range(0, n, 16):  # 16 pixels of one image are neighbours in memory, and so are all lights of a pixel
+    transpose(sums, 3 * n, images, 3 * first_pixel)
+    return bad, bad_light, bad_pixel, beyond
+
+
+@kernel
+def transpose(sums: Float32, n: int, images: Stored, first: int) -> None:
+    """Write the first n values of each light, light by light: sums has all lights of a value, images all values of one.
+
+    Args:
+        sums: (n_pixels, 3, n_lights).
+        images: (n_lights, n_pixels, 3); written from value `first` on.
+    """
+    n_lights, row = images.shape[0], images.shape[1] * images.shape[2]
+    step = lane_numbers() * np.int32(n_lights)
+    for block in range(0, n, LANES):
         for l in range(n_lights):
-            for i in range(block, min(block + 16, n)):
-                for channel in range(3):
-                    images[l, first_pixel + i, channel] = sums[i, channel, l]
-    return bad, bad_light, bad_pixel
+            values = stored(images, gather(sums, step + np.int32(block * n_lights + l)))
+            if block + LANES <= n:
+                put_lanes(images, l * row + first + block, values)
+            else:
+                compress(lane_numbers() < np.int32(n - block), values, images, l * row + first + block)

@@ -50,6 +50,11 @@ class ImageFormat:
     quality: int = 95
     exposure: float = 0.0
 
+    @property
+    def composes_halves(self) -> bool:
+        """Whether images may be handed over as halves; with "auto" only those without values beyond 65504."""
+        return self.format == "exr" and self.half != "never"
+
     def __post_init__(self) -> None:
         _compression(self.compression)
         if self.half not in ("auto", "always", "never"):
@@ -60,14 +65,16 @@ class ImageFormat:
             raise ValueError(f"expected a quality from 1 to 100, got {self.quality}")
 
 
-def write_image(path: Path, image: Image, image_format: ImageFormat, attributes: Attributes | None = None) -> None:
+def write_image(
+    path: Path, image: Image | NDArray[np.float16], image_format: ImageFormat, attributes: Attributes | None = None
+) -> None:
     """Write one image, whole or not at all; equal images give equal bytes.
 
     Several threads may write different images at once.
 
     Args:
         path: the file; its suffix plays no part, `image_format.format` decides.
-        image: (h, w, 3), linear, finite.
+        image: (h, w, 3), linear, finite; one of halves, for EXR alone, is stored as it is, and not looked at.
         image_format: format and its options.
         attributes: EXR keeps all of them, PNG what is text or a number, TIFF the program's name, JPEG none.
 
@@ -77,8 +84,14 @@ def write_image(path: Path, image: Image, image_format: ImageFormat, attributes:
     """
     if image.ndim != 3 or image.shape[2] != 3:
         raise ValueError(f"{path}: expected an image of shape (h, w, 3), got {image.shape}")
-    largest = _largest(str(path), image)
     attributes = attributes or {}
+    if image.dtype == np.float16:
+        spec = _spec(image.shape, ["R", "G", "B"], ["half"] * 3, attributes)
+        spec.attribute("compression", _compression(image_format.compression))
+        _write_oiio(path, "openexr", spec, image)
+        return
+    image = np.asarray(image, np.float32)
+    largest = _largest(str(path), image)
     if image_format.format in ("png", "jpg"):
         exposed = image * np.float32(2.0**image_format.exposure) if image_format.exposure else image
         write_bytes(path, _encode8(srgb8_from_linear(exposed), image_format, attributes))

@@ -37,12 +37,14 @@ _ELEMENTS = {
     types.float64: ir.DoubleType(),
     types.int32: _WORD,
     types.uint8: ir.IntType(8),
+    types.uint16: ir.IntType(16),
     types.uint64: ir.IntType(64),
     types.boolean: ir.IntType(1),
 }
 _WHOLE = (types.int32, types.uint8, types.uint64)
-_SUFFIX = {types.float32: "f32", types.float64: "f64", types.int32: "i32"}
+_SUFFIX = {types.float32: "f32", types.float64: "f64", types.int32: "i32", types.uint16: "i16"}
 _FUSED = ("contract",)
+_LARGEST_HALF = 0x477FE000  # 65504 as the bits of a float32
 
 
 class Lanes(_Type):  # type: ignore[misc]
@@ -163,6 +165,38 @@ def _put_lanes_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(array, offset, value), codegen
+
+
+def _stored_of(typingctx: Any, array: Any, value: Any) -> Any:
+    """Float32 numbers as an array stores them: as they are, or in uint16 as the bits of halves.
+
+    A half is the nearest one, of two equally near ones the even; numbers beyond the largest half become that.
+    """
+    if array.dtype == types.float32:
+        return value(array, value), lambda context, builder, sig, args: args[1]
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        kind, reals = _vector(INTEGERS), _vector(sig.args[1])
+
+        def number(x: int) -> Any:
+            return ir.Constant(kind, [x] * LANES)
+
+        bits = builder.bitcast(args[1], kind)
+        sign = builder.and_(bits, number(-(1 << 31)))
+        size = builder.xor(bits, sign)
+        size = builder.select(builder.icmp_signed("<", size, number(_LARGEST_HALF)), size, number(_LARGEST_HALF))
+        # one step of float32 is the smallest half there: adding it rounds to what a subnormal half can hold
+        coarse = number((127 - 15 + 23 - 10 + 1) << 23)
+        small = builder.fadd(builder.bitcast(size, reals), builder.bitcast(coarse, reals))
+        small = builder.sub(builder.bitcast(small, kind), coarse)
+        odd = builder.and_(builder.lshr(size, number(13)), number(1))
+        normal = builder.add(builder.add(size, number(((15 - 127) << 23) + 0xFFF)), odd)
+        normal = builder.lshr(normal, number(13))
+        half = builder.select(builder.icmp_signed("<", size, number(113 << 23)), small, normal)
+        half = builder.or_(half, builder.lshr(sign, number(16)))
+        return builder.trunc(half, _vector(Lanes(types.uint16)))
+
+    return Lanes(types.uint16)(array, value), codegen
 
 
 def _gather_of(typingctx: Any, array: Any, offsets: Any) -> Any:
@@ -307,6 +341,7 @@ def _lane_numbers_of(typingctx: Any) -> Any:
 
 lanes_at: Any = intrinsic(_lanes_at_of)
 put_lanes: Any = intrinsic(_put_lanes_of)
+stored: Any = intrinsic(_stored_of)
 gather: Any = intrinsic(_gather_of)
 scatter: Any = intrinsic(_scatter_of)
 compress: Any = intrinsic(_compress_of)

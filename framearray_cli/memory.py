@@ -13,7 +13,7 @@ from .prepare import Prepared
 from .rays import room_for_hits
 from .terms.ambient import BATCH
 from .work import Work
-from .writer import BLOCKS
+from .writer import BLOCKS, image_format
 
 # Share of the free memory that frames under way may take unless the job says; the rest is for scene, files and others.
 FREE_SHARE = 2 / 3
@@ -86,7 +86,7 @@ def window_memory(prepared: Prepared, n_lights: int, mirror_share: float = 0.0) 
     per_hit = per_record + 16 * job.output.layers + frames * (8 if balance else 4)
     # a frame's mirror hits wait for N_r frames; twice while the lists of all batches are joined, and chains add some
     mirrored = mirror_share * job.specular.hits * (n_r + 3) * per_record
-    per_image_pixel = frames * frames * 4 + BLOCKS * 12 * n_lights
+    per_image_pixel = frames * frames * 4 + BLOCKS * (6 if image_format(job).composes_halves else 12) * n_lights
     return int(width * height * (held * per_hit + mirrored + per_image_pixel))
 
 

@@ -6,13 +6,14 @@ from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from . import __version__
 from .crew import Crew
 from .embree import Engine
 from .errors import OutputError
 from .filepatterns import file_patterns
 from .frame import find_frame
-from .images import ImageFormat
 from .job import Job
 from .jobfile import job_table
 from .manifest import Manifest, ManifestCamera, ManifestLight, matrix_rows, write_manifest
@@ -22,7 +23,7 @@ from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
 from .terms.ambient import Ambient
 from .window import Window
 from .work import Work
-from .writer import ArrayWriter
+from .writer import ArrayWriter, image_format
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,7 +134,7 @@ def _frames(
 
     job = prepared.job
     threads = job.render.threads or os.cpu_count() or 1
-    notes, hits = [], 0.0
+    notes, hits, stored = [], 0.0, image_format(job)
     crew = Crew(work, threads)
     if work.lights.n_lights < prepared.n_lights:
         ambient = ambient.for_lights(lights)
@@ -144,7 +145,7 @@ def _frames(
         prepared.eyes,
         job.camera.resolution,
         job.output.fps,
-        image_format(job),
+        stored,
         lights,
         threads,
         count,
@@ -154,11 +155,14 @@ def _frames(
             for c in range(work.n_frames):
                 window.add(find_frame(work, c, crew))
                 for j in window.complete():
-                    composed = window.compose(j, writer.block())
+                    block = writer.block()
+                    composed = window.compose(j, block)
+                    if composed.beyond and stored.half == "auto":  # too bright for halves: some images will be floats
+                        composed = window.compose(j, np.empty(block.shape, np.float32))
                     hits += float(composed.hits.mean())
                     if composed.bad:
                         notes.append(_bad_values(composed.bad, j, composed.first_bad, job.camera.resolution[0]))
-                    writer.write(composed, range(prepared.n_cameras) if prepared.still else range(j, j + 1))
+                    writer.write(composed, range(prepared.n_cameras) if prepared.still else range(j, j + 1), block)
             writer.finish()
     finally:
         crew.close()
@@ -178,14 +182,6 @@ def _summary(prepared: Prepared, ambient: Ambient, parts: list[_Part], seconds: 
         hits=parts[0].hits,
         peak_memory=peak_memory(),
         notes=(*ambient.notes, *(note for part in parts for note in part.notes)),
-    )
-
-
-def image_format(job: Job) -> ImageFormat:
-    """How the job wants its images stored."""
-    out = job.output
-    return ImageFormat(
-        format=out.format, compression=out.compression, half=out.half, quality=out.quality, exposure=out.exposure
     )
 
 

@@ -13,7 +13,7 @@ from time import perf_counter
 import numpy as np
 
 from .arrays import Float32, Images, Int32
-from .compose import INDIRECT, OBSCURANCE, Band, accumulate, begin, empty_band, finish, normalise
+from .compose import INDIRECT, OBSCURANCE, Band, accumulate, as_stored, begin, empty_band, finish, normalise
 from .crew import Crew, Scratch
 from .denoise import denoised
 from .frame import Frame, fill_holes
@@ -52,6 +52,7 @@ class Composed:
         images: (n_lights, height, width, 3) radiance.
         layers: None unless the job keeps them.
         hits: (n_pixels,) number of hits that each pixel rests on, native and outer.
+        beyond: number of values beyond the largest half; where images are halves, such values were cut to it.
         bad: number of values that were not finite or negative; each was replaced by 0.
         first_bad: light index and pixel of the first of them, or None.
     """
@@ -60,6 +61,7 @@ class Composed:
     images: Images
     layers: Layers | None
     hits: Int32
+    beyond: int
     bad: int
     first_bad: tuple[int, int] | None
 
@@ -103,10 +105,10 @@ class Window:
         """Compose frame j, once all frames of its window were added.
 
         Args:
-            images: (n_lights, height, width, 3), overwritten.
+            images: (n_lights, height, width, 3), overwritten; float32, or float16 where that is how they are stored.
         """
         work = self._work
-        flat = images.reshape(len(images), work.n_pixels, 3)
+        flat = as_stored(images.reshape(len(images), work.n_pixels, 3))
         maps = np.empty((work.n_pixels, 9), np.float32) if work.layers else None
         own = np.empty((work.n_pixels, 4), np.float32) if work.layers else None
         samples = np.empty(work.n_pixels, np.int32)
@@ -114,7 +116,7 @@ class Window:
         mirror_scale = self._mirror_scale(j, holes)
         smooth = self._smooth_indirect(j, holes[:1], images.shape[1:3]) if work.denoise else None
 
-        def band(first: int, scratch: Scratch) -> tuple[int, int, int]:
+        def band(first: int, scratch: Scratch) -> tuple[int, int, int, int]:
             started = perf_counter()
             n = min(BAND_PIXELS, work.n_pixels - first)
             sums = self._bands.pop()
@@ -145,8 +147,9 @@ class Window:
             images=images,
             layers=_layers(maps, own, samples, shape) if maps is not None and own is not None else None,
             hits=samples,
+            beyond=sum(result[3] for result in results),
             bad=bad,
-            first_bad=next(((l, pixel) for count, l, pixel in results if count), None),
+            first_bad=next(((l, pixel) for count, l, pixel, _ in results if count), None),
         )
 
     def _smooth_indirect(self, j: int, holes: list[tuple[Placed, Records]], shape: tuple[int, ...]) -> Float32:

@@ -12,11 +12,20 @@ import numpy as np
 from .arrays import Float32, Images
 from .imageattributes import Attributes, frame_attributes
 from .images import ImageFormat, write_image, write_layers
+from .job import Job
 from .paths import Eyes
 from .window import Composed, Layers
 
 # Blocks of images in memory: one is filled while the other is written.
 BLOCKS = 2
+
+
+def image_format(job: Job) -> ImageFormat:
+    """How the job wants its images stored."""
+    out = job.output
+    return ImageFormat(
+        format=out.format, compression=out.compression, half=out.half, quality=out.quality, exposure=out.exposure
+    )
 
 
 class ArrayWriter:
@@ -50,8 +59,10 @@ class ArrayWriter:
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="write")
         self._free: SimpleQueue[Images | BaseException] = SimpleQueue()
         width, height = resolution
+        shape = (len(lights), height, width, 3)
         for _ in range(BLOCKS):
-            self._free.put(np.empty((len(lights), height, width, 3), np.float32))
+            halves = image_format.composes_halves
+            self._free.put(np.empty(shape, np.float16) if halves else np.empty(shape, np.float32))
 
     def block(self) -> Images:
         """A block to compose a frame into, (n_lights, height, width, 3); waits until one is free.
@@ -68,8 +79,13 @@ class ArrayWriter:
         """Take a block back that is not to be written."""
         self._free.put(block)
 
-    def write(self, composed: Composed, cameras: range) -> None:
-        """Write a composed frame as that of each of the given cameras; its block is free when that is done."""
+    def write(self, composed: Composed, cameras: range, block: Images | None = None) -> None:
+        """Write a composed frame as that of each of the given cameras.
+
+        Args:
+            block: what is free when that is done; the frame's own images if None.
+        """
+        block = composed.images if block is None else block
         tasks = [self._pool.submit(self._write_image, composed, c, l) for c in cameras for l in self._lights]
         if composed.layers is not None:
             tasks += [self._pool.submit(self._write_layers, composed.layers, c) for c in cameras]
@@ -85,7 +101,7 @@ class ArrayWriter:
             try:
                 unfinished.get_nowait()
             except Empty:
-                self._free.put(composed.images)
+                self._free.put(block)
 
         for task in tasks:
             task.add_done_callback(done)

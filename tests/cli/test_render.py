@@ -4,9 +4,13 @@ import re
 import tomllib
 from pathlib import Path
 
+import numpy as np
+import OpenImageIO as oiio
 import pytest
 import tiny
 from program import finish, names, run, start, write_job
+
+from framearray_cli.images import read_image
 
 IMAGES = {f"tiny.c0000.l{l:03d}.png" for l in range(3)}
 FILES = IMAGES | {"tiny.layers.c0000.exr", "manifest.toml"}
@@ -156,3 +160,22 @@ def test_the_installed_command_and_the_module_are_the_same(tmp_path):
     told = finish(start("render", "-q", write_job(tmp_path)))
     assert (told.code, told.out, told.err) == (0, "", "")
     assert names(tmp_path / "out") == FILES
+
+
+@pytest.mark.parametrize(("irradiance", "kinds"), [(3.0, {"half"}), (3e5, {"half", "float"})])
+def test_images_are_halves_unless_they_are_too_bright(tmp_path, capsys, irradiance, kinds):
+    """Halves are composed as they are written; a frame too bright for them is composed again."""
+    keys = [{"frame": k, "direction": [-0.6, -1.0, -0.3], "irradiance": [i] * 3} for k, i in ((0, 3), (1, irradiance))]
+    light = {"frames": 2, "sources": [{"type": "directional", "keys": keys}]}
+    found = {}
+    for half in ("auto", "never"):
+        output = {"format": "exr", "half": half, "directory": half, "layers": False}
+        assert run(capsys, "render", write_job(tmp_path, light=light, output=output)).code == 0
+        found[half] = {f.name: f for f in (tmp_path / half).glob("*.exr")}
+    stored = set()
+    for name, file in found["auto"].items():
+        kind = str(oiio.ImageInput.open(str(file)).spec().format)
+        exact = read_image(found["never"][name])
+        np.testing.assert_array_equal(read_image(file), exact.astype(np.float16) if kind == "half" else exact)
+        stored.add(kind)
+    assert stored == kinds

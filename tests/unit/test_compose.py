@@ -12,6 +12,7 @@ from framearray_cli.compose import (
     WEIGHT,
     Band,
     accumulate,
+    as_stored,
     begin,
     empty_band,
     finish,
@@ -80,15 +81,17 @@ def lights() -> tuple[Any, Any]:
     return rng.random((3, N_LIGHTS)).astype(np.float32), rng.random((3, N_LIGHTS)).astype(np.float32)
 
 
-def composed(case: Case, bands: Any = ((0, N_PIXELS),)) -> tuple[Any, list[tuple[int, int, int]]]:
-    colour, ambient = lights()
-    images, bad = np.full((N_LIGHTS, N_PIXELS, 3), np.nan, np.float32), []
+def composed(
+    case: Case, bands: Any = ((0, N_PIXELS),), dtype: Any = np.float32, brightness: float = 1.0
+) -> tuple[Any, list[tuple[int, int, int, int]]]:
+    colour, ambient = (np.float32(brightness) * values for values in lights())
+    images, bad = np.full((N_LIGHTS, N_PIXELS, 3), np.nan, dtype), []
     band = empty_band(N_PIXELS, N_LIGHTS)
     for first, n in bands:
         begin(band, n)
         case.add(band, first, n)
         normalise(band, n)
-        bad.append(finish(band, first, n, colour, ambient, np.float32(0), images))
+        bad.append(finish(band, first, n, colour, ambient, np.float32(0), as_stored(images)))
     return images, bad
 
 
@@ -100,7 +103,7 @@ def test_images_are_weighed_means(channels: int, constant: bool, weighed: bool) 
     images, bad = composed(case)
     # some tens of terms of one sign, each a few roundings
     np.testing.assert_allclose(images, case.picture(*lights()), rtol=5e-6)
-    assert bad == [(0, -1, -1)]
+    assert bad == [(0, -1, -1, 0)]
 
 
 def test_sums_of_a_band() -> None:
@@ -128,6 +131,20 @@ def test_sums_of_a_band() -> None:
 @pytest.mark.parametrize("bands", [[(0, 1), (1, 39)], [(0, 16), (16, 16), (32, 8)], [(35, 5), (0, 35)]])
 def test_bands_of_any_size_give_the_same(bands: Any) -> None:
     np.testing.assert_array_equal(composed(Case(1), bands)[0], composed(Case(1))[0])
+
+
+@pytest.mark.parametrize("bands", [[(0, 40)], [(0, 1), (1, 39)], [(0, 3), (3, 37)]])
+def test_halves_are_the_nearest_ones(bands: Any) -> None:
+    images, bad = composed(Case(1), bands, np.float16)
+    np.testing.assert_array_equal(images, composed(Case(1))[0].astype(np.float16))
+    assert sum(entry[3] for entry in bad) == 0
+
+
+def test_values_beyond_the_largest_half_are_cut_and_counted() -> None:
+    exact = composed(Case(1), brightness=1e6)[0]
+    images, bad = composed(Case(1), dtype=np.float16, brightness=1e6)
+    np.testing.assert_array_equal(images, np.minimum(exact, 65504).astype(np.float16))
+    assert bad[0][3] == (exact > 65504).sum() > 0 and bad[0][0] == 0
 
 
 def test_a_scale_a_pixel_multiplies_all_its_hits() -> None:
@@ -165,10 +182,10 @@ def test_what_is_not_a_radiance_is_counted_located_and_black(value: float) -> No
     with np.errstate(over="ignore"):
         images, bad = composed(case)
     if value == 3e38:  # large, but a number: it stays
-        assert bad == [(1, 5, 21)]
+        assert bad == [(1, 5, 21, 1)]
         assert images[4, 21, 1] > 1e34
     else:
         expected = 1 if value == -1.0 else 2  # -1 drowns in the pixel's other light
-        assert bad[0] == (expected, 5 if value == -1.0 else 4, 21)
+        assert bad[0] == (expected, 5 if value == -1.0 else 4, 21, 0)
     assert images[5, 21, 2] == 0
     assert np.isfinite(images).all() and (images >= 0).all()
