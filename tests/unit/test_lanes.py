@@ -1,0 +1,533 @@
+"""Sixteen numbers at a time: every operation against numpy, and functions of lanes against those of one number."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numba as nb
+import numpy as np
+import pytest
+import tiny
+
+from framearray_cli.camera import OUTSIDE, Cameras, project
+from framearray_cli.kernel import inlined, kernel
+from framearray_cli.lanes import (
+    LANES,
+    bits,
+    choose,
+    compress,
+    count,
+    doubles,
+    floor,
+    gather,
+    integers,
+    lane_numbers,
+    lanes_at,
+    lowest,
+    put_lanes,
+    reals,
+    root,
+    scatter,
+)
+from framearray_cli.sampling import above, cosine_direction, disc
+from framearray_cli.surface import (
+    Surfaces,
+    geometric_normal,
+    position_at,
+    reflectivity_at,
+    shading_normal,
+    specular_at,
+    surfaces,
+    texture_at,
+)
+
+ULP = 2.0**-23  # one float32 rounding, of a number of size 1, is at most half of it
+FEW = 8 * ULP
+ODD = 3  # a flat offset that no packet starts at
+READ, WRITTEN = np.s_[ODD : ODD + LANES], np.s_[5 : 5 + LANES]
+
+
+def fresh(dtype: Any, n: int = 2 * LANES) -> Any:
+    """Numbers that a test recognises if they are still there."""
+    return np.full(n, 77, dtype)
+
+
+def only_changed(array: Any, at: slice) -> Any:
+    """What stands in a place, after a look that nothing else was written."""
+    rest = np.ones(len(array), bool)
+    rest[at] = False
+    assert (array[rest] == 77).all()
+    return array[at]
+
+
+def flagged(number: int) -> Any:
+    """(16,) what `bits` tells, one flag a lane."""
+    return (number >> np.arange(LANES)) & 1 == 1
+
+
+@kernel
+def with_reals(a: Any, b: Any, one: Any, out: Any, told: Any) -> None:
+    """Operators of reals; `one` is a number of the same dtype."""
+    x, y = lanes_at(a, 3), lanes_at(b, 3)
+    put_lanes(out, 0, x + y)
+    put_lanes(out, 16, x - y)
+    put_lanes(out, 32, x * y)
+    put_lanes(out, 48, x / y)
+    put_lanes(out, 64, -x)
+    put_lanes(out, 80, root(x))
+    put_lanes(out, 96, floor(x))
+    put_lanes(out, 112, choose(x < y, x, one))
+    put_lanes(out, 128, choose(x < y, one, y))
+    put_lanes(out, 144, x + 2)  # numbers of other dtypes, on either side
+    put_lanes(out, 160, 1 - x)
+    put_lanes(out, 176, one)
+    total = x
+    for _ in range(3):
+        total = total + y
+    put_lanes(out, 192, total)
+    for i in range(16):
+        out[208 + i] = root(a[3 + i])
+        out[224 + i] = floor(a[3 + i])
+        out[240 + i] = choose(a[3 + i] < b[3 + i], a[3 + i], b[3 + i])
+    less, more = x < y, x > y
+    told[0], told[1], told[2] = bits(less), bits(x <= y), bits(more)
+    told[3], told[4], told[5] = bits(x >= y), bits(x == y), bits(less | more)
+    told[6], told[7], told[8] = bits(less & more), bits(~less), bits(less ^ (x <= y))
+    told[9], told[10] = bits(x < one), bits(one < x)
+    told[11], told[12] = count(less), count(a[3] < b[3])
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_reals_are_those_of_numpy(dtype: Any) -> None:
+    a, b = np.random.default_rng(1).normal(size=(2, 2 * LANES)).astype(dtype) * 9
+    a[3:11] = (np.nan, 1, np.inf, -0.0, np.finfo(dtype).smallest_subnormal, -np.inf, np.nan, 2.5)
+    b[3:11] = (1, np.nan, np.inf, 0.0, 0.5, np.inf, np.nan, 2.5)
+    one, out, told = dtype(0.75), fresh(dtype, 272), np.zeros(13, np.int64)
+    with_reals(a, b, one, out, told)
+    x, y = a[READ], b[READ]
+    with np.errstate(all="ignore"):
+        expected = [x + y, x - y, x * y, x / y, -x, np.sqrt(x), np.floor(x), np.where(x < y, x, one)]
+        expected += [np.where(x < y, one, y), x + dtype(2), dtype(1) - x, np.full(LANES, one), ((x + y) + y) + y]
+        expected += [np.sqrt(x), np.floor(x), np.where(x < y, x, y)]
+    np.testing.assert_array_equal(out[:256].reshape(16, LANES), expected)
+    np.testing.assert_array_equal(np.signbit(out[64:80]), np.signbit(-x))
+    assert (out[256:] == 77).all()
+    less, same, more = x < y, x == y, x > y  # each false for nan
+    flags = [less, less | same, more, more | same, same, less | more, less & more, ~less, same, x < one, one < x]
+    np.testing.assert_array_equal([flagged(number) for number in told[:11]], flags)
+    assert told[11] == less.sum() and told[12] == less[0]
+
+
+@kernel
+def with_integers(a: Any, b: Any, out: Any, told: Any) -> None:
+    x, y = lanes_at(a, 3), lanes_at(b, 3)
+    put_lanes(out, 0, x + y)
+    put_lanes(out, 16, x - y)
+    put_lanes(out, 32, x * y)
+    put_lanes(out, 48, x & y)
+    put_lanes(out, 64, x | y)
+    put_lanes(out, 80, x ^ y)
+    put_lanes(out, 96, ~x)
+    put_lanes(out, 112, -x)
+    put_lanes(out, 128, x >> 5)
+    put_lanes(out, 144, choose(x == y, x, 3))
+    told[0], told[1] = bits(x == y), bits(x == 9)
+
+
+@pytest.mark.parametrize("dtype", [np.int32, np.uint8, np.uint64])
+def test_integers_are_those_of_numpy_and_shifts_bring_in_zeros(dtype: Any) -> None:
+    info = np.iinfo(dtype)
+    a, b = np.random.default_rng(2).integers(info.min, info.max, (2, 2 * LANES), dtype, endpoint=True)
+    a[3:7], b[3:7] = (info.min, info.max, 9, 0), (info.max, info.max, 9, 0)
+    out, told = fresh(dtype, 176), np.zeros(2, np.int64)
+    with_integers(a, b, out, told)
+    x, y = a[READ], b[READ]
+    shifted = (x.view(f"u{x.itemsize}") >> dtype(5).view(f"u{x.itemsize}")).view(dtype)
+    expected = [x + y, x - y, x * y, x & y, x | y, x ^ y, ~x, np.zeros_like(x) - x, shifted, np.where(x == y, x, 3)]
+    np.testing.assert_array_equal(out[:160].reshape(10, LANES), np.array(expected, dtype))
+    assert (out[160:] == 77).all()
+    np.testing.assert_array_equal([flagged(number) for number in told], [x == y, x == 9])
+
+
+@kernel
+def with_signs(a: Any, b: Any, told: Any) -> None:
+    x, y = lanes_at(a, 3), lanes_at(b, 3)
+    told[0], told[1], told[2], told[3] = bits(x < y), bits(x <= y), bits(x > y), bits(x >= 5)
+
+
+def test_int32_has_an_order() -> None:
+    a, b = np.random.default_rng(3).integers(-9, 9, (2, 2 * LANES), np.int32)
+    told = np.zeros(4, np.int64)
+    with_signs(a, b, told)
+    x, y = a[READ], b[READ]
+    np.testing.assert_array_equal([flagged(number) for number in told], [x < y, x <= y, x > y, x >= 5])
+
+
+@kernel
+def convert(f: Any, d: Any, i: Any, b: Any, u: Any, to_f: Any, to_d: Any, to_i: Any) -> None:
+    """Each conversion of lanes (rows of 16), and in the row behind it of one number at a time."""
+    put_lanes(to_f, 0, reals(lanes_at(f, 3)))
+    put_lanes(to_f, 32, reals(lanes_at(d, 3)))
+    put_lanes(to_f, 64, reals(lanes_at(i, 3)))
+    put_lanes(to_d, 0, doubles(lanes_at(f, 3)))
+    put_lanes(to_d, 32, doubles(lanes_at(d, 3)))
+    put_lanes(to_d, 64, doubles(lanes_at(i, 3)))
+    put_lanes(to_i, 0, integers(lanes_at(f, 3)))
+    put_lanes(to_i, 32, integers(lanes_at(d, 3)))
+    put_lanes(to_i, 64, integers(lanes_at(i, 3)))
+    put_lanes(to_i, 96, integers(lanes_at(b, 3)))
+    put_lanes(to_i, 128, integers(lanes_at(u, 3)))
+    put_lanes(to_i, 160, lane_numbers())
+    put_lanes(to_i, 176, integers(2.9))
+    for k in range(16):
+        to_f[16 + k], to_f[48 + k], to_f[80 + k] = reals(f[3 + k]), reals(d[3 + k]), reals(i[3 + k])
+        to_d[16 + k], to_d[48 + k], to_d[80 + k] = doubles(f[3 + k]), doubles(d[3 + k]), doubles(i[3 + k])
+        to_i[16 + k], to_i[48 + k], to_i[80 + k] = integers(f[3 + k]), integers(d[3 + k]), integers(i[3 + k])
+        to_i[112 + k], to_i[144 + k] = integers(b[3 + k]), integers(u[3 + k])
+
+
+def test_conversions_are_those_of_numpy_for_lanes_and_for_numbers() -> None:
+    rng = np.random.default_rng(4)
+    d = rng.normal(size=2 * LANES) * 1e6
+    d[3:6] = (-0.5, 2.0**31 - 1, -(2.0**31))
+    f = (rng.normal(size=2 * LANES) * 1e6).astype(np.float32)
+    i = rng.integers(-(2**31), 2**31, 2 * LANES, np.int32)
+    b = rng.integers(0, 256, 2 * LANES, np.uint8)
+    b[3] = 255
+    u = rng.integers(0, 2**64, 2 * LANES, np.uint64)
+    to_f, to_d, to_i = fresh(np.float32, 96), fresh(np.float64, 96), fresh(np.int32, 192)
+    convert(f, d, i, b, u, to_f, to_d, to_i)
+    for found, sources in ((to_f, (f, d, i)), (to_d, (f, d, i)), (to_i, (f, d, i, b, u))):
+        for source, (lanes, numbers) in zip(sources, found.reshape(-1, 2, LANES), strict=False):
+            np.testing.assert_array_equal(lanes, source[READ].astype(found.dtype))
+            np.testing.assert_array_equal(numbers, lanes)
+    np.testing.assert_array_equal(to_i[160:176], np.arange(LANES))
+    np.testing.assert_array_equal(to_i[176:], 2)
+
+
+@kernel
+def move(source: Any, at: Any, to: Any, put: Any, gathered: Any, one_by_one: Any, scattered: Any) -> None:
+    put_lanes(put, 5, lanes_at(source, 3))
+    found = gather(source, lanes_at(at, 3))
+    put_lanes(gathered, 5, found)
+    for k in range(16):
+        one_by_one[5 + k] = gather(source, at[3 + k])
+    scatter(scattered, lanes_at(to, 1), found)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int32, np.uint8, np.uint64])
+def test_lanes_are_read_and_written_where_they_belong(dtype: Any) -> None:
+    rng = np.random.default_rng(5)
+    source = rng.integers(0, 256, 60).astype(dtype)
+    at = rng.integers(0, 60, 2 * LANES, np.int32)
+    at[3:6] = (59, 0, 59)
+    to = rng.permutation(60)[: 2 * LANES].astype(np.int32)
+    put, gathered, one_by_one, scattered = fresh(dtype), fresh(dtype), fresh(dtype), fresh(dtype, 60)
+    move(source, at, to, put, gathered, one_by_one, scattered)
+    np.testing.assert_array_equal(only_changed(put, WRITTEN), source[READ])
+    np.testing.assert_array_equal(only_changed(gathered, WRITTEN), source[at[READ]])
+    np.testing.assert_array_equal(only_changed(one_by_one, WRITTEN), source[at[READ]])
+    expected = fresh(dtype, 60)
+    expected[to[1 : 1 + LANES]] = source[at[READ]]
+    np.testing.assert_array_equal(scattered, expected)
+
+
+def test_arrays_of_more_dimensions_are_counted_flat() -> None:
+    source, put = np.arange(60, dtype=np.float32).reshape(5, 4, 3), fresh(np.float32, 40).reshape(2, 20)
+    at = np.arange(2 * LANES, dtype=np.int32) + 20
+    move(source, at, at, put, fresh(np.float32), fresh(np.float32), fresh(np.float32, 60))
+    np.testing.assert_array_equal(only_changed(put.reshape(40), WRITTEN), np.arange(3, 19))
+
+
+def test_of_two_lanes_at_one_place_the_later_stays() -> None:
+    source, scattered = np.arange(60, dtype=np.float32), fresh(np.float32, 60)
+    at, to = np.arange(2 * LANES, dtype=np.int32), np.zeros(2 * LANES, np.int32)
+    move(source, at, to, fresh(np.float32), fresh(np.float32), fresh(np.float32), scattered)
+    assert scattered[0] == ODD + LANES - 1 and (scattered[1:] == 77).all()
+
+
+@kernel
+def pick(mask: Any, f: Any, d: Any, i: Any, out_f: Any, out_d: Any, out_i: Any, told: Any) -> None:
+    flags = lanes_at(mask, 0) > 0
+    compress(flags, lanes_at(f, 3), out_f, 5)
+    compress(flags, lanes_at(d, 3), out_d, 5)
+    compress(flags, lanes_at(i, 3), out_i, 5)
+    told[0], told[1], told[2] = count(flags), bits(flags), lowest(bits(flags))
+
+
+@pytest.mark.parametrize("lanes", [[], [0], [15], [1, 4, 5, 11], list(range(LANES))])
+def test_compress_writes_the_flagged_lanes_and_nothing_else(lanes: list[int]) -> None:
+    mask = np.zeros(LANES, np.int32)
+    mask[lanes] = 1
+    arrays = [np.random.default_rng(6).integers(-99, 70, 2 * LANES).astype(t) for t in (np.float32, "f8", np.int32)]
+    outs, told = [fresh(array.dtype) for array in arrays], np.zeros(3, np.int64)
+    pick(mask, *arrays, *outs, told)
+    for array, out in zip(arrays, outs, strict=True):
+        written = only_changed(out, np.s_[5 : 5 + len(lanes)])
+        np.testing.assert_array_equal(written, array[READ][lanes])
+    assert told.tolist() == [len(lanes), sum(1 << lane for lane in lanes), lanes[0] if lanes else 64]
+
+
+MISUSES: dict[str, Callable[..., Any]] = {
+    "float32 + float64": lambda f, d, i: put_lanes(f, 0, lanes_at(f, 0) + lanes_at(d, 0)),
+    "float32 * int32": lambda f, d, i: put_lanes(f, 0, lanes_at(f, 0) * lanes_at(i, 0)),
+    "float32 < int32": lambda f, d, i: count(lanes_at(f, 0) < lanes_at(i, 0)),
+    "flags & int32": lambda f, d, i: count((lanes_at(f, 0) < 1.0) & lanes_at(i, 0)),
+    "lanes + an array": lambda f, d, i: put_lanes(f, 0, lanes_at(f, 0) + f),
+    "lanes !=": lambda f, d, i: count(lanes_at(f, 0) != lanes_at(f, 1)),
+    "if lanes": lambda f, d, i: 1 if lanes_at(f, 0) < 1.0 else 2,
+}
+
+
+@pytest.mark.parametrize("misuse", MISUSES)
+def test_misuse_is_a_typing_error(misuse: str) -> None:
+    arrays = [np.zeros(2 * LANES, dtype) for dtype in (np.float32, np.float64, np.int32)]
+    with pytest.raises(nb.TypingError):
+        nb.njit(MISUSES[misuse])(*arrays)
+
+
+@kernel
+def sample_numbers(normal: Any, way: Any, uv: Any, out: Any) -> None:
+    for i in range(uv.shape[1]):
+        u, v, gx, gy, gz = uv[0, i], uv[1, i], normal[0, i], normal[1, i], normal[2, i]
+        out[0, i], out[1, i] = disc(u, v)
+        out[2, i], out[3, i], out[4, i] = cosine_direction(gx, gy, gz, u, v)
+        out[5, i], out[6, i], out[7, i] = above(way[0, i], way[1, i], way[2, i], gx, gy, gz)
+
+
+@kernel
+def sample_lanes(normal: Any, way: Any, uv: Any, out: Any) -> None:
+    n = uv.shape[1]
+    for i in range(0, n, LANES):
+        u, v = lanes_at(uv, i), lanes_at(uv, n + i)
+        gx, gy, gz = lanes_at(normal, i), lanes_at(normal, n + i), lanes_at(normal, 2 * n + i)
+        a, b = disc(u, v)
+        x, y, z = cosine_direction(gx, gy, gz, u, v)
+        dx, dy, dz = above(lanes_at(way, i), lanes_at(way, n + i), lanes_at(way, 2 * n + i), gx, gy, gz)
+        put_lanes(out, i, a)
+        put_lanes(out, n + i, b)
+        put_lanes(out, 2 * n + i, x)
+        put_lanes(out, 3 * n + i, y)
+        put_lanes(out, 4 * n + i, z)
+        put_lanes(out, 5 * n + i, dx)
+        put_lanes(out, 6 * n + i, dy)
+        put_lanes(out, 7 * n + i, dz)
+
+
+def units(rng: Any, n: int) -> Any:
+    """(3, n) directions."""
+    found = rng.normal(size=(3, n))
+    return (found / np.linalg.norm(found, axis=0)).astype(np.float32)
+
+
+def test_directions_of_lanes_are_those_of_numbers() -> None:
+    rng, n = np.random.default_rng(7), 64 * LANES
+    uv = (rng.integers(0, 2**24, (2, n)) * 2.0**-24).astype(np.float32)
+    edges = np.float32([0, 0.25, 0.5, 0.75, 1 - 2.0**-24])
+    uv[:, :25] = np.reshape(np.meshgrid(edges, edges), (2, 25))
+    uv[1, 25:50] = uv[0, 25:50]  # on the diagonal, where the map changes over
+    normal, way = units(rng, n), units(rng, n)
+    normal[:, 10:16] = np.float32([[0, 0, 1], [0, 0, -1], [1, 0, 0], [1, 0, -0.0], [0, 1, -1e-8], [1e-4, 0, -1]]).T
+    way[:, 50:60] = -normal[:, 50:60]  # straight below
+    numbers, lanes = np.full((2, 8, n), np.nan, np.float32)
+    sample_numbers(normal, way, uv, numbers)
+    sample_lanes(normal, way, uv, lanes)
+    np.testing.assert_allclose(lanes[[0, 1, 5, 6, 7]], numbers[[0, 1, 5, 6, 7]], rtol=0, atol=FEW)
+    # The height above the surface is a root, which makes more of a rounding near 0: its square does not.
+    parts = []
+    for found in (numbers, lanes):
+        height = (found[2:5].astype(np.float64) * normal).sum(axis=0)
+        parts.append((height * height, found[2:5] - height * normal))
+    np.testing.assert_allclose(parts[1][0], parts[0][0], rtol=0, atol=2 * FEW)
+    np.testing.assert_allclose(parts[1][1], parts[0][1], rtol=0, atol=FEW)
+
+
+@kernel
+def texture_numbers(s: Surfaces, texture: Any, uv: Any, out: Any) -> None:
+    for i in range(uv.shape[1]):
+        out[0, i], out[1, i], out[2, i], out[3, i] = texture_at(s, texture[i], uv[0, i], uv[1, i])
+
+
+@kernel
+def texture_lanes(s: Surfaces, texture: Any, uv: Any, out: Any) -> None:
+    n = uv.shape[1]
+    for i in range(0, n, LANES):
+        r, g, b, a = texture_at(s, lanes_at(texture, i), lanes_at(uv, i), lanes_at(uv, n + i))
+        put_lanes(out, i, r)
+        put_lanes(out, n + i, g)
+        put_lanes(out, 2 * n + i, b)
+        put_lanes(out, 3 * n + i, a)
+
+
+def test_textures_of_lanes_are_those_of_numbers() -> None:
+    """Inside, below 0, on texel borders and centres, beside 0, and where there is no texel."""
+    rng = np.random.default_rng(8)
+    texels = rng.integers(0, 256, (3, 5, 4), dtype=np.uint8), rng.integers(0, 256, (8, 8, 4), dtype=np.uint8)
+    one = surfaces(tiny.scene_of(tiny.quad((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)), textures=texels))
+    coordinates = np.concatenate(
+        [
+            np.arange(-20, 21) / 16,
+            np.arange(-10, 11) / 10,
+            np.arange(-6, 7) / 6,
+            [1e-30, -1e-30, -1e-9, 0.99999994, 1e9, -1e30, np.inf, -np.inf, np.nan],
+            rng.normal(size=12) * 3,
+        ]
+    ).astype(np.float32)
+    assert len(coordinates) % LANES == 0
+    uv = np.ascontiguousarray(np.reshape(np.meshgrid(coordinates, coordinates), (2, -1)))
+    texture = rng.integers(0, 2, uv.shape[1]).astype(np.int32)
+    numbers, lanes = np.full((2, 4, uv.shape[1]), np.nan)
+    texture_numbers(one, texture, uv, numbers)
+    texture_lanes(one, texture, uv, lanes)
+    assert np.isfinite(numbers).all() and numbers.std() > 0.1
+    np.testing.assert_allclose(lanes, numbers, rtol=0, atol=1e-13)  # float64: some hundred roundings
+
+
+@inlined
+def everything(s: Surfaces, triangle: Any, u: Any, v: Any, dx: Any, dy: Any, dz: Any) -> Any:
+    gx, gy, gz = geometric_normal(s, triangle, dx, dy, dz)
+    shading = shading_normal(s, triangle, u, v, gx, gy, gz)
+    return (
+        position_at(s, triangle, u, v),
+        (gx, gy, gz),
+        shading,
+        reflectivity_at(s, triangle, u, v),
+        specular_at(s, triangle, u, v),
+    )
+
+
+@kernel
+def find_numbers(s: Surfaces, triangle: Any, uv: Any, way: Any, out: Any) -> None:
+    for i in range(uv.shape[1]):
+        found = everything(s, triangle[i], uv[0, i], uv[1, i], way[0, i], way[1, i], way[2, i])
+        for k in range(5):
+            for axis in range(3):
+                out[k, axis, i] = found[k][axis]
+
+
+@kernel
+def find_lanes(s: Surfaces, triangle: Any, uv: Any, way: Any, out: Any) -> None:
+    n = uv.shape[1]
+    for i in range(0, n, LANES):
+        x, y, z = lanes_at(way, i), lanes_at(way, n + i), lanes_at(way, 2 * n + i)
+        found = everything(s, lanes_at(triangle, i), lanes_at(uv, i), lanes_at(uv, n + i), x, y, z)
+        for k in range(5):
+            for axis in range(3):
+                put_lanes(out, (3 * k + axis) * n + i, found[k][axis])
+
+
+def nasty_room() -> Any:
+    """Surfaces of the room with tiny triangles, tilted normals that cancel on every fifth triangle at (1/2, 0), and
+    texture coordinates that are negative, on texel borders and not finite."""
+    rng, s = np.random.default_rng(9), surfaces(tiny.room())
+    n = len(s.corners)
+    size = np.tile(np.float32([1, 1e-4, 1e-12, 1e4]), n)[:n, None, None]
+    corners = np.ascontiguousarray(s.corners * size)
+    a, b, c = (s.corners[:, k].astype(np.float64) for k in range(3))
+    geometric = np.cross(b - a, c - a)
+    geometric /= np.linalg.norm(geometric, axis=-1, keepdims=True)
+    normals = geometric[:, None] + 0.7 * units(rng, 3 * n).T.reshape(n, 3, 3)
+    normals = np.ascontiguousarray(normals / np.linalg.norm(normals, axis=-1, keepdims=True), np.float32)
+    normals[::5, 1] = -normals[::5, 0]
+    uvs = (rng.integers(-16, 17, (n, 3, 2)) / 8).astype(np.float32)
+    uvs[::7] += rng.random((len(uvs[::7]), 3, 2), np.float32)
+    uvs[::11, 1, 0], uvs[5::11, 0, 1] = np.nan, np.inf
+    assert len(s.colours) == n and (s.reflectivity_texture >= 0).any()
+    texture = np.where(np.arange(len(s.material)) % 2, 0, s.reflectivity_texture[s.material]).astype(np.int32)
+    # a material a triangle, so that textured and plain ones are neighbours
+    material = np.arange(n, dtype=np.int32)
+    reflectivity, specular = s.reflectivity[s.material], s.specular[s.material]
+    specular[::3] = (0.5, 0.25, 0.75)
+    return s._replace(
+        corners=corners, normals=normals, uvs=uvs, material=material, reflectivity=reflectivity, specular=specular,
+        reflectivity_texture=texture, specular_texture=texture[::-1].copy(),
+    )  # fmt: skip
+
+
+def test_what_lanes_find_on_triangles_is_what_numbers_find() -> None:
+    rng, s = np.random.default_rng(10), nasty_room()
+    n = 64 * LANES
+    triangle = rng.integers(0, len(s.corners), n).astype(np.int32)
+    triangle[: n // 2].sort()
+    uv = np.ascontiguousarray(rng.dirichlet((0.5, 0.5, 0.5), n)[:, :2].T.astype(np.float32))
+    cancel = triangle % 5 == 0
+    uv[:, cancel] = ((0.5,), (0.0,))
+    corner = np.flatnonzero(~cancel)[:99]
+    uv[:, corner] = np.float32([[0, 0], [1, 0], [0, 1]])[rng.integers(0, 3, 99)].T
+    way = units(rng, n) * np.float32(3)
+    numbers, lanes = np.full((2, 5, 3, n), np.nan, np.float32)
+    find_numbers(s, triangle, uv, way, numbers)
+    find_lanes(s, triangle, uv, way, lanes)
+    assert np.isfinite(numbers).all() and all(part.std() > 0.1 for part in numbers[1:])
+    off = abs(lanes - numbers)
+    largest = abs(s.corners[triangle]).max(axis=(1, 2))
+    assert (off[0] <= ULP * largest).all(), "float64 until the last rounding"
+    assert (off[1] <= ULP).all(), "float64 until the last rounding"
+    np.testing.assert_array_equal(lanes[2][:, cancel], lanes[1][:, cancel])
+    np.testing.assert_array_equal(numbers[2][:, cancel], numbers[1][:, cancel])
+    weights = np.stack([1 - uv.sum(axis=0, dtype=np.float64), *uv])
+    length = np.linalg.norm(np.einsum("kn,nka->na", weights, s.normals[triangle]), axis=1)
+    assert length[~cancel].min() > 0.1
+    assert (off[2] * length <= FEW)[:, ~cancel].all()
+    # three roundings of coordinates up to 4, by 8 texels of contrast 1 in two directions, and those of the product
+    assert (off[3:] <= 3 * 2 * ULP * 8 * 2 + FEW).all()
+
+
+@kernel
+def project_numbers(cams: Cameras, k: int, points: Any, pixel: Any, depth: Any) -> None:
+    for i in range(points.shape[1]):
+        pixel[i], depth[i] = project(cams, k, points[0, i], points[1, i], points[2, i])
+
+
+@kernel
+def project_lanes(cams: Cameras, k: int, points: Any, pixel: Any, depth: Any) -> None:
+    n = points.shape[1]
+    for i in range(0, n, LANES):
+        seen, far = project(cams, k, lanes_at(points, i), lanes_at(points, n + i), lanes_at(points, 2 * n + i))
+        put_lanes(pixel, i, seen)
+        put_lanes(depth, i, far)
+
+
+def projected(cams: Cameras, k: int, points: Any) -> Any:
+    """Pixels and depths, (2, n) each: of numbers, of lanes."""
+    pixel, depth = fresh(np.int32, (2, points.shape[1])), np.zeros((2, points.shape[1]), np.float32)
+    for row, run in enumerate((project_numbers, project_lanes)):
+        run(cams, k, points, pixel[row], depth[row])
+    return pixel, depth
+
+
+def two_eyes() -> Cameras:
+    """One that looks along -z, one that is turned; 8 pixels of focal length, 24 x 18 pixels."""
+    turned, _ = np.linalg.qr(np.random.default_rng(11).normal(size=(3, 3)))
+    right, up, forward = (np.float32([e, q]) for e, q in zip(np.diag([1, 1, -1]), turned, strict=True))
+    return Cameras(np.zeros((2, 3), np.float32), right, up, forward, 8.0, 24, 18)
+
+
+def test_lanes_on_borders_of_pixels_are_seen_where_numbers_are() -> None:
+    """Everything is exact here."""
+    x, y = np.meshgrid(np.arange(-14, 18) / 8, np.arange(-11, 12) / 8)
+    x, y = x.ravel(), y.ravel()
+    at = [np.stack([x * far, y * far, np.full_like(x, -far)]) for far in (1, 2, -1, 0)]
+    points = np.ascontiguousarray(np.concatenate(at, axis=1), np.float32)
+    points[:, -4:] = [[np.nan, 0, 0, np.inf], [0, np.nan, 0, 0], [-1, -1, np.nan, -1]]
+    points[:, 368] = (0, 0, -np.inf)
+    assert points.shape[1] % LANES == 0
+    pixel, depth = projected(two_eyes(), 0, points)
+    np.testing.assert_array_equal(pixel[1], pixel[0])
+    np.testing.assert_array_equal(depth[1], depth[0])
+    assert set(pixel[0]) == {OUTSIDE, *range(24 * 18)}
+    assert (pixel[0, 2 * len(x) :] == OUTSIDE).all()
+
+
+def test_lanes_are_seen_where_numbers_are() -> None:
+    points = np.random.default_rng(12).normal(size=(3, 256 * LANES)).astype(np.float32)
+    cams = two_eyes()
+    pixel, depth = projected(cams, 1, points)
+    length = np.linalg.norm(points, axis=0)
+    assert (abs(depth[1] - depth[0]) <= FEW * length).all()
+    z = cams.forward[1].astype(np.float64) @ points
+    image = np.stack([12 + 8 * (cams.right[1] @ points) / z, 9 - 8 * (cams.up[1] @ points) / z])
+    # by how much rounding may move a point in the image; what is nearer to a pixel's border may change sides
+    moved = 8 * FEW * length / abs(z) * (1 + abs(image - [[12], [9]]) / 8)
+    clear = (abs(image - np.round(image)) > moved).all(axis=0) & (abs(z) > FEW * length)
+    assert clear.mean() > 0.99 and (pixel[0] != OUTSIDE).mean() > 0.2
+    np.testing.assert_array_equal(pixel[1, clear], pixel[0, clear])
