@@ -58,7 +58,7 @@ def peak(name: str, variant: Variant, args: argparse.Namespace) -> dict[str, obj
         job = with_resolution(job, (int(args.resolution.split("x")[0]), int(args.resolution.split("x")[1])))
     with opened(job) as case:
         before = peak_memory()
-        measured = steady(varied(case, variant), args.frames)[0]
+        measured = steady(varied(case, variant), args.frames)
         return {**measured.table(), "peak": peak_memory(), "before": before}
 
 

@@ -165,7 +165,7 @@ def noise(references: Sequence[Reference], case: Case, l: Sequence[int]) -> floa
 
 def _time(case: Case, variant: Variant) -> float:
     parts = parts_of(case, variant)
-    return sum(steady(part, 2)[0].ms for part in parts) / len(parts)
+    return sum(steady(part, 2).ms for part in parts) / len(parts)
 
 
 def containers(case: Case, c: int, l: Sequence[int]) -> dict[str, Table]:

@@ -53,7 +53,7 @@ def measure(name: str, quick: bool) -> Table:
                     write_image(Path(folder) / f"{i}-{c}-{l}.exr", made, FORMATS["zip:1"])
                     written.append(time.perf_counter() - started)
                 shares.append(busy())
-        ours = steady(under(varied(case, SCRATCH), [where[0][1]]), 1, place=PLACES[0][0])[0]
+        ours = steady(under(varied(case, SCRATCH), [where[0][1]]), 1, place=PLACES[0][0])
         return {
             "version": mi.__version__,
             "ms": 1e3 * float(np.median(spent)),

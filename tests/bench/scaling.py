@@ -48,7 +48,7 @@ def measure(quick: bool) -> Table:
 
 
 def _row(case: Case, quick: bool, **size: float) -> Table:
-    measured = steady(case, 1 if quick else FRAMES)[0]
+    measured = steady(case, 1 if quick else FRAMES)
     tell(f"{size}: {measured.ms:.2f} ms an image")
     return {**size, **measured.table()}
 
@@ -122,7 +122,7 @@ def _cameras(case: Case, quick: bool) -> list[Table]:
         prepared = replace(case.prepared, eyes=_longer_eyes(case, at))
         # the same cameras every time: those of the middle of the first turn
         place = 0.5 / times
-        measured = steady(replace(case, work=work, prepared=prepared), 1 if quick else FRAMES, place=place)[0]
+        measured = steady(replace(case, work=work, prepared=prepared), 1 if quick else FRAMES, place=place)
         tell(f"{len(at)} cameras: {measured.ms:.2f} ms an image")
         rows.append({"cameras": len(at), **measured.table()})
     return rows

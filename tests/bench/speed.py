@@ -70,7 +70,7 @@ def measure_once(case: Case, variant: Variant, place: float) -> Table:
     table["written"] = dict(zip(names, written, strict=True))
     if variant.floor:
         part = parts[len(parts) // 2]
-        first = start_of(part, variant.frames * (1 + len(names)), place)
+        first = start_of(part, variant.frames, place)
         c = first + 2 * part.work.n_r + 1 + variant.frames // 2
         expected = total(table["rays"]) * part.work.n_pixels * part.work.lights.n_lights
         table["floor"] = replay(record(part, c, expected), part.work.tracer, part.threads, table["rays"])

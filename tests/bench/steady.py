@@ -88,30 +88,24 @@ def start_of(case: Case, frames: int, place: float) -> int:
     return min(max(round(place * case.work.n_frames) - frames // 2 - case.work.n_r - 1, 0), last)
 
 
-def steady(
-    case: Case, frames: int, formats: Sequence[ImageFormat | None] = (None,), place: float = 0.5
-) -> list[Measured]:
-    """Make the images of `frames` interior frames, as often as there are formats, one frame after another.
+def steady(case: Case, frames: int, image_format: ImageFormat | None = None, place: float = 0.5) -> Measured:
+    """Make the images of `frames` interior frames.
 
     Args:
-        formats: how images are written, or None: they are composed and dropped.
+        image_format: how images are written, or None: they are composed and dropped.
         place: where on the path, 0 to 1.
     """
     work, n_r = case.work, case.work.n_r
     before = 2 * n_r + 1  # frames that fill the window and compose one frame, so that all is compiled
-    first = start_of(case, frames * len(formats), place)
+    first = start_of(case, frames, place)
     crew = Crew(work, case.threads)
     window = Window(work, case.ambient, crew, first=first + n_r)
-    found: list[Measured] = []
     try:
         with _writer(case, Path(), None) as nothing:
             _pass(work, window, crew, nothing, range(first, first + before))
-        for image_format in formats:
-            first += before if not found else frames
-            found.append(_measured(case, window, crew, range(first, first + frames), image_format))
+        return _measured(case, window, crew, range(first + before, first + before + frames), image_format)
     finally:
         crew.close()
-    return found
 
 
 def _measured(case: Case, window: Window, crew: Crew, cameras: range, image_format: ImageFormat | None) -> Measured:
@@ -152,9 +146,12 @@ def _pass(work: Work, window: Window, crew: Crew, writer: TimedWriter, cameras: 
 
 
 def steady_mean(cases: Sequence[Case], frames: int, formats: Sequence[ImageFormat | None], place: float) -> list[Table]:
-    """Run every case; returns, for each format, the mean over the cases, which all make the same number of images."""
-    runs = [steady(case, frames, formats, place) for case in cases]
-    return [mean([measured.table() for measured in column]) for column in zip(*runs, strict=True)]
+    """Run every case once a format, with the same cameras.
+
+    Returns:
+        for each format, the mean over the cases, which all make the same number of images.
+    """
+    return [mean([steady(case, frames, stored, place).table() for case in cases]) for stored in formats]
 
 
 def mean(tables: Sequence[Table]) -> Table:
