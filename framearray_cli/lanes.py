@@ -7,7 +7,8 @@ the operations.
 
 What is written with `choose`, `gather`, `root` and their like works for single numbers, too.
 
-Sums and products may be fused (one rounding instead of two); nothing else differs from the numbers one at a time.
+Two things differ from numbers one at a time: sums and products may be fused (one rounding instead of two), and whole
+numbers are shifted to the right as bits, without their sign. What does not fit together is an error of typing.
 """
 
 import operator
@@ -41,6 +42,7 @@ _ELEMENTS = {
     types.uint64: ir.IntType(64),
     types.boolean: ir.IntType(1),
 }
+_REAL = (types.float32, types.float64)
 _WHOLE = (types.int32, types.uint8, types.uint64)
 _SUFFIX = {types.float32: "f32", types.float64: "f64", types.int32: "i32", types.uint16: "i16"}
 _FUSED = ("contract",)
@@ -79,51 +81,60 @@ def _spread(context: Any, builder: Any, source: Any, target: Lanes, value: Any) 
     )
 
 
-def _operator(function: Any, compute: Callable[..., Any], flags: bool = False) -> None:
+def _operator(function: Any, compute: Callable[..., Any], dtypes: tuple[Any, ...], flags: bool = False) -> None:
     """Define an operator of two lanes of one dtype, or of lanes and a number."""
 
     class _Typed(_Template):  # type: ignore[misc]
         def generic(self, args: Any, kws: Any) -> Any:
             lanes = [arg for arg in args if isinstance(arg, Lanes)]
             rest = [arg for arg in args if not isinstance(arg, Lanes)]
-            fits = all(lane == lanes[0] for lane in lanes) and all(isinstance(arg, types.Number) for arg in rest)
-            if not lanes or not fits:
+            if not lanes or not all(lane == lanes[0] for lane in lanes) or not all(_takes(lanes[0], n) for n in rest):
+                return None
+            if lanes[0].dtype not in dtypes:
                 return None
             return _signature(FLAGS if flags else lanes[0], *([lanes[0]] * len(args)))
 
     _infer(function)(_Typed)
 
     def lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return compute(builder, sig.args[0].dtype in (types.float32, types.float64), *args)
+        return compute(builder, sig.args[0].dtype, *args)
 
     for n in (1, 2):
         _lower_builtin(function, *([Lanes] * n))(lowered)
 
 
-def _binary(of_reals: str, of_integers: str) -> Callable[..., Any]:
-    def compute(builder: Any, real: bool, a: Any, b: Any) -> Any:
-        return getattr(builder, of_reals)(a, b, flags=_FUSED) if real else getattr(builder, of_integers)(a, b)
+def _takes(lanes: Lanes, number: Any) -> bool:
+    """Whether a number may stand beside lanes: whole ones beside all, others beside reals."""
+    return isinstance(number, types.Integer) or (isinstance(number, types.Float) and lanes.dtype in _REAL)
+
+
+def _binary(of_reals: str, of_integers: str = "") -> Callable[..., Any]:
+    def compute(builder: Any, dtype: Any, a: Any, b: Any) -> Any:
+        return getattr(builder, of_reals)(a, b, flags=_FUSED) if dtype in _REAL else getattr(builder, of_integers)(a, b)
 
     return compute
 
 
 def _compared(sign: str) -> Callable[..., Any]:
-    def compute(builder: Any, real: bool, a: Any, b: Any) -> Any:
-        return builder.fcmp_ordered(sign, a, b) if real else builder.icmp_signed(sign, a, b)
+    def compute(builder: Any, dtype: Any, a: Any, b: Any) -> Any:
+        if dtype in _REAL:
+            return builder.fcmp_ordered(sign, a, b)
+        return builder.icmp_signed(sign, a, b) if dtype == types.int32 else builder.icmp_unsigned(sign, a, b)
 
     return compute
 
 
-_operator(operator.add, _binary("fadd", "add"))
-_operator(operator.sub, _binary("fsub", "sub"))
-_operator(operator.mul, _binary("fmul", "mul"))
-_operator(operator.truediv, _binary("fdiv", "sdiv"))
-_operator(operator.and_, _binary("and_", "and_"))
-_operator(operator.or_, _binary("or_", "or_"))
-_operator(operator.xor, _binary("xor", "xor"))
-_operator(operator.rshift, _binary("lshr", "lshr"))
-_operator(operator.neg, lambda builder, real, a: builder.fneg(a) if real else builder.neg(a))
-_operator(operator.invert, lambda builder, real, a: builder.not_(a))
+_BITS = (*_WHOLE, types.boolean)
+_operator(operator.add, _binary("fadd", "add"), (*_REAL, *_WHOLE))
+_operator(operator.sub, _binary("fsub", "sub"), (*_REAL, *_WHOLE))
+_operator(operator.mul, _binary("fmul", "mul"), (*_REAL, *_WHOLE))
+_operator(operator.truediv, _binary("fdiv"), _REAL)
+_operator(operator.and_, _binary("", "and_"), _BITS)
+_operator(operator.or_, _binary("", "or_"), _BITS)
+_operator(operator.xor, _binary("", "xor"), _BITS)
+_operator(operator.rshift, _binary("", "lshr"), _WHOLE)
+_operator(operator.neg, lambda builder, dtype, a: builder.fneg(a) if dtype in _REAL else builder.neg(a), (*_REAL, *_WHOLE))
+_operator(operator.invert, lambda builder, dtype, a: builder.not_(a), _BITS)
 for _sign, _compare in (
     ("<", operator.lt),
     ("<=", operator.le),
@@ -131,7 +142,13 @@ for _sign, _compare in (
     (">=", operator.ge),
     ("==", operator.eq),
 ):
-    _operator(_compare, _compared(_sign), flags=True)
+    _operator(_compare, _compared(_sign), (*_REAL, *_WHOLE), flags=True)
+
+
+def _is_array(array: Any, lanes: Any = None) -> bool:
+    """Whether something is a contiguous array of a dtype that lanes have, or that these lanes have."""
+    fits = isinstance(array, types.Array) and array.layout == "C" and array.dtype in _ELEMENTS
+    return fits and array.dtype != types.boolean and (lanes is None or lanes == Lanes(array.dtype))
 
 
 def _place(context: Any, builder: Any, array_type: Any, array: Any, offset_type: Any, offset: Any) -> Any:
@@ -146,6 +163,8 @@ def _pointer_to_lanes(builder: Any, place: Any, lanes: Lanes) -> Any:
 
 def _lanes_at_of(typingctx: Any, array: Any, offset: Any) -> Any:
     """Elements offset to offset + 15 of a contiguous array, counted flat."""
+    if not _is_array(array):
+        return None
     lanes = Lanes(array.dtype)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -156,7 +175,9 @@ def _lanes_at_of(typingctx: Any, array: Any, offset: Any) -> Any:
 
 
 def _put_lanes_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
-    """Write elements offset to offset + 15 of a contiguous array, counted flat."""
+    """Write elements offset to offset + 15 of a contiguous array, counted flat; a number goes to all of them."""
+    if not _is_array(array) or not (value == Lanes(array.dtype) or _takes(Lanes(array.dtype), value)):
+        return None
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         place = _place(context, builder, sig.args[0], args[0], sig.args[1], args[1])
@@ -172,6 +193,8 @@ def _stored_of(typingctx: Any, array: Any, value: Any) -> Any:
 
     A half is the nearest one, of two equally near ones the even; numbers beyond the largest half become that.
     """
+    if not isinstance(array, types.Array) or value != Lanes(types.float32):
+        return None
     if array.dtype == types.float32:
         return value(array, value), lambda context, builder, sig, args: args[1]
 
@@ -201,6 +224,8 @@ def _stored_of(typingctx: Any, array: Any, value: Any) -> Any:
 
 def _gather_of(typingctx: Any, array: Any, offsets: Any) -> Any:
     """The elements of a contiguous array at 16 flat offsets, or the one at one offset."""
+    if not _is_array(array) or not (offsets == INTEGERS or isinstance(offsets, types.Integer)):
+        return None
     if not isinstance(offsets, Lanes):
 
         def one(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -222,6 +247,8 @@ def _gather_of(typingctx: Any, array: Any, offsets: Any) -> Any:
 
 def _scatter_of(typingctx: Any, array: Any, offsets: Any, value: Any) -> Any:
     """Write 16 values to the flat offsets of a contiguous array."""
+    if not _is_array(array, value) or offsets != INTEGERS:
+        return None
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         data = context.make_array(sig.args[0])(context, builder, args[0]).data
@@ -235,6 +262,8 @@ def _scatter_of(typingctx: Any, array: Any, offsets: Any, value: Any) -> Any:
 
 def _compress_of(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any) -> Any:
     """Write the flagged lanes one after another to a contiguous array, from a flat offset on."""
+    if flags != FLAGS or not _is_array(array, value) or array.dtype not in _SUFFIX:
+        return None
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         place = _place(context, builder, sig.args[2], args[2], sig.args[3], args[3])
@@ -248,6 +277,8 @@ def _compress_of(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any
 
 def _count_of(typingctx: Any, flags: Any) -> Any:
     """How many lanes are flagged; of a single flag 0 or 1."""
+    if flags not in (FLAGS, types.boolean):
+        return None
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         if not isinstance(sig.args[0], Lanes):
@@ -260,6 +291,8 @@ def _count_of(typingctx: Any, flags: Any) -> Any:
 
 def _bits_of(typingctx: Any, flags: Any) -> Any:
     """The flags as the bits of a number, lane 0 the lowest."""
+    if flags != FLAGS:
+        return None
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.zext(builder.bitcast(args[0], ir.IntType(LANES)), ir.IntType(64))
@@ -278,7 +311,11 @@ def _lowest_of(typingctx: Any, bits: Any) -> Any:
 
 def _choose_of(typingctx: Any, flags: Any, yes: Any, no: Any) -> Any:
     """`yes` where flagged, else `no`; either may be a number. With one flag, of two numbers, without a jump."""
+    if flags not in (FLAGS, types.boolean):
+        return None
     lanes = next((arg for arg in (yes, no) if isinstance(arg, Lanes)), None)
+    if lanes is not None and not all(arg == lanes or _takes(lanes, arg) for arg in (yes, no)):
+        return None
     if lanes is None:
         number = typingctx.unify_types(yes, no)
         lanes = Lanes(number) if isinstance(flags, Lanes) else number
@@ -292,6 +329,9 @@ def _choose_of(typingctx: Any, flags: Any, yes: Any, no: Any) -> Any:
 
 def _function(name: str) -> Callable[..., Any]:
     def of(typingctx: Any, value: Any) -> Any:
+        if (value.dtype if isinstance(value, Lanes) else value) not in _REAL:
+            return None
+
         def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             kind, of = ir.FunctionType(args[0].type, [args[0].type]), sig.args[0]
             suffix = f"v{LANES}{_SUFFIX[of.dtype]}" if isinstance(of, Lanes) else _SUFFIX[of]

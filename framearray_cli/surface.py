@@ -55,7 +55,7 @@ def surfaces(scene: Scene) -> Surfaces:
     largest = np.abs(scene.corners).max(axis=(1, 2), initial=0.0)
     code = np.arange(256) / 255.0
     linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
-    arrays = {name: getattr(scene, name) for name in Surfaces._fields if hasattr(scene, name)}
+    arrays = {name: np.ascontiguousarray(getattr(scene, name)) for name in Surfaces._fields if hasattr(scene, name)}
     textured = (scene.reflectivity_texture >= 0) | (scene.specular_texture >= 0)
     plain = ~textured & (len(scene.colours) == 0)
     return Surfaces(

@@ -27,6 +27,7 @@ from framearray_cli.lanes import (
     reals,
     root,
     scatter,
+    stored,
 )
 from framearray_cli.sampling import above, cosine_direction, disc
 from framearray_cli.surface import (
@@ -531,3 +532,28 @@ def test_lanes_are_seen_where_numbers_are() -> None:
     clear = (abs(image - np.round(image)) > moved).all(axis=0) & (abs(z) > FEW * length)
     assert clear.mean() > 0.99 and (pixel[0] != OUTSIDE).mean() > 0.2
     np.testing.assert_array_equal(pixel[1, clear], pixel[0, clear])
+
+
+@kernel
+def store(array: Any, out: Any) -> None:
+    for first in range(0, array.size, LANES):
+        put_lanes(out, first, stored(out, lanes_at(array, first)))
+
+
+def test_halves_are_those_of_numpy_and_never_infinite() -> None:
+    rng = np.random.default_rng(5)
+    some = rng.normal(size=4096) * 10.0 ** rng.uniform(-9, 6, 4096)
+    borders = [0.0, -0.0, 65504, 65519.9, 65520, 1e9, -1e9, 2.0**-24, 2.0**-25, 2.0**-25 * 1.001, 2.0**-14, 6e-5]
+    exact = np.concatenate([some, borders, np.ldexp(1.0, np.arange(-30, 17)), np.zeros(5)]).astype(np.float32)
+    out = np.empty(len(exact), np.uint16)
+    store(exact, out)
+    np.testing.assert_array_equal(out, np.clip(exact, -65504, 65504).astype(np.float16).view(np.uint16))
+    same = np.empty_like(exact)
+    store(exact, same)
+    np.testing.assert_array_equal(same, exact)
+
+
+@pytest.mark.parametrize("array", [np.zeros((32, 2), np.float32)[:, 0], np.zeros(32, np.int64), np.zeros(32, bool)])
+def test_arrays_that_lanes_cannot_read_are_refused(array: Any) -> None:
+    with pytest.raises(nb.TypingError):
+        store(array, np.zeros(32, np.float32))
