@@ -24,7 +24,7 @@ $(VENV)/installed-dev: $(VENV)/installed
 
 $(VENV)/installed-bench: $(VENV)/installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[movie,bench]'
-	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
+	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers,denoise]'
 	@touch $@
 
 install: $(VENV)/installed ## Set up the program in .venv

@@ -42,6 +42,7 @@ class Variant:
     Attributes:
         name: in results and tables.
         n_r, hits, obscurance, step, unbiased, balance: as in the job file.
+        denoise: W is denoised.
         one_light: every image knows one light position alone.
         frames: cameras of one timed run; 0: only its error is measured, with its time from one short run.
         floor: whether its rays are replayed through Embree alone.
@@ -55,6 +56,7 @@ class Variant:
     step: int = 1
     unbiased: bool = False
     balance: bool = False
+    denoise: bool = False
     one_light: bool = False
     frames: int = 0
     floor: bool = False
@@ -88,6 +90,8 @@ VARIANTS: tuple[Variant, ...] = (
     Variant(name="n_r 7", n_r=7),
     Variant(name="obscurance 1", obscurance=1),
     Variant(name="obscurance 10", obscurance=10),
+    Variant(name="denoise", denoise=True, frames=4),
+    Variant(name="denoise, obscurance 1", obscurance=1, denoise=True),
     LIGHT_REUSE,
     CAMERA_REUSE,
     SCRATCH,
@@ -155,6 +159,7 @@ def _changed(job: Job, variant: Variant) -> Job:
             "specular": job.specular.model_copy(update={"hits": math.ceil(variant.rests_on)}),
             "ambient": job.ambient.model_copy(update={"method": "eye", "intensity": (1.0, 1.0, 1.0), "paths": 1}),
             "output": job.output.model_copy(update={"layers": False}),
+            "denoise": job.denoise.model_copy(update={"obscurance": variant.denoise}),
         }
     )
 

@@ -5,6 +5,7 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +36,7 @@ from .results import Table
 from .speed import tell
 from .steady import mean, steady
 
-PLACES = (0.4,)  # of the camera path
+PLACE = 0.4  # of the camera path, where two frames in a row are looked at
 LIGHTS = (1 / 8, 3 / 8, 5 / 8, 7 / 8)  # of the light path
 SEEDS = (101, 202)  # of the two runs that are compared with the two halves
 # Containers for images: file format, and how many bits a channel.
@@ -61,7 +62,7 @@ def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = 
     with opened(job_named(name, quick)) as case:
         n_lights = case.work.lights.n_lights
         l = [min(int(share * n_lights), n_lights - 1) for share in LIGHTS]
-        frames = [round(place * case.work.n_frames) for place in PLACES]
+        frames = [round(PLACE * case.work.n_frames) + step for step in (0, 1)]
         references = []
         for c in frames:
             started = time.perf_counter()
@@ -72,8 +73,12 @@ def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = 
         for variant in variants:
             if variant in (SCRATCH, CAMERA_REUSE):  # the same pictures as light reuse alone and the frame array
                 continue
+            if variant.denoise and find_spec("pyoidn") is None:
+                tell(f"{name}: {variant.name} is left out: Open Image Denoise is not installed")
+                continue
             pairs = [(images(case, variant, c, l, SEEDS[0]), images(case, variant, c, l, SEEDS[1])) for c in frames]
             found[variant.name] = compare(case, l, pairs, references)
+            found[variant.name]["flicker"] = flicker(case, l, pairs, references)
             found[variant.name]["added"] = added(variant, pairs, exact, references, case, l)
             if not variant.frames:
                 found[variant.name]["ms"] = _time(case, variant)
@@ -125,6 +130,21 @@ def compare(
     found = mean(tables)
     found["squared_bias_error"] /= np.sqrt(len(tables))
     return found
+
+
+def flicker(
+    case: Case, l: Sequence[int], pairs: Sequence[tuple[Images, Images]], references: Sequence[Reference]
+) -> float:
+    """RMSE of what changes of the error from one frame to the next, over sqrt 2 and the mean of the reference.
+
+    It equals the RMSE where the errors of two frames in a row are independent, and 0 where they are the same.
+    """
+    shares = []
+    for k in range(len(l)):
+        first, second = (wanted.image(k, case.ambient.intensity[l[k]]) for wanted in references)
+        change = (pairs[1][0][k] - second) - (pairs[0][0][k] - first)
+        shares.append(rmse(change, np.zeros_like(change)) / 2**0.5 / float(first.mean(dtype=np.float64)))
+    return sum(shares) / len(shares)
 
 
 def added(

@@ -219,8 +219,10 @@ light is the same for all. Relative to the mean of the reference, averaged over 
 - *Bias*: root of the squared bias, from two runs and the two halves, whose noise does not go together: no noise is in
   it. Where the squared bias is less than twice its standard error, "below" that.
 - *Added*: RMSE of the difference to exact shadows with the same random numbers.
+- *Flicker*: RMSE of the change of the error from one frame of the camera path to the next, over sqrt 2: the same as
+  *RMSE* where the errors of two frames have nothing to do with each other.
 """
-    head = ["", "ms", "RMSE", "relMSE", "mean off", "edges, RMSE", "edges, most", "bias", "added"]
+    head = ["", "ms", "RMSE", "relMSE", "mean off", "edges, RMSE", "edges, most", "bias", "added", "flicker"]
     parts = ["## Error beside time", about]
     for name, table in error.items():
         rows = []
@@ -237,6 +239,7 @@ light is the same for all. Relative to the mean of the reference, averaged over 
                     percent(t["edge_max"]),
                     _bias(t),
                     percent(t["added"]) if t["added"] else "",
+                    percent(t["flicker"]),
                 ]
             )
         known = f"The reference's own RMSE is {percent(table['noise'], 2)}."

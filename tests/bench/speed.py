@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from importlib.util import find_spec
 
 from framearray_cli.images import ImageFormat
 
@@ -34,7 +35,7 @@ def measure(
     Args:
         patience: seconds to wait, before each measurement, for other programs to leave the cores alone.
     """
-    timed = [variant for variant in variants if variant.frames]
+    timed = [v for v in variants if v.frames and not (v.denoise and find_spec("pyoidn") is None)]
     found: dict[str, list[Table]] = {variant.name: [] for variant in timed}
     shares: list[float] = []
     with opened(job_named(name, quick)) as case:
