@@ -3,7 +3,8 @@
 numpy's types carry the dtype; the shape stands in the alias's name and comment.
 """
 
-from typing import TypeAlias
+import math
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,10 @@ Float32: TypeAlias = NDArray[np.float32]
 Float64: TypeAlias = NDArray[np.float64]
 Int32: TypeAlias = NDArray[np.int32]
 Bytes: TypeAlias = NDArray[np.uint8]
+Addresses: TypeAlias = NDArray[np.int64]
 Keys: TypeAlias = NDArray[np.uint64]  # random streams
+
+LINE = 64  # bytes of a cache line
 
 # What kernels pass by value: Python's float where it does not matter, float32 where it is to stay that.
 Real: TypeAlias = float | np.float32
@@ -26,3 +30,14 @@ CornerUvs: TypeAlias = Float32  # (n_triangles, 3, 2), v upwards
 Rgb: TypeAlias = Float32  # (n, 3), linear, Rec. 709 primaries
 Image: TypeAlias = Float32  # (height, width, 3), linear radiance, row 0 at the top
 Images: TypeAlias = NDArray[np.float32] | NDArray[np.float16]  # (n_lights, height, width, 3)
+
+
+def with_room(shape: tuple[int, ...], dtype: Any) -> Any:
+    """An array, contents arbitrary, that starts at a cache line.
+
+    Behind it there is room for what a kernel reads beyond its end, 16 numbers at a time, and ignores.
+    """
+    size, item = math.prod(shape), np.dtype(dtype).itemsize
+    block = np.empty(size + 16 + LINE // item, dtype)
+    start = -block.ctypes.data % LINE // item
+    return block[start : start + size].reshape(shape)

@@ -2,8 +2,8 @@
 
     image[l] = (direct[l] + I_A[l] R W + constant) weighed over all hits + the same over reflected hits / n_native
 
-A band of pixels is summed in arrays that stay in the cache: one `begin`, one `accumulate` an eye of the window, one
-`normalise`, one `accumulate` of the frame's reflected hits, one `finish`. Sums happen in this fixed order, so that
+A band of pixels is summed in arrays that stay in the cache: `begin`, `accumulate` for the hits of all eyes of the
+window, `normalise`, `accumulate` for the frame's reflected hits, `finish`. Sums happen in this fixed order, so that
 images do not depend on the number of threads.
 """
 
@@ -12,8 +12,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Float32, Images, Int32, Real, Rgb
-from .kernel import kernel, prefetch_row
+from .arrays import Addresses, Float32, Images, Int32, Real, Rgb
+from .kernel import kernel
 from .lanes import LANES, compress, gather, lane_numbers, put_lanes, stored
 
 # Images as they are stored: float32, or the bits of halves; (n_lights, n_pixels, 3).
@@ -24,34 +24,40 @@ HALF_MAX = np.float32(65504.0)  # the largest half
 
 
 class Band(NamedTuple):
-    """Sums over the pixels of a band.
+    """Sums over the pixels of a band, and room for the hits of one pixel.
 
     Attributes:
-        direct: (n_pixels, 3, n_lights) sum of w R / pi E[l], in units of the lights' colour.
+        direct: (n_pixels, 3, n_lights or more, a multiple of LANES) sum of w R / pi E[l], in units of the lights'
+            colour.
         rest: (n_pixels, 10) sums of w, w R W (3), w constant (3), w W (3).
         reflectivity: (n_pixels, 3) sum of w R.
         hits: (n_pixels,) number of hits.
+        rows: (MOST,) where the irradiance of a hit stands: an address.
+        shares: (MOST, 3) w R / pi of a hit.
     """
 
     direct: Float32
     rest: Float32
     reflectivity: Rgb
     hits: Int32
+    rows: Addresses
+    shares: Float32
 
 
 WEIGHT, INDIRECT, STEADY, OBSCURANCE = 0, 1, 4, 7
-
-# How many hits ahead irradiance is fetched: memory answers in about the time that this many hits take to sum.
-AHEAD = 8
+# Hits of a pixel that are summed at once.
+MOST = 64
 
 
 def empty_band(n_pixels: int, n_lights: int) -> Band:
     """Room for the sums of n_pixels pixels."""
     return Band(
-        direct=np.empty((n_pixels, 3, n_lights), np.float32),
+        direct=np.empty((n_pixels, 3, -(-n_lights // LANES) * LANES), np.float32),
         rest=np.empty((n_pixels, 10), np.float32),
         reflectivity=np.empty((n_pixels, 3), np.float32),
         hits=np.empty(n_pixels, np.int32),
+        rows=np.empty(MOST, np.int64),
+        shares=np.empty((MOST, 3), np.float32),
     )
 
 
@@ -71,71 +77,6 @@ def begin(band: Band, n: int) -> None:
             band.reflectivity[i, channel] = 0.0
             for l in range(band.direct.shape[2]):
                 band.direct[i, channel, l] = 0.0
-
-
-@kernel
-def accumulate(
-    band: Band,
-    first_pixel: int,
-    n: int,
-    start: Int32,
-    order: Int32,
-    weight: Float32,
-    scale: Float32,
-    reflectivity: Rgb,
-    obscurance: Rgb,
-    constant: Rgb,
-    irradiance: Float32,
-) -> None:
-    """Add hits to the sums of pixels first_pixel to first_pixel + n - 1.
-
-    Args:
-        start, order: from `sort_by_pixel`.
-        weight: (n_hits,) weight of each hit, or (0,) where all weigh 1.
-        scale: (n_pixels,) a factor for all hits of a pixel, or (0,) where it is 1.
-        reflectivity, obscurance, constant: (n_hits, 3); constant is (0, 3) where the scene has none.
-        irradiance: (n_hits, 1 or 3, n_lights).
-    """
-    channels, n_lights = irradiance.shape[1], irradiance.shape[2]
-    weighed, scaled, steady = weight.shape[0] > 0, scale.shape[0] > 0, constant.shape[0] > 0
-    rest = band.rest
-    last = start[first_pixel + n]
-    for i in range(n):
-        pixel = first_pixel + i
-        factor = scale[pixel] if scaled else np.float32(1.0)
-        band.hits[i] += start[pixel + 1] - start[pixel]
-        for entry in range(start[pixel], start[pixel + 1]):
-            if entry + AHEAD < last:  # hits lie wherever they were found: fetch one while others are summed
-                prefetch_row(irradiance, order[entry + AHEAD])
-            hit = order[entry]
-            w = factor * weight[hit] if weighed else factor
-            rest[i, WEIGHT] += w
-            if steady:
-                for channel in range(3):
-                    rest[i, STEADY + channel] += w * constant[hit, channel]
-            red, green, blue = w * reflectivity[hit, 0], w * reflectivity[hit, 1], w * reflectivity[hit, 2]
-            if not (red > 0.0 or green > 0.0 or blue > 0.0):
-                continue
-            band.reflectivity[i, 0] += red
-            band.reflectivity[i, 1] += green
-            band.reflectivity[i, 2] += blue
-            rest[i, INDIRECT] += red * obscurance[hit, 0]
-            rest[i, INDIRECT + 1] += green * obscurance[hit, 1]
-            rest[i, INDIRECT + 2] += blue * obscurance[hit, 2]
-            for channel in range(3):
-                rest[i, OBSCURANCE + channel] += w * obscurance[hit, channel]
-            red, green, blue = red * INVERSE_PI, green * INVERSE_PI, blue * INVERSE_PI
-            if channels == 1:
-                for l in range(n_lights):
-                    e = irradiance[hit, 0, l]
-                    band.direct[i, 0, l] += red * e
-                    band.direct[i, 1, l] += green * e
-                    band.direct[i, 2, l] += blue * e
-            else:
-                for l in range(n_lights):
-                    band.direct[i, 0, l] += red * irradiance[hit, 0, l]
-                    band.direct[i, 1, l] += green * irradiance[hit, 1, l]
-                    band.direct[i, 2, l] += blue * irradiance[hit, 2, l]
 
 
 @kernel
@@ -199,14 +140,14 @@ def transpose(sums: Float32, n: int, images: Stored, first: int) -> None:
     """Write the first n values of each light, light by light: sums has all lights of a value, images all values of one.
 
     Args:
-        sums: (n_pixels, 3, n_lights).
+        sums: (n_pixels, 3, n_lights or more).
         images: (n_lights, n_pixels, 3); written from value `first` on.
     """
-    n_lights, row = images.shape[0], images.shape[1] * images.shape[2]
-    step = lane_numbers() * np.int32(n_lights)
+    n_lights, row, stride = images.shape[0], images.shape[1] * images.shape[2], sums.shape[2]
+    step = lane_numbers() * np.int32(stride)
     for block in range(0, n, LANES):
         for l in range(n_lights):
-            values = stored(images, gather(sums, step + np.int32(block * n_lights + l)))
+            values = stored(images, gather(sums, step + np.int32(block * stride + l)))
             if block + LANES <= n:
                 put_lanes(images, l * row + first + block, values)
             else:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .arrays import with_room
 from .hits import empty_hits
 from .rays import room_for_hits, room_for_tests
 from .terms.direct_steps import room_for_steps
@@ -15,7 +16,7 @@ from .work import Work
 
 # Hits of a batch: large enough that calls and changes of threads cost nothing, small enough that a frame has several
 # for each thread and that their arrays stay in a core's cache.
-BATCH, LARGEST_BATCH, BATCHES_A_THREAD = 2048, 8192, 16
+BATCH, LARGEST_BATCH, BATCHES_A_THREAD = 1024, 8192, 24
 # Rays traced together within a batch.
 RAYS = 4096
 
@@ -33,7 +34,7 @@ class Shelf:
             array = kept.pop()
             if array.shape == shape:
                 return array
-        return np.empty(shape, dtype)
+        return with_room(shape, dtype)
 
     def give(self, name: str, array: Any) -> None:
         """Put an array back that nobody reads any more."""
@@ -96,6 +97,14 @@ class Crew:
             for future in futures:
                 future.cancel()
             raise
+
+    def batches(self, n: int) -> list[tuple[int, int]]:
+        """Cut n hits into tasks, (first, number) each; the last quarter in small ones, so that threads end together."""
+        large = n - n // 4
+        found = [(first, self.batch) for first in range(0, large, self.batch)]
+        end = found[-1][0] + self.batch if found else 0
+        found += [(first, BATCH) for first in range(end, n, BATCH)]
+        return [(first, min(m, n - first)) for first, m in found]
 
     def rays(self) -> Counter[str]:
         """Rays traced so far, by kind."""

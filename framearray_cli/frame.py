@@ -66,9 +66,8 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
     kept = n if work.layers or work.denoise else 0
     normal, depth = np.empty((kept, 3), np.float32), np.empty(kept, np.float32)
 
-    def batch(task: tuple[Pass, int], scratch: Scratch) -> list[tuple[Int32, Records]]:
-        part, first = task
-        m = min(crew.batch, part.n - first)
+    def batch(task: tuple[Pass, int, int], scratch: Scratch) -> list[tuple[Int32, Records]]:
+        part, first, m = task
         span = slice(part.first_hit + first, part.first_hit + first + m)
         _native(work, c, part, first, m, scratch)
         hits = scratch.hits
@@ -78,7 +77,7 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
         _place(work, c, m, scratch, frames, pixel[:, span], weight[:, span])
         return mirror_paths(work, hits, m, scratch) if work.depth else []
 
-    tasks = [(part, first) for part in parts for first in range(0, part.n, crew.batch)]
+    tasks = [(part, first, m) for part in parts for first, m in crew.batches(part.n)]
     mirrored = [path for paths in crew.run(batch, tasks) for path in paths]
     mirror_hits = np.empty(0, np.int32)
     if work.depth:

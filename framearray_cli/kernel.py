@@ -40,24 +40,33 @@ def inlined(function: F) -> F:
     return compiled
 
 
-def _prefetch_row_of(typingctx: Any, array: Any, i: Any) -> Any:
-    """Ask for array[i] to be brought into the cache, a request a cache line; nothing waits for it."""
+def _prefetch_of(typingctx: Any, address: Any, n_bytes: Any) -> Any:
+    """Ask for the bytes from an address on to be brought into the cache, a line at a time; nothing waits for it."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        view = context.make_array(signature.args[0])(context, builder, args[0])
         word, byte = ir.IntType(64), ir.IntType(8).as_pointer()
-        row_bytes = builder.extract_value(view.strides, 0)
-        index = context.cast(builder, args[1], signature.args[1], types.intp)
-        row = builder.add(builder.ptrtoint(view.data, word), builder.mul(index, row_bytes))
-        first_line = builder.and_(row, word(-_LINE))
         kind = ir.FunctionType(ir.VoidType(), [byte, ir.IntType(32), ir.IntType(32), ir.IntType(32)])
         fetch = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
         flags = [ir.Constant(ir.IntType(32), value) for value in (0, 3, 1)]  # to read, keep in all levels, data
-        with cgutils.for_range_slice(builder, first_line, builder.add(row, row_bytes), word(_LINE), word) as (line, _):
+        first_line, end = builder.and_(args[0], word(-_LINE)), builder.add(args[0], args[1])
+        with cgutils.for_range_slice(builder, first_line, end, word(_LINE), word) as (line, _):
             builder.call(fetch, [builder.inttoptr(line, byte), *flags])
         return context.get_dummy_value()
 
-    return types.void(array, i), codegen
+    return types.void(types.intp, types.intp), codegen
 
 
-prefetch_row: Any = intrinsic(_prefetch_row_of)
+def _number_at(dtype: Any, element: Any) -> Callable[..., Any]:
+    def of(typingctx: Any, address: Any, i: Any) -> Any:
+        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            return builder.load(builder.gep(builder.inttoptr(args[0], element.as_pointer()), [args[1]]))
+
+        return dtype(types.intp, types.intp), codegen
+
+    return of
+
+
+# For lists of arrays, of which a kernel takes the addresses: each array by itself would cost more than a short loop.
+prefetch: Any = intrinsic(_prefetch_of)
+real_at: Any = intrinsic(_number_at(types.float32, ir.FloatType()))
+integer_at: Any = intrinsic(_number_at(types.int32, ir.IntType(32)))

@@ -133,7 +133,9 @@ _operator(operator.and_, _binary("", "and_"), _BITS)
 _operator(operator.or_, _binary("", "or_"), _BITS)
 _operator(operator.xor, _binary("", "xor"), _BITS)
 _operator(operator.rshift, _binary("", "lshr"), _WHOLE)
-_operator(operator.neg, lambda builder, dtype, a: builder.fneg(a) if dtype in _REAL else builder.neg(a), (*_REAL, *_WHOLE))
+_operator(
+    operator.neg, lambda builder, dtype, a: builder.fneg(a) if dtype in _REAL else builder.neg(a), (*_REAL, *_WHOLE)
+)
 _operator(operator.invert, lambda builder, dtype, a: builder.not_(a), _BITS)
 for _sign, _compare in (
     ("<", operator.lt),
@@ -172,6 +174,17 @@ def _lanes_at_of(typingctx: Any, array: Any, offset: Any) -> Any:
         return builder.load(_pointer_to_lanes(builder, place, lanes), align=4)
 
     return lanes(array, offset), codegen
+
+
+def _lanes_from_of(typingctx: Any, address: Any) -> Any:
+    """16 float32 numbers from an address on."""
+    lanes = Lanes(types.float32)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        place = builder.inttoptr(args[0], _vector(lanes).as_pointer())
+        return builder.load(place, align=4)
+
+    return lanes(types.intp), codegen
 
 
 def _put_lanes_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
@@ -380,6 +393,7 @@ def _lane_numbers_of(typingctx: Any) -> Any:
 
 
 lanes_at: Any = intrinsic(_lanes_at_of)
+lanes_from: Any = intrinsic(_lanes_from_of)
 put_lanes: Any = intrinsic(_put_lanes_of)
 stored: Any = intrinsic(_stored_of)
 gather: Any = intrinsic(_gather_of)

@@ -12,8 +12,9 @@ from time import perf_counter
 
 import numpy as np
 
-from .arrays import Float32, Images, Int32
-from .compose import INDIRECT, OBSCURANCE, Band, accumulate, as_stored, begin, empty_band, finish, normalise
+from .accumulate import accumulate, compose_pixels, sources
+from .arrays import Addresses, Float32, Images, Int32
+from .compose import INDIRECT, as_stored, begin, empty_band, normalise
 from .crew import Crew, Scratch
 from .denoise import denoised
 from .frame import Frame, fill_holes
@@ -21,8 +22,8 @@ from .kernel import kernel
 from .terms.ambient import Ambient
 from .work import Placed, Records, Work
 
-# Pixels composed together: their sums over all lights fit a core's cache.
-BAND_PIXELS = 1024
+# Pixels whose sums over all lights are held together: they fit a core's cache. And pixels of a task.
+BAND_PIXELS, TASK_PIXELS = 256, 2048
 _NOTHING = np.empty(0, np.float32)
 
 
@@ -109,43 +110,41 @@ class Window:
         """
         work = self._work
         flat = as_stored(images.reshape(len(images), work.n_pixels, 3))
-        maps = np.empty((work.n_pixels, 9), np.float32) if work.layers else None
-        own = np.empty((work.n_pixels, 4), np.float32) if work.layers else None
+        layered = work.n_pixels if work.layers else 0
+        maps, own = np.empty((layered, 9), np.float32), np.empty((layered, 4), np.float32)
         samples = np.empty(work.n_pixels, np.int32)
         holes = self._holes(j)
         mirror_scale = self._mirror_scale(j, holes)
-        smooth = self._smooth_indirect(j, holes[:1], images.shape[1:3]) if work.denoise else None
+        hits, mirrored = self._hits(j, holes[:1]), self._mirrored(j, holes[1:], mirror_scale)
+        smooth = (
+            self._smooth_indirect(j, holes[:1], images.shape[1:3]) if work.denoise else np.empty((0, 3), np.float32)
+        )
+        frame = self._frames[j]
 
-        def band(first: int, scratch: Scratch) -> tuple[int, int, int, int]:
+        def some(first: int, scratch: Scratch) -> tuple[int, int, int, int]:
             started = perf_counter()
-            n = min(BAND_PIXELS, work.n_pixels - first)
+            n = min(TASK_PIXELS, work.n_pixels - first)
             sums = self._bands.pop()
             try:
-                self._sum_hits(j, first, n, sums, holes[:1])
-                samples[first : first + n] = sums.hits[:n]
-                if smooth is not None:
-                    sums.rest[:n, INDIRECT : INDIRECT + 3] = smooth[first : first + n]
-                if maps is not None and own is not None:
-                    maps[first : first + n, :3] = sums.rest[:n, OBSCURANCE : OBSCURANCE + 3]
-                    maps[first : first + n, 3:6] = sums.rest[:n, INDIRECT : INDIRECT + 3]
-                    maps[first : first + n, 6:] = sums.reflectivity[:n]
-                    frame = self._frames[j]
-                    place = frame.places[j]
-                    average_native(place.start, place.order, frame.normal, frame.depth, first, n, own)
-                self._sum_mirrored(j, first, n, sums, holes[1:], mirror_scale)
-                bad = finish(sums, first, n, self._colour, self._ambient, self._lowest, flat)
+                found: tuple[int, int, int, int] = compose_pixels(
+                    sums, first, n, hits, mirrored, work.lights.channels, smooth, self._colour, self._ambient,
+                    self._lowest, flat, samples, maps,
+                )  # fmt: skip
             finally:
                 self._bands.append(sums)
+            if layered:
+                place = frame.places[j]
+                average_native(place.start, place.order, frame.normal, frame.depth, first, n, own)
             scratch.seconds["compose"] += perf_counter() - started
-            return bad
+            return found
 
-        results = self._crew.run(band, range(0, work.n_pixels, BAND_PIXELS))
+        results = self._crew.run(some, range(0, work.n_pixels, TASK_PIXELS))
         bad = sum(result[0] for result in results)
         shape = images.shape[1:3]
         return Composed(
             c=j,
             images=images,
-            layers=_layers(maps, own, samples, shape) if maps is not None and own is not None else None,
+            layers=_layers(maps, own, samples, shape) if layered else None,
             hits=samples,
             beyond=sum(result[3] for result in results),
             bad=bad,
@@ -160,12 +159,14 @@ class Window:
         n_pixels = self._work.n_pixels
         indirect, reflectivity = np.empty((n_pixels, 3), np.float32), np.empty((n_pixels, 3), np.float32)
         own = np.empty((n_pixels, 4), np.float32)
-        frame = self._frames[j]
+        frame, hits = self._frames[j], self._hits(j, holes)
 
         def band(first: int, _scratch: Scratch) -> None:
             n = min(BAND_PIXELS, n_pixels - first)
             sums = empty_band(n, 0)
-            self._sum_hits(j, first, n, sums, holes, lit=False)
+            begin(sums, n)
+            accumulate(sums, first, n, hits, 1, 0)
+            normalise(sums, n)
             indirect[first : first + n] = sums.rest[:n, INDIRECT : INDIRECT + 3]
             reflectivity[first : first + n] = sums.reflectivity[:n]
             place = frame.places[j]
@@ -187,17 +188,19 @@ class Window:
         missed = np.flatnonzero(reached[work.order] == 0)
         return fill_holes(work, j, work.order[missed], self._crew) if len(missed) else []
 
-    def _sum_hits(
-        self, j: int, first: int, n: int, sums: Band, holes: list[tuple[Placed, Records]], lit: bool = True
-    ) -> None:
-        """Weighed means over all hits of frame j in a band; without direct light unless `lit`."""
-        begin(sums, n)
-        for k in self._work.frames_around(j, self._work.n_r):
-            frame = self._frames[k]
-            _add(sums, first, n, frame.places[j], frame.records, frame.weights[j], _NOTHING, lit)
-        for place, records in holes:
-            _add(sums, first, n, place, records, _NOTHING, _NOTHING, lit)
-        normalise(sums, n)
+    def _hits(self, j: int, holes: list[tuple[Placed, Records]]) -> Addresses:
+        """All hits of frame j, for `accumulate`."""
+        frames = [self._frames[k] for k in self._work.frames_around(j, self._work.n_r)]
+        found = [(frame.places[j], frame.records, frame.weights[j], _NOTHING) for frame in frames]
+        return sources(found + [(place, records, _NOTHING, _NOTHING) for place, records in holes])
+
+    def _mirrored(self, j: int, holes: list[tuple[Placed, Records]], scale: Float32) -> Addresses:
+        """What the mirrors of frame j show, for `accumulate`: a mean over its native hits alone."""
+        frame = self._frames[j]
+        found = [(place, records, _NOTHING, scale) for place, records in holes]
+        if frame.mirrored is not None and frame.mirror_places is not None:
+            found.insert(0, (frame.mirror_places, frame.mirrored, _NOTHING, scale))
+        return sources(found)
 
     def _mirror_scale(self, j: int, holes: list[tuple[Placed, Records]]) -> Float32:
         """One over the native hits of each pixel of frame j, (n_pixels,); those that fill holes count."""
@@ -205,33 +208,6 @@ class Window:
         for place, _ in holes[:1] if len(own) else []:
             own = own + np.diff(place.start)
         return (1.0 / np.maximum(own, 1)).astype(np.float32)
-
-    def _sum_mirrored(
-        self, j: int, first: int, n: int, sums: Band, holes: list[tuple[Placed, Records]], scale: Float32
-    ) -> None:
-        """Add what the mirrors of frame j show: a mean over its native hits alone."""
-        frame = self._frames[j]
-        if frame.mirrored is not None and frame.mirror_places is not None:
-            _add(sums, first, n, frame.mirror_places, frame.mirrored, _NOTHING, scale)
-        for place, records in holes:
-            _add(sums, first, n, place, records, _NOTHING, scale)
-
-
-def _add(
-    sums: Band,
-    first: int,
-    n: int,
-    place: Placed,
-    records: Records,
-    weight: Float32,
-    scale: Float32,
-    lit: bool = True,
-) -> None:
-    irradiance = records.irradiance if lit else np.empty((len(records.irradiance), 1, 0), np.float32)
-    accumulate(
-        sums, first, n, place.start, place.order, weight, scale,
-        records.reflectivity, records.obscurance, records.constant, irradiance,
-    )  # fmt: skip
 
 
 @kernel

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Float32, Float64, Int32, Rgb
+from .arrays import Float32, Float64, Int32, Rgb, with_room
 from .camera import Cameras
 from .embree.packets import Tracer
 from .hits import pixel_order
@@ -120,7 +120,7 @@ class Placed:
 
 
 def _fresh(_name: str, shape: tuple[int, ...], dtype: Any) -> Any:
-    return np.empty(shape, dtype)
+    return with_room(shape, dtype)
 
 
 def empty_records(work: Work, n: int, take: Callable[[str, tuple[int, ...], Any], Any] = _fresh) -> Records:
@@ -142,12 +142,10 @@ def joined(work: Work, parts: list[tuple[Int32, Records]]) -> tuple[Int32, Recor
     if not parts:
         return np.empty(0, np.int32), empty_records(work, 0)
     pixels, records = zip(*parts, strict=True)
-    return np.concatenate(pixels), Records(
-        reflectivity=np.concatenate([r.reflectivity for r in records]),
-        obscurance=np.concatenate([r.obscurance for r in records]),
-        constant=np.concatenate([r.constant for r in records]),
-        irradiance=np.concatenate([r.irradiance for r in records]),
-    )
+    whole = empty_records(work, sum(len(r.reflectivity) for r in records))
+    for name, array in whole.arrays.items():
+        np.concatenate([r.arrays[name] for r in records], out=array)
+    return np.concatenate(pixels), whole
 
 
 def placed_by_pixel(pixel: Int32, n_pixels: int, order: Int32 | None = None) -> Placed:

@@ -22,7 +22,7 @@ from framearray_cli.frame import find_frame
 from framearray_cli.images import ImageFormat
 from framearray_cli.window import Composed, Window
 from framearray_cli.work import Work
-from framearray_cli.writer import ArrayWriter
+from framearray_cli.writer import BLOCKS, ArrayWriter
 
 from .cases import Case
 from .results import Table
@@ -171,7 +171,7 @@ def mean(tables: Sequence[Table]) -> Table:
 def _writer(case: Case, folder: Path, image_format: ImageFormat | None) -> TimedWriter:
     job, prepared, n_lights = case.prepared.job, case.prepared, case.work.lights.n_lights
     stored = image_format or ImageFormat()
-    return TimedWriter(
+    writer = TimedWriter(
         folder,
         file_patterns(job.name, prepared.n_cameras, n_lights, stored.format),
         prepared.eyes,
@@ -183,3 +183,7 @@ def _writer(case: Case, folder: Path, image_format: ImageFormat | None) -> Timed
         lambda images: None,
         writes=image_format is not None,
     )
+    for block in [writer.block() for _ in range(BLOCKS)]:  # memory that was never written costs a page at a time
+        block.fill(0)
+        writer.give_back(block)
+    return writer

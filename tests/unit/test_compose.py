@@ -5,13 +5,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from framearray_cli.accumulate import MOST, accumulate, sources
+from framearray_cli.arrays import with_room
 from framearray_cli.compose import (
     INDIRECT,
     OBSCURANCE,
     STEADY,
     WEIGHT,
     Band,
-    accumulate,
     as_stored,
     begin,
     empty_band,
@@ -19,6 +20,7 @@ from framearray_cli.compose import (
     normalise,
 )
 from framearray_cli.reuse import sort_by_pixel
+from framearray_cli.work import Placed, Records
 
 N_PIXELS, N_LIGHTS, NOTHING = 40, 7, np.empty(0, np.float32)
 
@@ -39,13 +41,19 @@ class Case:
         self.reflectivity = values(n, 3) * (rng.random((n, 1)) < 0.8)  # some hits are black
         self.obscurance = values(n, 3)
         self.constant = values(n, 3) if constant else np.empty((0, 3), np.float32)
-        self.irradiance = values(n, channels, N_LIGHTS)
+        self.irradiance = with_room((n, channels, N_LIGHTS), np.float32)
+        self.irradiance[:] = values(n, channels, N_LIGHTS)
 
     def add(self, band: Band, first: int, n: int, scale: Any = NOTHING) -> None:
-        accumulate(
-            band, first, n, self.start, self.order, self.weight, scale,
-            self.reflectivity, self.obscurance, self.constant, self.irradiance,
-        )  # fmt: skip
+        placed = Placed(start=self.start, order=self.order)
+        records = Records(
+            reflectivity=self.reflectivity,
+            obscurance=self.obscurance,
+            constant=self.constant,
+            irradiance=self.irradiance,
+        )
+        parts = sources([(placed, records, self.weight, np.float32(scale))])
+        accumulate(band, first, n, parts, self.irradiance.shape[1], N_LIGHTS)
 
     def sums(self, values: Any, scale: Any = NOTHING) -> Any:
         """Weighed sums of values (n, ...) by pixel."""
@@ -125,12 +133,18 @@ def test_sums_of_a_band() -> None:
         band.rest[:20, OBSCURANCE : OBSCURANCE + 3], case.sums(case.obscurance * seen)[pixels], rtol=2e-6
     )
     np.testing.assert_allclose(band.reflectivity[:20], case.sums(case.reflectivity)[pixels], rtol=2e-6)
-    np.testing.assert_allclose(band.direct[:20], case.sums(case.direct())[pixels], rtol=2e-6)
+    np.testing.assert_allclose(band.direct[:20, :, :N_LIGHTS], case.sums(case.direct())[pixels], rtol=2e-6)
 
 
 @pytest.mark.parametrize("bands", [[(0, 1), (1, 39)], [(0, 16), (16, 16), (32, 8)], [(35, 5), (0, 35)]])
 def test_bands_of_any_size_give_the_same(bands: Any) -> None:
     np.testing.assert_array_equal(composed(Case(1), bands)[0], composed(Case(1))[0])
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_a_pixel_may_have_more_hits_than_are_summed_at_once(channels: int) -> None:
+    case = Case(channels, n=40 * 3 * MOST, weighed=False)
+    np.testing.assert_allclose(composed(case)[0], case.picture(*lights()), rtol=2e-5)
 
 
 @pytest.mark.parametrize("bands", [[(0, 40)], [(0, 1), (1, 39)], [(0, 3), (3, 37)]])
