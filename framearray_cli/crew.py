@@ -16,7 +16,7 @@ from .work import Work
 
 # Hits of a batch: large enough that calls and changes of threads cost nothing, small enough that a frame has several
 # for each thread and that their arrays stay in a core's cache.
-BATCH, LARGEST_BATCH, BATCHES_A_THREAD = 1024, 8192, 24
+BATCH, LARGEST_BATCH, BATCHES_A_THREAD = 2048, 8192, 20
 # Rays traced together within a batch.
 RAYS = 4096
 

@@ -10,7 +10,19 @@ import numpy as np
 
 from .arrays import Bytes, Directions, Float32, Int32, Keys, Points, Real, Rgb, Triple
 from .camera import Cameras, eye_ray
-from .embree.packets import DIRECTION, GEOMETRY, MISS, TRIANGLE, Tracer, U, V, intersect, scene_triangle, set_ray
+from .embree.packets import (
+    DIRECTION,
+    GEOMETRY,
+    MISS,
+    TRIANGLE,
+    Tracer,
+    U,
+    V,
+    hit_triangle,
+    intersect,
+    scene_triangle,
+    set_ray,
+)
 from .kernel import inlined, kernel
 from .lanes import LANES, choose, gather, lane_numbers, lanes_at, put_lanes, root, scatter
 from .sampling import PIXEL, PIXEL_SAMPLE, r2, stream, word
@@ -239,11 +251,17 @@ def pilot_hits(
     packets: Float32,
     hits: Hits,
 ) -> None:
-    """Look through the centres of pixels order[first : first + n].
+    """Look through the centres of pixels order[first : first + n] for mirrors; of the hits only `specular` is known.
 
     What they show decides how many samples a pixel gets; no sample's place depends on them, so that is unbiased.
     """
     for i in range(n):
         _shoot(cams, c, order[first + i], 0.5, 0.5, i, packets, hits)
     intersect(tracer, packets, n, True)
-    record_hits(surfaces, tracer, packets, n, True, hits)
+    for i in range(n):
+        triangle = hit_triangle(tracer, packets, i)
+        for channel in range(3):
+            hits.specular[i, channel] = 0.0
+        if triangle != MISS:
+            red, green, blue = specular_at(surfaces, triangle, packets[i >> 4, U, i & 15], packets[i >> 4, V, i & 15])
+            hits.specular[i, 0], hits.specular[i, 1], hits.specular[i, 2] = red, green, blue

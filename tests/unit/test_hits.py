@@ -7,7 +7,17 @@ import pytest
 import tiny
 from oracle import Oracle
 
-from framearray_cli.hits import ESCAPED, SURFACE, Hits, empty_hits, extra_hits, native_hits, pilot_hits, pixel_order
+from framearray_cli.hits import (
+    ESCAPED,
+    SURFACE,
+    Hits,
+    empty_hits,
+    extra_hits,
+    native_hits,
+    pilot_hits,
+    pixel_order,
+    record_hits,
+)
 from framearray_cli.rays import room_for_hits
 from framearray_cli.work import Work
 
@@ -126,7 +136,11 @@ def test_pilot_rays_pass_through_pixel_centres() -> None:
     with tiny.planned(tiny.prepared(tiny.job())) as (work, _):
         hits, packets = empty_hits(432), room_for_hits(432).packets
         pilot_hits(work.cams, 0, work.order, 0, 432, work.surfaces, work.tracer, packets, hits)
+        seen = empty_hits(432)
+        record_hits(work.surfaces, work.tracer, packets, 432, True, seen)
+    np.testing.assert_allclose(hits.specular, seen.specular, rtol=1e-6)
+    assert 0 < (hits.specular.max(axis=1) > 0).sum() < 432
     frame = np.stack([work.cams.right[0], work.cams.up[0], work.cams.forward[0]])
-    a, b, _ = (hits.incoming @ frame.T).astype(np.float64).T
+    a, b, _ = (seen.incoming @ frame.T).astype(np.float64).T
     np.testing.assert_allclose(a * work.cams.focal + 12, hits.pixel % 24 + 0.5, atol=1e-4)
     np.testing.assert_allclose(9 - b * work.cams.focal, hits.pixel // 24 + 0.5, atol=1e-4)
