@@ -227,7 +227,7 @@ light is the same for all. Relative to the mean of the reference, averaged over 
     for name, table in error.items():
         rows = []
         for variant, t in table["variants"].items():
-            timed = speed.get(name, {}).get("median", {}).get(variant, t)
+            timed = speed.get(name, {}).get("median", {}).get(variant, {})  # only what was timed with the same cameras
             rows.append(
                 [
                     variant,
