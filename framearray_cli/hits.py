@@ -104,6 +104,13 @@ def ray_origin(hits: Hits, i: int) -> Triple:
 
 
 @inlined
+def triple(array: Float32, i: int) -> Triple:
+    """Row i of an (n, 3) array, or rows of it for lanes."""
+    at = i * np.int32(3)
+    return gather(array, at), gather(array, at + np.int32(1)), gather(array, at + np.int32(2))
+
+
+@inlined
 def _put(array: Float32, i: int, x: Real, y: Real, z: Real) -> None:
     """Write rows i to i + 15 of an (n, 3) array."""
     at = (lane_numbers() + np.int32(i)) * np.int32(3)

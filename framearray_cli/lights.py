@@ -10,15 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .arrays import Float32, Float64, Int32
-from .lanes import LANES
+from .arrays import Float32, Float64, Int32, with_room
 from .paths import Lights
 
 POINT, DIRECTIONAL = 0, 1
 
 
 class LightArrays(NamedTuple):
-    """All sources of a job for kernels; they read it a packet of light positions at a time, see `with_room`.
+    """All sources of a job for kernels; they read it a packet of light positions at a time, see `padded`.
 
     Attributes:
         kind: (n_sources,) POINT or DIRECTIONAL.
@@ -45,13 +44,13 @@ class LightArrays(NamedTuple):
         return int(self.vector.shape[2])
 
 
-def with_room(lights: LightArrays) -> LightArrays:
+def padded(lights: LightArrays) -> LightArrays:
     """The same lights, with room behind each array for what a kernel reads beyond its end, and ignores."""
 
     def copied(array: Any) -> Any:
-        room = np.zeros(array.size + LANES, array.dtype)
-        room[: array.size] = array.ravel()
-        return room[: array.size].reshape(array.shape)
+        room = with_room(array.shape, array.dtype)
+        room[:] = array
+        return room
 
     return LightArrays(*(copied(array) for array in lights))
 
@@ -78,7 +77,7 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
         lit=np.asarray((intensity > 0).any(axis=-1), np.float32),
         colour=np.asarray(colour, np.float32),
     )
-    return with_room(found)
+    return padded(found)
 
 
 def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
@@ -91,4 +90,4 @@ def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
         lit=lights.lit[:, some],
         colour=lights.colour[some],
     )
-    return with_room(found)
+    return padded(found)

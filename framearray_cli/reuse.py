@@ -14,20 +14,13 @@ p_j / sum of n_k p_k over the eyes k of the window of j (balance heuristic, [Vea
 
 import numpy as np
 
-from .arrays import Float32, Float64, Int32, Real, Triple
+from .arrays import Float32, Float64, Int32, Real
 from .camera import OUTSIDE, Cameras, project
 from .embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, is_blocked, occlude
-from .hits import SURFACE, Hits
+from .hits import SURFACE, Hits, triple
 from .kernel import inlined, kernel
 from .lanes import LANES, choose, compress, count, doubles, gather, lane_numbers, lanes_at, put_lanes
 from .rays import Rays
-
-
-@inlined
-def _triple(array: Float32, i: int) -> Triple:
-    """Rows of an (n, 3) array."""
-    at = i * np.int32(3)
-    return gather(array, at), gather(array, at + np.int32(1)), gather(array, at + np.int32(2))
 
 
 @inlined
@@ -37,8 +30,8 @@ def _seen(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[int, Real, Real]:
     Also what the density p_k is made of: how far the surface faces the eye, and the hit's depth.
     """
     o, at = cams.position, lane_numbers() + np.int32(i)
-    x, y, z = _triple(hits.position, at)
-    gx, gy, gz = _triple(hits.geometric, at)
+    x, y, z = triple(hits.position, at)
+    gx, gy, gz = triple(hits.geometric, at)
     surface = gather(hits.kind, at) == np.uint8(SURFACE)
     # what is infinitely far lies in one direction from all eyes
     from_eye = choose(surface, np.float32(1.0), np.float32(0.0))
@@ -60,9 +53,9 @@ def _aim(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays, n: 
         row = lanes_at(rays.number, first)
         i = place - row * np.int32(stride)
         surface = gather(hits.kind, i) == np.uint8(SURFACE)
-        ox, oy, oz = _triple(cams.position, row + np.int32(first_eye))
-        px, py, pz = _triple(hits.position, i)
-        gx, gy, gz = _triple(hits.geometric, i)
+        ox, oy, oz = triple(cams.position, row + np.int32(first_eye))
+        px, py, pz = triple(hits.position, i)
+        gx, gy, gz = triple(hits.geometric, i)
         e, at = gather(hits.offset, i), (first >> 4) * packet
         x, y, z = px + e * gx, py + e * gy, pz + e * gz
         put_lanes(rays.packets, at + ORIGIN * LANES, choose(surface, x, ox))

@@ -162,7 +162,7 @@ class Window:
         frame, hits = self._frames[j], self._hits(j, holes)
 
         def band(first: int, _scratch: Scratch) -> None:
-            n = min(BAND_PIXELS, n_pixels - first)
+            n = min(TASK_PIXELS, n_pixels - first)
             sums = empty_band(n, 0)
             begin(sums, n)
             accumulate(sums, first, n, hits, 1, 0)
@@ -172,7 +172,7 @@ class Window:
             place = frame.places[j]
             average_native(place.start, place.order, frame.normal, frame.depth, first, n, own)
 
-        self._crew.run(band, range(0, n_pixels, BAND_PIXELS))
+        self._crew.run(band, range(0, n_pixels, TASK_PIXELS))
         obscurance = np.divide(indirect, reflectivity, out=np.zeros_like(indirect), where=reflectivity > 0)
         images = (array.reshape(*shape, 3) for array in (obscurance, reflectivity, own[:, :3]))
         return reflectivity * denoised(*images).reshape(n_pixels, 3)

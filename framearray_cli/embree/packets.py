@@ -146,7 +146,8 @@ def is_blocked(packets: Float32, i: int) -> bool:
 @inlined
 def scene_triangle(tracer: Tracer, triangle: int, geometry: int) -> int:
     """The scene's number of a triangle of a geometry; for one ray, or for lanes."""
-    return triangle + choose(geometry > np.int32(OPAQUE), np.int32(tracer.first_masked), np.int32(0))  # type: ignore[no-any-return]
+    number: int = triangle + choose(geometry > np.int32(OPAQUE), np.int32(tracer.first_masked), np.int32(0))
+    return number
 
 
 @inlined

@@ -25,7 +25,7 @@ from ..embree.packets import (
     intersect,
     scene_triangle,
 )
-from ..hits import Hits, reflects
+from ..hits import Hits, reflects, triple
 from ..kernel import inlined, kernel
 from ..lanes import LANES, choose, compress, count, gather, integers, lane_numbers, lanes_at, put_lanes, reals, scatter
 from ..rays import Rays
@@ -89,13 +89,11 @@ def _aim(hits: Hits, rays: Rays, n: int, first_ray: int, n_rays: int, settings: 
     packet = 0
     for first in range(0, n, LANES):
         hit = lanes_at(rays.place, first)
-        at = hit * np.int32(3)
-        mx, my = gather(hits.shading, at), gather(hits.shading, at + np.int32(1))
-        mz, e = gather(hits.shading, at + np.int32(2)), gather(hits.offset, hit)
-        gx, gy = gather(hits.geometric, at), gather(hits.geometric, at + np.int32(1))
-        gz = gather(hits.geometric, at + np.int32(2))
-        ox, oy = gather(hits.position, at) + e * gx, gather(hits.position, at + np.int32(1)) + e * gy
-        oz = gather(hits.position, at + np.int32(2)) + e * gz
+        e = gather(hits.offset, hit)
+        mx, my, mz = triple(hits.shading, hit)
+        gx, gy, gz = triple(hits.geometric, hit)
+        px, py, pz = triple(hits.position, hit)
+        ox, oy, oz = px + e * gx, py + e * gy, pz + e * gz
         random = word(gather(hits.key, hit), HEMISPHERE)
         a, b = integers(random) + np.int32(first_ray) * step_x, integers(random >> np.uint64(32))
         b = b + np.int32(first_ray) * step_y

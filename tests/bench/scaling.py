@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.arrays import Float32, Float64
-from framearray_cli.lights import DIRECTIONAL, LightArrays, with_room
+from framearray_cli.lights import DIRECTIONAL, LightArrays, padded
 from framearray_cli.paths import Eyes
 from framearray_cli.prepare import open_embree, plan_work
 
@@ -85,7 +85,7 @@ def resampled(lights: LightArrays, at: Float64) -> LightArrays:
         lit=np.ceil(_between(lights.lit, at, 1)),
         colour=_between(lights.colour, at, 0),
     )
-    return with_room(found)
+    return padded(found)
 
 
 def _between(values: Float32, at: Float64, axis: int) -> Float32:
