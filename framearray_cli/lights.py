@@ -48,7 +48,7 @@ def padded(lights: LightArrays) -> LightArrays:
     """The same lights, with room behind each array for what a kernel reads beyond its end, and ignores."""
 
     def copied(array: Any) -> Any:
-        room = with_room(array.shape, array.dtype)
+        room = with_room(array.shape, array.dtype, fill=1)
         room[:] = array
         return room
 

@@ -50,4 +50,6 @@ def test_positions_are_centred_and_directions_are_not() -> None:
     np.testing.assert_allclose(result.vector[0].T, [[0.001, 1, 2], [3, 4, 5]], rtol=1e-6)
     np.testing.assert_allclose(result.vector[1].T, [[0, -1, 0], [0.6, -0.8, 0]], rtol=1e-7)
     for array in (result.vector, result.strength, result.colour):
+        behind = np.lib.stride_tricks.as_strided(array.reshape(-1)[-1:], (17,), (4,))[1:]
+        assert (behind == 1).all()  # numbers that are quick to compute with
         assert array.dtype == np.float32 and array.flags.c_contiguous
