@@ -9,7 +9,7 @@ import numpy as np
 
 from .arrays import Directions, Float64, Points, Real, Triple
 from .kernel import inlined
-from .lanes import choose, doubles, integers
+from .lanes import choose, doubles, floor, integers, reals
 from .paths import Eyes
 
 OUTSIDE = -1  # the "pixel" of a point that an eye does not see
@@ -52,14 +52,21 @@ def cameras(eyes: Eyes, resolution: tuple[int, int], centre: Float64) -> Cameras
 @inlined
 def eye_ray(cams: Cameras, c: int, x: Real, y: Real) -> Triple:
     """Direction from eye c through image position (x, y) in pixels; its component along the optical axis is 1."""
-    a = np.float32((x - 0.5 * cams.width) / cams.focal)
-    b = np.float32((0.5 * cams.height - y) / cams.focal)
+    a = reals((x - 0.5 * cams.width) / cams.focal)
+    b = reals((0.5 * cams.height - y) / cams.focal)
     r, u, f = cams.right, cams.up, cams.forward
     return (
         a * r[c, 0] + b * u[c, 0] + f[c, 0],
         a * r[c, 1] + b * u[c, 1] + f[c, 1],
         a * r[c, 2] + b * u[c, 2] + f[c, 2],
     )
+
+
+@inlined
+def corner_of(cams: Cameras, pixel: int) -> tuple[float, float]:
+    """Image position (x, y) of the top left corner of a pixel."""
+    row = floor(doubles(pixel) / doubles(cams.width))
+    return doubles(pixel) - row * cams.width, row
 
 
 @inlined

@@ -9,22 +9,22 @@ import numba as nb
 import numpy as np
 
 from .arrays import Bytes, Directions, Float32, Int32, Keys, Points, Real, Rgb, Triple
-from .camera import Cameras, eye_ray
+from .camera import Cameras, corner_of, eye_ray
 from .embree.packets import (
     DIRECTION,
     GEOMETRY,
     MISS,
+    ORIGIN,
+    TFAR,
     TRIANGLE,
     Tracer,
     U,
     V,
-    hit_triangle,
     intersect,
     scene_triangle,
-    set_ray,
 )
 from .kernel import inlined, kernel
-from .lanes import LANES, choose, gather, lane_numbers, lanes_at, put_lanes, root, scatter
+from .lanes import LANES, choose, doubles, floor, gather, integers, lane_numbers, lanes_at, put_lanes, root, scatter
 from .sampling import PIXEL, PIXEL_SAMPLE, r2, stream, word
 from .surface import (
     Surfaces,
@@ -119,6 +119,17 @@ def _put(array: Float32, i: int, x: Real, y: Real, z: Real) -> None:
     scatter(array, at + np.int32(2), z)
 
 
+@inlined
+def _met(tracer: Tracer, packets: Float32, i: int) -> tuple[bool, int, Real, Real]:
+    """Whether rays i to i + 15 met nothing, and the triangles and places (u, v) that they met, else 0."""
+    bits, at = packets.view(np.int32), (i >> 4) * packets.shape[1] * LANES
+    triangle = lanes_at(bits, at + TRIANGLE * LANES)
+    missed = triangle < np.int32(0)
+    triangle = choose(missed, 0, scene_triangle(tracer, triangle, lanes_at(bits, at + GEOMETRY * LANES)))
+    u, v = lanes_at(packets, at + U * LANES), lanes_at(packets, at + V * LANES)
+    return missed, triangle, choose(missed, 0.0, u), choose(missed, 0.0, v)
+
+
 @kernel
 def record_hits(surfaces: Surfaces, tracer: Tracer, packets: Float32, n: int, mirrors: bool, hits: Hits) -> None:
     """Turn traced rays 0 to n - 1 into hits; key and pixel are left alone."""
@@ -127,11 +138,7 @@ def record_hits(surfaces: Surfaces, tracer: Tracer, packets: Float32, n: int, mi
         at = (i >> 4) * packet
         dx, dy = lanes_at(packets, at + DIRECTION * LANES), lanes_at(packets, at + (DIRECTION + 1) * LANES)
         dz = lanes_at(packets, at + (DIRECTION + 2) * LANES)
-        triangle = lanes_at(bits, at + TRIANGLE * LANES)
-        missed = triangle < np.int32(0)
-        triangle = choose(missed, 0, scene_triangle(tracer, triangle, lanes_at(bits, at + GEOMETRY * LANES)))
-        u, v = lanes_at(packets, at + U * LANES), lanes_at(packets, at + V * LANES)
-        u, v = choose(missed, 0.0, u), choose(missed, 0.0, v)
+        missed, triangle, u, v = _met(tracer, packets, i)
         # all is read before anything is written: the compiler then reads what is needed twice only once
         x, y, z = position_at(surfaces, triangle, u, v)
         length = root(dx * dx + dy * dy + dz * dz)
@@ -175,22 +182,37 @@ def pixel_order(width: int, height: int) -> Int32:
 
 
 @inlined
-def _shoot(cams: Cameras, c: int, pixel: int, jx: Real, jy: Real, i: int, packets: Float32, hits: Hits) -> None:
-    """Write eye ray i, through (jx, jy) within the box of a pixel."""
-    dx, dy, dz = eye_ray(cams, c, pixel % cams.width + jx, pixel // cams.width + jy)
-    o = cams.position
-    set_ray(packets, i, o[c, 0], o[c, 1], o[c, 2], dx, dy, dz, np.float32(np.inf))
-    hits.pixel[i] = pixel
+def _numbers(i: int, n: int) -> int:
+    """The numbers i to i + 15, but none above n - 1."""
+    number = lane_numbers() + np.int32(i)
+    kept: int = choose(number < np.int32(n), number, np.int32(n - 1))
+    return kept
 
 
 @inlined
-def _shoot_sample(
+def _shoot(cams: Cameras, c: int, pixel: int, jx: Real, jy: Real, i: int, packets: Float32, hits: Hits) -> None:
+    """Write eye rays i to i + 15, through (jx, jy) within the boxes of pixels."""
+    x, y = corner_of(cams, pixel)
+    dx, dy, dz = eye_ray(cams, c, x + doubles(jx), y + doubles(jy))
+    o, at = cams.position, (i >> 4) * packets.shape[1] * LANES
+    put_lanes(packets, at + ORIGIN * LANES, o[c, 0])
+    put_lanes(packets, at + (ORIGIN + 1) * LANES, o[c, 1])
+    put_lanes(packets, at + (ORIGIN + 2) * LANES, o[c, 2])
+    put_lanes(packets, at + DIRECTION * LANES, dx)
+    put_lanes(packets, at + (DIRECTION + 1) * LANES, dy)
+    put_lanes(packets, at + (DIRECTION + 2) * LANES, dz)
+    put_lanes(packets, at + TFAR * LANES, np.float32(np.inf))
+    put_lanes(hits.pixel, i, pixel)
+
+
+@inlined
+def _shoot_samples(
     cams: Cameras, c: int, seed: int, pixel: int, sample: int, i: int, packets: Float32, hits: Hits
 ) -> None:
-    """Write the eye ray of one sample; the samples of a pixel are spread by the golden ratio sequence."""
+    """Write the eye rays of 16 samples; the samples of a pixel are spread by the golden ratio sequence."""
     jx, jy = r2(word(stream(seed, c, pixel, PIXEL_SAMPLE), PIXEL), sample)
     _shoot(cams, c, pixel, jx, jy, i, packets, hits)
-    hits.key[i] = stream(seed, c, pixel, sample)
+    put_lanes(hits.key, i, stream(seed, c, pixel, sample))
 
 
 @kernel
@@ -213,12 +235,16 @@ def native_hits(
 
     They are numbered by groups of 16 pixels, within a group by sample, then by pixel.
     """
-    n_pixels = pixels.shape[0]
-    for i in range(n):
-        group, rest = divmod(first + i, 16 * per_pixel)
-        members = min(16, n_pixels - 16 * group)
-        sample, member = divmod(rest, members)
-        _shoot_sample(cams, c, seed, pixels[16 * group + member], first_sample + sample, i, packets, hits)
+    # a frame may have more hits than an int32 counts; the quotients of such numbers are exact in float64
+    n_pixels, of_group = np.float64(pixels.shape[0]), np.float64(16 * per_pixel)
+    for i in range(0, n, LANES):
+        number = doubles(_numbers(i, n)) + np.float64(first)
+        group = floor(number / of_group)
+        rest, left = number - group * of_group, n_pixels - group * 16.0
+        members = choose(left < 16.0, left, 16.0)
+        sample = floor(rest / members)
+        pixel = gather(pixels, integers(group * 16.0 + rest - sample * members))
+        _shoot_samples(cams, c, seed, pixel, integers(sample) + np.int32(first_sample), i, packets, hits)
     intersect(tracer, packets, n, True)
     record_hits(surfaces, tracer, packets, n, mirrors, hits)
 
@@ -239,9 +265,11 @@ def extra_hits(
     hits: Hits,
 ) -> None:
     """Find hits first to first + n - 1 of those that mirror pixels have beyond the others, `per_pixel` each."""
-    for i in range(n):
-        at, sample = divmod(first + i, per_pixel)
-        _shoot_sample(cams, c, seed, pixels[at], first_sample + sample, i, packets, hits)
+    for i in range(0, n, LANES):
+        number = doubles(_numbers(i, n)) + np.float64(first)
+        at = floor(number / np.float64(per_pixel))
+        sample = integers(number - at * np.float64(per_pixel)) + np.int32(first_sample)
+        _shoot_samples(cams, c, seed, gather(pixels, integers(at)), sample, i, packets, hits)
     intersect(tracer, packets, n, True)
     record_hits(surfaces, tracer, packets, n, True, hits)
 
@@ -262,13 +290,10 @@ def pilot_hits(
 
     What they show decides how many samples a pixel gets; no sample's place depends on them, so that is unbiased.
     """
-    for i in range(n):
-        _shoot(cams, c, order[first + i], 0.5, 0.5, i, packets, hits)
+    for i in range(0, n, LANES):
+        _shoot(cams, c, gather(order, _numbers(i, n) + np.int32(first)), 0.5, 0.5, i, packets, hits)
     intersect(tracer, packets, n, True)
-    for i in range(n):
-        triangle = hit_triangle(tracer, packets, i)
-        for channel in range(3):
-            hits.specular[i, channel] = 0.0
-        if triangle != MISS:
-            red, green, blue = specular_at(surfaces, triangle, packets[i >> 4, U, i & 15], packets[i >> 4, V, i & 15])
-            hits.specular[i, 0], hits.specular[i, 1], hits.specular[i, 2] = red, green, blue
+    for i in range(0, n, LANES):
+        missed, triangle, u, v = _met(tracer, packets, i)
+        red, green, blue = specular_at(surfaces, triangle, u, v)
+        _put(hits.specular, i, choose(missed, 0.0, red), choose(missed, 0.0, green), choose(missed, 0.0, blue))

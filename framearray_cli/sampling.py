@@ -12,7 +12,7 @@ import numpy as np
 
 from .arrays import Real, Triple
 from .kernel import inlined
-from .lanes import choose, root
+from .lanes import choose, integers, reals, root, words
 
 # Dimensions: one stream a purpose.
 PIXEL, HEMISPHERE, CHOICE, STEPS = 0, 1, 2, 3
@@ -37,7 +37,7 @@ def mix(z: np.uint64) -> np.uint64:
 @inlined
 def stream(seed: int, c: int, pixel: int, sample: int) -> np.uint64:
     """The 64-bit key of one sample: c below 2^20, pixel below 2^28, sample below 2^16."""
-    place = (np.uint64(c) << np.uint64(44)) | (np.uint64(pixel) << np.uint64(16)) | np.uint64(sample)
+    place = words(pixel) * np.uint64(1 << 16) + words(sample) + words(c) * np.uint64(1 << 44)
     return mix(place ^ mix(np.uint64(seed) + np.uint64(0x9E3779B97F4A7C15)))
 
 
@@ -50,10 +50,10 @@ def word(key: np.uint64, dimension: int) -> np.uint64:
 @inlined
 def shifted(bits: np.uint64, i: int, step_x: int | np.uint32, step_y: int | np.uint32) -> tuple[Real, Real]:
     """Point i of a lattice, shifted by the random bits: uniform in [0, 1)^2; steps in units of 2^-32."""
-    x = np.uint32(bits & np.uint64(0xFFFFFFFF)) + np.uint32(i) * np.uint32(step_x)
-    y = np.uint32(bits >> np.uint64(32)) + np.uint32(i) * np.uint32(step_y)
-    x, y = np.uint32(x) >> np.uint32(8), np.uint32(y) >> np.uint32(8)  # 24 bits: what float32 holds below 1
-    return np.float32(x) * UNIT_24, np.float32(y) * UNIT_24
+    x = integers(bits) + integers(i) * np.int32(np.uint32(step_x))
+    y = integers(bits >> np.uint64(32)) + integers(i) * np.int32(np.uint32(step_y))
+    most = np.int32(0xFFFFFF)  # 24 bits: what float32 holds below 1
+    return reals((x >> np.int32(8)) & most) * UNIT_24, reals((y >> np.int32(8)) & most) * UNIT_24
 
 
 @inlined

@@ -28,6 +28,7 @@ from framearray_cli.lanes import (
     root,
     scatter,
     stored,
+    words,
 )
 from framearray_cli.sampling import above, cosine_direction, disc
 from framearray_cli.surface import (
@@ -164,7 +165,7 @@ def test_int32_has_an_order() -> None:
 
 
 @kernel
-def convert(f: Any, d: Any, i: Any, b: Any, u: Any, to_f: Any, to_d: Any, to_i: Any) -> None:
+def convert(f: Any, d: Any, i: Any, b: Any, u: Any, pixel: Any, to_f: Any, to_d: Any, to_i: Any, to_u: Any) -> None:
     """Each conversion of lanes (rows of 16), and in the row behind it of one number at a time."""
     put_lanes(to_f, 0, reals(lanes_at(f, 3)))
     put_lanes(to_f, 32, reals(lanes_at(d, 3)))
@@ -179,11 +180,15 @@ def convert(f: Any, d: Any, i: Any, b: Any, u: Any, to_f: Any, to_d: Any, to_i: 
     put_lanes(to_i, 128, integers(lanes_at(u, 3)))
     put_lanes(to_i, 160, lane_numbers())
     put_lanes(to_i, 176, integers(2.9))
+    put_lanes(to_u, 0, words(lanes_at(b, 3)))
+    put_lanes(to_u, 32, words(lanes_at(u, 3)))
+    put_lanes(to_u, 64, words(lanes_at(pixel, 3)))
     for k in range(16):
         to_f[16 + k], to_f[48 + k], to_f[80 + k] = reals(f[3 + k]), reals(d[3 + k]), reals(i[3 + k])
         to_d[16 + k], to_d[48 + k], to_d[80 + k] = doubles(f[3 + k]), doubles(d[3 + k]), doubles(i[3 + k])
         to_i[16 + k], to_i[48 + k], to_i[80 + k] = integers(f[3 + k]), integers(d[3 + k]), integers(i[3 + k])
         to_i[112 + k], to_i[144 + k] = integers(b[3 + k]), integers(u[3 + k])
+        to_u[16 + k], to_u[48 + k], to_u[80 + k] = words(b[3 + k]), words(u[3 + k]), words(pixel[3 + k])
 
 
 def test_conversions_are_those_of_numpy_for_lanes_and_for_numbers() -> None:
@@ -195,9 +200,11 @@ def test_conversions_are_those_of_numpy_for_lanes_and_for_numbers() -> None:
     b = rng.integers(0, 256, 2 * LANES, np.uint8)
     b[3] = 255
     u = rng.integers(0, 2**64, 2 * LANES, np.uint64)
+    pixel = np.abs(i >> 3)
     to_f, to_d, to_i = fresh(np.float32, 96), fresh(np.float64, 96), fresh(np.int32, 192)
-    convert(f, d, i, b, u, to_f, to_d, to_i)
-    for found, sources in ((to_f, (f, d, i)), (to_d, (f, d, i)), (to_i, (f, d, i, b, u))):
+    to_u = fresh(np.uint64, 96)
+    convert(f, d, i, b, u, pixel, to_f, to_d, to_i, to_u)
+    for found, sources in ((to_f, (f, d, i)), (to_d, (f, d, i)), (to_i, (f, d, i, b, u)), (to_u, (b, u, pixel))):
         for source, (lanes, numbers) in zip(sources, found.reshape(-1, 2, LANES), strict=False):
             np.testing.assert_array_equal(lanes, source[READ].astype(found.dtype))
             np.testing.assert_array_equal(numbers, lanes)
