@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Real, Rgb
+from ..arrays import Float32, Real, Rgb
 from ..embree.packets import (
     DIRECTION,
     GEOMETRY,
@@ -21,13 +21,25 @@ from ..embree.packets import (
     Tracer,
     U,
     V,
-    hit_triangle,
     intersect,
     scene_triangle,
 )
 from ..hits import Hits, reflects, triple
 from ..kernel import inlined, kernel
-from ..lanes import LANES, choose, compress, count, gather, integers, lane_numbers, lanes_at, put_lanes, reals, scatter
+from ..lanes import (
+    LANES,
+    choose,
+    compress,
+    count,
+    gather,
+    integers,
+    lane_numbers,
+    lanes_at,
+    put_lanes,
+    reals,
+    root,
+    scatter,
+)
 from ..rays import Rays
 from ..sampling import HEMISPHERE, UNIT_24, above, cosine_direction, word
 from ..surface import Surfaces, reflectivity_at, specular_at
@@ -114,49 +126,56 @@ def _aim(hits: Hits, rays: Rays, n: int, first_ray: int, n_rays: int, settings: 
     return packet
 
 
-@kernel
-def _sort_out(rays: Rays, n: int, settings: ObscuranceSettings) -> int:
-    """Value the rays that meet nothing within d_max; list the others in `rays.number[0]`, and return how many.
+@inlined
+def _rho_of_lanes(falloff: int, tau: Real, x: Real, room: Float32, at: int) -> Real:
+    """`rho` of sixteen numbers; those that lanes cannot work out are worked out in `room`, from a flat offset on."""
+    curve: Real = x
+    if falloff == SQRT:
+        curve = root(x)
+    elif falloff != LINEAR:
+        put_lanes(room, at, x)
+        flat = room.reshape(room.size)
+        for i in range(at, at + LANES):
+            flat[i] = rho(falloff, tau, flat[i])
+        curve = lanes_at(room, at)
+    return curve
 
-    `rays.number[1]` says which rays see the background.
+
+@kernel
+def _value(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int, settings: ObscuranceSettings) -> int:
+    """Value traced rays 0 to n - 1: R(Q) rho(d) where they meet a surface within d_max.
+
+    Of a surface that does not look the same everywhere only rho(d) is known then; such rays are listed in
+    `rays.number[0]`. `rays.number[1]` says which rays see the background.
+
+    Returns:
+        how many are listed.
     """
     second, packet = rays.number.shape[1], rays.packets.shape[1] * LANES
     bits, d_max = rays.packets.view(np.int32), np.float32(settings.d_max)
-    near = 0
+    varied = 0
     for first in range(0, n, LANES):
         ray = (first >> 4) * packet
         distance, triangle = lanes_at(rays.packets, ray + TFAR * LANES), lanes_at(bits, ray + TRIANGLE * LANES)
         missed = triangle < np.int32(0)
         within = ~missed & (distance < d_max)
-        nothing = within
+        nothing = ~within
         if settings.sky:
-            nothing = within | missed
+            nothing = nothing & ~missed
             put_lanes(rays.number, second + first, choose(missed, integers(1), np.int32(0)))
+        triangle = scene_triangle(tracer, triangle, lanes_at(bits, ray + GEOMETRY * LANES))
+        material = gather(surfaces.material, choose(within, triangle, np.int32(0)))
+        at, x = material * np.int32(3), choose(within, distance, np.float32(0.0)) / d_max
+        weight = _rho_of_lanes(settings.falloff, settings.tau, x, rays.value, first)
         for channel in range(3):
-            put_lanes(
-                rays.value,
-                channel * rays.value.shape[1] + first,
-                choose(nothing, reals(0.0), settings.average[channel]),
-            )
-        compress(within, lane_numbers() + np.int32(first), rays.number, near)
-        near += count(within)
-    return near
-
-
-@kernel
-def _look_up(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int, settings: ObscuranceSettings) -> None:
-    """Value listed rays 0 to n - 1 by R(Q) rho(d)."""
-    packets, d_max = rays.packets, np.float32(settings.d_max)
-    varied = 0
-    for k in range(n):
-        i = rays.number[0, k]
-        material = surfaces.material[hit_triangle(tracer, packets, i)]
-        weight = rho(settings.falloff, settings.tau, packets[i >> 4, TFAR, i & 15] / d_max)
-        for channel in range(3):
-            rays.value[channel, i] = weight * surfaces.total[material, channel]
-        rays.number[0, varied] = i
-        varied += surfaces.plain[material] == 0
-    _tint(surfaces, tracer, rays, varied)
+            value = weight * gather(surfaces.total, at + np.int32(channel))
+            value = choose(within, value, choose(nothing, reals(settings.average[channel]), np.float32(0.0)))
+            put_lanes(rays.value, channel * rays.value.shape[1] + first, value)
+        if settings.falloff != CONSTANT:
+            changing = within & (gather(surfaces.plain, material) == np.uint8(0))
+            compress(changing, lane_numbers() + np.int32(first), rays.number, varied)
+            varied += count(changing)
+    return varied
 
 
 @kernel
@@ -234,9 +253,8 @@ def _trace(
         n_rays = min(settings.n_rays - first_ray, room)
         n_traced = LANES * _aim(hits, rays, n, first_ray, n_rays, settings)
         intersect(tracer, rays.packets, n_traced, False)
-        near = _sort_out(rays, n_traced, settings)
-        if settings.falloff != CONSTANT:
-            _look_up(surfaces, tracer, rays, near, settings)
+        varied = _value(surfaces, tracer, rays, n_traced, settings)
+        _tint(surfaces, tracer, rays, varied)
         _hand_over(rays, n, first_ray, n_rays, settings, result, skylight)
 
 
