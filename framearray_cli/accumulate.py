@@ -5,27 +5,17 @@ from collections.abc import Iterable
 import numpy as np
 
 from .arrays import Addresses, Float32, Int32, Real, Rgb
-from .compose import (
-    INDIRECT,
-    INVERSE_PI,
-    MOST,
-    OBSCURANCE,
-    STEADY,
-    WEIGHT,
-    Band,
-    Stored,
-    begin,
-    finish,
-    normalise,
-)
+from .compose import INVERSE_PI, MOST, Band, Stored, finish
 from .kernel import inlined, integer_at, kernel, prefetch, real_at
-from .lanes import LANES, lanes_at, lanes_from, put_lanes
-from .work import Placed, Records
+from .lanes import LANES, lane_numbers, lanes_at, lanes_from, put_lanes, reals
+from .work import INDIRECT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, Placed, Records, lit_bit
 
 # Columns of a list of sources: addresses of arrays, 0 for one that is empty.
-START, ORDER, WEIGHTS, SCALE, REFLECTIVITY, W, CONSTANT, IRRADIANCE = range(8)
-# How many hits ahead a source is fetched: memory answers in about the time that this many hits take to sum.
+START, ORDER, WEIGHTS, SCALE, ROW, IRRADIANCE = range(6)
+# How many hits ahead the light of a hit is fetched, and twice as many its row: memory answers in about the time that
+# this many hits take to sum.
 AHEAD = 8
+ROW_BYTES = 4 * LANES
 
 
 def sources(parts: Iterable[tuple[Placed, Records, Float32, Float32]]) -> Addresses:
@@ -36,121 +26,120 @@ def sources(parts: Iterable[tuple[Placed, Records, Float32, Float32]]) -> Addres
             (n_pixels,) a factor for all hits of a pixel, or (0,) where it is 1.
 
     Returns:
-        (n, 8) addresses.
+        (n, 6) addresses.
     """
     rows = []
     for placed, known, weight, scale in parts:
-        arrays = (
-            placed.start,
-            placed.order,
-            weight,
-            scale,
-            known.reflectivity,
-            known.obscurance,
-            known.constant,
-            known.irradiance,
-        )
+        arrays = (placed.start, placed.order, weight, scale, known.row, known.irradiance)
         assert all(array.flags.c_contiguous for array in arrays)
         rows.append([array.ctypes.data if array.size else 0 for array in arrays])
-    return np.array(rows, np.int64).reshape(-1, 8)
+    return np.array(rows, np.int64).reshape(-1, 6)
 
 
 @inlined
-def _add_light(band: Band, i: int, n: int, channels: int, n_lights: int) -> None:
+def _add_light(band: Band, i: int, n: int, channels: int, n_lights: int, fresh: bool) -> None:
     """Add the direct light of the n hits that wait to pixel i of the band; each sum is read and written once."""
-    stride = band.direct.shape[2]
+    stride, any_lit = band.direct.shape[2], 0
+    for k in range(n):
+        any_lit |= band.lit[k]
     for l in range(0, n_lights, LANES):
-        at = 3 * i * stride + l
-        red, green = lanes_at(band.direct, at), lanes_at(band.direct, at + stride)
-        blue = lanes_at(band.direct, at + 2 * stride)
-        for k in range(n):
-            row = band.rows[k] + 4 * l
+        at, bit = 3 * i * stride + l, lit_bit(n_lights, l)
+        red = green = blue = reals(lane_numbers()) * np.float32(0.0)
+        if not fresh:
+            red, green = lanes_at(band.direct, at), lanes_at(band.direct, at + stride)
+            blue = lanes_at(band.direct, at + 2 * stride)
+        for k in range(n if (any_lit >> bit) & 1 else 0):
+            if (band.lit[k] >> bit) & 1 == 0:
+                continue
+            place = band.places[k] + 4 * l
             if channels == 1:
-                e = lanes_from(row)
+                e = lanes_from(place)
                 red = red + e * band.shares[k, 0]
                 green = green + e * band.shares[k, 1]
                 blue = blue + e * band.shares[k, 2]
             else:
-                red = red + lanes_from(row) * band.shares[k, 0]
-                green = green + lanes_from(row + 4 * n_lights) * band.shares[k, 1]
-                blue = blue + lanes_from(row + 8 * n_lights) * band.shares[k, 2]
+                red = red + lanes_from(place) * band.shares[k, 0]
+                green = green + lanes_from(place + 4 * n_lights) * band.shares[k, 1]
+                blue = blue + lanes_from(place + 8 * n_lights) * band.shares[k, 2]
         put_lanes(band.direct, at, red)
         put_lanes(band.direct, at + stride, green)
         put_lanes(band.direct, at + 2 * stride, blue)
 
 
 @inlined
-def _fetch(source: Addresses, entry: int, last: int, row_bytes: int) -> None:
-    """Ask for what is known of a hit that comes soon."""
-    if entry < last:
-        hit = integer_at(source[ORDER], entry)
-        prefetch(source[REFLECTIVITY] + 12 * hit, 12)
-        prefetch(source[W] + 12 * hit, 12)
-        if source[CONSTANT] != 0:
-            prefetch(source[CONSTANT] + 12 * hit, 12)
-        prefetch(source[IRRADIANCE] + row_bytes * hit, row_bytes)
-
-
-@inlined
-def _add(sums: Float32, i: int, first: int, red: Real, green: Real, blue: Real) -> None:
-    sums[i, first] += red
-    sums[i, first + 1] += green
-    sums[i, first + 2] += blue
+def _fetch(source: Addresses, entry: int, last: int, channels: int, n_lights: int) -> None:
+    """Ask for the row of a hit that comes soon, and for the light of an earlier one, which its row tells of."""
+    if entry + 2 * AHEAD < last:
+        prefetch(source[ROW] + ROW_BYTES * integer_at(source[ORDER], entry + 2 * AHEAD), 1)
+    if entry + AHEAD < last:
+        hit = integer_at(source[ORDER], entry + AHEAD)
+        lit = int(real_at(source[ROW], LANES * hit + LIT))
+        for l in range(0, n_lights if lit != 0 else 0, LANES):
+            if (lit >> lit_bit(n_lights, l)) & 1:
+                for channel in range(channels):
+                    prefetch(source[IRRADIANCE] + 4 * (n_lights * (channels * hit + channel) + l), ROW_BYTES)
 
 
 @kernel
-def accumulate(band: Band, first_pixel: int, n: int, parts: Addresses, channels: int, n_lights: int) -> None:
-    """Add hits to the sums of pixels first_pixel to first_pixel + n - 1, pixel by pixel, source by source.
+def accumulate(
+    band: Band, first_pixel: int, n: int, parts: Addresses, channels: int, n_lights: int, mean: bool
+) -> None:
+    """Sum the hits of pixels first_pixel to first_pixel + n - 1, pixel by pixel, source by source.
 
     Args:
         parts: from `sources`.
         channels: of irradiance, 1 or 3.
         n_lights: of irradiance; 0: direct light is left out.
+        mean: the sums become means over the weights, zero in a pixel without hits; else they are added to what the
+            band holds.
     """
-    row_bytes, nothing = 4 * channels * n_lights, np.float32(0.0)
     for i in range(n):
-        pixel, waiting = first_pixel + i, 0
-        # the pixel's sums stay in registers
-        weight = r_red = r_green = r_blue = w_red = w_green = w_blue = nothing
-        rw_red = rw_green = rw_blue = c_red = c_green = c_blue = nothing
+        pixel, n_hits, waiting, fresh = first_pixel + i, 0, 0, mean
+        total = reals(lane_numbers()) * np.float32(0.0)  # the sum of the rows stays in a register
         for part in range(parts.shape[0]):
             source = parts[part]
             start, end = integer_at(source[START], pixel), integer_at(source[START], pixel + 1)
             last = integer_at(source[START], first_pixel + n)
             factor = real_at(source[SCALE], pixel) if source[SCALE] != 0 else np.float32(1.0)
-            band.hits[i] += end - start
+            n_hits += end - start
             for entry in range(start, end):
-                _fetch(source, entry + AHEAD, last, row_bytes)
+                _fetch(source, entry, last, channels, n_lights)
                 hit = integer_at(source[ORDER], entry)
                 w = factor * real_at(source[WEIGHTS], hit) if source[WEIGHTS] != 0 else factor
-                weight += w
-                if source[CONSTANT] != 0:
-                    c_red += w * real_at(source[CONSTANT], 3 * hit)
-                    c_green += w * real_at(source[CONSTANT], 3 * hit + 1)
-                    c_blue += w * real_at(source[CONSTANT], 3 * hit + 2)
-                red, green = w * real_at(source[REFLECTIVITY], 3 * hit), w * real_at(source[REFLECTIVITY], 3 * hit + 1)
-                blue = w * real_at(source[REFLECTIVITY], 3 * hit + 2)
-                if not (red > 0.0 or green > 0.0 or blue > 0.0):
+                row = source[ROW] + ROW_BYTES * hit
+                total = total + lanes_from(row) * w
+                lit = int(real_at(row, LIT))
+                if lit == 0 or n_lights == 0:
                     continue
-                r_red, r_green, r_blue = r_red + red, r_green + green, r_blue + blue
-                o_red, o_green = real_at(source[W], 3 * hit), real_at(source[W], 3 * hit + 1)
-                o_blue = real_at(source[W], 3 * hit + 2)
-                rw_red, rw_green, rw_blue = rw_red + red * o_red, rw_green + green * o_green, rw_blue + blue * o_blue
-                w_red, w_green, w_blue = w_red + w * o_red, w_green + w * o_green, w_blue + w * o_blue
-                band.rows[waiting] = source[IRRADIANCE] + row_bytes * hit
-                band.shares[waiting, 0] = red * INVERSE_PI
-                band.shares[waiting, 1] = green * INVERSE_PI
-                band.shares[waiting, 2] = blue * INVERSE_PI
-                waiting += 1
                 if waiting == MOST:
-                    _add_light(band, i, waiting, channels, n_lights)
-                    waiting = 0
-        _add_light(band, i, waiting, channels, n_lights)
-        band.rest[i, WEIGHT] += weight
-        _add(band.rest, i, INDIRECT, rw_red, rw_green, rw_blue)
-        _add(band.rest, i, STEADY, c_red, c_green, c_blue)
-        _add(band.rest, i, OBSCURANCE, w_red, w_green, w_blue)
-        _add(band.reflectivity, i, 0, r_red, r_green, r_blue)
+                    _add_light(band, i, waiting, channels, n_lights, fresh)
+                    waiting, fresh = 0, False
+                band.places[waiting], band.lit[waiting] = source[IRRADIANCE] + 4 * channels * n_lights * hit, lit
+                for channel in range(3):
+                    band.shares[waiting, channel] = w * INVERSE_PI * real_at(row, REFLECTIVITY + channel)
+                waiting += 1
+        if mean:
+            put_lanes(band.sums, LANES * i, total)
+            weight = band.sums[i, WEIGHT]
+            inverse = np.float32(1.0) / weight if weight > 0.0 else np.float32(0.0)
+            put_lanes(band.sums, LANES * i, total * inverse)
+            band.hits[i] = n_hits
+            _scale(band, i, waiting, n_lights, fresh, inverse)
+        else:
+            put_lanes(band.sums, LANES * i, lanes_at(band.sums, LANES * i) + total)
+        _add_light(band, i, waiting, channels, n_lights, fresh)
+
+
+@inlined
+def _scale(band: Band, i: int, n: int, n_lights: int, fresh: bool, factor: Real) -> None:
+    """Multiply what waits for pixel i of the band, and what is summed already."""
+    for k in range(n):
+        for channel in range(3):
+            band.shares[k, channel] *= factor
+    if not fresh:
+        for channel in range(3):
+            for l in range(n_lights):
+                band.direct[i, channel, l] *= factor
 
 
 @kernel
@@ -187,20 +176,18 @@ def compose_pixels(
     bad, bad_light, bad_pixel, beyond = 0, -1, -1, 0
     for first in range(first_pixel, first_pixel + n, band.hits.shape[0]):
         m = min(band.hits.shape[0], first_pixel + n - first)
-        begin(band, m)
-        accumulate(band, first, m, hits, channels, n_lights)
-        normalise(band, m)
+        accumulate(band, first, m, hits, channels, n_lights, True)
         for i in range(m):
             samples[first + i] = band.hits[i]
             for channel in range(3):
                 if smooth.shape[0] > 0:
-                    band.rest[i, INDIRECT + channel] = smooth[first + i, channel]
+                    band.sums[i, INDIRECT + channel] = smooth[first + i, channel]
                 if maps.shape[0] > 0:
-                    maps[first + i, channel] = band.rest[i, OBSCURANCE + channel]
-                    maps[first + i, 3 + channel] = band.rest[i, INDIRECT + channel]
-                    maps[first + i, 6 + channel] = band.reflectivity[i, channel]
+                    maps[first + i, channel] = band.sums[i, OBSCURANCE + channel]
+                    maps[first + i, 3 + channel] = band.sums[i, INDIRECT + channel]
+                    maps[first + i, 6 + channel] = band.sums[i, REFLECTIVITY + channel]
         if mirrored.shape[0] > 0:
-            accumulate(band, first, m, mirrored, channels, n_lights)
+            accumulate(band, first, m, mirrored, channels, n_lights, False)
         found, l, pixel, large = finish(band, first, m, colour, ambient, lowest, images)
         if bad == 0 and found > 0:
             bad_light, bad_pixel = l, pixel

@@ -2,9 +2,9 @@
 
     image[l] = (direct[l] + I_A[l] R W + constant) weighed over all hits + the same over reflected hits / n_native
 
-A band of pixels is summed in arrays that stay in the cache: `begin`, `accumulate` for the hits of all eyes of the
-window, `normalise`, `accumulate` for the frame's reflected hits, `finish`. Sums happen in this fixed order, so that
-images do not depend on the number of threads.
+A band of pixels is summed in arrays that stay in the cache: `accumulate` over the hits of all eyes of the
+window, `accumulate` for the frame's reflected hits, `finish`. Sums happen in this fixed order, so that images do not
+depend on the number of threads.
 """
 
 from typing import NamedTuple, TypeAlias
@@ -12,9 +12,10 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Addresses, Float32, Images, Int32, Real, Rgb
+from .arrays import Addresses, Float32, Images, Int32, Real, Rgb, with_room
 from .kernel import kernel
 from .lanes import LANES, compress, gather, lane_numbers, put_lanes, stored
+from .work import INDIRECT, STEADY
 
 # Images as they are stored: float32, or the bits of halves; (n_lights, n_pixels, 3).
 Stored: TypeAlias = Float32 | NDArray[np.uint16]
@@ -29,22 +30,21 @@ class Band(NamedTuple):
     Attributes:
         direct: (n_pixels, 3, n_lights or more, a multiple of LANES) sum of w R / pi E[l], in units of the lights'
             colour.
-        rest: (n_pixels, 10) sums of w, w R W (3), w constant (3), w W (3).
-        reflectivity: (n_pixels, 3) sum of w R.
+        sums: (n_pixels, LANES) weighed sums of rows of hits, see `Records`.
         hits: (n_pixels,) number of hits.
-        rows: (MOST,) where the irradiance of a hit stands: an address.
+        places: (MOST,) where the irradiance of a hit stands: an address.
         shares: (MOST, 3) w R / pi of a hit.
+        lit: (MOST,) which of its light is not zero: see `Records`.
     """
 
     direct: Float32
-    rest: Float32
-    reflectivity: Rgb
+    sums: Float32
     hits: Int32
-    rows: Addresses
+    places: Addresses
     shares: Float32
+    lit: Addresses
 
 
-WEIGHT, INDIRECT, STEADY, OBSCURANCE = 0, 1, 4, 7
 # Hits of a pixel that are summed at once.
 MOST = 64
 
@@ -52,48 +52,18 @@ MOST = 64
 def empty_band(n_pixels: int, n_lights: int) -> Band:
     """Room for the sums of n_pixels pixels."""
     return Band(
-        direct=np.empty((n_pixels, 3, -(-n_lights // LANES) * LANES), np.float32),
-        rest=np.empty((n_pixels, 10), np.float32),
-        reflectivity=np.empty((n_pixels, 3), np.float32),
+        direct=with_room((n_pixels, 3, -(-n_lights // LANES) * LANES), np.float32),
+        sums=with_room((n_pixels, LANES), np.float32),
         hits=np.empty(n_pixels, np.int32),
-        rows=np.empty(MOST, np.int64),
+        places=np.empty(MOST, np.int64),
         shares=np.empty((MOST, 3), np.float32),
+        lit=np.empty(MOST, np.int64),
     )
 
 
 def as_stored(images: Images) -> Stored:
     """Images as `finish` takes them; shares memory."""
     return np.asarray(images.view(np.uint16)) if images.dtype == np.float16 else np.asarray(images, np.float32)
-
-
-@kernel
-def begin(band: Band, n: int) -> None:
-    """Set the sums of pixels 0 to n - 1 of a band to zero."""
-    for i in range(n):
-        band.hits[i] = 0
-        for value in range(band.rest.shape[1]):
-            band.rest[i, value] = 0.0
-        for channel in range(3):
-            band.reflectivity[i, channel] = 0.0
-            for l in range(band.direct.shape[2]):
-                band.direct[i, channel, l] = 0.0
-
-
-@kernel
-def normalise(band: Band, n: int) -> None:
-    """Turn sums into means over the weights; a pixel without hits stays zero."""
-    for i in range(n):
-        total = band.rest[i, WEIGHT]
-        if total <= 0.0:
-            continue
-        inverse = np.float32(1.0) / total
-        for channel in range(3):
-            direct = band.direct[i, channel]
-            for l in range(direct.shape[0]):
-                direct[l] *= inverse
-            band.reflectivity[i, channel] *= inverse
-        for value in range(1, 10):
-            band.rest[i, value] *= inverse
 
 
 @kernel
@@ -117,7 +87,7 @@ def finish(
     n_lights, sums = images.shape[0], band.direct
     for i in range(n):
         for channel in range(3):
-            indirect, steady = band.rest[i, INDIRECT + channel], band.rest[i, STEADY + channel]
+            indirect, steady = band.sums[i, INDIRECT + channel], band.sums[i, STEADY + channel]
             wrong = large = 0
             for l in range(n_lights):
                 value = colour[channel, l] * sums[i, channel, l] + ambient[channel, l] * indirect + steady

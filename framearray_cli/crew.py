@@ -57,6 +57,7 @@ class Scratch:
         self.irradiance = np.empty(full, np.float32)  # of all lights, where only some are kept
         self.pixel = np.empty((n_eyes, batch), np.int32)
         self.density = np.empty((n_eyes, batch if work.balance else 0), np.float64)
+        self.obscurance = np.empty((batch, 3), np.float32)
         self.skylight = np.empty((batch if work.obscurance.sky else 0, 3), np.float32)
         self.rays: Counter[str] = Counter()
         self.seconds: defaultdict[str, float] = defaultdict(float)

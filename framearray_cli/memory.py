@@ -8,6 +8,7 @@ import psutil
 
 from .errors import JobError
 from .hits import empty_hits, pilot_hits
+from .lanes import LANES
 from .plan import flag_mirrors, frame_hits
 from .prepare import Prepared
 from .rays import room_for_hits
@@ -70,7 +71,7 @@ def ambient_memory(prepared: Prepared) -> int:
 def window_memory(prepared: Prepared, n_lights: int, mirror_share: float = 0.0) -> int:
     """Bytes that the window of frames and the images under way take for some of the lights.
 
-    A hit takes its irradiance under every light, reflectivity, W, and its place and weight in every frame that uses it.
+    A hit takes its irradiance under every light, a row, and its place and weight in every frame that uses it.
 
     Args:
         mirror_share: of the pixels that see a mirror; their hits are held until their frame is composed.
@@ -81,8 +82,8 @@ def window_memory(prepared: Prepared, n_lights: int, mirror_share: float = 0.0) 
     per_pixel = frame_hits(n_frames, job.reuse.n_r, job.samples.hits)
     held = max(float(per_pixel[max(j - n_r, 0) : j + n_r + 1].sum()) for j in range(n_frames))
     frames = min(2 * n_r + 1, n_frames)
-    balance, has_constant = job.reuse.weights == "balance" and n_r > 0, any(job.scene.background)
-    per_record = 4 * (prepared.light_arrays.channels * n_lights + 6 + 3 * has_constant)
+    balance = job.reuse.weights == "balance" and n_r > 0
+    per_record = 4 * (prepared.light_arrays.channels * n_lights + LANES)
     per_hit = per_record + 16 * job.output.layers + frames * (8 if balance else 4)
     # a frame's mirror hits wait for N_r frames; twice while the lists of all batches are joined, and chains add some
     mirrored = mirror_share * job.specular.hits * (n_r + 3) * per_record

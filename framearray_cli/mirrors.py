@@ -29,9 +29,7 @@ def mirror_paths(work: Work, hits: Hits, n: int, scratch: Scratch) -> list[tuple
         scratch.rays["mirror"] += m
         hits, n, throughput = reflected, m, next_throughput
         records = empty_records(work, m)
-        estimate_terms(work, hits, m, scratch, records, "mirror obscurance", "mirror shadow")
-        records.reflectivity *= throughput[:m]
-        records.constant *= throughput[:m] if work.has_constant else 1.0
+        estimate_terms(work, hits, m, scratch, records, "mirror obscurance", "mirror shadow", throughput)
         found.append((hits.pixel[:m].copy(), records))
     scratch.seconds["mirror"] += perf_counter() - started
     return found

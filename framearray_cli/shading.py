@@ -4,23 +4,37 @@ from time import perf_counter
 
 import numpy as np
 
-from .arrays import Rgb
+from .arrays import Float32, Rgb
 from .crew import Scratch
 from .hits import ESCAPED, Hits
-from .kernel import kernel
+from .kernel import inlined, kernel
+from .lanes import LANES, bits, lanes_at
 from .terms.direct import direct
 from .terms.direct_steps import direct_by_steps
 from .terms.obscurance import obscurance
-from .work import Records, Work
+from .work import INDIRECT, LIT, OBSCURANCE, REFLECTIVITY, STEADY, WEIGHT, Records, Work, lit_bit
+
+_NOTHING = np.empty((0, 3), np.float32)
 
 
 def estimate_terms(
-    work: Work, hits: Hits, n: int, scratch: Scratch, out: Records, obscurance_kind: str, shadow_kind: str
+    work: Work,
+    hits: Hits,
+    n: int,
+    scratch: Scratch,
+    out: Records,
+    obscurance_kind: str,
+    shadow_kind: str,
+    throughput: Rgb = _NOTHING,
 ) -> None:
-    """Estimate W, the constant part and E[l] of hits 0 to n - 1."""
+    """Estimate W, the constant part and E[l] of hits 0 to n - 1.
+
+    Args:
+        throughput: (>= n, 3) what mirrors leave of the light of each hit, or (0, 3).
+    """
     started = perf_counter()
     scratch.rays[obscurance_kind] += obscurance(
-        hits, n, work.obscurance, work.surfaces, work.tracer, scratch.hit_rays, out.obscurance, scratch.skylight
+        hits, n, work.obscurance, work.surfaces, work.tracer, scratch.hit_rays, scratch.obscurance, scratch.skylight
     )
     middle = perf_counter()
     if scratch.steps is None:
@@ -34,25 +48,58 @@ def estimate_terms(
         if not work.keeps_all:
             out.irradiance[:n] = irradiance[:n, :, work.kept.start : work.kept.stop]
     scratch.rays[shadow_kind] += rays
-    _finish(hits, n, work.background, scratch.skylight, out.reflectivity, out.constant)
+    write_rows(hits, n, work.background, scratch.obscurance, scratch.skylight, throughput, out.irradiance, out.row)
     scratch.seconds[obscurance_kind] += middle - started
     scratch.seconds[shadow_kind] += perf_counter() - middle
 
 
 @kernel
-def _finish(hits: Hits, n: int, background: Rgb, skylight: Rgb, reflectivity: Rgb, constant: Rgb) -> None:
-    """Copy the reflectivity of n hits, and work out what of their light is the same whatever the lights do.
+def write_rows(
+    hits: Hits,
+    n: int,
+    background: Rgb,
+    obscurance: Rgb,
+    skylight: Rgb,
+    throughput: Rgb,
+    irradiance: Float32,
+    row: Float32,
+) -> None:
+    """Write what composing needs of hits 0 to n - 1 beside their irradiance; see `Records`.
 
     Args:
         background: (3,) what escaped rays see.
-        skylight: (n, 3) background that reaches each hit, or (0, 3).
-        constant: (n, 3) overwritten, or (0, 3) where nothing is constant.
+        obscurance: (>= n, 3) W.
+        skylight: (>= n, 3) background that reaches each hit, or (0, 3).
+        throughput: (>= n, 3) what mirrors leave of the light of each hit, or (0, 3).
+        row: (n, LANES) overwritten.
     """
     for i in range(n):
+        row[i, WEIGHT] = 1.0
         for channel in range(3):
-            reflectivity[i, channel] = hits.reflectivity[i, channel]
-            if constant.shape[0]:
-                seen = background[channel] if hits.kind[i] == ESCAPED else np.float32(0.0)
-                if skylight.shape[0]:
-                    seen += hits.reflectivity[i, channel] * skylight[i, channel]
-                constant[i, channel] = seen
+            tint = throughput[i, channel] if throughput.shape[0] else np.float32(1.0)
+            reflectivity = tint * hits.reflectivity[i, channel]
+            steady = tint * background[channel] if hits.kind[i] == ESCAPED else np.float32(0.0)
+            if skylight.shape[0]:
+                steady += reflectivity * skylight[i, channel]
+            row[i, INDIRECT + channel] = reflectivity * obscurance[i, channel]
+            row[i, STEADY + channel] = steady
+            row[i, OBSCURANCE + channel] = obscurance[i, channel]
+            row[i, REFLECTIVITY + channel] = reflectivity
+        row[i, LIT] = _lit(irradiance, i)
+        for column in range(LIT + 1, LANES):
+            row[i, column] = 0.0
+
+
+@inlined
+def _lit(irradiance: Float32, i: int) -> int:
+    """Which packets of light positions give hit i any light, a bit each or one for several."""
+    channels, n_lights = irradiance.shape[1], irradiance.shape[2]
+    found = 0
+    for channel in range(channels):
+        row = (i * channels + channel) * n_lights
+        for l in range(0, n_lights, LANES):
+            light = bits(~(lanes_at(irradiance, row + l) == np.float32(0.0)))
+            if l + LANES > n_lights:
+                light &= (1 << (n_lights - l)) - 1
+            found |= int(light != 0) << lit_bit(n_lights, l)
+    return found

@@ -14,13 +14,13 @@ import numpy as np
 
 from .accumulate import accumulate, compose_pixels, sources
 from .arrays import Addresses, Float32, Images, Int32
-from .compose import INDIRECT, as_stored, begin, empty_band, normalise
+from .compose import as_stored, empty_band
 from .crew import Crew, Scratch
 from .denoise import denoised
 from .frame import Frame, fill_holes
 from .kernel import kernel
 from .terms.ambient import Ambient
-from .work import Placed, Records, Work
+from .work import INDIRECT, REFLECTIVITY, Placed, Records, Work
 
 # Pixels whose sums over all lights are held together: they fit a core's cache. And pixels of a task.
 BAND_PIXELS, TASK_PIXELS = 256, 2048
@@ -164,11 +164,9 @@ class Window:
         def band(first: int, _scratch: Scratch) -> None:
             n = min(TASK_PIXELS, n_pixels - first)
             sums = empty_band(n, 0)
-            begin(sums, n)
-            accumulate(sums, first, n, hits, 1, 0)
-            normalise(sums, n)
-            indirect[first : first + n] = sums.rest[:n, INDIRECT : INDIRECT + 3]
-            reflectivity[first : first + n] = sums.reflectivity[:n]
+            accumulate(sums, first, n, hits, 1, 0, True)
+            indirect[first : first + n] = sums.sums[:n, INDIRECT : INDIRECT + 3]
+            reflectivity[first : first + n] = sums.sums[:n, REFLECTIVITY : REFLECTIVITY + 3]
             place = frame.places[j]
             average_native(place.start, place.order, frame.normal, frame.depth, first, n, own)
 

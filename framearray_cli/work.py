@@ -10,6 +10,8 @@ from .arrays import Float32, Float64, Int32, Rgb, with_room
 from .camera import Cameras
 from .embree.packets import Tracer
 from .hits import pixel_order
+from .kernel import inlined
+from .lanes import LANES
 from .lights import LightArrays, some_lights
 from .reuse import sort_by_pixel
 from .surface import Surfaces
@@ -87,13 +89,32 @@ class Work:
         return range(max(c - reach, 0), min(c + reach, self.n_frames - 1) + 1)
 
 
+# Columns of a row of a hit, and of the sums of such rows; those from INDIRECT to REFLECTIVITY are of three channels.
+WEIGHT, INDIRECT, STEADY, OBSCURANCE, REFLECTIVITY, LIT = 0, 1, 4, 7, 10, 13
+# The most bits that a whole number in a float32 has.
+LIT_BITS = 24
+
+
+@inlined
+def lit_bit(n_lights: int, l: int) -> int:
+    """The bit of LIT that tells of light position l: it stands for a packet of positions, or for 2, 4, ... of them."""
+    packet, last = l >> 4, n_lights - 1 >> 4
+    while last >= LIT_BITS:
+        packet, last = packet >> 1, last >> 1
+    return packet
+
+
 @dataclass(slots=True, kw_only=True, eq=False)
 class Records:
-    """What composing needs of n hits: reflectivity, W, what is the same under every light, and E of every light."""
+    """What composing needs of n hits.
 
-    reflectivity: Rgb
-    obscurance: Rgb
-    constant: Rgb
+    Attributes:
+        row: (n, LANES) a cache line a hit, so that one sum of lines is the sum of all: 1; R W; what is the same under
+            every light; W; R; LIT, a whole number whose bits say in which packets of light positions there is light.
+        irradiance: (n, channels, n_lights).
+    """
+
+    row: Float32
     irradiance: Float32
 
     @property
@@ -104,9 +125,7 @@ class Records:
     def part(self, span: slice) -> "Records":
         """The records of some hits; they share memory."""
         return Records(
-            reflectivity=self.reflectivity[span],
-            obscurance=self.obscurance[span],
-            constant=self.constant[span],
+            row=self.row[span],
             irradiance=self.irradiance[span],
         )
 
@@ -130,9 +149,7 @@ def empty_records(work: Work, n: int, take: Callable[[str, tuple[int, ...], Any]
         take: makes an array of a name, shape and dtype.
     """
     return Records(
-        reflectivity=take("reflectivity", (n, 3), np.float32),
-        obscurance=take("obscurance", (n, 3), np.float32),
-        constant=take("constant", (n if work.has_constant else 0, 3), np.float32),
+        row=take("row", (n, LANES), np.float32),
         irradiance=take("irradiance", (n, work.lights.channels, len(work.kept)), np.float32),
     )
 
@@ -142,7 +159,7 @@ def joined(work: Work, parts: list[tuple[Int32, Records]]) -> tuple[Int32, Recor
     if not parts:
         return np.empty(0, np.int32), empty_records(work, 0)
     pixels, records = zip(*parts, strict=True)
-    whole = empty_records(work, sum(len(r.reflectivity) for r in records))
+    whole = empty_records(work, sum(len(r.row) for r in records))
     for name, array in whole.arrays.items():
         np.concatenate([r.arrays[name] for r in records], out=array)
     return np.concatenate(pixels), whole

@@ -5,30 +5,35 @@ from typing import Any
 import numpy as np
 import pytest
 
-from framearray_cli.accumulate import MOST, accumulate, sources
+from framearray_cli.accumulate import accumulate, sources
 from framearray_cli.arrays import with_room
-from framearray_cli.compose import (
-    INDIRECT,
-    OBSCURANCE,
-    STEADY,
-    WEIGHT,
-    Band,
-    as_stored,
-    begin,
-    empty_band,
-    finish,
-    normalise,
-)
+from framearray_cli.compose import MOST, Band, as_stored, empty_band, finish
+from framearray_cli.lanes import LANES
 from framearray_cli.reuse import sort_by_pixel
-from framearray_cli.work import Placed, Records
+from framearray_cli.work import INDIRECT, LIT, LIT_BITS, OBSCURANCE, REFLECTIVITY, STEADY, WEIGHT, Placed, Records
 
 N_PIXELS, N_LIGHTS, NOTHING = 40, 7, np.empty(0, np.float32)
+
+
+def lit_packets(irradiance: Any) -> Any:
+    """Which packets of light positions are not all zero, (n,): a bit for each, or for as many as share one."""
+    n_packets = -(-irradiance.shape[2] // LANES)
+    shared = 1
+    while n_packets > shared * LIT_BITS:
+        shared *= 2
+    return sum(
+        (irradiance[:, :, bit * shared * LANES : (bit + 1) * shared * LANES] != 0).any(axis=(1, 2)) * 2.0**bit
+        for bit in range(-(-n_packets // shared))
+    )
 
 
 class Case:
     """Random hits, and what numpy makes of them in float64."""
 
-    def __init__(self, channels: int, n: int = 600, constant: bool = True, weighed: bool = True, seed: int = 1) -> None:
+    def __init__(
+        self, channels: int, n: int = 600, constant: bool = True, weighed: bool = True, seed: int = 1,
+        n_lights: int = N_LIGHTS,
+    ) -> None:  # fmt: skip
         rng = np.random.default_rng(seed)
         self.pixel = rng.integers(-1, N_PIXELS, n).astype(np.int32)
         self.start, self.order = np.empty(N_PIXELS + 1, np.int32), np.empty(n, np.int32)
@@ -41,19 +46,23 @@ class Case:
         self.reflectivity = values(n, 3) * (rng.random((n, 1)) < 0.8)  # some hits are black
         self.obscurance = values(n, 3)
         self.constant = values(n, 3) if constant else np.empty((0, 3), np.float32)
-        self.irradiance = with_room((n, channels, N_LIGHTS), np.float32)
-        self.irradiance[:] = values(n, channels, N_LIGHTS)
+        self.irradiance = with_room((n, channels, n_lights), np.float32)
+        self.irradiance[:] = values(n, channels, n_lights)
 
-    def add(self, band: Band, first: int, n: int, scale: Any = NOTHING) -> None:
-        placed = Placed(start=self.start, order=self.order)
-        records = Records(
-            reflectivity=self.reflectivity,
-            obscurance=self.obscurance,
-            constant=self.constant,
-            irradiance=self.irradiance,
-        )
-        parts = sources([(placed, records, self.weight, np.float32(scale))])
-        accumulate(band, first, n, parts, self.irradiance.shape[1], N_LIGHTS)
+    def row(self) -> Any:
+        row = with_room((len(self.pixel), LANES), np.float32, fill=0)
+        row[:, WEIGHT] = 1
+        row[:, INDIRECT : INDIRECT + 3] = self.reflectivity * self.obscurance
+        row[:, STEADY : STEADY + 3] = self.constant if len(self.constant) else 0
+        row[:, OBSCURANCE : OBSCURANCE + 3] = self.obscurance
+        row[:, REFLECTIVITY : REFLECTIVITY + 3] = self.reflectivity
+        row[:, LIT] = lit_packets(self.irradiance)
+        return row
+
+    def add(self, band: Band, first: int, n: int, scale: Any = NOTHING, mean: bool = True) -> None:
+        placed, row = Placed(start=self.start, order=self.order), self.row()
+        parts = sources([(placed, Records(row=row, irradiance=self.irradiance), self.weight, np.float32(scale))])
+        accumulate(band, first, n, parts, *self.irradiance.shape[1:], mean)
 
     def sums(self, values: Any, scale: Any = NOTHING) -> Any:
         """Weighed sums of values (n, ...) by pixel."""
@@ -66,7 +75,7 @@ class Case:
         return out
 
     def direct(self) -> Any:
-        irradiance = np.broadcast_to(self.irradiance, (len(self.pixel), 3, N_LIGHTS))
+        irradiance = np.broadcast_to(self.irradiance, (len(self.pixel), 3, self.irradiance.shape[2]))
         return self.reflectivity[:, :, None].astype(np.float64) / np.pi * irradiance
 
     def picture(self, colour: Any, ambient: Any) -> Any:
@@ -96,9 +105,7 @@ def composed(
     images, bad = np.full((N_LIGHTS, N_PIXELS, 3), np.nan, dtype), []
     band = empty_band(N_PIXELS, N_LIGHTS)
     for first, n in bands:
-        begin(band, n)
         case.add(band, first, n)
-        normalise(band, n)
         bad.append(finish(band, first, n, colour, ambient, np.float32(0), as_stored(images)))
     return images, bad
 
@@ -114,26 +121,39 @@ def test_images_are_weighed_means(channels: int, constant: bool, weighed: bool) 
     assert bad == [(0, -1, -1, 0)]
 
 
-def test_sums_of_a_band() -> None:
+def test_means_of_a_band() -> None:
     case, band = Case(1), empty_band(N_PIXELS, N_LIGHTS)
-    begin(band, 20)
     case.add(band, 15, 20)
     pixels = slice(15, 35)
     np.testing.assert_array_equal(band.hits[:20], np.bincount(case.pixel[case.pixel >= 0], minlength=N_PIXELS)[pixels])
+    total = case.sums(np.ones(len(case.pixel)))[pixels]
     expected = {
-        WEIGHT: case.sums(np.ones((len(case.pixel), 1))),
         INDIRECT: case.sums(case.reflectivity.astype(np.float64) * case.obscurance),
         STEADY: case.sums(case.constant),
+        OBSCURANCE: case.sums(case.obscurance),
+        REFLECTIVITY: case.sums(case.reflectivity),
     }
     for first, values in expected.items():
-        np.testing.assert_allclose(band.rest[:20, first : first + values.shape[1]], values[pixels], rtol=2e-6)
-    # a black hit has no W; those sums count the others
-    seen = (case.reflectivity > 0).any(axis=1, keepdims=True)
-    np.testing.assert_allclose(
-        band.rest[:20, OBSCURANCE : OBSCURANCE + 3], case.sums(case.obscurance * seen)[pixels], rtol=2e-6
-    )
-    np.testing.assert_allclose(band.reflectivity[:20], case.sums(case.reflectivity)[pixels], rtol=2e-6)
-    np.testing.assert_allclose(band.direct[:20, :, :N_LIGHTS], case.sums(case.direct())[pixels], rtol=2e-6)
+        means = values[pixels] / total[:, None]
+        np.testing.assert_allclose(band.sums[:20, first : first + 3], means, rtol=2e-6)
+    direct = case.sums(case.direct())[pixels] / total[:, None, None]
+    np.testing.assert_allclose(band.direct[:20, :, :N_LIGHTS], direct, rtol=2e-6)
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("n_lights", [1, 15, 16, 17, 40, LANES * LIT_BITS, LANES * LIT_BITS + 1, 900])
+def test_light_that_is_zero_is_left_out(channels: int, n_lights: int) -> None:
+    """Most packets of light positions are dark, some hits and some pixels see no light at all."""
+    case, band = Case(channels, n=300, n_lights=n_lights), empty_band(N_PIXELS, n_lights)
+    rng, n_packets = np.random.default_rng(4), -(-n_lights // LANES)
+    dark = np.repeat(rng.random((300, 1, n_packets)) < 0.7, LANES, axis=2)[:, :, :n_lights]
+    case.irradiance[np.broadcast_to(dark, case.irradiance.shape)] = 0
+    case.irradiance[case.pixel == 7] = 0
+    band.direct[:] = np.nan  # what a band held before counts for nothing
+    case.add(band, 0, N_PIXELS)
+    direct = case.sums(case.direct()) / case.sums(np.ones(300))[:, None, None]
+    np.testing.assert_allclose(band.direct[:, :, :n_lights], direct, rtol=2e-6)
+    assert not direct[7].any() and direct.any()
 
 
 @pytest.mark.parametrize("bands", [[(0, 1), (1, 39)], [(0, 16), (16, 16), (32, 8)], [(35, 5), (0, 35)]])
@@ -167,10 +187,8 @@ def test_a_scale_a_pixel_multiplies_all_its_hits() -> None:
     scale = np.random.default_rng(3).random(N_PIXELS).astype(np.float32)
     colour, ambient = lights()
     band, images = empty_band(N_PIXELS, N_LIGHTS), np.empty((N_LIGHTS, N_PIXELS, 3), np.float32)
-    begin(band, N_PIXELS)
     case.add(band, 0, N_PIXELS)
-    normalise(band, N_PIXELS)
-    other.add(band, 0, N_PIXELS, scale)
+    other.add(band, 0, N_PIXELS, scale, mean=False)
     finish(band, 0, N_PIXELS, colour, ambient, np.float32(0), images)
     more = colour * other.sums(other.direct(), scale)
     more = more + ambient * other.sums(other.reflectivity.astype(np.float64) * other.obscurance, scale)[:, :, None]
