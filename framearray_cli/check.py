@@ -1,7 +1,6 @@
 """What a job will take, without rendering it: `framearray check`."""
 
 import math
-import os
 import tempfile
 import time
 from dataclasses import dataclass, replace
@@ -169,7 +168,7 @@ def _probe(prepared: Prepared, work: Work, ambient: Ambient, pixels: int) -> _Pr
     """Render and write small frames."""
     small = _small(work, pixels)
     n, writing = small.n_frames, 0.0
-    crew = Crew(small, prepared.job.render.threads or os.cpu_count() or 1)
+    crew = Crew(small, prepared.threads)
     try:
         with tempfile.TemporaryDirectory() as name:
             started = time.perf_counter()

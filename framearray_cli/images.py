@@ -45,7 +45,7 @@ class ImageFormat:
     """
 
     format: Extension = "exr"
-    compression: str = "zip"
+    compression: str = "none"
     half: Literal["auto", "always", "never"] = "auto"
     quality: int = 95
     exposure: float = 0.0

@@ -64,8 +64,8 @@ def require_memory(prepared: Prepared) -> None:
 
 
 def ambient_memory(prepared: Prepared) -> int:
-    """Bytes that a batch of walks takes: what each gathers of every light, in float32 and twice in float64."""
-    return BATCH * prepared.n_lights * 3 * (4 + 8 + 8)
+    """Bytes that batches of walks take: what each gathers of every light, in float32 and twice in float64."""
+    return prepared.threads * BATCH * prepared.n_lights * 3 * (4 + 8 + 8)
 
 
 def window_memory(prepared: Prepared, n_lights: int, mirror_share: float = 0.0) -> int:

@@ -129,16 +129,29 @@ def between_keys(frames: Sequence[int], values: Sequence[Sequence[float]], n: in
     keyed = np.asarray(values, dtype=np.float64)
     if len(frames) == 1:
         return np.repeat(keyed, n, axis=0)
-    from scipy.interpolate import PchipInterpolator
-
-    at = np.clip(np.arange(n), frames[0], frames[-1])
+    at = np.clip(np.arange(n, dtype=np.float64), frames[0], frames[-1])
     before = np.searchsorted(frames, at, side="right").clip(max=len(frames) - 1) - 1  # (n,) key before each frame
     ends = np.stack([keyed[before], keyed[before + 1]])
-    with np.errstate(over="ignore"):  # the inverse of a slope below 1e-308 is infinite, its own inverse 0, as it should
-        curve: Float64 = PchipInterpolator(frames, keyed, axis=0)(at)
+    curve = _smooth(frames, keyed, at) if len(frames) > 2 else _straight(frames, keyed, at)
     curve = np.clip(curve, ends.min(axis=0), ends.max(axis=0))  # the last bits, too, stay between the keys
     for key, frame in enumerate(frames):
         curve[at == frame] = keyed[key]
+    return curve
+
+
+def _straight(frames: Sequence[int], keyed: Float64, at: Float64) -> Float64:
+    """The line through two keys."""
+    share = ((at - frames[0]) / (frames[1] - frames[0]))[:, None]
+    line: Float64 = (1 - share) * keyed[0] + share * keyed[1]
+    return line
+
+
+def _smooth(frames: Sequence[int], keyed: Float64, at: Float64) -> Float64:
+    """A curve through the keys that turns only at keys."""
+    from scipy.interpolate import PchipInterpolator  # a quarter of a second, which two keys need not cost
+
+    with np.errstate(over="ignore"):  # the inverse of a slope below 1e-308 is infinite, its own inverse 0, as it should
+        curve: Float64 = PchipInterpolator(frames, keyed, axis=0)(at)
     return curve
 
 

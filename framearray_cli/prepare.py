@@ -1,6 +1,7 @@
 """From a job to everything that is known before the first frame: scene, eyes, lights, ambient light, plan."""
 
 import json
+import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ from .plan import frame_hits
 from .sampling import lattice_steps
 from .scene import Scene, load_scene
 from .surface import Surfaces, surfaces
-from .terms.ambient import Ambient, ambient_by_eye, fixed_ambient
+from .terms.ambient import Ambient, EyeWalks, ambient_by_eye, fixed_ambient
 from .terms.ambient_light import ambient_by_light
 from .terms.obscurance import FALLOFFS, ObscuranceSettings
 from .work import Work
@@ -49,6 +50,13 @@ class Prepared:
     def n_lights(self) -> int:
         """N_l."""
         return self.lights.n
+
+    @property
+    def threads(self) -> int:
+        """Threads of the render: the job's, else one for each core that this process may use."""
+        if self.job.render.threads:
+            return self.job.render.threads
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def prepare(job: Job) -> Prepared:
@@ -129,10 +137,18 @@ def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Am
             seed, job.ambient.paths, prepared.surfaces, embree.tracer, prepared.light_arrays, background
         )
     cams = cameras(prepared.eyes, job.camera.resolution, prepared.scene.centre)
-    args = (cams, seed, job.ambient.paths, prepared.surfaces, embree.tracer, prepared.light_arrays, background)
+    walks = EyeWalks(
+        cams=cams,
+        seed=seed,
+        paths=job.ambient.paths,
+        surfaces=prepared.surfaces,
+        tracer=embree.tracer,
+        lights=prepared.light_arrays,
+        background=background,
+    )
     if job.ambient.intensity is not None:
-        return fixed_ambient(*args, intensity=np.array(job.ambient.intensity, np.float32))
-    return ambient_by_eye(*args)
+        return fixed_ambient(walks, np.array(job.ambient.intensity, np.float32), prepared.threads)
+    return ambient_by_eye(walks, prepared.threads)
 
 
 def job_fingerprint(prepared: Prepared) -> str:

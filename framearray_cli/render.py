@@ -1,6 +1,5 @@
 """The frame loop [FA alg. 1]: from a job to images and a manifest."""
 
-import os
 import time
 from collections import Counter
 from contextlib import suppress
@@ -133,7 +132,7 @@ def _frames(
         listener.written(images)
 
     job = prepared.job
-    threads = job.render.threads or os.cpu_count() or 1
+    threads = prepared.threads
     notes, hits, stored = [], 0.0, image_format(job)
     crew = Crew(work, threads)
     if work.lights.n_lights < prepared.n_lights:

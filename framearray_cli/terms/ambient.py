@@ -7,7 +7,9 @@ eye hit, which is what obscurance rays see. The same walks serve every light pos
 """
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -173,80 +175,123 @@ def _to_first_vertices(work: Workspace, n: int, surfaces: Surfaces, tracer: Trac
     return found
 
 
-def ambient_by_eye(
-    cams: Cameras,
-    seed: int,
-    paths: int | None,
-    surfaces: Surfaces,
-    tracer: Tracer,
-    lights: LightArrays,
-    background: Rgb,
-) -> Ambient:
-    """Estimate I_A[l] and the average reflectivity by walks from the eyes.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Walked:
+    """What a batch of walks from the eyes found.
 
-    Args:
+    Attributes:
+        spent, rays: walks that were started, and rays.
+        seen, seen_reflectivity: surfaces that the eyes saw, and the sum of their reflectivities, (3,).
+        count, reflectivity: first vertices that E averages, and the sum of their reflectivities, (3,).
+        total, squares: (3, n_lights) and (n_lights,) sums over walks of E, and of the square of its channels' mean.
+    """
+
+    spent: int
+    rays: int
+    seen: int
+    seen_reflectivity: Float64
+    count: int
+    reflectivity: Float64
+    total: Float64
+    squares: Float64
+
+    def and_then(self, other: "_Walked") -> "_Walked":
+        """Both together."""
+        return _Walked(**{f.name: getattr(self, f.name) + getattr(other, f.name) for f in fields(self)})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class EyeWalks:
+    """Where walks from the eyes start and what they meet; arguments of `ambient_by_eye`.
+
+    Attributes:
         paths: number of walks; None: as many as a standard error of 1 % takes, at most `MOST`.
         background: (3,) radiance outside the scene; it lights the surfaces too.
     """
-    work = Workspace(lights)
-    count, spent, reflectivity = 0, 0, np.zeros(3)
-    seen, seen_reflectivity = 0, np.zeros(3)
-    total, squares = np.zeros((3, lights.n_lights)), np.zeros(lights.n_lights)
-    limit = paths or MOST
-    while spent < limit:
-        n = min(BATCH, limit - spent)
-        _start_at_eyes(cams, seed, spent, n, surfaces, tracer, work.hit_packets, work.hits[0], work.walkers[0])
+
+    cams: Cameras
+    seed: int
+    paths: int | None
+    surfaces: Surfaces
+    tracer: Tracer
+    lights: LightArrays
+    background: Rgb
+
+    def batch(self, work: Workspace, first: int, n: int) -> _Walked:
+        """Walk walks first to first + n - 1 to their ends."""
+        lights, surfaces, tracer, background = self.lights, self.surfaces, self.tracer, self.background
+        rays = work.rays
+        hits, walkers = work.hits[0], work.walkers[0]
+        _start_at_eyes(self.cams, self.seed, first, n, surfaces, tracer, work.hit_packets, hits, walkers)
         work.rays += n
-        spent += n
-        seen += int((work.hits[0].kind[:n] == SURFACE).sum())
-        seen_reflectivity += total_reflectivity(work.hits[0], n)
-        n = _to_first_vertices(work, n, surfaces, tracer)
+        seen, seen_reflectivity = int((hits.kind[:n] == SURFACE).sum()), total_reflectivity(hits, n)
+        left = _to_first_vertices(work, n, surfaces, tracer)
         work.sums[:] = 0.0
         hits, walkers = work.hits[0], work.walkers[0]
-        reflectivity += total_reflectivity(hits, n)
-        walkers.throughput[:n] = 1.0
-        walkers.step[:n] = DIFFUSE
-        first = walkers.walk[:n].copy()
+        reflectivity = total_reflectivity(hits, left)
+        walkers.throughput[:left] = 1.0
+        walkers.step[:left] = DIFFUSE
+        walks = walkers.walk[:left].copy()
         for _ in range(MAX_BOUNCES):
-            work.gather(n, lights, tracer)
-            n = work.advance(n, surfaces, tracer)
+            work.gather(left, lights, tracer)
+            left = work.advance(left, surfaces, tracer)
             if background.any():
-                _see_background(work.hits[0], work.walkers[0], n, background, work.sums)
-            choose_all(work.hits[0], work.walkers[0], n, False)
-            if n == 0:
+                _see_background(work.hits[0], work.walkers[0], left, background, work.sums)
+            choose_all(work.hits[0], work.walkers[0], left, False)
+            if left == 0:
                 break
-        gathered = work.sums[first].astype(np.float64)  # (n, 3, n_lights)
-        count += len(first)
-        total += gathered.sum(axis=0)
-        squares += (gathered.mean(axis=1) ** 2).sum(axis=0)
-        if paths is None and spent >= FEWEST and count and relative_error(total, squares, count).max() <= TARGET_ERROR:
-            break
-    if count == 0:
-        found = summarise(total, squares, seen_reflectivity / max(seen, 1), spent, work.rays, False)
+        gathered = work.sums[walks].astype(np.float64)  # (n_walks, 3, n_lights)
+        return _Walked(
+            spent=n,
+            rays=work.rays - rays,
+            seen=seen,
+            seen_reflectivity=seen_reflectivity,
+            count=len(walks),
+            reflectivity=reflectivity,
+            total=gathered.sum(axis=0),
+            squares=(gathered.mean(axis=1) ** 2).sum(axis=0),
+        )
+
+    def until(self, enough: Callable[[_Walked], bool], threads: int) -> _Walked:
+        """Walk batch after batch, as many at once as there are threads; what lies behind the last one is forgotten."""
+        limit, found = self.paths or MOST, None
+        workspaces = [Workspace(self.lights) for _ in range(threads)]
+        with ThreadPoolExecutor(threads, thread_name_prefix="ambient") as pool:
+            for group in range(0, limit, threads * BATCH):
+                starts = range(group, min(group + threads * BATCH, limit), BATCH)
+                sizes = [min(BATCH, limit - first) for first in starts]
+                for walked in pool.map(self.batch, workspaces, starts, sizes):
+                    found = found.and_then(walked) if found else walked
+                    if enough(found):
+                        return found
+        assert found
+        return found
+
+
+def ambient_by_eye(walks: EyeWalks, threads: int = 1) -> Ambient:
+    """Estimate I_A[l] and the average reflectivity by walks from the eyes; the same for any number of threads."""
+
+    def enough(found: _Walked) -> bool:
+        if walks.paths is not None or found.spent < FEWEST or not found.count:
+            return False
+        return bool(relative_error(found.total, found.squares, found.count).max() <= TARGET_ERROR)
+
+    found = walks.until(enough, threads)
+    if found.count == 0:
+        reflectivity = found.seen_reflectivity / max(found.seen, 1)
+        dark = summarise(found.total, found.squares, reflectivity, found.spent, found.rays, False)
         note = "ambient: no walk from the eyes met a second surface, so the ambient intensity is 0"
-        return replace(found, notes=(note,))
-    error = relative_error(total, squares, count)
-    return summarise(total / count, error, reflectivity / count, spent, work.rays, paths is None)
+        return replace(dark, notes=(note,))
+    error = relative_error(found.total, found.squares, found.count)
+    mean, reflectivity = found.total / found.count, found.reflectivity / found.count
+    return summarise(mean, error, reflectivity, found.spent, found.rays, walks.paths is None)
 
 
-def fixed_ambient(
-    cams: Cameras,
-    seed: int,
-    paths: int | None,
-    surfaces: Surfaces,
-    tracer: Tracer,
-    lights: LightArrays,
-    background: Rgb,
-    intensity: Rgb,
-) -> Ambient:
+def fixed_ambient(walks: EyeWalks, intensity: Rgb, threads: int = 1) -> Ambient:
     """Take I_A from the job, (3,); only the average reflectivity is estimated, by a few walks."""
-    walked = ambient_by_eye(cams, seed, paths or FEWEST, surfaces, tracer, lights, background)
-    return replace(
-        walked,
-        intensity=np.tile(intensity, (lights.n_lights, 1)),
-        standard_error=np.zeros(lights.n_lights),
-        notes=(),
-    )
+    walked = ambient_by_eye(replace(walks, paths=walks.paths or FEWEST), threads)
+    n_lights = walks.lights.n_lights
+    return replace(walked, intensity=np.tile(intensity, (n_lights, 1)), standard_error=np.zeros(n_lights), notes=())
 
 
 def total_reflectivity(hits: Hits, n: int) -> Float64:

@@ -142,8 +142,9 @@ def test_before_the_command_line_is_loaded(monkeypatch):
     fake = ModuleType("framearray_cli.cli")
     fake.main = lambda: seen.append(signal.getsignal(signal.SIGINT))
     monkeypatch.setitem(sys.modules, "framearray_cli.cli", fake)
+    monkeypatch.setattr(os, "_exit", lambda code: seen.append(code))  # how the process ends when all is done
     importlib.import_module("framearray_cli.__main__").main()
-    assert seen == [signal.SIG_DFL]
+    assert seen == [signal.SIG_DFL, 0]
 
 
 @pytest.mark.slow
