@@ -155,16 +155,17 @@ class AmbientTable(Table):
         description="Fixes I_A for every light position, as a radiance, W/(m2 sr), instead of `method` and `paths`.",
         json_schema_extra=computed("measured"),
     )
-    method: Literal["eye", "light"] = Field(
+    method: Literal["eye", "light", "fit"] = Field(
         default="eye",
         description='"eye": walks from what the cameras see gather the light that arrives there. '
-        '"light": particles from the light spread over the scene.',
+        '"light": particles from the light spread over the scene. "fit": the value that makes indirect light as bright '
+        "as path tracing does, on average over what the cameras see.",
     )
     paths: int | None = Field(
         default=None,
         ge=1,
         le=2**24,
-        description='Walks ("eye") or particles a light position ("light").',
+        description='Walks ("eye", "fit") or particles a light position ("light").',
         json_schema_extra=computed("as many as a standard error of 1 % needs"),
     )
 

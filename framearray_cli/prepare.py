@@ -20,6 +20,7 @@ from .sampling import lattice_steps
 from .scene import Scene, load_scene
 from .surface import Surfaces, surfaces
 from .terms.ambient import Ambient, EyeWalks, ambient_by_eye, fixed_ambient
+from .terms.ambient_fit import Curve, ambient_by_fit
 from .terms.ambient_light import ambient_by_light
 from .terms.obscurance import FALLOFFS, ObscuranceSettings
 from .work import Work
@@ -146,9 +147,17 @@ def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Am
         lights=prepared.light_arrays,
         background=background,
     )
+    if job.ambient.method == "fit":
+        return ambient_by_fit(walks, _curve(job), prepared.threads)
     if job.ambient.intensity is not None:
         return fixed_ambient(walks, np.array(job.ambient.intensity, np.float32), prepared.threads)
     return ambient_by_eye(walks, prepared.threads)
+
+
+def _curve(job: Job) -> Curve:
+    wanted = job.obscurance
+    sky = wanted.outside == "background"
+    return Curve(d_max=wanted.range, falloff=FALLOFFS[wanted.falloff], tau=wanted.tau, sky=sky)
 
 
 def job_fingerprint(prepared: Prepared) -> str:

@@ -3,19 +3,19 @@
 E[l] is the average irradiance, all bounces counted, over the surface sides that light on its way to the eye comes
 from. `method = "eye"` walks from eye hits of the whole camera path: E[l] is its mean over the first vertices after the
 eye hit, which is what obscurance rays see. The same walks serve every light position, so I_A does not flicker.
-`method = "light"` is in `ambient_light.py`.
+`method = "light"` is in `ambient_light.py`, `method = "fit"` in `ambient_fit.py`.
 """
 
 import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Float32, Float64, Rgb
+from ..arrays import Float32, Float64, Points, Rgb
 from ..camera import Cameras, eye_ray
 from ..embree.packets import Tracer, intersect, set_ray
 from ..hits import ESCAPED, SURFACE, Hits, empty_hits, record_hits
@@ -96,7 +96,7 @@ class Workspace:
 
 
 @kernel
-def _start_at_eyes(
+def start_at_eyes(
     cams: Cameras,
     seed: int,
     first: int,
@@ -136,7 +136,7 @@ def choose_all(hits: Hits, walkers: Walkers, n: int, must_go_on: bool) -> None:
 
 
 @kernel
-def _see_background(hits: Hits, walkers: Walkers, n: int, background: Rgb, sums: Float32) -> None:
+def see_background(hits: Hits, walkers: Walkers, n: int, background: Rgb, sums: Float32) -> None:
     """A walk that leaves the scene brings the background's irradiance: pi times its radiance."""
     for i in range(n):
         if hits.kind[i] == ESCAPED:
@@ -146,17 +146,52 @@ def _see_background(hits: Hits, walkers: Walkers, n: int, background: Rgb, sums:
                     sums[walkers.walk[i], channel, l] += light
 
 
-def _to_first_vertices(work: Workspace, n: int, surfaces: Surfaces, tracer: Tracer) -> int:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Steps:
+    """The diffuse step of each walk, from what an eye sees to the first vertex; by number of the walk.
+
+    Attributes:
+        reflectivity: (n, 3) where the step starts.
+        position: (n, 3) the same place.
+        distance: (n,) to the first vertex; inf where there is none, NaN for walks that saw no diffuse surface.
+    """
+
+    reflectivity: Rgb
+    position: Points
+    distance: Float32
+
+    def begin(self, hits: Hits, walkers: Walkers, n: int) -> None:
+        """Note where diffuse steps of walks 0 to n - 1 start."""
+        leaves = walkers.step[:n] == DIFFUSE
+        walk = walkers.walk[:n][leaves]
+        self.reflectivity[walk], self.position[walk] = hits.reflectivity[:n][leaves], hits.position[:n][leaves]
+
+    def end(self, hits: Hits, walkers: Walkers, n: int) -> None:
+        """Note where they end."""
+        came = walkers.step[:n] == DIFFUSE
+        walk, surface = walkers.walk[:n][came], hits.kind[:n][came] == SURFACE
+        away = np.linalg.norm(hits.position[:n][came] - self.position[walk], axis=-1)
+        self.distance[walk] = np.where(surface, away, np.inf)
+
+
+def to_first_vertices(work: Workspace, n: int, surfaces: Surfaces, tracer: Tracer, steps: Steps | None = None) -> int:
     """From eye hits, through mirrors, to the diffuse hit that the eye sees, and on to the vertex after it.
 
     Walks that wait there while others still pass mirrors are set aside.
+
+    Args:
+        steps: is told of the last, diffuse step.
     """
     done_hits, done_walkers, found = [], [], 0
     for _ in range(MAX_BOUNCES):
         hits, walkers = work.hits[0], work.walkers[0]
         choose_all(hits, walkers, n, True)
+        if steps:
+            steps.begin(hits, walkers, n)
         n = work.advance(n, surfaces, tracer)
         hits, walkers = work.hits[0], work.walkers[0]
+        if steps:
+            steps.end(hits, walkers, n)
         arrived = (walkers.step[:n] == DIFFUSE) & (hits.kind[:n] == SURFACE)
         done_hits.append(Hits(*(a[:n][arrived] for a in hits)))
         done_walkers.append(Walkers(*(a[:n][arrived] for a in walkers)))
@@ -219,27 +254,20 @@ class EyeWalks:
 
     def batch(self, work: Workspace, first: int, n: int) -> _Walked:
         """Walk walks first to first + n - 1 to their ends."""
-        lights, surfaces, tracer, background = self.lights, self.surfaces, self.tracer, self.background
+        surfaces, tracer = self.surfaces, self.tracer
         rays = work.rays
         hits, walkers = work.hits[0], work.walkers[0]
-        _start_at_eyes(self.cams, self.seed, first, n, surfaces, tracer, work.hit_packets, hits, walkers)
+        start_at_eyes(self.cams, self.seed, first, n, surfaces, tracer, work.hit_packets, hits, walkers)
         work.rays += n
         seen, seen_reflectivity = int((hits.kind[:n] == SURFACE).sum()), total_reflectivity(hits, n)
-        left = _to_first_vertices(work, n, surfaces, tracer)
+        left = to_first_vertices(work, n, surfaces, tracer)
         work.sums[:] = 0.0
         hits, walkers = work.hits[0], work.walkers[0]
         reflectivity = total_reflectivity(hits, left)
         walkers.throughput[:left] = 1.0
         walkers.step[:left] = DIFFUSE
         walks = walkers.walk[:left].copy()
-        for _ in range(MAX_BOUNCES):
-            work.gather(left, lights, tracer)
-            left = work.advance(left, surfaces, tracer)
-            if background.any():
-                _see_background(work.hits[0], work.walkers[0], left, background, work.sums)
-            choose_all(work.hits[0], work.walkers[0], left, False)
-            if left == 0:
-                break
+        self.follow(work, left)
         gathered = work.sums[walks].astype(np.float64)  # (n_walks, 3, n_lights)
         return _Walked(
             spent=n,
@@ -252,20 +280,56 @@ class EyeWalks:
             squares=(gathered.mean(axis=1) ** 2).sum(axis=0),
         )
 
-    def until(self, enough: Callable[[_Walked], bool], threads: int) -> _Walked:
-        """Walk batch after batch, as many at once as there are threads; what lies behind the last one is forgotten."""
-        limit, found = self.paths or MOST, None
-        workspaces = [Workspace(self.lights) for _ in range(threads)]
-        with ThreadPoolExecutor(threads, thread_name_prefix="ambient") as pool:
-            for group in range(0, limit, threads * BATCH):
-                starts = range(group, min(group + threads * BATCH, limit), BATCH)
-                sizes = [min(BATCH, limit - first) for first in starts]
-                for walked in pool.map(self.batch, workspaces, starts, sizes):
-                    found = found.and_then(walked) if found else walked
-                    if enough(found):
-                        return found
-        assert found
-        return found
+    def follow(self, work: Workspace, n: int) -> None:
+        """Walk the current walks to their ends, and gather the light of every vertex in `work.sums`."""
+        for _ in range(MAX_BOUNCES):
+            work.gather(n, self.lights, self.tracer)
+            n = work.advance(n, self.surfaces, self.tracer)
+            if self.background.any():
+                see_background(work.hits[0], work.walkers[0], n, self.background, work.sums)
+            choose_all(work.hits[0], work.walkers[0], n, False)
+            if n == 0:
+                break
+
+
+class Sum(Protocol):
+    """What a batch of walks found, and what several did together."""
+
+    def and_then(self, other: Self) -> Self:
+        """Both together."""
+
+
+S = TypeVar("S", bound=Sum)
+
+
+def walk_until(
+    batch: Callable[[Workspace, int, int], S],
+    enough: Callable[[S], bool],
+    paths: int | None,
+    lights: LightArrays,
+    threads: int,
+) -> S:
+    """Walk batch after batch, as many at once as there are threads; what lies behind the last one is forgotten.
+
+    So the result is the same for any number of threads.
+
+    Args:
+        batch: walks a number of walks from a first one on.
+        enough: whether what was found by so many batches will do.
+        paths: how many walks there are; None: `MOST`.
+    """
+    limit, found = paths or MOST, None
+    workspaces = [Workspace(lights) for _ in range(threads)]
+    with ThreadPoolExecutor(threads, thread_name_prefix="ambient") as pool:
+        for group in range(0, limit, threads * BATCH):
+            starts = range(group, min(group + threads * BATCH, limit), BATCH)
+            sizes = [min(BATCH, limit - first) for first in starts]
+            for walked in pool.map(batch, workspaces, starts, sizes):
+                found = found.and_then(walked) if found else walked
+                if enough(found):
+                    return found
+    assert found
+    return found
 
 
 def ambient_by_eye(walks: EyeWalks, threads: int = 1) -> Ambient:
@@ -276,7 +340,7 @@ def ambient_by_eye(walks: EyeWalks, threads: int = 1) -> Ambient:
             return False
         return bool(relative_error(found.total, found.squares, found.count).max() <= TARGET_ERROR)
 
-    found = walks.until(enough, threads)
+    found = walk_until(walks.batch, enough, walks.paths, walks.lights, threads)
     if found.count == 0:
         reflectivity = found.seen_reflectivity / max(found.seen, 1)
         dark = summarise(found.total, found.squares, reflectivity, found.spent, found.rays, False)

@@ -90,16 +90,38 @@ class PathTracer:
             rows, points = rows[bright], points.take(bright)
         return total
 
-    def seen_first(self, eye: list[float], target: list[float], fov: float, aspect: float, n: int) -> Points:
-        """First surfaces behind what an eye sees: where cosine-distributed rays from the hits of n eye rays end."""
+    def seen(self, eye: list[float], target: list[float], fov: float, aspect: float, n: int) -> Points:
+        """What n rays of an eye meet."""
         forward = np.subtract(target, eye) / np.linalg.norm(np.subtract(target, eye))
         right = np.cross(forward, [0, 1, 0]) / np.linalg.norm(np.cross(forward, [0, 1, 0]))
         up = np.cross(right, forward)
         half = np.tan(np.radians(fov) / 2)
         x, y = self.random.uniform(-half, half, (2, n, 1))
         way = forward + aspect * x * right + y * up
-        points, _ = self.first_hits(np.tile(np.array(eye, float), (n, 1)), way)
-        return self.bounce(points)[0]
+        return self.first_hits(np.tile(np.array(eye, float), (n, 1)), way)[0]
+
+    def seen_first(self, eye: list[float], target: list[float], fov: float, aspect: float, n: int) -> Points:
+        """First surfaces behind what an eye sees: where cosine-distributed rays from the hits of n eye rays end."""
+        return self.bounce(self.seen(eye, target, fov, aspect, n))[0]
+
+    def fitted(self, points: Points, d_max: float, groups: int) -> Array:
+        """Irradiance that makes obscurances of falloff `sqrt` as bright as the light at some points: one a group.
+
+        A group is the ratio of the sums of R(P) R(Q) E(Q) and of R(P) R(Q) rho(d), with the average reflectivity where
+        nothing is met within d_max.
+        """
+        behind, met = self.bounce(points)
+        light, openness = np.zeros(len(met)), np.ones(len(met))
+        light[met] = behind.reflectivity * self.irradiance(behind)
+        away = np.linalg.norm(behind.position - points.position[met], axis=1)
+        reflected = np.full(len(met), behind.reflectivity.mean())
+        near = np.zeros(len(met), bool)
+        near[met] = away < d_max
+        openness[near] = np.sqrt(away[near[met]] / d_max)
+        reflected[near] = behind.reflectivity[near[met]]
+        y, x = points.reflectivity * light, points.reflectivity * reflected * openness
+        n = len(met) // groups * groups
+        return np.asarray(y[:n].reshape(groups, -1).sum(axis=1) / x[:n].reshape(groups, -1).sum(axis=1))
 
     def spread(self, parts: list[int], n: int, sides: Array) -> Points:
         """n places, even by area, on some triangles, on the side that `sides` (n_triangles, 3) points to."""

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from stages import result_of
-from ztests import chi2_bounds, estimate
+from ztests import Estimate, chi2_bounds, estimate
 
 from framearray_cli.job import Job
 from framearray_cli.jobfile import read_job
@@ -68,7 +68,7 @@ def measured(reflectivity: float, method: str, out: Path) -> tuple[NDArray[np.fl
     return np.array(found), np.array(predicted)
 
 
-@pytest.mark.parametrize("method", ["eye", "light"])
+@pytest.mark.parametrize("method", ["eye", "light", "fit"])
 @pytest.mark.parametrize("reflectivity", [0.2, 0.5, 0.8])
 def test_furnace(reflectivity: float, method: str, tmp_path: Path) -> None:
     by_light, predicted = measured(reflectivity, method, tmp_path)
@@ -76,13 +76,15 @@ def test_furnace(reflectivity: float, method: str, tmp_path: Path) -> None:
     whole = expected_direct(reflectivity).mean(axis=(0, 2, 3)) + right
     for l in range(by_light.shape[1]):  # the same random numbers serve all lights, so each is tested alone
         got = estimate(by_light[:, l])
-        assert abs(got.z(right)) < 3
+        # six seeds tell their spread badly; what the program says of its error is checked below, and serves here
+        said = Estimate(mean=got.mean, error=right * float(predicted[:, l].mean()) / SEEDS**0.5)
+        assert abs(said.z(right)) < 3
         assert abs(got.mean - right) < 0.01 * whole[l]
         assert got.error < 0.01 * right
         # the spread over seeds is what the program said its error would be, or less where walks are well spread
         spread = ((by_light[:, l] - got.mean) ** 2).sum() / (right * predicted[:, l].mean()) ** 2
         assert spread < chi2_bounds(SEEDS - 1)[1]
-        assert abs(got.z(1.05 * right)) > 3  # the test can fail
+        assert abs(said.z(1.05 * right)) > 3  # the test can fail
 
 
 def test_every_pixel_of_the_furnace(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ scene paths camera lights sampling surface
 embree/packets embree/masks embree/native embree/fallback embree/__init__
 rays hits plan
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
-terms/ambient_area terms/ambient_light
+terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise compose accumulate window
 imageattributes images manifest outfolder writer
 prepare memory render check
