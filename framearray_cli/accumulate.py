@@ -45,9 +45,6 @@ def _add_light(band: Band, i: int, n: int, channels: int, n_lights: int, fresh: 
     for l in range(0, n_lights, LANES):
         at, bit = 3 * i * stride + l, lit_bit(n_lights, l)
         red = green = blue = reals(lane_numbers()) * np.float32(0.0)
-        if not fresh:
-            red, green = lanes_at(band.direct, at), lanes_at(band.direct, at + stride)
-            blue = lanes_at(band.direct, at + 2 * stride)
         for k in range(n if (any_lit >> bit) & 1 else 0):
             if (band.lit[k] >> bit) & 1 == 0:
                 continue
@@ -61,6 +58,9 @@ def _add_light(band: Band, i: int, n: int, channels: int, n_lights: int, fresh: 
                 red = red + lanes_from(place) * band.shares[k, 0]
                 green = green + lanes_from(place + 4 * n_lights) * band.shares[k, 1]
                 blue = blue + lanes_from(place + 8 * n_lights) * band.shares[k, 2]
+        if not fresh:  # only now: what a single hit adds to the sum of a million would be lost in its last digits
+            red, green = red + lanes_at(band.direct, at), green + lanes_at(band.direct, at + stride)
+            blue = blue + lanes_at(band.direct, at + 2 * stride)
         put_lanes(band.direct, at, red)
         put_lanes(band.direct, at + stride, green)
         put_lanes(band.direct, at + 2 * stride, blue)
