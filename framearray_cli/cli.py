@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from .job import Job
     from .prepare import Prepared
     from .render import Summary
+    from .report import Report
+    from .report.case import Case
     from .terms.ambient import Ambient
 
 OUT_OF_MEMORY = 2  # the job asks for more than the machine has
@@ -197,6 +199,70 @@ def assemble(
 
 
 @app.command()
+def report(
+    job_file: JobFile,
+    folder: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder of the report; default: beside the images.", metavar="FOLDER"),
+    ] = None,
+    camera: Annotated[
+        list[int] | None, typer.Option("--camera", help="A camera to look at; may be repeated.", metavar="C")
+    ] = None,
+    light: Annotated[
+        list[int] | None, typer.Option("--light", help="A light position to look at; may be repeated.", metavar="L")
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary", help="Values of a setting to try: samples.hits=1,2,4; may be repeated.", metavar="KEY=VALUES"
+        ),
+    ] = None,
+    error: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--error", min=1e-6, help="RMSE to find the cheapest settings for: 0.05; may be repeated.", metavar="E"
+        ),
+    ] = None,
+    times: Annotated[
+        float, typer.Option("--times", min=1, help="Samples of a reference over those of a picture.", metavar="N")
+    ] = 100.0,
+    threads: Threads = None,
+    quiet: Quiet = False,
+) -> None:
+    """Measure what each setting of a job buys and costs: speed against error, as a page with tables and plots."""
+    job = _job(job_file, threads, None)
+    with Screen(out, quiet=quiet) as screen:
+        screen.wait("reading the scene")
+        from . import report as reporting
+
+        class Shown(reporting.Listener):
+            """Prints the scene, then a progress bar."""
+
+            def opened(self, case: "Case") -> None:
+                screen.say(_scene_lines(case.prepared))
+
+            def planned(self, references: int, settings: int) -> None:
+                screen.count("measuring", references + settings, "step")
+
+            def done(self) -> None:
+                screen.advance()
+
+        wish = reporting.Wish(
+            cameras=camera or (),
+            lights=light or (),
+            vary=dict(reporting.read_vary(option, job) for option in vary or ()),
+            errors=error or (),
+            times=times,
+        )
+        place = folder.absolute() if folder else job.output.directory.with_name(f"{job.output.directory.name}-report")
+        with compile_clock(screen.compiling):
+            made = reporting.make_report(job, place, wish, Shown())
+        reporting.write_report(made)
+    if not quiet:
+        say(out, _report_lines(made))
+
+
+@app.command()
 def schema() -> None:
     """Print the JSON Schema of job files, for editors that complete and check them."""
     import json
@@ -266,6 +332,18 @@ def _summary_lines(summary: "Summary", told: Sequence[str], job: "Job") -> list[
         *(f"note: {note}" for note in summary.notes if note not in told),
         f"images and manifest: {job.output.directory}",
     ]
+
+
+def _report_lines(made: "Report") -> list[str]:
+    """What a report found: the job's own settings, and the cheapest ones for some errors."""
+    from .report import advice_lines
+
+    own = made.measured[0]
+    lines = [f"as the job says: {own.ms:.3g} ms an image before writing, RMSE {own.quality.rmse:.1%}"]
+    for one in made.advice:
+        found = f"{one.best.named.name}, {one.best.ms:.3g} ms an image" if one.best else "nothing that was tried"
+        lines += [f"for an RMSE of {one.error:.1%}: {found}", *(f"  {line}" for line in advice_lines(one.best, made))]
+    return [*lines, f"report: {made.folder / 'index.html'}"]
 
 
 def _problems(error: JobError, outcome: str) -> list[str]:

@@ -112,6 +112,15 @@ def write_image(
         _write_oiio(path, "tiff", spec, image)
 
 
+def write_codes(path: Path, codes: Bytes) -> None:
+    """Write (h, w, 3) 8-bit sRGB codes as PNG, whole or not at all.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    write_bytes(path, _encode8(codes, ImageFormat(format="png"), {}))
+
+
 def write_layers(
     path: Path, layers: Mapping[str, Float32], attributes: Attributes | None = None, compression: str = "zip"
 ) -> None:

@@ -6,7 +6,7 @@ contributes (docs/decisions/window.md). A frame is composed as soon as the last 
 what no frame can need any more is dropped: never more than 2 N_r + 1 frames are held.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -102,20 +102,21 @@ class Window:
                 passed.put_back(self._crew.shelf)
             self._next += 1
 
-    def compose(self, j: int, images: Images) -> Composed:
+    def compose(self, j: int, images: Images, eyes: Sequence[int] | None = None) -> Composed:
         """Compose frame j, once all frames of its window were added.
 
         Args:
             images: (n_lights, height, width, 3), overwritten; float32, or float16 where that is how they are stored.
+            eyes: only hits of these eyes are averaged, and pixels that none of them reaches stay black; None: of all.
         """
         work = self._work
         flat = as_stored(images.reshape(len(images), work.n_pixels, 3))
         layered = work.n_pixels if work.layers else 0
         maps, own = np.empty((layered, 9), np.float32), np.empty((layered, 4), np.float32)
         samples = np.empty(work.n_pixels, np.int32)
-        holes = self._holes(j)
+        holes = self._holes(j) if eyes is None else []
         mirror_scale = self._mirror_scale(j, holes)
-        hits, mirrored = self._hits(j, holes[:1]), self._mirrored(j, holes[1:], mirror_scale)
+        hits, mirrored = self._hits(j, holes[:1], eyes), self._mirrored(j, holes[1:], mirror_scale)
         smooth = (
             self._smooth_indirect(j, holes[:1], images.shape[1:3]) if work.denoise else np.empty((0, 3), np.float32)
         )
@@ -186,9 +187,9 @@ class Window:
         missed = np.flatnonzero(reached[work.order] == 0)
         return fill_holes(work, j, work.order[missed], self._crew) if len(missed) else []
 
-    def _hits(self, j: int, holes: list[tuple[Placed, Records]]) -> Addresses:
-        """All hits of frame j, for `accumulate`."""
-        frames = [self._frames[k] for k in self._work.frames_around(j, self._work.n_r)]
+    def _hits(self, j: int, holes: list[tuple[Placed, Records]], eyes: Sequence[int] | None = None) -> Addresses:
+        """All hits of frame j, or those of some eyes, for `accumulate`."""
+        frames = [self._frames[k] for k in self._work.frames_around(j, self._work.n_r) if eyes is None or k in eyes]
         found = [(frame.places[j], frame.records, frame.weights[j], _NOTHING) for frame in frames]
         return sources(found + [(place, records, _NOTHING, _NOTHING) for place, records in holes])
 

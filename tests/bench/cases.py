@@ -1,20 +1,13 @@
 """Ways to make the images of a job: the frame array and its options, and what it is compared with."""
 
-import math
-import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
-import numpy as np
-
-from framearray_cli.embree import EmbreeScene
 from framearray_cli.job import Job
 from framearray_cli.jobfile import read_job
-from framearray_cli.lights import some_lights
-from framearray_cli.prepare import Prepared, open_embree, plan_work, prepare
-from framearray_cli.terms.ambient import Ambient
-from framearray_cli.work import Work
+from framearray_cli.report.case import Case as Case
+from framearray_cli.report.case import opened as opened
+from framearray_cli.report.case import under as under
+from framearray_cli.report.case import varied as with_settings
 
 from .results import ROOT
 
@@ -22,17 +15,6 @@ JOBS = ("kitchen", "stairs", "cabin")
 QUICK_RESOLUTION = (160, 120)
 # Light positions, as shares of the path, that images of one light are measured at.
 PLACES_OF_LIGHT = (1 / 6, 1 / 2, 5 / 6)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Case:
-    """A job, opened and planned."""
-
-    prepared: Prepared
-    embree: EmbreeScene
-    work: Work
-    ambient: Ambient
-    threads: int = field(default_factory=lambda: os.cpu_count() or 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,65 +96,19 @@ def with_resolution(job: Job, resolution: tuple[int, int]) -> Job:
     return job.model_copy(update={"camera": job.camera.model_copy(update={"resolution": resolution})})
 
 
-@contextmanager
-def opened(job: Job) -> Iterator[Case]:
-    """Open a job for measuring."""
-    prepared = prepare(job)
-    with open_embree(prepared) as embree:
-        work, ambient = plan_work(prepared, embree)
-        yield Case(prepared=prepared, embree=embree, work=work, ambient=ambient)
-
-
 def varied(case: Case, variant: Variant) -> Case:
-    """The same job made another way; every frame counts as an interior one of its path.
-
-    Frames at the ends of a path have more native hits than others; here none has.
-    """
-    prepared = replace(case.prepared, job=_changed(case.prepared.job, variant))
-    work, _ = plan_work(prepared, case.embree)
-    middle = work.per_pixel[work.n_frames // 2]
-    work = replace(
-        work,
-        lights=case.work.lights,
-        kept=case.work.kept,
-        per_pixel=np.full_like(work.per_pixel, middle),
-        obscurance=work.obscurance._replace(average=case.work.obscurance.average),
+    """The same job made another way; every frame counts as an interior one of its path."""
+    settings = replace(
+        case.settings,
+        n_r=variant.n_r,
+        weights="balance" if variant.balance else "average",
+        hits=variant.hits,
+        obscurance=variant.obscurance,
+        shadow_step=variant.step,
+        shadow_unbiased=variant.unbiased,
+        denoise=variant.denoise,
     )
-    return replace(case, prepared=prepared, work=work)
-
-
-def _changed(job: Job, variant: Variant) -> Job:
-    """The job that asks for a variant; its ambient light is not estimated again."""
-    samples = job.samples.model_copy(
-        update={
-            "hits": variant.hits,
-            "obscurance": variant.obscurance,
-            "shadow_step": variant.step,
-            "shadow_unbiased": variant.unbiased,
-        }
-    )
-    weights = "balance" if variant.balance else "average"
-    return job.model_copy(
-        update={
-            "samples": samples,
-            "reuse": job.reuse.model_copy(update={"n_r": variant.n_r, "weights": weights}),
-            "specular": job.specular.model_copy(update={"hits": math.ceil(variant.rests_on)}),
-            "ambient": job.ambient.model_copy(update={"method": "eye", "intensity": (1.0, 1.0, 1.0), "paths": 1}),
-            "output": job.output.model_copy(update={"layers": False}),
-            "denoise": job.denoise.model_copy(update={"obscurance": variant.denoise}),
-        }
-    )
-
-
-def under(case: Case, l: Sequence[int]) -> Case:
-    """The same job with light positions l alone."""
-    lights = some_lights(case.work.lights, l)
-    ambient = replace(
-        case.ambient,
-        intensity=np.ascontiguousarray(case.ambient.intensity[list(l)]),
-        standard_error=case.ambient.standard_error[list(l)],
-    )
-    return replace(case, work=replace(case.work, lights=lights, kept=range(len(l))), ambient=ambient)
+    return with_settings(case, settings)
 
 
 def parts_of(case: Case, variant: Variant) -> list[Case]:

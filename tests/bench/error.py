@@ -14,6 +14,8 @@ from framearray_cli.arrays import Images
 from framearray_cli.crew import Crew
 from framearray_cli.frame import find_frame
 from framearray_cli.images import ImageFormat, read_image, write_image
+from framearray_cli.report.metrics import errors, rmse, shadow_edges, squared_bias
+from framearray_cli.report.reference import PASSES, Reference, reference
 from framearray_cli.window import Window
 
 from .cases import (
@@ -30,8 +32,6 @@ from .cases import (
     varied,
 )
 from .machine import busy
-from .metrics import errors, rmse, shadow_edges, squared_bias
-from .reference import PASSES, Reference, reference
 from .results import Table
 from .speed import tell
 from .steady import mean, steady

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from bench.floor import PIECE, _pieces
 from bench.markdown import grid, number, percent
-from bench.metrics import block_mean, errors, relmse, rmse, shadow_edges, squared_bias
 from bench.results import load, median, save
 from bench.scaling import resampled
 from bench.steady import mean
 
 from framearray_cli.lights import DIRECTIONAL, POINT, LightArrays
+from framearray_cli.report.metrics import block_mean, errors, relmse, rmse, shadow_edges, squared_bias
 
 
 def flat(value: float, shape: tuple[int, int] = (40, 60)) -> np.ndarray:

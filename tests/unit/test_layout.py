@@ -27,6 +27,8 @@ reuse work crew shading mirrors frame denoise compose accumulate window
 imageattributes images manifest outfolder writer
 prepare memory render check
 moviepath movies assemble
+report/settings report/case report/probes report/reference report/metrics report/flip report/quality report/measure
+report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
 screen cli __main__
 """
 ORDER = FLOW.split()
@@ -47,7 +49,10 @@ DOORS = {
     "OpenImageIO": ("images",),
     "PIL": ("meshes/", "images"),
     "tomllib": ("jobfile", "manifest"),
-    "tomli_w": ("manifest",),
+    "tomli_w": ("manifest", "report/tables"),
+    "matplotlib": ("report/plots",),
+    "jinja2": ("report/page",),
+    "flip_evaluator": ("report/flip",),
     "typer": ("cli",),
     "rich": ("cli", "screen"),
     "av": ("movies",),
@@ -55,7 +60,7 @@ DOORS = {
     "psutil": ("memory", "check"),
 }
 # What takes long to import, or may be absent: `framearray --help` does without.
-HEAVY = ("numba", "llvmlite", "embreex", "trimesh", "OpenImageIO", "PIL", "scipy", "av")
+HEAVY = ("numba", "llvmlite", "embreex", "trimesh", "OpenImageIO", "PIL", "scipy", "av", "matplotlib", "jinja2")
 
 FILES = {path.relative_to(PACKAGE).with_suffix("").as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}
 

@@ -4,6 +4,7 @@ What a pixel shows is linear in the ambient light: light + I_A[l] * indirect. Bo
 stays right when the estimate of I_A changes, and says what a light alone does.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
@@ -11,15 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.arrays import Float32, Float64, Image, Rgb
-from framearray_cli.crew import Crew
-from framearray_cli.fingerprint import fingerprint
-from framearray_cli.frame import find_frame
-from framearray_cli.prepare import job_fingerprint
-from framearray_cli.window import Layers, Window
-from framearray_cli.work import Work
-
-from .cases import Case, under
+from ..arrays import Float32, Float64, Image, Rgb
+from ..crew import Crew
+from ..files import make_folder, whole_file
+from ..fingerprint import fingerprint
+from ..frame import find_frame
+from ..prepare import job_fingerprint
+from ..window import Layers, Window
+from ..work import Work
+from .case import Case, under
 
 # Native hits of a pixel in one pass: as many as memory holds easily; in all, 100 times those of the frame array.
 HITS = 28
@@ -61,10 +62,18 @@ class Reference:
         return found
 
 
+def passes_for(times: float, rests_on: float) -> int:
+    """Passes of each half, so that a reference has `times` the samples of a pixel that rests on so many hits."""
+    return max(math.ceil(times * rests_on / (2 * HITS)), 1)
+
+
 def reference(case: Case, c: int, l: Sequence[int], folder: Path, passes: int = PASSES) -> Reference:
     """Make the reference of frame c under light positions l, or read it where it was made before.
 
     It is kept by what its pixels depend on, but for the program itself: delete the folder when the method changes.
+
+    Raises:
+        OutputError: it cannot be kept.
     """
     average = case.work.obscurance.average.tobytes()
     pixels = job_fingerprint(case.prepared).encode()  # the seed, too, which does no harm
@@ -75,8 +84,9 @@ def reference(case: Case, c: int, l: Sequence[int], folder: Path, passes: int = 
         with np.load(file) as kept:
             return Reference(**{name: kept[name] for name in names}, hits=HITS * passes)
     made = _render(under(case, l), c, passes)
-    folder.mkdir(parents=True, exist_ok=True)
-    np.savez(file, **{name: getattr(made, name) for name in names})
+    make_folder(folder)
+    with whole_file(file) as part, part.open("wb") as stream:
+        np.savez(stream, **{name: getattr(made, name) for name in names})
     return made
 
 

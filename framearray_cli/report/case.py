@@ -1,0 +1,88 @@
+"""A job that is opened for measuring, and the same job with other settings, or under some of its light positions."""
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..embree import EmbreeScene
+from ..job import Job
+from ..lights import some_lights
+from ..prepare import Prepared, open_embree, plan_work, prepare
+from ..terms.ambient import Ambient
+from ..work import Work
+from .settings import Settings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Case:
+    """A job, opened and planned.
+
+    Attributes:
+        settings: what its work was planned with.
+    """
+
+    prepared: Prepared
+    embree: EmbreeScene
+    work: Work
+    ambient: Ambient
+    settings: Settings
+
+    @property
+    def threads(self) -> int:
+        """Threads of the job."""
+        return self.prepared.threads
+
+
+@contextmanager
+def opened(job: Job) -> Iterator[Case]:
+    """Open a job for measuring.
+
+    Raises:
+        JobError, SceneError: as a render would.
+    """
+    prepared = prepare(job)
+    with open_embree(prepared) as embree:
+        work, ambient = plan_work(prepared, embree)
+        yield Case(prepared=prepared, embree=embree, work=work, ambient=ambient, settings=Settings.of(job))
+
+
+def varied(case: Case, settings: Settings) -> Case:
+    """The same job with other settings; every frame counts as an interior one of its path.
+
+    Frames at the ends of a path have more native hits than others; here none has. The ambient light is the same, and
+    pixels that see a mirror rest on their share more or fewer hits, too.
+    """
+    job = settings.applied(case.prepared.job)
+    share = settings.rests_on / case.settings.rests_on
+    job = job.model_copy(
+        update={
+            "specular": job.specular.model_copy(update={"hits": math.ceil(share * job.specular.hits)}),
+            "ambient": job.ambient.model_copy(update={"method": "eye", "intensity": (1.0, 1.0, 1.0), "paths": 1}),
+            "output": job.output.model_copy(update={"layers": False}),
+        }
+    )
+    prepared = replace(case.prepared, job=job)
+    work, _ = plan_work(prepared, case.embree)
+    middle = work.per_pixel[work.n_frames // 2]
+    work = replace(
+        work,
+        lights=case.work.lights,
+        kept=case.work.kept,
+        per_pixel=np.full_like(work.per_pixel, middle),
+        obscurance=work.obscurance._replace(average=case.work.obscurance.average),
+    )
+    return replace(case, prepared=prepared, work=work, settings=settings)
+
+
+def under(case: Case, l: Sequence[int]) -> Case:
+    """The same job with light positions l alone."""
+    lights = some_lights(case.work.lights, l)
+    ambient = replace(
+        case.ambient,
+        intensity=np.ascontiguousarray(case.ambient.intensity[list(l)]),
+        standard_error=case.ambient.standard_error[list(l)],
+    )
+    return replace(case, work=replace(case.work, lights=lights, kept=range(len(l))), ambient=ambient)

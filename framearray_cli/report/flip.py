@@ -1,0 +1,41 @@
+"""The door to HDR-FLIP: how visible a difference is at all exposures that a picture may be shown at [Andersson21]."""
+
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Float32, Image
+from ..errors import MissingExtraError
+
+# What the extra `report` brings.
+EXTRA = ("matplotlib", "flip_evaluator", "jinja2")
+
+
+def require_extra() -> None:
+    """Make sure that everything a report needs is there, before any work is done.
+
+    Raises:
+        MissingExtraError: it is not.
+    """
+    from importlib.util import find_spec
+
+    missing = [name for name in EXTRA if find_spec(name) is None]
+    if missing:
+        raise MissingExtraError(
+            f"a report needs {', '.join(missing)}, which is not installed; "
+            'install it with: pip install "framearray[report]"'
+        )
+
+
+def flip_map(image: Image, reference: Image) -> Float32:
+    """HDR-FLIP of every pixel, (h, w), 0 to 1; 67 pixels a degree, as on a desktop screen.
+
+    Args:
+        image, reference: (h, w, 3) linear radiance; below 0 counts as 0.
+    """
+    import flip_evaluator
+
+    evaluator: Any = flip_evaluator
+    shown = (np.ascontiguousarray(np.maximum(picture, 0.0), np.float32) for picture in (reference, image))
+    error, _, _ = evaluator.evaluate(*shown, "HDR", inputsRGB=False, applyMagma=False, computeMeanError=False)
+    return np.asarray(error, np.float32)[..., 0]

@@ -1,0 +1,88 @@
+"""Where in the window errors come from: the same frame made of the hits of one eye of its window at a time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..crew import Crew
+from ..frame import find_frame
+from ..window import Window
+from .case import Case, varied
+from .measure import SEEDS
+from .metrics import squared_bias
+from .reference import Reference
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Offset:
+    """What the hits of one eye bring to a frame.
+
+    Attributes:
+        offset: of the eye along the path.
+        accepted: hits that the frame sees, over those that the eye found.
+        covered: share of pixels that get any.
+        rmse: over covered pixels, relative to the mean of the reference there.
+        squared_bias, squared_bias_error: of the same, see `Quality`.
+    """
+
+    offset: int
+    accepted: float
+    covered: float
+    rmse: float
+    squared_bias: float
+    squared_bias_error: float
+
+
+def by_offset(case: Case, c: int, lights: Sequence[int], reference: Reference) -> list[Offset]:
+    """Make frame c of each eye of its window alone, with the job's own settings."""
+    changed = varied(case, case.settings)
+    images = np.empty((2, case.work.lights.n_lights, case.work.cams.height, case.work.cams.width, 3), np.float32)
+    windows, crews = [], []
+    try:
+        for seed in SEEDS:
+            work = replace(changed.work, seed=seed)
+            crew = Crew(work, changed.threads)
+            crews.append(crew)
+            window = Window(work, changed.ambient, crew, first=c)
+            for k in work.frames_around(c, work.n_r):
+                window.add(find_frame(work, k, crew))
+            windows.append(window)
+        found = []
+        for k in changed.work.frames_around(c, changed.work.n_r):
+            hits = [window.compose(c, images[i], [k]).hits for i, window in enumerate(windows)]
+            found.append(_offset(case, k - c, hits, images, lights, reference))
+        return found
+    finally:
+        for crew in crews:
+            crew.close()
+
+
+def _offset(
+    case: Case, offset: int, hits: Sequence[np.ndarray], images: np.ndarray, lights: Sequence[int],
+    reference: Reference,
+) -> Offset:  # fmt: skip
+    shape = reference.depth.shape
+    seen = ((hits[0] > 0) & (hits[1] > 0)).reshape(shape)
+    rows = []
+    for i, l in enumerate(lights):
+        ambient = case.ambient.intensity[l]
+        right, halves = reference.image(i, ambient), [reference.half(h, i, ambient) for h in (0, 1)]
+        mean = float(right[seen].mean(dtype=np.float64)) if seen.any() else 1.0
+        rmse = (
+            float(np.sqrt(np.mean((images[0, l][seen] - right[seen]).astype(np.float64) ** 2))) if seen.any() else 0.0
+        )
+        runs = [np.where(seen[..., None], images[run, l], halves[run]) for run in (0, 1)]
+        square, spread = squared_bias((runs[0], runs[1]), (halves[0], halves[1]))
+        share = float(seen.mean()) or 1.0
+        rows.append((rmse / mean, square / share / mean**2, spread / share / mean**2))
+    per_pixel = case.settings.hits
+    rmse, square, spread = np.mean(rows, axis=0)
+    return Offset(
+        offset=offset,
+        accepted=float(hits[0].mean()) / per_pixel,
+        covered=float(seen.mean()),
+        rmse=float(rmse),
+        squared_bias=float(square),
+        squared_bias_error=float(spread) / len(rows) ** 0.5,
+    )

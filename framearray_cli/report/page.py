@@ -1,0 +1,56 @@
+"""A report as one HTML page, beside its plots and pictures."""
+
+from collections.abc import Sequence
+from importlib.resources import files
+
+from .. import __version__
+from ..files import whole_file
+from .crops import draw_crops, draw_maps
+from .front import times_faster
+from .measure import Measured
+from .plots import draw_plots
+from .run import Report
+from .tables import write_tables
+
+
+def write_report(report: Report) -> None:
+    """Write tables, plots, pictures and the page into the report's folder.
+
+    Raises:
+        OutputError: something cannot be written.
+    """
+    import jinja2
+
+    write_tables(report)
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    environment.filters.update(percent=_percent, number=_number)
+    template = environment.from_string((files(__package__) / "page.html").read_text(encoding="utf-8"))
+    text = template.render(
+        report=report,
+        version=__version__,
+        plots=draw_plots(report),
+        crops=draw_crops(report),
+        maps=draw_maps(report),
+        rows=[(one, times_faster(one, report.measured), one in report.front) for one in report.measured],
+        advice=[(one, advice_lines(one.best, report)) for one in report.advice],
+        cameras=[c for frames in report.probes.cameras for c in frames],
+    )
+    with whole_file(report.folder / "index.html") as part:
+        part.write_text(text, encoding="utf-8")
+
+
+def advice_lines(best: Measured | None, report: Report) -> Sequence[str]:
+    """Lines to paste into the job to get some settings; a remark where there is nothing to paste."""
+    if best is None:
+        return ["# no settings that were tried reach it"]
+    return best.named.settings.lines(report.settings) or ["# as the job is"]
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.3g} %"
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.3g}"

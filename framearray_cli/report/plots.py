@@ -1,0 +1,118 @@
+"""The door to matplotlib: a report's plots, as SVG."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from .measure import Measured
+from .run import Report
+from .settings import LIGHT_REUSE, SCRATCH
+
+COLOURS = {"job": "#c53030", LIGHT_REUSE: "#718096", SCRATCH: "#1a202c"}
+CYCLE = ("#2b6cb0", "#2f855a", "#b7791f", "#6b46c1", "#0987a0", "#b83280", "#9c4221", "#4a5568")
+
+
+def draw_plots(report: Report) -> dict[str, str]:
+    """Draw every plot into the report's folder; returns what it shows -> file name."""
+    import matplotlib
+
+    matplotlib.use("svg")
+    matplotlib.rcParams.update({"svg.hashsalt": "framearray", "svg.fonttype": "none", "font.size": 9})
+    plots: dict[str, Callable[[Report, Any], None]] = {
+        "error and time": _error_and_time,
+        "bias and noise": _bias_and_noise,
+        "by offset": _by_offset,
+        "flicker": _flicker,
+    }
+    found = {}
+    for title, draw in plots.items():
+        name = f"{title.replace(' ', '-')}.svg"
+        if _draw(report.folder / name, draw, report):
+            found[title] = name
+    return found
+
+
+def _draw(file: Path, draw: Callable[[Report, Any], None], report: Report) -> bool:
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(7.4, 4.4), layout="constrained")
+    try:
+        draw(report, axes)
+        if not axes.has_data():
+            return False
+        axes.grid(alpha=0.3, which="both")
+        figure.savefig(file, metadata={"Date": None, "Creator": None})
+    finally:
+        pyplot.close(figure)
+    return True
+
+
+def _families(report: Report) -> dict[str, list[Measured]]:
+    """Points that are joined, by family; each starts from the job's own settings where it varies one of them."""
+    own = report.measured[0]
+    families: dict[str, list[Measured]] = {}
+    for one in report.measured[1:]:
+        start = [] if one.named.family in (LIGHT_REUSE, SCRATCH) else [own]
+        families.setdefault(one.named.family, start).append(one)
+    return families
+
+
+def _colour(family: str, i: int) -> str:
+    return COLOURS.get(family, CYCLE[i % len(CYCLE)])
+
+
+def _error_and_time(report: Report, axes: Any) -> None:
+    for i, (family, points) in enumerate(_families(report).items()):
+        points = sorted(points, key=lambda m: m.ms)
+        times, errors = [m.ms for m in points], [m.quality.rmse for m in points]
+        axes.plot(times, errors, "o-", color=_colour(family, i), label=family, markersize=4, linewidth=1, alpha=0.8)
+    front = report.front
+    axes.plot(
+        [m.ms for m in front], [m.quality.rmse for m in front], "-", color="#f6ad55", linewidth=5, alpha=0.5, zorder=0,
+        label="best front",
+    )  # fmt: skip
+    own = report.measured[0]
+    axes.plot([own.ms], [own.quality.rmse], "*", color=COLOURS["job"], markersize=13, label="as the job says")
+    axes.set(xscale="log", yscale="log", xlabel="ms an image", ylabel="RMSE over the mean of the reference")
+    axes.legend(fontsize=7, ncols=2)
+
+
+def _bars(axes: Any, names: list[str], series: dict[str, list[float]], label: str) -> None:
+    """Horizontal bars, one group a name."""
+    height = 0.8 / len(series)
+    for i, (name, values) in enumerate(series.items()):
+        places = [k + (i - (len(series) - 1) / 2) * height for k in range(len(names))]
+        axes.barh(places, values, height=height, color=CYCLE[i], label=name)
+    axes.set_yticks(range(len(names)), names, fontsize=7)
+    axes.invert_yaxis()
+    axes.set_xlabel(label)
+    axes.legend(fontsize=7)
+
+
+def _bias_and_noise(report: Report, axes: Any) -> None:
+    shown = [m for m in report.measured if not m.named.settings.one_light]
+    series = {"bias": [m.quality.bias for m in shown], "noise": [m.quality.noise for m in shown]}
+    _bars(axes, [m.named.name for m in shown], series, "over the mean of the reference")
+
+
+def _flicker(report: Report, axes: Any) -> None:
+    shown = [m for m in report.measured if not m.named.settings.one_light]
+    series = {}
+    for name, key in (("along the camera path", "flicker_camera"), ("along the light path", "flicker_light")):
+        values = [getattr(m.quality, key) for m in shown]
+        if all(value is not None for value in values):
+            series[name] = values
+    if series:
+        _bars(axes, [m.named.name for m in shown], series, "relMSE of what changes from image to image")
+
+
+def _by_offset(report: Report, axes: Any) -> None:
+    if len(report.offsets) < 2:
+        return
+    at = [o.offset for o in report.offsets]
+    axes.plot(at, [o.rmse for o in report.offsets], "o-", color=CYCLE[0], label="RMSE")
+    axes.plot(at, [max(o.squared_bias, 0) ** 0.5 for o in report.offsets], "s-", color=CYCLE[2], label="bias")
+    axes.plot(at, [o.accepted for o in report.offsets], "^--", color=CYCLE[1], label="hits accepted, share")
+    axes.set(xlabel="offset of the eye in the window", ylabel="over the mean of the reference; share")
+    axes.set_ylim(bottom=0)
+    axes.legend(fontsize=7)

@@ -1,0 +1,70 @@
+"""A report's numbers as tables: TOML for programs, CSV for spreadsheets."""
+
+import csv
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import tomli_w
+
+from ..files import whole_file
+from .front import Advice, times_faster
+from .measure import Measured
+from .run import Report
+
+COLUMNS = (
+    "name", "n_r", "weights", "hits", "obscurance", "shadow_step", "shadow_unbiased", "denoise", "one_light", "ms",
+    "rmse", "relmse", "flip", "mean_off", "edge_rmse", "edge_max", "bias", "noise", "squared_bias",
+    "squared_bias_error", "flicker_camera", "flicker_light", "accepted_hits", "accepted_hits_1st_percentile",
+    "times_faster_than_scratch", "on_the_front",
+)  # fmt: skip
+
+
+def row(one: Measured, report: Report) -> dict[str, Any]:
+    """One line of the tables; what was not measured is left out."""
+    values = {
+        "name": one.named.name,
+        **asdict(one.named.settings),
+        **asdict(one.quality),
+        "ms": one.ms,
+        "bias": one.quality.bias,
+        "noise": one.quality.noise,
+        "accepted_hits": one.hits[0],
+        "accepted_hits_1st_percentile": one.hits[1],
+        "times_faster_than_scratch": times_faster(one, report.measured),
+        "on_the_front": one in report.front,
+    }
+    return {name: values[name] for name in COLUMNS if values[name] is not None}
+
+
+def write_tables(report: Report) -> None:
+    """Write table.csv and table.toml into the report's folder.
+
+    Raises:
+        OutputError: they cannot be written.
+    """
+    rows = [row(one, report) for one in report.measured]
+    with whole_file(report.folder / "table.csv") as part, part.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, COLUMNS, restval="")
+        writer.writeheader()
+        writer.writerows(rows)
+    table = {
+        "job": report.job.name,
+        "cameras": [c for frames in report.probes.cameras for c in frames],
+        "lights": list(report.probes.lights),
+        "reference": {"hits": report.reference_hits, "rmse": report.reference_noise},
+        "settings": rows,
+        "offsets": [asdict(offset) for offset in report.offsets],
+        "advice": [_advice(one, report) for one in report.advice],
+    }
+    with whole_file(report.folder / "table.toml") as part:
+        part.write_bytes(tomli_w.dumps(table).encode())
+
+
+def _advice(one: Advice, report: Report) -> dict[str, Any]:
+    found: dict[str, Any] = {"error": one.error}
+    if one.best:
+        lines: Sequence[str] = one.best.named.settings.lines(report.settings)
+        found |= {"settings": one.best.named.name, "ms": one.best.ms, "rmse": one.best.quality.rmse}
+        found["lines"] = list(lines)
+    return found

@@ -1,0 +1,105 @@
+"""Whole reports of small jobs."""
+
+import csv
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+import tiny
+from program import Result, run, write_job
+
+pytest.importorskip("flip_evaluator")
+pytest.importorskip("jinja2")
+pytest.importorskip("matplotlib")
+
+SMALL = {
+    "camera": tiny.WALK | {"resolution": [48, 36]},
+    "light": {"frames": 3},
+    "reuse": {"n_r": 1},
+    "samples": {"hits": 1, "obscurance": 2},
+}
+FEW = ("--vary", "samples.hits=2", "--vary", "samples.obscurance=4", "--vary", "samples.shadow_step=2", "--times", "20")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a job, and its report beside its images."""
+    folder = tmp_path_factory.mktemp("report")
+    write_job(folder, **SMALL)
+    return folder
+
+
+def report(capsys: pytest.CaptureFixture[str], folder: Path, *options: str) -> Result:
+    return run(capsys, "report", folder / "job.toml", *options)
+
+
+def read_rows(place: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader((place / "table.csv").read_text(encoding="utf-8").splitlines()))
+
+
+def test_a_report_has_all_its_parts(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    told = report(capsys, made, *FEW)
+    assert (told.code, told.err) == (0, "")
+    place = made / "out-report"
+    assert f"report: {place / 'index.html'}" in told.out and "for an RMSE of" in told.out
+    page = (place / "index.html").read_text()
+    for name in re.findall(r'(?:src|href)="([^"]+)"', page):
+        assert (place / name).is_file(), name
+    for plot in ("error-and-time", "bias-and-noise", "by-offset", "flicker"):
+        assert (place / f"{plot}.svg").read_text().startswith("<?xml")
+    rows = read_rows(place)
+    table = tomllib.loads((place / "table.toml").read_text())
+    assert [row["name"] for row in rows] == [row["name"] for row in table["settings"]]
+    assert {"as the job says", "hits 2", "n_r 0", "obscurance 4"} <= {row["name"] for row in rows}
+    assert table["reference"]["hits"] >= 20 * 3
+    for row in rows:
+        assert float(row["ms"]) > 0 and 0 < float(row["rmse"]) < 10 and 0 <= float(row["flip"]) <= 1
+        assert row["name"] in page
+    assert [offset["offset"] for offset in table["offsets"]] == [-1, 0, 1]
+    assert table["offsets"][1]["accepted"] == pytest.approx(1.0)  # every eye sees its own hits
+    assert 0 < table["offsets"][0]["accepted"] < 1
+    by_name = {row["name"]: float(row["rmse"]) for row in rows}
+    assert by_name["hits 2"] < by_name["as the job says"] < by_name["n_r 0"]
+    assert by_name["from scratch, 3 hits"] == pytest.approx(by_name["light reuse alone, 3 hits"], rel=1e-6)
+
+
+def test_references_are_used_again(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    report(capsys, made, *FEW)
+    kept = {file: file.stat().st_mtime_ns for file in (made / "out-report" / "references").iterdir()}
+    assert len(kept) == 4
+    assert report(capsys, made, *FEW, "--quiet").out == ""
+    assert {file: file.stat().st_mtime_ns for file in (made / "out-report" / "references").iterdir()} == kept
+
+
+def test_advice_is_for_the_errors_that_were_asked_for(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    told = report(capsys, made, *FEW, "--error", "5", "--error", "0.000001", "--output", str(made / "elsewhere"))
+    assert re.search(r"for an RMSE of 500.0%: \w", told.out)
+    assert "for an RMSE of 0.0%: nothing that was tried" in told.out
+    assert (made / "elsewhere" / "index.html").is_file()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--camera", "6"), "--camera: expected 0 to 5, got 6"),
+        (("--light", "-1"), "--light: expected 0 to 2, got -1"),
+        (("--vary", "samples.hit=2"), "--vary: expected one of"),
+        (("--times", "0"), "times"),
+    ],
+)
+def test_wrong_wishes(made: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, str], words: str) -> None:
+    told = report(capsys, made, *options)
+    assert told.code == 2 and words in told.err
+    assert "Traceback" not in told.err
+
+
+def test_one_camera_and_one_light(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """No neighbours to compare, no window: what cannot be shown is left out."""
+    still = {"resolution": [40, 30], "keys": tiny.WALK["keys"][:1]}
+    changes = SMALL | {"camera": still, "light": {"frames": 1, "sources": [tiny.SUN]}}
+    write_job(tmp_path, **changes)
+    told = report(capsys, tmp_path, *FEW)
+    assert (told.code, told.err) == (0, "")
+    rows = read_rows(tmp_path / "out-report")
+    assert all(row["flicker_camera"] == row["flicker_light"] == "" for row in rows)
