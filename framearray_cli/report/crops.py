@@ -53,7 +53,7 @@ def draw_maps(report: Report) -> list[Picture]:
     return [
         _written(report, "reference.png", srgb8_from_linear(scale * report.example), "reference"),
         _written(report, "own.png", srgb8_from_linear(scale * own.example), _caption(own)),
-        _written(report, "flip.png", _heat(report.flip), f"HDR-FLIP: black 0, white 1; mean {own.quality.flip:.3f}"),
+        _written(report, "flip.png", _heat(report.flip), f"HDR-FLIP: black 0, white 1; mean {report.flip.mean():.3f}"),
         _written(
             report, "signed.png", _signed(report.signed),
             "image less reference: red too bright, blue too dark; full colour at half the mean of the reference",

@@ -19,7 +19,7 @@ class Quality:
     Attributes:
         rmse: root mean square error over the mean of the reference.
         relmse: mean of (I - R)^2 / (R^2 + EPSILON).
-        flip: mean HDR-FLIP, 0 to 1.
+        flip: mean HDR-FLIP, 0 to 1; it takes long, so of neighbours only the first has it.
         mean_off: mean of I - R over the mean of the reference.
         edge_rmse, edge_max: error at shadow edges, see `Errors`.
         squared_bias, squared_bias_error: what independent runs have in common, and its standard error; over the square
@@ -30,7 +30,7 @@ class Quality:
 
     rmse: float
     relmse: float
-    flip: float
+    flip: float | None
     mean_off: float
     edge_rmse: float
     edge_max: float
@@ -62,6 +62,7 @@ def quality(
         lights: light positions of the images.
         pairs: places in `lights` of neighbours on the light path.
     """
+    neighbours = {second for _, second in pairs}
     right = np.stack([[r.image(k, ambient.intensity[l]) for k, l in enumerate(lights)] for r in references])
     found = []
     for c, reference in enumerate(references):
@@ -77,7 +78,7 @@ def quality(
                 Quality(
                     rmse=apart.rmse,
                     relmse=apart.relmse,
-                    flip=float(flip_map(image, wanted).mean(dtype=np.float64)),
+                    flip=_mean_flip(image, wanted) if c == 0 and k not in neighbours else None,
                     mean_off=apart.bias,
                     edge_rmse=apart.edge_rmse,
                     edge_max=apart.edge_max,
@@ -92,6 +93,10 @@ def quality(
                 )
             )
     return found
+
+
+def _mean_flip(image: Image, wanted: Image) -> float:
+    return float(flip_map(image, wanted).mean(dtype=np.float64))
 
 
 def _flicker(image: Image, wanted: Image, next_image: Image, next_wanted: Image) -> float:

@@ -126,7 +126,7 @@ def to_try(base: Settings, n_cameras: int, vary: Mapping[str, Sequence[Any]]) ->
         for value in values:
             changed = replace(base, **{KEYS[key]: value})
             if changed.n_r <= longest and changed != base:
-                found.append(Named(name=f"{key.split('.')[1]} {_plain(value)}", family=key, settings=changed))
+                found.append(Named(name=f"{KEYS[key]} {_plain(value)}", family=key, settings=changed))
     for hits, n_r in ((base.hits / 2, 2 * base.n_r + 1), (base.hits / 4, 4 * base.n_r + 2)):
         if base.n_r and n_r <= longest and hits >= FEWEST_HITS:
             wide = replace(base, hits=hits, n_r=n_r)
