@@ -11,6 +11,7 @@ from framearray_cli.arrays import Float32, Float64
 from framearray_cli.lights import DIRECTIONAL, LightArrays, padded
 from framearray_cli.paths import Eyes
 from framearray_cli.prepare import open_embree, plan_work
+from framearray_cli.report.settings import Settings
 
 from .cases import FRAME_ARRAY, QUICK_RESOLUTION, Case, job_named, opened, varied
 from .machine import busy, describe
@@ -106,7 +107,13 @@ def _n_r(case: Case, quick: bool) -> list[Table]:
 def _threads(case: Case, quick: bool) -> list[Table]:
     cores = os.cpu_count() or 1
     counts = [n for n in (1, 2, 4, 8, 16, 32, 64, 128) if n < cores] + [cores]
-    return [_row(replace(case, threads=n), quick, threads=n) for n in counts]
+    return [_row(_with_threads(case, n), quick, threads=n) for n in counts]
+
+
+def _with_threads(case: Case, n: int) -> Case:
+    job = case.prepared.job
+    job = job.model_copy(update={"render": job.render.model_copy(update={"threads": n})})
+    return replace(case, prepared=replace(case.prepared, job=job))
 
 
 def _cameras(case: Case, quick: bool) -> list[Table]:
@@ -141,7 +148,9 @@ def _triangles(quick: bool) -> list[Table]:
         with open_embree(prepared) as embree:
             built = time.perf_counter() - started
             work, ambient = plan_work(prepared, embree)
-            case = varied(Case(prepared=prepared, embree=embree, work=work, ambient=ambient), FRAME_ARRAY)
+            settings = Settings.of(prepared.job)
+            planned = Case(prepared=prepared, embree=embree, work=work, ambient=ambient, settings=settings)
+            case = varied(planned, FRAME_ARRAY)
             row = _row(case, quick, triangles=len(prepared.scene.corners))
         rows.append({**row, "scene_s": scene_seconds, "embree_s": built})
     return rows
