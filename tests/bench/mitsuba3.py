@@ -20,7 +20,7 @@ from framearray_cli.terms.obscurance import FALLOFFS
 from .cases import SCRATCH, Case, job_named, opened, under, varied
 from .machine import busy
 from .results import Table
-from .speed import FORMATS
+from .speed import FORMATS, WRITTEN
 from .steady import steady
 
 HITS, RAYS = int(SCRATCH.hits), SCRATCH.obscurance
@@ -50,7 +50,7 @@ def measure(name: str, quick: bool) -> Table:
                     started = time.perf_counter()
                     made = image(c, l)
                     spent.append(time.perf_counter() - started)
-                    write_image(Path(folder) / f"{i}-{c}-{l}.exr", made, FORMATS["zip:1"])
+                    write_image(Path(folder) / f"{i}-{c}-{l}.exr", made, FORMATS[WRITTEN])
                     written.append(time.perf_counter() - started)
                 shares.append(busy())
         ours = steady(under(varied(case, SCRATCH), [where[0][1]]), 1, place=PLACES[0][0])

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from .cases import FRAME_ARRAY, JOBS, REDUCED, SCRATCH, VARIANTS
 from .markdown import grid, number, percent, times, total
 from .results import Table
-from .speed import FORMATS
+from .speed import FORMATS, WRITTEN
 
 HEAD = """
 # Speed
@@ -53,7 +53,7 @@ def summary(speed: Mapping[str, Table], mitsuba: Mapping[str, Table]) -> list[st
         found = table["median"]
         array, reduced, scratch = (found[v.name] for v in (FRAME_ARRAY, REDUCED, SCRATCH))
         peer = mitsuba.get(name, {})
-        zipped = array["written"]["zip:1"]["ms"]
+        written = array["written"][WRITTEN]["ms"]
         rows.append(
             [
                 f"`jobs/{name}.toml`",
@@ -61,9 +61,9 @@ def summary(speed: Mapping[str, Table], mitsuba: Mapping[str, Table]) -> list[st
                 times(array["floor_ratio"]["ms"]),
                 times(scratch["ms"] / array["ms"]),
                 times(scratch["ms"] / reduced["ms"]),
-                number(zipped),
-                times(scratch["written"]["zip:1"]["ms"] / zipped),
-                times(peer["written_ms"] / zipped) if "written_ms" in peer else "",
+                number(written),
+                times(scratch["written"][WRITTEN]["ms"] / written),
+                times(peer["written_ms"] / written) if "written_ms" in peer else "",
             ]
         )
     head = [
@@ -82,7 +82,7 @@ time at another place of the camera path; figures are medians.
   times as long that takes.
 - *Floor*: the rays of one frame, recorded and replayed through Embree packets on all cores; nothing but Embree's own
   calls is timed. Packets are those that the program makes, idle lanes and all.
-- *Written*: as half EXR, `zip:1`, to a temporary folder.
+- *Written*: as half EXR, not compressed, to a temporary folder.
 """
     return ["## Summary", about, grid(head, rows), _sizes(speed)]
 
@@ -184,7 +184,7 @@ def peers(speed: Mapping[str, Table], mitsuba: Mapping[str, Table], cycles: Mapp
                 continue
             found = speed[name]["median"] if name in speed else {}
             array = found.get(FRAME_ARRAY.name, {}).get("ms")
-            written = found.get(FRAME_ARRAY.name, {}).get("written", {}).get("zip:1", {}).get("ms")
+            written = found.get(FRAME_ARRAY.name, {}).get("written", {}).get(WRITTEN, {}).get("ms")
             rows.append(
                 [
                     f"{program} {t['version']}, {name}",
