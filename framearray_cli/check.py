@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import psutil
 
 from .compiling import compile_clock
 from .crew import Crew
@@ -15,7 +14,15 @@ from .filepatterns import file_patterns
 from .frame import find_frame
 from .job import Job
 from .jobfile import job_table
-from .memory import ambient_memory, free_memory, light_blocks, mirror_share, require_memory, window_memory
+from .memory import (
+    ambient_memory,
+    free_memory,
+    light_blocks,
+    mirror_share,
+    require_memory,
+    resident_memory,
+    window_memory,
+)
 from .outfolder import free_space, in_the_way, is_same, read_array
 from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
 from .terms.ambient import Ambient
@@ -90,7 +97,7 @@ def check(job: Job) -> Estimate:
             first, second = (_probe(prepared, work, ambient, int(p)) for p in (FIRST_SHARE * pixels, pixels))
             mirrors = mirror_share(work)
             blocks = light_blocks(prepared, mirrors)
-            resident, available = psutil.Process().memory_info().rss, free_memory()
+            resident, available = resident_memory(), free_memory()
     scale = work.n_pixels / second.pixels
     largest = max(len(block) for block in blocks)
     more = max(window_memory(prepared, largest, mirrors), ambient_memory(prepared))

@@ -243,7 +243,7 @@ class RenderTable(Table):
 
     memory: Bytes | None = Field(
         default=None,
-        description='Most memory that frames under way may take, such as "8 GiB". What needs more is rendered in '
+        description='Most memory that the program may take, such as "8 GiB". What needs more is rendered in '
         "blocks of light positions, one after the other; the images are the same, the time is longer.",
         json_schema_extra=computed("two thirds of what is free"),
     )

@@ -18,8 +18,11 @@ from .writer import BLOCKS, image_format
 
 # Share of the free memory that frames under way may take unless the job says; the rest is for scene, files and others.
 FREE_SHARE = 2 / 3
+# What is not there yet when a job is planned: compiled kernels, and the arrays of each thread; found at 1920 x 1080.
+GROWTH = 256 * 2**20
 # Mirrors are looked for in this many frames of the path, this many rays at a time.
 PILOT_FRAMES, PILOT_BATCH = 8, 2048
+LAYER_CHANNELS = 14
 
 
 def peak_memory() -> int:
@@ -41,9 +44,20 @@ def free_memory() -> int:
     return int(psutil.virtual_memory().available + psutil.swap_memory().free)
 
 
+def resident_memory() -> int:
+    """Bytes that this process holds now: the program, the scene, and Embree's tree once it is built."""
+    return int(psutil.Process().memory_info().rss)
+
+
+def taken_memory() -> int:
+    """Bytes that the program will hold beside frames: what it holds now, and what it still loads and keeps."""
+    return resident_memory() + GROWTH
+
+
 def memory_limit(prepared: Prepared) -> int:
-    """Bytes that frames under way may take: the job's limit, else a share of what is free."""
-    return prepared.job.render.memory or int(FREE_SHARE * free_memory())
+    """Bytes that frames under way may take: what the limit leaves beside the rest, or a share of what is free."""
+    limit = prepared.job.render.memory
+    return limit - taken_memory() if limit else int(FREE_SHARE * free_memory())
 
 
 def require_memory(prepared: Prepared) -> None:
@@ -55,6 +69,8 @@ def require_memory(prepared: Prepared) -> None:
     needed, limit = window_memory(prepared, 1), memory_limit(prepared)
     if prepared.job.render.memory is None:
         needed, limit = max(needed, ambient_memory(prepared)), free_memory()
+    else:  # told as the job's limit is: of the whole program
+        needed, limit = needed + taken_memory(), prepared.job.render.memory
     if needed > limit:
         problem = (
             f"rendering needs at least {needed / 2**30:.1f} GiB of memory, {limit / 2**30:.1f} GiB may be used; "
@@ -87,7 +103,12 @@ def window_memory(prepared: Prepared, n_lights: int, mirror_share: float = 0.0) 
     per_hit = per_record + 16 * job.output.layers + frames * (8 if balance else 4)
     # a frame's mirror hits wait for N_r frames; twice while the lists of all batches are joined, and chains add some
     mirrored = mirror_share * job.specular.hits * (n_r + 3) * per_record
-    per_image_pixel = frames * frames * 4 + BLOCKS * (6 if image_format(job).composes_halves else 12) * n_lights
+    # of the frame that is being found: the pixel of each hit in every frame around, before hits are sorted by it
+    finding = float(per_pixel.max()) * frames * 4
+    layers = 2 * LAYER_CHANNELS * 4 * job.output.layers  # as they are summed, and as they are written
+    per_image_pixel = (
+        finding + layers + frames * frames * 4 + BLOCKS * (6 if image_format(job).composes_halves else 12) * n_lights
+    )
     return int(width * height * (held * per_hit + mirrored + per_image_pixel))
 
 

@@ -299,7 +299,8 @@ def scaling(found: Table, drawn: Mapping[str, str]) -> list[str]:
     width, height = found["resolution"]
     about = f"""
 `jobs/{found["job"]}.toml` at {width} x {height}, weights `average`, all shadows tested, nothing written; one number
-changes at a time. Other programs took {percent(statistics.median(found["busy"]), 2)} of the cores (median).
+changes at a time. The cameras are those of the middle of the path, where mirrors make images dearer than the medians
+above say. Other programs took {percent(statistics.median(found["busy"]), 2)} of the cores (median).
 """
     parts = ["## Scaling", about]
     for name, title, text, head, cells in SWEEPS:

@@ -30,6 +30,12 @@ def job(folder: Path, memory: Any = None, **samples: Any) -> Any:
     return tiny.Job.model_validate(table)
 
 
+@pytest.fixture(autouse=True)
+def _program_of_no_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Limits of this file are some kilobytes; the program itself is not counted here."""
+    monkeypatch.setattr("framearray_cli.memory.taken_memory", lambda: 0)
+
+
 @pytest.mark.parametrize("samples", [{}, {"shadow_step": 3}, {"shadow_step": 3, "shadow_unbiased": True}])
 def test_blocks_give_the_same_bytes(tmp_path: Path, samples: dict[str, Any]) -> None:
     whole = job(tmp_path, **samples)
@@ -66,3 +72,13 @@ def test_mirrors_are_seen_before_the_first_frame(tmp_path: Path) -> None:
         assert 0.1 < mirror_share(work) < 1
     with tiny.planned(tiny.prepared(tiny.job(), tiny.room(mirrors=False))) as (work, _):
         assert mirror_share(work) == 0.0
+
+
+def test_the_limit_is_that_of_the_whole_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the program holds already is not there for frames."""
+    inputs = tiny.prepared(job(tmp_path, window_memory(tiny.prepared(job(tmp_path)), 6) + 1000))
+    monkeypatch.setattr("framearray_cli.memory.taken_memory", lambda: 1000)
+    assert [len(block) for block in light_blocks(inputs, 0.0)] == [4, 3]
+    monkeypatch.setattr("framearray_cli.memory.taken_memory", lambda: 2**40)
+    with pytest.raises(JobError, match=r"needs at least 1024\.0 GiB"):
+        require_memory(inputs)
