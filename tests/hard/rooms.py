@@ -44,7 +44,7 @@ def thinner() -> Any:
 
 
 def coincident() -> Any:
-    """Every wall three times, cut along the other diagonal and shifted by a rounding; of equal ones one would do."""
+    """Every wall three times, cut along either diagonal."""
     other = np.array([[[-1, -1, 0], [1, -1, 0], [1, 1, 0]], [[-1, -1, 0], [1, 1, 0], [-1, 1, 0]]], np.float64)
     turned = [other @ _axes(k, sign).T + sign * np.eye(3)[k] for k in range(3) for sign in (-1, 1)]
     crossed = [np.roll(face[:, :, :], 1, axis=1) for face in turned]
@@ -90,7 +90,7 @@ def slivers() -> Any:
 
 
 def broken() -> Any:
-    """Among the walls: triangles without an area, doubled ones, and corners that are no numbers."""
+    """Walls beside triangles without an area, doubled ones, and ones with corners that are no numbers."""
     walls = grid(4)
     lines = np.stack([walls[:, 0], walls[:, 1], (walls[:, 0] + walls[:, 1]) / 2], axis=1)
     points = np.repeat(walls[:20, :1], 3, axis=1)
