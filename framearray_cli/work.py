@@ -65,11 +65,6 @@ class Work:
         return self.cams.width * self.cams.height
 
     @property
-    def has_constant(self) -> bool:
-        """Whether anything a pixel shows is the same under every light."""
-        return bool(self.background.any())
-
-    @property
     def keeps_all(self) -> bool:
         """Whether all light that is computed is stored too."""
         return len(self.kept) == self.lights.n_lights

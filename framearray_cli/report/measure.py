@@ -10,7 +10,6 @@ import numpy as np
 from ..arrays import Float32, Int32
 from ..crew import Crew
 from ..frame import find_frame
-from ..images import ImageFormat
 from ..window import Window
 from .case import Case, under, varied
 from .quality import Quality, mean_quality, quality
@@ -65,7 +64,7 @@ def run(case: Case, settings: Settings, cameras: Sequence[int], lights: Sequence
     changed = under(changed, lights) if settings.one_light else changed
     work = replace(changed.work, seed=seed)
     shape = (work.lights.n_lights, work.cams.height, work.cams.width, 3)
-    block = np.empty(shape, np.float16 if ImageFormat().composes_halves else np.float32)
+    block = np.empty(shape, np.float16)
     exact = np.empty(shape, np.float32)
     kept = range(len(lights)) if settings.one_light else lights
     crew = Crew(work, changed.threads)
@@ -108,15 +107,19 @@ def measure(
         found += quality(pictures, [references[c] for c in frames], case.ambient, lights, pairs)
         example = runs[0].images[0, 0] if example is None else example
     assert example is not None
-    images = len(lights) if named.settings.one_light else case.work.lights.n_lights
-    if named.settings.one_light:  # each image alone: a run of one light position, times as many
-        alone = [run(case, named.settings, frames[:1], lights[:1], SEEDS[0]).seconds for frames in cameras]
-        seconds, images = alone, 1
     all_hits = np.concatenate([h.ravel() for h in hits])
     return Measured(
         named=named,
-        ms=1e3 * statistics.median(seconds) / images,
+        ms=1e3 * statistics.median(seconds) / case.work.lights.n_lights,
         quality=mean_quality(found),
         hits=(float(all_hits.mean()), float(np.percentile(all_hits, 1))),
         example=example,
     )
+
+
+def measure_alone(
+    case: Case, named: Named, cameras: Sequence[Sequence[int]], lights: Sequence[int], twin: Measured
+) -> Measured:
+    """Time images that are made for one light position each; their pictures are those of `twin`, which shares hits."""
+    seconds = [run(case, named.settings, frames[:1], lights[:1], SEEDS[0]).seconds for frames in cameras]
+    return replace(twin, named=named, ms=1e3 * statistics.median(seconds))

@@ -21,6 +21,7 @@ from ..prepare import job_fingerprint
 from ..window import Layers, Window
 from ..work import Work
 from .case import Case, under
+from .metrics import rmse
 
 # Native hits of a pixel in one pass: as many as memory holds easily; in all, 100 times those of the frame array.
 HITS = 28
@@ -133,3 +134,15 @@ def _pass(work: Work, case: Case, c: int) -> tuple[Float32, Float32, Layers]:
         crew.close()
     assert layers is not None
     return images[0], images[1, 0] - images[0, 0], layers
+
+
+def noise(references: Sequence[Reference], case: Case, l: Sequence[int]) -> float:
+    """RMSE of a reference itself over its mean: half of what its halves differ by."""
+    shares = []
+    for wanted in references:
+        for k in range(len(l)):
+            ambient = case.ambient.intensity[l[k]]
+            right = wanted.image(k, ambient)
+            apart = rmse(wanted.half(0, k, ambient), wanted.half(1, k, ambient))
+            shares.append(apart / 2 / float(right.mean(dtype=np.float64)))
+    return sum(shares) / len(shares)

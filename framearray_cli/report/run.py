@@ -1,7 +1,7 @@
 """What `framearray report` does: references, pictures of many settings, and what follows from them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,11 @@ from ..job import Job
 from .case import Case, opened
 from .flip import flip_map, require_extra
 from .front import Advice, advice, worth_trying
-from .measure import Measured, measure
-from .metrics import rmse
+from .measure import Measured, measure, measure_alone
 from .offsets import Offset, by_offset
 from .probes import Probes, probes
-from .reference import Reference, passes_for, reference
-from .settings import Settings, to_try
+from .reference import Reference, noise, passes_for, reference
+from .settings import Named, Settings, to_try
 
 TIMES = 100.0  # samples of a reference over those of a picture
 
@@ -102,11 +101,9 @@ def make_report(job: Job, folder: Path, wish: Wish, listener: Listener | None = 
         for c in frames:
             references[c] = reference(case, c, looked_at.lights, folder / "references", passes)
             listener.done()
-        measured = []
+        measured: list[Measured] = []
         for named in trying:
-            measured.append(
-                measure(case, named, looked_at.cameras, looked_at.lights, looked_at.light_pairs, references)
-            )
+            measured.append(_measured(case, named, looked_at, references, measured))
             listener.done()
         first, own = references[frames[0]], measured[0]
         right = first.image(0, case.ambient.intensity[looked_at.lights[0]])
@@ -121,19 +118,20 @@ def make_report(job: Job, folder: Path, wish: Wish, listener: Listener | None = 
             offsets=tuple(by_offset(case, frames[0], looked_at.lights, first)),
             advice=tuple(advice(measured, wanted)),
             reference_hits=2 * first.hits,
-            reference_noise=_noise(references, case, looked_at),
+            reference_noise=noise(list(references.values()), case, looked_at.lights),
             example=right,
             flip=flip_map(own.example, right),
             signed=np.asarray((own.example - right).mean(axis=-1) / right.mean(dtype=np.float64), np.float32),
         )
 
 
-def _noise(references: Mapping[int, Reference], case: Case, looked_at: Probes) -> float:
-    """RMSE of a reference over its mean: half of what its halves differ by."""
-    shares = []
-    for wanted in references.values():
-        for k, l in enumerate(looked_at.lights):
-            ambient = case.ambient.intensity[l]
-            apart = rmse(wanted.half(0, k, ambient), wanted.half(1, k, ambient))
-            shares.append(apart / 2 / float(wanted.image(k, ambient).mean(dtype=np.float64)))
-    return float(np.mean(shares))
+def _measured(
+    case: Case, named: Named, looked_at: Probes, references: dict[int, Reference], others: Sequence[Measured]
+) -> Measured:
+    """Cost and error of some settings; `others` were measured before, light reuse before the same without it."""
+    cameras, lights = looked_at.cameras, looked_at.lights
+    if not named.settings.one_light:
+        return measure(case, named, cameras, lights, looked_at.light_pairs, references)
+    shared = replace(named.settings, one_light=False)
+    twin = next(other for other in others if other.named.settings == shared)
+    return measure_alone(case, named, cameras, lights, twin)

@@ -101,7 +101,7 @@ class Named:
     settings: Settings
 
 
-FRAME_ARRAY, LIGHT_REUSE, SCRATCH = "frame array", "light reuse alone", "from scratch"
+LIGHT_REUSE, SCRATCH = "light reuse alone", "from scratch"
 
 
 def to_try(base: Settings, n_cameras: int, vary: Mapping[str, Sequence[Any]]) -> list[Named]:

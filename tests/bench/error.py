@@ -15,7 +15,7 @@ from framearray_cli.crew import Crew
 from framearray_cli.frame import find_frame
 from framearray_cli.images import ImageFormat, read_image, write_image
 from framearray_cli.report.metrics import errors, rmse, shadow_edges, squared_bias
-from framearray_cli.report.reference import PASSES, Reference, reference
+from framearray_cli.report.reference import PASSES, Reference, noise, reference
 from framearray_cli.window import Window
 
 from .cases import (
@@ -168,18 +168,6 @@ def added(
         for k in range(len(l)):
             right = wanted.image(k, case.ambient.intensity[l[k]])
             shares.append(rmse(pair[0][k], other[k]) / float(right.mean(dtype=np.float64)))
-    return sum(shares) / len(shares)
-
-
-def noise(references: Sequence[Reference], case: Case, l: Sequence[int]) -> float:
-    """RMSE of a reference itself over its mean: half of what its halves differ by."""
-    shares = []
-    for wanted in references:
-        for k in range(len(l)):
-            ambient = case.ambient.intensity[l[k]]
-            right = wanted.image(k, ambient)
-            apart = rmse(wanted.half(0, k, ambient), wanted.half(1, k, ambient))
-            shares.append(apart / 2 / float(right.mean(dtype=np.float64)))
     return sum(shares) / len(shares)
 
 

@@ -27,7 +27,7 @@ reuse work crew shading mirrors frame denoise compose accumulate window
 imageattributes images manifest outfolder writer
 prepare memory render check
 moviepath movies assemble
-report/settings report/case report/probes report/reference report/metrics report/flip report/quality report/measure
+report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
 screen cli __main__
 """
@@ -57,7 +57,7 @@ DOORS = {
     "rich": ("cli", "screen"),
     "av": ("movies",),
     "scipy": ("paths",),
-    "psutil": ("memory", "check"),
+    "psutil": ("memory",),
 }
 # What takes long to import, or may be absent: `framearray --help` does without.
 HEAVY = ("numba", "llvmlite", "embreex", "trimesh", "OpenImageIO", "PIL", "scipy", "av", "matplotlib", "jinja2")

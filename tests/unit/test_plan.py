@@ -67,7 +67,7 @@ def test_a_still_camera_has_the_hits_of_its_whole_window_and_no_reuse() -> None:
 
 def test_features_that_a_scene_lacks_are_off() -> None:
     with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}), tiny.room(mirrors=False))) as (work, _):
-        assert work.depth == 0 and work.mirror_hits == 0 and not work.has_constant
+        assert work.depth == 0 and work.mirror_hits == 0 and not work.background.any()
     with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}, specular={"depth": 0}))) as (work, _):
         assert work.depth == 0 and work.mirror_hits == 0
     with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}))) as (work, _):
