@@ -13,7 +13,6 @@ from .camera import Cameras, corner_of, eye_ray
 from .embree.packets import (
     DIRECTION,
     GEOMETRY,
-    MISS,
     ORIGIN,
     TFAR,
     TRIANGLE,
@@ -24,7 +23,20 @@ from .embree.packets import (
     scene_triangle,
 )
 from .kernel import inlined, kernel
-from .lanes import LANES, choose, doubles, floor, gather, integers, lane_numbers, lanes_at, put_lanes, root, scatter
+from .lanes import (
+    LANES,
+    choose,
+    doubles,
+    floor,
+    gather,
+    integers,
+    lane_numbers,
+    lanes_at,
+    put_lanes,
+    put_triples,
+    root,
+    triples_at,
+)
 from .sampling import PIXEL, PIXEL_SAMPLE, r2, stream, word
 from .surface import (
     Surfaces,
@@ -97,6 +109,16 @@ def reflects(hits: Hits, i: int) -> bool:
 
 
 @inlined
+def reflect(hits: Hits, i: int, n: int) -> bool:
+    """`reflects` of hits i to i + 15, of which those from n on do not count."""
+    red, green, blue = triples_at(hits.reflectivity, i)
+    of_any = (red > np.float32(0.0)) | (green > np.float32(0.0)) | (blue > np.float32(0.0))
+    surface = lanes_at(hits.kind, i) == np.uint8(SURFACE)
+    wanted: bool = surface & of_any & (lane_numbers() < np.int32(n - i))
+    return wanted
+
+
+@inlined
 def ray_origin(hits: Hits, i: int) -> Triple:
     """Where rays that leave hit i start: above the triangle, on the viewer's side."""
     p, g, e = hits.position, hits.geometric, hits.offset[i]
@@ -108,15 +130,6 @@ def triple(array: Float32, i: int) -> Triple:
     """Row i of an (n, 3) array, or rows of it for lanes."""
     at = i * np.int32(3)
     return gather(array, at), gather(array, at + np.int32(1)), gather(array, at + np.int32(2))
-
-
-@inlined
-def _put(array: Float32, i: int, x: Real, y: Real, z: Real) -> None:
-    """Write rows i to i + 15 of an (n, 3) array."""
-    at = (lane_numbers() + np.int32(i)) * np.int32(3)
-    scatter(array, at, x)
-    scatter(array, at + np.int32(1), y)
-    scatter(array, at + np.int32(2), z)
 
 
 @inlined
@@ -133,7 +146,7 @@ def _met(tracer: Tracer, packets: Float32, i: int) -> tuple[bool, int, Real, Rea
 @kernel
 def record_hits(surfaces: Surfaces, tracer: Tracer, packets: Float32, n: int, mirrors: bool, hits: Hits) -> None:
     """Turn traced rays 0 to n - 1 into hits; key and pixel are left alone."""
-    packet, bits = packets.shape[1] * LANES, packets.view(np.int32)
+    packet = packets.shape[1] * LANES
     for i in range(0, n, LANES):
         at = (i >> 4) * packet
         dx, dy = lanes_at(packets, at + DIRECTION * LANES), lanes_at(packets, at + (DIRECTION + 1) * LANES)
@@ -148,18 +161,19 @@ def record_hits(surfaces: Surfaces, tracer: Tracer, packets: Float32, n: int, mi
         offset = gather(surfaces.offset, triangle)
         if mirrors:
             s_red, s_green, s_blue = specular_at(surfaces, triangle, u, v)
-            _put(
+            put_triples(
                 hits.specular, i, choose(missed, 0.0, s_red), choose(missed, 0.0, s_green), choose(missed, 0.0, s_blue)
             )
-        _put(hits.incoming, i, dx, dy, dz)
+        put_triples(hits.incoming, i, dx, dy, dz)
         x, y, z = choose(missed, dx / length, x), choose(missed, dy / length, y), choose(missed, dz / length, z)
-        _put(hits.position, i, x, y, z)
-        _put(hits.geometric, i, gx, gy, gz)
-        _put(hits.shading, i, nx, ny, nz)
+        put_triples(hits.position, i, x, y, z)
+        put_triples(hits.geometric, i, gx, gy, gz)
+        put_triples(hits.shading, i, nx, ny, nz)
         put_lanes(hits.offset, i, offset)
-        _put(hits.reflectivity, i, choose(missed, 0.0, red), choose(missed, 0.0, green), choose(missed, 0.0, blue))
-        for ray in range(i, i + LANES):
-            hits.kind[ray] = ESCAPED if bits[i >> 4, TRIANGLE, ray & 15] == MISS else SURFACE
+        put_triples(
+            hits.reflectivity, i, choose(missed, 0.0, red), choose(missed, 0.0, green), choose(missed, 0.0, blue)
+        )
+        put_lanes(hits.kind, i, choose(missed, np.uint8(ESCAPED), np.uint8(SURFACE)))
 
 
 @nb.njit(cache=True)
@@ -296,4 +310,4 @@ def pilot_hits(
     for i in range(0, n, LANES):
         missed, triangle, u, v = _met(tracer, packets, i)
         red, green, blue = specular_at(surfaces, triangle, u, v)
-        _put(hits.specular, i, choose(missed, 0.0, red), choose(missed, 0.0, green), choose(missed, 0.0, blue))
+        put_triples(hits.specular, i, choose(missed, 0.0, red), choose(missed, 0.0, green), choose(missed, 0.0, blue))

@@ -19,7 +19,7 @@ from .camera import OUTSIDE, Cameras, project
 from .embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, is_blocked, occlude
 from .hits import SURFACE, Hits, triple
 from .kernel import inlined, kernel
-from .lanes import LANES, choose, compress, count, doubles, gather, lane_numbers, lanes_at, put_lanes
+from .lanes import LANES, choose, compress, count, doubles, gather, lane_numbers, lanes_at, put_lanes, triples_at
 from .rays import Rays
 
 
@@ -29,10 +29,10 @@ def _seen(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[int, Real, Real]:
 
     Also what the density p_k is made of: how far the surface faces the eye, and the hit's depth.
     """
-    o, at = cams.position, lane_numbers() + np.int32(i)
-    x, y, z = triple(hits.position, at)
-    gx, gy, gz = triple(hits.geometric, at)
-    surface = gather(hits.kind, at) == np.uint8(SURFACE)
+    o = cams.position
+    x, y, z = triples_at(hits.position, i)
+    gx, gy, gz = triples_at(hits.geometric, i)
+    surface = lanes_at(hits.kind, i) == np.uint8(SURFACE)
     # what is infinitely far lies in one direction from all eyes
     from_eye = choose(surface, np.float32(1.0), np.float32(0.0))
     dx, dy, dz = x - from_eye * o[k, 0], y - from_eye * o[k, 1], z - from_eye * o[k, 2]

@@ -69,41 +69,57 @@ def surfaces(scene: Scene) -> Surfaces:
 
 @inlined
 def _texel(s: Surfaces, texel: int, weight: Real) -> tuple[Real, Real, Real, Real]:
-    """Linear red, green, blue, and alpha of a texel, times a weight."""
+    """Linear red, green, blue, and alpha (0 to 255) of a texel, times a weight."""
     code, last = gather(s.texels.view(np.int32), texel), np.int32(255)
     return (
-        weight * doubles(gather(s.linear, code & last)),
-        weight * doubles(gather(s.linear, (code >> np.int32(8)) & last)),
-        weight * doubles(gather(s.linear, (code >> np.int32(16)) & last)),
-        weight * doubles((code >> np.int32(24)) & last),
+        weight * gather(s.linear, code & last),
+        weight * gather(s.linear, (code >> np.int32(8)) & last),
+        weight * gather(s.linear, (code >> np.int32(16)) & last),
+        weight * reals((code >> np.int32(24)) & last),
     )
+
+
+@inlined
+def _place_in(s: Surfaces, texture: int) -> tuple[int, int, int]:
+    """First texel, width and height of a texture."""
+    at = texture * np.int32(3)
+    return gather(s.textures, at), gather(s.textures, at + np.int32(1)), gather(s.textures, at + np.int32(2))
 
 
 @inlined
 def texture_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real, Real, Real]:
     """Bilinear, repeating look-up: linear red, green, blue, and alpha; texel centres at half-integers, v upwards."""
-    first, width, height = (
-        gather(s.textures, texture * np.int32(3)),
-        gather(s.textures, texture * np.int32(3) + np.int32(1)),
-        gather(s.textures, texture * np.int32(3) + np.int32(2)),
-    )
+    first, width, height = _place_in(s, texture)
     u, v = doubles(u), doubles(v)
     x = (u - floor(u)) * doubles(width) - 0.5
     y = (1.0 - (v - floor(v))) * doubles(height) - 0.5
     finite = (x * x < 1e18) & (y * y < 1e18)  # a non-finite coordinate has no texel; the first stands in
     x, y = choose(finite, x, 0.0), choose(finite, y, 0.0)
-    fx, fy = x - floor(x), y - floor(y)
+    one, fx, fy = np.float32(1.0), reals(x - floor(x)), reals(y - floor(y))
     left, top = integers(floor(x)), integers(floor(y))  # -1 to the last
     right, bottom = left + np.int32(1), top + np.int32(1)
     left, top = choose(left < np.int32(0), left + width, left), choose(top < np.int32(0), top + height, top)
     right = choose(right >= width, right - width, right)
     bottom = choose(bottom >= height, bottom - height, bottom)
     upper, lower = first + top * width, first + bottom * width
-    r0, g0, b0, a0 = _texel(s, upper + left, (1.0 - fx) * (1.0 - fy))
-    r1, g1, b1, a1 = _texel(s, upper + right, fx * (1.0 - fy))
-    r2, g2, b2, a2 = _texel(s, lower + left, (1.0 - fx) * fy)
+    r0, g0, b0, a0 = _texel(s, upper + left, (one - fx) * (one - fy))
+    r1, g1, b1, a1 = _texel(s, upper + right, fx * (one - fy))
+    r2, g2, b2, a2 = _texel(s, lower + left, (one - fx) * fy)
     r3, g3, b3, a3 = _texel(s, lower + right, fx * fy)
-    return r0 + r1 + r2 + r3, g0 + g1 + g2 + g3, b0 + b1 + b2 + b3, (a0 + a1 + a2 + a3) * (1.0 / 255.0)
+    return r0 + r1 + r2 + r3, g0 + g1 + g2 + g3, b0 + b1 + b2 + b3, (a0 + a1 + a2 + a3) * np.float32(1.0 / 255.0)
+
+
+@inlined
+def nearest_texel_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real, Real, Real]:
+    """The texel that a place lies in, as `texture_at` gives it half-way between neighbours."""
+    first, width, height = _place_in(s, texture)
+    x, y = (u - floor(u)) * reals(width), (v - floor(v)) * reals(height)
+    # what rounding moved to the far border is the next repetition's first; so is what is not finite
+    x = choose((x >= np.float32(0.0)) & (x < reals(width)), x, np.float32(0.0))
+    y = choose((y >= np.float32(0.0)) & (y < reals(height)), y, np.float32(0.0))
+    row = height - np.int32(1) - integers(y)
+    red, green, blue, alpha = _texel(s, first + row * width + integers(x), np.float32(1.0))
+    return red, green, blue, alpha * np.float32(1.0 / 255.0)
 
 
 @inlined
@@ -116,16 +132,21 @@ def _between(corners: Float32, triangle: int, stride: int, axis: int, u: Real, v
 
 
 @inlined
-def _tinted(s: Surfaces, red: Real, green: Real, blue: Real, texture: int, triangle: int, u: Real, v: Real) -> Triple:
-    """A material's factor times texture and corner colour."""
+def _tinted(
+    s: Surfaces, red: Real, green: Real, blue: Real, texture: int, triangle: int, u: Real, v: Real, blended: bool
+) -> Triple:
+    """A material's factor times texture, blended between texels or not, and corner colour."""
     w = np.float32(1.0) - u - v
     textured = texture >= np.int32(0)
     if count(textured) > 0:
         tu, tv = _between(s.uvs, triangle, 2, 0, u, v, w), _between(s.uvs, triangle, 2, 1, u, v, w)
-        r, g, b, _ = texture_at(s, choose(textured, texture, np.int32(0)), tu, tv)
-        red = choose(textured, red * reals(r), red)
-        green = choose(textured, green * reals(g), green)
-        blue = choose(textured, blue * reals(b), blue)
+        texture = choose(textured, texture, np.int32(0))
+        r, g, b, _ = texture_at(s, texture, tu, tv) if blended else nearest_texel_at(s, texture, tu, tv)
+        red, green, blue = (
+            choose(textured, red * r, red),
+            choose(textured, green * g, green),
+            choose(textured, blue * b, blue),
+        )
     if s.colours.shape[0] > 0:
         red = red * _between(s.colours, triangle, 3, 0, u, v, w)
         green = green * _between(s.colours, triangle, 3, 1, u, v, w)
@@ -134,25 +155,37 @@ def _tinted(s: Surfaces, red: Real, green: Real, blue: Real, texture: int, trian
 
 
 @inlined
-def reflectivity_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
+def reflectivity_at(s: Surfaces, triangle: int, u: Real, v: Real, blended: bool = True) -> Triple:
     """Diffuse reflectivity, RGB 0 to 1, at barycentric (u, v) of a triangle."""
     m = gather(s.material, triangle)
     at = m * np.int32(3)
     red, green = gather(s.reflectivity, at), gather(s.reflectivity, at + np.int32(1))
     blue = gather(s.reflectivity, at + np.int32(2))
-    return _tinted(s, red, green, blue, gather(s.reflectivity_texture, m), triangle, u, v)
+    return _tinted(s, red, green, blue, gather(s.reflectivity_texture, m), triangle, u, v, blended)
 
 
 @inlined
-def specular_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
+def specular_at(s: Surfaces, triangle: int, u: Real, v: Real, blended: bool = True) -> Triple:
     """Mirror reflectivity, RGB 0 to 1, at barycentric (u, v) of a triangle."""
     m = gather(s.material, triangle)
     at, nothing = m * np.int32(3), np.float32(0.0)
     red, green = gather(s.specular, at), gather(s.specular, at + np.int32(1))
     blue = gather(s.specular, at + np.int32(2))
     if count((red > nothing) | (green > nothing) | (blue > nothing)) > 0:
-        red, green, blue = _tinted(s, red, green, blue, gather(s.specular_texture, m), triangle, u, v)
+        texture = gather(s.specular_texture, m)
+        red, green, blue = _tinted(s, red, green, blue, texture, triangle, u, v, blended)
     return red, green, blue
+
+
+@inlined
+def total_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
+    """Diffuse and mirror reflectivity together, of the nearest texel: what an average over many places takes.
+
+    Blending between texels would cost three times as much and leave the average as it is.
+    """
+    red, green, blue = reflectivity_at(s, triangle, u, v, False)
+    s_red, s_green, s_blue = specular_at(s, triangle, u, v, False)
+    return red + s_red, green + s_green, blue + s_blue
 
 
 @inlined

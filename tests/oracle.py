@@ -157,9 +157,7 @@ class Oracle:
         near = (triangle >= 0) & (distance < d_max)
         brought = np.tile(self.ambient.reflectivity.astype(np.float64), (len(owner), 1))
         met, at = triangle[near], uv[near]
-        brought[near] = self.rho(distance[near] / d_max)[:, None] * (
-            self.model.diffuse(met, at) + self.model.mirror(met, at)
-        )
+        brought[near] = self.rho(distance[near] / d_max)[:, None] * self.model.total(met, at)
         light = np.zeros((len(owner), 3))
         if sky:
             brought[triangle < 0] = 0

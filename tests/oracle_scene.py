@@ -90,21 +90,33 @@ class Model:
         weights = np.column_stack([1 - uv.sum(axis=1), uv])
         return (weights[:, :, None] * table[triangle].astype(np.float64)).sum(axis=1)
 
-    def part(self, factor: Any, texture: Any, triangle: Any, uv: Any) -> Any:
+    def part(self, factor: Any, texture: Any, triangle: Any, uv: Any, look_up: Any = None) -> Any:
         """Reflectivity of the diffuse or the mirror part: material times texture times corner colour."""
+        look_up = look_up or self.texture
         material = self.scene.material[triangle]
         colour = factor[material].astype(np.float64)
         textures = texture[material]
         for number in np.unique(textures[textures >= 0]):
             rows = textures == number
-            colour[rows] *= self.texture(number, self.mix(self.scene.uvs, triangle[rows], uv[rows]))
+            colour[rows] *= look_up(number, self.mix(self.scene.uvs, triangle[rows], uv[rows]))
         return colour * self.mix(self.scene.colours, triangle, uv) if len(self.scene.colours) else colour
+
+    def texels(self, number: int) -> Any:
+        """Linear RGB of a texture (height, width, 3)."""
+        first, width, height = (int(x) for x in self.scene.textures[number])
+        code = self.scene.texels[first : first + width * height, :3].reshape(height, width, 3) / 255
+        return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
+
+    def nearest(self, number: int, uv: Any) -> Any:
+        """Linear RGB of the texels, repeating, that texture coordinates (n, 2), v upwards, lie in."""
+        linear = self.texels(number)
+        height, width = linear.shape[:2]
+        return linear[height - 1 - np.floor(uv[:, 1] % 1 * height).astype(int), (uv[:, 0] % 1 * width).astype(int)]
 
     def texture(self, number: int, uv: Any) -> Any:
         """Bilinear and repeating: linear RGB at texture coordinates (n, 2), v upwards; texels are centred at halves."""
-        first, width, height = (int(x) for x in self.scene.textures[number])
-        code = self.scene.texels[first : first + width * height, :3].reshape(height, width, 3) / 255
-        linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
+        linear = self.texels(number)
+        height, width = linear.shape[:2]
         place = np.stack([uv[:, 0] * width, -uv[:, 1] * height], axis=1) - 0.5  # row 0 is on top, where v is 1
         low = np.floor(place).astype(int)
         right, down = (place - low).T[:, :, None]
@@ -123,6 +135,13 @@ class Model:
     def mirror(self, triangle: Any, uv: Any) -> Any:
         """Mirror reflectivity (n, 3)."""
         return self.part(self.scene.specular, self.scene.specular_texture, triangle, uv)
+
+    def total(self, triangle: Any, uv: Any) -> Any:
+        """Diffuse and mirror reflectivity together (n, 3), of the nearest texel, as obscurance takes it."""
+        scene = self.scene
+        return self.part(scene.reflectivity, scene.reflectivity_texture, triangle, uv, self.nearest) + self.part(
+            scene.specular, scene.specular_texture, triangle, uv, self.nearest
+        )
 
     def look(self, origins: Any, dirs: Any, key: Any, pixel: Any) -> Points:
         """Everything about the first hits of rays (n, 3), (n, 3)."""

@@ -4,9 +4,9 @@ import numpy as np
 
 from ..arrays import Float32, Real, Triple
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude
-from ..hits import Hits, ray_origin, reflects
+from ..hits import Hits, ray_origin, reflect, reflects, triple
 from ..kernel import inlined, kernel
-from ..lanes import LANES, bits, choose, lane_numbers, lanes_at, lowest, put_lanes, root
+from ..lanes import LANES, bits, choose, compress, count, lane_numbers, lanes_at, lowest, put_lanes, root, triples_at
 from ..lights import DIRECTIONAL, LightArrays
 from ..rays import Rays
 
@@ -15,6 +15,25 @@ FAR_END = np.float32(1.0 - 1e-4)
 # Rows of queued rays: origin, vector to the light, how far along it.
 FROM, TO, REACH = 0, 3, 6
 ALL = (1 << LANES) - 1
+# Up to so many light positions, sixteen hits are worked on at a time instead of sixteen positions.
+FEW = 8
+
+
+@inlined
+def _facing(
+    kind: int, x: Real, y: Real, z: Real, p: Triple, g: Triple, m: Triple, lit: Real
+) -> tuple[Real, Real, Real, Real]:
+    """Vectors from points p to a source, given where it is or where it shines to, and geometry factors; see `_look`."""
+    nothing, one = np.float32(0.0), np.float32(1.0)
+    sign, from_point = (-one, nothing) if kind == DIRECTIONAL else (one, one)
+    x, y, z = sign * x - from_point * p[0], sign * y - from_point * p[1], sign * z - from_point * p[2]
+    cosine = x * m[0] + y * m[1] + z * m[2]
+    in_front = (cosine > nothing) & (x * g[0] + y * g[1] + z * g[2] > nothing)
+    factor = cosine * lit
+    if kind != DIRECTIONAL:
+        square = x * x + y * y + z * z
+        factor = factor / (square * root(square))
+    return x, y, z, choose(in_front, factor, nothing)
 
 
 @inlined
@@ -25,22 +44,13 @@ def _look(hits: Hits, i: int, lights: LightArrays, s: int, l: int) -> tuple[Real
     directional one, whose vector has length 1. It is 0 where the source does not shine, is behind either normal, or
     is exactly at the hit.
     """
-    n_lights, nothing = lights.lit.shape[1], np.float32(0.0)
+    n_lights = lights.lit.shape[1]
     at = 3 * s * n_lights + l
     x, y = lanes_at(lights.vector, at), lanes_at(lights.vector, at + n_lights)
-    z = lanes_at(lights.vector, at + 2 * n_lights)
-    p, g, m = hits.position, hits.geometric, hits.shading
-    if lights.kind[s] == DIRECTIONAL:
-        x, y, z = -x, -y, -z
-    else:
-        x, y, z = x - p[i, 0], y - p[i, 1], z - p[i, 2]
-    cosine = x * m[i, 0] + y * m[i, 1] + z * m[i, 2]
-    in_front = (cosine > nothing) & (x * g[i, 0] + y * g[i, 1] + z * g[i, 2] > nothing)
-    factor = cosine * lanes_at(lights.lit, s * n_lights + l)
-    if lights.kind[s] != DIRECTIONAL:
-        square = x * x + y * y + z * z
-        factor = factor / (square * root(square))
-    return x, y, z, choose(in_front & (lane_numbers() < np.int32(n_lights - l)), factor, nothing)
+    z, lit = lanes_at(lights.vector, at + 2 * n_lights), lanes_at(lights.lit, s * n_lights + l)
+    p, g, m = triple(hits.position, i), triple(hits.geometric, i), triple(hits.shading, i)
+    x, y, z, factor = _facing(lights.kind[s], x, y, z, p, g, m, lit)
+    return x, y, z, choose(lane_numbers() < np.int32(n_lights - l), factor, np.float32(0.0))
 
 
 @inlined
@@ -96,25 +106,46 @@ def _settle(tracer: Tracer, rays: Rays, n: int, irradiance: Float32) -> None:
             flat[rays.place[ray] + channel * n_lights] += rays.value[channel, ray]
 
 
-@kernel
-def direct(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, irradiance: Float32) -> int:
-    """Compute the irradiance of each light position at hits 0 to n - 1.
+@inlined
+def _of_few(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, irradiance: Float32) -> int:
+    """`direct`, sixteen hits at a time."""
+    channels, n_lights, room, row = irradiance.shape[1], irradiance.shape[2], rays.row.shape[1], rays.row
+    capacity = rays.packets.shape[0] * LANES
+    waiting = total = 0
+    for i in range(0, n, LANES):
+        at, wanted = lane_numbers() + np.int32(i), reflect(hits, i, n)
+        p, g, m = triples_at(hits.position, i), triples_at(hits.geometric, i), triples_at(hits.shading, i)
+        e = lanes_at(hits.offset, i)
+        origin = (p[0] + e * g[0], p[1] + e * g[1], p[2] + e * g[2])
+        for s in range(lights.kind.shape[0]):
+            for l in range(n_lights):
+                if waiting > capacity - LANES:
+                    _settle(tracer, rays, waiting, irradiance)
+                    total, waiting = total + waiting, 0
+                a, lit = lights.vector, lights.lit[s, l]
+                x, y, z, factor = _facing(lights.kind[s], a[s, 0, l], a[s, 1, l], a[s, 2, l], p, g, m, lit)
+                traced = wanted & (factor > np.float32(0.0))
+                to = (x, y, z)
+                for axis in range(3):
+                    compress(traced, origin[axis], row, (FROM + axis) * room + waiting)
+                    compress(traced, to[axis], row, (TO + axis) * room + waiting)
+                put_lanes(row, REACH * room + waiting, np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END)
+                compress(traced, at * np.int32(channels * n_lights) + np.int32(l), rays.place, waiting)
+                for channel in range(channels):
+                    strength = lights.strength[s, channel, l]
+                    compress(traced, factor * strength, rays.value, channel * rays.value.shape[1] + waiting)
+                waiting += count(traced)
+    _settle(tracer, rays, waiting, irradiance)
+    return total + waiting
 
-    A source counts where it is in front of both normals; else no ray is spent. Hits that reflect nothing get 0.
 
-    Args:
-        rays: room for rays; as many as fit are traced together.
-        irradiance: (n, channels, n_lights), overwritten; in units of `lights.colour`.
-    Returns:
-        number of shadow rays.
-    """
+@inlined
+def _of_many(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, irradiance: Float32) -> int:
+    """`direct`, sixteen light positions at a time."""
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]
     capacity = rays.packets.shape[0] * LANES
     waiting = total = 0
     for i in range(n):
-        for channel in range(channels):
-            for l in range(n_lights):
-                irradiance[i, channel, l] = 0.0
         if not reflects(hits, i):
             continue
         origin, place = ray_origin(hits, i), i * channels * n_lights
@@ -139,3 +170,25 @@ def direct(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, 
                     lit &= ~(((1 << m) - 1) << start)
     _settle(tracer, rays, waiting, irradiance)
     return total + waiting
+
+
+@kernel
+def direct(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, irradiance: Float32) -> int:
+    """Compute the irradiance of each light position at hits 0 to n - 1.
+
+    A source counts where it is in front of both normals; else no ray is spent. Hits that reflect nothing get 0.
+
+    Args:
+        rays: room for rays; as many as fit are traced together.
+        irradiance: (n, channels, n_lights), overwritten; in units of `lights.colour`.
+    Returns:
+        number of shadow rays.
+    """
+    channels, n_lights = irradiance.shape[1], irradiance.shape[2]
+    for i in range(n):
+        for channel in range(channels):
+            for l in range(n_lights):
+                irradiance[i, channel, l] = 0.0
+    if n_lights <= FEW:
+        return _of_few(hits, n, lights, tracer, rays, irradiance)
+    return _of_many(hits, n, lights, tracer, rays, irradiance)

@@ -24,7 +24,7 @@ from ..embree.packets import (
     intersect,
     scene_triangle,
 )
-from ..hits import Hits, reflects, triple
+from ..hits import Hits, reflect, triple
 from ..kernel import inlined, kernel
 from ..lanes import (
     LANES,
@@ -42,7 +42,7 @@ from ..lanes import (
 )
 from ..rays import Rays
 from ..sampling import HEMISPHERE, UNIT_24, above, cosine_direction, word
-from ..surface import Surfaces, reflectivity_at, specular_at
+from ..surface import Surfaces, total_at
 
 SQRT, LINEAR, CBRT, EXPONENTIAL, CONSTANT = range(5)
 FALLOFFS = {"sqrt": SQRT, "linear": LINEAR, "cbrt": CBRT, "exponential": EXPONENTIAL, "constant": CONSTANT}
@@ -196,10 +196,10 @@ def _tint(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int) -> None:
         )
         triangle = scene_triangle(tracer, triangle, geometry)
         u, v = gather(rays.packets, at + np.int32(U * LANES)), gather(rays.packets, at + np.int32(V * LANES))
-        diffuse, mirror = reflectivity_at(surfaces, triangle, u, v), specular_at(surfaces, triangle, u, v)
+        total = total_at(surfaces, triangle, u, v)
         for channel in range(3):
             place = i + np.int32(channel) * stride
-            scatter(rays.value, place, gather(rays.value, place) * (diffuse[channel] + mirror[channel]))
+            scatter(rays.value, place, gather(rays.value, place) * total[channel])
 
 
 @kernel
@@ -282,16 +282,18 @@ def obscurance(
     fit = max(rays.packets.shape[0] // settings.n_rays, 1) * LANES
     waiting = total = 0
     for i in range(n):
-        if not reflects(hits, i):
-            for channel in range(3):
-                result[i, channel] = 0.0
-                if settings.sky:
-                    skylight[i, channel] = 0.0
-            continue
-        if waiting == fit:
-            _trace(hits, surfaces, tracer, rays, waiting, settings, result, skylight)
-            total, waiting = total + waiting, 0
-        rays.place[waiting] = i
-        waiting += 1
+        for channel in range(3):
+            result[i, channel] = 0.0
+            if settings.sky:
+                skylight[i, channel] = 0.0
+    for first in range(0, n, LANES):
+        wanted = reflect(hits, first, n)
+        compress(wanted, lane_numbers() + np.int32(first), rays.place, waiting)
+        waiting += count(wanted)
+        if waiting >= fit:
+            _trace(hits, surfaces, tracer, rays, fit, settings, result, skylight)
+            total, waiting = total + fit, waiting - fit
+            for k in range(waiting):
+                rays.place[k] = rays.place[fit + k]
     _trace(hits, surfaces, tracer, rays, waiting, settings, result, skylight)
     return (total + waiting) * settings.n_rays

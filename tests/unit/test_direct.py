@@ -1,5 +1,6 @@
 """Direct light at hits whose irradiance is known."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from framearray_cli.terms.direct_steps import direct_by_steps, room_for_steps
 UP = (0.0, 1.0, 0.0)
 RNG = np.random.default_rng(7)
 ABOVE = np.array([0.0, 4.0, 0.0])
+FAR = [tiny.box((90, -21, -1), (91, -20, 1)), tiny.box((-91, 20, -1), (-90, 21, 1))]
 
 
 def lamps(positions: Any, intensity: Any = (1.0, 1.0, 1.0)) -> LightPath:
@@ -49,7 +51,7 @@ def lit(scene: Scene, hits: Hits, lights: LightArrays, room: int = 4096) -> tupl
 
 def far_box() -> Scene:
     """Something to trace that no ray to a light meets; its centre is the origin."""
-    return tiny.scene_of(np.concatenate([tiny.box((90, -21, -1), (91, -20, 1)), tiny.box((-91, 20, -1), (-90, 21, 1))]))
+    return tiny.scene_of(np.concatenate(FAR))
 
 
 def floor_points(n: int = 200) -> Hits:
@@ -68,6 +70,33 @@ def test_a_point_source_falls_off_with_the_square_of_the_distance() -> None:
     np.testing.assert_allclose(found[:, 0], 3 * expected, rtol=1e-6)
     np.testing.assert_allclose(found[:, 2], 1 * expected, rtol=1e-6)
     assert rays == 200 * 17
+
+
+@pytest.mark.parametrize("room", [32, 4096])
+def test_few_lights_are_those_of_many(room: int) -> None:
+    """Sixteen hits at a time, for up to eight positions, or sixteen positions at a time: the same light."""
+    scene = tiny.scene_of(np.concatenate([tiny.box((-2, 1, -2), (2, 1.5, 2)), *FAR]))
+    hits = floor_points()
+    hits.kind[7], hits.reflectivity[11] = ESCAPED, 0.0
+    positions, ways = RNG.uniform(-3, 3, (18, 3)) + ABOVE, RNG.normal(size=(18, 3)) - ABOVE
+    dark = lamps(positions, (1.0, 1.0, 1.0))
+    dark.intensity[3] = 0.0
+    expected, _ = lit(scene, hits, arrays(dark, suns(ways, (1.0, 2.0, 3.0))), room)
+    free, _ = lit(far_box(), hits, arrays(dark, suns(ways, (1.0, 2.0, 3.0))), room)
+    assert 0.05 < (expected < 0.999 * free).mean() < 0.95
+    for n_lights in (1, 8):
+        few = [
+            replace(source, vector=source.vector[:n_lights], intensity=source.intensity[:n_lights])
+            for source in (dark, suns(ways, (1.0, 2.0, 3.0)))
+        ]
+        found, rays = lit(scene, hits, arrays(*few), room)
+        np.testing.assert_allclose(found, expected[:, :, :n_lights], rtol=1e-6, atol=0)
+        assert rays == sum(lit(scene, hits, arrays(*(at(s, l) for s in few)), room)[1] for l in range(n_lights))
+        assert (found[[7, 11]] == 0).all()
+
+
+def at(source: LightPath, l: int) -> LightPath:
+    return replace(source, vector=source.vector[l : l + 1], intensity=source.intensity[l : l + 1])
 
 
 def test_a_directional_source_has_no_distance() -> None:

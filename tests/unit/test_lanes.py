@@ -24,16 +24,19 @@ from framearray_cli.lanes import (
     lanes_at,
     lowest,
     put_lanes,
+    put_triples,
     reals,
     root,
     scatter,
     stored,
+    triples_at,
     words,
 )
 from framearray_cli.sampling import above, cosine_direction, disc
 from framearray_cli.surface import (
     Surfaces,
     geometric_normal,
+    nearest_texel_at,
     position_at,
     reflectivity_at,
     shading_normal,
@@ -246,6 +249,25 @@ def test_arrays_of_more_dimensions_are_counted_flat() -> None:
     np.testing.assert_array_equal(only_changed(put.reshape(40), WRITTEN), np.arange(3, 19))
 
 
+@kernel
+def turn(source: Any, columns: Any, rows: Any) -> None:
+    x, y, z = triples_at(source, 2)
+    put_lanes(columns, 0, x)
+    put_lanes(columns, LANES, y)
+    put_lanes(columns, 2 * LANES, z)
+    put_triples(rows, 1, x, y, z)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.int32])
+def test_rows_of_three_become_columns_and_rows_again(dtype: Any) -> None:
+    source = np.arange(3 * (LANES + 4)).reshape(-1, 3).astype(dtype)
+    columns, rows = np.zeros((3, LANES), dtype), np.full((LANES + 3, 3), -1, dtype)
+    turn(source, columns, rows)
+    assert np.array_equal(columns, source[2 : 2 + LANES].T)
+    assert np.array_equal(rows[1 : 1 + LANES], source[2 : 2 + LANES])
+    assert (rows[0] == -1).all() and (rows[1 + LANES :] == -1).all()
+
+
 def test_of_two_lanes_at_one_place_the_later_stays() -> None:
     source, scattered = np.arange(60, dtype=np.float32), fresh(np.float32, 60)
     at, to = np.arange(2 * LANES, dtype=np.int32), np.zeros(2 * LANES, np.int32)
@@ -353,17 +375,18 @@ def test_directions_of_lanes_are_those_of_numbers() -> None:
 def texture_numbers(s: Surfaces, texture: Any, uv: Any, out: Any) -> None:
     for i in range(uv.shape[1]):
         out[0, i], out[1, i], out[2, i], out[3, i] = texture_at(s, texture[i], uv[0, i], uv[1, i])
+        out[4, i], out[5, i], out[6, i], out[7, i] = nearest_texel_at(s, texture[i], uv[0, i], uv[1, i])
 
 
 @kernel
 def texture_lanes(s: Surfaces, texture: Any, uv: Any, out: Any) -> None:
     n = uv.shape[1]
     for i in range(0, n, LANES):
-        r, g, b, a = texture_at(s, lanes_at(texture, i), lanes_at(uv, i), lanes_at(uv, n + i))
-        put_lanes(out, i, r)
-        put_lanes(out, n + i, g)
-        put_lanes(out, 2 * n + i, b)
-        put_lanes(out, 3 * n + i, a)
+        number, u, v = lanes_at(texture, i), lanes_at(uv, i), lanes_at(uv, n + i)
+        blended, nearest = texture_at(s, number, u, v), nearest_texel_at(s, number, u, v)
+        for k in range(4):
+            put_lanes(out, k * n + i, blended[k])
+            put_lanes(out, (4 + k) * n + i, nearest[k])
 
 
 def test_textures_of_lanes_are_those_of_numbers() -> None:
@@ -383,11 +406,12 @@ def test_textures_of_lanes_are_those_of_numbers() -> None:
     assert len(coordinates) % LANES == 0
     uv = np.ascontiguousarray(np.reshape(np.meshgrid(coordinates, coordinates), (2, -1)))
     texture = rng.integers(0, 2, uv.shape[1]).astype(np.int32)
-    numbers, lanes = np.full((2, 4, uv.shape[1]), np.nan)
+    numbers, lanes = np.full((2, 8, uv.shape[1]), np.nan, np.float32)
     texture_numbers(one, texture, uv, numbers)
     texture_lanes(one, texture, uv, lanes)
     assert np.isfinite(numbers).all() and numbers.std() > 0.1
-    np.testing.assert_allclose(lanes, numbers, rtol=0, atol=1e-13)  # float64: some hundred roundings
+    np.testing.assert_allclose(lanes[:4], numbers[:4], rtol=0, atol=FEW)
+    assert np.array_equal(lanes[4:], numbers[4:])  # texels themselves
 
 
 @inlined

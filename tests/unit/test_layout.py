@@ -13,7 +13,8 @@ PACKAGE = Path(framearray_cli.__file__).parent
 
 # Every file, in the order in which data flows; a file imports only from those before it.
 FLOW = """
-__init__ errors arrays kernelcache kernel lanes compiling files framerate filepatterns fingerprint colour sphere
+__init__ errors arrays kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
+compiling files framerate filepatterns fingerprint colour sphere
 jobvalues jobkeys job jobschema jobdocs problems eyefile jobfile
 meshes/assets meshes/container meshes/model meshes/defaults meshes/cleaning meshes/polygons meshes/merge
 meshes/overrides meshes/textures meshes/opacity meshes/mtl meshes/walk meshes/gltf_materials meshes/gltf_prepare
@@ -36,12 +37,12 @@ ORDER = FLOW.split()
 # Which files may import a library; what is not here may be imported anywhere.
 DOORS = {
     "embreex": ("embree/",),
-    "llvmlite": ("embree/", "kernel", "lanes"),
+    "llvmlite": ("embree/", "kernel", "lanes/"),
     "numba": (
         "embree/",
         "kernelcache",
         "kernel",
-        "lanes",
+        "lanes/",
         "compiling",
         "hits",
     ),  # hits: one function that allocates, so no kernel

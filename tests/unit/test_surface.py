@@ -15,12 +15,14 @@ from framearray_cli.surface import (
     Surfaces,
     geometric_normal,
     is_cut_out,
+    nearest_texel_at,
     position_at,
     reflectivity_at,
     shading_normal,
     specular_at,
     surfaces,
     texture_at,
+    total_at,
 )
 
 QUAD = tiny.quad((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0))
@@ -31,6 +33,18 @@ UVS = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float64)
 def look_up(s: Surfaces, uv: Any, out: Any) -> None:
     for i in range(uv.shape[0]):
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = texture_at(s, 0, uv[i, 0], uv[i, 1])
+
+
+@kernel
+def pick(s: Surfaces, uv: Any, out: Any) -> None:
+    for i in range(uv.shape[0]):
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = nearest_texel_at(s, 0, uv[i, 0], uv[i, 1])
+
+
+@kernel
+def add_up(s: Surfaces, triangle: int, uv: Any, out: Any) -> None:
+    for i in range(uv.shape[0]):
+        out[i, 0], out[i, 1], out[i, 2] = total_at(s, triangle, uv[i, 0], uv[i, 1])
 
 
 @kernel
@@ -87,6 +101,45 @@ def test_a_texel_centre_shows_the_texel(width: int, height: int) -> None:
     # a centre is off by 2^-24 of the coordinate at most, so by 2^-24 * 8 texels of contrast 1
     np.testing.assert_allclose(values[..., :3], linear_from_srgb8(texels[..., :3]), rtol=0, atol=2e-6)
     np.testing.assert_allclose(values[..., 3], texels[..., 3] / 255, rtol=0, atol=2e-6)
+
+
+@pytest.mark.parametrize(("width", "height"), [(8, 8), (5, 3), (1, 1), (1, 7)])
+def test_the_nearest_texel_is_the_one_around_a_place_in_every_repetition(width: int, height: int) -> None:
+    rng = np.random.default_rng(4)
+    texels = rng.integers(0, 256, (height, width, 4), dtype=np.uint8)
+    s = textured(texels)
+    places = centres(width, height)
+    for shift in ((0, 0), (1, -2), (-3, 5)):
+        inside = rng.uniform(-0.49, 0.49, places.shape) / (width, height)
+        uv = (places + inside + shift).reshape(-1, 2).astype(np.float32)
+        out = np.empty((len(uv), 4), np.float32)
+        pick(s, uv, out)
+        expected = np.concatenate([linear_from_srgb8(texels[..., :3]), texels[..., 3:] / 255], axis=-1)
+        np.testing.assert_allclose(out, expected.reshape(-1, 4), rtol=3e-7, atol=0)
+
+
+def test_what_nearest_texels_average_to_is_what_blended_ones_do() -> None:
+    """Obscurance takes the nearest texel: each texel counts for its own area, as when it is blended."""
+    s = textured(tiny.checks(16))
+    places = ((np.arange(512) + 0.5) / 512).astype(np.float32)
+    uv = np.ascontiguousarray(np.stack(np.meshgrid(places, places), axis=-1).reshape(-1, 2))
+    nearest = np.empty((len(uv), 4), np.float32)
+    pick(s, uv, nearest)
+    blended = looked_up(s, uv)
+    np.testing.assert_allclose(nearest.mean(axis=0, dtype=float), blended.mean(axis=0, dtype=float), rtol=1e-5)
+    assert abs(nearest - blended).max() > 0.1
+
+
+def test_reflectivity_in_all_is_the_diffuse_and_the_mirror_part() -> None:
+    """At texel centres, where blending changes nothing."""
+    material = Material(name="T", reflectivity=(0.5, 0.4, 0.3), texture=0, specular=(0.2, 0.1, 0.4), specular_texture=0)
+    s = surfaces(tiny.scene_of(QUAD, material, uvs=UVS, textures=(tiny.checks(4),)))
+    uv = np.float32([[0.25, 0.125], [0.5, 0.125], [0.25, 0.375]])  # of the first triangle: (u + v, v) in the texture
+    total = np.empty((len(uv), 3), np.float32)
+    add_up(s, 0, uv, total)
+    parts = found(s, uv)
+    np.testing.assert_allclose(total, parts["diffuse"] + parts["mirror"], rtol=0, atol=2e-6)
+    assert (parts["mirror"] > 0.01).any()
 
 
 def test_textures_repeat_in_both_directions() -> None:
