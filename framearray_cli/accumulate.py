@@ -1,39 +1,51 @@
 """Adding the hits of many frames to pixels, one pass over them, until images are finished."""
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Addresses, Float32, Int32, Real, Rgb
+from .arrays import Addresses, Float32, Float64, Int32, Real, Rgb
 from .compose import INVERSE_PI, MOST, Band, Stored, finish
 from .kernel import inlined, integer_at, kernel, prefetch, real_at
 from .lanes import LANES, lane_numbers, lanes_at, lanes_from, put_lanes, reals
-from .work import INDIRECT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, Placed, Records, lit_bit
+from .work import HALF, INDIRECT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, Placed, Records, lit_bit
 
 # Columns of a list of sources: addresses of arrays, 0 for one that is empty.
-START, ORDER, WEIGHTS, SCALE, ROW, IRRADIANCE = range(6)
+START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE = range(7)
+_NOTHING = np.empty(0, np.float32)
 # How many hits ahead the light of a hit is fetched, and twice as many its row: memory answers in about the time that
 # this many hits take to sum.
 AHEAD = 8
 ROW_BYTES = 4 * LANES
 
 
-def sources(parts: Iterable[tuple[Placed, Records, Float32, Float32]]) -> Addresses:
-    """List hits for `accumulate`; whoever asks keeps the arrays while the list is in use.
+class Source(NamedTuple):
+    """Hits that are summed.
 
-    Args:
-        parts: hits by pixel; what is known of them; (n_hits,) the weight of each, or (0,) where all weigh 1;
-            (n_pixels,) a factor for all hits of a pixel, or (0,) where it is 1.
-
-    Returns:
-        (n, 6) addresses.
+    Attributes:
+        placed: hits by pixel.
+        known: what is known of them.
+        weight: (n_hits,) of each, or (0,) where all weigh 1.
+        scale: (n_pixels,) a factor for all hits of a pixel, or (0,) where it is 1.
+        odd_scale: (n_pixels,) that of the second half of the samples, or (0,) where it is the same.
     """
+
+    placed: Placed
+    known: Records
+    weight: Float32 = _NOTHING
+    scale: Float32 = _NOTHING
+    odd_scale: Float32 = _NOTHING
+
+
+def sources(parts: Iterable[Source]) -> Addresses:
+    """List hits for `accumulate`, (n, 7) addresses; whoever asks keeps the arrays while the list is in use."""
     rows = []
-    for placed, known, weight, scale in parts:
-        arrays = (placed.start, placed.order, weight, scale, known.row, known.irradiance)
+    for placed, known, weight, scale, odd_scale in parts:
+        arrays = (placed.start, placed.order, weight, scale, odd_scale, known.row, known.irradiance)
         assert all(array.flags.c_contiguous for array in arrays)
         rows.append([array.ctypes.data if array.size else 0 for array in arrays])
-    return np.array(rows, np.int64).reshape(-1, 6)
+    return np.array(rows, np.int64).reshape(-1, 7)
 
 
 @inlined
@@ -100,13 +112,16 @@ def accumulate(
             source = parts[part]
             start, end = integer_at(source[START], pixel), integer_at(source[START], pixel + 1)
             last = integer_at(source[START], first_pixel + n)
-            factor = real_at(source[SCALE], pixel) if source[SCALE] != 0 else np.float32(1.0)
+            even = real_at(source[SCALE], pixel) if source[SCALE] != 0 else np.float32(1.0)
+            odd = real_at(source[ODD_SCALE], pixel) if source[ODD_SCALE] != 0 else even
             n_hits += end - start
             for entry in range(start, end):
                 _fetch(source, entry, last, channels, n_lights)
                 hit = integer_at(source[ORDER], entry)
-                w = factor * real_at(source[WEIGHTS], hit) if source[WEIGHTS] != 0 else factor
                 row = source[ROW] + ROW_BYTES * hit
+                w = odd if real_at(row, HALF) > 0.0 else even
+                if source[WEIGHTS] != 0:
+                    w *= real_at(source[WEIGHTS], hit)
                 total = total + lanes_from(row) * w
                 lit = int(real_at(row, LIT))
                 if lit == 0 or n_lights == 0:
@@ -193,3 +208,51 @@ def compose_pixels(
             bad_light, bad_pixel = l, pixel
         bad, beyond = bad + found, beyond + large
     return bad, bad_light, bad_pixel, beyond
+
+
+BY_SAMPLE = -1
+
+
+@kernel
+def weigh_halves(parts: Addresses, half: Int32, first_pixel: int, n: int, weights: Float64) -> None:
+    """Sum the weights of the hits of both halves in pixels first_pixel to first_pixel + n - 1.
+
+    Args:
+        parts: from `sources`.
+        half: (n_parts,) the half that all hits of a part belong to, or BY_SAMPLE.
+        weights: (2, n_pixels) overwritten there.
+    """
+    for pixel in range(first_pixel, first_pixel + n):
+        weights[0, pixel] = weights[1, pixel] = 0.0
+        for part in range(parts.shape[0]):
+            source, own = parts[part], half[part]
+            for entry in range(integer_at(source[START], pixel), integer_at(source[START], pixel + 1)):
+                hit = integer_at(source[ORDER], entry)
+                if half[part] == BY_SAMPLE:
+                    own = int(real_at(source[ROW] + ROW_BYTES * hit, HALF))
+                weights[own, pixel] += real_at(source[WEIGHTS], hit) if source[WEIGHTS] != 0 else np.float32(1.0)
+
+
+@kernel
+def compose_differences(
+    band: Band, first_pixel: int, n: int, parts: Addresses, channels: int, colour: Rgb, ambient: Rgb, images: Float32
+) -> None:
+    """Compose sums of hits, each with its factor, as images, a band at a time; see `standarderror.py`.
+
+    Args:
+        band: room for the sums of some pixels.
+        parts: from `sources`, with factors.
+        channels: of irradiance, 1 or 3.
+        colour, ambient: see `finish`.
+        images: (n_lights, n_pixels, 3) overwritten in pixels first_pixel to first_pixel + n - 1.
+    """
+    for first in range(first_pixel, first_pixel + n, band.hits.shape[0]):
+        m = min(band.hits.shape[0], first_pixel + n - first)
+        for i in range(m):
+            for column in range(band.sums.shape[1]):
+                band.sums[i, column] = 0.0
+            for channel in range(3):
+                for l in range(band.direct.shape[2]):
+                    band.direct[i, channel, l] = 0.0
+        accumulate(band, first, m, parts, channels, images.shape[0], False)
+        finish(band, first, m, colour, ambient, np.float32(-np.inf), images)

@@ -13,6 +13,7 @@ Float32: TypeAlias = NDArray[np.float32]
 Float64: TypeAlias = NDArray[np.float64]
 Int32: TypeAlias = NDArray[np.int32]
 Bytes: TypeAlias = NDArray[np.uint8]
+Flags: TypeAlias = NDArray[np.bool_]
 Addresses: TypeAlias = NDArray[np.int64]
 Keys: TypeAlias = NDArray[np.uint64]  # random streams
 

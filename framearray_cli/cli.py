@@ -329,8 +329,21 @@ def _summary_lines(summary: "Summary", told: Sequence[str], job: "Job") -> list[
         f"{summary.images / summary.seconds:.1f} images a second",
         f"{rays:.2f} rays a pixel an image{beside}, {rate:.1f} Mrays/s, "
         f"{summary.hits:.1f} hits a pixel, peak memory {size(summary.peak_memory)}",
+        *_error_lines(summary),
         *(f"note: {note}" for note in summary.notes if note not in told),
         f"images and manifest: {job.output.directory}",
+    ]
+
+
+def _error_lines(summary: "Summary") -> list[str]:
+    """How noisy the images are, where the job asks."""
+    found = summary.standard_error
+    if not found:
+        return []
+    where = f"camera {found['camera']}, light {found['light']}"
+    return [
+        f"standard error {found['rms']:.3g}, {found['relative']:.1%} of the mean radiance; "
+        f"the largest of an image {found['largest']:.3g} ({where})"
     ]
 
 

@@ -50,7 +50,7 @@ class Scratch:
         self.hit_rays = room_for_hits(rays)
         self.test_rays = room_for_tests(RAYS, work.lights.n_lights)
         self.hits = empty_hits(batch)
-        self.reflected = [empty_hits(batch), empty_hits(batch)] if work.depth else []
+        self.reflected = [empty_hits(batch) for _ in range(2 if work.depth else 0)]
         self.throughput = [np.empty((batch, 3), np.float32) for _ in self.reflected]
         self.steps = room_for_steps(work.lights.n_lights) if work.shadow_step > 1 else None
         full = (0 if work.keeps_all else batch, work.lights.channels, work.lights.n_lights)

@@ -31,7 +31,8 @@ class Frame:
         places: frame j -> where its pixels see them.
         weights: frame j -> (n,) weight of each hit there, or (0,) where all weigh alike.
         mirrored, mirror_places: reflected hits of the frame's own mirror pixels; None in a scene without mirrors.
-        mirror_hits: (n_pixels,) native hits of each pixel whose mirrors were followed; (0,) without mirrors.
+        mirror_hits: (2, n_pixels) native hits of each pixel whose mirrors were followed, of even and of odd sample
+            numbers; (2, 0) without mirrors.
         normal, depth: (n, 3) and (n,) of native hits, for the layers; (0, 3) and (0,) without.
         kept: the large arrays of the above, by name, for the shelf.
     """
@@ -79,7 +80,7 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
 
     tasks = [(part, first, m) for part in parts for first, m in crew.batches(part.n)]
     mirrored = [path for paths in crew.run(batch, tasks) for path in paths]
-    mirror_hits = np.empty(0, np.int32)
+    mirror_hits = np.empty((2, 0), np.int32)
     if work.depth:
         extra, mirror_hits = extra_mirror_hits(work, c, parts, crew)
         mirrored += extra
@@ -113,7 +114,7 @@ def fill_holes(work: Work, c: int, pixels: Int32, crew: Crew) -> list[tuple[Plac
         m = min(crew.batch, n - first)
         extra_hits(
             work.cams, c, work.seed, pixels, HOLE_SAMPLE, 1, first, m, work.surfaces, work.tracer,
-            scratch.hit_rays.packets, scratch.hits,
+            scratch.hit_rays.packets, scratch.hits, work.halves_by_sample,
         )  # fmt: skip
         scratch.rays["native"] += m
         estimate_terms(work, scratch.hits, m, scratch, records.part(slice(first, first + m)), "obscurance", "shadow")
@@ -131,7 +132,7 @@ def _native(work: Work, c: int, part: Pass, first: int, n: int, scratch: Scratch
     started = perf_counter()
     native_hits(
         work.cams, c, work.seed, part.pixels, part.per_pixel, part.first_sample, first, n, work.surfaces, work.tracer,
-        work.depth > 0, scratch.hit_rays.packets, scratch.hits,
+        work.depth > 0, scratch.hit_rays.packets, scratch.hits, work.halves_by_sample,
     )  # fmt: skip
     scratch.rays["native"] += n
     scratch.seconds["native"] += perf_counter() - started

@@ -37,7 +37,7 @@ from .lanes import (
     root,
     triples_at,
 )
-from .sampling import PIXEL, PIXEL_SAMPLE, r2, stream, word
+from .sampling import OTHER_HALF, PIXEL, PIXEL_SAMPLE, r2, stream, word
 from .surface import (
     Surfaces,
     geometric_normal,
@@ -63,6 +63,7 @@ class Hits(NamedTuple):
         incoming: (n, 3) direction of the ray that found the hit, not normalised.
         key: (n,) random stream.
         pixel: (n,) the pixel of the eye that found the hit.
+        half: (n,) which half of its pixel's samples a hit belongs to, 0 or 1; 0 where they are one.
     """
 
     kind: Bytes
@@ -75,6 +76,7 @@ class Hits(NamedTuple):
     incoming: Float32
     key: Keys
     pixel: Int32
+    half: Bytes
 
 
 def empty_hits(n: int) -> Hits:
@@ -98,6 +100,7 @@ def empty_hits(n: int) -> Hits:
         incoming=vectors(),
         key=np.empty(whole, np.uint64)[:n],
         pixel=np.empty(whole, np.int32)[:n],
+        half=np.empty(whole, np.uint8)[:n],
     )
 
 
@@ -221,10 +224,20 @@ def _shoot(cams: Cameras, c: int, pixel: int, jx: Real, jy: Real, i: int, packet
 
 @inlined
 def _shoot_samples(
-    cams: Cameras, c: int, seed: int, pixel: int, sample: int, i: int, packets: Float32, hits: Hits
+    cams: Cameras, c: int, seed: int, pixel: int, sample: int, i: int, packets: Float32, hits: Hits, halves: bool
 ) -> None:
-    """Write the eye rays of 16 samples; the samples of a pixel are spread by the golden ratio sequence."""
-    jx, jy = r2(word(stream(seed, c, pixel, PIXEL_SAMPLE), PIXEL), sample)
+    """Write the eye rays of 16 samples; the samples of a pixel are spread by the golden ratio sequence.
+
+    Where they are taken in two halves, even and odd ones are spread each by a sequence of its own.
+    """
+    key, number = stream(seed, c, pixel, PIXEL_SAMPLE), sample
+    random = word(key, PIXEL)
+    put_lanes(hits.half, i, np.uint8(0))
+    if halves:
+        odd = (sample & np.int32(1)) == np.int32(1)
+        random, number = choose(odd, word(key, OTHER_HALF), random), integers(sample >> np.int32(1))
+        put_lanes(hits.half, i, choose(odd, np.uint8(1), np.uint8(0)))
+    jx, jy = r2(random, number)
     _shoot(cams, c, pixel, jx, jy, i, packets, hits)
     put_lanes(hits.key, i, stream(seed, c, pixel, sample))
 
@@ -244,10 +257,14 @@ def native_hits(
     mirrors: bool,
     packets: Float32,
     hits: Hits,
+    halves: bool = False,
 ) -> None:
     """Find native hits first to first + n - 1 of eye c, `per_pixel` in each of `pixels`.
 
     They are numbered by groups of 16 pixels, within a group by sample, then by pixel.
+
+    Args:
+        halves: the samples of a pixel are taken in two halves, see `Hits.half`.
     """
     # a frame may have more hits than an int32 counts; the quotients of such numbers are exact in float64
     n_pixels, of_group = np.float64(pixels.shape[0]), np.float64(16 * per_pixel)
@@ -258,7 +275,7 @@ def native_hits(
         members = choose(left < 16.0, left, 16.0)
         sample = floor(rest / members)
         pixel = gather(pixels, integers(group * 16.0 + rest - sample * members))
-        _shoot_samples(cams, c, seed, pixel, integers(sample) + np.int32(first_sample), i, packets, hits)
+        _shoot_samples(cams, c, seed, pixel, integers(sample) + np.int32(first_sample), i, packets, hits, halves)
     intersect(tracer, packets, n, True)
     record_hits(surfaces, tracer, packets, n, mirrors, hits)
 
@@ -277,13 +294,14 @@ def extra_hits(
     tracer: Tracer,
     packets: Float32,
     hits: Hits,
+    halves: bool = False,
 ) -> None:
     """Find hits first to first + n - 1 of those that mirror pixels have beyond the others, `per_pixel` each."""
     for i in range(0, n, LANES):
         number = doubles(_numbers(i, n)) + np.float64(first)
         at = floor(number / np.float64(per_pixel))
         sample = integers(number - at * np.float64(per_pixel)) + np.int32(first_sample)
-        _shoot_samples(cams, c, seed, gather(pixels, integers(at)), sample, i, packets, hits)
+        _shoot_samples(cams, c, seed, gather(pixels, integers(at)), sample, i, packets, hits, halves)
     intersect(tracer, packets, n, True)
     record_hits(surfaces, tracer, packets, n, True, hits)
 

@@ -66,7 +66,11 @@ class ImageFormat:
 
 
 def write_image(
-    path: Path, image: Image | NDArray[np.float16], image_format: ImageFormat, attributes: Attributes | None = None
+    path: Path,
+    image: Image | NDArray[np.float16],
+    image_format: ImageFormat,
+    attributes: Attributes | None = None,
+    more: Mapping[str, Image] | None = None,
 ) -> None:
     """Write one image, whole or not at all; equal images give equal bytes.
 
@@ -77,6 +81,7 @@ def write_image(
         image: (h, w, 3), linear, finite; one of halves, for EXR alone, is stored as it is, and not looked at.
         image_format: format and its options.
         attributes: EXR keeps all of them, PNG what is text or a number, TIFF the program's name, JPEG none.
+        more: images of the same shape that EXR stores as layers of these names, as it stores the image itself.
 
     Raises:
         ValueError: the image holds NaN or infinity, or has another shape.
@@ -86,9 +91,7 @@ def write_image(
         raise ValueError(f"{path}: expected an image of shape (h, w, 3), got {image.shape}")
     attributes = attributes or {}
     if image.dtype == np.float16:
-        spec = _spec(image.shape, ["R", "G", "B"], ["half"] * 3, attributes)
-        spec.attribute("compression", _compression(image_format.compression))
-        _write_oiio(path, "openexr", spec, image)
+        _write_exr(path, image, more or {}, image_format, attributes)
         return
     image = np.asarray(image, np.float32)
     largest = _largest(str(path), image)
@@ -98,11 +101,7 @@ def write_image(
         return
     if image_format.format == "exr":
         half = image_format.half == "always" or (image_format.half == "auto" and largest <= HALF_MAX)
-        spec = _spec(image.shape, ["R", "G", "B"], ["half" if half else "float"] * 3, attributes)
-        spec.attribute("compression", _compression(image_format.compression))
-        # Cut before the cast: half a step above 65504 a half becomes infinite.
-        pixels = np.clip(image, -HALF_MAX, HALF_MAX) if half and largest > HALF_MAX else image
-        _write_oiio(path, "openexr", spec, pixels.astype(np.float16) if half else pixels)
+        _write_exr(path, _halves(image, largest) if half else image, more or {}, image_format, attributes)
     else:
         # Only plain text: other types of attribute can end the process in the TIFF writer.
         text = {name: value for name, value in attributes.items() if isinstance(value, str)}
@@ -110,6 +109,28 @@ def write_image(
         spec.attribute("compression", "none")  # zip saves a fifth of a noisy float image and takes 20 times as long
         spec.attribute("tiff:write_exif", 0)  # else it fails to write an empty Exif directory, and says so
         _write_oiio(path, "tiff", spec, image)
+
+
+def _halves(image: Image, largest: float) -> NDArray[np.float16]:
+    """Cut before the cast: half a step above 65504 a half becomes infinite."""
+    return (np.clip(image, -HALF_MAX, HALF_MAX) if largest > HALF_MAX else image).astype(np.float16)
+
+
+def _write_exr(
+    path: Path,
+    image: Image | NDArray[np.float16],
+    more: Mapping[str, Image],
+    image_format: ImageFormat,
+    attributes: Attributes,
+) -> None:
+    """Write an image, and others of the same kind of numbers as its layers."""
+    kind = "half" if image.dtype == np.float16 else "float"
+    layers = [_halves(layer, np.inf) if kind == "half" else layer for layer in more.values()]
+    names = ["R", "G", "B"] + [f"{name}.{letter}" for name in more for letter in "RGB"]
+    pixels = np.concatenate([image, *layers], axis=-1) if layers else image
+    spec = _spec(pixels.shape, names, [kind] * len(names), attributes)
+    spec.attribute("compression", _compression(image_format.compression))
+    _write_oiio(path, "openexr", spec, pixels)
 
 
 def write_codes(path: Path, codes: Bytes) -> None:

@@ -105,6 +105,12 @@ class SamplesTable(Table):
         "come out below 0.",
     )
 
+    halves: bool = Field(
+        default=False,
+        description="Sample every pixel in two independent halves. What they differ by gives each pixel's standard "
+        "error, which EXR images then have as channels `error` and `difference`.",
+    )
+
 
 class ReuseTable(Table):
     """How far the samples of one eye serve its neighbours."""
@@ -295,6 +301,12 @@ class Job(Table):
     def _fill_defaults(self, info: ValidationInfo) -> "Job":
         if (2 * self.reuse.n_r + 1) * self.samples.hits > MOST_HITS:
             fail([(("samples", "hits"), f"expected at most {MOST_HITS // (2 * self.reuse.n_r + 1)} with this n_r")])
+        if self.samples.halves and self.output.format != "exr":
+            fail(
+                [(("samples", "halves"), 'expected output.format = "exr": no other format has room for more channels')]
+            )
+        if self.samples.halves and (2 * self.reuse.n_r + 1) * self.samples.hits < 2:
+            fail([(("samples", "halves"), "expected at least two hits for each pixel of an image")])
         job_file = (info.context or {}).get("job_file")
         self._file = job_file
         if "hits" not in self.specular.model_fields_set:

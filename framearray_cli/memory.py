@@ -106,8 +106,13 @@ def window_memory(prepared: Prepared, n_lights: int, mirror_share: float = 0.0) 
     # of the frame that is being found: the pixel of each hit in every frame around, before hits are sorted by it
     finding = float(per_pixel.max()) * frames * 4
     layers = 2 * LAYER_CHANNELS * 4 * job.output.layers  # as they are summed, and as they are written
+    differences = (BLOCKS + 1) * 12 * n_lights * job.samples.halves
     per_image_pixel = (
-        finding + layers + frames * frames * 4 + BLOCKS * (6 if image_format(job).composes_halves else 12) * n_lights
+        finding
+        + layers
+        + differences
+        + frames * frames * 4
+        + BLOCKS * (6 if image_format(job).composes_halves else 12) * n_lights
     )
     return int(width * height * (held * per_hit + mirrored + per_image_pixel))
 

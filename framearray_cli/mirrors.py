@@ -7,7 +7,7 @@ import numpy as np
 from .arrays import Int32
 from .crew import Crew, Scratch
 from .hits import Hits, extra_hits, pilot_hits
-from .plan import Pass, flag_mirrors
+from .plan import Pass, flag_mirrors, halves_of
 from .shading import estimate_terms
 from .terms.specular import count_mirrors, reflect
 from .work import Records, Work, empty_records
@@ -38,7 +38,11 @@ def mirror_paths(work: Work, hits: Hits, n: int, scratch: Scratch) -> list[tuple
 def extra_mirror_hits(
     work: Work, c: int, parts: tuple[Pass, ...], crew: Crew
 ) -> tuple[list[tuple[Int32, Records]], Int32]:
-    """Follow the native hits that only mirror pixels have; returns them and the number of native hits of each pixel."""
+    """Follow the native hits that only mirror pixels have.
+
+    Returns:
+        reflected hits; (2, n_pixels) native hits of each pixel, of even and of odd sample numbers.
+    """
     most = sum(part.per_pixel for part in parts)
     least = int(work.per_pixel[c])
     extra = max(work.mirror_hits - least, 0)
@@ -55,7 +59,7 @@ def extra_mirror_hits(
         n = min(crew.batch, len(pixels) * extra - first)
         extra_hits(
             work.cams, c, work.seed, pixels, most, extra, first, n, work.surfaces, work.tracer,
-            scratch.hit_rays.packets, scratch.hits,
+            scratch.hit_rays.packets, scratch.hits, work.halves_by_sample,
         )  # fmt: skip
         scratch.rays["mirror"] += n
         return mirror_paths(work, scratch.hits, n, scratch)
@@ -64,7 +68,7 @@ def extra_mirror_hits(
         crew.run(look, range(0, work.n_pixels, crew.batch))
     pixels = work.order[flags[work.order] > 0]
     found = crew.run(follow, range(0, len(pixels) * extra, crew.batch)) if extra else []
-    own = extra * flags.astype(np.int32)
+    own = halves_of(most, extra)[:, None] * flags.astype(np.int32)
     for part in parts:
-        own[part.pixels] += part.per_pixel
+        own[:, part.pixels] += halves_of(part.first_sample, part.per_pixel)[:, None]
     return [path for batch in found for path in batch], own

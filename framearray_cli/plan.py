@@ -33,6 +33,11 @@ def frame_hits(n_c: int, n_r: int, hits: float) -> Float64:
     return counts
 
 
+def turns(hits: float) -> int:
+    """After how many frames every pixel had a native hit: m for 1/m hits, 1 for whole ones."""
+    return Fraction(hits - int(hits)).limit_denominator(SPARSEST).denominator
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pass:
     """Some native hits of a frame: `per_pixel` in each of `pixels`.
@@ -72,6 +77,12 @@ def passes(order: Int32, width: int, c: int, per_pixel: float) -> tuple[Pass, ..
         some = np.ascontiguousarray(order[turn < share.numerator])
         found.append(Pass(pixels=some, per_pixel=1, first_sample=whole, first_hit=whole * len(order)))
     return tuple(found)
+
+
+def halves_of(first: int, n: int) -> Int32:
+    """How many of the samples first to first + n - 1 have an even number, and how many an odd one: (2,)."""
+    even = (first + n + 1) // 2 - (first + 1) // 2
+    return np.array([even, n - even], np.int32)
 
 
 @kernel

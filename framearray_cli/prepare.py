@@ -15,7 +15,7 @@ from .job import Job
 from .jobfile import job_table
 from .lights import LightArrays, light_arrays
 from .paths import Eyes, Lights, eyes, lights
-from .plan import frame_hits
+from .plan import frame_hits, turns
 from .sampling import lattice_steps
 from .scene import Scene, load_scene
 from .surface import Surfaces, surfaces
@@ -127,6 +127,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
         shadow_unbiased=job.samples.shadow_unbiased,
         layers=job.output.layers,
         denoise=job.denoise.obscurance,
+        halves=turns(job.samples.hits) if job.samples.halves else 0,
     )
     return work, ambient
 

@@ -19,6 +19,7 @@ from .manifest import Manifest, ManifestCamera, ManifestLight, matrix_rows, writ
 from .memory import light_blocks, mirror_share, peak_memory, require_memory
 from .outfolder import claim_folder
 from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
+from .standarderror import summed_up
 from .terms.ambient import Ambient
 from .window import Window
 from .work import Work
@@ -37,6 +38,7 @@ class Summary:
         hits: mean accepted hits a pixel of a frame, native and outer.
         peak_memory: bytes.
         notes: what the user should know.
+        standard_error: see `standarderror.summed_up`; empty unless the job asks for it.
     """
 
     images: int
@@ -47,6 +49,7 @@ class Summary:
     hits: float
     peak_memory: int
     notes: tuple[str, ...]
+    standard_error: dict[str, float | int]
 
     @property
     def rays_per_pixel_image(self) -> dict[str, float]:
@@ -115,6 +118,7 @@ class _Part:
     stages: dict[str, float]
     hits: float
     notes: tuple[str, ...]
+    errors: dict[tuple[int, int], tuple[float, float]]
 
 
 def _frames(
@@ -165,13 +169,20 @@ def _frames(
             writer.finish()
     finally:
         crew.close()
-    return _Part(rays=crew.rays(), stages=crew.seconds(), hits=hits / work.n_frames, notes=tuple(notes))
+    return _Part(
+        rays=crew.rays(),
+        stages=crew.seconds(),
+        hits=hits / work.n_frames,
+        notes=tuple(notes),
+        errors=writer.errors,
+    )
 
 
 def _summary(prepared: Prepared, ambient: Ambient, parts: list[_Part], seconds: float) -> Summary:
     """Put the passes over the camera path together."""
     rays = sum((part.rays for part in parts), Counter({"ambient": ambient.rays}))
     width, height = prepared.job.camera.resolution
+    errors = {image: error for part in parts for image, error in part.errors.items()}
     return Summary(
         images=prepared.n_cameras * prepared.n_lights,
         seconds=seconds,
@@ -181,6 +192,7 @@ def _summary(prepared: Prepared, ambient: Ambient, parts: list[_Part], seconds: 
         hits=parts[0].hits,
         peak_memory=peak_memory(),
         notes=(*ambient.notes, *(note for part in parts for note in part.notes)),
+        standard_error=summed_up(errors) if errors else {},
     )
 
 
@@ -248,4 +260,6 @@ def _with_summary(manifest: Manifest, summary: Summary) -> Manifest:
         "peak_memory": summary.peak_memory,
         "notes": list(summary.notes),
     }
+    if summary.standard_error:
+        table["standard_error"] = summary.standard_error
     return replace(manifest, summary=table)

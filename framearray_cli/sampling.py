@@ -15,7 +15,7 @@ from .kernel import inlined
 from .lanes import choose, integers, reals, root, words
 
 # Dimensions: one stream a purpose.
-PIXEL, HEMISPHERE, CHOICE, STEPS = 0, 1, 2, 3
+PIXEL, HEMISPHERE, CHOICE, STEPS, OTHER_HALF = 0, 1, 2, 3, 4
 PIXEL_SAMPLE = (1 << 16) - 1  # the sample index, which no hit has, of what all samples of a pixel share
 HOLE_SAMPLE = (1 << 16) - 2  # that of the hit of a pixel that no other hit reaches
 

@@ -12,7 +12,7 @@ from .lanes import LANES, bits, lanes_at
 from .terms.direct import direct
 from .terms.direct_steps import direct_by_steps
 from .terms.obscurance import obscurance
-from .work import INDIRECT, LIT, OBSCURANCE, REFLECTIVITY, STEADY, WEIGHT, Records, Work, lit_bit
+from .work import HALF, INDIRECT, LIT, OBSCURANCE, REFLECTIVITY, STEADY, WEIGHT, Records, Work, lit_bit
 
 _NOTHING = np.empty((0, 3), np.float32)
 
@@ -86,7 +86,8 @@ def write_rows(
             row[i, OBSCURANCE + channel] = obscurance[i, channel]
             row[i, REFLECTIVITY + channel] = reflectivity
         row[i, LIT] = _lit(irradiance, i)
-        for column in range(LIT + 1, LANES):
+        row[i, HALF] = hits.half[i]
+        for column in range(HALF + 1, LANES):
             row[i, column] = 0.0
 
 

@@ -12,19 +12,19 @@ from time import perf_counter
 
 import numpy as np
 
-from .accumulate import accumulate, compose_pixels, sources
+from .accumulate import BY_SAMPLE, Source, accumulate, compose_differences, compose_pixels, sources, weigh_halves
 from .arrays import Addresses, Float32, Images, Int32
 from .compose import as_stored, empty_band
 from .crew import Crew, Scratch
 from .denoise import denoised
 from .frame import Frame, fill_holes
 from .kernel import kernel
+from .standarderror import fill_unknown, half_factors
 from .terms.ambient import Ambient
 from .work import INDIRECT, REFLECTIVITY, Placed, Records, Work
 
 # Pixels whose sums over all lights are held together: they fit a core's cache. And pixels of a task.
 BAND_PIXELS, TASK_PIXELS = 256, 2048
-_NOTHING = np.empty(0, np.float32)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,6 +56,7 @@ class Composed:
         beyond: number of values beyond the largest half; where images are halves, such values were cut to it.
         bad: number of values that were not finite or negative; each was replaced by 0.
         first_bad: light index and pixel of the first of them, or None.
+        differences: (n_lights, height, width, 3) of the halves of the hits, see standarderror.py; or None.
     """
 
     c: int
@@ -65,6 +66,7 @@ class Composed:
     beyond: int
     bad: int
     first_bad: tuple[int, int] | None
+    differences: Float32 | None = None
 
 
 class Window:
@@ -140,6 +142,7 @@ class Window:
             return found
 
         results = self._crew.run(some, range(0, work.n_pixels, TASK_PIXELS))
+        differences = self._differences(j, samples, images.shape) if work.halves else None
         bad = sum(result[0] for result in results)
         shape = images.shape[1:3]
         return Composed(
@@ -150,7 +153,38 @@ class Window:
             beyond=sum(result[3] for result in results),
             bad=bad,
             first_bad=next(((l, pixel) for count, l, pixel, _ in results if count), None),
+            differences=differences,
         )
+
+    def _differences(self, j: int, samples: Int32, shape: tuple[int, ...]) -> Float32:
+        """What the halves of the hits of frame j differ by, (n_lights, height, width, 3); see standarderror.py."""
+        work, frame = self._work, self._frames[j]
+        images, weights = np.empty((len(work.kept), work.n_pixels, 3), np.float32), np.empty((2, work.n_pixels))
+        eyes = work.frames_around(j, work.n_r)
+        own = np.array([k // work.halves % 2 if work.n_r else BY_SAMPLE for k in eyes], np.int32)
+        hits = self._hits(j, [])
+        tasks = [(first, min(TASK_PIXELS, work.n_pixels - first)) for first in range(0, work.n_pixels, TASK_PIXELS)]
+        self._crew.run(lambda task, _: weigh_halves(hits, own, task[0], task[1], weights), tasks)
+        factors, parts = half_factors(weights), []
+        for k, half in zip(eyes, own, strict=True):
+            scales = (factors[half],) if work.n_r else (factors[0], factors[1])
+            parts.append(
+                Source(self._frames[k].places[j], self._frames[k].records, self._frames[k].weights[j], *scales)
+            )
+        if frame.mirrored is not None and frame.mirror_places is not None:
+            even, odd = half_factors(frame.mirror_hits)
+            parts.append(Source(frame.mirror_places, frame.mirrored, scale=even, odd_scale=odd))
+        listed = sources(parts)
+
+        def some(task: tuple[int, int], _scratch: Scratch) -> None:
+            band = self._bands.pop()
+            compose_differences(band, *task, listed, work.lights.channels, self._colour, self._ambient, images)
+            self._bands.append(band)
+
+        self._crew.run(some, tasks)
+        differences = images.reshape(shape)
+        fill_unknown(differences, (weights > 0).all(axis=0).reshape(shape[1:3]), samples.reshape(shape[1:3]))
+        return differences
 
     def _smooth_indirect(self, j: int, holes: list[tuple[Placed, Records]], shape: tuple[int, ...]) -> Float32:
         """R W of every pixel of frame j with W denoised, (n_pixels, 3).
@@ -190,20 +224,20 @@ class Window:
     def _hits(self, j: int, holes: list[tuple[Placed, Records]], eyes: Sequence[int] | None = None) -> Addresses:
         """All hits of frame j, or those of some eyes, for `accumulate`."""
         frames = [self._frames[k] for k in self._work.frames_around(j, self._work.n_r) if eyes is None or k in eyes]
-        found = [(frame.places[j], frame.records, frame.weights[j], _NOTHING) for frame in frames]
-        return sources(found + [(place, records, _NOTHING, _NOTHING) for place, records in holes])
+        found = [Source(frame.places[j], frame.records, frame.weights[j]) for frame in frames]
+        return sources(found + [Source(place, records) for place, records in holes])
 
     def _mirrored(self, j: int, holes: list[tuple[Placed, Records]], scale: Float32) -> Addresses:
         """What the mirrors of frame j show, for `accumulate`: a mean over its native hits alone."""
         frame = self._frames[j]
-        found = [(place, records, _NOTHING, scale) for place, records in holes]
+        found = [Source(place, records, scale=scale) for place, records in holes]
         if frame.mirrored is not None and frame.mirror_places is not None:
-            found.insert(0, (frame.mirror_places, frame.mirrored, _NOTHING, scale))
+            found.insert(0, Source(frame.mirror_places, frame.mirrored, scale=scale))
         return sources(found)
 
     def _mirror_scale(self, j: int, holes: list[tuple[Placed, Records]]) -> Float32:
         """One over the native hits of each pixel of frame j, (n_pixels,); those that fill holes count."""
-        own = self._frames[j].mirror_hits
+        own: Int32 = self._frames[j].mirror_hits.sum(axis=0)
         for place, _ in holes[:1] if len(own) else []:
             own = own + np.diff(place.start)
         return (1.0 / np.maximum(own, 1)).astype(np.float32)

@@ -14,6 +14,7 @@ from .imageattributes import Attributes, frame_attributes
 from .images import ImageFormat, write_image, write_layers
 from .job import Job
 from .paths import Eyes
+from .standarderror import square_mean, standard_error
 from .window import Composed, Layers
 
 # Blocks of images in memory: one is filled while the other is written.
@@ -32,6 +33,9 @@ class ArrayWriter:
     """A few threads that write images; hands out blocks of memory for frames and takes them back when written.
 
     An error in a thread stops the render at the next frame.
+
+    Attributes:
+        errors: (camera, light) -> mean square of the standard error, and mean radiance, of images that tell theirs.
     """
 
     def __init__(
@@ -56,6 +60,7 @@ class ArrayWriter:
         self._directory, self._patterns, self._eyes = directory, patterns, eyes
         self._resolution, self._fps, self._format = resolution, fps, image_format
         self._written, self._lights = written, lights
+        self.errors: dict[tuple[int, int], tuple[float, float]] = {}
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="write")
         self._free: SimpleQueue[Images | BaseException] = SimpleQueue()
         width, height = resolution
@@ -118,7 +123,16 @@ class ArrayWriter:
 
     def _write_image(self, composed: Composed, c: int, l: int) -> None:
         path = self._directory / self._patterns[0].format(camera=c, light=l)
-        write_image(path, composed.images[l - self._lights.start], self._format, self._attributes(c, l))
+        at = l - self._lights.start
+        image, more = composed.images[at], {}
+        if composed.differences is not None:
+            hits = composed.hits.reshape(image.shape[:2])
+            more = {
+                "error": standard_error(composed.differences[at], hits),
+                "difference": composed.differences[at],
+            }
+            self.errors[c, l] = square_mean(more["error"]), float(image.mean(dtype=np.float64))
+        write_image(path, image, self._format, self._attributes(c, l), more)
         self._written(1)
 
     def _write_layers(self, layers: Layers, c: int) -> None:

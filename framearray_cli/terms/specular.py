@@ -67,6 +67,7 @@ def reflect(
             reflected_throughput[m, channel] = throughput[i, channel] * hits.specular[i, channel]
         reflected.key[m] = mix(hits.key[i])
         reflected.pixel[m] = hits.pixel[i]
+        reflected.half[m] = hits.half[i]
         m += 1
     intersect(tracer, packets, m, True)
     record_hits(surfaces, tracer, packets, m, True, reflected)

@@ -3,9 +3,9 @@
 import argparse
 import json
 
-from . import cycles, error, mitsuba3, peers, processes, scaling, speed, table
+from . import cycles, error, mitsuba3, peers, processes, scaling, speed, table, told
 from .cases import FRAME_ARRAY, JOBS, Variant, job_named, opened, variant_named, varied, with_resolution
-from .results import folder, save
+from .results import folder, load, save
 from .steady import steady
 
 PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
@@ -15,7 +15,9 @@ PARTS = ("speed", "error", "peers", "memory", "startup")
 def main() -> None:
     """Measure what is asked for, and write the page."""
     parser = argparse.ArgumentParser(prog="bench", description="Measure what an image costs, and write docs/speed.md.")
-    parser.add_argument("what", nargs="?", default="all", choices=("all", "scaling", "page", "peak", *PROGRAMS, *PARTS))
+    parser.add_argument(
+        "what", nargs="?", default="all", choices=("all", "scaling", "told", "page", "peak", *PROGRAMS, *PARTS)
+    )
     parser.add_argument("jobs", nargs="*", default=list(JOBS), help="some of the jobs")
     parser.add_argument("--quick", action="store_true", help="a small picture, once; the page goes to out/bench/quick")
     parser.add_argument("--runs", type=int, default=speed.RUNS, help="how often each thing is measured")
@@ -31,6 +33,11 @@ def main() -> None:
         print(json.dumps(PROGRAMS[args.what](args.jobs[0], args.quick)))
         return
     out = folder(args.quick)
+    if args.what == "told":
+        for name in args.jobs:
+            save(out, f"told-{name}", {"rows": told.measure(name, out)})
+        told.write([row for name in JOBS if (kept := load(out, f"told-{name}")) for row in kept["rows"]])
+        return
     todo = PARTS if args.what == "all" else (args.what,)
     for name in args.jobs:
         if "speed" in todo:

@@ -5,12 +5,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from framearray_cli.accumulate import accumulate, sources
+from framearray_cli.accumulate import BY_SAMPLE, Source, accumulate, compose_differences, sources, weigh_halves
 from framearray_cli.arrays import with_room
 from framearray_cli.compose import MOST, Band, as_stored, empty_band, finish
 from framearray_cli.lanes import LANES
 from framearray_cli.reuse import sort_by_pixel
-from framearray_cli.work import INDIRECT, LIT, LIT_BITS, OBSCURANCE, REFLECTIVITY, STEADY, WEIGHT, Placed, Records
+from framearray_cli.work import (
+    HALF,
+    INDIRECT,
+    LIT,
+    LIT_BITS,
+    OBSCURANCE,
+    REFLECTIVITY,
+    STEADY,
+    WEIGHT,
+    Placed,
+    Records,
+)
 
 N_PIXELS, N_LIGHTS, NOTHING = 40, 7, np.empty(0, np.float32)
 
@@ -48,6 +59,7 @@ class Case:
         self.constant = values(n, 3) if constant else np.empty((0, 3), np.float32)
         self.irradiance = with_room((n, channels, n_lights), np.float32)
         self.irradiance[:] = values(n, channels, n_lights)
+        self.half = rng.integers(0, 2, n)
 
     def row(self) -> Any:
         row = with_room((len(self.pixel), LANES), np.float32, fill=0)
@@ -57,12 +69,16 @@ class Case:
         row[:, OBSCURANCE : OBSCURANCE + 3] = self.obscurance
         row[:, REFLECTIVITY : REFLECTIVITY + 3] = self.reflectivity
         row[:, LIT] = lit_packets(self.irradiance)
+        row[:, HALF] = self.half
         return row
 
     def add(self, band: Band, first: int, n: int, scale: Any = NOTHING, mean: bool = True) -> None:
-        placed, row = Placed(start=self.start, order=self.order), self.row()
-        parts = sources([(placed, Records(row=row, irradiance=self.irradiance), self.weight, np.float32(scale))])
+        records = Records(row=self.row(), irradiance=self.irradiance)
+        parts = sources([self.source(records, np.float32(scale))])
         accumulate(band, first, n, parts, *self.irradiance.shape[1:], mean)
+
+    def source(self, records: Records, scale: Any = NOTHING, odd_scale: Any = NOTHING) -> Source:
+        return Source(Placed(start=self.start, order=self.order), records, self.weight, scale, odd_scale)
 
     def sums(self, values: Any, scale: Any = NOTHING) -> Any:
         """Weighed sums of values (n, ...) by pixel."""
@@ -108,6 +124,41 @@ def composed(
         case.add(band, first, n)
         bad.append(finish(band, first, n, colour, ambient, np.float32(0), as_stored(images)))
     return images, bad
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("weighed", [False, True])
+def test_differences_are_sums_with_a_factor_for_each_half(channels: int, weighed: bool) -> None:
+    case = Case(channels, weighed=weighed)
+    rng = np.random.default_rng(6)
+    even, odd = rng.normal(size=(2, N_PIXELS)).astype(np.float32)
+    records = Records(row=case.row(), irradiance=case.irradiance)
+    images = np.full((N_LIGHTS, N_PIXELS, 3), np.nan, np.float32)
+    colour, ambient = lights()
+    listed = sources([case.source(records, even, odd)])
+    compose_differences(empty_band(16, N_LIGHTS), 0, N_PIXELS, listed, channels, colour, ambient, images)
+    factor = np.where(case.half == 1, odd[case.pixel], even[case.pixel]).astype(np.float64)
+    value = (
+        colour * case.sums(case.direct() * factor[:, None, None])
+        + ambient * case.sums(case.reflectivity.astype(np.float64) * case.obscurance * factor[:, None])[:, :, None]
+        + case.sums(case.constant.astype(np.float64) * factor[:, None])[:, :, None]
+    )
+    # terms of both signs, so their roundings are judged by what they are of
+    np.testing.assert_allclose(images, value.transpose(2, 0, 1), rtol=0, atol=5e-6 * abs(value).max())
+    assert (value > 0).any() and (value < 0).any()
+
+
+@pytest.mark.parametrize("weighed", [False, True])
+def test_halves_are_weighed_by_part_and_by_sample(weighed: bool) -> None:
+    cases = [Case(1, weighed=weighed, seed=seed) for seed in (1, 2, 3)]
+    records = [Records(row=case.row(), irradiance=case.irradiance) for case in cases]
+    weights = np.full((2, N_PIXELS), np.nan)
+    listed = sources([case.source(known) for case, known in zip(cases, records, strict=True)])
+    weigh_halves(listed, np.array([1, BY_SAMPLE, 0], np.int32), 0, N_PIXELS, weights)
+    second = cases[1]
+    for half, whole in ((0, cases[2]), (1, cases[0])):
+        expected = whole.sums(np.ones(len(whole.pixel))) + second.sums((second.half == half).astype(float))
+        np.testing.assert_allclose(weights[half], expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize("channels", [1, 3])

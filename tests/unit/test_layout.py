@@ -24,7 +24,7 @@ embree/packets embree/masks embree/native embree/fallback embree/__init__
 rays hits plan
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
 terms/ambient_area terms/ambient_light terms/ambient_fit
-reuse work crew shading mirrors frame denoise compose accumulate window
+reuse work crew shading mirrors frame denoise standarderror compose accumulate window
 imageattributes images manifest outfolder writer
 prepare memory render check
 moviepath movies assemble
@@ -57,7 +57,7 @@ DOORS = {
     "typer": ("cli",),
     "rich": ("cli", "screen"),
     "av": ("movies",),
-    "scipy": ("paths",),
+    "scipy": ("paths", "standarderror"),
     "psutil": ("memory",),
 }
 # What takes long to import, or may be absent: `framearray --help` does without.

@@ -34,7 +34,7 @@ def points(n: int, position: Any, normal: Any) -> Hits:
     hits.offset[:] = 1e-5
     hits.reflectivity[:], hits.specular[:], hits.incoming[:] = 0.5, 0.0, -np.asarray(normal, np.float32)
     hits.key[:] = np.random.default_rng(1).integers(0, 2**63, n).astype(np.uint64)
-    hits.pixel[:] = 0
+    hits.pixel[:], hits.half[:] = 0, 0
     return hits
 
 

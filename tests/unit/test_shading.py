@@ -11,7 +11,7 @@ from framearray_cli.arrays import with_room
 from framearray_cli.hits import ESCAPED, SURFACE
 from framearray_cli.lanes import LANES
 from framearray_cli.shading import write_rows
-from framearray_cli.work import INDIRECT, LIT, LIT_BITS, OBSCURANCE, REFLECTIVITY, STEADY, WEIGHT
+from framearray_cli.work import HALF, INDIRECT, LIT, LIT_BITS, OBSCURANCE, REFLECTIVITY, STEADY, WEIGHT
 
 N = 37
 NOTHING = np.empty((0, 3), np.float32)
@@ -22,6 +22,7 @@ def written(n_lights: int = 20, channels: int = 1, skylight: bool = False, throu
     rng = np.random.default_rng(n_lights)
     hits = points(N, (0, 0, 0), (0, 1, 0))
     hits.kind[:] = np.where(rng.random(N) < 0.3, ESCAPED, SURFACE)
+    hits.half[:] = rng.integers(0, 2, N)
     hits.reflectivity[:] = rng.random((N, 3)) * (hits.kind == SURFACE)[:, None]
 
     def values() -> Any:
@@ -56,7 +57,8 @@ def test_rows_are_those_of_numpy(skylight: bool, throughput: bool) -> None:
         OBSCURANCE: given["obscurance"],
         REFLECTIVITY: reflectivity,
     }
-    assert (row[:, WEIGHT] == 1).all() and not row[:, LIT + 1 :].any()
+    assert (row[:, WEIGHT] == 1).all() and not row[:, HALF + 1 :].any()
+    assert np.array_equal(row[:, HALF], hits.half) and 0 < hits.half.sum() < N
     for first, values in expected.items():
         np.testing.assert_allclose(row[:, first : first + 3], values, rtol=3e-7)
 

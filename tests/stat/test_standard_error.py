@@ -1,0 +1,143 @@
+"""The standard error that an image tells of itself against the spread of the same image over seeds.
+
+D^2 (`framearray_cli/standarderror.py`) averaged over seeds is the variance of a pixel, so over pixels and seeds its
+root mean square is that of the spread. Two light positions, so that sums and differences of images are judged too.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from stages import box, make_job, quad, write_scene
+
+from framearray_cli.crew import Crew
+from framearray_cli.frame import find_frame
+from framearray_cli.job import Job
+from framearray_cli.prepare import open_embree, plan_work, prepare
+from framearray_cli.standarderror import standard_error
+from framearray_cli.window import Window
+
+Array = NDArray[np.float64]
+
+LAMP = {
+    "type": "point",
+    "keys": [
+        {"frame": 0, "position": [0.6, 1.6, 0.3], "intensity": [1.2, 1.0, 0.8]},
+        {"frame": 1, "position": [-1.0, 1.2, 0.5], "intensity": [0.4, 0.6, 1.2]},
+    ],
+}
+FRAMES, MIDDLE, SEEDS, SIZE = 9, 4, 40, (32, 24)
+# The standard error must neither flatter nor scare: within this share of the spread. Its own standard error here: the
+# mean of 40 x 768 values of one degree of freedom each, so well below 1 %.
+SHARE = 0.2
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A checkered floor, a box, a post and a mirror before a wall."""
+    checks = np.kron(np.indices((4, 4)).sum(axis=0) % 2, np.ones((8, 8)))
+    texture = (np.stack([checks, 1 - checks, 0.5 + 0 * checks], axis=-1) * 200 + 30).astype(np.uint8)
+    parts = [
+        quad("Floor", [-3, 0, -3], [0, 0, 5], [6, 0, 0], uv=2.0),
+        quad("Wall", [-3, 0, -2], [6, 0, 0], [0, 3, 0]),
+        *box("Box", [-0.5, 0, -1.2], [0.0, 0.7, -0.7]),
+        *box("Post", [0.35, 0, -0.6], [0.42, 1.3, -0.53]),
+        quad("Mirror", [0.5, 0.1, -1.6], [0.8, 0, 0.3], [0, 0.8, -0.2]),
+    ]
+    return write_scene(tmp_path_factory.mktemp("halves"), parts, {"Floor": texture})
+
+
+def job_of(scene: Path, out: Path, **changes: dict[str, Any]) -> Job:
+    keys = [
+        {"frame": 0, "eye": [-0.12, 0.9, 1.2], "target": [0, 0.4, -1.0]},
+        {"frame": FRAMES - 1, "eye": [0.12, 0.95, 1.1], "target": [0, 0.4, -1.0]},
+    ]
+    tables: dict[str, dict[str, Any]] = {
+        "samples": {"hits": 2, "obscurance": 2},
+        "reuse": {"n_r": 3, "weights": "balance"},
+        "specular": {"hits": 16},
+    }
+    tables = {name: {**table, **changes.get(name, {})} for name, table in tables.items()}
+    tables["samples"]["halves"] = True
+    return make_job(
+        scene, out, materials={"Box": [0.7, 0.3, 0.2], "Post": 0.8, "Mirror": {"reflectivity": 0.1, "specular": 0.7}},
+        camera={"resolution": list(SIZE), "fov": 50.0, "keys": keys},
+        lights=[LAMP], light_frames=2,
+        obscurance={"range": 0.6}, ambient={"intensity": [0.3, 0.25, 0.2]}, **tables,
+    )  # fmt: skip
+
+
+def over_seeds(job: Job, seeds: int = SEEDS) -> tuple[Array, Array, Array]:
+    """Images and differences of the middle frame, and the errors that are written: (seeds, lights, values) each."""
+    images, differences, errors = [], [], []
+    prepared = prepare(job)
+    block = np.empty((2, SIZE[1], SIZE[0], 3), np.float32)
+    with open_embree(prepared) as embree:
+        planned, ambient = plan_work(prepared, embree)
+        for seed in range(seeds):
+            work = replace(planned, seed=seed)
+            crew = Crew(work, 1)
+            window = Window(work, ambient, crew, MIDDLE)
+            for c in work.frames_around(MIDDLE, work.n_r):
+                window.add(find_frame(work, c, crew))
+            composed = window.compose(MIDDLE, block)
+            crew.close()
+            assert composed.differences is not None
+            images.append(block.astype(float).reshape(2, -1))
+            differences.append(composed.differences.astype(float).reshape(2, -1))
+            hits = composed.hits.reshape(SIZE[1], SIZE[0])
+            errors.append([standard_error(image, hits).astype(float).ravel() for image in composed.differences])
+    return np.array(images), np.array(differences), np.array(errors)
+
+
+def told_to_true(images: Array, told: Array) -> float:
+    """Root mean square of what is told over that of the spread."""
+    return float(np.sqrt((told**2).mean() / images.var(axis=0, ddof=1).mean()))
+
+
+CASES: dict[str, dict[str, dict[str, Any]]] = {
+    "balance": {},
+    "average": {"reuse": {"weights": "average"}},
+    "a wide window": {"reuse": {"n_r": 4}, "samples": {"hits": 1}},
+    "few hits": {"samples": {"hits": 0.5}},
+    "a third of a hit": {"samples": {"hits": 1 / 3}},
+    "no reuse": {"reuse": {"n_r": 0}, "samples": {"hits": 8}},
+    "no reuse, two hits": {"reuse": {"n_r": 0}, "samples": {"hits": 2}},
+    "no mirrors": {"specular": {"depth": 0}},
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_an_image_tells_of_its_error_is_its_spread(case: str, scene: Path, tmp_path: Path) -> None:
+    images, differences, errors = over_seeds(job_of(scene, tmp_path, **CASES[case]))
+    assert abs(told_to_true(images, differences) - 1) < SHARE
+    assert abs(told_to_true(images, errors) - 1) < SHARE  # averaging over neighbours moves errors, and keeps their sum
+
+
+def test_in_mirrors_too(scene: Path, tmp_path: Path) -> None:
+    """Those pixels alone: what mirrors show rests on samples of one frame."""
+    looks = [over_seeds(job_of(scene, tmp_path, specular={"depth": depth}), 4)[0].mean(axis=0) for depth in (4, 0)]
+    shown = abs(looks[0] - looks[1]) > 0.01
+    assert 0.02 < shown.mean() < 0.3
+    images, differences, _ = over_seeds(job_of(scene, tmp_path))
+    assert abs(told_to_true(images[:, shown], differences[:, shown]) - 1) < SHARE
+
+
+def test_a_wrong_error_is_found(scene: Path, tmp_path: Path) -> None:
+    """The comparison fails for what is a third too large, and for what is a quarter too small."""
+    images, differences, _ = over_seeds(job_of(scene, tmp_path))
+    for factor in (4 / 3, 3 / 4):
+        assert abs(told_to_true(images, factor * differences) - 1) > SHARE
+
+
+@pytest.mark.parametrize("combine", [lambda a, b: a - b, lambda a, b: 0.3 * a + 2.0 * b], ids=["minus", "sum"])
+def test_images_of_two_lights_combined_tell_their_error(
+    combine: Callable[[Array, Array], Array], scene: Path, tmp_path: Path
+) -> None:
+    """Hits are shared by lights, so errors are not independent; differences know that."""
+    images, differences = (combine(both[:, 0], both[:, 1]) for both in over_seeds(job_of(scene, tmp_path))[:2])
+    assert abs(told_to_true(images, differences) - 1) < SHARE
