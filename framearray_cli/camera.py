@@ -23,6 +23,7 @@ class Cameras(NamedTuple):
         right, up, forward: (n_c, 3) unit axes of each eye.
         focal: focal length in pixels.
         width, height: resolution in pixels.
+        near: depth along the optical axis from which on an eye sees, scene units; see `surface.nearest`.
     """
 
     position: Points
@@ -32,9 +33,10 @@ class Cameras(NamedTuple):
     focal: float
     width: int
     height: int
+    near: float
 
 
-def cameras(eyes: Eyes, resolution: tuple[int, int], centre: Float64) -> Cameras:
+def cameras(eyes: Eyes, resolution: tuple[int, int], centre: Float64, near: float = 0.0) -> Cameras:
     """Gather what kernels read of the eyes; the cast to float32 happens here, after centring."""
     world_from_camera = eyes.world_from_camera
     width, height = resolution
@@ -46,6 +48,7 @@ def cameras(eyes: Eyes, resolution: tuple[int, int], centre: Float64) -> Cameras
         focal=float(0.5 * height / np.tan(np.radians(eyes.fov_deg) / 2)),
         width=width,
         height=height,
+        near=near,
     )
 
 

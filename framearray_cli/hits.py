@@ -122,10 +122,17 @@ def reflect(hits: Hits, i: int, n: int) -> bool:
 
 
 @inlined
+def lift(hits: Hits, i: int) -> Triple:
+    """From hit i to where rays that leave it start: above the triangle, on the viewer's side."""
+    g, e = hits.geometric, hits.offset[i]
+    return e * g[i, 0], e * g[i, 1], e * g[i, 2]
+
+
+@inlined
 def ray_origin(hits: Hits, i: int) -> Triple:
-    """Where rays that leave hit i start: above the triangle, on the viewer's side."""
-    p, g, e = hits.position, hits.geometric, hits.offset[i]
-    return p[i, 0] + e * g[i, 0], p[i, 1] + e * g[i, 1], p[i, 2] + e * g[i, 2]
+    """Where rays that leave hit i start."""
+    p, (x, y, z) = hits.position, lift(hits, i)
+    return p[i, 0] + x, p[i, 1] + y, p[i, 2] + z
 
 
 @inlined
@@ -276,7 +283,7 @@ def native_hits(
         sample = floor(rest / members)
         pixel = gather(pixels, integers(group * 16.0 + rest - sample * members))
         _shoot_samples(cams, c, seed, pixel, integers(sample) + np.int32(first_sample), i, packets, hits, halves)
-    intersect(tracer, packets, n, True)
+    intersect(tracer, packets, n, True, cams.near)
     record_hits(surfaces, tracer, packets, n, mirrors, hits)
 
 
@@ -302,7 +309,7 @@ def extra_hits(
         at = floor(number / np.float64(per_pixel))
         sample = integers(number - at * np.float64(per_pixel)) + np.int32(first_sample)
         _shoot_samples(cams, c, seed, gather(pixels, integers(at)), sample, i, packets, hits, halves)
-    intersect(tracer, packets, n, True)
+    intersect(tracer, packets, n, True, cams.near)
     record_hits(surfaces, tracer, packets, n, True, hits)
 
 
@@ -324,7 +331,7 @@ def pilot_hits(
     """
     for i in range(0, n, LANES):
         _shoot(cams, c, gather(order, _numbers(i, n) + np.int32(first)), 0.5, 0.5, i, packets, hits)
-    intersect(tracer, packets, n, True)
+    intersect(tracer, packets, n, True, cams.near)
     for i in range(0, n, LANES):
         missed, triangle, u, v = _met(tracer, packets, i)
         red, green, blue = specular_at(surfaces, triangle, u, v)

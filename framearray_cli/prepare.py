@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import Float32
-from .camera import cameras
+from .camera import Cameras, cameras
 from .denoise import require_denoiser
 from .embree import EmbreeScene, Engine
 from .fingerprint import fingerprint
@@ -18,7 +18,7 @@ from .paths import Eyes, Lights, eyes, lights
 from .plan import frame_hits, turns
 from .sampling import lattice_steps
 from .scene import Scene, load_scene
-from .surface import Surfaces, surfaces
+from .surface import Surfaces, nearest, surfaces
 from .terms.ambient import Ambient, EyeWalks, ambient_by_eye, fixed_ambient
 from .terms.ambient_fit import Curve, ambient_by_fit
 from .terms.ambient_light import ambient_by_light
@@ -91,7 +91,7 @@ def open_embree(prepared: Prepared, engine: Engine = "auto") -> EmbreeScene:
 def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
     """Estimate the ambient light and put together what every frame needs."""
     job, scene = prepared.job, prepared.scene
-    cams = cameras(prepared.eyes, job.camera.resolution, scene.centre)
+    cams = _cameras(prepared)
     background = np.array(job.scene.background, np.float32)
     ambient = _ambient(prepared, embree, background)
     n_r = job.reuse.n_r
@@ -132,15 +132,19 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
     return work, ambient
 
 
+def _cameras(prepared: Prepared) -> Cameras:
+    near = nearest(prepared.surfaces)
+    return cameras(prepared.eyes, prepared.job.camera.resolution, prepared.scene.centre, near)
+
+
 def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Ambient:
     job, seed = prepared.job, prepared.job.seed
     if job.ambient.method == "light" and job.ambient.intensity is None:
         return ambient_by_light(
             seed, job.ambient.paths, prepared.surfaces, embree.tracer, prepared.light_arrays, background
         )
-    cams = cameras(prepared.eyes, job.camera.resolution, prepared.scene.centre)
     walks = EyeWalks(
-        cams=cams,
+        cams=_cameras(prepared),
         seed=seed,
         paths=job.ambient.paths,
         surfaces=prepared.surfaces,

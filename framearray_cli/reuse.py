@@ -16,11 +16,15 @@ import numpy as np
 
 from .arrays import Float32, Float64, Int32, Real
 from .camera import OUTSIDE, Cameras, project
-from .embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, is_blocked, occlude
+from .embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, is_blocked, occlude
 from .hits import SURFACE, Hits, triple
 from .kernel import inlined, kernel
 from .lanes import LANES, choose, compress, count, doubles, gather, lane_numbers, lanes_at, put_lanes, triples_at
 from .rays import Rays
+
+# Visibility rays end this many times as far before an eye as it sees from: their directions are rounded, and an eye
+# that stands on a surface would lose what it sees at less than two degrees above it.
+EYE_END = np.float32(8.0)
 
 
 @inlined
@@ -44,8 +48,12 @@ def _seen(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[int, Real, Real]:
 
 @kernel
 def _aim(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays, n: int) -> None:
-    """Write the queued visibility rays between hits and eyes; for an escaped ray, from the eye out of the scene."""
-    packet, one = rays.packets.shape[1] * LANES, np.float32(1.0)
+    """Write the queued visibility rays between hits and eyes; for an escaped ray, from the eye out of the scene.
+
+    Eyes see from the depth `cams.near` on, as where they look for hits of their own: rays end or start there.
+    """
+    packet, one, nothing = rays.packets.shape[1] * LANES, np.float32(1.0), np.float32(0.0)
+    near, f = np.float32(cams.near), cams.forward
     for ray in range(n, (n + LANES - 1) // LANES * LANES):
         rays.place[ray], rays.number[0, ray] = rays.place[n - 1], rays.number[0, n - 1]
     for first in range(0, n, LANES):
@@ -61,10 +69,18 @@ def _aim(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays, n: 
         put_lanes(rays.packets, at + ORIGIN * LANES, choose(surface, x, ox))
         put_lanes(rays.packets, at + (ORIGIN + 1) * LANES, choose(surface, y, oy))
         put_lanes(rays.packets, at + (ORIGIN + 2) * LANES, choose(surface, z, oz))
-        put_lanes(rays.packets, at + DIRECTION * LANES, choose(surface, ox - x, px))
-        put_lanes(rays.packets, at + (DIRECTION + 1) * LANES, choose(surface, oy - y, py))
-        put_lanes(rays.packets, at + (DIRECTION + 2) * LANES, choose(surface, oz - z, pz))
-        put_lanes(rays.packets, at + TFAR * LANES, choose(surface, one, np.float32(np.inf)))
+        dx, dy, dz = choose(surface, ox - x, px), choose(surface, oy - y, py), choose(surface, oz - z, pz)
+        put_lanes(rays.packets, at + DIRECTION * LANES, dx)
+        put_lanes(rays.packets, at + (DIRECTION + 1) * LANES, dy)
+        put_lanes(rays.packets, at + (DIRECTION + 2) * LANES, dz)
+        fx, fy, fz = triple(f, row + np.int32(first_eye))
+        along = dx * fx + dy * fy + dz * fz
+        depth = choose(surface, -along, along)
+        beyond = depth > near
+        share = near / choose(beyond, depth, one)
+        end = choose(beyond, one - EYE_END * share, -one)  # a hit that is too near is hidden
+        put_lanes(rays.packets, at + TNEAR * LANES, choose(surface, nothing, share))
+        put_lanes(rays.packets, at + TFAR * LANES, choose(surface, end, np.float32(np.inf)))
 
 
 @kernel
@@ -82,6 +98,8 @@ def _confirm(
             flat_pixel[rays.place[ray]] = OUTSIDE
             if density.size > 0:
                 flat_density[rays.place[ray]] = 0.0
+    for first in range(0, n, LANES):  # shadow rays take the same packets, and start at 0
+        put_lanes(rays.packets, (first >> 4) * rays.packets.shape[1] * LANES + TNEAR * LANES, np.float32(0.0))
 
 
 @kernel

@@ -67,6 +67,14 @@ def surfaces(scene: Scene) -> Surfaces:
     )
 
 
+def nearest(s: Surfaces) -> float:
+    """The depth from which on eyes see a scene: the largest ray offset, scene units.
+
+    An eye exactly on a surface sees nothing of it, whichever side float32 rounds it to.
+    """
+    return float(s.offset.max(initial=0.0))
+
+
 @inlined
 def _texel(s: Surfaces, texel: int, weight: Real) -> tuple[Real, Real, Real, Real]:
     """Linear red, green, blue, and alpha (0 to 255) of a texel, times a weight."""

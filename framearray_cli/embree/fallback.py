@@ -20,6 +20,7 @@ from .packets import (
     ORIGIN,
     RAY_ROWS,
     TFAR,
+    TNEAR,
     TRIANGLE,
     Tracer,
     U,
@@ -53,17 +54,22 @@ class EmbreexScene:
         """Drop embreex's scene."""
         self._scene = self._mesh = None
 
-    def first_hits(self, origins: Float32, directions: Float32, tfar: Float32) -> dict[str, Any]:
-        """Embreex's output for rays (n, 3), (n, 3), (n,): tfar, u, v, primID, Ng; cut-out hits passed over."""
+    def first_hits(self, origins: Float32, directions: Float32, tnear: Float32, tfar: Float32) -> dict[str, Any]:
+        """Embreex's output for rays (n, 3), (n, 3), (n,), (n,): tfar, u, v, primID, Ng.
+
+        What is nearer than tnear and what is cut out is passed over.
+        """
         out = dict(self._scene.run(origins, directions, tfar.copy(), query="INTERSECT", output=1))
-        if self._scene_has_masks:
-            self._pass_cut_outs(origins, directions, tfar, out)
+        if self._scene_has_masks or tnear.any():
+            self._pass_over(origins, directions, tnear, tfar, out)
         return out
 
-    def _pass_cut_outs(self, origins: Float32, directions: Float32, tfar: Float32, out: dict[str, Any]) -> None:
-        """Trace on behind every cut-out hit, until rays meet something solid or nothing."""
+    def _pass_over(
+        self, origins: Float32, directions: Float32, tnear: Float32, tfar: Float32, out: dict[str, Any]
+    ) -> None:
+        """Trace on behind every hit that does not count, until rays meet one that does, or nothing."""
         start = np.zeros(len(origins), np.float32)
-        todo = self._cut_out(out["primID"], out["u"], out["v"])
+        todo = self._ignored(out, tnear)
         for _ in range(_MAX_LAYERS):
             rays = np.flatnonzero(todo)
             if not len(rays):
@@ -71,7 +77,7 @@ class EmbreexScene:
             # a step past the layer: a few units in the last place of everything that made up its distance
             reach = np.abs(origins[rays]).max(axis=1) / np.maximum(np.abs(directions[rays]).max(axis=1), 1e-30)
             step = np.float32(4e-7) * (out["tfar"][rays] + start[rays] + reach)
-            start[rays] = out["tfar"][rays] + step
+            start[rays] = np.maximum(out["tfar"][rays] + step, tnear[rays])
             moved = origins[rays] + start[rays, None] * directions[rays]
             left = np.minimum(tfar[rays], _FAR) - start[rays]
             again = self._scene.run(
@@ -81,7 +87,11 @@ class EmbreexScene:
                 out[name][rays] = again[name]
             out["tfar"][rays] = again["tfar"] + start[rays]
             todo[:] = False
-            todo[rays] = self._cut_out(again["primID"], again["u"], again["v"])
+            todo[rays] = self._ignored({name: out[name][rays] for name in out}, tnear[rays])
+
+    def _ignored(self, out: dict[str, Any], tnear: Float32) -> Any:
+        """Which hits do not count."""
+        return ((out["primID"] >= 0) & (out["tfar"] < tnear)) | self._cut_out(out["primID"], out["u"], out["v"])
 
     def _cut_out(self, triangles: Int32, u: Float32, v: Float32) -> Any:
         cut = np.zeros(len(triangles), bool)
@@ -106,10 +116,11 @@ class EmbreexScene:
     def _occlude(self, n_packets: int, _scene: int, address: int, _unused: int) -> None:
         packets = _view(address, n_packets, RAY_ROWS)
         live, rays = _rays(packets)
-        if self._scene_has_masks:
+        origins, directions, tnear, tfar = rays
+        if self._scene_has_masks or tnear.any():
             blocked = self.first_hits(*rays)["primID"] >= 0
         else:
-            blocked = self._scene.run(rays[0], rays[1], rays[2].copy(), query="OCCLUDED") == 0
+            blocked = self._scene.run(origins, directions, tfar.copy(), query="OCCLUDED") == 0
         where = np.nonzero(live)
         tfar = packets[where[0], TFAR, where[1]]
         packets[where[0], TFAR, where[1]] = np.where(blocked, -np.inf, tfar)
@@ -120,10 +131,11 @@ def _view(address: int, n_packets: int, rows: int) -> Float32:
     return np.ctypeslib.as_array(block).reshape(n_packets, rows, LANES)
 
 
-def _rays(packets: Float32) -> tuple[Any, tuple[Float32, Float32, Float32]]:
+def _rays(packets: Float32) -> tuple[Any, tuple[Float32, Float32, Float32, Float32]]:
     """Lanes that are not idle, and their rays as embreex takes them."""
     live = packets[:, TFAR] >= 0  # (n_packets, 16)
     by_lane = packets.transpose(0, 2, 1)[live]
     origins = np.ascontiguousarray(by_lane[:, ORIGIN : ORIGIN + 3])
     directions = np.ascontiguousarray(by_lane[:, DIRECTION : DIRECTION + 3])
-    return live, (origins, directions, np.minimum(by_lane[:, TFAR], np.float32(_FAR)))
+    tfar = np.minimum(by_lane[:, TFAR], np.float32(_FAR))
+    return live, (origins, directions, np.ascontiguousarray(by_lane[:, TNEAR]), tfar)

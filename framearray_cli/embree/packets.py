@@ -19,7 +19,7 @@ from ..lanes import LANES, choose
 
 RAY_ROWS = 12
 HIT_ROWS = 24  # RTCRayHit16 needs 20 to 22 rows, by how Embree was built; the rest is padding to whole cache lines
-ORIGIN, DIRECTION, TFAR, MASK, NORMAL, U, V, TRIANGLE, GEOMETRY = 0, 4, 8, 9, 12, 15, 16, 17, 18
+ORIGIN, TNEAR, DIRECTION, TFAR, MASK, NORMAL, U, V, TRIANGLE, GEOMETRY = 0, 3, 4, 8, 9, 12, 15, 16, 17, 18
 
 MISS = -1
 OPAQUE, MASKED = 0, 1  # geometry numbers
@@ -82,7 +82,7 @@ def aligned(n_words: int) -> Float32:
 
 
 def empty_packets(n_packets: int, rows: int) -> Float32:
-    """Room for packets, (n, rows, 16) float32; tnear 0 and the mask of all rays are set for good."""
+    """Room for packets, (n, rows, 16) float32; tnear 0 and the mask of all rays are set."""
     packets = aligned(n_packets * rows * LANES).reshape(n_packets, rows, LANES)
     packets.view(np.int32)[:, MASK] = ALL_RAYS
     return packets
@@ -90,7 +90,7 @@ def empty_packets(n_packets: int, rows: int) -> Float32:
 
 @inlined
 def set_ray(packets: Float32, i: int, ox: Real, oy: Real, oz: Real, dx: Real, dy: Real, dz: Real, tfar: Real) -> None:
-    """Write ray i of a packet array; it reaches from its origin (tnear 0) to tfar, in lengths of the direction."""
+    """Write ray i of a packet array; it reaches from its origin to tfar, in lengths of the direction."""
     p, lane = i >> 4, i & 15
     packets[p, ORIGIN, lane] = ox
     packets[p, ORIGIN + 1, lane] = oy
@@ -111,10 +111,11 @@ def _idle_from(packets: Float32, n_rays: int) -> int:
 
 
 @kernel
-def intersect(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = False) -> None:
+def intersect(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = False, near: float = 0.0) -> None:
     """Find the first hits of rays 0 to n_rays - 1; see `hit_triangle`.
 
     Args:
+        near: what is nearer is passed over, in lengths of the directions.
         coherent: the rays of a packet run close together: Embree then keeps them together, which halves the time of
             shadow rays and takes a fifth of that of eye rays. For rays that scatter it gains nothing.
     """
@@ -122,6 +123,7 @@ def intersect(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = Fa
     bits = packets.view(np.int32)
     for p in range(n_packets):
         for lane in range(LANES):
+            packets[p, TNEAR, lane] = near
             bits[p, TRIANGLE, lane] = MISS
             bits[p, GEOMETRY, lane] = MISS
     _trace(tracer, tracer.intersect, packets, n_packets, coherent)

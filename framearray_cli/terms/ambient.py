@@ -124,7 +124,7 @@ def start_at_eyes(
         walkers.walk[i] = i
         for channel in range(3):
             walkers.throughput[i, channel] = 1.0
-    intersect(tracer, packets, n, False)
+    intersect(tracer, packets, n, False, cams.near)
     record_hits(surfaces, tracer, packets, n, True, hits)
 
 

@@ -43,14 +43,16 @@ def fill(packets: Any, origins: Any, dirs: Any, far: Any) -> None:
     packets[:] = flat.reshape(len(packets), LANES, -1).transpose(0, 2, 1)
 
 
-def first_hits(scene: EmbreeScene, origins: Any, dirs: Any, far: Any = np.inf, coherent: bool = False) -> Any:
+def first_hits(
+    scene: EmbreeScene, origins: Any, dirs: Any, far: Any = np.inf, coherent: bool = False, near: float = 0.0
+) -> Any:
     """(n, 4) float64: triangle or -1, t, u, v of each ray."""
     packets = empty_packets(-(-min(len(origins), CHUNK) // LANES), HIT_ROWS)
     far, found = np.broadcast_to(far, len(origins)), []
     for i in range(0, len(origins), CHUNK):
         n = len(origins[i : i + CHUNK])
         fill(packets, origins[i : i + CHUNK], dirs[i : i + CHUNK], far[i : i + CHUNK])
-        intersect(scene.tracer, packets, n, coherent)
+        intersect(scene.tracer, packets, n, coherent, near)
         rows = packets.transpose(0, 2, 1).reshape(-1, HIT_ROWS)[:n]
         bits = np.ascontiguousarray(rows).view(np.int32)
         triangle = bits[:, TRIANGLE] + scene.tracer.first_masked * (bits[:, GEOMETRY] == MASKED)
@@ -204,6 +206,36 @@ def test_opaque_and_masked_triangles_of_one_scene() -> None:
             assert (hits[:, 0] >= 2).tolist() == [True, False, False]  # fence, wall through the hole, wall
             assert hits[:, 1] == pytest.approx([5, 6, 6], rel=1e-6)
             assert blocked(opened, origins, dirs, 5.5).tolist() == [True, False, False]
+
+
+@pytest.mark.parametrize("engine", ["packets", "embreex"])
+def test_what_is_nearer_than_asked_for_is_passed_over(engine: Any) -> None:
+    """Three sheets one behind the other, the first of them where rays start."""
+    sheets = [tiny.quad((-1, -1, z), (1, -1, z), (1, 1, z), (-1, 1, z)) for z in (0.0, -1.0, -2.0)]
+    scene = tiny.scene_of(np.concatenate(sheets))
+    origins = np.tile(np.float32([0.2, 0.3, 1.0]), (20, 1))  # centred: the first sheet is at z = 1
+    dirs = np.tile(np.float32([0, 0, -1]), (20, 1))
+    with EmbreeScene(scene, engine) as opened:
+        for near, found in ((1e-5, 1), (0.999, 1), (1.001, 2)):
+            assert first_hits(opened, origins, dirs, near=near)[:, 1] == pytest.approx(np.full(20, found), rel=1e-6)
+        assert (first_hits(opened, origins, dirs, near=2.5)[:, 0] == MISS).all()
+        assert (first_hits(opened, origins, dirs, 1.5, near=1.2)[:, 0] == MISS).all()
+        # a later call of the same room for rays asks for nothing, and gets all
+        assert first_hits(opened, origins + np.float32([0, 0, 0.5]), dirs)[:, 1] == pytest.approx(0.5, rel=1e-6)
+
+
+@pytest.mark.parametrize("masked", [False, True])
+def test_both_engines_pass_over_the_same(masked: bool) -> None:
+    scene = litter(3_000, texture=0, **({"alpha_texture": 0, "alpha_cutoff": 0.5} if masked else {}))
+    origins, dirs, far = random_rays(scene, 4_000)
+    with EmbreeScene(scene, "packets") as a, EmbreeScene(scene, "embreex") as b:
+        one, other = (first_hits(engine, origins, dirs, far, near=0.7) for engine in (a, b))
+        usual = first_hits(a, origins, dirs, far)
+    assert (one[:, 0] != other[:, 0]).sum() <= 4  # where triangles meet at an edge, or a mask at a texel's
+    assert (one[one[:, 0] >= 0, 1] >= 0.7).all()
+    assert (usual[usual[:, 0] >= 0, 1] < 0.7).sum() > 100  # there was something to pass over
+    same = usual[:, 1] >= 0.7
+    np.testing.assert_array_equal(one[same], usual[same])
 
 
 @pytest.mark.parametrize("engine", ["packets", "embreex"])

@@ -531,7 +531,7 @@ def two_eyes() -> Cameras:
     """One that looks along -z, one that is turned; 8 pixels of focal length, 24 x 18 pixels."""
     turned, _ = np.linalg.qr(np.random.default_rng(11).normal(size=(3, 3)))
     right, up, forward = (np.float32([e, q]) for e, q in zip(np.diag([1, 1, -1]), turned, strict=True))
-    return Cameras(np.zeros((2, 3), np.float32), right, up, forward, 8.0, 24, 18)
+    return Cameras(np.zeros((2, 3), np.float32), right, up, forward, 8.0, 24, 18, 0.0)
 
 
 def test_lanes_on_borders_of_pixels_are_seen_where_numbers_are() -> None:
