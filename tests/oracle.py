@@ -129,7 +129,8 @@ class Oracle:
                 way = np.broadcast_to(-source.vector[l], hits.position.shape)
                 cosine, far = dot(hits.shading, way), np.inf
             lit = np.flatnonzero(hits.surface & (cosine > 0) & (dot(hits.geometric, way) > 0))
-            lit = lit[~self.model.blocked(hits.start[lit], way[lit], far)]
+            aim = way - (hits.start - hits.position) if source.kind == "point" else way
+            lit = lit[~self.model.blocked(hits.start[lit], aim[lit], far)]
             result[lit] += cosine[lit, None] * source.intensity[l]
         return result
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..arrays import Float32, Real, Triple
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude
-from ..hits import Hits, ray_origin, reflect, reflects, triple
+from ..hits import Hits, lift, ray_origin, reflect, reflects, triple
 from ..kernel import inlined, kernel
 from ..lanes import LANES, bits, choose, compress, count, lane_numbers, lanes_at, lowest, put_lanes, root, triples_at
 from ..lights import DIRECTIONAL, LightArrays
@@ -66,10 +66,16 @@ def look(hits: Hits, i: int, lights: LightArrays, s: int, row: Float32, value: F
 
 @inlined
 def _queue(
-    lights: LightArrays, s: int, l: int, x: Real, y: Real, z: Real, factor: Real, origin: Triple, place: int,
-    rays: Rays, waiting: int, channels: int,
+    lights: LightArrays, s: int, l: int, x: Real, y: Real, z: Real, factor: Real, origin: Triple, up: Triple,
+    place: int, rays: Rays, waiting: int, channels: int,
 ) -> None:  # fmt: skip
-    """Append rays to light positions l to l + 15; what comes next replaces those that do not count."""
+    """Append rays to light positions l to l + 15; what comes next replaces those that do not count.
+
+    They start by the vector `up` above the hit; those to a point aim at it from there, else they would end as far
+    beyond it, and a wall that it is on would hide it.
+    """
+    if lights.kind[s] != DIRECTIONAL:
+        x, y, z = x - up[0], y - up[1], z - up[2]
     n_lights, room, row = lights.lit.shape[1], rays.row.shape[1], rays.row
     put_lanes(row, FROM * room + waiting, origin[0])
     put_lanes(row, (FROM + 1) * room + waiting, origin[1])
@@ -116,7 +122,7 @@ def _of_few(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays,
         at, wanted = lane_numbers() + np.int32(i), reflect(hits, i, n)
         p, g, m = triples_at(hits.position, i), triples_at(hits.geometric, i), triples_at(hits.shading, i)
         e = lanes_at(hits.offset, i)
-        origin = (p[0] + e * g[0], p[1] + e * g[1], p[2] + e * g[2])
+        up = (e * g[0], e * g[1], e * g[2])
         for s in range(lights.kind.shape[0]):
             for l in range(n_lights):
                 if waiting > capacity - LANES:
@@ -125,10 +131,10 @@ def _of_few(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays,
                 a, lit = lights.vector, lights.lit[s, l]
                 x, y, z, factor = _facing(lights.kind[s], a[s, 0, l], a[s, 1, l], a[s, 2, l], p, g, m, lit)
                 traced = wanted & (factor > np.float32(0.0))
-                to = (x, y, z)
+                to, from_point = (x, y, z), np.float32(0.0 if lights.kind[s] == DIRECTIONAL else 1.0)
                 for axis in range(3):
-                    compress(traced, origin[axis], row, (FROM + axis) * room + waiting)
-                    compress(traced, to[axis], row, (TO + axis) * room + waiting)
+                    compress(traced, p[axis] + up[axis], row, (FROM + axis) * room + waiting)
+                    compress(traced, to[axis] - from_point * up[axis], row, (TO + axis) * room + waiting)
                 put_lanes(row, REACH * room + waiting, np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END)
                 compress(traced, at * np.int32(channels * n_lights) + np.int32(l), rays.place, waiting)
                 for channel in range(channels):
@@ -148,7 +154,7 @@ def _of_many(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays
     for i in range(n):
         if not reflects(hits, i):
             continue
-        origin, place = ray_origin(hits, i), i * channels * n_lights
+        origin, up, place = ray_origin(hits, i), lift(hits, i), i * channels * n_lights
         for s in range(lights.kind.shape[0]):
             for l in range(0, n_lights, LANES):
                 x, y, z, factor = _look(hits, i, lights, s, l)
@@ -158,14 +164,14 @@ def _of_many(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays
                         _settle(tracer, rays, waiting, irradiance)
                         total, waiting = total + waiting, 0
                     if lit == ALL:
-                        _queue(lights, s, l, x, y, z, factor, origin, place, rays, waiting, channels)
+                        _queue(lights, s, l, x, y, z, factor, origin, up, place, rays, waiting, channels)
                         waiting, lit = waiting + LANES, 0
                         continue
                     start = lowest(lit)  # one run of positions after another
                     m = lowest(~(lit >> start))
                     if start > 0:
                         x, y, z, factor = _look(hits, i, lights, s, l + start)
-                    _queue(lights, s, l + start, x, y, z, factor, origin, place, rays, waiting, channels)
+                    _queue(lights, s, l + start, x, y, z, factor, origin, up, place, rays, waiting, channels)
                     waiting += m
                     lit &= ~(((1 << m) - 1) << start)
     _settle(tracer, rays, waiting, irradiance)

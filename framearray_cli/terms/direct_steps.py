@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays import Float32, Int32
 from ..embree.packets import Tracer, is_blocked, occlude, set_ray
-from ..hits import Hits, ray_origin, reflects
+from ..hits import Hits, lift, ray_origin, reflects
 from ..kernel import inlined, kernel
 from ..lanes import LANES
 from ..lights import DIRECTIONAL, LightArrays
@@ -95,8 +95,8 @@ def _aim(hits: Hits, first: int, lights: LightArrays, s: int, place: int, rays: 
     if lights.kind[s] == DIRECTIONAL:
         set_ray(rays.packets, waiting, ox, oy, oz, -x, -y, -z, np.float32(np.inf))
     else:
-        p = hits.position
-        x, y, z = x - p[first + b, 0], y - p[first + b, 1], z - p[first + b, 2]
+        p, (ux, uy, uz) = hits.position, lift(hits, first + b)
+        x, y, z = x - p[first + b, 0] - ux, y - p[first + b, 1] - uy, z - p[first + b, 2] - uz
         set_ray(rays.packets, waiting, ox, oy, oz, x, y, z, FAR_END)
     rays.place[waiting] = place
 
@@ -129,6 +129,9 @@ def _test_every(
         if room.in_front[b] == 0:
             continue
         ox, oy, oz = ray_origin(hits, first + b)
+        ux, uy, uz = lift(hits, first + b)
+        if lights.kind[s] == DIRECTIONAL:
+            ux, uy, uz = np.float32(0.0), np.float32(0.0), np.float32(0.0)
         phase = np.int64(word(hits.key[first + b], STEPS) % np.uint64(step))
         l = 0
         while l < n_lights:
@@ -141,7 +144,8 @@ def _test_every(
                 if waiting == capacity:
                     _learn(tracer, rays, waiting, room.visible)
                     total, waiting = total + waiting, 0
-                set_ray(rays.packets, waiting, ox, oy, oz, row[TO, l], row[TO + 1, l], row[TO + 2, l], reach)
+                x, y, z = row[TO, l] - ux, row[TO + 1, l] - uy, row[TO + 2, l] - uz
+                set_ray(rays.packets, waiting, ox, oy, oz, x, y, z, reach)
                 rays.place[waiting] = b * n_lights + l
                 waiting += 1
                 if l == last:
