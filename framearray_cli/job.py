@@ -134,6 +134,16 @@ class ObscuranceTable(Table):
         description="Distance d_max beyond which a surface no longer obscures another, in scene units. "
         "About half the height of a room is a good start.",
     )
+
+    @field_validator("range", mode="before")
+    @classmethod
+    def _compares(cls, value: object) -> object:
+        if isinstance(value, int | float) and not isinstance(value, bool) and value == 0:
+            fail([((), f"expected a number above 0, got {shown(value)}: nothing is within it")])
+        if isinstance(value, float) and not math.isfinite(value):
+            fail([((), f"expected a finite number above 0, got {shown(value)}: distances are measured against it")])
+        return value
+
     falloff: Literal["sqrt", "linear", "cbrt", "exponential", "constant"] = Field(
         default="sqrt",
         description="How the openness rho rises from 0 at distance 0 to 1 at `range`. "

@@ -158,3 +158,23 @@ def test_our_own_mistakes_keep_their_traceback(tmp_path, monkeypatch):
 
     with pytest.raises(ZeroDivisionError):
         main(["render", str(write_job(tmp_path))])
+
+
+@pytest.mark.parametrize("command", ["render", "check"])
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (0, "expected a number above 0, got 0: nothing is within it"),
+        (-0.0, "expected a number above 0, got -0.0: nothing is within it"),
+        (float("inf"), "expected a finite number above 0, got inf: distances are measured against it"),
+        (float("nan"), "expected a finite number above 0, got nan: distances are measured against it"),
+        (-1.5, "expected a number above 0, got -1.5"),
+    ],
+)
+def test_a_range_in_which_obscurances_mean_nothing(command, value, message, tmp_path, capsys):
+    """W of a range of 0 would be empty, and of an infinite one undefined: d / d_max."""
+    job = write_job(tmp_path, obscurance={"range": value})
+    told = run(capsys, command, job)
+    assert (told.code, told.out) == (2, "")
+    assert told.err.splitlines() == [f"{job}: obscurance.range: {message}", "1 problem; nothing was rendered."]
+    assert names(tmp_path) == {"job.toml", "tiny.glb"}
