@@ -48,6 +48,34 @@ def test_differing_finds_what_differs_and_nothing_else() -> None:
     assert ztests.differing(np.zeros((5, 1)), np.ones((5, 1)))[0] > 1e4  # values without any spread
 
 
+def test_off_finds_wrong_means_and_nothing_else() -> None:
+    a = np.random.default_rng(2).normal(size=(20, 300))
+    right = np.zeros(300)
+    assert ztests.off(a, right).max() < 1
+    right[7] = 3.0
+    assert (ztests.off(a, right) > 1).nonzero()[0].tolist() == [7]
+    assert ztests.off(np.zeros((5, 1)), np.ones(1))[0] > 1e4
+
+
+@pytest.mark.parametrize("test", ["off", "differing"])
+def test_pixel_tests_are_as_strict_as_they_say(test: str) -> None:
+    """Of 400 families of 50 values each that nothing is wrong with, about CHANCE = 1 in 370 may fail: at most 6.
+
+    More have a chance of 1e-3 (Poisson). A test that is too strict, or that lets too much pass, shows in half of it:
+    the largest of 50 deviations is beyond half of what is allowed in more than a tenth of all families.
+    """
+    rng = np.random.default_rng(3)
+    a, b = rng.normal(size=(2, 400, 40, 50))
+    worst = np.array(
+        [
+            ztests.off(x, np.zeros(50)).max() if test == "off" else ztests.differing(x, y).max()
+            for x, y in zip(a, b, strict=True)
+        ]
+    )
+    assert (worst > 1).sum() <= 6
+    assert 0.1 < (worst > 0.5).mean() < 0.99
+
+
 def test_z_of_an_estimate_without_error() -> None:
     sure = ztests.estimate(np.ones(10))
     assert sure.z(1.0) == 0

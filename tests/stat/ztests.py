@@ -70,6 +70,21 @@ def differing(a: Array, b: Array, rounding: float = 1e-6) -> Array:
     return np.divide(off, allowed * error, out=np.where(off > 0, np.inf, 0.0), where=error > 0)
 
 
+def off(a: Array, right: Array, rounding: float = 1e-6) -> Array:
+    """Which columns of runs a (n, values) have another mean than `right` (values,): Student's test, Sidak's correction.
+
+    Args:
+        rounding: relative error of the right values, added to the standard errors.
+
+    Returns:
+        (values,) how many times the allowed deviation each difference is; above 1 it is significant.
+    """
+    error = a.std(axis=0, ddof=1) / math.sqrt(len(a)) + rounding * np.abs(right)
+    far = np.abs(a.mean(axis=0) - right)
+    allowed = float(t.ppf(1 - sidak(far.size) / 2, len(a) - 1))
+    return np.divide(far, allowed * error, out=np.where(far > 0, np.inf, 0.0), where=error > 0)
+
+
 def chi2_bounds(freedom: int) -> tuple[float, float]:
     """Between which values a sum of `freedom` squared standard deviations stays, but for `CHANCE`."""
     low, high = chi2.ppf([CHANCE / 2, 1 - CHANCE / 2], freedom)

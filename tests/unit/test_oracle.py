@@ -66,6 +66,8 @@ NO_REUSE: dict[str, dict[str, Any]] = {
     "constant": {"obscurance": {"falloff": "constant"}},
     "a short range": {"obscurance": {"range": 0.2}},
     "a range beyond the room": {"obscurance": {"range": 50.0}},
+    "a view of a degree": {"camera": {"fov": 1.0}},
+    "a view of 170 degrees": {"camera": {"fov": 170.0}, "scene": SKY},
 }
 
 
@@ -128,6 +130,29 @@ REUSE: dict[str, dict[str, Any]] = {
                 {"frame": 2, "eye": [0.4, 1.4, 1.5], "target": [0, 0.9, -1]},
                 {"frame": 3, "eye": [0.4, 1.4, 1.5], "target": [0, 0.9, -1]},
                 {"frame": 4, "eye": [0.5, 1.4, 1.2], "target": [0, 0.8, -1]},
+            ],
+        },
+        "reuse": {"n_r": 2},
+    },
+    "past things that are then behind": {
+        "camera": {
+            "frames": 5,
+            "fov": 120.0,
+            "keys": [
+                {"frame": 0, "eye": [0.1, 1.2, 1.8], "target": [0.1, 1.1, -3.0]},
+                {"frame": 4, "eye": [0.1, 1.2, -1.0], "target": [0.1, 1.1, -3.0]},
+            ],
+        },
+        "reuse": {"n_r": 2},
+    },
+    "round about, a third of a turn a frame": {
+        "camera": {
+            "frames": 4,
+            "keys": [
+                {"frame": 0, "eye": [0.2, 1.3, 1.2], "target": [0.2, 1.2, -1.0]},
+                {"frame": 1, "eye": [0.2, 1.3, 1.1], "target": [2.2, 1.2, 2.2]},
+                {"frame": 2, "eye": [0.2, 1.3, 1.0], "target": [-2.2, 1.2, 2.2]},
+                {"frame": 3, "eye": [0.2, 1.3, 0.9], "target": [0.2, 1.2, -1.0]},
             ],
         },
         "reuse": {"n_r": 2},

@@ -97,13 +97,3 @@ def test_a_pixel_that_nobody_reaches_gets_a_hit() -> None:
         assert (frame.hits >= 1).all() and frame.hits.mean() < 1.5
         # where alone an outer hit on a mirror's edge falls, nothing is seen: a pixel or two of 432
         assert (frame.images.max(axis=(0, 3)) == 0).sum() <= 2
-
-
-def test_sparse_hits_and_a_wide_window_show_the_same_scene() -> None:
-    walk = dict(tiny.WALK)
-    images = [
-        tiny.render_frames(tiny.prepared(tiny.job(samples={"hits": hits}, camera=walk, reuse={"n_r": n_r}))).images
-        for hits, n_r in ((16, 0), (0.5, 5))
-    ]
-    means = [image.mean(axis=(2, 3)) for image in images]
-    np.testing.assert_allclose(means[1], means[0], rtol=0.05)  # the mean of 432 pixels; their noise is below 2 %
