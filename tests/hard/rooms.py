@@ -1,31 +1,23 @@
-"""Closed rooms that are hard to trace, and counting what light does in them that it must not do.
+"""Closed rooms that are hard to trace.
 
-Every room is convex and closed: from inside, a lamp inside reaches every point of the walls, and a lamp outside none.
-So each shadow ray has a known answer, and wrong ones are counted instead of looked for in pictures.
+Every room is convex and closed: from inside, all of it is in sight, and nothing outside is. So each ray has a known
+answer; `counting.py` counts the wrong ones.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import tiny
-
-from framearray_cli.embree import EmbreeScene
-from framearray_cli.embree.packets import intersect, set_ray
-from framearray_cli.hits import SURFACE, Hits, empty_hits, record_hits
-from framearray_cli.kernel import kernel
-from framearray_cli.lights import light_arrays
-from framearray_cli.paths import LightPath, Lights
-from framearray_cli.rays import room_for_hits, room_for_tests
-from framearray_cli.surface import surfaces
-from framearray_cli.terms.direct import direct
 
 # Turns no wall into a coordinate plane, where float32 would be exact.
 TURN = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
 # Lamps inside, in a room from -1 to 1: at the middle, and near walls, edges and corners.
 INSIDE = np.array([[0, 0, 0], [0.3, -0.6, 0.2], [0.99, 0.1, 0], [-0.98, 0.98, 0.1], [0.97, -0.97, 0.97]])
 OUTSIDE = np.array([[1.5, 0.2, 0.1], [0, 4, 1], [-2, -2, 2], [0.1, 0.2, -1.01], [30, -20, 10]])
+
+
+TIP = np.tan(np.radians(0.5))  # half the slope of the wedge
 
 
 def plain() -> Any:
@@ -101,7 +93,7 @@ def broken() -> Any:
 
 def wedge() -> Any:
     """A room that ends in an edge of one degree, where walls come nearer to each other than rays start above them."""
-    h = np.tan(np.radians(0.5))
+    h = TIP
     near, far = [(-1, 0, z) for z in (-1, 1)], [(1, y, z) for y in (-2 * h, 2 * h) for z in (-1, 1)]
     (a, b), (c, d, e, f) = near, far
     sides = [np.array([[a, c, e]], np.float64), np.array([[b, d, f]], np.float64)]
@@ -129,58 +121,29 @@ ROOMS: dict[str, Callable[[], Any]] = {
 # Where rooms are not as wide as the lamps above suppose: what the lamps' coordinates are multiplied with.
 WIDTH = {"wedge": np.array([1, 0.0, 1]), "ball": np.array([0.55, 0.55, 0.55])}
 
-
-@dataclass(frozen=True)
-class Count:
-    """Shadow rays whose answer is known, and how many of them gave the other one."""
-
-    rays: int
-    wrong: int
-
-
-@kernel
-def _shoot(origin: Any, way: Any, packets: Any) -> None:
-    for i in range(way.shape[0]):
-        set_ray(packets, i, origin[0], origin[1], origin[2], way[i, 0], way[i, 1], way[i, 2], np.float32(np.inf))
+# Points exactly on walls, edges and corners of a room.
+BOX_WALLS = [(1, 0.3, -0.2), (-0.7, 1, 0.4), (1, 1, 0.3), (1, -1, 1)]
+ON_WALLS: dict[str, list[Any]] = {name: BOX_WALLS for name in ROOMS} | {
+    "wedge": [(1, 0.3 * TIP, 0.2), (0.5, 1.5 * TIP, -0.4), (1, 2 * TIP, 1), (-1, 0, 0.2)],
+    "ball": [ball()[0].mean(axis=0), ball()[5000, :2].mean(axis=0), ball()[12000, 0], (1, 0, 0)],
+}
 
 
-def count(name: str, *, size: float = 1.0, at: Any = (0.0, 0.0, 0.0), n: int = 16384) -> tuple[Count, Count]:
-    """Leaks (from lamps outside) and false shadows (of lamps inside), on points that are seen from inside.
-
-    Args:
-        size: what all lengths are multiplied with.
-        at: where the middle of the room is.
-    """
-    at, width = np.asarray(at, np.float64), WIDTH.get(name, np.ones(3))
-
-    def placed(points: Any) -> Any:
-        with np.errstate(invalid="ignore"):  # one room has corners that are no numbers
-            return size * (points @ TURN) + at
-
-    scene = tiny.scene_of(placed(ROOMS[name]()))
-    eye = np.asarray(placed(np.array([0.11, 0.0, -0.17])) - scene.centre, np.float32)
-    with EmbreeScene(scene) as embree:
-        hits = _seen(scene, embree, eye, n)
-        leaks = _lit(hits, embree, placed(OUTSIDE), scene.centre, size)
-        lit = _lit(hits, embree, placed(INSIDE * width), scene.centre, size)
-    return Count(leaks.size, int(leaks.sum())), Count(lit.size, int((~lit).sum()))
+def planes(name: str) -> tuple[Any, Any]:
+    """Unit normals (n, 3) outwards, and distances (n,) from the middle, of the planes that a room lies between."""
+    box = np.concatenate([np.eye(3), -np.eye(3)])
+    if name == "ball":
+        return _planes_of(ball())
+    if name == "wedge":
+        slopes = np.array([[-TIP, 1, 0], [-TIP, -1, 0]]) * np.cos(np.radians(0.5))
+        return np.concatenate([box[[0, 2, 5]], slopes]), np.array([1, 1, 1, *(-slopes[:, 0])])
+    return box, np.ones(6)
 
 
-def _seen(scene: Any, embree: EmbreeScene, eye: Any, n: int) -> Hits:
-    """What n rays in all directions meet: it must be a wall, whatever the direction."""
-    way = np.random.default_rng(3).normal(size=(n, 3)).astype(np.float32)
-    packets, hits = room_for_hits(n).packets, empty_hits(n)
-    _shoot(eye, way, packets)
-    intersect(embree.tracer, packets, n)
-    record_hits(surfaces(scene), embree.tracer, packets, n, False, hits)
-    assert (hits.kind == SURFACE).all(), "a ray left a closed room"
-    return hits
-
-
-def _lit(hits: Hits, embree: EmbreeScene, lamps: Any, centre: Any, size: float) -> Any:
-    """(n_hits, n_lamps) which lamps reach which hits; those behind the surface do not count as shadows."""
-    power = np.full((len(lamps), 3), size**2)
-    lights = light_arrays(Lights(sources=(LightPath(kind="point", vector=lamps, intensity=power),)), centre)
-    out = np.empty((len(hits.kind), 1, len(lamps)), np.float32)
-    direct(hits, len(hits.kind), lights, embree.tracer, room_for_tests(4096, len(lamps)), out)
-    return out[:, 0] > 0
+def _planes_of(corners: Any) -> tuple[Any, Any]:
+    """Those of the triangles of a convex body about the middle."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1)
+    normal, corner = normal[length > 1e-12] / length[length > 1e-12, None], corners[length > 1e-12, 0]
+    distance = (normal * corner).sum(axis=1)
+    return normal * np.sign(distance)[:, None], abs(distance)

@@ -170,9 +170,11 @@ def without_ambient(job: Any) -> Any:
 @pytest.mark.parametrize(
     ("eye", "target", "lit"),
     [
-        ((0.8, 0.9, -0.7), (0.8, 0.0, -0.7), True),  # on the box, looking down along up: at the face that it is on
-        ((0.8, 0.9, -0.7), (0.8, 2.0, -0.7), False),  # on the box, looking up: at the back of the face that it is on
-        ((0.8, 0.9001, -0.7), (0.8, 2.0, -0.7), True),  # a tenth of a millimetre above it
+        ((0.8, 0.9, -0.7), (0.8, 2.0, -0.7), True),  # on the box, looking up along up
+        ((0.8, 0.9, -0.7), (0.8, 0.0, -0.7), False),  # on the box, looking down: into it
+        ((0.8, 0.9001, -0.7), (0.8, 0.0, -0.7), True),  # a tenth of a millimetre above it: at its face
+        ((-2.0, 1.0, 0.5), (1.0, 1.0, 0.5), False),  # on a wall, behind the mirror before it
+        ((-2.0, 0.0, 2.0), (0.0, 1.0, 0.0), True),  # in a corner of the room
         ((-1.95, 1.0, 0.0), (1.0, 1.0, 0.0), False),  # between a wall and a mirror that stands before it
         ((0.8, 0.5, -0.7), (0.8, 0.5, 3.0), False),  # inside the closed box
         ((0.2, 1.3, 1.7), (0.2, -1.0, 1.7), True),  # straight down, with the up of a still camera
@@ -185,20 +187,37 @@ def test_eyes_where_no_eye_should_be(eye: Any, target: Any, lit: bool) -> None:
     assert (images.mean() > 0.01) == lit
 
 
-def test_two_equal_eyes_in_a_row() -> None:
-    """A camera that stops: equal eyes share all their hits, and their pictures come to the same."""
-    keys = [
-        {"frame": 0, "eye": [0.2, 1.3, 1.7], "target": [-0.1, 0.9, -1.0]},
-        {"frame": 2, "eye": [0.3, 1.3, 1.5], "target": [-0.1, 0.9, -1.0]},
-        {"frame": 4, "eye": [0.3, 1.3, 1.5], "target": [-0.1, 0.9, -1.0]},
-        {"frame": 6, "eye": [0.4, 1.3, 1.4], "target": [-0.1, 0.9, -1.0]},
-    ]
-    for weights in ("average", "balance"):
-        job = tiny.job(camera=SMALL | {"keys": keys, "frames": 7}, reuse={"n_r": 1, "weights": weights})
-        images = pictures(job, tiny.room(mirrors=False))
-        # frames 3 and 4 are equal; of their windows, two of three eyes are the same
-        apart = np.sqrt(((images[3] - images[4]) ** 2).mean())
-        assert apart < np.sqrt(((images[3] - images[6]) ** 2).mean())
+def test_an_eye_inside_a_thick_wall_sees_black() -> None:
+    """Between the two faces of a wall there is no light, and its picture is all there."""
+    shell = np.concatenate([tiny.box((-2, 0, -2), (2, 2.5, 2)), tiny.box((-2.3, -0.3, -2.3), (2.3, 2.8, 2.3))])
+    scene = tiny.scene_of(shell, Material(name="Grey", reflectivity=(0.6, 0.6, 0.6)))
+    key = {"frame": 0, "eye": [-2.15, 1.0, 0.0], "target": [1.0, 1.0, 0.0]}
+    job = without_ambient(tiny.job(camera=SMALL | {"keys": [key], "frames": 1}))
+    assert not pictures(job, scene).any()
+    inside = {"frame": 0, "eye": [-1.95, 1.0, 0.0], "target": [1.0, 1.0, 0.0]}
+    job = without_ambient(tiny.job(camera=SMALL | {"keys": [inside], "frames": 1}))
+    assert pictures(job, scene).mean() > 0.01
+
+
+@pytest.mark.parametrize("n_r", [0, 2])
+def test_an_eye_on_the_floor_sees_the_room_as_one_just_above_it(n_r: int) -> None:
+    """A camera that glides over the floor, exactly on it: above the horizon nothing is hidden by the floor itself."""
+
+    def walk_at(height: float) -> Any:
+        keys = [
+            {"frame": 0, "eye": [0.2, height, 1.7], "target": [-0.1, 0.4 + height, -1.0]},
+            {"frame": 4, "eye": [0.3, height, 1.5], "target": [-0.1, 0.4 + height, -1.0]},
+        ]
+        job = tiny.job(camera=SMALL | {"keys": keys, "frames": 5}, reuse={"n_r": n_r})
+        return without_ambient(job)
+
+    room = tiny.room()
+    on, above = pictures(walk_at(0.0), room), pictures(walk_at(1e-4), room)
+    upper = np.s_[:, :, :36]  # the eye looks up a little: all of the image's upper half is above the horizon
+    assert above[upper].mean() > 0.01
+    assert differing(on[upper], above[upper]) < FLIPPED
+    fallback = tiny.render_frames(tiny.prepared(walk_at(0.0), room), engine="embreex").images
+    assert differing(fallback, on) < FLIPPED
 
 
 def test_facing_mirrors_end() -> None:
