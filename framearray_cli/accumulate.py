@@ -9,7 +9,7 @@ from .arrays import Addresses, Float32, Float64, Int32, Real, Rgb
 from .compose import INVERSE_PI, MOST, Band, Stored, finish
 from .kernel import inlined, integer_at, kernel, prefetch, real_at
 from .lanes import LANES, lane_numbers, lanes_at, lanes_from, put_lanes, reals
-from .work import HALF, INDIRECT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, Placed, Records, lit_bit
+from .work import BY_SAMPLE, HALF, INDIRECT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, Placed, Records, lit_bit
 
 # Columns of a list of sources: addresses of arrays, 0 for one that is empty.
 START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE = range(7)
@@ -208,9 +208,6 @@ def compose_pixels(
             bad_light, bad_pixel = l, pixel
         bad, beyond = bad + found, beyond + large
     return bad, bad_light, bad_pixel, beyond
-
-
-BY_SAMPLE = -1
 
 
 @kernel

@@ -19,7 +19,7 @@ from .plan import Pass, passes
 from .reuse import balance_weights, outer_hits
 from .sampling import HOLE_SAMPLE
 from .shading import estimate_terms
-from .work import Placed, Records, Work, empty_records, joined, placed_by_pixel
+from .work import BY_SAMPLE, Placed, Records, Work, empty_records, joined, placed_by_pixel
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -114,7 +114,7 @@ def fill_holes(work: Work, c: int, pixels: Int32, crew: Crew) -> list[tuple[Plac
         m = min(crew.batch, n - first)
         extra_hits(
             work.cams, c, work.seed, pixels, HOLE_SAMPLE, 1, first, m, work.surfaces, work.tracer,
-            scratch.hit_rays.packets, scratch.hits, work.halves_by_sample,
+            scratch.hit_rays.packets, scratch.hits,
         )  # fmt: skip
         scratch.rays["native"] += m
         estimate_terms(work, scratch.hits, m, scratch, records.part(slice(first, first + m)), "obscurance", "shadow")
@@ -132,7 +132,7 @@ def _native(work: Work, c: int, part: Pass, first: int, n: int, scratch: Scratch
     started = perf_counter()
     native_hits(
         work.cams, c, work.seed, part.pixels, part.per_pixel, part.first_sample, first, n, work.surfaces, work.tracer,
-        work.depth > 0, scratch.hit_rays.packets, scratch.hits, work.halves_by_sample,
+        work.depth > 0, scratch.hit_rays.packets, scratch.hits, work.halves == BY_SAMPLE,
     )  # fmt: skip
     scratch.rays["native"] += n
     scratch.seconds["native"] += perf_counter() - started

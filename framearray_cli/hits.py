@@ -63,7 +63,7 @@ class Hits(NamedTuple):
         incoming: (n, 3) direction of the ray that found the hit, not normalised.
         key: (n,) random stream.
         pixel: (n,) the pixel of the eye that found the hit.
-        half: (n,) which half of its pixel's samples a hit belongs to, 0 or 1; 0 where they are one.
+        half: (n,) which half of its pixel's samples a hit belongs to, 0 or 1.
     """
 
     kind: Bytes
@@ -239,11 +239,10 @@ def _shoot_samples(
     """
     key, number = stream(seed, c, pixel, PIXEL_SAMPLE), sample
     random = word(key, PIXEL)
-    put_lanes(hits.half, i, np.uint8(0))
+    odd = (sample & np.int32(1)) == np.int32(1)
+    put_lanes(hits.half, i, choose(odd, np.uint8(1), np.uint8(0)))
     if halves:
-        odd = (sample & np.int32(1)) == np.int32(1)
         random, number = choose(odd, word(key, OTHER_HALF), random), integers(sample >> np.int32(1))
-        put_lanes(hits.half, i, choose(odd, np.uint8(1), np.uint8(0)))
     jx, jy = r2(random, number)
     _shoot(cams, c, pixel, jx, jy, i, packets, hits)
     put_lanes(hits.key, i, stream(seed, c, pixel, sample))
@@ -271,7 +270,7 @@ def native_hits(
     They are numbered by groups of 16 pixels, within a group by sample, then by pixel.
 
     Args:
-        halves: the samples of a pixel are taken in two halves, see `Hits.half`.
+        halves: the two halves of a pixel's samples are independent of each other.
     """
     # a frame may have more hits than an int32 counts; the quotients of such numbers are exact in float64
     n_pixels, of_group = np.float64(pixels.shape[0]), np.float64(16 * per_pixel)

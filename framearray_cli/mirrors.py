@@ -59,7 +59,7 @@ def extra_mirror_hits(
         n = min(crew.batch, len(pixels) * extra - first)
         extra_hits(
             work.cams, c, work.seed, pixels, most, extra, first, n, work.surfaces, work.tracer,
-            scratch.hit_rays.packets, scratch.hits, work.halves_by_sample,
+            scratch.hit_rays.packets, scratch.hits, work.halves != 0,
         )  # fmt: skip
         scratch.rays["mirror"] += n
         return mirror_paths(work, scratch.hits, n, scratch)

@@ -23,7 +23,10 @@ from .terms.ambient import Ambient, EyeWalks, ambient_by_eye, fixed_ambient
 from .terms.ambient_fit import Curve, ambient_by_fit
 from .terms.ambient_light import ambient_by_light
 from .terms.obscurance import FALLOFFS, ObscuranceSettings
-from .work import Work
+from .work import BY_SAMPLE, Work
+
+# Native hits of a pixel of a frame from which on they are sampled in two halves.
+FEWEST_SPLIT = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -127,9 +130,21 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
         shadow_unbiased=job.samples.shadow_unbiased,
         layers=job.output.layers,
         denoise=job.denoise.obscurance,
-        halves=turns(job.samples.hits) if job.samples.halves else 0,
+        halves=_halves(job, still=prepared.still),
     )
     return work, ambient
+
+
+def _halves(job: Job, *, still: bool) -> int:
+    """How the job's hits are told apart in two halves; see `Work.halves`.
+
+    Frames see a place differently, so halves of frames differ by more than noise; that shows where there is little
+    noise. Halves of one or two samples are spread worse over a pixel than these samples together are.
+    """
+    if not job.samples.halves:
+        return 0
+    by_sample = job.samples.hits >= FEWEST_SPLIT or still or job.reuse.n_r == 0
+    return BY_SAMPLE if by_sample else turns(job.samples.hits)
 
 
 def _cameras(prepared: Prepared) -> Cameras:

@@ -1,8 +1,8 @@
 """How far an image is from what it would be with endless samples, told from the image itself.
 
 The hits of a pixel are kept apart in two halves with weights W_A and W_B, sampled independently of each other: the
-frames of the camera path take turns, and where a pixel rests on its own frame alone, its samples do. With a and b the
-means of the halves, the image is I = (W_A a + W_B b) / (W_A + W_B), and
+samples of every frame take turns, or whole frames do where a frame has few samples a pixel. With a and b the means
+of the halves, the image is I = (W_A a + W_B b) / (W_A + W_B), and
 
     D = (a - b) sqrt(W_A W_B) / (W_A + W_B)
 

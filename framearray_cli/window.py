@@ -12,7 +12,7 @@ from time import perf_counter
 
 import numpy as np
 
-from .accumulate import BY_SAMPLE, Source, accumulate, compose_differences, compose_pixels, sources, weigh_halves
+from .accumulate import Source, accumulate, compose_differences, compose_pixels, sources, weigh_halves
 from .arrays import Addresses, Float32, Images, Int32
 from .compose import as_stored, empty_band
 from .crew import Crew, Scratch
@@ -21,7 +21,7 @@ from .frame import Frame, fill_holes
 from .kernel import kernel
 from .standarderror import fill_unknown, half_factors
 from .terms.ambient import Ambient
-from .work import INDIRECT, REFLECTIVITY, Placed, Records, Work
+from .work import BY_SAMPLE, INDIRECT, REFLECTIVITY, Placed, Records, Work
 
 # Pixels whose sums over all lights are held together: they fit a core's cache. And pixels of a task.
 BAND_PIXELS, TASK_PIXELS = 256, 2048
@@ -161,13 +161,13 @@ class Window:
         work, frame = self._work, self._frames[j]
         images, weights = np.empty((len(work.kept), work.n_pixels, 3), np.float32), np.empty((2, work.n_pixels))
         eyes = work.frames_around(j, work.n_r)
-        own = np.array([k // work.halves % 2 if work.n_r else BY_SAMPLE for k in eyes], np.int32)
+        own = np.array([work.half_of(k) for k in eyes], np.int32)
         hits = self._hits(j, [])
         tasks = [(first, min(TASK_PIXELS, work.n_pixels - first)) for first in range(0, work.n_pixels, TASK_PIXELS)]
         self._crew.run(lambda task, _: weigh_halves(hits, own, task[0], task[1], weights), tasks)
         factors, parts = half_factors(weights), []
         for k, half in zip(eyes, own, strict=True):
-            scales = (factors[half],) if work.n_r else (factors[0], factors[1])
+            scales = (factors[0], factors[1]) if half == BY_SAMPLE else (factors[half],)
             parts.append(
                 Source(self._frames[k].places[j], self._frames[k].records, self._frames[k].weights[j], *scales)
             )

@@ -32,8 +32,8 @@ class Work:
         shadow_step, shadow_unbiased: see `terms/direct_steps.py`; step 1 tests every light position.
         layers: whether normals and depths are kept for the layers.
         denoise: whether W is denoised in composing.
-        halves: frames of the camera path that belong to the same half of all hits, one group after another; 0: the
-            halves are not told apart.
+        halves: how hits are told apart in two halves: BY_SAMPLE, or so many frames of the camera path in turn belong
+            to one half, or 0: not at all.
     """
 
     cams: Cameras
@@ -67,10 +67,9 @@ class Work:
     def n_pixels(self) -> int:
         return self.cams.width * self.cams.height
 
-    @property
-    def halves_by_sample(self) -> bool:
-        """Whether the samples of a pixel are taken in two halves: where they are not shared, or seen in a mirror."""
-        return self.halves > 0 and (self.n_r == 0 or self.depth > 0)
+    def half_of(self, c: int) -> int:
+        """The half that all hits of frame c belong to, or BY_SAMPLE."""
+        return c // self.halves % 2 if self.halves > 0 else BY_SAMPLE
 
     @property
     def keeps_all(self) -> bool:
@@ -94,6 +93,8 @@ class Work:
 
 # Columns of a row of a hit, and of the sums of such rows; those from INDIRECT to REFLECTIVITY are of three channels.
 WEIGHT, INDIRECT, STEADY, OBSCURANCE, REFLECTIVITY, LIT, HALF = 0, 1, 4, 7, 10, 13, 14
+# In place of a half: each hit has its own.
+BY_SAMPLE = -1
 # The most bits that a whole number in a float32 has.
 LIT_BITS = 24
 
@@ -114,7 +115,7 @@ class Records:
     Attributes:
         row: (n, LANES) a cache line a hit, so that one sum of lines is the sum of all: 1; R W; what is the same under
             every light; W; R; LIT, a whole number whose bits say in which packets of light positions there is light;
-            HALF, 1 for a sample of the second half, else 0.
+            HALF, 1 for an odd sample of its pixel, else 0.
         irradiance: (n, channels, n_lights).
     """
 

@@ -10,10 +10,12 @@ from framearray_cli.arrays import Float32, Images
 from framearray_cli.crew import Crew
 from framearray_cli.frame import find_frame
 from framearray_cli.plan import turns
+from framearray_cli.prepare import FEWEST_SPLIT
 from framearray_cli.report.metrics import rmse
 from framearray_cli.report.reference import HITS, PASSES, Reference, reference
 from framearray_cli.standarderror import square_mean, standard_error
 from framearray_cli.window import Window
+from framearray_cli.work import BY_SAMPLE
 
 from .cases import Case, Variant, job_named, opened, under, varied, with_resolution
 from .markdown import grid, number, percent
@@ -49,8 +51,9 @@ error that the images have: the root mean square over a picture of what is told,
 {table}
 
 What is told is sampling error alone. The error that `average` makes where frames see a place differently is the same
-in both halves, so it is told in part at most: with many hits, where noise is small, true errors of `average` stay above
-what is told. `balance` has no such error. The error of I_A, which all pixels share, is not in it; the manifest has it
+in both halves: with many hits, where noise is small, true errors of `average` stay above what is told. `balance` has no
+such error. With fewer than four hits in a frame, whole frames make the halves, and part of what they see differently is
+told as noise. The error of I_A, which all pixels share, is not in it; the manifest has it
 for every light position.
 """
 
@@ -74,7 +77,8 @@ def measure(name: str, folder: Path) -> list[Table]:
 def compare(case: Case, variant: Variant, c: int, wanted: Reference) -> list[Table]:
     """Each image of frame c made by a variant: what it tells, and how far it is from the reference."""
     work = varied(case, variant).work
-    images, differences, hits = composed(replace(case, work=replace(work, seed=SEED, halves=turns(variant.hits))), c)
+    halves = BY_SAMPLE if variant.hits >= FEWEST_SPLIT or variant.n_r == 0 else turns(variant.hits)
+    images, differences, hits = composed(replace(case, work=replace(work, seed=SEED, halves=halves)), c)
     rows = []
     for k in range(len(images)):
         ambient = case.ambient.intensity[k]

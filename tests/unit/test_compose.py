@@ -5,12 +5,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from framearray_cli.accumulate import BY_SAMPLE, Source, accumulate, compose_differences, sources, weigh_halves
+from framearray_cli.accumulate import Source, accumulate, compose_differences, sources, weigh_halves
 from framearray_cli.arrays import with_room
 from framearray_cli.compose import MOST, Band, as_stored, empty_band, finish
 from framearray_cli.lanes import LANES
 from framearray_cli.reuse import sort_by_pixel
 from framearray_cli.work import (
+    BY_SAMPLE,
     HALF,
     INDIRECT,
     LIT,

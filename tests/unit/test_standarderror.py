@@ -76,7 +76,9 @@ def windowed(job: Job, j: int, eyes: Any = None) -> Any:
 
 def test_the_difference_is_that_of_the_two_halves_of_the_window() -> None:
     """Against images composed of the hits of each half alone, which weigh by their number."""
-    job = tiny.job(camera=WALK, reuse={"n_r": 2, "weights": "average"}, samples={"halves": True}, specular={"depth": 0})
+    job = tiny.job(
+        camera=WALK, reuse={"n_r": 2, "weights": "average"}, samples={"hits": 1, "halves": True}, specular={"depth": 0}
+    )
     whole, even, odd = (windowed(job, 3, eyes) for eyes in (None, (2, 4), (1, 3, 5)))
     n, m = (half.hits.reshape(whole.images.shape[1:3])[..., None].astype(float) for half in (even, odd))
     assert (whole.hits == even.hits + odd.hits).all()
