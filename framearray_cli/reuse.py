@@ -50,7 +50,8 @@ def _seen(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[int, Real, Real]:
 def _aim(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays, n: int) -> None:
     """Write the queued visibility rays between hits and eyes; for an escaped ray, from the eye out of the scene.
 
-    Eyes see from the depth `cams.near` on, as where they look for hits of their own: rays end or start there.
+    Eyes see from the depth `cams.near` on, as where they look for hits of their own: rays start there, or end a little
+    before.
     """
     packet, one, nothing = rays.packets.shape[1] * LANES, np.float32(1.0), np.float32(0.0)
     near, f = np.float32(cams.near), cams.forward
