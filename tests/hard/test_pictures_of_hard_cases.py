@@ -212,7 +212,7 @@ def test_an_eye_on_the_floor_sees_the_room_as_one_just_above_it(n_r: int) -> Non
         return without_ambient(job)
 
     room = tiny.room()
-    on, above = pictures(walk_at(0.0), room), pictures(walk_at(1e-4), room)
+    on, above = pictures(walk_at(0.0), room), pictures(walk_at(1e-5), room)
     upper = np.s_[:, :, :36]  # the eye looks up a little: all of the image's upper half is above the horizon
     assert above[upper].mean() > 0.01
     assert differing(on[upper], above[upper]) < FLIPPED
