@@ -83,11 +83,13 @@ class EmbreexScene:
             again = self._scene.run(
                 moved, directions[rays], np.maximum(left, 0).astype(np.float32), query="INTERSECT", output=1
             )
+            # a line meets a triangle once: the same one again is a step that rounding swallowed
+            same = (again["primID"] == out["primID"][rays]) & (again["primID"] >= 0)
             for name in ("u", "v", "primID", "Ng"):
                 out[name][rays] = again[name]
             out["tfar"][rays] = again["tfar"] + start[rays]
             todo[:] = False
-            todo[rays] = self._ignored({name: out[name][rays] for name in out}, tnear[rays])
+            todo[rays] = same | self._ignored({name: out[name][rays] for name in out}, tnear[rays])
 
     def _ignored(self, out: dict[str, Any], tnear: Float32) -> Any:
         """Which hits do not count."""
