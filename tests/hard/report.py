@@ -32,7 +32,7 @@ from test_reprojection import RIGHT, million_hits
 from test_sums import mean_of_many
 
 HITS = 50_000
-FEWER = {"ball": 5_000}  # the right answers of the ball take its twenty thousand planes
+FEWER = {"ball": 2_000}  # the right answers of the ball take its twenty thousand planes
 # Name of the column, unit of length, and how far away the room is.
 PLACES = (
     ("as it is", 1.0, 0.0),
@@ -145,7 +145,7 @@ def walls_section() -> Iterator[str]:
         return f"{count.wrong} / {count.rays:,}"
 
     for name in ON_WALLS:
-        n = 8 if name == "ball" else 64
+        n = 2 if name == "ball" else 64
         with staged(name) as stage:
             looks = [eyes_on_walls(stage, inwards, n).wrong for inwards in (True, False)]
             cells = [lamps_on_walls(stage), light_from_within(name)]
