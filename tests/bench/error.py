@@ -11,12 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from framearray_cli.arrays import Images
-from framearray_cli.crew import Crew
-from framearray_cli.frame import find_frame
 from framearray_cli.images import ImageFormat, read_image, write_image
 from framearray_cli.report.metrics import errors, rmse, shadow_edges, squared_bias
 from framearray_cli.report.reference import PASSES, Reference, noise, reference
-from framearray_cli.window import Window
 
 from .cases import (
     CAMERA_REUSE,
@@ -31,6 +28,7 @@ from .cases import (
     under,
     varied,
 )
+from .frames import frame
 from .machine import busy
 from .results import Table
 from .speed import tell
@@ -98,16 +96,7 @@ def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = 
 def images(case: Case, variant: Variant, c: int, l: Sequence[int], seed: int) -> Images:
     """Frame c made by a variant, under light positions l."""
     changed = varied(case, variant) if not variant.one_light else under(varied(case, variant), l)
-    work = replace(changed.work, seed=seed)
-    crew = Crew(work, case.threads)
-    window = Window(work, changed.ambient, crew, first=c)
-    out = np.empty((work.lights.n_lights, work.cams.height, work.cams.width, 3), np.float32)
-    try:
-        for other in work.frames_around(c, work.n_r):
-            window.add(find_frame(work, other, crew))
-        window.compose(c, out)
-    finally:
-        crew.close()
+    out = frame(changed, c, seed).images
     return out if variant.one_light else np.ascontiguousarray(out[list(l)])
 
 

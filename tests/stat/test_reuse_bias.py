@@ -1,4 +1,4 @@
-"""Reuse leaves the mean alone with the weights `balance`, and does not with `average`.
+"""Reuse leaves the mean alone with the weights `balance`, and does not with `average`; docs/bias.md has the figures.
 
 A small scene with silhouettes, a texture, the sky and a mirror; the middle frame of a short path, rendered with and
 without reuse for independent seeds, compared pixel by pixel.
@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bench.squares import Squares, products, squares
 from numpy.typing import NDArray
 from stages import box, make_job, point, quad, sun, write_scene
 from ztests import differing
@@ -43,10 +44,13 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_stage(tmp_path_factory.mktemp("reuse"))
 
 
-def job_of(scene: Path, out: Path, hits: float, n_r: int, weights: str) -> Job:
+SLOW, FAST = 0.12, 1.0  # how far the eye goes to either side; its middle frame is the same
+
+
+def job_of(scene: Path, out: Path, hits: float, n_r: int, weights: str, way: float = SLOW) -> Job:
     keys = [
-        {"frame": 0, "eye": [-0.12, 0.9, 1.2], "target": [0, 0.4, -1.0]},
-        {"frame": FRAMES - 1, "eye": [0.12, 0.95, 1.1], "target": [0, 0.4, -1.0]},
+        {"frame": 0, "eye": [-way, 0.9, 1.2], "target": [0, 0.4, -1.0]},
+        {"frame": FRAMES - 1, "eye": [way, 0.95, 1.1], "target": [0, 0.4, -1.0]},
     ]
     return make_job(
         scene, out, materials={"Box": [0.7, 0.3, 0.2], "Post": 0.8, "Mirror": {"reflectivity": 0.1, "specular": 0.7}},
@@ -107,3 +111,45 @@ def test_average_is_biased_at_silhouettes_and_texture_edges(scene: Path, right: 
 def test_no_reuse_twice_is_the_same(scene: Path, right: Array, tmp_path: Path) -> None:
     """The comparison finds nothing between two halves of one thing."""
     assert differing(right[::2], right[1::2]).max() < 1
+
+
+def off_by(found: Array, right: Array) -> Squares:
+    """Squared bias of the pictures of many seeds."""
+    return squares(*products(found, right), len(found))
+
+
+def fast(scene: Path, right: Array, out: Path, weights: str, hits: int, seeds: int = SEEDS) -> Squares:
+    """What pictures of a camera that moves fast are off by."""
+    return off_by(middle_frames(job_of(scene, out, hits, N_R, weights, FAST), range(seeds)), right)
+
+
+def test_with_a_fast_camera_average_is_off_and_balance_at_most_a_tenth_of_it(
+    scene: Path, right: Array, tmp_path: Path
+) -> None:
+    average, balance = (fast(scene, right, tmp_path, weights, 4) for weights in ("average", "balance"))
+    assert average.bias > 10 * average.error
+    assert balance.bias + 3 * balance.error < average.bias / 10
+
+
+def falls(few: Squares, many: Squares, times: float) -> float:
+    """By how many standard errors a squared bias lies above what 1 / n, n being `times` as large, leaves of it."""
+    share = times**-2.0
+    return (many.bias - share * few.bias) / float(np.hypot(many.error, share * few.error))
+
+
+def test_what_balance_is_off_by_falls_with_hits_as_one_over_n(scene: Path, right: Array, tmp_path: Path) -> None:
+    few, many = (fast(scene, right, tmp_path, "balance", hits, 240 // hits) for hits in (1, 4))
+    assert few.bias > 4 * few.error  # a ratio is biased where there are few hits
+    assert falls(few, many, 4) < 3
+    # what average is off by stays
+    few, many = (fast(scene, right, tmp_path, "average", hits) for hits in (1, 4))
+    assert falls(few, many, 4) > 10
+
+
+def test_squared_bias_of_no_reuse_is_none(right: Array) -> None:
+    """Neither bound holds of what has no bias, and a bias that is added is found."""
+    none = off_by(right[::2], right[1::2])
+    assert abs(none.bias) < 4 * none.error
+    added = off_by(right[::2] * 1.05, right[1::2])
+    assert abs(added.bias - np.mean((0.05 * right.mean(axis=0)) ** 2)) < 4 * added.error
+    assert added.bias > 10 * added.error
