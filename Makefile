@@ -6,7 +6,7 @@ JOB := jobs/kitchen-small.toml
 OUT := out/kitchen-small
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-all smoke format check docs bench bench-scaling clean
+.PHONY: help install render test test-all smoke format check docs bench bench-scaling bench-bias clean
 
 help: ## Show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -61,6 +61,9 @@ bench: $(VENV)/installed-bench ## Measure what an image costs, and write docs/sp
 
 bench-scaling: $(VENV)/installed-bench ## Measure time against the size of a job, for docs/speed.md
 	PYTHONPATH=tests $(BIN)/python -m bench scaling $(BENCH)
+
+bench-bias: $(VENV)/installed-bench ## Measure what reuse is off by with both kinds of weights, and write docs/bias.md
+	PYTHONPATH=tests $(BIN)/python -m bench bias $(BENCH)
 
 clean: ## Remove what was built and rendered
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache

@@ -1,15 +1,19 @@
 """Measures what an image costs and how far it is from right. Not part of the tests.
 
-`make bench` runs `python -m bench`, `make bench-scaling` runs `python -m bench scaling`.
+`make bench` runs `python -m bench`, `make bench-scaling` runs `python -m bench scaling`, and `make bench-bias` runs
+`python -m bench bias`.
 
     cases.py      ways to make the images of a job: the frame array, its options, baselines
     steady.py     the frame loop in its steady state, under a clock
     floor.py      the same rays through Embree alone
     speed.py      all of these in turn, several times
-    metrics.py    distances between images
-    reference.py  images of a thousand and more hits a pixel
+    frames.py     one frame for one seed
     error.py      how far each way is from them
     processes.py  start-up time and peak memory, each in a process of its own
+    squares.py    squared bias without noise, and its standard error
+    regions.py    silhouettes, textures, disocclusions and other parts of a picture
+    campaths.py   cameras that move as a job says, fast, or close to a surface
+    bias.py       what both kinds of weights are off by
     peers.py      what images cost in other programs: mitsuba3.py, cycles.py
     rooms.py      generated scenes of any number of triangles
     scaling.py    time an image against the size of a job
@@ -18,5 +22,6 @@
     markdown.py   numbers and tables as text
     pages.py      the parts of docs/speed.md
     table.py      results -> docs/speed.md
+    biaspage.py   results -> docs/bias.md
     plots.py      results -> docs/plots/
 """

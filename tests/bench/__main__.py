@@ -3,25 +3,25 @@
 import argparse
 import json
 
-from . import cycles, error, mitsuba3, peers, processes, scaling, speed, table, told
+from . import bias, biaspage, cycles, error, mitsuba3, peers, processes, scaling, speed, table, told
 from .cases import FRAME_ARRAY, JOBS, Variant, job_named, opened, variant_named, varied, with_resolution
 from .results import folder, load, save
 from .steady import steady
 
 PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
 PARTS = ("speed", "error", "peers", "memory", "startup")
+CHOICES = ("all", "scaling", "bias", "told", "page", "peak", *PROGRAMS, *PARTS)
 
 
 def main() -> None:
     """Measure what is asked for, and write the page."""
     parser = argparse.ArgumentParser(prog="bench", description="Measure what an image costs, and write docs/speed.md.")
-    parser.add_argument(
-        "what", nargs="?", default="all", choices=("all", "scaling", "told", "page", "peak", *PROGRAMS, *PARTS)
-    )
+    parser.add_argument("what", nargs="?", default="all", choices=CHOICES)
     parser.add_argument("jobs", nargs="*", default=list(JOBS), help="some of the jobs")
     parser.add_argument("--quick", action="store_true", help="a small picture, once; the page goes to out/bench/quick")
     parser.add_argument("--runs", type=int, default=speed.RUNS, help="how often each thing is measured")
     parser.add_argument("--patience", type=float, default=0.0, help="seconds to wait for a busy machine, each time")
+    parser.add_argument("--part", nargs="*", default=list(bias.MEASURES), choices=bias.MEASURES, help="for `bias`")
     parser.add_argument("--variant", default=FRAME_ARRAY.name, help="for `peak`")
     parser.add_argument("--resolution", help="for `peak`: 800x600")
     parser.add_argument("--frames", type=int, default=2, help="for `peak`")
@@ -37,6 +37,12 @@ def main() -> None:
         for name in args.jobs:
             save(out, f"told-{name}", {"rows": told.measure(name, out)})
         told.write([row for name in JOBS if (kept := load(out, f"told-{name}")) for row in kept["rows"]])
+        return
+    if args.what == "bias":
+        for name in args.jobs:
+            for part in args.part:
+                save(out, f"bias-{name}-{part}", bias.measure_part(name, part, args.quick))
+        biaspage.write(args.quick)
         return
     todo = PARTS if args.what == "all" else (args.what,)
     for name in args.jobs:
@@ -54,6 +60,7 @@ def main() -> None:
     if "scaling" in todo:
         save(out, "scaling", scaling.measure(args.quick))
     table.write(args.quick)
+    biaspage.write(args.quick)
 
 
 def peak(name: str, variant: Variant, args: argparse.Namespace) -> dict[str, object]:

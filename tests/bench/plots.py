@@ -1,8 +1,8 @@
-"""Results of the sweeps -> small SVG pictures."""
+"""Results -> small SVG pictures."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from .results import Table
 
@@ -16,17 +16,16 @@ PLOTS: tuple[tuple[str, str, str, Callable[[Table], float]], ...] = (
 )
 # Sweeps that need no logarithmic axis.
 LINEAR = ("n_r",)
+COLOURS = ("#2b6cb0", "#c53030", "#2f855a")
+LINES = {"average": "--", "balance": "-"}
+
+Point: TypeAlias = tuple[int, float, float]
 
 
 def draw(scaling: Table, folder: Path) -> dict[str, str]:
     """Draw every sweep; returns sweep -> the picture's place beside the page. Without matplotlib there are none."""
-    try:
-        import matplotlib
-    except ImportError:
+    if not _ready(folder):
         return {}
-    matplotlib.use("svg")
-    matplotlib.rcParams.update({"svg.hashsalt": "framearray", "svg.fonttype": "none", "font.size": 9})
-    folder.mkdir(parents=True, exist_ok=True)
     found = {}
     for sweep, name, label, size in PLOTS:
         rows = scaling.get(sweep, [])
@@ -34,6 +33,18 @@ def draw(scaling: Table, folder: Path) -> dict[str, str]:
             _plot(folder / name, label, [size(r) for r in rows], [r["ms"] for r in rows], sweep not in LINEAR)
             found[sweep] = f"{folder.name}/{name}"
     return found
+
+
+def _ready(folder: Path) -> bool:
+    """Make ready to draw into a folder; False without matplotlib."""
+    try:
+        import matplotlib
+    except ImportError:
+        return False
+    matplotlib.use("svg")
+    matplotlib.rcParams.update({"svg.hashsalt": "framearray", "svg.fonttype": "none", "font.size": 9})
+    folder.mkdir(parents=True, exist_ok=True)
+    return True
 
 
 def _plot(file: Path, label: str, sizes: list[float], ms: list[float], logarithmic: bool) -> None:
@@ -56,6 +67,49 @@ def _plot(file: Path, label: str, sizes: list[float], ms: list[float], logarithm
         figure.savefig(file, metadata={"Date": None, "Creator": None})
     finally:
         pyplot.close(figure)
+
+
+def draw_bias(found: Mapping[tuple[str, str], Mapping[str, Sequence[Point]]], folder: Path) -> str | None:
+    """Draw squared bias against hits, a panel a camera; returns the picture's place beside the page.
+
+    Args:
+        found: (job, camera) -> weights -> (hits, squared bias, standard error).
+    """
+    if not _ready(folder):
+        return None
+    from matplotlib import pyplot
+
+    cameras = list(dict.fromkeys(camera for _, camera in found))
+    colours = dict(zip(dict.fromkeys(job for job, _ in found), COLOURS, strict=False))
+    figure, panels = pyplot.subplots(
+        1, len(cameras), figsize=(2.9 * len(cameras), 3.1), sharey=True, squeeze=False, layout="constrained"
+    )
+    try:
+        for axes, camera in zip(panels[0], cameras, strict=True):
+            for (job, of), curves in found.items():
+                for weights, curve in curves.items() if of == camera else ():
+                    _curve(axes, curve, colours[job], LINES[weights], f"{job}, {weights}")
+            axes.set(xscale="log", yscale="log", title=camera, xlabel="hits a pixel a frame")
+            axes.xaxis.set_major_formatter(_tick)
+            axes.xaxis.set_minor_formatter("")
+            axes.grid(alpha=0.3)
+        panels[0][0].set_ylabel("squared bias over the squared mean")
+        figure.legend(*panels[0][0].get_legend_handles_labels(), fontsize=7, ncols=3, loc="outside lower center")
+        figure.savefig(folder / "bias.svg", metadata={"Date": None, "Creator": None})
+    finally:
+        pyplot.close(figure)
+    return f"{folder.name}/bias.svg"
+
+
+def _curve(axes: Any, curve: Sequence[Point], colour: str, line: str, label: str) -> None:
+    """Points that stand out of the noise with their standard errors, and bounds of the others."""
+    seen = [point for point in curve if point[1] > 2 * point[2]]
+    if seen:
+        hits, bias, error = zip(*seen, strict=True)
+        axes.errorbar(hits, bias, error, color=colour, linestyle=line, marker="o", markersize=3, label=label)
+    below = [(hits, max(bias, 0.0) + 2 * error) for hits, bias, error in curve if bias <= 2 * error]
+    if below:
+        axes.plot(*zip(*below, strict=True), "v", color=colour, fillstyle="none", markersize=5)
 
 
 def _tick(value: float, _position: Any) -> str:

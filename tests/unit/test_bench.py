@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bench.biaspage import at_most, at_time
 from bench.floor import PIECE, _pieces
 from bench.markdown import grid, number, percent
 from bench.results import load, median, save
@@ -118,3 +119,16 @@ def test_pieces_hold_one_kind_and_one_flag_each():
     ]
     mixed = _pieces([(len(flags), "native")], ("native",), flags)
     assert mixed.tolist() == [[0, 3, 0], [3, PIECE + 3, 0], [PIECE + 3, PIECE + 8, 0], [PIECE + 8, PIECE + 12, 0]]
+
+
+def test_an_error_at_another_time_lies_on_the_line_of_logarithms():
+    curve = [(4.0, 0.5), (1.0, 1.0), (16.0, 0.125)]
+    assert at_time(curve, 2.0, 1) == pytest.approx(0.5**0.5)
+    assert at_time(curve, 4.0, 1) == pytest.approx(0.5)
+    assert at_time(curve, 64.0, 1) == pytest.approx(0.125 / 4)  # as noise falls from the second to the third
+
+
+def test_a_bound_counts_noise_against_balance():
+    average = {"bias": 10.0, "error": 0.1}
+    assert at_most({"bias": -1.0, "error": 0.2}, average) == pytest.approx(0.06)
+    assert at_most({"bias": 0.5, "error": 0.2}, average) == pytest.approx(0.11)

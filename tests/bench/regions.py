@@ -1,0 +1,94 @@
+"""Where in a picture errors of reuse are looked for: parts of it, found from what a reference says of its geometry."""
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from framearray_cli.arrays import Float32
+from framearray_cli.camera import Cameras
+
+Mask: TypeAlias = NDArray[np.bool_]
+
+# An edge: inverse depth bends by more than this share of itself from pixel to pixel (on a plane it does not bend at
+# all), or normals part by more than the angle of this cosine.
+BEND, COSINE = 0.05, 0.95
+# A texture: reflectivity differs by more than this between neighbours, and no edge is there.
+STEP = 0.03
+GRAZING = 0.25  # cosine between normal and direction to the eye, below which a surface is seen at a grazing angle
+BORDER = 0.05  # of the picture's height: how wide its border is
+FEW = 0.7  # of the hits that a pixel would rest on if every eye of its window saw what it sees
+
+
+def regions(
+    normal: Float32, depth: Float32, reflectivity: Float32, hits: NDArray[np.floating], cams: Cameras, c: int
+) -> dict[str, Mask]:
+    """Parts of frame c by name, (h, w) each; they may overlap, but for the last: what is in none of the others.
+
+    Args:
+        normal: (h, w, 3), depth: (h, w), reflectivity: (h, w, 3); see `Layers`.
+        hits: (h, w) hits that a pixel rests on, over those of a pixel that every eye of the window sees.
+    """
+    h, w = depth.shape
+    edges = _bends(depth) | _turns(normal)
+    border = np.ones((h, w), bool)
+    margin = max(round(BORDER * h), 1)
+    border[margin:-margin, margin:-margin] = False
+    found = {
+        "silhouettes": edges,
+        "textures": _steps(reflectivity) & ~edges,
+        "grazing angles": (np.abs(_facing(normal, cams, c)) < GRAZING) & (depth > 0),
+        "frame edges": border,
+        "disocclusions": (hits < FEW) & ~border,
+    }
+    found["the rest"] = ~np.logical_or.reduce(list(found.values()))
+    return found
+
+
+def _bends(depth: Float32) -> Mask:
+    """Outlines: inverse depth, 0 where nothing is seen, is linear in a picture of a plane."""
+    near = np.divide(1.0, depth, out=np.zeros(depth.shape), where=depth > 0)
+    found = np.zeros(depth.shape, bool)
+    for axis in (0, 1):
+        values, bends = np.moveaxis(near, axis, 0), np.moveaxis(found, axis, 0)  # views
+        largest = np.maximum(np.maximum(values[:-2], values[2:]), values[1:-1])
+        bends[1:-1] |= np.abs(np.diff(values, 2, axis=0)) > BEND * largest
+    return found
+
+
+def _turns(normal: Float32) -> Mask:
+    """Creases, and pixels that show several surfaces, whose mean normal is short."""
+    length = np.linalg.norm(normal, axis=-1)
+    found = (length > 0) & (length < COSINE)
+    for axis in (0, 1):
+        for other in _neighbours(normal, axis):
+            lengths = length * np.linalg.norm(other, axis=-1)
+            found |= (normal * other).sum(axis=-1) < COSINE * lengths
+    return np.asarray(found)
+
+
+def _steps(reflectivity: Float32) -> Mask:
+    found = np.zeros(reflectivity.shape[:2], bool)
+    for axis in (0, 1):
+        for other in _neighbours(reflectivity, axis):
+            found |= np.abs(other - reflectivity).max(axis=-1) > STEP
+    return found
+
+
+def _facing(normal: Float32, cams: Cameras, c: int) -> Float32:
+    """Cosine between a pixel's normal and the direction to its eye."""
+    h, w = normal.shape[:2]
+    x = (np.arange(w) + 0.5 - 0.5 * w) / cams.focal
+    y = (0.5 * h - np.arange(h) - 0.5) / cams.focal
+    look_vec = x[None, :, None] * cams.right[c] + y[:, None, None] * cams.up[c] + cams.forward[c]
+    lengths = np.linalg.norm(look_vec, axis=-1) * np.linalg.norm(normal, axis=-1)
+    along = -(look_vec * normal).sum(axis=-1)
+    return np.asarray(np.divide(along, lengths, out=np.ones_like(along), where=lengths > 0), np.float32)
+
+
+def _neighbours(values: NDArray[np.floating], axis: int) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+    """The neighbours before and after along an axis; at the border a value is its own neighbour."""
+    first, last = values.take([0], axis), values.take([-1], axis)
+    inner = values.shape[axis]
+    padded = np.concatenate([first, values, last], axis)
+    return padded.take(range(inner), axis), padded.take(range(2, inner + 2), axis)

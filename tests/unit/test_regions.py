@@ -1,0 +1,54 @@
+"""Parts of a picture where errors of reuse are looked for."""
+
+import numpy as np
+from bench.regions import regions
+
+from framearray_cli.camera import Cameras
+
+H, W, F = 40, 60, 50.0
+
+
+def looking_down() -> Cameras:
+    """An eye at height 1 that looks along -z."""
+    axes = {"right": [1, 0, 0], "up": [0, 1, 0], "forward": [0, 0, -1]}
+    arrays = {name: np.array([axis], np.float32) for name, axis in axes.items()}
+    return Cameras(position=np.zeros((1, 3), np.float32), focal=F, width=W, height=H, **arrays)
+
+
+def floor_and_wall() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Normal, depth and reflectivity: a wall at depth 4, and below the middle a floor 1 below the eye."""
+    down = (np.arange(H) + 0.5 - H / 2) / F
+    depth = np.repeat(np.where(down > 0.25, 1 / np.maximum(down, 0.01), 4.0)[:, None], W, 1).astype(np.float32)
+    normal = np.zeros((H, W, 3), np.float32)
+    normal[..., 2], normal[down > 0.25, :] = 1, [0, 1, 0]
+    return normal, depth, np.full((H, W, 3), 0.5, np.float32)
+
+
+def test_parts_of_a_room():
+    normal, depth, reflectivity = floor_and_wall()
+    reflectivity[:10, :20] = 0.3  # a picture on the wall
+    depth[5:15, 40:50] = 2.0  # a board before it
+    share = np.ones((H, W))
+    share[5:15, 50:52] = 0.4
+    found = regions(normal, depth, reflectivity, share, looking_down(), 0)
+    corner = 33  # the first row of the floor
+    assert found["silhouettes"][corner - 1 : corner + 1].all()
+    assert not found["silhouettes"][corner + 2 :].any()  # a plane seen at a slant has no outline
+    outline = found["silhouettes"][: corner - 1]
+    assert outline[10, 39] and outline[10, 40] and outline[10, 49] and outline[10, 50]
+    assert not outline[10, 42:48].any() and not outline[:, :38].any()
+    assert found["textures"][5, 19] and found["textures"][5, 20] and not found["textures"][5, 10]
+    assert found["disocclusions"].sum() == 20
+    assert found["frame edges"].sum() == H * W - (H - 4) * (W - 4)
+    assert found["the rest"][20, 10]
+    assert not (found["the rest"] & found["frame edges"]).any()
+
+
+def test_grazing_angles_are_those_to_the_eye():
+    normal, depth, reflectivity = floor_and_wall()
+    normal[:] = [0, 1, 0]  # all is floor, seen at the angle that its row says
+    found = regions(normal, depth, reflectivity, np.ones((H, W)), looking_down(), 0)["grazing angles"]
+    down = np.abs(np.arange(H) + 0.5 - H / 2) / F
+    assert found[:, W // 2].tolist() == (down / np.hypot(1, down) < 0.25).tolist()
+    depth[:] = 0  # nothing is seen
+    assert not regions(normal, depth, reflectivity, np.ones((H, W)), looking_down(), 0)["grazing angles"].any()
