@@ -25,11 +25,14 @@ from .squares import products, squares
 from .steady import mean, steady
 
 PLACES = (0.4, 0.6)  # of the camera path
-LIGHTS = (1 / 6, 1 / 2, 5 / 6)  # of the light path
+LIGHTS = tuple((i + 0.5) / 6 for i in range(6))  # of the light path
 WEIGHTS = ("average", "balance")
 PART_HITS = 28  # of a pixel in one part of a reference
 SEEDS = {"average": 10_000, "balance": 20_000, "reference": 2_000_000_000}
 EPSILON = 0.01  # of relative squares: (I - R)^2 / (R^2 + EPSILON)
+USUAL = 2  # native hits a pixel a frame, as jobs have them
+# Times as many runs as the cabin needs: patches of sunlight make most of the noise.
+MORE = {"kitchen": 6, "stairs": 2, "cabin": 1}
 # Parts of a picture beside those of `regions`: all of it, and all of it with relative squares.
 WHOLE, RELATIVE = "all", "relative"
 
@@ -45,22 +48,24 @@ class Plan:
         runs: by weights, with one hit; with more hits less noise, so fewer runs.
         parts: of a reference.
         fewest: runs in any case.
+        more: times as many runs with the usual hits, which all tables but one are about.
     """
 
     resolution: tuple[int, int] | None
     places: tuple[float, ...] = PLACES
     hits: tuple[int, ...] = (1, 2, 4, 8)
-    runs: Mapping[str, int] = field(default_factory=lambda: {"average": 24, "balance": 48})
+    runs: Mapping[str, int] = field(default_factory=lambda: {"average": 16, "balance": 40})
     parts: int = 50
     fewest: int = 4
+    more: int = 1
 
     def seeds(self, weights: str, hits: int) -> range:
         """Seeds of the runs."""
-        n = max(self.runs[weights] // hits, self.fewest)
+        n = max(self.runs[weights] // hits, self.fewest) * (self.more if hits == USUAL else 1)
         return range(SEEDS[weights], SEEDS[weights] + n)
 
 
-SMALL = Plan(resolution=(160, 120))
+SMALL = Plan(resolution=(128, 96))
 OWN = Plan(resolution=None, places=PLACES[:1], hits=(1, 2, 4), runs={"average": 4, "balance": 4}, parts=8)
 QUICK = Plan(resolution=(48, 36), runs={"average": 6, "balance": 8}, parts=6)
 # What is measured of a job: a camera of `CAMERAS` in small, the job as it is at its own size, and time.
@@ -100,7 +105,7 @@ class Sums:
 def measure_part(name: str, part: str, quick: bool) -> Table:
     """One of `MEASURES`."""
     if part in CAMERAS:
-        return measure(name, part, QUICK if quick else SMALL)
+        return measure(name, part, QUICK if quick else replace(SMALL, more=MORE[name]))
     plan = replace(QUICK, hits=OWN.hits) if quick else OWN
     return costs(name, plan) if part == "time" else measure(name, "slow", plan)
 
@@ -133,10 +138,10 @@ def _add_frame(case: Case, c: int, camera: str, plan: Plan, sums: Sums) -> None:
     scale = right.mean(axis=(0, 2, 3, 4))[:, None, None, None]  # the mean of each picture
     dark = 1 / np.sqrt(np.square(right.mean(axis=0)) + EPSILON)
     masks: Mapping[str, Mask] = {}
-    for hits in sorted(plan.hits, key=lambda hits: hits != 2):  # 2 first: it says which pixels rest on few hits
+    for hits in sorted(plan.hits, key=lambda hits: hits != USUAL):  # that one says first which pixels rest on few hits
         for weights in reversed(WEIGHTS):
             images, share = runs(case, cams, weights, hits, plan.seeds(weights, hits))
-            masks = masks or regions(*geometry, share, cams, MIDDLE)
+            masks = masks or regions(*geometry, share, cams, MIDDLE, N_R)
             sums.add(weights, hits, WHOLE, images / scale, right / scale)
             sums.add(weights, hits, RELATIVE, images * dark, right * dark)
             for part, mask in masks.items():

@@ -5,14 +5,13 @@ import statistics
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from .bias import EPSILON, LIGHTS, OWN, RELATIVE, WHOLE
+from .bias import EPSILON, LIGHTS, OWN, RELATIVE, USUAL, WHOLE
 from .campaths import CAMERAS, CLOSE, N_R, NEARER, SPEED
 from .cases import JOBS
 from .markdown import grid, number, percent
 from .plots import draw_bias
 from .results import ROOT, Table, folder, load
 
-USUAL = 2  # native hits a pixel a frame, as jobs have them
 ALLOWED = 3  # standard errors that a bound leaves to chance
 
 HEAD = f"""
@@ -37,10 +36,11 @@ Ambient light, average reflectivity and light positions are the same in runs and
 """
 
 BY_PART = f"""
-With {USUAL} hits. Parts may overlap. *Silhouettes*: inverse depth bends by 5 % or normals part by 18 degrees between
-neighbours. *Textures*: reflectivity steps by 0.03 and no silhouette is there. *Grazing angles*: more than 75.5 degrees
-from the normal. *Frame edges*: a border of 5 % of the height. *Disocclusions*: inside of it, pixels that rest on fewer
-than 70 % of the hits that they would have if every eye of the window saw them. *Share*: of the pixels.
+With {USUAL} hits. *Silhouettes*: inverse depth bends by 5 % or normals part by 18 degrees between neighbours.
+*Textures*: reflectivity steps by 0.03. *Grazing angles*: more than 75.5 degrees from the normal. *Frame edges*: where
+the picture of another eye of the window ends. None of these three is counted at silhouettes. *Disocclusions*: pixels
+that rest on fewer than 70 % of the hits that they would have if every eye of the window saw them, silhouettes or not.
+*Share*: of the pixels.
 """
 
 BY_HITS = """
@@ -119,16 +119,16 @@ def _summary(found: Mapping[tuple[str, str], Table]) -> list[str]:
         average, balance = (row_of(table, weights, USUAL, WHOLE) for weights in ("average", "balance"))
         assert average and balance
         z = average["bias"] / average["error"]
-        cells = [_millionths(average), f"{z:.0f}", _root(average), _millionths(balance), _root(balance)]
+        cells = [str(average["runs"]), _millionths(average), f"{z:.0f}", _root(average)]
+        cells += [str(balance["runs"]), _millionths(balance), _root(balance)]
         rows.append([f"{job}, {camera}", *cells, _beside(balance, average)])
     first = next(iter(found.values()))
-    size, lights = " x ".join(map(str, first["resolution"])), ", ".join(str(l) for l in first["lights"])
-    n = {w: row["runs"] for w in ("average", "balance") if (row := row_of(first, w, USUAL, WHOLE))}
+    size, lights = " x ".join(map(str, first["resolution"])), len(first["lights"])
     about = f"""
-{size} pixels, two cameras of each path under light positions {lights}; {USUAL} hits a pixel a frame, {n["average"]}
-runs with `average` and {n["balance"]} with `balance`; references of {first["reference"]:,} hits a pixel.
+{size} pixels, two frames of each path under {lights} light positions each; {USUAL} hits a pixel a frame; references of
+{first["reference"]:,} hits a pixel.
 """
-    head = ["", "`average`", "z", "root", "`balance`", "root", "at most"]
+    head = ["", "runs", "`average`", "z", "root", "runs", "`balance`", "root", "at most"]
     return ["## Three jobs, three cameras", about, grid(head, rows)]
 
 

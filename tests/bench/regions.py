@@ -5,7 +5,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.arrays import Float32
+from framearray_cli.arrays import Float32, Float64
 from framearray_cli.camera import Cameras
 
 Mask: TypeAlias = NDArray[np.bool_]
@@ -16,32 +16,56 @@ BEND, COSINE = 0.05, 0.95
 # A texture: reflectivity differs by more than this between neighbours, and no edge is there.
 STEP = 0.03
 GRAZING = 0.25  # cosine between normal and direction to the eye, below which a surface is seen at a grazing angle
-BORDER = 0.05  # of the picture's height: how wide its border is
+BORDER = 1.5  # pixels from where another eye's picture ends
 FEW = 0.7  # of the hits that a pixel would rest on if every eye of its window saw what it sees
 
 
 def regions(
-    normal: Float32, depth: Float32, reflectivity: Float32, hits: NDArray[np.floating], cams: Cameras, c: int
+    normal: Float32, depth: Float32, reflectivity: Float32, hits: NDArray[np.floating], cams: Cameras, c: int, n_r: int
 ) -> dict[str, Mask]:
-    """Parts of frame c by name, (h, w) each; they may overlap, but for the last: what is in none of the others.
+    """Parts of frame c by name, (h, w) each.
+
+    Disocclusions may overlap with the parts before; the last part is what is in none of the others.
 
     Args:
         normal: (h, w, 3), depth: (h, w), reflectivity: (h, w, 3); see `Layers`.
         hits: (h, w) hits that a pixel rests on, over those of a pixel that every eye of the window sees.
     """
-    h, w = depth.shape
+    look_vec = _looks(cams, c)
     edges = _bends(depth) | _turns(normal)
-    border = np.ones((h, w), bool)
-    margin = max(round(BORDER * h), 1)
-    border[margin:-margin, margin:-margin] = False
     found = {
         "silhouettes": edges,
         "textures": _steps(reflectivity) & ~edges,
-        "grazing angles": (np.abs(_facing(normal, cams, c)) < GRAZING) & (depth > 0),
-        "frame edges": border,
-        "disocclusions": (hits < FEW) & ~border,
+        "grazing angles": (np.abs(_facing(normal, look_vec)) < GRAZING) & (depth > 0) & ~edges,
+        "frame edges": _ends(depth, look_vec, cams, c, n_r) & ~edges,
+        "disocclusions": hits < FEW,
     }
     found["the rest"] = ~np.logical_or.reduce(list(found.values()))
+    return found
+
+
+def _looks(cams: Cameras, c: int) -> Float64:
+    """Vectors from eye c through the middle of its pixels, (h, w, 3), 1 long along the optical axis."""
+    x = (np.arange(cams.width) + 0.5 - 0.5 * cams.width) / cams.focal
+    y = (0.5 * cams.height - np.arange(cams.height) - 0.5) / cams.focal
+    found: Float64 = x[None, :, None] * cams.right[c] + y[:, None, None] * cams.up[c] + cams.forward[c]
+    return found
+
+
+def _ends(depth: Float32, look_vec: Float64, cams: Cameras, c: int, n_r: int) -> Mask:
+    """What lies where the picture of another eye of the window ends."""
+    found = np.zeros(depth.shape, bool)
+    for k in range(max(c - n_r, 0), min(c + n_r + 1, len(cams.position))):
+        if k == c:
+            continue
+        seen = (depth > 0)[..., None]  # else it lies in one direction from all eyes
+        vec = np.where(seen, depth[..., None] * look_vec + cams.position[c] - cams.position[k], look_vec)
+        z = vec @ cams.forward[k]
+        ahead = np.where(z > 0, z, np.inf)
+        x = 0.5 * cams.width + cams.focal * (vec @ cams.right[k]) / ahead
+        y = 0.5 * cams.height - cams.focal * (vec @ cams.up[k]) / ahead
+        inside = np.minimum(np.minimum(x, cams.width - x), np.minimum(y, cams.height - y))
+        found |= (z > 0) & (np.abs(inside) < BORDER)
     return found
 
 
@@ -75,15 +99,11 @@ def _steps(reflectivity: Float32) -> Mask:
     return found
 
 
-def _facing(normal: Float32, cams: Cameras, c: int) -> Float32:
-    """Cosine between a pixel's normal and the direction to its eye."""
-    h, w = normal.shape[:2]
-    x = (np.arange(w) + 0.5 - 0.5 * w) / cams.focal
-    y = (0.5 * h - np.arange(h) - 0.5) / cams.focal
-    look_vec = x[None, :, None] * cams.right[c] + y[:, None, None] * cams.up[c] + cams.forward[c]
+def _facing(normal: Float32, look_vec: Float64) -> Float64:
+    """Cosine between a pixel's normal and the direction to its eye; 1 where there is no normal."""
     lengths = np.linalg.norm(look_vec, axis=-1) * np.linalg.norm(normal, axis=-1)
     along = -(look_vec * normal).sum(axis=-1)
-    return np.asarray(np.divide(along, lengths, out=np.ones_like(along), where=lengths > 0), np.float32)
+    return np.divide(along, lengths, out=np.ones_like(along), where=lengths > 0)
 
 
 def _neighbours(values: NDArray[np.floating], axis: int) -> tuple[NDArray[np.floating], NDArray[np.floating]]:

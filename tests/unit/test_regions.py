@@ -8,11 +8,12 @@ from framearray_cli.camera import Cameras
 H, W, F = 40, 60, 50.0
 
 
-def looking_down() -> Cameras:
-    """An eye at height 1 that looks along -z."""
+def looking_ahead(*eyes: float) -> Cameras:
+    """Eyes side by side, at places along x, that look along -z."""
     axes = {"right": [1, 0, 0], "up": [0, 1, 0], "forward": [0, 0, -1]}
-    arrays = {name: np.array([axis], np.float32) for name, axis in axes.items()}
-    return Cameras(position=np.zeros((1, 3), np.float32), focal=F, width=W, height=H, **arrays)
+    arrays = {name: np.tile(np.array(axis, np.float32), (len(eyes), 1)) for name, axis in axes.items()}
+    position = np.array([[x, 0, 0] for x in eyes], np.float32)
+    return Cameras(position=position, focal=F, width=W, height=H, **arrays)
 
 
 def floor_and_wall() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -30,7 +31,7 @@ def test_parts_of_a_room():
     depth[5:15, 40:50] = 2.0  # a board before it
     share = np.ones((H, W))
     share[5:15, 50:52] = 0.4
-    found = regions(normal, depth, reflectivity, share, looking_down(), 0)
+    found = regions(normal, depth, reflectivity, share, looking_ahead(0.0), 0, 3)
     corner = 33  # the first row of the floor
     assert found["silhouettes"][corner - 1 : corner + 1].all()
     assert not found["silhouettes"][corner + 2 :].any()  # a plane seen at a slant has no outline
@@ -39,16 +40,29 @@ def test_parts_of_a_room():
     assert not outline[10, 42:48].any() and not outline[:, :38].any()
     assert found["textures"][5, 19] and found["textures"][5, 20] and not found["textures"][5, 10]
     assert found["disocclusions"].sum() == 20
-    assert found["frame edges"].sum() == H * W - (H - 4) * (W - 4)
-    assert found["the rest"][20, 10]
-    assert not (found["the rest"] & found["frame edges"]).any()
+    assert not found["frame edges"].any()
+    assert found["the rest"][20, 10] and not found["the rest"][5, 19] and not found["the rest"][10, 50]
 
 
 def test_grazing_angles_are_those_to_the_eye():
     normal, depth, reflectivity = floor_and_wall()
-    normal[:] = [0, 1, 0]  # all is floor, seen at the angle that its row says
-    found = regions(normal, depth, reflectivity, np.ones((H, W)), looking_down(), 0)["grazing angles"]
+    normal[:], depth[:] = [0, 1, 0], 4.0  # all is floor, seen at the angle that its row says
+    found = regions(normal, depth, reflectivity, np.ones((H, W)), looking_ahead(0.0), 0, 3)["grazing angles"]
     down = np.abs(np.arange(H) + 0.5 - H / 2) / F
     assert found[:, W // 2].tolist() == (down / np.hypot(1, down) < 0.25).tolist()
     depth[:] = 0  # nothing is seen
-    assert not regions(normal, depth, reflectivity, np.ones((H, W)), looking_down(), 0)["grazing angles"].any()
+    assert not regions(normal, depth, reflectivity, np.ones((H, W)), looking_ahead(0.0), 0, 3)["grazing angles"].any()
+
+
+def test_frame_edges_are_where_the_picture_of_another_eye_ends():
+    normal, depth, reflectivity = floor_and_wall()
+    normal[:], depth[:] = [0, 0, 1], 4.0  # all is wall
+    # the second eye sees it 10.25 pixels to the left, the third is not in the window
+    cams = looking_ahead(0.0, 0.82, 5.0)
+    found = regions(normal, depth, reflectivity, np.ones((H, W)), cams, 0, 1)["frame edges"]
+    middles = np.arange(W) + 0.5
+    assert np.flatnonzero(found[H // 2]).tolist() == np.flatnonzero(np.abs(middles - 10.25) < 1.5).tolist()
+    assert not found[H // 2, 20:].any()
+    depth[:] = 0  # what is infinitely far lies in one direction from both
+    found = regions(normal, depth, reflectivity, np.ones((H, W)), cams, 0, 1)["frame edges"]
+    assert np.flatnonzero(found[H // 2]).tolist() == [0, W - 1]
