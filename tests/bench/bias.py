@@ -32,7 +32,7 @@ SEEDS = {"average": 10_000, "balance": 20_000, "reference": 2_000_000_000}
 EPSILON = 0.01  # of relative squares: (I - R)^2 / (R^2 + EPSILON)
 USUAL = 2  # native hits a pixel a frame, as jobs have them
 # Times as many runs as the cabin needs: patches of sunlight make most of the noise.
-MORE = {"kitchen": 6, "stairs": 2, "cabin": 1}
+MORE = {"kitchen": 5, "stairs": 2, "cabin": 1}
 # Parts of a picture beside those of `regions`: all of it, and all of it with relative squares.
 WHOLE, RELATIVE = "all", "relative"
 
@@ -104,10 +104,13 @@ class Sums:
 
 def measure_part(name: str, part: str, quick: bool) -> Table:
     """One of `MEASURES`."""
-    if part in CAMERAS:
-        return measure(name, part, QUICK if quick else replace(SMALL, more=MORE[name]))
-    plan = replace(QUICK, hits=OWN.hits) if quick else OWN
-    return costs(name, plan) if part == "time" else measure(name, "slow", plan)
+    own = replace(QUICK, hits=OWN.hits) if quick else OWN
+    if part == "time":
+        return costs(name, own)
+    if part == "own-size":
+        return measure(name, "slow", own)
+    plan = QUICK if quick else replace(SMALL, more=MORE[name])
+    return measure(name, part, replace(plan, hits=(USUAL,)) if part == "close" else plan)
 
 
 def measure(name: str, camera: str, plan: Plan) -> Table:
