@@ -16,7 +16,7 @@ from framearray_cli.camera import Cameras
 
 from .campaths import CAMERAS, MIDDLE, N_R, seen_by
 from .cases import Case, Variant, job_named, opened, under, varied, with_resolution
-from .frames import frame
+from .frames import frames
 from .machine import busy
 from .regions import Mask, regions
 from .results import Table
@@ -119,13 +119,13 @@ def measure(name: str, camera: str, plan: Plan) -> Table:
     job = job_named(name, False)
     job = with_resolution(job, plan.resolution) if plan.resolution else job
     with opened(job) as case:
-        frames = [round(place * case.work.n_frames) for place in plan.places]
+        cameras = [round(place * case.work.n_frames) for place in plan.places]
         lights = [int(share * case.work.lights.n_lights) for share in LIGHTS]
-        for c in frames:
+        for c in cameras:
             _add_frame(under(case, lights), c, camera, plan, sums)
             tell(f"{name}, {camera}: camera {c}: {time.perf_counter() - started:.0f} s")
     return {
-        "cameras": frames,
+        "cameras": cameras,
         "lights": lights,
         "resolution": list(job.camera.resolution),
         "reference": plan.parts * PART_HITS,
@@ -159,7 +159,8 @@ def reference(case: Case, cams: Cameras, parts: int) -> tuple[Float32, tuple[Flo
         (parts, n_lights, h, w, 3), and normal, depth and reflectivity, see `Layers`.
     """
     changed = seen_by(varied(case, Variant(name="reference", n_r=0, hits=PART_HITS)), cams)
-    made = [frame(changed, MIDDLE, SEEDS["reference"] + i, layers=i == 0) for i in range(parts)]
+    seeds = range(SEEDS["reference"], SEEDS["reference"] + parts)
+    made = frames(changed, MIDDLE, seeds, layers=True)
     layers = made[0].layers
     assert layers is not None
     return np.stack([one.images for one in made]), (layers.normal, layers.depth, layers.reflectivity)
@@ -171,7 +172,7 @@ def runs(case: Case, cams: Cameras, weights: str, hits: int, seeds: Sequence[int
     Also the hits of a pixel, (h, w): their mean over those that it has where every eye of the window sees it.
     """
     changed = seen_by(varied(case, Variant(name=weights, n_r=N_R, hits=hits, balance=weights == "balance")), cams)
-    made = [frame(changed, MIDDLE, seed) for seed in seeds]
+    made = frames(changed, MIDDLE, seeds)
     share = np.mean([one.hits for one in made], axis=0) / ((2 * N_R + 1) * hits)
     return np.stack([one.images for one in made]), share.reshape(cams.height, cams.width)
 

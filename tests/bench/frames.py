@@ -1,5 +1,7 @@
 """One frame of a case for one seed, of its whole window: what is compared with references."""
 
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -11,10 +13,14 @@ from framearray_cli.window import Composed, Window
 from .cases import Case
 
 
-def frame(case: Case, c: int, seed: int, layers: bool = False) -> Composed:
-    """Find the hits of all eyes of the window of frame c, and compose it; its images are not rounded to halves."""
+def frame(case: Case, c: int, seed: int, *, layers: bool = False, threads: int | None = None) -> Composed:
+    """Find the hits of all eyes of the window of frame c, and compose it; its images are not rounded to halves.
+
+    Args:
+        threads: None: those of the case.
+    """
     work = replace(case.work, seed=seed, layers=layers)
-    crew = Crew(work, case.threads)
+    crew = Crew(work, threads or case.threads)
     window = Window(work, case.ambient, crew, first=c)
     out = np.empty((len(work.kept), work.cams.height, work.cams.width, 3), np.float32)
     try:
@@ -23,3 +29,18 @@ def frame(case: Case, c: int, seed: int, layers: bool = False) -> Composed:
         return window.compose(c, out)
     finally:
         crew.close()
+
+
+def frames(case: Case, c: int, seeds: Sequence[int], *, layers: bool = False) -> list[Composed]:
+    """Frame c for many seeds, each by one thread: small pictures keep no two threads busy.
+
+    Args:
+        layers: of the first seed.
+    """
+
+    def one(i: int) -> Composed:
+        return frame(case, c, seeds[i], layers=layers and i == 0, threads=1)
+
+    first = one(0)  # whatever is not compiled yet is compiled once
+    with ThreadPoolExecutor(case.threads) as pool:
+        return [first, *pool.map(one, range(1, len(seeds)))]
