@@ -119,16 +119,20 @@ def _summary(found: Mapping[tuple[str, str], Table]) -> list[str]:
         average, balance = (row_of(table, weights, USUAL, WHOLE) for weights in ("average", "balance"))
         assert average and balance
         z = average["bias"] / average["error"]
-        cells = [str(average["runs"]), _millionths(average), f"{z:.0f}", _root(average)]
+        cells = [
+            " x ".join(map(str, table["resolution"])),
+            str(average["runs"]),
+            _millionths(average),
+            f"{z:.0f}",
+            _root(average),
+        ]
         cells += [str(balance["runs"]), _millionths(balance), _root(balance)]
         rows.append([f"{job}, {camera}", *cells, _beside(balance, average)])
     first = next(iter(found.values()))
-    size, lights = " x ".join(map(str, first["resolution"])), len(first["lights"])
     about = f"""
-{size} pixels, two frames of each path under {lights} light positions each; {USUAL} hits a pixel a frame; references of
-{first["reference"]:,} hits a pixel.
+Two frames of each path; {USUAL} hits a pixel a frame; references of {first["reference"]:,} hits a pixel.
 """
-    head = ["", "runs", "`average`", "z", "root", "runs", "`balance`", "root", "at most"]
+    head = ["", "pixels", "lights", "runs", "`average`", "z", "root", "runs", "`balance`", "root", "at most"]
     return ["## Three jobs, three cameras", about, grid(head, rows)]
 
 
