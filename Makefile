@@ -6,7 +6,7 @@ JOB := jobs/kitchen-small.toml
 OUT := out/kitchen-small
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-all smoke format check docs bench bench-scaling bench-bias clean
+.PHONY: help install render test test-all smoke format check docs bench bench-scaling bench-bias bench-ambient clean
 
 help: ## Show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -64,6 +64,9 @@ bench-scaling: $(VENV)/installed-bench ## Measure time against the size of a job
 
 bench-bias: $(VENV)/installed-bench ## Measure what reuse is off by with both kinds of weights, and write docs/bias.md
 	PYTHONPATH=tests $(BIN)/python -m bench bias $(BENCH)
+
+bench-ambient: $(VENV)/installed-bench ## Measure the ambient estimate against path tracing, and write docs/ambient.md
+	PYTHONPATH=tests $(BIN)/python -m bench ambient $(BENCH)
 
 clean: ## Remove what was built and rendered
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache

@@ -43,10 +43,16 @@ def opened(job: Job) -> Iterator[Case]:
     Raises:
         JobError, SceneError: as a render would.
     """
-    prepared = prepare(job)
+    with planned(prepare(job)) as case:
+        yield case
+
+
+@contextmanager
+def planned(prepared: Prepared) -> Iterator[Case]:
+    """Plan a job that is prepared, for measuring."""
     with open_embree(prepared) as embree:
         work, ambient = plan_work(prepared, embree)
-        yield Case(prepared=prepared, embree=embree, work=work, ambient=ambient, settings=Settings.of(job))
+        yield Case(prepared=prepared, embree=embree, work=work, ambient=ambient, settings=Settings.of(prepared.job))
 
 
 def varied(case: Case, settings: Settings) -> Case:

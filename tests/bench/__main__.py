@@ -3,21 +3,21 @@
 import argparse
 import json
 
-from . import bias, biaspage, cycles, error, mitsuba3, peers, processes, scaling, speed, table, told
+from . import ambient, bias, biaspage, cycles, error, mitsuba3, pathtraced, peers, processes, scaling, speed, table, told
 from .cases import FRAME_ARRAY, JOBS, Variant, job_named, opened, variant_named, varied, with_resolution
 from .results import folder, load, save
 from .steady import steady
 
 PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
 PARTS = ("speed", "error", "peers", "memory", "startup")
-CHOICES = ("all", "scaling", "bias", "told", "page", "peak", *PROGRAMS, *PARTS)
+OTHERS = ("scaling", "bias", "told", "page", "peak", "trace", *ambient.PARTS)
 
 
 def main() -> None:
     """Measure what is asked for, and write the page."""
     parser = argparse.ArgumentParser(prog="bench", description="Measure what an image costs, and write docs/speed.md.")
-    parser.add_argument("what", nargs="?", default="all", choices=CHOICES)
-    parser.add_argument("jobs", nargs="*", default=list(JOBS), help="some of the jobs")
+    parser.add_argument("what", nargs="?", default="all", choices=("all", *OTHERS, *PROGRAMS, *PARTS))
+    parser.add_argument("jobs", nargs="*", help="some of the jobs, or of the scenes of `ambient`")
     parser.add_argument("--quick", action="store_true", help="a small picture, once; the page goes to out/bench/quick")
     parser.add_argument("--runs", type=int, default=speed.RUNS, help="how often each thing is measured")
     parser.add_argument("--patience", type=float, default=0.0, help="seconds to wait for a busy machine, each time")
@@ -25,27 +25,34 @@ def main() -> None:
     parser.add_argument("--variant", default=FRAME_ARRAY.name, help="for `peak`")
     parser.add_argument("--resolution", help="for `peak`: 800x600")
     parser.add_argument("--frames", type=int, default=2, help="for `peak`")
+    parser.add_argument("--mitsuba", default=pathtraced.COMPILED, help="for `trace`: the variant")
     args = parser.parse_args()
+    if args.what in ambient.PARTS:
+        ambient.run(args.what, args.jobs, args.quick)
+        return
     if args.what == "peak":
         print(json.dumps(peak(args.jobs[0], variant_named(args.variant), args)))
+        return
+    if args.what == "trace":
+        print(json.dumps(pathtraced.trace(args.jobs[0], args.quick, folder(args.quick), args.mitsuba)))
         return
     if args.what in PROGRAMS:
         print(json.dumps(PROGRAMS[args.what](args.jobs[0], args.quick)))
         return
-    out = folder(args.quick)
+    out, jobs = folder(args.quick), args.jobs or list(JOBS)
     if args.what == "told":
-        for name in args.jobs:
+        for name in jobs:
             save(out, f"told-{name}", {"rows": told.measure(name, out)})
         told.write([row for name in JOBS if (kept := load(out, f"told-{name}")) for row in kept["rows"]])
         return
     if args.what == "bias":
-        for name in args.jobs:
+        for name in jobs:
             for part in args.part:
                 save(out, f"bias-{name}-{part}", bias.measure_part(name, part, args.quick))
         biaspage.write(args.quick)
         return
     todo = PARTS if args.what == "all" else (args.what,)
-    for name in args.jobs:
+    for name in jobs:
         if "speed" in todo:
             save(out, f"speed-{name}", speed.measure(name, args.quick, args.runs, args.patience))
         if "error" in todo:
@@ -54,7 +61,7 @@ def main() -> None:
             for program in PROGRAMS:
                 save(out, f"{program}-{name}", peers.measure(program, name, args.quick))
     if "memory" in todo:
-        save(out, "memory", processes.memory(args.quick, args.jobs))
+        save(out, "memory", processes.memory(args.quick, jobs))
     if "startup" in todo:
         save(out, "startup", processes.start_up(args.quick))
     if "scaling" in todo:

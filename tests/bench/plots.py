@@ -24,7 +24,7 @@ Point: TypeAlias = tuple[int, float, float]
 
 def draw(scaling: Table, folder: Path) -> dict[str, str]:
     """Draw every sweep; returns sweep -> the picture's place beside the page. Without matplotlib there are none."""
-    if not _ready(folder):
+    if not ready(folder):
         return {}
     found = {}
     for sweep, name, label, size in PLOTS:
@@ -35,8 +35,8 @@ def draw(scaling: Table, folder: Path) -> dict[str, str]:
     return found
 
 
-def _ready(folder: Path) -> bool:
-    """Make ready to draw into a folder; False without matplotlib."""
+def ready(folder: Path) -> bool:
+    """Whether there is matplotlib; it is set up so that the same results give the same files in `folder`."""
     try:
         import matplotlib
     except ImportError:
@@ -62,7 +62,7 @@ def _plot(file: Path, label: str, sizes: list[float], ms: list[float], logarithm
         else:
             axes.set_ylim(bottom=0)
         for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_formatter(ticker.FuncFormatter(_tick))
+            axis.set_major_formatter(ticker.FuncFormatter(tick))
         axes.grid(alpha=0.3)
         figure.savefig(file, metadata={"Date": None, "Creator": None})
     finally:
@@ -75,7 +75,7 @@ def draw_bias(found: Mapping[tuple[str, str], Mapping[str, Sequence[Point]]], fo
     Args:
         found: (job, camera) -> weights -> (hits, squared bias, standard error).
     """
-    if not _ready(folder):
+    if not ready(folder):
         return None
     from matplotlib import pyplot
 
@@ -90,7 +90,7 @@ def draw_bias(found: Mapping[tuple[str, str], Mapping[str, Sequence[Point]]], fo
                 for weights, curve in curves.items() if of == camera else ():
                     _curve(axes, curve, colours[job], LINES[weights], f"{job}, {weights}")
             axes.set(xscale="log", yscale="log", title=camera, xlabel="hits a pixel a frame")
-            axes.xaxis.set_major_formatter(_tick)
+            axes.xaxis.set_major_formatter(tick)
             axes.xaxis.set_minor_formatter("")
             axes.grid(alpha=0.3)
         panels[0][0].set_ylabel("squared bias over the squared mean")
@@ -112,8 +112,8 @@ def _curve(axes: Any, curve: Sequence[Point], colour: str, line: str, label: str
         axes.plot(*zip(*below, strict=True), "v", color=colour, fillstyle="none", markersize=5)
 
 
-def _tick(value: float, _position: Any) -> str:
-    """1,000 and more in words, less as it is."""
+def tick(value: float, _position: Any) -> str:
+    """Label of an axis: 1,000 and more in words, less as it is."""
     for size, word in ((1e6, "M"), (1e3, "k")):
         if value >= size:
             return f"{value / size:g}{word}"

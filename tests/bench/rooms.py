@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from framearray_cli.meshes import Material, Meshes
 from framearray_cli.meshes.model import Part
 from framearray_cli.paths import eyes, lights
 from framearray_cli.prepare import Prepared
-from framearray_cli.scene import build_scene
+from framearray_cli.scene import Scene, build_scene
 from framearray_cli.surface import surfaces
 
 SIZE = (8.0, 3.0, 8.0)  # of the room
@@ -22,6 +23,15 @@ RADIUS = 0.4
 
 def room(n_triangles: int, resolution: tuple[int, int]) -> tuple[Prepared, float]:
     """A room of about n triangles, ready to render, and the seconds it took to make a scene of its triangles."""
+    parts, materials = spheres(n_triangles)
+    started = time.perf_counter()
+    scene = scene_of(parts, materials)
+    seconds = time.perf_counter() - started
+    return prepared_of(_job(resolution), scene), seconds
+
+
+def spheres(n_triangles: int) -> tuple[list[Part], list[Material]]:
+    """A closed room full of spheres, of about n triangles."""
     n = n_triangles / math.prod(COUNT)
     rings = max(3, round(math.sqrt(n / 4)))  # 2 * rings * (rings - 1) * 2 triangles a sphere
     parts = [Part(material=0, corners=_box())]
@@ -30,22 +40,27 @@ def room(n_triangles: int, resolution: tuple[int, int]) -> tuple[Prepared, float
         place = [(i + 0.5) / k * side for i, k, side in zip(index, COUNT, SIZE, strict=True)]
         parts.append(Part(material=1 + sum(index) % 2, corners=sphere + place))
     names = ("Wall", 0.7), ("Ball", 0.6), ("Other ball", 0.4)
-    materials = tuple(Material(name=name, reflectivity=(r, r, r)) for name, r in names)
-    started = time.perf_counter()
-    scene = build_scene(Meshes(parts=tuple(parts), materials=materials, textures=(), dropped={}, notes=()), {})
-    seconds = time.perf_counter() - started
-    job = _job(resolution)
-    job_lights = lights(job)
-    prepared = Prepared(
+    return parts, [Material(name=name, reflectivity=(r, r, r)) for name, r in names]
+
+
+def scene_of(parts: Sequence[Part], materials: Sequence[Material]) -> Scene:
+    """A scene that is in no file."""
+    return build_scene(Meshes(parts=tuple(parts), materials=tuple(materials), textures=(), dropped={}, notes=()), {})
+
+
+def prepared_of(job: Job, scene: Scene) -> Prepared:
+    """A job ready to render in a scene that is in no file."""
+    job_eyes, job_lights = eyes(job), lights(job)
+    matrices = job_eyes.world_from_camera
+    return Prepared(
         job=job,
         scene=scene,
-        eyes=eyes(job),
+        eyes=job_eyes,
         lights=job_lights,
         light_arrays=light_arrays(job_lights, scene.centre),
         surfaces=surfaces(scene),
-        still=False,
+        still=bool((matrices == matrices[:1]).all()),
     )
-    return prepared, seconds
 
 
 def _sphere(rings: int, segments: int) -> Float64:

@@ -1,0 +1,27 @@
+"""Measures the ambient estimate, and writes docs/ambient.md: `python -m bench ambient`."""
+
+from collections.abc import Sequence
+
+from . import ambient_levels, ambient_page, ambient_pictures, pathtraced
+from .ambient_scenes import FURNACE, SMALLER, probes
+from .results import folder, save
+
+# All of it, or one part; the parts keep their results, so that each can be made again alone.
+PARTS = ("ambient", "ambient-levels", "ambient-traced", "ambient-pictures", "ambient-page")
+
+
+def run(what: str, names: Sequence[str], quick: bool) -> None:
+    """Measure a part of it, or all, in some of the scenes, or all; then write the page from whatever was measured."""
+    out = folder(quick)
+    for probe in probes():
+        if names and probe.name not in names:
+            continue
+        if what in ("ambient", "ambient-levels") and probe.name not in SMALLER:
+            save(out, f"ambient-levels-{probe.name}", ambient_levels.measure(probe, quick))
+        if probe.name == FURNACE:  # known without path tracing
+            continue
+        if what in ("ambient", "ambient-traced") and probe.traced == probe.name:
+            save(out, f"traced-{probe.name}", pathtraced.measure(probe.name, quick))
+        if what in ("ambient", "ambient-pictures"):
+            save(out, f"ambient-pictures-{probe.name}", ambient_pictures.measure(probe, quick, out))
+    ambient_page.write(quick)
