@@ -10,7 +10,8 @@ from .steady import steady
 
 PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
 PARTS = ("speed", "error", "peers", "memory", "startup")
-OTHERS = ("scaling", "bias", "told", "page", "peak", "trace", *ambient.PARTS)
+TRACES = ("trace", "trace-means")
+OTHERS = ("scaling", "bias", "told", "page", "peak", *TRACES, *ambient.PARTS)
 
 
 def main() -> None:
@@ -25,7 +26,7 @@ def main() -> None:
     parser.add_argument("--variant", default=FRAME_ARRAY.name, help="for `peak`")
     parser.add_argument("--resolution", help="for `peak`: 800x600")
     parser.add_argument("--frames", type=int, default=2, help="for `peak`")
-    parser.add_argument("--mitsuba", default=pathtraced.COMPILED, help="for `trace`: the variant")
+    parser.add_argument("--mitsuba", default=pathtraced.COMPILED, help="for `trace` and `trace-means`: the variant")
     args = parser.parse_args()
     if args.what in ambient.PARTS:
         ambient.run(args.what, args.jobs, args.quick)
@@ -33,8 +34,12 @@ def main() -> None:
     if args.what == "peak":
         print(json.dumps(peak(args.jobs[0], variant_named(args.variant), args)))
         return
-    if args.what == "trace":
-        print(json.dumps(pathtraced.trace(args.jobs[0], args.quick, folder(args.quick), args.mitsuba)))
+    if args.what in TRACES:
+        if args.what == "trace":
+            traced = pathtraced.trace(args.jobs[0], args.quick, folder(args.quick), args.mitsuba)
+        else:
+            traced = pathtraced.trace_means(args.jobs[0], args.quick, args.mitsuba)
+        print(json.dumps(traced))
         return
     if args.what in PROGRAMS:
         print(json.dumps(PROGRAMS[args.what](args.jobs[0], args.quick)))

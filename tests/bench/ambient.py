@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 from . import ambient_levels, ambient_page, ambient_pictures, pathtraced
 from .ambient_scenes import FURNACE, SMALLER, probes
+from .cases import JOBS
 from .results import folder, save
 
 # All of it, or one part; the parts keep their results, so that each can be made again alone.
-PARTS = ("ambient", "ambient-levels", "ambient-traced", "ambient-pictures", "ambient-page")
+PARTS = ("ambient", "ambient-levels", "ambient-traced", "ambient-pictures", "ambient-along", "ambient-page")
 
 
 def run(what: str, names: Sequence[str], quick: bool) -> None:
@@ -21,7 +22,10 @@ def run(what: str, names: Sequence[str], quick: bool) -> None:
         if probe.name == FURNACE:  # known without path tracing
             continue
         if what in ("ambient", "ambient-traced") and probe.traced == probe.name:
-            save(out, f"traced-{probe.name}", pathtraced.measure(probe.name, quick))
+            save(out, f"traced-{probe.name}", pathtraced.measure("trace", probe.name, quick))
         if what in ("ambient", "ambient-pictures"):
             save(out, f"ambient-pictures-{probe.name}", ambient_pictures.measure(probe, quick, out))
+        if what in ("ambient", "ambient-along") and probe.name in JOBS:
+            means = pathtraced.measure("trace-means", probe.name, quick)
+            save(out, f"ambient-along-{probe.name}", ambient_pictures.along(probe, means, quick, out))
     ambient_page.write(quick)

@@ -38,13 +38,18 @@ def render(results: Path, beside: Path) -> str:
     levels = {name: table for name in names if (table := load(results, f"ambient-levels-{name}"))}
     compared = {name: table for name in names if (table := load(results, f"ambient-pictures-{name}"))}
     pictures = {name: table for name, table in compared.items() if "skipped" not in table}
+    along = {name: table for name in names if (table := load(results, f"ambient-along-{name}")) and "cameras" in table}
     left_out = {name: table["skipped"] for name, table in compared.items() if "skipped" in table}
     drawn = draw(levels, pictures, beside / "plots")
     parts = [HEAD]
     if levels:
         parts += [*walks(levels, drawn), *honesty(levels)]
     if pictures:
-        parts += [*level(pictures, drawn), *errors(pictures, strips(pictures, results, beside / "pictures"))]
+        parts += level(pictures, drawn)
+    if along:
+        parts += paths(along)
+    if pictures:
+        parts += errors(pictures, strips(pictures, results, beside / "pictures"))
         parts += same_light(pictures)
     if left_out:
         parts.append("Not path-traced: " + "; ".join(f"{name}: {why}" for name, why in left_out.items()) + ".")
@@ -156,6 +161,27 @@ have one camera alone: there "fit" must come out as 1, but for the standard erro
     if "levels" in drawn:
         parts.append(f"![Mean indirect light over the path-traced one]({drawn['levels']})")
     return [*parts, grid(head, rows)]
+
+
+def paths(along: Mapping[str, Table]) -> list[str]:
+    """Mean indirect light along the camera path."""
+    n = len(next(iter(along.values()))["cameras"])
+    about = f"""
+There is one I_A for all cameras of a light position. Mean indirect light at {n} cameras spread over the path, over the
+path-traced mean: of all of them together, and of single ones.
+"""
+    rows = []
+    for name, table in along.items():
+        cells = [name]
+        for method in METHODS:
+            found = table["methods"][method]
+            ratios = np.array(found["ratios"])
+            cells += [number(found["ratio"]), f"{ratios.min():.2f} to {ratios.max():.2f}"]
+        rows.append([*cells, percent(float(np.hypot.reduce(table["error"]) / np.sum(table["indirect"])), 2)])
+    head = [""]
+    for method in METHODS:
+        head += [f"`{method}`", "single cameras"]
+    return ["## Along the camera path", about, grid([*head, "standard error, path traced"], rows)]
 
 
 def errors(pictures: Mapping[str, Table], shown: Mapping[str, str]) -> list[str]:

@@ -19,7 +19,8 @@ from framearray_cli.report.reference import noise, reference
 from framearray_cli.window import Window
 
 from .ambient_levels import METHODS
-from .ambient_scenes import Probe, under_one, with_ambient
+from .ambient_scenes import Probe, resized, under_one, with_ambient
+from .pathtraced import SMALL
 from .results import Table, load
 from .speed import tell
 
@@ -131,6 +132,25 @@ def measure(probe: Probe, quick: bool, folder: Path) -> Table:
         found["own"][method] = _sampled(probe, method, total, indirect)
         tell(f"{probe.name}: {method}: indirect light is {found['model'][method]['indirect']['ratio']:.3f} of right")
     np.savez(folder / f"ambient-shown-{probe.name}.npz", **shown)
+    return found
+
+
+def along(probe: Probe, means: Table, quick: bool, folder: Path) -> Table:
+    """Mean indirect light of each method at some cameras of a path, over the path-traced `means`."""
+    if "skipped" in means:
+        return means
+    right = np.array(means["indirect"])
+    found: Table = {**means, "words": probe.words, "methods": {}}
+    prepared = under_one(resized(probe.prepared(), SMALL), probe.l)
+    for method in METHODS:
+        with planned(with_ambient(prepared, method, PATHS[method] >> (5 if quick else 0))) as case:
+            level, ours = case.ambient.intensity[0], []
+            for c in means["cameras"]:
+                one = reference(case, c, [0], folder, 1).indirect
+                ours.append(float((level * one).mean(dtype=np.float64)))
+        ratio = float(np.sum(ours) / right.sum())
+        found["methods"][method] = {"ratios": (np.array(ours) / right).tolist(), "ratio": ratio}
+        tell(f"{probe.name}: {method}: indirect light of {len(ours)} cameras is {ratio:.3f} of right")
     return found
 
 

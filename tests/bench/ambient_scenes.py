@@ -71,6 +71,11 @@ def under_one(prepared: Prepared, l: int) -> Prepared:
     return replace(prepared, lights=lights, light_arrays=some_lights(prepared.light_arrays, [l]))
 
 
+def resized(prepared: Prepared, resolution: tuple[int, int]) -> Prepared:
+    """The same at another resolution."""
+    return replace(prepared, job=with_resolution(prepared.job, resolution))
+
+
 def _of_job(name: str) -> Probe:
     job = with_resolution(read_job(ROOT / "jobs" / f"{name}.toml"), QUICK_RESOLUTION)
     c, l = (int(share * n) for share, n in zip(PLACE, (job.camera.frames, job.light.frames), strict=True))
@@ -96,7 +101,7 @@ def _materials(**reflectivity: tuple[float, float, float]) -> list[Material]:
 def _closed() -> Prepared:
     """The room of `rooms.py` with a lamp off its middle."""
     scene = scene_of(*spheres(20_000))
-    lamp = {"type": "point", "keys": [{"frame": 0, "position": [2.4, 2.6, 4.0], "intensity": [20.0, 18.0, 15.0]}]}
+    lamp = {"type": "point", "keys": [{"frame": 0, "position": [3.2, 2.6, 4.0], "intensity": [20.0, 18.0, 15.0]}]}
     return prepared_of(_job("closed", {"eye": [1.0, 1.5, 7.2], "target": [4.0, 1.2, 3.0]}, lamp), scene)
 
 

@@ -6,8 +6,7 @@ from a source or the background, by mirrors or not: it shows that both programs 
 """
 
 import subprocess
-import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +17,15 @@ from framearray_cli.lights import DIRECTIONAL
 from framearray_cli.prepare import Prepared
 from framearray_cli.scene import Scene
 
-from .ambient_scenes import Probe, probe_named
+from .ambient_scenes import Probe, probe_named, resized
 from .processes import asked
 from .results import Table
 from .speed import tell
 
 COMPILED, SCALAR = "llvm_ad_rgb", "scalar_rgb"  # variants of Mitsuba: by LLVM, and one path at a time
 SAMPLES, QUICK_SAMPLES = 1024, 32  # of a pixel, in all
+# Of small pictures along the camera path, whose mean alone counts.
+CAMERAS, SMALL, SMALL_SAMPLES = 12, (80, 60), 128
 PASSES = 16  # independent ones, whose spread tells the error
 ROULETTE = 16  # vertices before a path may end by chance; there is no other end
 
@@ -57,8 +58,8 @@ def _error(passes: Float32) -> float:
     return float(means.std(ddof=1) / np.sqrt(len(means)))
 
 
-def measure(name: str, quick: bool) -> Table:
-    """Trace the pictures of a probe; {"skipped": why} where that cannot be had.
+def measure(what: str, name: str, quick: bool) -> Table:
+    """Do what `trace` or `trace_means` does to a probe; {"skipped": why} where that cannot be had.
 
     In a process of its own: older LLVMs cannot compile Mitsuba's integrator, and end the process. Then the variant
     without a compiler is tried, which takes several times as long.
@@ -67,11 +68,11 @@ def measure(name: str, quick: bool) -> Table:
     table: Table = {}
     for variant in (COMPILED, SCALAR):
         try:
-            table = asked("trace", name, *options, "--mitsuba", variant)
+            table = asked(what, name, *options, "--mitsuba", variant)
             break
         except subprocess.CalledProcessError as error:
             table = {"skipped": f"Mitsuba ended with status {error.returncode}"}
-    tell(f"{name}: " + (f"not traced: {table['skipped']}" if "skipped" in table else f"traced in {table['s']:.0f} s"))
+    tell(f"{name}: " + (f"not traced: {table['skipped']}" if "skipped" in table else "traced"))
     return table
 
 
@@ -81,26 +82,51 @@ def trace(name: str, quick: bool, folder: Path, variant: str = COMPILED) -> Tabl
     Args:
         variant: of Mitsuba, for its path tracer.
     """
-    try:
-        import mitsuba as mi
-    except ImportError:
-        return {"skipped": "Mitsuba is not installed (pip install mitsuba)"}
-    missing = {COMPILED, variant} - set(mi.variants())
-    if missing:
-        return {"skipped": f"this Mitsuba has no variant {', '.join(missing)}"}
+    mi, why = _mitsuba(variant)
+    if why:
+        return {"skipped": why}
     probe = probe_named(name)
     prepared = probe.prepared()
     why = unknown(prepared.scene)
     if why:
         return {"skipped": why}
     samples = QUICK_SAMPLES if quick else SAMPLES
-    started = time.perf_counter()
     traced = pictures(mi, prepared, probe, samples, variant)
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / f"traced-{name}.npz"
     traced.save(file)
-    spent = time.perf_counter() - started
-    return {"file": file.name, "version": mi.__version__, "samples": samples, "variant": variant, "s": spent}
+    return {"file": file.name, "version": mi.__version__, "samples": samples, "variant": variant}
+
+
+def _mitsuba(variant: str) -> tuple[Any, str]:
+    """Mitsuba, and why it is of no use, or ""."""
+    try:
+        import mitsuba as mi
+    except ImportError:
+        return None, "Mitsuba is not installed (pip install mitsuba)"
+    missing = {COMPILED, variant} - set(mi.variants())
+    return mi, f"this Mitsuba has no variant {', '.join(missing)}" if missing else ""
+
+
+def trace_means(name: str, quick: bool, variant: str = COMPILED) -> Table:
+    """Trace small pictures of some cameras of a path in this process; {"skipped": why} where that cannot be had.
+
+    Returns:
+        cameras; indirect: (n,) mean of their indirect light over pixels and channels; error: (n,) its standard error.
+    """
+    mi, why = _mitsuba(variant)
+    if why:
+        return {"skipped": why}
+    probe = probe_named(name)
+    prepared = resized(probe.prepared(), SMALL)
+    cameras = [int((i + 0.5) / CAMERAS * prepared.n_cameras) for i in range(2 if quick else CAMERAS)]
+    means, errors = [], []
+    for c in cameras:
+        found = pictures(mi, prepared, replace(probe, c=c), QUICK_SAMPLES if quick else SMALL_SAMPLES, variant)
+        indirect = found.total - found.light
+        means.append(float(indirect.mean(dtype=np.float64)))
+        errors.append(_error(indirect))
+    return {"cameras": cameras, "indirect": means, "error": errors}
 
 
 def unknown(scene: Scene) -> str:

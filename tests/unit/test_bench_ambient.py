@@ -99,6 +99,8 @@ def test_scenes_are_what_their_names_say():
         assert (corners.min(axis=0) < prepared.eyes.position[0]).all()
         assert (max(prepared.job.scene.background) > 0) is escapes
         assert not pathtraced.unknown(prepared.scene)
+        with open_embree(prepared) as embree:
+            assert _estimate(prepared, embree, "eye", 256, 1)[0] > 0  # the lamp is in no ball, the sun gets in
     assert probe_named("open-sky").traced == "open"
     assert len({probe.name for probe in probes()}) == len(probes())
 
@@ -122,12 +124,16 @@ def test_the_page_shows_what_there_is(tmp_path: Path):
         "model": {**compared, OWN_LEVEL: distances(1.0)}, "own": compared, "direct": {**distances(1.0)["whole"]},
     }  # fmt: skip
     save(tmp_path, "ambient-pictures-kitchen", picture)
+    ratios = {method: {"ratio": 0.9, "ratios": [0.75, 1.5]} for method in METHODS}
+    along = {"cameras": [1, 2], "indirect": [0.2, 0.3], "error": [0.003, 0.004], "methods": ratios}
+    save(tmp_path, "ambient-along-kitchen", along)
     save(tmp_path, "ambient-pictures-cabin", {"skipped": "Mitsuba is not installed"})
     image = np.full(SHAPE, 0.3, np.float32)
     np.savez(tmp_path / "ambient-shown-kitchen.npz", eye=image, fit=image, traced=image)
     page = ambient_page.render(tmp_path, tmp_path)
     assert "2 *" in page and "1 *" not in page  # the dishonest errors alone are marked
     assert "| kitchen | 60 % | 0.8 | 2 | 1.01 | 0.010 | +1.0 |" in page
+    assert "| kitchen | 0.9 | 0.75 to 1.50 | 0.9 | 0.75 to 1.50 | 0.9 | 0.75 to 1.50 | 1 % |" in page
     assert "cabin: Mitsuba is not installed" in page
     for file in ("plots/ambient-walks.svg", "plots/ambient-levels.svg", "pictures/ambient-kitchen.jpg"):
         assert file in page
@@ -137,6 +143,7 @@ def test_the_page_shows_what_there_is(tmp_path: Path):
 def test_without_mitsuba_nothing_is_traced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "mitsuba", None)
     assert "not installed" in pathtraced.trace("window", True, tmp_path)["skipped"]
+    assert "not installed" in pathtraced.trace_means("kitchen", True)["skipped"]
     assert not list(tmp_path.iterdir())
 
 
@@ -146,7 +153,7 @@ def test_mitsuba_sees_the_same_scene(tmp_path: Path):
     from bench.ambient_pictures import measure
     from bench.results import folder
 
-    table = pathtraced.measure("window", True)
+    table = pathtraced.measure("trace", "window", True)
     if "skipped" in table:
         pytest.skip(table["skipped"])
     save(tmp_path, "traced-window", {**table, "file": str(folder(True) / table["file"])})
