@@ -23,7 +23,7 @@ def run(what: str, names: Sequence[str], quick: bool) -> None:
             continue
         if what in ("ambient", "ambient-traced") and probe.traced == probe.name:
             save(out, f"traced-{probe.name}", pathtraced.measure("trace", probe.name, quick))
-        if what in ("ambient", "ambient-pictures"):
+        if what in ("ambient", "ambient-pictures") and probe.traced == probe.name:
             save(out, f"ambient-pictures-{probe.name}", ambient_pictures.measure(probe, quick, out))
         if what in ("ambient", "ambient-along") and probe.name in JOBS:
             means = pathtraced.measure("trace-means", probe.name, quick)

@@ -9,7 +9,8 @@ from scipy.stats import chi2, norm
 from .ambient_levels import METHODS
 from .ambient_pictures import OWN_LEVEL
 from .ambient_plots import draw, strips
-from .ambient_scenes import probes
+from .ambient_scenes import SMALLER, probes
+from .cases import JOBS
 from .markdown import grid, number, percent
 from .results import ROOT, Table, folder, load
 
@@ -139,11 +140,11 @@ def level(pictures: Mapping[str, Table], drawn: Mapping[str, str]) -> list[str]:
     about = f"""
 One picture of each scene (of the jobs at 0.4 of the camera path and the middle of the light path), path-traced by
 Mitsuba {traced["version"]}'s `path` integrator with {traced["samples"]:,} samples a pixel: the same triangles, normals,
-textures, mirrors, lights and background, paths that end by chance alone. Indirect light is what is left of it without
+textures, mirrors, lights and background; paths end by chance alone. Indirect light is what is left of it without
 the light that comes straight from a source or the background, or by mirrors alone. Mean indirect light over the
 path-traced mean, channels and pixels together; I_A comes from so many walks that its own error is small. The jobs' I_A
 is for all their cameras, so that one picture may be off where the mean over the cameras is not. The generated scenes
-have one camera alone: there "fit" must come out as 1, but for the standard errors of both, which follow it.
+have one camera alone: there "fit" must come out as 1, but for the standard errors of both, which follow it with z.
 """
     rows = []
     for name, table in pictures.items():
@@ -154,7 +155,7 @@ have one camera alone: there "fit" must come out as 1, but for the standard erro
         fit = table["model"]["fit"]
         off = fit["indirect"]["ratio"] - 1
         error = float(np.hypot(fit["error"], fit["indirect"]["ratio_error"]))
-        cells += [f"{error:.3f}", f"{off / error:+.1f}"]
+        cells += [f"{error:.3f}", "" if name in (*JOBS, *SMALLER) else f"{off / error:+.1f}"]
         rows.append(cells)
     head = ["", "indirect light, share", *(f"`{method}`" for method in METHODS), "standard error", "z of `fit`"]
     parts = ["## The level of indirect light", about]
@@ -228,8 +229,9 @@ def same_light(pictures: Mapping[str, Table]) -> list[str]:
     """Both programs see the same scene."""
     about = """
 Light straight from the sources and the background, mirrors included, is no matter of obscurances: both programs must
-give the same. Mean of ours over Mitsuba's, its standard error as far as Mitsuba's noise goes, and the RMSE that is left
-without the noise of either.
+give the same. Mean of ours over Mitsuba's, its standard error as far as Mitsuba's noise goes, and the RMSE without
+Mitsuba's noise; ours is still in it, at shadow edges. In the stairs Mitsuba lets its rays start 1 mm and more above a
+surface, so that some light gets below the edges of steps.
 """
     rows = []
     for name, table in pictures.items():
