@@ -1,7 +1,7 @@
 """Measures what an image costs and how far it is from right. Not part of the tests.
 
-`make bench` runs `python -m bench`, `make bench-scaling` runs `python -m bench scaling`, and so do `make bench-bias` and
-`make bench-ambient` with their names.
+`make bench` runs `python -m bench`, `make bench-scaling` runs `python -m bench scaling`; likewise `make bench-bias` and
+`make bench-ambient`.
 
     cases.py      ways to make the images of a job: the frame array, its options, baselines
     steady.py     the frame loop in its steady state, under a clock

@@ -3,7 +3,21 @@
 import argparse
 import json
 
-from . import ambient, bias, biaspage, cycles, error, mitsuba3, pathtraced, peers, processes, scaling, speed, table, told
+from . import (
+    ambient,
+    bias,
+    biaspage,
+    cycles,
+    error,
+    mitsuba3,
+    pathtraced,
+    peers,
+    processes,
+    scaling,
+    speed,
+    table,
+    told,
+)
 from .cases import FRAME_ARRAY, JOBS, Variant, job_named, opened, variant_named, varied, with_resolution
 from .results import folder, load, save
 from .steady import steady
