@@ -119,13 +119,8 @@ def _summary(found: Mapping[tuple[str, str], Table]) -> list[str]:
         average, balance = (row_of(table, weights, USUAL, WHOLE) for weights in ("average", "balance"))
         assert average and balance
         z = average["bias"] / average["error"]
-        cells = [
-            " x ".join(map(str, table["resolution"])),
-            str(average["runs"]),
-            _millionths(average),
-            f"{z:.0f}",
-            _root(average),
-        ]
+        size, lights = " x ".join(map(str, table["resolution"])), str(len(table["lights"]))
+        cells = [size, lights, str(average["runs"]), _millionths(average), f"{z:.0f}", _root(average)]
         cells += [str(balance["runs"]), _millionths(balance), _root(balance)]
         rows.append([f"{job}, {camera}", *cells, _beside(balance, average)])
     first = next(iter(found.values()))
