@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .auto import Choice, require_least_memory, settled
 from .compiling import compile_clock
 from .crew import Crew
 from .filepatterns import file_patterns
@@ -19,7 +20,6 @@ from .memory import (
     free_memory,
     light_blocks,
     mirror_share,
-    require_memory,
     resident_memory,
     window_memory,
 )
@@ -46,11 +46,13 @@ class Estimate:
         memory: bytes at most, of the whole program; `available`: bytes the machine can give it.
         disk: bytes of all images and layers; `free`: bytes free where they go.
         seconds: from start to end, writing included, with kernels that were compiled before.
+        choice: of what the job leaves open; None where it says all.
         blocks: of light positions, rendered one after the other because of the memory limit.
         warnings: what would go wrong.
     """
 
     prepared: Prepared
+    choice: Choice | None
     ambient: Ambient
     memory: int
     available: int
@@ -88,9 +90,10 @@ def check(job: Job) -> Estimate:
     started = time.perf_counter()
     with compile_clock() as clock:
         prepared = prepare(job)
-        require_memory(prepared)
-        identity = job_fingerprint(prepared)
+        require_least_memory(prepared)
         with open_embree(prepared) as embree:
+            prepared, choice = settled(prepared, embree)
+            identity = job_fingerprint(prepared)
             work, ambient = plan_work(prepared, embree)
             before_frames = time.perf_counter() - started - clock.seconds
             pixels = _probe_pixels(work)
@@ -107,6 +110,7 @@ def check(job: Job) -> Estimate:
     copies = prepared.n_cameras - work.n_frames  # frames of a camera that stands still, which are written only
     return Estimate(
         prepared=prepared,
+        choice=choice,
         ambient=ambient,
         memory=resident + more,
         available=resident + available,

@@ -20,6 +20,7 @@ from .screen import Screen, duration, say, size
 if TYPE_CHECKING:
     from types import FrameType
 
+    from .auto import Choice
     from .job import Job
     from .prepare import Prepared
     from .render import Summary
@@ -110,6 +111,9 @@ def render(
                 if files:
                     screen.say([f"removed {files:,} files of the frame array in {job.output.directory}"])
 
+            def settled(self, choice: "Choice") -> None:
+                screen.say(choice.lines())
+
             def planned(self, ambient: "Ambient") -> None:
                 screen.say(_ambient_lines(ambient))
                 self.told = ambient.notes
@@ -146,6 +150,7 @@ def check(job_file: JobFile, threads: Threads = None, output: Output = None) -> 
     n_c, n_l = estimate.prepared.n_cameras, estimate.prepared.n_lights
     width, height = job.camera.resolution
     say(out, _scene_lines(estimate.prepared))
+    say(out, estimate.choice.lines() if estimate.choice else [])
     say(out, _ambient_lines(estimate.ambient))
     say(
         out,

@@ -21,6 +21,7 @@ from .jobvalues import (
     Reflectivity,
     Table,
     Triple,
+    Window,
     absolute,
     computed,
     fail,
@@ -29,6 +30,7 @@ from .jobvalues import (
 )
 
 Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; every other format is taken as y up
+DEFAULT_N_R, DEFAULT_HITS = 3, 2  # those of [FA]; what is chosen for "auto" is to be as exact
 NAME = "[A-Za-z0-9_][A-Za-z0-9._-]{0,99}"  # what can start a file name on every system
 
 
@@ -86,9 +88,11 @@ class SamplesTable(Table):
     """How many samples a picture is made of."""
 
     hits: HitCount = Field(
-        default=2,
+        default=DEFAULT_HITS,
         description="Native hits of a pixel in a frame. With reuse a pixel averages up to (2 n_r + 1) times as many. "
-        "0.5: one in every second pixel, in the others the next frame; likewise a third, down to an eighth.",
+        "0.5: one in every second pixel, in the others the next frame; likewise a third, down to an eighth. "
+        '"auto": chosen from the camera path, to take the least time for the error that n_r = 3 and hits = 2 have on '
+        "an ordinary walk.",
     )
     obscurance: int = Field(default=5, ge=1, le=65535, description="Obscurance rays of a hit.")
     shadow_step: int = Field(
@@ -115,8 +119,10 @@ class SamplesTable(Table):
 class ReuseTable(Table):
     """How far the samples of one eye serve its neighbours."""
 
-    n_r: int = Field(
-        default=3, ge=0, le=64, description="Frames before and frames after that share their hits, N_r. 0: no reuse."
+    n_r: Window = Field(
+        default=DEFAULT_N_R,
+        description="Frames before and frames after that share their hits, N_r. 0: no reuse. "
+        '"auto": chosen from the camera path, likewise; where `hits` is given, for the error that n_r = 3 has with it.',
     )
     weights: Literal["average", "balance"] = Field(
         default="balance",
@@ -202,7 +208,9 @@ class SpecularTable(Table):
         ge=1,
         le=MOST_HITS,
         description="Native hits of a pixel that sees a mirror; what a mirror shows is never reused.",
-        json_schema_extra=computed("(2 n_r + 1) times `samples.hits`"),
+        json_schema_extra=computed(
+            '(2 n_r + 1) times `samples.hits`; 7 times with n_r = "auto", 14 with hits = "auto"'
+        ),
     )
 
 
@@ -303,24 +311,45 @@ class Job(Table):
         """The job file this was read from, for messages."""
         return self._file
 
+    @property
+    def n_r(self) -> int:
+        """N_r: `reuse.n_r`, after a choice where that is "auto" (`auto.settled`)."""
+        assert self.reuse.n_r != "auto"
+        return self.reuse.n_r
+
+    @property
+    def hits(self) -> float:
+        """Native hits of a pixel in a frame: `samples.hits`, after a choice where that is "auto"."""
+        assert self.samples.hits != "auto"
+        return self.samples.hits
+
+    @property
+    def rests_on(self) -> float:
+        """Hits that a pixel is to rest on, were all of its window accepted: (2 N_r + 1) times `samples.hits`."""
+        n_r, hits = self.reuse.n_r, self.samples.hits
+        if hits == "auto":
+            return (2 * DEFAULT_N_R + 1) * DEFAULT_HITS
+        return (2 * (DEFAULT_N_R if n_r == "auto" else n_r) + 1) * hits
+
     def __eq__(self, other: object) -> bool:
         """Two jobs are equal if they say the same, whatever file they come from."""
         return isinstance(other, Job) and self.__dict__ == other.__dict__
 
     @model_validator(mode="after")
     def _fill_defaults(self, info: ValidationInfo) -> "Job":
-        if (2 * self.reuse.n_r + 1) * self.samples.hits > MOST_HITS:
-            fail([(("samples", "hits"), f"expected at most {MOST_HITS // (2 * self.reuse.n_r + 1)} with this n_r")])
+        if self.rests_on > MOST_HITS and self.samples.hits != "auto":
+            frames = round(self.rests_on / self.samples.hits)
+            fail([(("samples", "hits"), f"expected at most {MOST_HITS // frames} with this n_r")])
         if self.samples.halves and self.output.format != "exr":
             fail(
                 [(("samples", "halves"), 'expected output.format = "exr": no other format has room for more channels')]
             )
-        if self.samples.halves and (2 * self.reuse.n_r + 1) * self.samples.hits < 2:
+        if self.samples.halves and self.rests_on < 2:
             fail([(("samples", "halves"), "expected at least two hits for each pixel of an image")])
         job_file = (info.context or {}).get("job_file")
         self._file = job_file
         if "hits" not in self.specular.model_fields_set:
-            hits = min(math.ceil((2 * self.reuse.n_r + 1) * self.samples.hits), MOST_HITS)
+            hits = min(math.ceil(self.rests_on), MOST_HITS)
             fill(self, "specular", self.specular.model_copy(update={"hits": hits}))
         if "directory" not in self.output.model_fields_set:
             directory = absolute(Path("..") / "out" / self.name, job_file)

@@ -9,13 +9,14 @@ import os
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NoReturn, TypeAlias
+from typing import Annotated, Any, Literal, NoReturn, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationError, ValidationInfo, WithJsonSchema
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 Place: TypeAlias = tuple[int | str, ...]  # keys and list positions from the value at hand down to the problem
 Triple: TypeAlias = tuple[float, float, float]
+Auto: TypeAlias = Literal["auto"]  # chosen from the camera path, see auto.py
 
 FARTHEST = 1e12  # scene units; squares and cubes of it still fit in float32 (3e38)
 BRIGHTEST = 1e20  # W/sr, W/m2 or radiance; times any reflectivity and over any squared distance it stays finite
@@ -154,18 +155,32 @@ def _bytes(value: object) -> int:
 
 
 MOST_HITS = 65000  # hits of one pixel in one frame; random streams tell 2^16 apart
-_SHARES = (1 / 2, 1 / 3, 1 / 4, 1 / 5, 1 / 6, 1 / 7, 1 / 8)
+SHARES = (1 / 2, 1 / 3, 1 / 4, 1 / 5, 1 / 6, 1 / 7, 1 / 8)  # of pixels that may get a hit in a frame
 
 
-def _hits(value: object) -> float:
-    """Check a number of hits a pixel: a whole number, or a unit fraction down to 1/8."""
+def _hits(value: object) -> float | Auto:
+    """Check a number of hits a pixel: a whole number, a unit fraction down to 1/8, or "auto"."""
+    if value == "auto":
+        return "auto"
     if isinstance(value, int | float) and not isinstance(value, bool):
         if value >= 1 and value == int(value) and value <= MOST_HITS:
             return float(value)
-        for share in _SHARES:
+        for share in SHARES:
             if abs(value - share) < 1e-3:  # 0.333 means a third
                 return share
-    fail([((), f"expected a whole number from 1 to {MOST_HITS}, or 1/2, 1/3, ... 1/8, got {shown(value)}")])
+    fail([((), f'expected a whole number from 1 to {MOST_HITS}, 1/2, 1/3, ... 1/8 or "auto", got {shown(value)}')])
+
+
+LONGEST_WINDOW = 64  # frames to either side; more would not fit into memory
+
+
+def _window(value: object) -> int | Auto:
+    """Check N_r, or "auto"."""
+    if value == "auto":
+        return "auto"
+    if isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= LONGEST_WINDOW:
+        return value
+    fail([((), f'expected a whole number from 0 to {LONGEST_WINDOW} or "auto", got {shown(value)}')])
 
 
 def _vector_schema(count: int, *, grey: bool = False, whole: bool = False, **bounds: float) -> WithJsonSchema:
@@ -189,9 +204,21 @@ Size: TypeAlias = Annotated[
     _vector_schema(2, whole=True, minimum=1, maximum=16384),
 ]
 HitCount: TypeAlias = Annotated[
-    float,
+    int | float | Auto,
     PlainValidator(_hits),
-    WithJsonSchema({"type": "number", "minimum": 0.125, "maximum": MOST_HITS, "x-words": "a number"}),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "minimum": 0.125, "maximum": MOST_HITS, "x-words": "a number"},
+                {"const": "auto"},
+            ]
+        }
+    ),
+]
+Window: TypeAlias = Annotated[
+    int | Auto,
+    PlainValidator(_window),
+    WithJsonSchema({"anyOf": [{"type": "integer", "minimum": 0, "maximum": LONGEST_WINDOW}, {"const": "auto"}]}),
 ]
 Bytes: TypeAlias = Annotated[
     int,

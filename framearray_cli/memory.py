@@ -93,9 +93,9 @@ def window_memory(prepared: Prepared, n_lights: int, mirror_share: float = 0.0) 
         mirror_share: of the pixels that see a mirror; their hits are held until their frame is composed.
     """
     job = prepared.job
-    n_frames, n_r = (1, 0) if prepared.still else (prepared.n_cameras, job.reuse.n_r)
+    n_frames, n_r = (1, 0) if prepared.still else (prepared.n_cameras, job.n_r)
     width, height = job.camera.resolution
-    per_pixel = frame_hits(n_frames, job.reuse.n_r, job.samples.hits)
+    per_pixel = frame_hits(n_frames, job.n_r, job.hits)
     held = max(float(per_pixel[max(j - n_r, 0) : j + n_r + 1].sum()) for j in range(n_frames))
     frames = min(2 * n_r + 1, n_frames)
     balance = job.reuse.weights == "balance" and n_r > 0
@@ -117,12 +117,15 @@ def window_memory(prepared: Prepared, n_lights: int, mirror_share: float = 0.0) 
     return int(width * height * (held * per_hit + mirrored + per_image_pixel))
 
 
-def light_blocks(prepared: Prepared, mirror_share: float) -> list[range]:
+def light_blocks(prepared: Prepared, mirror_share: float, limit: int | None = None) -> list[range]:
     """Cut the light positions into as few blocks, of about one size, as the memory limit allows.
 
     Every block goes along the whole camera path and finds its hits again: they depend on no light.
+
+    Args:
+        limit: bytes; None: what the job says, or the machine has free.
     """
-    n, limit = prepared.n_lights, memory_limit(prepared)
+    n, limit = prepared.n_lights, memory_limit(prepared) if limit is None else limit
     for count in range(1, n + 1):
         size = -(-n // count)
         if window_memory(prepared, size, mirror_share) <= limit:

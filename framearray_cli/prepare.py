@@ -97,7 +97,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
     cams = _cameras(prepared)
     background = np.array(job.scene.background, np.float32)
     ambient = _ambient(prepared, embree, background)
-    n_r = job.reuse.n_r
+    n_r = job.n_r
     if prepared.still:  # one frame, with the hits that its whole window would have
         cams = cams._replace(**{name: getattr(cams, name)[:1] for name in ("position", "right", "up", "forward")})
     step_x, step_y = lattice_steps(job.samples.obscurance)
@@ -121,7 +121,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
         ),
         seed=job.seed,
         n_r=0 if prepared.still else n_r,
-        per_pixel=frame_hits(len(cams.position), n_r, job.samples.hits),
+        per_pixel=frame_hits(len(cams.position), n_r, job.hits),
         mirror_hits=job.specular.hits if mirrors else 0,
         depth=job.specular.depth if mirrors else 0,
         balance=job.reuse.weights == "balance" and not prepared.still,

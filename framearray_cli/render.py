@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import __version__
+from .auto import Choice, require_least_memory, settled
 from .crew import Crew
 from .embree import Engine
 from .errors import OutputError
@@ -16,7 +17,7 @@ from .frame import find_frame
 from .job import Job
 from .jobfile import job_table
 from .manifest import Manifest, ManifestCamera, ManifestLight, matrix_rows, write_manifest
-from .memory import light_blocks, mirror_share, peak_memory, require_memory
+from .memory import light_blocks, mirror_share, peak_memory
 from .outfolder import claim_folder
 from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
 from .standarderror import summed_up
@@ -66,6 +67,9 @@ class Listener:
     def removed(self, files: int) -> None:
         """That many files of the array that lay in the folder were removed."""
 
+    def settled(self, choice: Choice) -> None:
+        """What the job leaves open was chosen."""
+
     def planned(self, ambient: Ambient) -> None:
         """The ambient light is known."""
 
@@ -87,13 +91,17 @@ def render(job: Job, listener: Listener | None = None, *, engine: Engine = "auto
     started = time.perf_counter()
     prepared = prepare(job)
     listener.prepared(prepared)
-    require_memory(prepared)
-    folder, identity = job.output.directory, job_fingerprint(prepared)
-    listener.removed(claim_folder(folder, job.name, identity, job_table(job)["output"], restart=restart))
+    require_least_memory(prepared)
+    folder = job.output.directory
     with open_embree(prepared, engine) as embree:
+        prepared, choice = settled(prepared, embree)
+        identity = job_fingerprint(prepared)
+        listener.removed(claim_folder(folder, job.name, identity, job_table(job)["output"], restart=restart))
+        if choice:
+            listener.settled(choice)
         work, ambient = plan_work(prepared, embree)
         listener.planned(ambient)
-        manifest = _manifest(prepared, ambient, identity)
+        manifest = _manifest(prepared, ambient, identity, choice)
         write_manifest(folder, manifest)
         written: list[int] = []
         try:
@@ -206,7 +214,7 @@ def _patterns(prepared: Prepared) -> tuple[str, str]:
     return file_patterns(prepared.job.name, prepared.n_cameras, prepared.n_lights, prepared.job.output.format)
 
 
-def _manifest(prepared: Prepared, ambient: Ambient, identity: str) -> Manifest:
+def _manifest(prepared: Prepared, ambient: Ambient, identity: str, choice: Choice | None) -> Manifest:
     """What a program needs that has never seen this one; everything but how the run went."""
     job, report = prepared.job, prepared.scene.report
     images, layers = _patterns(prepared)
@@ -243,7 +251,8 @@ def _manifest(prepared: Prepared, ambient: Ambient, identity: str) -> Manifest:
             "dropped": report.dropped,
             "notes": list(report.notes),
         },
-        summary={"finished": False, "images": 0, "ambient_paths": ambient.paths},
+        summary={"finished": False, "images": 0, "ambient_paths": ambient.paths}
+        | ({"automatic": choice.table()} if choice else {}),
         directory=job.output.directory,
     )
 
@@ -262,4 +271,6 @@ def _with_summary(manifest: Manifest, summary: Summary) -> Manifest:
     }
     if summary.standard_error:
         table["standard_error"] = summary.standard_error
+    if "automatic" in manifest.summary:
+        table["automatic"] = manifest.summary["automatic"]
     return replace(manifest, summary=table)

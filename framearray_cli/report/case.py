@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..auto import settled
 from ..embree import EmbreeScene
 from ..job import Job
 from ..lights import some_lights
@@ -51,6 +52,7 @@ def opened(job: Job) -> Iterator[Case]:
 def planned(prepared: Prepared) -> Iterator[Case]:
     """Plan a job that is prepared, for measuring."""
     with open_embree(prepared) as embree:
+        prepared, _ = settled(prepared, embree)
         work, ambient = plan_work(prepared, embree)
         yield Case(prepared=prepared, embree=embree, work=work, ambient=ambient, settings=Settings.of(prepared.job))
 

@@ -10,6 +10,7 @@ from .front import times_faster
 from .measure import Measured
 from .plots import draw_plots
 from .run import Report
+from .settings import Settings
 from .tables import write_tables
 
 
@@ -45,7 +46,7 @@ def advice_lines(best: Measured | None, report: Report) -> Sequence[str]:
     """Lines to paste into the job to get some settings; a remark where there is nothing to paste."""
     if best is None:
         return ["# no settings that were tried reach it"]
-    return best.named.settings.lines(report.settings) or ["# as the job is"]
+    return best.named.settings.lines(Settings.of(report.job)) or ["# as the job is"]
 
 
 def _percent(value: float) -> str:

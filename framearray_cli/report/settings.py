@@ -167,6 +167,9 @@ def read_vary(option: str, job: Job) -> tuple[str, list[Any]]:
     values = [_value(word.strip()) for word in text.split(",")]
     base, problems = Settings.of(job), []
     for value in values:
+        if value == "auto":
+            problems.append(f"{key} = {value!r}: expected a value to measure")
+            continue
         try:
             replace(base, **{KEYS[key]: value}).applied(job)
         except ValueError as error:

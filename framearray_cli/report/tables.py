@@ -11,6 +11,7 @@ from ..files import whole_file
 from .front import Advice, times_faster
 from .measure import Measured
 from .run import Report
+from .settings import Settings
 
 COLUMNS = (
     "name", "n_r", "weights", "hits", "obscurance", "shadow_step", "shadow_unbiased", "denoise", "one_light", "ms",
@@ -64,7 +65,7 @@ def write_tables(report: Report) -> None:
 def _advice(one: Advice, report: Report) -> dict[str, Any]:
     found: dict[str, Any] = {"error": one.error}
     if one.best:
-        lines: Sequence[str] = one.best.named.settings.lines(report.settings)
+        lines: Sequence[str] = one.best.named.settings.lines(Settings.of(report.job))
         found |= {"settings": one.best.named.name, "ms": one.best.ms, "rmse": one.best.quality.rmse}
         found["lines"] = list(lines)
     return found

@@ -133,8 +133,12 @@ def test_defaults_follow_the_other_keys(table):
 
 
 @pytest.mark.parametrize(
-    ("n_r", "hits", "mirror"), [(0, 1, 1), (5, 3, 33), (64, 503, 503 * 129), (3, 0.5, 4), (0, 0.125, 1)]
-)
+    ("n_r", "hits", "mirror"),
+    [
+        (0, 1, 1), (5, 3, 33), (64, 503, 503 * 129), (3, 0.5, 4), (0, 0.125, 1),
+        ("auto", "auto", 14), ("auto", 2, 14), ("auto", 0.5, 4), (9, "auto", 14),
+    ],
+)  # fmt: skip
 def test_mirror_pixels_get_the_total_of_their_neighbours(table, n_r, hits, mirror):
     table["reuse"]["n_r"], table["samples"]["hits"] = n_r, hits
     job = read(table)
@@ -216,8 +220,11 @@ WRONG = [
     ("light.sources.0.keys", [], "light.sources[0].keys: expected a list of tables, at least 1, got 0"),
     ("light.sources.0.keys.0.color", 1,
      "light.sources[0].keys[1].color: missing; keys[0] gives it, so every key of this list must"),
-    ("samples.hits", 0, "samples.hits: expected a whole number from 1 to 65000, or 1/2, 1/3, ... 1/8, got 0"),
-    ("reuse.n_r", 65, "reuse.n_r: expected a whole number from 0 to 64, got 65"),
+    ("samples.hits", 0, 'samples.hits: expected a whole number from 1 to 65000, 1/2, 1/3, ... 1/8 or "auto", got 0'),
+    ("reuse.n_r", 65, 'reuse.n_r: expected a whole number from 0 to 64 or "auto", got 65'),
+    ("samples.hits", 9286, "samples.hits: expected at most 9285 with this n_r"),
+    ("samples.hits", "two",
+     'samples.hits: expected a whole number from 1 to 65000, 1/2, 1/3, ... 1/8 or "auto", got "two"'),
     ("obscurance.range", 0, "obscurance.range: expected a number above 0, got 0: nothing is within it"),
     ("obscurance.range", float("inf"),
      "obscurance.range: expected a finite number above 0, got inf: distances are measured against it"),
@@ -302,6 +309,7 @@ NOT_IN_SCHEMA = [
     "camera.keys.1.up=[0, 1, 0]",
     "light.frames=47",
     "light.sources.0.keys.0.color=1",
+    "samples.hits=9286",
 ]
 
 
@@ -314,3 +322,13 @@ def test_schema_accepts_what_the_job_accepts_and_refuses_the_rest(table):
     assert missed == NOT_IN_SCHEMA
     for place, _ in UNKNOWN:
         assert not validator.is_valid(replaced(table, place, 1)), place
+
+
+def test_what_is_chosen_later_is_not_read_before(table):
+    table["reuse"]["n_r"] = table["samples"]["hits"] = "auto"
+    job = read(table)
+    for name in ("n_r", "hits"):
+        with pytest.raises(AssertionError):
+            getattr(job, name)
+    numbers = read({**table, "reuse": {}, "samples": {"hits": 0.333}})
+    assert (numbers.n_r, numbers.hits) == (3, 1 / 3)

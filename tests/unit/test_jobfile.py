@@ -83,7 +83,7 @@ def test_all_problems_are_told_at_once_in_the_order_of_the_keys(tmp_path):
     assert problems(path) == [
         'camera.fov: expected a number from 0.001 to 179.9, got "wide"',
         'camera.keys[0].fov: unknown key here; "fov" belongs in [camera]',
-        "samples.hits: expected a whole number from 1 to 65000, or 1/2, 1/3, ... 1/8, got 0",
+        'samples.hits: expected a whole number from 1 to 65000, 1/2, 1/3, ... 1/8 or "auto", got 0',
         "obscurance.range: missing; expected a number above 0",
         'obscurance.rnage: unknown key; did you mean "range"?',
     ]
@@ -206,6 +206,7 @@ def again(job, folder):
         "",
         "[ambient]\nintensity = 0.5\n",
         "[ambient]\npaths = 7\nmethod = 'light'\n",
+        "[reuse]\nn_r = 'auto'\n[samples]\nhits = 'auto'\n",
         "[render]\nthreads = 3\n[output]\ndirectory = '/x/y'\nformat = 'png'\nexposure = 2\n",
         "[scene.materials.'a b.\"c']\nspecular = 1\n",
     ],

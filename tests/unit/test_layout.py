@@ -26,7 +26,7 @@ terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps term
 terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise standarderror compose accumulate window
 imageattributes images manifest outfolder writer
-prepare memory render check
+prepare memory acceptance expected auto render check
 moviepath movies assemble
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__

@@ -1,0 +1,110 @@
+"""What neighbour eyes see of each other's hits along a job's own camera path, from a sparse probe."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import Float64, Int32, with_room
+from .camera import Cameras, cameras
+from .embree import EmbreeScene
+from .hits import SURFACE, Hits, empty_hits, native_hits, pixel_order
+from .lanes import LANES
+from .lights import some_lights
+from .prepare import Prepared
+from .rays import Rays, room_for_hits, room_for_tests
+from .reuse import outer_hits
+from .terms.direct import direct
+
+# Frames of the path that are looked at, native hits of each, and light positions that shadow rays are counted for.
+PROBE_FRAMES, PROBE_HITS, PROBE_LIGHTS = 16, 512, 32
+# Hits of a neighbour for one of the eye itself, at most: where the eye itself sees a surface from its edge.
+MOST_DENSE = 1000.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Acceptance:
+    """Some hits of some frames, and how densely the eyes around would sample the same places.
+
+    Only hits that reflect diffusely are kept, as the others have no noise; where none does, all are.
+
+    Attributes:
+        n_frames: of the path; 1 for a camera at rest.
+        frame: (n,) the frame whose eye found each hit.
+        density: (n, 2 reach + 1) hits that eye frame + k, k from -reach to reach, puts into a pixel of the frame for
+            each hit a pixel that it finds, p_k / p_c; 0 where it does not see the place, or is not on the path.
+        reflecting: share of all hits that reflect diffusely.
+        shadow_rays: of a hit under all light positions, each of them tested.
+    """
+
+    n_frames: int
+    frame: Int32
+    density: Float64
+    reflecting: float
+    shadow_rays: float
+
+    @property
+    def reach(self) -> int:
+        """The farthest neighbour that was asked."""
+        return int(self.density.shape[1]) // 2
+
+    def seen(self, k: int) -> float:
+        """Share of hits that the eyes k frames before and after see; beyond the reach, as at its end."""
+        k, shares = min(k, self.reach), []
+        for offset in (-k, k):
+            there = (self.frame + offset >= 0) & (self.frame + offset < self.n_frames)
+            shares.append(self.density[there, self.reach + offset] > 0)
+        both = np.concatenate(shares)
+        return float(both.mean()) if len(both) else 0.0
+
+
+def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
+    """Look for a few hundred native hits of some frames from all eyes at most `reach` frames away.
+
+    The hits are some of those that a render finds, so the same job gives the same answer anywhere.
+    """
+    job, n_c = prepared.job, 1 if prepared.still else prepared.n_cameras
+    cams = cameras(prepared.eyes, job.camera.resolution, prepared.scene.centre)
+    lights = some_lights(prepared.light_arrays, spread(prepared.n_lights, PROBE_LIGHTS))
+    order = pixel_order(cams.width, cams.height)
+    pixels = order[spread(len(order), PROBE_HITS)]
+    n = len(pixels)
+    hits, hit_rays = empty_hits(PROBE_HITS), room_for_hits(PROBE_HITS)
+    test_rays = room_for_tests(PROBE_HITS, lights.n_lights)
+    irradiance = with_room((PROBE_HITS, lights.channels, lights.n_lights), np.float32)
+    frames, densities, diffuse, shadow = [], [], [], 0
+    for c in spread(n_c, PROBE_FRAMES):
+        native_hits(
+            cams, c, job.seed, pixels, 1, 0, 0, n, prepared.surfaces, embree.tracer, False,
+            hit_rays.packets, hits,
+        )  # fmt: skip
+        shadow += direct(hits, n, lights, embree.tracer, test_rays, irradiance)
+        eyes = range(max(c - reach, 0), min(c + reach, n_c - 1) + 1)
+        density, first = np.zeros((n, 2 * reach + 1)), eyes.start - c + reach
+        density[:, first : first + len(eyes)] = _densities(cams, c, eyes, hits, n, embree, test_rays)
+        diffuse.append((hits.kind[:n] == SURFACE) & (hits.reflectivity[:n] > 0).any(axis=1))
+        densities.append(density)
+        frames.append(np.full(n, c, np.int32))
+    reflects = np.concatenate(diffuse)
+    kept = reflects if reflects.any() else slice(None)
+    return Acceptance(
+        n_frames=n_c,
+        frame=np.concatenate(frames)[kept],
+        density=np.concatenate(densities)[kept],
+        reflecting=float(reflects.mean()),
+        shadow_rays=shadow / len(reflects) * prepared.n_lights / lights.n_lights,
+    )
+
+
+def spread(n: int, most: int) -> list[int]:
+    """At most so many of the numbers 0 to n - 1, evenly spread, each in the middle of its share."""
+    count = min(n, most)
+    return [(2 * i + 1) * n // (2 * count) for i in range(count)]
+
+
+def _densities(cams: Cameras, c: int, eyes: range, hits: Hits, n: int, embree: EmbreeScene, test_rays: Rays) -> Float64:
+    """Density of the hits of each eye at hits 0 to n - 1, over that of eye c, (n, n_eyes)."""
+    stride = -(-n // LANES) * LANES
+    pixel, density = np.empty((len(eyes), stride), np.int32), np.empty((len(eyes), stride))
+    outer_hits(cams, c, eyes.start, hits, n, embree.tracer, test_rays, pixel, density)
+    own = density[c - eyes.start, :n]
+    return np.minimum(density[:, :n] / own, MOST_DENSE).T

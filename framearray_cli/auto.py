@@ -1,0 +1,181 @@
+"""`reuse.n_r = "auto"` and `samples.hits = "auto"`: the settings that take the least time for an error that is wanted.
+
+The error that is wanted is that which the default, n_r = 3 and hits = 2, has on an ordinary walk; where the job says
+`samples.hits`, that which n_r = 3 has with so many.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .acceptance import probe
+from .embree import EmbreeScene
+from .expected import Model, Reuse, worth
+from .job import DEFAULT_HITS, DEFAULT_N_R, Job
+from .jobvalues import MOST_HITS, SHARES
+from .memory import light_blocks, require_memory
+from .prepare import Prepared
+
+# Longest windows that are tried. With `average` old views of a place bring an error that no number of hits removes.
+LONGEST = {"balance": 16, "average": DEFAULT_N_R}
+# Numbers of hits that are tried, rising.
+HITS = (*sorted(SHARES), *map(float, range(1, 17)))
+# What does not fit into so many bytes is thought to be rendered in blocks of light positions, whatever a machine has.
+ROOM = 4 * 2**30
+# Of the hits of the default window, how many count on an ordinary walk: 0.91 to 0.93 in the three jobs of the paper.
+ORDINARY = 0.9
+DEFAULT = Reuse(n_r=DEFAULT_N_R, hits=float(DEFAULT_HITS))
+# Numbers of frames that the share of hits seen is told for.
+TOLD = (1, 2, 4, 8, 16)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choice:
+    """What was chosen, and why.
+
+    Attributes:
+        keys: of the job file that say "auto".
+        error: expected, over that which is wanted.
+        time: expected, over that of the default.
+        hits: expected hits of a pixel, native and outer: mean and 1st percentile.
+        seen: share of hits that eyes some frames away see, by that number of frames.
+    """
+
+    reuse: Reuse
+    keys: tuple[str, ...]
+    error: float
+    time: float
+    hits: tuple[float, float]
+    seen: dict[int, float]
+
+    def lines(self) -> list[str]:
+        """What a person is told."""
+        said = {"reuse.n_r": f"n_r = {self.reuse.n_r}", "samples.hits": f"hits = {self.reuse.hits:g}"}
+        default = f"n_r = {DEFAULT.n_r}, hits = {DEFAULT.hits:g}"
+        lines = [
+            f"automatic: {', '.join(said[key] for key in self.keys)}; expected: {self.hits[0]:.1f} hits a pixel "
+            f"(1st percentile {self.hits[1]:.1f}), {self.error:.2f} times the error that is wanted, "
+            f"{self.time:.2f} times the time of {default}"
+        ]
+        if self.error > 1:
+            lines.append("  note: no window reaches the error that is wanted; this one makes the most of its time")
+        if self.seen:
+            shares = ", ".join(f"{share:.0%} ({k})" for k, share in self.seen.items())
+            lines.append(f"  hits that are seen so many frames away: {shares}")
+        return lines
+
+    def table(self) -> dict[str, object]:
+        """For the manifest."""
+        return {
+            "keys": list(self.keys),
+            "n_r": self.reuse.n_r,
+            "hits": self.reuse.hits,
+            "error_to_wanted": round(self.error, 4),
+            "time_to_default": round(self.time, 4),
+            "hits_per_pixel": round(self.hits[0], 3),
+            "hits_1st_percentile": round(self.hits[1], 3),
+            "seen": {str(k): round(share, 4) for k, share in self.seen.items()},
+        }
+
+
+def settled(prepared: Prepared, embree: EmbreeScene) -> tuple[Prepared, Choice | None]:
+    """The same job with a number for each "auto", and why; no choice where the job says all numbers.
+
+    Raises:
+        JobError: it does not fit into memory with what was chosen.
+    """
+    job = prepared.job
+    keys = auto_keys(job)
+    if not keys:
+        return prepared, None
+    longest = LONGEST[job.reuse.weights] if job.reuse.n_r == "auto" else job.reuse.n_r
+    model = Model(
+        found=probe(prepared, embree, max(longest, DEFAULT.n_r)),
+        n_lights=prepared.n_lights,
+        obscurance=job.samples.obscurance,
+        shadow_step=job.samples.shadow_step,
+        balance=job.reuse.weights == "balance",
+    )
+    wanted = wanted_variance(job)
+    chosen = choose(model, wanted, to_try(job, model.found.n_frames), lambda reuse: _blocks(prepared, reuse))
+    result = applied(prepared, chosen)
+    require_memory(result)
+    counts = model.counts(chosen)
+    return result, Choice(
+        reuse=chosen,
+        keys=keys,
+        error=(model.variance(chosen) / wanted) ** 0.5,
+        time=model.time(chosen, _blocks(prepared, chosen)) / model.time(DEFAULT, _blocks(prepared, DEFAULT)),
+        hits=(float(counts.mean()), float(np.percentile(counts, 1))),
+        seen={k: model.found.seen(k) for k in TOLD if k <= min(model.found.reach, model.found.n_frames - 1)},
+    )
+
+
+def require_least_memory(prepared: Prepared) -> None:
+    """Refuse a job that does not fit into memory whatever is chosen; see `require_memory`.
+
+    Raises:
+        JobError: it does not.
+    """
+    n_r, hits = prepared.job.reuse.n_r, prepared.job.samples.hits
+    least = Reuse(n_r=0 if n_r == "auto" else n_r, hits=HITS[0] if hits == "auto" else hits)
+    require_memory(applied(prepared, least))
+
+
+def auto_keys(job: Job) -> tuple[str, ...]:
+    """The keys of a job that say "auto"."""
+    values = {"reuse.n_r": job.reuse.n_r, "samples.hits": job.samples.hits}
+    return tuple(key for key, value in values.items() if value == "auto")
+
+
+def applied(prepared: Prepared, reuse: Reuse) -> Prepared:
+    """The same job with these settings."""
+    job = prepared.job
+    updates = {
+        "reuse": job.reuse.model_copy(update={"n_r": reuse.n_r}),
+        "samples": job.samples.model_copy(update={"hits": reuse.hits}),
+    }
+    return replace(prepared, job=job.model_copy(update=updates))
+
+
+def wanted_variance(job: Job) -> float:
+    """Variance of a pixel of the default window on an ordinary walk, in units of that of one hit."""
+    hits = DEFAULT.hits if job.samples.hits == "auto" else job.samples.hits
+    return 1.0 / (ORDINARY * (2 * DEFAULT.n_r + 1) * float(worth(np.array(hits))))
+
+
+def to_try(job: Job, n_frames: int) -> Iterator[list[Reuse]]:
+    """The settings that a job leaves open, a list a window with hits rising; no window is longer than the path."""
+    n_r, hits = job.reuse.n_r, job.samples.hits
+    longest = min(LONGEST[job.reuse.weights], n_frames - 1)
+    for window in range(longest + 1) if n_r == "auto" else [n_r]:
+        each = [Reuse(n_r=window, hits=h) for h in (HITS if hits == "auto" else [hits])]
+        yield [one for one in each if (2 * window + 1) * one.hits <= MOST_HITS]
+
+
+def choose(
+    model: Model, wanted: float, trying: Iterator[list[Reuse]], blocks: Callable[[Reuse], int] = lambda _: 1
+) -> Reuse:
+    """The settings of least time whose variance is at most the wanted one; the shorter window if two are alike.
+
+    Where no settings reach it, those of the least time for the error they give: time falls and variance grows as hits
+    become fewer, so that their product tells which window makes the most of its time.
+
+    Args:
+        trying: lists of settings, in each of which hits, time and accuracy rise.
+        blocks: of light positions that settings are rendered in.
+    """
+    reached, rest = [], []
+    for row in trying:
+        good = next((reuse for reuse in row if model.variance(reuse) <= wanted), None)
+        if good:
+            reached.append(good)
+        rest += row
+    if reached:
+        return min(reached, key=lambda reuse: model.time(reuse, blocks(reuse)))
+    return min(rest, key=lambda reuse: model.time(reuse, blocks(reuse)) * model.variance(reuse))
+
+
+def _blocks(prepared: Prepared, reuse: Reuse) -> int:
+    return len(light_blocks(applied(prepared, reuse), 0.0, ROOM))

@@ -1,0 +1,90 @@
+"""Expected error and time of an image with some settings of reuse, from what a probe of the camera path found.
+
+Both rest on counts alone, never on a clock or on what the machine has free: the same job gives the same numbers
+anywhere. `docs/decisions/auto.md` says where the constants come from, and how far off they are.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .acceptance import Acceptance
+from .arrays import Float64
+from .plan import frame_hits
+
+# The variance of a pixel falls with this power of the hits that one eye finds in it: they are spread evenly.
+EVENNESS = 1.3
+
+# Nanoseconds of a processor. Rays by kind, what the program does for them included.
+EYE_RAY, OBSCURANCE_RAY, SHADOW_RAY, VISIBILITY_RAY = 115.0, 190.0, 48.0, 43.0
+# To project a hit into an eye; to weigh it by the density of one eye in one frame; to sort it into a frame.
+PROJECT, WEIGH, SORT = 5.0, 1.5, 20.0
+# To add a hit to a pixel, and to turn a pixel's sums into stored numbers, under one light position.
+ADD, STORE = 0.35, 3.5
+# Shadow rays that `shadow_step` = s leaves: a share of 1 / s, and this for places where the light changes.
+BISECTED = 0.04
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reuse:
+    """Settings of reuse: N_r, and native hits of a pixel in a frame."""
+
+    n_r: int
+    hits: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Model:
+    """What error and time depend on beside settings of reuse; see `Acceptance`, and the job file for the others."""
+
+    found: Acceptance
+    n_lights: int
+    obscurance: int
+    shadow_step: int = 1
+    balance: bool = True
+
+    def counts(self, reuse: Reuse) -> Float64:
+        """Expected hits, native and outer, in the pixel of each probed hit, (n,)."""
+        return self._arriving(self._native(reuse), reuse.n_r)
+
+    def variance(self, reuse: Reuse) -> float:
+        """Expected variance of a pixel, mean over pixels, in units of that of one hit.
+
+        It is 1 over the number of hits, those of one eye counted as `worth` says; a pixel that no hit reaches gets one.
+        """
+        sums = self._arriving(worth(self._native(reuse)), reuse.n_r)
+        return float((1.0 / np.maximum(sums, 1.0)).mean())
+
+    def time(self, reuse: Reuse, blocks: int = 1) -> float:
+        """Expected time of a pixel of a frame under all light positions, ns of a processor; mirrors left out.
+
+        Args:
+            blocks: of light positions; each finds the hits again.
+        """
+        found, n_r = self.found, min(reuse.n_r, self.found.n_frames - 1)
+        native = reuse.hits * (found.n_frames + 2 * reuse.n_r) / found.n_frames
+        eyes = range(1, min((2 if self.balance else 1) * n_r, found.n_frames - 1) + 1)
+        place = sum(2 * (PROJECT + VISIBILITY_RAY * found.seen(k)) for k in eyes)
+        if self.balance and n_r:
+            place += WEIGH * (2 * n_r + 1) ** 2
+        find = EYE_RAY + OBSCURANCE_RAY * self.obscurance * found.reflecting + place
+        light = SHADOW_RAY * found.shadow_rays * min(1.0 / self.shadow_step + BISECTED, 1.0)
+        used = native * (1 + 2 * sum(found.seen(k) for k in range(1, n_r + 1)))
+        return native * (blocks * find + light) + used * (blocks * SORT + ADD * self.n_lights) + STORE * self.n_lights
+
+    def _native(self, reuse: Reuse) -> Float64:
+        """Native hits a pixel of every frame, (n_frames,)."""
+        return frame_hits(self.found.n_frames, reuse.n_r, reuse.hits)
+
+    def _arriving(self, each: Float64, n_r: int) -> Float64:
+        """What arrives at each probed hit from the eyes of its window, each of which has so much a pixel, (n,)."""
+        found, offsets = self.found, np.arange(-n_r, n_r + 1)
+        eyes = np.clip(found.frame[:, None] + offsets, 0, found.n_frames - 1)  # beyond the path densities are 0
+        sums: Float64 = (each[eyes] * found.density[:, offsets + found.reach]).sum(axis=1)
+        return sums
+
+
+def worth(hits: Float64) -> Float64:
+    """How many independent hits the hits of one eye in a pixel are worth; see `EVENNESS`."""
+    value: Float64 = np.where(hits >= 1.0, hits**EVENNESS, hits)
+    return value

@@ -1,0 +1,81 @@
+"""Jobs that leave n_r and hits open: what `render` and `check` choose is printed, stored, and the same every time."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+import tiny
+from program import run, write_job
+
+BOTH = {"camera": tiny.WALK, "reuse": {"n_r": "auto"}, "samples": {"hits": "auto"}}
+LINE = r"^automatic: n_r = (\d+), hits = ([\d.]+); expected: [\d.]+ hits a pixel \(1st percentile [\d.]+\), "
+LINE += r"[\d.]+ times the error that is wanted, [\d.]+ times the time of n_r = 3, hits = 2$"
+SEEN = r"^  hits that are seen so many frames away: \d+% \(1\), \d+% \(2\), \d+% \(4\)$"
+
+
+def manifest(folder: Path) -> dict:
+    return tomllib.loads((folder / "manifest.toml").read_text())
+
+
+def images(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.iterdir() if file.suffix != ".toml"}
+
+
+def test_a_choice_is_printed_and_stored(tmp_path, capsys):
+    told = run(capsys, "render", write_job(tmp_path, **BOTH))
+    assert (told.code, told.err) == (0, "")
+    n_r, hits = re.search(LINE, told.out, re.MULTILINE).groups()
+    assert re.search(SEEN, told.out, re.MULTILINE)
+    stored = manifest(tmp_path / "out")
+    assert stored["summary"]["finished"] is True
+    assert stored["summary"]["automatic"]["keys"] == ["reuse.n_r", "samples.hits"]
+    assert set(stored["summary"]["automatic"]["seen"]) == {"1", "2", "4"}
+    assert (stored["job"]["reuse"]["n_r"], stored["job"]["samples"]["hits"]) == (int(n_r), float(hits))
+    assert stored["job"]["specular"]["hits"] == 14
+    checked = run(capsys, "check", write_job(tmp_path, **BOTH))
+    assert (checked.code, checked.err) == (0, "")
+    assert re.search(LINE, checked.out, re.MULTILINE).group() == re.search(LINE, told.out, re.MULTILINE).group()
+    assert "warning" not in checked.out, "the array that lies there is the same one"
+
+
+def test_the_numbers_that_were_chosen_give_the_same_array(tmp_path, capsys):
+    """Whatever the threads; and a job that says them finds its own array in the folder."""
+    assert run(capsys, "render", "-q", write_job(tmp_path, **BOTH)).code == 0
+    stored, first = manifest(tmp_path / "out"), images(tmp_path / "out")
+    numbers = {"reuse": {"n_r": stored["job"]["reuse"]["n_r"]}, "samples": {"hits": stored["job"]["samples"]["hits"]}}
+    same = write_job(tmp_path, "same.toml", **(BOTH | numbers | {"specular": {"hits": 14}}))
+    assert run(capsys, "render", "-q", write_job(tmp_path, **BOTH), "--threads", "1").code == 0
+    assert (manifest(tmp_path / "out")["fingerprint"], images(tmp_path / "out")) == (stored["fingerprint"], first)
+    told = run(capsys, "render", same)
+    assert (told.code, told.err, "automatic" in told.out) == (0, "", False)
+    assert (manifest(tmp_path / "out")["fingerprint"], images(tmp_path / "out")) == (stored["fingerprint"], first)
+    assert "automatic" not in manifest(tmp_path / "out")["summary"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"), [({"reuse": {"n_r": "auto"}}, "n_r = "), ({"samples": {"hits": "auto"}}, "hits = ")]
+)
+def test_one_of_the_two(changes, key, tmp_path, capsys):
+    told = run(capsys, "check", write_job(tmp_path, camera=tiny.WALK, **changes))
+    assert told.code == 0
+    assert re.search(rf"^automatic: {key}[\d.]+; expected", told.out, re.MULTILINE)
+
+
+def test_another_word_is_a_problem(tmp_path, capsys):
+    told = run(capsys, "render", write_job(tmp_path, reuse={"n_r": "Auto"}, samples={"hits": "best"}))
+    assert told.code == 2
+    assert told.err.splitlines() == [
+        f'{tmp_path / "job.toml"}: samples.hits: expected a whole number from 1 to 65000, 1/2, 1/3, ... 1/8 or "auto", '
+        'got "best"',
+        f'{tmp_path / "job.toml"}: reuse.n_r: expected a whole number from 0 to 64 or "auto", got "Auto"',
+        "2 problems; nothing was rendered.",
+    ]
+
+
+def test_a_job_beyond_memory_is_refused_before_anything_is_chosen(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("framearray_cli.memory.free_memory", lambda: 2**20)
+    monkeypatch.setattr("framearray_cli.auto.probe", None)
+    told = run(capsys, "render", "-q", write_job(tmp_path, **BOTH))
+    assert told.code == 2
+    assert re.search(r"rendering needs at least [\d.]+ GiB of memory", told.err)
