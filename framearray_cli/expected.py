@@ -15,12 +15,12 @@ from .plan import frame_hits
 # The variance of a pixel falls with this power of the hits that one eye finds in it: they are spread evenly.
 EVENNESS = 1.3
 
-# Nanoseconds of a processor. Rays by kind, what the program does for them included.
-EYE_RAY, OBSCURANCE_RAY, SHADOW_RAY, VISIBILITY_RAY = 115.0, 190.0, 48.0, 43.0
-# To project a hit into an eye; to weigh it by the density of one eye in one frame; to sort it into a frame.
-PROJECT, WEIGH, SORT = 5.0, 1.5, 20.0
-# To add a hit to a pixel, and to turn a pixel's sums into stored numbers, under one light position.
-ADD, STORE = 0.35, 3.5
+# Nanoseconds of a processor. A ray of each kind, with all that the program does for it.
+EYE_RAY, OBSCURANCE_RAY, SHADOW_RAY, VISIBILITY_RAY = 115.0, 190.0, 48.0, 40.0
+# A hit: to weigh it by the density of one eye in one frame, and to sort it into one frame.
+WEIGH, SORT = 0.5, 5.0
+# A pixel: to look up the hits of one eye; under each light position, to add a hit and to store the sum.
+LOOK_UP, ADD, STORE = 18.0, 0.3, 3.2
 # Shadow rays that `shadow_step` = s leaves: a share of 1 / s, and this for places where the light changes.
 BISECTED = 0.04
 
@@ -64,13 +64,14 @@ class Model:
         found, n_r = self.found, min(reuse.n_r, self.found.n_frames - 1)
         native = reuse.hits * (found.n_frames + 2 * reuse.n_r) / found.n_frames
         eyes = range(1, min((2 if self.balance else 1) * n_r, found.n_frames - 1) + 1)
-        place = sum(2 * (PROJECT + VISIBILITY_RAY * found.seen(k)) for k in eyes)
+        place = SORT * (2 * n_r + 1) + sum(2 * VISIBILITY_RAY * found.seen(k) for k in eyes)
         if self.balance and n_r:
             place += WEIGH * (2 * n_r + 1) ** 2
         find = EYE_RAY + OBSCURANCE_RAY * self.obscurance * found.reflecting + place
         light = SHADOW_RAY * found.shadow_rays * min(1.0 / self.shadow_step + BISECTED, 1.0)
         used = native * (1 + 2 * sum(found.seen(k) for k in range(1, n_r + 1)))
-        return native * (blocks * find + light) + used * (blocks * SORT + ADD * self.n_lights) + STORE * self.n_lights
+        pixel = LOOK_UP * (2 * n_r + 1) * blocks + (ADD * used + STORE) * self.n_lights
+        return native * (blocks * find + light) + pixel
 
     def _native(self, reuse: Reuse) -> Float64:
         """Native hits a pixel of every frame, (n_frames,)."""

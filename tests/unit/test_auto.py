@@ -123,12 +123,12 @@ def test_time_by_hand() -> None:
 
     one = Model(found=found, n_lights=20, obscurance=3, balance=False)
     native = 2 * 1002 / 1000
-    place = 2 * (e.PROJECT + e.VISIBILITY_RAY)
-    right = native * (e.EYE_RAY + 3 * e.OBSCURANCE_RAY + place + 10 * e.SHADOW_RAY)
-    right += native * 3 * (e.SORT + 20 * e.ADD) + 20 * e.STORE
+    rays = 2 * e.VISIBILITY_RAY
+    right = native * (e.EYE_RAY + 3 * e.OBSCURANCE_RAY + rays + 3 * e.SORT + 10 * e.SHADOW_RAY)
+    right += 3 * e.LOOK_UP + 20 * (3 * native * e.ADD + e.STORE)
     assert one.time(Reuse(n_r=1, hits=2)) == pytest.approx(right)
     dearer = Model(found=found, n_lights=20, obscurance=3, balance=True).time(Reuse(n_r=1, hits=2))
-    assert dearer == pytest.approx(right + native * (place + 9 * e.WEIGH))
+    assert dearer == pytest.approx(right + native * (rays + 9 * e.WEIGH))
 
 
 def test_path_ends_count_as_they_are_rendered() -> None:
