@@ -46,6 +46,8 @@ def test_lines_to_paste_say_what_differs_and_nothing_else() -> None:
         "[reuse]", "n_r = 7", 'weights = "average"', "[samples]", "hits = 0.5", "shadow_unbiased = true",
     ]  # fmt: skip
     assert BASE.lines(BASE) == []
+    left_open = Settings.of(tiny.job(camera=tiny.WALK, reuse={"n_r": "auto"}, samples={"hits": "auto"}))
+    assert BASE.lines(left_open) == ["[reuse]", "n_r = 2", "[samples]", "hits = 2"]
 
 
 def test_values_to_vary() -> None:
@@ -61,6 +63,7 @@ def test_values_to_vary() -> None:
         ("samples.hits", "expected one of reuse.n_r"),
         ("samples.hits=", "expected one of reuse.n_r"),
         ("samples.hits=0.3", "samples.hits = 0.3"),
+        ("samples.hits=2,auto", "samples.hits = 'auto': expected a value to measure"),
         ("reuse.n_r=-1,2,900", "reuse.n_r = 900"),
         ("reuse.weights=best", "reuse.weights = 'best'"),
         ("samples.obscurance=nan", "samples.obscurance"),
