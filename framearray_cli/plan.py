@@ -25,11 +25,10 @@ def frame_hits(n_c: int, n_r: int, hits: float) -> Float64:
 
     The hits of any window [c - n_r, c + n_r] sum to at least (2 n_r + 1) * hits.
     """
-    counts = np.zeros(n_c)
-    period = 2 * n_c
-    for virtual in range(-n_r, n_c + n_r):
-        k = virtual % period  # the path, there and back again
-        counts[k if k < n_c else period - 1 - k] += hits
+    # the path, there and back again
+    virtual = np.arange(-n_r, n_c + n_r) % (2 * n_c)
+    counts: Float64 = np.bincount(np.minimum(virtual, 2 * n_c - 1 - virtual), minlength=n_c).astype(np.float64)
+    counts *= hits
     return counts
 
 
