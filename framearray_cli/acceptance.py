@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import Float64, Int32, with_room
-from .camera import Cameras, cameras
+from .camera import Cameras
 from .embree import EmbreeScene
 from .hits import SURFACE, Hits, empty_hits, native_hits, pixel_order
 from .lanes import LANES
 from .lights import some_lights
-from .prepare import Prepared
+from .prepare import Prepared, eye_cameras
 from .rays import Rays, room_for_hits, room_for_tests
 from .reuse import outer_hits
 from .terms.direct import direct
@@ -63,7 +63,7 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
     The hits are some of those that a render finds, so the same job gives the same answer anywhere.
     """
     job, n_c = prepared.job, 1 if prepared.still else prepared.n_cameras
-    cams = cameras(prepared.eyes, job.camera.resolution, prepared.scene.centre)
+    cams = eye_cameras(prepared)
     lights = some_lights(prepared.light_arrays, spread(prepared.n_lights, PROBE_LIGHTS))
     order = pixel_order(cams.width, cams.height)
     pixels = order[spread(len(order), PROBE_HITS)]

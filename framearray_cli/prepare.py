@@ -94,7 +94,7 @@ def open_embree(prepared: Prepared, engine: Engine = "auto") -> EmbreeScene:
 def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
     """Estimate the ambient light and put together what every frame needs."""
     job, scene = prepared.job, prepared.scene
-    cams = _cameras(prepared)
+    cams = eye_cameras(prepared)
     background = np.array(job.scene.background, np.float32)
     ambient = _ambient(prepared, embree, background)
     n_r = job.n_r
@@ -143,11 +143,12 @@ def _halves(job: Job, *, still: bool) -> int:
     """
     if not job.samples.halves:
         return 0
-    by_sample = job.samples.hits >= FEWEST_SPLIT or still or job.reuse.n_r == 0
-    return BY_SAMPLE if by_sample else turns(job.samples.hits)
+    by_sample = job.hits >= FEWEST_SPLIT or still or job.n_r == 0
+    return BY_SAMPLE if by_sample else turns(job.hits)
 
 
-def _cameras(prepared: Prepared) -> Cameras:
+def eye_cameras(prepared: Prepared) -> Cameras:
+    """All eyes as kernels take them; what is nearer to an eye than rays start above a surface it does not see."""
     near = nearest(prepared.surfaces)
     return cameras(prepared.eyes, prepared.job.camera.resolution, prepared.scene.centre, near)
 
@@ -159,7 +160,7 @@ def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Am
             seed, job.ambient.paths, prepared.surfaces, embree.tracer, prepared.light_arrays, background
         )
     walks = EyeWalks(
-        cams=_cameras(prepared),
+        cams=eye_cameras(prepared),
         seed=seed,
         paths=job.ambient.paths,
         surfaces=prepared.surfaces,
