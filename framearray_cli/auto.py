@@ -36,6 +36,7 @@ class Choice:
 
     Attributes:
         keys: of the job file that say "auto".
+        enough: whether it is as exact as wanted; else nothing that was tried is.
         error: expected, over that which is wanted.
         time: expected, over that of the default.
         hits: expected hits of a pixel, native and outer: mean and 1st percentile.
@@ -44,6 +45,7 @@ class Choice:
 
     reuse: Reuse
     keys: tuple[str, ...]
+    enough: bool
     error: float
     time: float
     hits: tuple[float, float]
@@ -58,7 +60,7 @@ class Choice:
             f"(1st percentile {self.hits[1]:.1f}), {self.error:.2f} times the error that is wanted, "
             f"{self.time:.2f} times the time of {default}"
         ]
-        if self.error > 1:
+        if not self.enough:
             lines.append("  note: no window reaches the error that is wanted; this one makes the most of its time")
         if self.seen:
             shares = ", ".join(f"{share:.0%} ({k})" for k, share in self.seen.items())
@@ -71,6 +73,7 @@ class Choice:
             "keys": list(self.keys),
             "n_r": self.reuse.n_r,
             "hits": self.reuse.hits,
+            "enough": self.enough,
             "error_to_wanted": round(self.error, 4),
             "time_to_default": round(self.time, 4),
             "hits_per_pixel": round(self.hits[0], 3),
@@ -98,16 +101,17 @@ def settled(prepared: Prepared, embree: EmbreeScene) -> tuple[Prepared, Choice |
         balance=job.reuse.weights == "balance",
     )
     wanted = wanted_variance(job)
-    chosen = choose(model, wanted, to_try(job, model.found.n_frames), lambda reuse: _blocks(prepared, reuse))
+    enough, trying = exact_enough(model, job), to_try(job, model.found.n_frames)
+    chosen = choose(model, enough, trying, lambda reuse: _blocks(prepared, reuse))
     result = applied(prepared, chosen)
     require_memory(result)
-    counts = model.counts(chosen)
     return result, Choice(
         reuse=chosen,
         keys=keys,
+        enough=enough(chosen),
         error=(model.variance(chosen) / wanted) ** 0.5,
         time=model.time(chosen, _blocks(prepared, chosen)) / model.time(DEFAULT, _blocks(prepared, DEFAULT)),
-        hits=(float(counts.mean()), float(np.percentile(counts, 1))),
+        hits=(float(model.counts(chosen).mean()), model.least(chosen)),
         seen={k: model.found.seen(k) for k in TOLD if k <= min(model.found.reach, model.found.n_frames - 1)},
     )
 
@@ -145,6 +149,13 @@ def wanted_variance(job: Job) -> float:
     return 1.0 / (ORDINARY * (2 * DEFAULT.n_r + 1) * float(worth(np.array(hits))))
 
 
+def exact_enough(model: Model, job: Job) -> Callable[[Reuse], bool]:
+    """What settings must be: as exact as wanted, and places that were just revealed no worse than by default."""
+    wanted = wanted_variance(job)
+    least = model.least(replace(DEFAULT, hits=DEFAULT.hits if job.samples.hits == "auto" else job.samples.hits))
+    return lambda reuse: model.variance(reuse) <= wanted and model.least(reuse) >= least
+
+
 def to_try(job: Job, n_frames: int) -> Iterator[list[Reuse]]:
     """The settings that a job leaves open, a list a window with hits rising; no window is longer than the path."""
     n_r, hits = job.reuse.n_r, job.samples.hits
@@ -155,11 +166,14 @@ def to_try(job: Job, n_frames: int) -> Iterator[list[Reuse]]:
 
 
 def choose(
-    model: Model, wanted: float, trying: Iterator[list[Reuse]], blocks: Callable[[Reuse], int] = lambda _: 1
+    model: Model,
+    enough: Callable[[Reuse], bool],
+    trying: Iterator[list[Reuse]],
+    blocks: Callable[[Reuse], int] = lambda _: 1,
 ) -> Reuse:
-    """The settings of least time whose variance is at most the wanted one; the shorter window if two are alike.
+    """The settings of least time that are exact enough; the shorter window if two are alike.
 
-    Where no settings reach it, those of the least time for the error they give: time falls and variance grows as hits
+    Where none are, those of the least time for the error they give: time falls and variance grows as hits
     become fewer, so that their product tells which window makes the most of its time.
 
     Args:
@@ -168,8 +182,8 @@ def choose(
     """
     reached, rest = [], []
     for row in trying:
-        good = next((reuse for reuse in row if model.variance(reuse) <= wanted), None)
-        if good:
+        good = next(filter(enough, row), None)
+        if good is not None:
             reached.append(good)
         rest += row
     if reached:

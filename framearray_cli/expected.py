@@ -47,6 +47,10 @@ class Model:
         """Expected hits, native and outer, in the pixel of each probed hit, (n,)."""
         return self._arriving(self._native(reuse), reuse.n_r)
 
+    def least(self, reuse: Reuse) -> float:
+        """Expected hits that all but one in a hundred pixels have."""
+        return float(np.percentile(self.counts(reuse), 1))
+
     def variance(self, reuse: Reuse) -> float:
         """Expected variance of a pixel, mean over pixels, in units of that of one hit.
 
