@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from framearray_cli.accumulate import accumulate, sources
+from framearray_cli.accumulate import Source, accumulate, sources
 from framearray_cli.arrays import with_room
 from framearray_cli.compose import empty_band
 from framearray_cli.lanes import LANES
@@ -21,8 +21,8 @@ def mean_of_many(n: int) -> tuple[Any, Any]:
     row[:, REFLECTIVITY : REFLECTIVITY + 3] = rng.random((n, 3))
     row[:, INDIRECT : INDIRECT + 3] = rng.random((n, 3))
     placed = Placed(start=np.array([0, n], np.int32), order=np.arange(n, dtype=np.int32))
-    band, nothing = empty_band(1, 3), np.empty(0, np.float32)
-    parts = sources([(placed, Records(row=row, irradiance=irradiance), nothing, nothing)])
+    band = empty_band(1, 3)
+    parts = sources([Source(placed, Records(row=row, irradiance=irradiance))])
     accumulate(band, 0, 1, parts, 1, 3, True)
     light = row[:, REFLECTIVITY : REFLECTIVITY + 3, None].astype(np.float64) / np.pi * irradiance
     exact = [light.mean(axis=0).ravel(), row[:, INDIRECT : INDIRECT + 3].mean(axis=0, dtype=np.float64)]

@@ -13,7 +13,7 @@ def looking_ahead(*eyes: float) -> Cameras:
     axes = {"right": [1, 0, 0], "up": [0, 1, 0], "forward": [0, 0, -1]}
     arrays = {name: np.tile(np.array(axis, np.float32), (len(eyes), 1)) for name, axis in axes.items()}
     position = np.array([[x, 0, 0] for x in eyes], np.float32)
-    return Cameras(position=position, focal=F, width=W, height=H, **arrays)
+    return Cameras(position=position, focal=F, width=W, height=H, near=0.0, **arrays)
 
 
 def floor_and_wall() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
