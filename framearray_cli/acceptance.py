@@ -7,7 +7,8 @@ import numpy as np
 from .arrays import Float64, Int32, with_room
 from .camera import Cameras
 from .embree import EmbreeScene
-from .hits import SURFACE, Hits, empty_hits, native_hits, pixel_order
+from .eyehits import native_hits, pixel_order
+from .hits import SURFACE, Hits, empty_hits
 from .lanes import LANES
 from .lights import some_lights
 from .prepare import Prepared, eye_cameras

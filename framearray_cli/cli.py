@@ -1,38 +1,29 @@
-"""The command line: each command parses, calls one function, prints. Only this file ends the process."""
+"""The command line: each command parses, calls one function, prints. Errors end the process here alone."""
 
 import io
-import os
-import signal
 import sys
-import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
-from rich.console import Console
 
 from . import __version__
-from .compiling import compile_clock, is_compiling
+from .compiling import compile_clock
 from .errors import FrameArrayError, JobError, OutputError
-from .screen import Screen, duration, say, size
+from .interrupts import Stopped, forget, listen
+from .screen import Screen, err, out, say, size
+from .wording import ambient_lines, estimate_lines, report_lines, scene_lines, summary_lines
 
 if TYPE_CHECKING:
-    from types import FrameType
-
     from .auto import Choice
     from .job import Job
     from .prepare import Prepared
-    from .render import Summary
-    from .report import Report
     from .report.case import Case
     from .terms.ambient import Ambient
 
 OUT_OF_MEMORY = 2  # the job asks for more than the machine has
 LITTLE_SPACE = 64 * 1024 * 1024  # bytes; with less, a full disk is the likely reason of an error
-PATIENCE = 1.0  # seconds that threads get to end by themselves after a signal
-# Callbacks from C and optional imports, in which every exception is caught.
-FORGETFUL = ("numba", "llvmlite", "importlib", "_frozen_importlib", "_frozen_importlib_external")
 MOST_THREADS = 1024  # as in the job file
 
 app = typer.Typer(
@@ -42,7 +33,6 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode=None,  # plain text, also in a log file
 )
-out, err = Console(), Console(stderr=True)
 
 JobFile = Annotated[Path, typer.Argument(metavar="JOB", help="Job file, TOML.", show_default=False)]
 Threads = Annotated[
@@ -56,16 +46,6 @@ Output = Annotated[
     typer.Option("--output", "-o", help="Folder for the images, instead of the job's.", metavar="FOLDER"),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
-
-
-class Stopped(BaseException):
-    """A signal asked the program to end, as Ctrl-C does."""
-
-    def __init__(self, signum: int) -> None:
-        super().__init__(signum)
-        # what shells expect of a program that a signal ended
-        self.exit_code = 128 + signum
-        self.word = "interrupted" if signum == signal.SIGINT else "terminated"
 
 
 def _version(wanted: bool) -> None:
@@ -103,7 +83,7 @@ def render(
             """Prints the scene, then the ambient light, then a progress bar."""
 
             def prepared(self, prepared: "Prepared") -> None:
-                screen.say(_scene_lines(prepared))
+                screen.say(scene_lines(prepared))
                 screen.wait("estimating the ambient light")
                 self.total = prepared.n_cameras * prepared.n_lights
 
@@ -115,7 +95,7 @@ def render(
                 screen.say(choice.lines())
 
             def planned(self, ambient: "Ambient") -> None:
-                screen.say(_ambient_lines(ambient))
+                screen.say(ambient_lines(ambient))
                 self.told = ambient.notes
                 screen.count("rendering", self.total, "image")
 
@@ -134,7 +114,7 @@ def render(
                 error.add_note(f"{done}; its manifest says that it is not finished")
             raise
     if not quiet:
-        say(out, _summary_lines(summary, shown.told, job))
+        say(out, summary_lines(summary, shown.told, job))
 
 
 @app.command()
@@ -147,21 +127,7 @@ def check(job_file: JobFile, threads: Threads = None, output: Output = None) -> 
 
         with compile_clock(screen.compiling):
             estimate = run(job)
-    n_c, n_l = estimate.prepared.n_cameras, estimate.prepared.n_lights
-    width, height = job.camera.resolution
-    say(out, _scene_lines(estimate.prepared))
-    say(out, estimate.choice.lines() if estimate.choice else [])
-    say(out, _ambient_lines(estimate.ambient))
-    say(
-        out,
-        [
-            f"array: {n_c:,} cameras x {n_l:,} lights = {n_c * n_l:,} images of {width} x {height}",
-            f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_blocks(estimate.blocks)}",
-            f"disk: about {size(estimate.disk)} in {job.output.directory}, {size(estimate.free)} free",
-            f"time: about {duration(estimate.seconds)} on this machine",
-            *(f"warning: {warning}" for warning in estimate.warnings),
-        ],
-    )
+    say(out, estimate_lines(estimate))
 
 
 @app.command()
@@ -244,7 +210,7 @@ def report(
             """Prints the scene, then a progress bar."""
 
             def opened(self, case: "Case") -> None:
-                screen.say(_scene_lines(case.prepared))
+                screen.say(scene_lines(case.prepared))
 
             def planned(self, references: int, settings: int) -> None:
                 screen.count("measuring", references + settings, "step")
@@ -264,7 +230,7 @@ def report(
             made = reporting.make_report(job, place, wish, Shown())
         reporting.write_report(made)
     if not quiet:
-        say(out, _report_lines(made))
+        say(out, report_lines(made))
 
 
 @app.command()
@@ -290,78 +256,11 @@ def _job(job_file: Path, threads: int | None, output: str | None) -> "Job":
     return job.model_copy(update=updates)
 
 
-def _blocks(n: int) -> str:
-    return f"; the lights are rendered in {n} blocks, one after the other" if n > 1 else ""
-
-
 def _place(name: str) -> Path:
     """A file or folder to write to."""
     if not name.strip():  # most often a shell variable that is not set; Path would make "." of it
         raise typer.BadParameter("expected a name, got none", param_hint="--output")
     return Path(name)
-
-
-def _scene_lines(prepared: "Prepared") -> list[str]:
-    from .scene import report_lines
-
-    return report_lines(prepared.scene.report, prepared.job.scene.file)
-
-
-def _ambient_lines(ambient: "Ambient") -> list[str]:
-    mean = ambient.intensity.mean(axis=1)
-    error = ambient.standard_error.max()
-    known = f"standard error at most {error:.1%}, {ambient.paths:,} paths" if error > 0 else "fixed, or nothing arrives"
-    return [
-        f"ambient light: I_A {mean.min():.4g} to {mean.max():.4g} ({known})",
-        *(f"  note: {note}" for note in ambient.notes),
-    ]
-
-
-def _summary_lines(summary: "Summary", told: Sequence[str], job: "Job") -> list[str]:
-    """What a render took.
-
-    Args:
-        told: notes that were printed before.
-    """
-    kinds = summary.rays_per_pixel_image
-    mirrors = sum(n for kind, n in kinds.items() if "mirror" in kind or kind == "pilot")
-    rays = sum(kinds.values()) - mirrors - kinds["ambient"]
-    rate = sum(summary.rays.values()) / summary.seconds / 1e6
-    beside = f" + {mirrors:.2f} for mirrors" if mirrors else ""
-    each = f"{1e3 * summary.seconds / summary.images:.1f} ms an image"
-    return [
-        f"{summary.images:,} images in {duration(summary.seconds)}: {each}, "
-        f"{summary.images / summary.seconds:.1f} images a second",
-        f"{rays:.2f} rays a pixel an image{beside}, {rate:.1f} Mrays/s, "
-        f"{summary.hits:.1f} hits a pixel, peak memory {size(summary.peak_memory)}",
-        *_error_lines(summary),
-        *(f"note: {note}" for note in summary.notes if note not in told),
-        f"images and manifest: {job.output.directory}",
-    ]
-
-
-def _error_lines(summary: "Summary") -> list[str]:
-    """How noisy the images are, where the job asks."""
-    found = summary.standard_error
-    if not found:
-        return []
-    where = f"camera {found['camera']}, light {found['light']}"
-    return [
-        f"standard error {found['rms']:.3g}, {found['relative']:.1%} of the mean radiance; "
-        f"the largest of an image {found['largest']:.3g} ({where})"
-    ]
-
-
-def _report_lines(made: "Report") -> list[str]:
-    """What a report found: the job's own settings, and the cheapest ones for some errors."""
-    from .report import advice_lines
-
-    own = made.measured[0]
-    lines = [f"as the job says: {own.ms:.3g} ms an image before writing, RMSE {own.quality.rmse:.1%}"]
-    for one in made.advice:
-        found = f"{one.best.named.name}, {one.best.ms:.3g} ms an image" if one.best else "nothing that was tried"
-        lines += [f"for an RMSE of {one.error:.1%}: {found}", *(f"  {line}" for line in advice_lines(one.best, made))]
-    return [*lines, f"report: {made.folder / 'index.html'}"]
 
 
 def _problems(error: JobError, outcome: str) -> list[str]:
@@ -374,43 +273,9 @@ def _fail(lines: Sequence[str], code: int) -> NoReturn:
     sys.exit(code)
 
 
-def _stop(signum: int, frame: "FrameType | None") -> None:
-    """Turn a signal into an exception, so that everything is tidied up; a second signal ends the process at once."""
-    signal.signal(signum, signal.SIG_DFL)
-    if is_compiling():  # that cannot be stopped, and would be waited for
-        timer = threading.Timer(PATIENCE, _leave, [Stopped(signum)])
-        timer.daemon = True
-        timer.start()
-    if hasattr(signal, "setitimer"):
-        signal.signal(signal.SIGALRM, lambda _, frame: _interrupt(signum, frame))
-    _interrupt(signum, frame)
-
-
-def _interrupt(signum: int, frame: "FrameType | None") -> None:
-    """Raise `Stopped`, unless that would be forgotten now; then in a moment, and again should it be forgotten."""
-    busy = False
-    while frame is not None and not busy:
-        busy = frame.f_globals.get("__name__", "").partition(".")[0] in FORGETFUL
-        frame = frame.f_back
-    if hasattr(signal, "setitimer"):
-        signal.setitimer(signal.ITIMER_REAL, 0.02 if busy else 2 * PATIENCE)
-        if busy:
-            return
-    raise Stopped(signum)
-
-
-def _leave(stopped: Stopped) -> None:
-    """End the process whatever its threads are doing."""
-    out.show_cursor()
-    say(err, [stopped.word])
-    os._exit(stopped.exit_code)
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and turn errors into messages and exit codes."""
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):  # Windows lacks the last
-            signal.signal(getattr(signal, name), _stop)
+    listen()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a file name that the terminal cannot show is no reason to fail
             stream.reconfigure(errors="backslashreplace")
@@ -425,8 +290,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         less = "a smaller resolution, n_r or fewer lights take less; `framearray check` tells how much a job needs"
         _fail([f"not enough memory; {less}", *_notes(error)], OUT_OF_MEMORY)
     except Stopped as stopped:
-        if hasattr(signal, "setitimer"):
-            signal.setitimer(signal.ITIMER_REAL, 0)
+        forget()
         _fail([stopped.word, *_notes(stopped)], stopped.exit_code)
 
 

@@ -13,7 +13,8 @@ import numpy as np
 from .arrays import Float32, Int32
 from .camera import Cameras
 from .crew import Crew, Scratch, Shelf
-from .hits import ESCAPED, SURFACE, Hits, extra_hits, native_hits
+from .eyehits import extra_hits, native_hits
+from .hits import ESCAPED, SURFACE, Hits
 from .mirrors import extra_mirror_hits, mirror_paths
 from .plan import Pass, passes
 from .reuse import balance_weights, outer_hits

@@ -7,7 +7,8 @@ import numpy as np
 import psutil
 
 from .errors import JobError
-from .hits import empty_hits, pilot_hits
+from .eyehits import pilot_hits
+from .hits import empty_hits
 from .lanes import LANES
 from .plan import flag_mirrors, frame_hits
 from .prepare import Prepared

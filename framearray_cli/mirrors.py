@@ -6,7 +6,8 @@ import numpy as np
 
 from .arrays import Int32
 from .crew import Crew, Scratch
-from .hits import Hits, extra_hits, pilot_hits
+from .eyehits import extra_hits, pilot_hits
+from .hits import Hits
 from .plan import Pass, flag_mirrors, halves_of
 from .shading import estimate_terms
 from .terms.specular import count_mirrors, reflect

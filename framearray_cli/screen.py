@@ -16,6 +16,8 @@ from rich.text import Text
 from .errors import OutputError
 from .files import reason
 
+out, err = Console(), Console(stderr=True)
+
 # Plain lines: a log file should tell that work goes on, not fill up.
 SECONDS_BETWEEN_LINES = 5.0
 

@@ -9,7 +9,7 @@ import numpy as np
 from .arrays import Float32, Float64, Int32, Rgb, with_room
 from .camera import Cameras
 from .embree.packets import Tracer
-from .hits import pixel_order
+from .eyehits import pixel_order
 from .kernel import inlined
 from .lanes import LANES
 from .lights import LightArrays, some_lights

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..arrays import Float32, Real, Triple
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude
-from ..hits import Hits, lift, ray_origin, reflect, reflects, triple
+from ..hits import Hits, lift, ray_origin, reflecting, reflects, triple
 from ..kernel import inlined, kernel
 from ..lanes import LANES, bits, choose, compress, count, lane_numbers, lanes_at, lowest, put_lanes, root, triples_at
 from ..lights import DIRECTIONAL, LightArrays
@@ -119,7 +119,7 @@ def _of_few(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays,
     capacity = rays.packets.shape[0] * LANES
     waiting = total = 0
     for i in range(0, n, LANES):
-        at, wanted = lane_numbers() + np.int32(i), reflect(hits, i, n)
+        at, wanted = lane_numbers() + np.int32(i), reflecting(hits, i, n)
         p, g, m = triples_at(hits.position, i), triples_at(hits.geometric, i), triples_at(hits.shading, i)
         e = lanes_at(hits.offset, i)
         up = (e * g[0], e * g[1], e * g[2])

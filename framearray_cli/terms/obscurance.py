@@ -24,7 +24,7 @@ from ..embree.packets import (
     intersect,
     scene_triangle,
 )
-from ..hits import Hits, reflect, triple
+from ..hits import Hits, reflecting, triple
 from ..kernel import inlined, kernel
 from ..lanes import (
     LANES,
@@ -287,7 +287,7 @@ def obscurance(
             if settings.sky:
                 skylight[i, channel] = 0.0
     for first in range(0, n, LANES):
-        wanted = reflect(hits, first, n)
+        wanted = reflecting(hits, first, n)
         compress(wanted, lane_numbers() + np.int32(first), rays.place, waiting)
         waiting += count(wanted)
         if waiting >= fit:

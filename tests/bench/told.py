@@ -6,18 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.arrays import Float32, Images
-from framearray_cli.crew import Crew
-from framearray_cli.frame import find_frame
 from framearray_cli.plan import turns
 from framearray_cli.prepare import FEWEST_SPLIT
 from framearray_cli.report.metrics import rmse
 from framearray_cli.report.reference import HITS, PASSES, Reference, reference
 from framearray_cli.standarderror import square_mean, standard_error
-from framearray_cli.window import Window
 from framearray_cli.work import BY_SAMPLE
 
 from .cases import Case, Variant, job_named, opened, under, varied, with_resolution
+from .frames import frame
 from .markdown import grid, number, percent
 from .results import ROOT, Table
 from .speed import tell
@@ -78,33 +75,19 @@ def compare(case: Case, variant: Variant, c: int, wanted: Reference) -> list[Tab
     """Each image of frame c made by a variant: what it tells, and how far it is from the reference."""
     work = varied(case, variant).work
     halves = BY_SAMPLE if variant.hits >= FEWEST_SPLIT or variant.n_r == 0 else turns(variant.hits)
-    images, differences, hits = composed(replace(case, work=replace(work, seed=SEED, halves=halves)), c)
+    made = frame(replace(case, work=replace(work, halves=halves)), c, SEED)
+    assert made.differences is not None
+    hits = made.hits.reshape(made.images.shape[1:3])
     rows = []
-    for k in range(len(images)):
+    for k, image in enumerate(made.images):
         ambient = case.ambient.intensity[k]
         right = wanted.image(k, ambient)
         mean = float(right.mean(dtype=np.float64))
         apart = rmse(wanted.half(0, k, ambient), wanted.half(1, k, ambient)) / 2  # of the reference itself
-        true = max(rmse(images[k], right) ** 2 - apart**2, 0.0) ** 0.5
-        told = square_mean(standard_error(differences[k], hits)) ** 0.5
+        true = max(rmse(image, right) ** 2 - apart**2, 0.0) ** 0.5
+        told = square_mean(standard_error(made.differences[k], hits)) ** 0.5
         rows.append({"camera": c, "light": k, "told": told / mean, "true": true / mean, "reference": apart / mean})
     return rows
-
-
-def composed(case: Case, c: int) -> tuple[Images, Float32, Float32]:
-    """Images of frame c, what their halves differ by, and hits by pixel."""
-    work = case.work
-    crew = Crew(work, case.threads)
-    window = Window(work, case.ambient, crew, first=c)
-    shape = (work.lights.n_lights, work.cams.height, work.cams.width, 3)
-    try:
-        for other in work.frames_around(c, work.n_r):
-            window.add(find_frame(work, other, crew))
-        found = window.compose(c, np.empty(shape, np.float32))
-    finally:
-        crew.close()
-    assert found.differences is not None
-    return found.images, found.differences, found.hits.reshape(shape[1:3]).astype(np.float32)
 
 
 def write(rows: Sequence[Table]) -> None:

@@ -15,7 +15,7 @@ import pytest
 import tiny
 from program import Result, finish, start, wait_for, write_job
 
-from framearray_cli import cli
+from framearray_cli import interrupts
 from framearray_cli.images import read_image
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of other kinds there")
@@ -165,10 +165,10 @@ def test_an_exception_is_not_raised_where_it_would_be_forgotten(module):
     exec("def f(stop): stop(); inside.append(stop)", space := {"__name__": module, "inside": inside})
 
     def arrive() -> None:
-        cli._stop(signal.SIGTERM, sys._getframe())
+        interrupts.stop(signal.SIGTERM, sys._getframe())
 
     space["f"](arrive)
     assert inside == [arrive]
-    with pytest.raises(cli.Stopped):
+    with pytest.raises(interrupts.Stopped):
         time.sleep(5)
     signal.setitimer(signal.ITIMER_REAL, 0)

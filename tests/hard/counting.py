@@ -17,7 +17,8 @@ from framearray_cli.camera import OUTSIDE as HIDDEN
 from framearray_cli.camera import Cameras
 from framearray_cli.embree import EmbreeScene
 from framearray_cli.embree.packets import DIRECTION, ORIGIN, TFAR, intersect
-from framearray_cli.hits import SURFACE, empty_hits, native_hits, pixel_order
+from framearray_cli.eyehits import native_hits, pixel_order
+from framearray_cli.hits import SURFACE, empty_hits
 from framearray_cli.lanes import LANES
 from framearray_cli.lights import light_arrays
 from framearray_cli.paths import LightPath, Lights

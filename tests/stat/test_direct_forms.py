@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from stages import Part, look, make_job, point, quad, result_of, sun, write_scene
 
 from framearray_cli.crew import Scratch
-from framearray_cli.hits import SURFACE, native_hits
+from framearray_cli.eyehits import native_hits
+from framearray_cli.hits import SURFACE
 from framearray_cli.job import Job
 from framearray_cli.prepare import open_embree, plan_work, prepare
 from framearray_cli.terms.direct import direct

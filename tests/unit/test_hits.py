@@ -7,17 +7,8 @@ import pytest
 import tiny
 from oracle import Oracle
 
-from framearray_cli.hits import (
-    ESCAPED,
-    SURFACE,
-    Hits,
-    empty_hits,
-    extra_hits,
-    native_hits,
-    pilot_hits,
-    pixel_order,
-    record_hits,
-)
+from framearray_cli.eyehits import extra_hits, native_hits, pilot_hits, pixel_order
+from framearray_cli.hits import ESCAPED, SURFACE, Hits, empty_hits, record_hits
 from framearray_cli.rays import room_for_hits
 from framearray_cli.work import Work
 

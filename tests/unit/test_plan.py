@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import tiny
 
-from framearray_cli.hits import empty_hits, pixel_order
+from framearray_cli.eyehits import pixel_order
+from framearray_cli.hits import empty_hits
 from framearray_cli.plan import flag_mirrors, frame_hits, passes
 
 PATHS = [(n_c, n_r) for n_c in (1, 2, 3, 4, 5, 7, 12, 24) for n_r in (0, 1, 2, 3, 5, 8, 30, 64)]

@@ -1,0 +1,164 @@
+"""Eye rays and the hits that they find: native ones, those that only mirror pixels have, and a look for mirrors."""
+
+import numba as nb
+import numpy as np
+
+from .arrays import Float32, Int32, Real
+from .camera import Cameras, corner_of, eye_ray
+from .embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, intersect
+from .hits import Hits, met, record_hits
+from .kernel import inlined, kernel
+from .lanes import LANES, choose, doubles, floor, gather, integers, lane_numbers, put_lanes, put_triples
+from .sampling import OTHER_HALF, PIXEL, PIXEL_SAMPLE, r2, stream, word
+from .surface import Surfaces, specular_at
+
+
+@nb.njit(cache=True)
+def pixel_order(width: int, height: int) -> Int32:
+    """All pixels, in 4 x 4 blocks within 32 x 32 tiles.
+
+    16 neighbours make a coherent packet, and a tile's triangles stay in the cache.
+    """
+    order = np.empty(width * height, np.int32)
+    n = 0
+    for ty in range(0, height, 32):
+        for tx in range(0, width, 32):
+            for by in range(ty, min(ty + 32, height), 4):
+                for bx in range(tx, min(tx + 32, width), 4):
+                    for y in range(by, min(by + 4, height)):
+                        for x in range(bx, min(bx + 4, width)):
+                            order[n] = y * width + x
+                            n += 1
+    return order
+
+
+@inlined
+def _numbers(i: int, n: int) -> int:
+    """The numbers i to i + 15, but none above n - 1."""
+    number = lane_numbers() + np.int32(i)
+    kept: int = choose(number < np.int32(n), number, np.int32(n - 1))
+    return kept
+
+
+@inlined
+def _shoot(cams: Cameras, c: int, pixel: int, jx: Real, jy: Real, i: int, packets: Float32, hits: Hits) -> None:
+    """Write eye rays i to i + 15, through (jx, jy) within the boxes of pixels."""
+    x, y = corner_of(cams, pixel)
+    dx, dy, dz = eye_ray(cams, c, x + doubles(jx), y + doubles(jy))
+    o, at = cams.position, (i >> 4) * packets.shape[1] * LANES
+    put_lanes(packets, at + ORIGIN * LANES, o[c, 0])
+    put_lanes(packets, at + (ORIGIN + 1) * LANES, o[c, 1])
+    put_lanes(packets, at + (ORIGIN + 2) * LANES, o[c, 2])
+    put_lanes(packets, at + DIRECTION * LANES, dx)
+    put_lanes(packets, at + (DIRECTION + 1) * LANES, dy)
+    put_lanes(packets, at + (DIRECTION + 2) * LANES, dz)
+    put_lanes(packets, at + TFAR * LANES, np.float32(np.inf))
+    put_lanes(hits.pixel, i, pixel)
+
+
+@inlined
+def _shoot_samples(
+    cams: Cameras, c: int, seed: int, pixel: int, sample: int, i: int, packets: Float32, hits: Hits, halves: bool
+) -> None:
+    """Write the eye rays of 16 samples; the samples of a pixel are spread by the golden ratio sequence.
+
+    Where they are taken in two halves, even and odd ones are spread each by a sequence of its own.
+    """
+    key, number = stream(seed, c, pixel, PIXEL_SAMPLE), sample
+    random = word(key, PIXEL)
+    odd = (sample & np.int32(1)) == np.int32(1)
+    put_lanes(hits.half, i, choose(odd, np.uint8(1), np.uint8(0)))
+    if halves:
+        random, number = choose(odd, word(key, OTHER_HALF), random), integers(sample >> np.int32(1))
+    jx, jy = r2(random, number)
+    _shoot(cams, c, pixel, jx, jy, i, packets, hits)
+    put_lanes(hits.key, i, stream(seed, c, pixel, sample))
+
+
+@kernel
+def native_hits(
+    cams: Cameras,
+    c: int,
+    seed: int,
+    pixels: Int32,
+    per_pixel: int,
+    first_sample: int,
+    first: int,
+    n: int,
+    surfaces: Surfaces,
+    tracer: Tracer,
+    mirrors: bool,
+    packets: Float32,
+    hits: Hits,
+    halves: bool = False,
+) -> None:
+    """Find native hits first to first + n - 1 of eye c, `per_pixel` in each of `pixels`.
+
+    They are numbered by groups of 16 pixels, within a group by sample, then by pixel.
+
+    Args:
+        halves: the two halves of a pixel's samples are independent of each other.
+    """
+    # a frame may have more hits than an int32 counts; the quotients of such numbers are exact in float64
+    n_pixels, of_group = np.float64(pixels.shape[0]), np.float64(16 * per_pixel)
+    for i in range(0, n, LANES):
+        number = doubles(_numbers(i, n)) + np.float64(first)
+        group = floor(number / of_group)
+        rest, left = number - group * of_group, n_pixels - group * 16.0
+        members = choose(left < 16.0, left, 16.0)
+        sample = floor(rest / members)
+        pixel = gather(pixels, integers(group * 16.0 + rest - sample * members))
+        _shoot_samples(cams, c, seed, pixel, integers(sample) + np.int32(first_sample), i, packets, hits, halves)
+    intersect(tracer, packets, n, True, cams.near)
+    record_hits(surfaces, tracer, packets, n, mirrors, hits)
+
+
+@kernel
+def extra_hits(
+    cams: Cameras,
+    c: int,
+    seed: int,
+    pixels: Int32,
+    first_sample: int,
+    per_pixel: int,
+    first: int,
+    n: int,
+    surfaces: Surfaces,
+    tracer: Tracer,
+    packets: Float32,
+    hits: Hits,
+    halves: bool = False,
+) -> None:
+    """Find hits first to first + n - 1 of those that mirror pixels have beyond the others, `per_pixel` each."""
+    for i in range(0, n, LANES):
+        number = doubles(_numbers(i, n)) + np.float64(first)
+        at = floor(number / np.float64(per_pixel))
+        sample = integers(number - at * np.float64(per_pixel)) + np.int32(first_sample)
+        _shoot_samples(cams, c, seed, gather(pixels, integers(at)), sample, i, packets, hits, halves)
+    intersect(tracer, packets, n, True, cams.near)
+    record_hits(surfaces, tracer, packets, n, True, hits)
+
+
+@kernel
+def pilot_hits(
+    cams: Cameras,
+    c: int,
+    order: Int32,
+    first: int,
+    n: int,
+    surfaces: Surfaces,
+    tracer: Tracer,
+    packets: Float32,
+    hits: Hits,
+) -> None:
+    """Look through the centres of pixels order[first : first + n] for mirrors; of the hits only `specular` is known.
+
+    What they show decides how many samples a pixel gets; no sample's place depends on them, so that is unbiased.
+    """
+    for i in range(0, n, LANES):
+        _shoot(cams, c, gather(order, _numbers(i, n) + np.int32(first)), 0.5, 0.5, i, packets, hits)
+    intersect(tracer, packets, n, True, cams.near)
+    for i in range(0, n, LANES):
+        missed, triangle, u, v = met(tracer, packets, i)
+        red, green, blue = specular_at(surfaces, triangle, u, v)
+        put_triples(hits.specular, i, choose(missed, 0.0, red), choose(missed, 0.0, green), choose(missed, 0.0, blue))

@@ -1,0 +1,68 @@
+"""Signals that ask the program to end, as Ctrl-C does: one exception, whatever the program is doing."""
+
+import os
+import signal
+import threading
+from types import FrameType
+
+from .compiling import is_compiling
+from .screen import err, out, say
+
+PATIENCE = 1.0  # seconds that threads get to end by themselves after a signal
+# Callbacks from C and optional imports, in which every exception is caught.
+FORGETFUL = ("numba", "llvmlite", "importlib", "_frozen_importlib", "_frozen_importlib_external")
+
+
+class Stopped(BaseException):
+    """A signal asked the program to end, as Ctrl-C does."""
+
+    def __init__(self, signum: int) -> None:
+        super().__init__(signum)
+        # what shells expect of a program that a signal ended
+        self.exit_code = 128 + signum
+        self.word = "interrupted" if signum == signal.SIGINT else "terminated"
+
+
+def listen() -> None:
+    """Turn signals into `Stopped` from now on."""
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):  # Windows lacks the last
+            signal.signal(getattr(signal, name), stop)
+
+
+def forget() -> None:
+    """Raise no `Stopped` again for a signal that was heard."""
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_REAL, 0)
+
+
+def stop(signum: int, frame: FrameType | None) -> None:
+    """Turn a signal into an exception, so that everything is tidied up; a second signal ends the process at once."""
+    signal.signal(signum, signal.SIG_DFL)
+    if is_compiling():  # that cannot be stopped, and would be waited for
+        timer = threading.Timer(PATIENCE, _leave, [Stopped(signum)])
+        timer.daemon = True
+        timer.start()
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, lambda _, frame: _interrupt(signum, frame))
+    _interrupt(signum, frame)
+
+
+def _interrupt(signum: int, frame: FrameType | None) -> None:
+    """Raise `Stopped`, unless that would be forgotten now; then in a moment, and again should it be forgotten."""
+    busy = False
+    while frame is not None and not busy:
+        busy = frame.f_globals.get("__name__", "").partition(".")[0] in FORGETFUL
+        frame = frame.f_back
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_REAL, 0.02 if busy else 2 * PATIENCE)
+        if busy:
+            return
+    raise Stopped(signum)
+
+
+def _leave(stopped: Stopped) -> None:
+    """End the process whatever its threads are doing."""
+    out.show_cursor()
+    say(err, [stopped.word])
+    os._exit(stopped.exit_code)

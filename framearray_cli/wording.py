@@ -1,0 +1,100 @@
+"""What commands print of what they found."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from .screen import duration, size
+
+if TYPE_CHECKING:
+    from .check import Estimate
+    from .job import Job
+    from .prepare import Prepared
+    from .render import Summary
+    from .report import Report
+    from .terms.ambient import Ambient
+
+
+def estimate_lines(estimate: "Estimate") -> list[str]:
+    """What a job holds, and what it will take."""
+    prepared = estimate.prepared
+    n_c, n_l, job = prepared.n_cameras, prepared.n_lights, prepared.job
+    width, height = job.camera.resolution
+    return [
+        *scene_lines(prepared),
+        *(estimate.choice.lines() if estimate.choice else []),
+        *ambient_lines(estimate.ambient),
+        f"array: {n_c:,} cameras x {n_l:,} lights = {n_c * n_l:,} images of {width} x {height}",
+        f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_blocks(estimate.blocks)}",
+        f"disk: about {size(estimate.disk)} in {job.output.directory}, {size(estimate.free)} free",
+        f"time: about {duration(estimate.seconds)} on this machine",
+        *(f"warning: {warning}" for warning in estimate.warnings),
+    ]
+
+
+def _blocks(n: int) -> str:
+    return f"; the lights are rendered in {n} blocks, one after the other" if n > 1 else ""
+
+
+def scene_lines(prepared: "Prepared") -> list[str]:
+    """What a scene holds, and what was left out of it."""
+    from .scene import report_lines
+
+    return report_lines(prepared.scene.report, prepared.job.scene.file)
+
+
+def ambient_lines(ambient: "Ambient") -> list[str]:
+    """The ambient light, and how well it is known."""
+    mean = ambient.intensity.mean(axis=1)
+    error = ambient.standard_error.max()
+    known = f"standard error at most {error:.1%}, {ambient.paths:,} paths" if error > 0 else "fixed, or nothing arrives"
+    return [
+        f"ambient light: I_A {mean.min():.4g} to {mean.max():.4g} ({known})",
+        *(f"  note: {note}" for note in ambient.notes),
+    ]
+
+
+def summary_lines(summary: "Summary", told: Sequence[str], job: "Job") -> list[str]:
+    """What a render took.
+
+    Args:
+        told: notes that were printed before.
+    """
+    kinds = summary.rays_per_pixel_image
+    mirrors = sum(n for kind, n in kinds.items() if "mirror" in kind or kind == "pilot")
+    rays = sum(kinds.values()) - mirrors - kinds["ambient"]
+    rate = sum(summary.rays.values()) / summary.seconds / 1e6
+    beside = f" + {mirrors:.2f} for mirrors" if mirrors else ""
+    each = f"{1e3 * summary.seconds / summary.images:.1f} ms an image"
+    return [
+        f"{summary.images:,} images in {duration(summary.seconds)}: {each}, "
+        f"{summary.images / summary.seconds:.1f} images a second",
+        f"{rays:.2f} rays a pixel an image{beside}, {rate:.1f} Mrays/s, "
+        f"{summary.hits:.1f} hits a pixel, peak memory {size(summary.peak_memory)}",
+        *_error_lines(summary),
+        *(f"note: {note}" for note in summary.notes if note not in told),
+        f"images and manifest: {job.output.directory}",
+    ]
+
+
+def _error_lines(summary: "Summary") -> list[str]:
+    """How noisy the images are, where the job asks."""
+    found = summary.standard_error
+    if not found:
+        return []
+    where = f"camera {found['camera']}, light {found['light']}"
+    return [
+        f"standard error {found['rms']:.3g}, {found['relative']:.1%} of the mean radiance; "
+        f"the largest of an image {found['largest']:.3g} ({where})"
+    ]
+
+
+def report_lines(made: "Report") -> list[str]:
+    """What a report found: the job's own settings, and the cheapest ones for some errors."""
+    from .report import advice_lines
+
+    own = made.measured[0]
+    lines = [f"as the job says: {own.ms:.3g} ms an image before writing, RMSE {own.quality.rmse:.1%}"]
+    for one in made.advice:
+        found = f"{one.best.named.name}, {one.best.ms:.3g} ms an image" if one.best else "nothing that was tried"
+        lines += [f"for an RMSE of {one.error:.1%}: {found}", *(f"  {line}" for line in advice_lines(one.best, made))]
+    return [*lines, f"report: {made.folder / 'index.html'}"]
