@@ -70,6 +70,7 @@ class Workspace:
         self.test_rays = room_for_tests(BATCH, lights.n_lights)
         self.hits = [empty_hits(BATCH), empty_hits(BATCH)]
         self.walkers = [empty_walkers(BATCH), empty_walkers(BATCH)]
+        self.leaves = np.zeros((BATCH, 3), np.float32)  # whole packets, as all that kernels read of hits
         self.irradiance = np.empty((BATCH, lights.channels, lights.n_lights), np.float32)
         self.sums = np.empty((BATCH, 3, lights.n_lights), np.float32)
         self.rays = 0
@@ -84,9 +85,8 @@ class Workspace:
 
     def diffuse_direct(self, n: int, lights: LightArrays, tracer: Tracer) -> Float32:
         """Direct irradiance at the first n current hits, (n, channels, n_lights); 0 where no walk goes on diffusely."""
-        leaves = self.walkers[0].step[:n, None] == DIFFUSE
-        where = np.ascontiguousarray(np.broadcast_to(leaves, (n, 3)), np.float32)
-        hits = self.hits[0]._replace(reflectivity=where)
+        self.leaves[:n] = self.walkers[0].step[:n, None] == DIFFUSE
+        hits = self.hits[0]._replace(reflectivity=self.leaves)
         self.rays += direct(hits, n, lights, tracer, self.test_rays, self.irradiance)
         return self.irradiance[:n]
 
