@@ -20,7 +20,7 @@ from counting import (
     visibility_rays,
 )
 from rooms import ON_WALLS, ROOMS, TURN
-from staging import staged
+from staging import Stage, staged
 
 from framearray_cli.surface import OFFSET_ULPS, ULP
 
@@ -38,6 +38,14 @@ def allowed(name: str, rays: int) -> int:
 def assert_right(name: str, leaks: Count, held_up: Count) -> None:
     assert leaks.wrong == 0
     assert held_up.wrong <= allowed(name, held_up.rays)
+
+
+def assert_all_right(name: str, stage: Stage) -> None:
+    """Rays of every kind between the walls of a room."""
+    assert_right(name, *shadow_rays(stage))
+    assert_right(name, *visibility_rays(stage))
+    rays = hemisphere_rays(stage)
+    assert rays.wrong <= allowed(name, rays.rays)
 
 
 @pytest.mark.parametrize("name", ROOMS)
@@ -69,20 +77,14 @@ def test_rays_of_obscurances_meet_the_walls_of_their_room(name: str) -> None:
 @pytest.mark.parametrize("name", ROOMS)
 def test_whatever_the_unit_of_length(name: str, size: float) -> None:
     with staged(name, size=size, n=POINTS.get(name, 8192)) as stage:
-        assert_right(name, *shadow_rays(stage))
-        assert_right(name, *visibility_rays(stage))
-        rays = hemisphere_rays(stage)
-        assert rays.wrong <= allowed(name, rays.rays)
+        assert_all_right(name, stage)
 
 
 @pytest.mark.parametrize("name", ROOMS)
 def test_ten_million_away(name: str) -> None:
     """Moved by 1e7 in float64: corners keep nine digits after the point, and the scene is centred before float32."""
     with staged(name, at=(1e7, -1e7, 1e7), n=POINTS.get(name, 8192)) as stage:
-        assert_right(name, *shadow_rays(stage))
-        assert_right(name, *visibility_rays(stage))
-        rays = hemisphere_rays(stage)
-        assert rays.wrong <= allowed(name, rays.rays)
+        assert_all_right(name, stage)
 
 
 @pytest.mark.parametrize("name", ON_WALLS)
