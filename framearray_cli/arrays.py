@@ -46,5 +46,16 @@ def with_room(shape: tuple[int, ...], dtype: Any, fill: float | None = None) -> 
     block = np.empty(size + 16 + LINE // item, dtype)
     if fill is not None:
         block[:] = fill
-    start = -block.ctypes.data % LINE // item
-    return block[start : start + size].reshape(shape)
+    return _at_line(block, size).reshape(shape)
+
+
+def reshaped(array: Any, shape: tuple[int, ...]) -> Any:
+    """The memory of an array made by `with_room` as one of another shape, or None where that is larger."""
+    size, block = math.prod(shape), array.base
+    room = LINE // block.itemsize
+    return _at_line(block, size).reshape(shape) if size + 16 + room <= block.size else None
+
+
+def _at_line(block: Any, size: int) -> Any:
+    start = -block.ctypes.data % LINE // block.itemsize
+    return block[start : start + size]

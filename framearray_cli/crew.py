@@ -1,6 +1,6 @@
 """The threads that work on a frame, the arrays each of them keeps, and memory that goes from frame to frame."""
 
-from collections import Counter, defaultdict
+from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from queue import SimpleQueue
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import with_room
+from .arrays import reshaped, with_room
 from .hits import empty_hits
 from .rays import room_for_hits, room_for_tests
 from .terms.direct_steps import room_for_steps
@@ -28,11 +28,11 @@ class Shelf:
         self._kept: dict[str, list[Any]] = {}
 
     def take(self, name: str, shape: tuple[int, ...], dtype: Any) -> Any:
-        """An array of a shape, contents arbitrary; kept ones of that name and another shape are let go."""
+        """An array of a shape, contents arbitrary; kept ones of that name that are too small are let go."""
         kept = self._kept.get(name, [])
         while kept:
-            array = kept.pop()
-            if array.shape == shape:
+            array = reshaped(kept.pop(), shape)
+            if array is not None:
                 return array
         return with_room(shape, dtype)
 
@@ -82,22 +82,32 @@ class Crew:
             self._scratch.put(scratch)
 
     def run(self, task: Callable[[Any, Scratch], Any], items: Iterable[Any]) -> list[Any]:
-        """`task(item, scratch)` for every item, in any order on all threads; results in the order of the items."""
+        """`task(item, scratch)` for every item, in any order on all threads; results in the order of the items.
 
-        def with_scratch(item: Any) -> Any:
+        Each thread takes one item after another by itself: a thread that is woken for each costs more than small tasks.
+        """
+        waiting = deque(enumerate(items))
+        results: list[Any] = [None] * len(waiting)
+
+        def take_turns() -> None:
             scratch = self._scratch.get()
             try:
-                return task(item, scratch)
+                while waiting:
+                    try:
+                        i, item = waiting.popleft()
+                    except IndexError:  # another thread took the last one
+                        return
+                    results[i] = task(item, scratch)
             finally:
                 self._scratch.put(scratch)
 
-        futures: list[Future[Any]] = [self._pool.submit(with_scratch, item) for item in items]
+        futures: list[Future[None]] = [self._pool.submit(take_turns) for _ in range(min(self.threads, len(results)))]
         try:
-            return [future.result() for future in futures]
-        except BaseException:
             for future in futures:
-                future.cancel()
-            raise
+                future.result()
+        finally:
+            waiting.clear()  # after an error, or Ctrl-C: what has begun ends, nothing else begins
+        return results
 
     def batches(self, n: int) -> list[tuple[int, int]]:
         """Cut n hits into tasks, (first, number) each; the last quarter in small ones, so that threads end together."""

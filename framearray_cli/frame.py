@@ -5,6 +5,7 @@ depends on which thread takes which batch.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from time import perf_counter
 from typing import Any
 
@@ -17,10 +18,10 @@ from .eyehits import extra_hits, native_hits
 from .hits import ESCAPED, SURFACE, Hits
 from .mirrors import extra_mirror_hits, mirror_paths
 from .plan import Pass, passes
-from .reuse import balance_weights, outer_hits
+from .reuse import balance_weights, outer_hits, sort_by_pixel
 from .sampling import HOLE_SAMPLE
 from .shading import estimate_terms
-from .work import BY_SAMPLE, Placed, Records, Work, empty_records, joined, placed_by_pixel
+from .work import BY_SAMPLE, Placed, Records, Work, empty_records
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -35,7 +36,7 @@ class Frame:
         mirror_hits: (2, n_pixels) native hits of each pixel whose mirrors were followed, of even and of odd sample
             numbers; (2, 0) without mirrors.
         normal, depth: (n, 3) and (n,) of native hits, for the layers; (0, 3) and (0,) without.
-        kept: the large arrays of the above, by name, for the shelf.
+        kept: the large arrays of the above but those of mirrors, by name, for the shelf.
     """
 
     c: int
@@ -49,7 +50,14 @@ class Frame:
     depth: Float32
     kept: dict[str, Any]
 
-    def put_back(self, shelf: "Shelf") -> None:
+    def forget_mirrors(self, shelf: Shelf) -> None:
+        """Give the memory of what the frame's own mirrors show to the next one, once the frame is composed."""
+        if self.mirrored:
+            for name, array in self.mirrored.arrays.items():
+                shelf.give(f"mirrored {name}", array)
+        self.mirrored = self.mirror_places = None
+
+    def put_back(self, shelf: Shelf) -> None:
         """Give the frame's memory to the next one; the frame is of no use afterwards."""
         for name, array in self.kept.items():
             shelf.give(name, array)
@@ -81,25 +89,20 @@ def find_frame(work: Work, c: int, crew: Crew) -> Frame:
 
     tasks = [(part, first, m) for part in parts for first, m in crew.batches(part.n)]
     mirrored = [path for paths in crew.run(batch, tasks) for path in paths]
-    mirror_hits = np.empty((2, 0), np.int32)
+    mirror_hits = take("mirror_hits", (2, work.n_pixels if work.depth else 0), np.int32)
     if work.depth:
-        extra, mirror_hits = extra_mirror_hits(work, c, parts, crew)
-        mirrored += extra
-
-    def sort(row: int, _scratch: Scratch) -> Placed:
-        return placed_by_pixel(pixel[row], work.n_pixels, order[row])
-
-    places = dict(zip(frames, crew.run(sort, range(len(frames))), strict=True))
+        mirrored += extra_mirror_hits(work, c, parts, crew, mirror_hits)
+    places = dict(zip(frames, _sorted(pixel, work.n_pixels, order, crew), strict=True))
     crew.shelf.give("pixel", pixel)
-    all_mirrored = joined(work, mirrored) if work.depth else None
+    all_mirrored = _joined(work, mirrored, crew) if work.depth else None
     return Frame(
         c=c,
         records=records,
         places=places,
         weights={j: weight[row] for row, j in enumerate(frames)},
-        kept={**records.arrays, "order": order, "weight": weight},
+        kept={**records.arrays, "order": order, "weight": weight, "mirror_hits": mirror_hits},
         mirrored=all_mirrored[1] if all_mirrored else None,
-        mirror_places=placed_by_pixel(all_mirrored[0], work.n_pixels) if all_mirrored else None,
+        mirror_places=_placed(all_mirrored[0], work.n_pixels, crew) if all_mirrored else None,
         mirror_hits=mirror_hits,
         normal=normal,
         depth=depth,
@@ -122,11 +125,51 @@ def fill_holes(work: Work, c: int, pixels: Int32, crew: Crew) -> list[tuple[Plac
         return mirror_paths(work, scratch.hits, m, scratch) if work.depth else []
 
     mirrored = [path for paths in crew.run(batch, range(0, n, crew.batch)) for path in paths]
-    found = [(placed_by_pixel(pixels, work.n_pixels), records)]
+    found = [(_placed(pixels, work.n_pixels, crew), records)]
     if mirrored:
-        where, reflected = joined(work, mirrored)
-        found.append((placed_by_pixel(where, work.n_pixels), reflected))
+        where, reflected = _joined(work, mirrored, crew)
+        found.append((_placed(where, work.n_pixels, crew), reflected))
     return found
+
+
+def _joined(work: Work, parts: list[tuple[Int32, Records]], crew: Crew) -> tuple[Int32, Records]:
+    """One list of reflected hits from those of all batches, in their order."""
+    ends = np.cumsum([0, *(len(pixels) for pixels, _ in parts)])
+    n = int(ends[-1])
+
+    def take(name: str, *shape_and_type: Any) -> Any:
+        return crew.shelf.take(f"mirrored {name}", *shape_and_type)
+
+    pixel, whole = np.empty(n, np.int32), empty_records(work, n, take)
+
+    def copy(first: int, _scratch: Scratch) -> None:
+        for part in range(first, len(parts), crew.threads):
+            span = slice(ends[part], ends[part + 1])
+            pixel[span] = parts[part][0]
+            for name, array in parts[part][1].arrays.items():
+                whole.arrays[name][span] = array
+
+    crew.run(copy, range(crew.threads))
+    return pixel, whole
+
+
+def _placed(pixel: Int32, n_pixels: int, crew: Crew) -> Placed:
+    """Sort hits by the pixel that they fall into."""
+    return _sorted(pixel[None], n_pixels, np.empty((1, len(pixel)), np.int32), crew)[0]
+
+
+def _sorted(pixel: Int32, n_pixels: int, order: Int32, crew: Crew) -> list[Placed]:
+    """Hits sorted by the pixels of every frame, (n_frames, n); a few frames are cut into ranges, one a thread."""
+    places = [Placed(start=np.empty(n_pixels + 1, np.int32), order=row) for row in order]
+    parts = -(-crew.threads // len(places))
+    cuts = [n_pixels * part // parts for part in range(parts + 1)]
+
+    def sort(task: tuple[int, int, int], _scratch: Scratch) -> None:
+        row, first, last = task
+        sort_by_pixel(pixel[row], first, last, places[row].start, places[row].order)
+
+    crew.run(sort, [(row, *span) for row in range(len(places)) for span in pairwise(cuts)])
+    return places
 
 
 def _native(work: Work, c: int, part: Pass, first: int, n: int, scratch: Scratch) -> None:

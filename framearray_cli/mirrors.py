@@ -37,16 +37,25 @@ def mirror_paths(work: Work, hits: Hits, n: int, scratch: Scratch) -> list[tuple
 
 
 def extra_mirror_hits(
-    work: Work, c: int, parts: tuple[Pass, ...], crew: Crew
-) -> tuple[list[tuple[Int32, Records]], Int32]:
+    work: Work, c: int, parts: tuple[Pass, ...], crew: Crew, own: Int32
+) -> list[tuple[Int32, Records]]:
     """Follow the native hits that only mirror pixels have.
 
-    Returns:
-        reflected hits; (2, n_pixels) native hits of each pixel, of even and of odd sample numbers.
+    Args:
+        own: (2, n_pixels) overwritten: native hits of each pixel, of even and of odd sample numbers.
     """
     most = sum(part.per_pixel for part in parts)
     least = int(work.per_pixel[c])
     extra = max(work.mirror_hits - least, 0)
+    own[:] = 0
+    for part in parts:
+        counts = halves_of(part.first_sample, part.per_pixel)[:, None]
+        if len(part.pixels) == work.n_pixels:
+            own += counts
+        else:
+            own[:, part.pixels] += counts
+    if not extra:
+        return []
     flags = np.zeros(work.n_pixels, np.uint8)
 
     def look(first: int, scratch: Scratch) -> None:
@@ -65,11 +74,8 @@ def extra_mirror_hits(
         scratch.rays["mirror"] += n
         return mirror_paths(work, scratch.hits, n, scratch)
 
-    if extra:
-        crew.run(look, range(0, work.n_pixels, crew.batch))
+    crew.run(look, range(0, work.n_pixels, crew.batch))
     pixels = work.order[flags[work.order] > 0]
-    found = crew.run(follow, range(0, len(pixels) * extra, crew.batch)) if extra else []
-    own = halves_of(most, extra)[:, None] * flags.astype(np.int32)
-    for part in parts:
-        own[:, part.pixels] += halves_of(part.first_sample, part.per_pixel)[:, None]
-    return [path for batch in found for path in batch], own
+    found = crew.run(follow, range(0, len(pixels) * extra, crew.batch))
+    own += halves_of(most, extra)[:, None] * flags
+    return [path for batch in found for path in batch]

@@ -182,25 +182,39 @@ def balance_weights(
 
 
 @kernel
-def sort_by_pixel(pixel: Int32, n_pixels: int, start: Int32, order: Int32) -> None:
-    """Counting sort of hits by the pixel they fall into; hits of one pixel stay in their order.
+def sort_by_pixel(pixel: Int32, first: int, last: int, start: Int32, order: Int32) -> None:
+    """Counting sort of the hits that fall into pixels first to last - 1; hits of one pixel stay in their order.
+
+    Ranges of pixels may be sorted at the same time: each writes its own part of `start` and `order`.
 
     Args:
         pixel: (n,) a pixel or OUTSIDE.
-        start: (n_pixels + 1,) overwritten: hits order[start[p] : start[p + 1]] fall into pixel p.
-        order: (n,) overwritten up to start[n_pixels].
+        start: (n_pixels + 1,) written from first to last - 1, and at n_pixels if that is `last`: hits
+            order[start[p] : start[p + 1]] fall into pixel p.
+        order: (n,) written from start[first] to start[last] - 1.
     """
-    for p in range(n_pixels + 1):
+    for p in range(first, last):
         start[p] = 0
+    before = 0
     for i in range(pixel.shape[0]):
-        if pixel[i] != OUTSIDE:
-            start[pixel[i] + 1] += 1
-    for p in range(n_pixels):
-        start[p + 1] += start[p]
+        p = pixel[i]
+        if first <= p < last:
+            start[p] += 1
+        elif OUTSIDE < p < first:
+            before += 1
+    end = before
+    for p in range(first, last):
+        count = start[p]
+        start[p] = end
+        end += count
     for i in range(pixel.shape[0]):
-        if pixel[i] != OUTSIDE:
-            order[start[pixel[i]]] = i
-            start[pixel[i]] += 1
-    for p in range(n_pixels, 0, -1):  # each start has moved to its pixel's end, which is the next one's start
+        p = pixel[i]
+        if first <= p < last:
+            order[start[p]] = i
+            start[p] += 1
+    for p in range(last - 1, first, -1):  # each start has moved to its pixel's end, which is the next one's start
         start[p] = start[p - 1]
-    start[0] = 0
+    if first < last:
+        start[first] = before
+    if last == start.shape[0] - 1:
+        start[last] = end

@@ -99,6 +99,7 @@ class Window:
         last = max(self._frames)
         while self._next < self._work.n_frames and self._work.frames_around(self._next, self._work.n_r)[-1] <= last:
             yield self._next
+            self._frames[self._next].forget_mirrors(self._crew.shelf)
             passed = self._frames.pop(self._next - self._work.n_r, None)
             if passed is not None:
                 passed.put_back(self._crew.shelf)
@@ -237,10 +238,11 @@ class Window:
 
     def _mirror_scale(self, j: int, holes: list[tuple[Placed, Records]]) -> Float32:
         """One over the native hits of each pixel of frame j, (n_pixels,); those that fill holes count."""
-        own: Int32 = self._frames[j].mirror_hits.sum(axis=0)
+        even, odd = self._frames[j].mirror_hits
+        own: Int32 = even + odd
         for place, _ in holes[:1] if len(own) else []:
-            own = own + np.diff(place.start)
-        return (1.0 / np.maximum(own, 1)).astype(np.float32)
+            own += np.diff(place.start)
+        return np.reciprocal(np.maximum(own, 1), dtype=np.float32)
 
 
 @kernel

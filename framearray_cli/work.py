@@ -13,7 +13,6 @@ from .eyehits import pixel_order
 from .kernel import inlined
 from .lanes import LANES
 from .lights import LightArrays, some_lights
-from .reuse import sort_by_pixel
 from .surface import Surfaces
 from .terms.obscurance import ObscuranceSettings
 
@@ -157,23 +156,3 @@ def empty_records(work: Work, n: int, take: Callable[[str, tuple[int, ...], Any]
         row=take("row", (n, LANES), np.float32),
         irradiance=take("irradiance", (n, work.lights.channels, len(work.kept)), np.float32),
     )
-
-
-def joined(work: Work, parts: list[tuple[Int32, Records]]) -> tuple[Int32, Records]:
-    """One list of reflected hits from those of all batches, in their order."""
-    if not parts:
-        return np.empty(0, np.int32), empty_records(work, 0)
-    pixels, records = zip(*parts, strict=True)
-    whole = empty_records(work, sum(len(r.row) for r in records))
-    for name, array in whole.arrays.items():
-        np.concatenate([r.arrays[name] for r in records], out=array)
-    return np.concatenate(pixels), whole
-
-
-def placed_by_pixel(pixel: Int32, n_pixels: int, order: Int32 | None = None) -> Placed:
-    """Sort hits by the pixel that they fall into; `order` is memory to use, (n,)."""
-    if order is None:
-        order = np.empty(len(pixel), np.int32)
-    placed = Placed(start=np.empty(n_pixels + 1, np.int32), order=order)
-    sort_by_pixel(pixel, n_pixels, placed.start, placed.order)
-    return placed

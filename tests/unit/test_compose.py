@@ -49,7 +49,7 @@ class Case:
         rng = np.random.default_rng(seed)
         self.pixel = rng.integers(-1, N_PIXELS, n).astype(np.int32)
         self.start, self.order = np.empty(N_PIXELS + 1, np.int32), np.empty(n, np.int32)
-        sort_by_pixel(self.pixel, N_PIXELS, self.start, self.order)
+        sort_by_pixel(self.pixel, 0, N_PIXELS, self.start, self.order)
 
         def values(*shape: int) -> Any:
             return rng.random(shape).astype(np.float32)
@@ -251,7 +251,7 @@ def test_a_scale_a_pixel_multiplies_all_its_hits() -> None:
 def test_a_pixel_without_hits_is_black() -> None:
     case = Case(1)
     case.pixel[case.pixel == 11] = -1
-    sort_by_pixel(case.pixel, N_PIXELS, case.start, case.order)
+    sort_by_pixel(case.pixel, 0, N_PIXELS, case.start, case.order)
     images, bad = composed(case)
     assert not images[:, 11].any() and images[:, 12].all() and bad[0][0] == 0
 

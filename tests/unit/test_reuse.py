@@ -1,5 +1,6 @@
 """Camera reuse: which pixels of other eyes see a hit, how densely, and how it is weighed there."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -153,7 +154,8 @@ def test_sort_by_pixel_is_a_stable_sort(n: int) -> None:
     pixel = np.random.default_rng(n).integers(-1, n_pixels, n).astype(np.int32)
     assert OUTSIDE == -1
     start, order = np.empty(n_pixels + 1, np.int32), np.full(n, -7, np.int32)
-    sort_by_pixel(pixel, n_pixels, start, order)
+    for first, last in pairwise([0, 0, 40, 41, n_pixels]):  # in any ranges
+        sort_by_pixel(pixel, first, last, start, order)
     expected = np.argsort(pixel, kind="stable")[(pixel == OUTSIDE).sum() :]
     np.testing.assert_array_equal(order[: start[-1]], expected)
     counts = np.bincount(pixel[pixel >= 0], minlength=n_pixels)

@@ -1,0 +1,76 @@
+"""The threads of a frame: every task once, results in order, errors at once; memory that is used again."""
+
+from collections.abc import Iterator
+from threading import Barrier
+
+import numpy as np
+import pytest
+import tiny
+
+from framearray_cli.arrays import LINE
+from framearray_cli.crew import Crew, Shelf
+
+
+@pytest.fixture
+def crew() -> Iterator[Crew]:
+    with tiny.planned(tiny.prepared(tiny.job())) as (work, _), tiny.crew_of(work, 3) as found:
+        yield found
+
+
+def test_every_item_is_done_once_and_results_keep_their_order(crew: Crew) -> None:
+    done: list[int] = []
+
+    def task(item: int, _scratch: object) -> int:
+        done.append(item)
+        return item * item
+
+    assert crew.run(task, range(1000)) == [item * item for item in range(1000)]
+    assert sorted(done) == list(range(1000))
+    assert crew.run(task, []) == []
+
+
+def test_all_threads_work_each_with_arrays_of_its_own(crew: Crew) -> None:
+    together = Barrier(3, timeout=60)  # breaks where three tasks do not run at a time
+
+    def task(_item: int, scratch: object) -> int:
+        together.wait()
+        return id(scratch)
+
+    assert len(set(crew.run(task, range(3)))) == 3
+
+
+def test_an_error_reaches_the_caller_and_ends_the_work(crew: Crew) -> None:
+    done: list[int] = []
+
+    def task(item: int, _scratch: object) -> None:
+        if item == 5:
+            raise ValueError("item 5")
+        done.append(item)
+
+    with pytest.raises(ValueError, match="item 5"):
+        crew.run(task, range(100_000))
+    crew.close()
+    assert len(done) < 99_999
+
+
+def test_the_crew_works_on_after_an_error(crew: Crew) -> None:
+    def task(item: int, _scratch: object) -> int:
+        return 1 // item
+
+    with pytest.raises(ZeroDivisionError):
+        crew.run(task, [0])
+    assert crew.run(task, [1, 1, 1, 1]) == [1, 1, 1, 1]
+
+
+def test_memory_on_the_shelf_serves_what_is_not_larger() -> None:
+    shelf = Shelf()
+    array = shelf.take("row", (50, 16), np.float32)
+    block = array.base
+    shelf.give("row", array)
+    smaller = shelf.take("row", (3, 7), np.float32)
+    assert smaller.base is block and smaller.shape == (3, 7) and smaller.ctypes.data % LINE == 0
+    shelf.give("row", smaller)
+    again = shelf.take("row", (50, 16), np.float32)
+    assert again.base is block and again.ctypes.data == array.ctypes.data
+    shelf.give("row", again)
+    assert shelf.take("row", (51, 16), np.float32).base is not block
