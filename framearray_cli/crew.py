@@ -98,6 +98,9 @@ class Crew:
                     except IndexError:  # another thread took the last one
                         return
                     results[i] = task(item, scratch)
+            except BaseException:
+                waiting.clear()  # what others have begun ends, nothing else begins
+                raise
             finally:
                 self._scratch.put(scratch)
 
@@ -106,7 +109,7 @@ class Crew:
             for future in futures:
                 future.result()
         finally:
-            waiting.clear()  # after an error, or Ctrl-C: what has begun ends, nothing else begins
+            waiting.clear()  # after Ctrl-C, too
         return results
 
     def batches(self, n: int) -> list[tuple[int, int]]:
