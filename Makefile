@@ -6,7 +6,7 @@ JOB := jobs/kitchen-small.toml
 OUT := out/kitchen-small
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-all smoke format check docs bench bench-scaling bench-bias bench-ambient clean
+.PHONY: help install render test test-all smoke format check docs bench bench-scaling bench-bias bench-ambient bench-report clean
 
 help: ## Show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -23,7 +23,7 @@ $(VENV)/installed-dev: $(VENV)/installed
 	@touch $@
 
 $(VENV)/installed-bench: $(VENV)/installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[movie,bench]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[movie,bench,report]'
 	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers,denoise]'
 	@touch $@
 
@@ -67,6 +67,9 @@ bench-bias: $(VENV)/installed-bench ## Measure what reuse is off by with both ki
 
 bench-ambient: $(VENV)/installed-bench ## Measure the ambient estimate against path tracing, and write docs/ambient.md
 	PYTHONPATH=tests $(BIN)/python -m bench ambient $(BENCH)
+
+bench-report: $(VENV)/installed-bench ## Measure speed against error of the three jobs, and write docs/report-*.md
+	PYTHONPATH=tests $(BIN)/python -m bench report $(BENCH)
 
 clean: ## Remove what was built and rendered
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache

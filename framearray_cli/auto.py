@@ -12,7 +12,8 @@ import numpy as np
 from .acceptance import probe
 from .embree import EmbreeScene
 from .expected import Model, Reuse, worth
-from .job import DEFAULT_HITS, DEFAULT_N_R, Job
+from .job import Job
+from .jobmethod import DEFAULT_HITS, DEFAULT_N_R
 from .jobvalues import MOST_HITS, SHARES
 from .memory import light_blocks, require_memory
 from .prepare import Prepared
@@ -123,7 +124,9 @@ def require_least_memory(prepared: Prepared) -> None:
         JobError: it does not.
     """
     n_r, hits = prepared.job.reuse.n_r, prepared.job.samples.hits
-    least = Reuse(n_r=0 if n_r == "auto" else n_r, hits=HITS[0] if hits == "auto" else hits)
+    if hits == "auto" or prepared.job.samples.error is not None:
+        hits = HITS[0]
+    least = Reuse(n_r=0 if n_r == "auto" else n_r, hits=hits)
     require_memory(applied(prepared, least))
 
 

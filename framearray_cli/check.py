@@ -25,6 +25,7 @@ from .memory import (
 )
 from .outfolder import free_space, in_the_way, is_same, read_array
 from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
+from .target import Target, aimed
 from .terms.ambient import Ambient
 from .window import Window
 from .work import Work
@@ -47,12 +48,14 @@ class Estimate:
         disk: bytes of all images and layers; `free`: bytes free where they go.
         seconds: from start to end, writing included, with kernels that were compiled before.
         choice: of what the job leaves open; None where it says all.
+        target: what the error takes that the job wants; None where it wants none.
         blocks: of light positions, rendered one after the other because of the memory limit.
         warnings: what would go wrong.
     """
 
     prepared: Prepared
     choice: Choice | None
+    target: Target | None
     ambient: Ambient
     memory: int
     available: int
@@ -95,15 +98,16 @@ def check(job: Job) -> Estimate:
             prepared, choice = settled(prepared, embree)
             identity = job_fingerprint(prepared)
             work, ambient = plan_work(prepared, embree)
+            work, target = aimed(prepared, work, ambient)
             before_frames = time.perf_counter() - started - clock.seconds
             pixels = _probe_pixels(work)
             first, second = (_probe(prepared, work, ambient, int(p)) for p in (FIRST_SHARE * pixels, pixels))
             mirrors = mirror_share(work)
-            blocks = light_blocks(prepared, mirrors)
+            blocks = light_blocks(prepared, mirrors, per_pixel=work.per_pixel)
             resident, available = resident_memory(), free_memory()
     scale = work.n_pixels / second.pixels
     largest = max(len(block) for block in blocks)
-    more = max(window_memory(prepared, largest, mirrors), ambient_memory(prepared))
+    more = max(window_memory(prepared, largest, mirrors, work.per_pixel), ambient_memory(prepared))
     disk = int(_frame_bytes(first, second, work.n_pixels) * prepared.n_cameras)
     free = free_space(job.output.directory)
     hits = float(work.per_pixel.sum()) * work.n_pixels
@@ -111,6 +115,7 @@ def check(job: Job) -> Estimate:
     return Estimate(
         prepared=prepared,
         choice=choice,
+        target=target,
         ambient=ambient,
         memory=resident + more,
         available=resident + available,
@@ -172,6 +177,7 @@ def _small(work: Work, pixels: int) -> Work:
             height=height,
         ),
         per_pixel=work.per_pixel[span],
+        allotment=None,  # of another resolution; `per_pixel` has its means
     )
 
 

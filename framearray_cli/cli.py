@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .job import Job
     from .prepare import Prepared
     from .report.case import Case
+    from .target import Target
     from .terms.ambient import Ambient
 
 OUT_OF_MEMORY = 2  # the job asks for more than the machine has
@@ -98,6 +99,9 @@ def render(
                 screen.say(ambient_lines(ambient))
                 self.told = ambient.notes
                 screen.count("rendering", self.total, "image")
+
+            def aimed(self, target: "Target") -> None:
+                screen.say(target.lines())
 
             def written(self, images: int) -> None:
                 screen.advance(images)

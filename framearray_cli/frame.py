@@ -17,8 +17,8 @@ from .crew import Crew, Scratch, Shelf
 from .eyehits import extra_hits, native_hits
 from .hits import ESCAPED, SURFACE, Hits
 from .mirrors import extra_mirror_hits, mirror_paths
-from .plan import Pass, passes
-from .reuse import balance_weights, outer_hits, sort_by_pixel
+from .plan import Pass
+from .reuse import balance_weights, expect_hits, of_one_hit, outer_hits, sort_by_pixel
 from .sampling import HOLE_SAMPLE
 from .shading import estimate_terms
 from .work import BY_SAMPLE, Placed, Records, Work, empty_records
@@ -65,7 +65,7 @@ class Frame:
 
 def find_frame(work: Work, c: int, crew: Crew) -> Frame:
     """Find the native hits of eye c, estimate their terms, and place them in the frames that see them."""
-    parts = passes(work.order, work.cams.width, c, float(work.per_pixel[c]))
+    parts = work.passes(c)
     n = sum(part.n for part in parts)
     frames = work.frames_around(c, work.n_r)
     take = crew.shelf.take
@@ -205,5 +205,12 @@ def _place(work: Work, c: int, n: int, scratch: Scratch, frames: range, pixel: I
     first = frames.start - eyes.start
     pixel[:] = seen[first : first + len(frames), :n]
     if work.balance:
-        balance_weights(work.per_pixel, work.n_r, eyes.start, frames.start, n, seen, density, weight)
+        per_pixel = work.per_pixel
+        if work.allotment is not None:
+            of_pixel, hits = work.allotment.blocks.of_pixel, work.allotment.hits
+            expect_hits(hits, of_pixel, eyes.start, n, seen, density)
+            per_pixel = np.ones_like(per_pixel)
+        balance_weights(per_pixel, work.n_r, eyes.start, frames.start, n, seen, density, weight)
+        if work.allotment is not None:
+            of_one_hit(hits, of_pixel, frames.start, n, pixel, weight)
     scratch.seconds["visibility"] += perf_counter() - started

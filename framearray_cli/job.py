@@ -12,16 +12,24 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
 from .jobkeys import CameraTable, LightTable
+from .jobmethod import (
+    DEFAULT_HITS,
+    DEFAULT_N_R,
+    AmbientTable,
+    DenoiseTable,
+    ObscuranceTable,
+    ReuseTable,
+    SamplesTable,
+    SpecularTable,
+)
 from .jobvalues import (
     MOST_HITS,
     Bytes,
     Emission,
     FileName,
-    HitCount,
     Reflectivity,
     Table,
     Triple,
-    Window,
     absolute,
     computed,
     fail,
@@ -30,7 +38,6 @@ from .jobvalues import (
 )
 
 Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; every other format is taken as y up
-DEFAULT_N_R, DEFAULT_HITS = 3, 2  # those of [FA]; what is chosen for "auto" is to be as exact
 NAME = "[A-Za-z0-9_][A-Za-z0-9._-]{0,99}"  # what can start a file name on every system
 
 
@@ -82,145 +89,6 @@ class SceneTable(Table):
         if "up" not in self.model_fields_set:
             fill(self, "up", "z" if self.file.suffix.lower() in Z_UP_FORMATS else "y")
         return self
-
-
-class SamplesTable(Table):
-    """How many samples a picture is made of."""
-
-    hits: HitCount = Field(
-        default=DEFAULT_HITS,
-        description="Native hits of a pixel in a frame. With reuse a pixel averages up to (2 n_r + 1) times as many. "
-        "0.5: one in every second pixel, in the others the next frame; likewise a third, down to an eighth. "
-        '"auto": chosen from the camera path, to take the least time for the error that n_r = 3 and hits = 2 have on '
-        "an ordinary walk.",
-    )
-    obscurance: int = Field(default=5, ge=1, le=65535, description="Obscurance rays of a hit.")
-    shadow_step: int = Field(
-        default=1,
-        ge=1,
-        le=1024,
-        description="Test shadows at every so many-th light position of a hit, and between two where they differ. "
-        "1: at every position. What hides a light between two tests alone is overlooked.",
-    )
-    shadow_unbiased: bool = Field(
-        default=False,
-        description="With `shadow_step`: check one random position of every interval that was taken for granted, and "
-        "count a disagreement for all of them. The mean is then right; single hits are noisier, and dark pixels may "
-        "come out below 0.",
-    )
-
-    halves: bool = Field(
-        default=False,
-        description="Sample every pixel in two independent halves. What they differ by gives each pixel's standard "
-        "error, which EXR images then have as channels `error` and `difference`.",
-    )
-
-
-class ReuseTable(Table):
-    """How far the samples of one eye serve its neighbours."""
-
-    n_r: Window = Field(
-        default=DEFAULT_N_R,
-        description="Frames before and frames after that share their hits, N_r. 0: no reuse. "
-        '"auto": chosen from the camera path, likewise; where `hits` is given, for the error that n_r = 3 has with it.',
-    )
-    weights: Literal["average", "balance"] = Field(
-        default="balance",
-        description='"average": all hits of a pixel count the same. "balance": each counts by how densely its eye '
-        "sees the place, which removes the error at silhouettes and texture edges and costs more rays.",
-    )
-
-
-class ObscuranceTable(Table):
-    """Indirect light: how far surfaces see each other."""
-
-    range: float = Field(
-        gt=0,
-        le=1e12,
-        description="Distance d_max beyond which a surface no longer obscures another, in scene units. "
-        "About half the height of a room is a good start.",
-    )
-
-    @field_validator("range", mode="before")
-    @classmethod
-    def _compares(cls, value: object) -> object:
-        if isinstance(value, int | float) and not isinstance(value, bool) and value == 0:
-            fail([((), f"expected a number above 0, got {shown(value)}: nothing is within it")])
-        if isinstance(value, float) and not math.isfinite(value):
-            fail([((), f"expected a finite number above 0, got {shown(value)}: distances are measured against it")])
-        return value
-
-    falloff: Literal["sqrt", "linear", "cbrt", "exponential", "constant"] = Field(
-        default="sqrt",
-        description="How the openness rho rises from 0 at distance 0 to 1 at `range`. "
-        '"constant" is 0 below `range`: plain ambient occlusion.',
-    )
-    tau: float = Field(
-        default=3.0,
-        ge=1e-3,
-        le=100,
-        description='Steepness of "exponential": rho = (1 - exp(-tau d / d_max)) / (1 - exp(-tau)). '
-        "Other falloffs ignore it.",
-    )
-    outside: Literal["average", "background"] = Field(
-        default="average",
-        description='What a ray brings that meets nothing within `range`. "average": the average reflectivity times '
-        'the ambient light. "background": rays are traced on, and those that leave the scene bring its background.',
-    )
-
-
-class AmbientTable(Table):
-    """The ambient light I_A of each light position, the level of all indirect light."""
-
-    intensity: Emission | None = Field(
-        default=None,
-        description="Fixes I_A for every light position, as a radiance, W/(m2 sr), instead of `method` and `paths`.",
-        json_schema_extra=computed("measured"),
-    )
-    method: Literal["eye", "light", "fit"] = Field(
-        default="eye",
-        description='"eye": walks from what the cameras see gather the light that arrives there. '
-        '"light": particles from the light spread over the scene. "fit": the value that makes indirect light as bright '
-        "as path tracing does, on average over what the cameras see.",
-    )
-    paths: int | None = Field(
-        default=None,
-        ge=1,
-        le=2**24,
-        description='Walks ("eye", "fit") or particles a light position ("light").',
-        json_schema_extra=computed("as many as a standard error of 1 % needs"),
-    )
-
-    @field_validator("method", "paths")
-    @classmethod
-    def _not_fixed(cls, value: object, info: ValidationInfo) -> object:
-        if value is not None and info.data.get("intensity") is not None:
-            fail([((), "expected no value, because `intensity` fixes the ambient light; remove one of the two")])
-        return value
-
-
-class SpecularTable(Table):
-    """Mirror reflection."""
-
-    depth: int = Field(default=4, ge=0, le=64, description="Longest chain of mirror reflections. 0: mirrors are black.")
-    hits: int = Field(
-        default=0,
-        ge=1,
-        le=MOST_HITS,
-        description="Native hits of a pixel that sees a mirror; what a mirror shows is never reused.",
-        json_schema_extra=computed(
-            '(2 n_r + 1) times `samples.hits`; 7 times with n_r = "auto", 14 with hits = "auto"'
-        ),
-    )
-
-
-class DenoiseTable(Table):
-    """Noise that is removed instead of sampled away; needs the extra `denoise`."""
-
-    obscurance: bool = Field(
-        default=False,
-        description="Denoise the obscurance of each camera, once for all lights, with Open Image Denoise.",
-    )
 
 
 class OutputTable(Table):
@@ -340,6 +208,9 @@ class Job(Table):
         if self.rests_on > MOST_HITS and self.samples.hits != "auto":
             frames = round(self.rests_on / self.samples.hits)
             fail([(("samples", "hits"), f"expected at most {MOST_HITS // frames} with this n_r")])
+        n_r = DEFAULT_N_R if self.reuse.n_r == "auto" else self.reuse.n_r
+        if self.samples.error is not None and (2 * n_r + 1) * self.samples.most_hits > MOST_HITS:
+            fail([(("samples", "most_hits"), f"expected at most {MOST_HITS // (2 * n_r + 1)} with this n_r")])
         if self.samples.halves and self.output.format != "exr":
             fail(
                 [(("samples", "halves"), 'expected output.format = "exr": no other format has room for more channels')]

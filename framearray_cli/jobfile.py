@@ -43,6 +43,7 @@ def job_table(job: Job) -> dict[str, Any]:
     table: dict[str, Any] = _plain(job.model_dump(exclude_none=True))
     if job.ambient.intensity is not None:  # it stands instead of the other two
         table["ambient"] = {"intensity": table["ambient"]["intensity"]}
+    del table["samples"]["most_hits" if job.samples.error is None else "hits"]  # of these two ways, the other is taken
     return table
 
 

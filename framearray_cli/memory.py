@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 
+from .arrays import Float64
 from .errors import JobError
 from .eyehits import pilot_hits
 from .hits import empty_hits
@@ -61,21 +62,26 @@ def memory_limit(prepared: Prepared) -> int:
     return limit - taken_memory() if limit else int(FREE_SHARE * free_memory())
 
 
-def require_memory(prepared: Prepared) -> None:
+def require_memory(prepared: Prepared, per_pixel: Float64 | None = None) -> None:
     """Refuse a job that does not fit into memory even light by light; the system would end it without a word.
+
+    Args:
+        per_pixel: see `window_memory`.
 
     Raises:
         JobError: it does not.
     """
-    needed, limit = window_memory(prepared, 1), memory_limit(prepared)
+    needed, limit = window_memory(prepared, 1, per_pixel=per_pixel), memory_limit(prepared)
     if prepared.job.render.memory is None:
         needed, limit = max(needed, ambient_memory(prepared)), free_memory()
     else:  # told as the job's limit is: of the whole program
         needed, limit = needed + taken_memory(), prepared.job.render.memory
     if needed > limit:
+        less = "a smaller camera.resolution, reuse.n_r or samples.hits takes less"
+        if prepared.job.samples.error is not None:
+            less = "a larger samples.error, or a smaller camera.resolution, reuse.n_r or samples.most_hits takes less"
         problem = (
-            f"rendering needs at least {needed / 2**30:.1f} GiB of memory, {limit / 2**30:.1f} GiB may be used; "
-            "a smaller camera.resolution, reuse.n_r or samples.hits takes less"
+            f"rendering needs at least {needed / 2**30:.1f} GiB of memory, {limit / 2**30:.1f} GiB may be used; {less}"
         )
         raise JobError(prepared.job.file or prepared.job.name, [problem])
 
@@ -85,18 +91,21 @@ def ambient_memory(prepared: Prepared) -> int:
     return prepared.threads * BATCH * prepared.n_lights * 3 * (4 + 8 + 8)
 
 
-def window_memory(prepared: Prepared, n_lights: int, mirror_share: float = 0.0) -> int:
+def window_memory(
+    prepared: Prepared, n_lights: int, mirror_share: float = 0.0, per_pixel: Float64 | None = None
+) -> int:
     """Bytes that the window of frames and the images under way take for some of the lights.
 
     A hit takes its irradiance under every light, a row, and its place and weight in every frame that uses it.
 
     Args:
         mirror_share: of the pixels that see a mirror; their hits are held until their frame is composed.
+        per_pixel: (n_frames,) mean native hits a pixel of every frame; None: what `samples.hits` says.
     """
     job = prepared.job
     n_frames, n_r = (1, 0) if prepared.still else (prepared.n_cameras, job.n_r)
     width, height = job.camera.resolution
-    per_pixel = frame_hits(n_frames, job.n_r, job.hits)
+    per_pixel = frame_hits(n_frames, job.n_r, job.hits) if per_pixel is None else per_pixel
     held = max(float(per_pixel[max(j - n_r, 0) : j + n_r + 1].sum()) for j in range(n_frames))
     frames = min(2 * n_r + 1, n_frames)
     balance = job.reuse.weights == "balance" and n_r > 0
@@ -118,18 +127,21 @@ def window_memory(prepared: Prepared, n_lights: int, mirror_share: float = 0.0) 
     return int(width * height * (held * per_hit + mirrored + per_image_pixel))
 
 
-def light_blocks(prepared: Prepared, mirror_share: float, limit: int | None = None) -> list[range]:
+def light_blocks(
+    prepared: Prepared, mirror_share: float, limit: int | None = None, per_pixel: Float64 | None = None
+) -> list[range]:
     """Cut the light positions into as few blocks, of about one size, as the memory limit allows.
 
     Every block goes along the whole camera path and finds its hits again: they depend on no light.
 
     Args:
         limit: bytes; None: what the job says, or the machine has free.
+        per_pixel: see `window_memory`.
     """
     n, limit = prepared.n_lights, memory_limit(prepared) if limit is None else limit
     for count in range(1, n + 1):
         size = -(-n // count)
-        if window_memory(prepared, size, mirror_share) <= limit:
+        if window_memory(prepared, size, mirror_share, per_pixel) <= limit:
             break
     return [range(first, min(first + size, n)) for first in range(0, n, size)]
 

@@ -44,9 +44,8 @@ def extra_mirror_hits(
     Args:
         own: (2, n_pixels) overwritten: native hits of each pixel, of even and of odd sample numbers.
     """
-    most = sum(part.per_pixel for part in parts)
-    least = int(work.per_pixel[c])
-    extra = max(work.mirror_hits - least, 0)
+    most = max((part.first_sample + part.per_pixel for part in parts), default=0)
+    extra = max(work.mirror_hits - work.fewest_hits(c), 0)
     own[:] = 0
     for part in parts:
         counts = halves_of(part.first_sample, part.per_pixel)[:, None]

@@ -78,6 +78,21 @@ def passes(order: Int32, width: int, c: int, per_pixel: float) -> tuple[Pass, ..
     return tuple(found)
 
 
+def passes_of_counts(order: Int32, counts: Int32) -> tuple[Pass, ...]:
+    """The native hits of a frame whose pixels have different numbers of them: a pass for each number.
+
+    Args:
+        order: (n_pixels,) every pixel once, in the order of tracing.
+        counts: (n_pixels,) hits of each pixel.
+    """
+    in_order, found, first_hit = counts[order], [], 0
+    for count in np.unique(counts[counts > 0]).tolist():
+        pixels = np.ascontiguousarray(order[in_order == count])
+        found.append(Pass(pixels=pixels, per_pixel=count, first_sample=0, first_hit=first_hit))
+        first_hit += found[-1].n
+    return tuple(found)
+
+
 def halves_of(first: int, n: int) -> Int32:
     """How many of the samples first to first + n - 1 have an even number, and how many an odd one: (2,)."""
     even = (first + n + 1) // 2 - (first + 1) // 2

@@ -19,7 +19,8 @@ from .plan import frame_hits, turns
 from .sampling import lattice_steps
 from .scene import Scene, load_scene
 from .surface import Surfaces, nearest, surfaces
-from .terms.ambient import Ambient, EyeWalks, ambient_by_eye, fixed_ambient
+from .terms.ambient import Ambient
+from .terms.ambient_eye import EyeWalks, ambient_by_eye, fixed_ambient
 from .terms.ambient_fit import Curve, ambient_by_fit
 from .terms.ambient_light import ambient_by_light
 from .terms.obscurance import FALLOFFS, ObscuranceSettings

@@ -17,10 +17,11 @@ from .frame import find_frame
 from .job import Job
 from .jobfile import job_table
 from .manifest import Manifest, ManifestCamera, ManifestLight, matrix_rows, write_manifest
-from .memory import light_blocks, mirror_share, peak_memory
+from .memory import light_blocks, mirror_share, peak_memory, require_memory
 from .outfolder import claim_folder
 from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
 from .standarderror import summed_up
+from .target import Target, aimed
 from .terms.ambient import Ambient
 from .window import Window
 from .work import Work
@@ -73,6 +74,9 @@ class Listener:
     def planned(self, ambient: Ambient) -> None:
         """The ambient light is known."""
 
+    def aimed(self, target: Target) -> None:
+        """Native hits were allotted for the error that the job wants."""
+
     def written(self, images: int) -> None:
         """That many more images are on disk."""
 
@@ -101,19 +105,23 @@ def render(job: Job, listener: Listener | None = None, *, engine: Engine = "auto
             listener.settled(choice)
         work, ambient = plan_work(prepared, embree)
         listener.planned(ambient)
-        manifest = _manifest(prepared, ambient, identity, choice)
+        work, target = aimed(prepared, work, ambient)
+        if target:
+            require_memory(prepared, work.per_pixel)
+            listener.aimed(target)
+        manifest = _manifest(prepared, ambient, identity, choice, target)
         write_manifest(folder, manifest)
         written: list[int] = []
         try:
             parts = [
                 _frames(prepared, work.for_lights(block), ambient, block, listener, written)
-                for block in light_blocks(prepared, mirror_share(work))
+                for block in light_blocks(prepared, mirror_share(work), per_pixel=work.per_pixel)
             ]
         except BaseException:
             with suppress(OutputError):  # what stopped the render is told; the manifest may meet the same full disk
                 write_manifest(folder, replace(manifest, summary=manifest.summary | {"images": sum(written)}))
             raise
-    summary = _summary(prepared, ambient, parts, time.perf_counter() - started)
+    summary = _summary(prepared, ambient, target, parts, time.perf_counter() - started)
     write_manifest(folder, _with_summary(manifest, summary))
     return summary
 
@@ -186,9 +194,13 @@ def _frames(
     )
 
 
-def _summary(prepared: Prepared, ambient: Ambient, parts: list[_Part], seconds: float) -> Summary:
+def _summary(
+    prepared: Prepared, ambient: Ambient, target: Target | None, parts: list[_Part], seconds: float
+) -> Summary:
     """Put the passes over the camera path together."""
     rays = sum((part.rays for part in parts), Counter({"ambient": ambient.rays}))
+    if target:
+        rays["target"] = target.rays
     width, height = prepared.job.camera.resolution
     errors = {image: error for part in parts for image, error in part.errors.items()}
     return Summary(
@@ -214,7 +226,9 @@ def _patterns(prepared: Prepared) -> tuple[str, str]:
     return file_patterns(prepared.job.name, prepared.n_cameras, prepared.n_lights, prepared.job.output.format)
 
 
-def _manifest(prepared: Prepared, ambient: Ambient, identity: str, choice: Choice | None) -> Manifest:
+def _manifest(
+    prepared: Prepared, ambient: Ambient, identity: str, choice: Choice | None, target: Target | None
+) -> Manifest:
     """What a program needs that has never seen this one; everything but how the run went."""
     job, report = prepared.job, prepared.scene.report
     images, layers = _patterns(prepared)
@@ -252,7 +266,8 @@ def _manifest(prepared: Prepared, ambient: Ambient, identity: str, choice: Choic
             "notes": list(report.notes),
         },
         summary={"finished": False, "images": 0, "ambient_paths": ambient.paths}
-        | ({"automatic": choice.table()} if choice else {}),
+        | ({"automatic": choice.table()} if choice else {})
+        | ({"target": target.table()} if target else {}),
         directory=job.output.directory,
     )
 
@@ -271,6 +286,5 @@ def _with_summary(manifest: Manifest, summary: Summary) -> Manifest:
     }
     if summary.standard_error:
         table["standard_error"] = summary.standard_error
-    if "automatic" in manifest.summary:
-        table["automatic"] = manifest.summary["automatic"]
+    table |= {key: manifest.summary[key] for key in ("automatic", "target") if key in manifest.summary}
     return replace(manifest, summary=table)

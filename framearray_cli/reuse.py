@@ -182,6 +182,36 @@ def balance_weights(
 
 
 @kernel
+def expect_hits(hits: Float32, of_pixel: Int32, first_eye: int, n: int, pixel: Int32, density: Float64) -> None:
+    """Make densities of hits of those of a hit a pixel: n_k p_k of p_k, where n_k differs from place to place.
+
+    Args:
+        hits: (n_c, n_blocks) native hits a pixel of every eye.
+        of_pixel: (n_pixels,) the block of a pixel.
+        pixel, density: (n_eyes, >= n) from `outer_hits`; densities of hits 0 to n - 1 are changed.
+    """
+    for row in range(pixel.shape[0]):
+        for i in range(n):
+            if pixel[row, i] != OUTSIDE:
+                density[row, i] *= hits[first_eye + row, of_pixel[pixel[row, i]]]
+
+
+@kernel
+def of_one_hit(hits: Float32, of_pixel: Int32, first_frame: int, n: int, pixel: Int32, weight: Float32) -> None:
+    """Make weights of one hit of those of the n_j hits that frame j's own eye finds there.
+
+    Args:
+        hits, of_pixel: as for `expect_hits`.
+        pixel: (n_frames, >= n) that see each hit.
+        weight: (n_frames, >= n) changed.
+    """
+    for row in range(pixel.shape[0]):
+        for i in range(n):
+            if pixel[row, i] != OUTSIDE:
+                weight[row, i] /= hits[first_frame + row, of_pixel[pixel[row, i]]]
+
+
+@kernel
 def sort_by_pixel(pixel: Int32, first: int, last: int, start: Int32, order: Int32) -> None:
     """Counting sort of the hits that fall into pixels first to last - 1; hits of one pixel stay in their order.
 

@@ -214,7 +214,7 @@ class Window:
     def _holes(self, j: int) -> list[tuple[Placed, Records]]:
         """Hits for pixels of frame j that nobody reached; there are none where every pixel has hits of its own."""
         work = self._work
-        if work.per_pixel[j] >= 1:
+        if work.fewest_hits(j) >= 1:
             return []
         reached = np.zeros(work.n_pixels, np.int32)
         for k in work.frames_around(j, work.n_r):

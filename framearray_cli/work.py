@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from .allotment import Allotment
 from .arrays import Float32, Float64, Int32, Rgb, with_room
 from .camera import Cameras
 from .embree.packets import Tracer
@@ -13,6 +14,7 @@ from .eyehits import pixel_order
 from .kernel import inlined
 from .lanes import LANES
 from .lights import LightArrays, some_lights
+from .plan import Pass, passes, passes_of_counts
 from .surface import Surfaces
 from .terms.obscurance import ObscuranceSettings
 
@@ -31,6 +33,7 @@ class Work:
         shadow_step, shadow_unbiased: see `terms/direct_steps.py`; step 1 tests every light position.
         layers: whether normals and depths are kept for the layers.
         denoise: whether W is denoised in composing.
+        allotment: native hits by place, where they differ; `per_pixel` has their means then.
         halves: how hits are told apart in two halves: BY_SAMPLE, or so many frames of the camera path in turn belong
             to one half, or 0: not at all.
     """
@@ -53,6 +56,7 @@ class Work:
     layers: bool
     denoise: bool = False
     halves: int = 0
+    allotment: Allotment | None = None
     order: Int32 = field(init=False)
 
     def __post_init__(self) -> None:
@@ -65,6 +69,16 @@ class Work:
     @property
     def n_pixels(self) -> int:
         return self.cams.width * self.cams.height
+
+    def passes(self, c: int) -> tuple[Pass, ...]:
+        """The native hits of frame c."""
+        if self.allotment is not None:
+            return passes_of_counts(self.order, self.allotment.counts(c))
+        return passes(self.order, self.cams.width, c, float(self.per_pixel[c]))
+
+    def fewest_hits(self, c: int) -> int:
+        """Native hits that every pixel of frame c has."""
+        return int(self.per_pixel[c] if self.allotment is None else self.allotment.counts(c).min())
 
     def half_of(self, c: int) -> int:
         """The half that all hits of frame c belong to, or BY_SAMPLE."""

@@ -21,6 +21,8 @@ KEYS = {
     "samples.shadow_unbiased": "shadow_unbiased",
     "denoise.obscurance": "denoise",
 }
+# What hits are given for in their place: settings that are measured say how many hits there are.
+TARGET = (("samples", "error"), ("samples", "most_hits"))
 # Fewer hits a pixel than that a frame cannot have: see `plan.py`.
 FEWEST_HITS = 1 / 8
 
@@ -67,7 +69,7 @@ class Settings:
         for table, values in tables.items():
             old = getattr(job, table)
             # what the job file says of it, and these; defaults that depend on others are worked out again
-            said = {name: getattr(old, name) for name in old.model_fields_set}
+            said = {name: getattr(old, name) for name in old.model_fields_set if (table, name) not in TARGET}
             updates[table] = type(old).model_validate({**said, **values})
         return job.model_copy(update=updates)
 

@@ -19,20 +19,8 @@ import numpy as np
 
 from ..arrays import Float32, Float64
 from ..kernel import kernel
-from .ambient import (
-    FEWEST,
-    TARGET_ERROR,
-    Ambient,
-    EyeWalks,
-    Steps,
-    Workspace,
-    choose_all,
-    start_at_eyes,
-    summarise,
-    to_first_vertices,
-    total_reflectivity,
-    walk_until,
-)
+from .ambient import FEWEST, TARGET_ERROR, Ambient, Workspace, choose_all, summarise, walk_until
+from .ambient_eye import EyeWalks, Steps, start_at_eyes, to_first_vertices, total_reflectivity
 from .obscurance import rho
 
 

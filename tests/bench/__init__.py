@@ -1,7 +1,7 @@
 """Measures what an image costs and how far it is from right. Not part of the tests.
 
-`make bench` runs `python -m bench`, `make bench-scaling` runs `python -m bench scaling`; likewise `make bench-bias` and
-`make bench-ambient`.
+`make bench` runs `python -m bench`, `make bench-scaling` runs `python -m bench scaling`; likewise `make bench-bias`,
+`make bench-ambient` and `make bench-report`.
 
     cases.py      ways to make the images of a job: the frame array, its options, baselines
     steady.py     the frame loop in its steady state, under a clock
@@ -20,6 +20,7 @@
     ambient.py    the ambient estimate, in ambient_scenes.py: ambient_levels.py against walks, ambient_pictures.py
                   against path-traced pictures; ambient_page.py and ambient_plots.py write docs/ambient.md
     pathtraced.py pictures by Mitsuba's path tracer
+    reports.py    reports of the three jobs -> docs/report-*.md
     machine.py    what all this ran on, and how busy that was
     results.py    results on the disk
     markdown.py   numbers and tables as text

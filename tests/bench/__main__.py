@@ -13,6 +13,7 @@ from . import (
     pathtraced,
     peers,
     processes,
+    reports,
     scaling,
     speed,
     table,
@@ -25,7 +26,7 @@ from .steady import steady
 PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
 PARTS = ("speed", "error", "peers", "memory", "startup")
 TRACES = ("trace", "trace-means")
-OTHERS = ("scaling", "bias", "told", "page", "peak", *TRACES, *ambient.PARTS)
+OTHERS = ("scaling", "report", "bias", "told", "page", "peak", *TRACES, *ambient.PARTS)
 
 
 def main() -> None:
@@ -63,6 +64,11 @@ def main() -> None:
         for name in jobs:
             save(out, f"told-{name}", {"rows": told.measure(name, out)})
         told.write([row for name in JOBS if (kept := load(out, f"told-{name}")) for row in kept["rows"]])
+        return
+    if args.what == "report":
+        for name in jobs:
+            reports.measure(name)
+            reports.write(name)
         return
     if args.what == "bias":
         for name in jobs:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from stages import box, make_job, point, quad, sun, write_scene
 from ztests import differing
 
+from framearray_cli.allotment import Allotment, blocks_of
 from framearray_cli.crew import Crew
 from framearray_cli.frame import find_frame
 from framearray_cli.job import Job
@@ -61,7 +62,7 @@ def job_of(scene: Path, out: Path, hits: float, n_r: int, weights: str, way: flo
     )  # fmt: skip
 
 
-def middle_frames(job: Job, seeds: range) -> Array:
+def middle_frames(job: Job, seeds: range, allotment: Allotment | None = None) -> Array:
     """The middle frame for each seed, (seeds, values), by the program's own frame loop without files."""
     images = []
     prepared = prepare(job)
@@ -69,7 +70,7 @@ def middle_frames(job: Job, seeds: range) -> Array:
     with open_embree(prepared) as embree:
         planned, ambient = plan_work(prepared, embree)
         for seed in seeds:
-            work = replace(planned, seed=seed)
+            work = replace(planned, seed=seed, allotment=allotment)
             crew = Crew(work, 1)
             window = Window(work, ambient, crew)
             for c in work.frames_around(MIDDLE, work.n_r):
@@ -97,6 +98,17 @@ def right(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Array:
 @pytest.mark.parametrize("hits", [4, 0.5])  # 28 hits a pixel, and 3 or 4
 def test_balance_leaves_the_mean_alone(hits: float, scene: Path, right: Array, tmp_path: Path) -> None:
     found = middle_frames(job_of(scene, tmp_path, hits, N_R, "balance"), range(SEEDS))
+    assert differing(found, right).max() < 1
+
+
+def test_balance_leaves_the_mean_alone_where_hits_differ_from_place_to_place(
+    scene: Path, right: Array, tmp_path: Path
+) -> None:
+    """From a quarter of a hit to eight, in small blocks, others in every frame: edges run through everything."""
+    blocks = blocks_of(24, 16, edge=3)
+    hits = np.random.default_rng(8).choice([0.25, 1.0, 1.5, 3.0, 8.0], (FRAMES, blocks.n)).astype(np.float32)
+    job = job_of(scene, tmp_path, 4, N_R, "balance")
+    found = middle_frames(job, range(SEEDS), Allotment(blocks=blocks, hits=hits))
     assert differing(found, right).max() < 1
 
 

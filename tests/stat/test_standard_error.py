@@ -19,6 +19,7 @@ from framearray_cli.frame import find_frame
 from framearray_cli.job import Job
 from framearray_cli.prepare import open_embree, plan_work, prepare
 from framearray_cli.standarderror import standard_error
+from framearray_cli.target import aimed
 from framearray_cli.window import Window
 
 Array = NDArray[np.float64]
@@ -144,3 +145,32 @@ def test_images_of_two_lights_combined_tell_their_error(
     """Hits are shared by lights, so errors are not independent; differences know that."""
     images, differences = (combine(both[:, 0], both[:, 1]) for both in over_seeds(job_of(scene, tmp_path))[:2])
     assert abs(told_to_true(images, differences) - 1) < SHARE
+
+
+@pytest.mark.parametrize(("error", "weights"), [(0.05, "balance"), (0.1, "balance"), (0.1, "average")])
+def test_a_wanted_error_is_reached(error: float, weights: str, scene: Path, tmp_path: Path) -> None:
+    """`samples.error` against the spread over seeds, each with a pilot of its own; mirrors are left out of both."""
+    changes = {"specular": {"depth": 0}, "reuse": {"weights": weights}}
+    table = job_of(scene, tmp_path, **changes)
+    wide, high = 3 * SIZE[0], 3 * SIZE[1]  # more blocks, so that it is not the pilot's own luck that is judged
+    updates = {
+        "samples": table.samples.model_copy(update={"error": error, "most_hits": 64}),
+        "camera": table.camera.model_copy(update={"resolution": (wide, high)}),
+    }
+    prepared, images, radiance = prepare(table.model_copy(update=updates)), [], []
+    block = np.empty((2, high, wide, 3), np.float32)
+    with open_embree(prepared) as embree:
+        planned, ambient = plan_work(prepared, embree)
+        for seed in range(8):
+            work, target = aimed(prepared, replace(planned, seed=seed), ambient)
+            assert target is not None and target.capped < 0.02 and abs(target.expected / error - 1) < 0.05
+            crew = Crew(work, 1)
+            window = Window(work, ambient, crew, MIDDLE)
+            for c in work.frames_around(MIDDLE, work.n_r):
+                window.add(find_frame(work, c, crew))
+            window.compose(MIDDLE, block)
+            crew.close()
+            images.append(block.astype(float).reshape(2, -1))
+            radiance.append(target.radiance)
+    spread = np.sqrt(np.array(images).var(axis=0, ddof=1).mean())
+    assert abs(spread / (error * np.mean(radiance)) - 1) < SHARE

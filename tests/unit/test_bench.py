@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bench import reports
 from bench.biaspage import at_most, at_time
 from bench.floor import PIECE, _pieces
 from bench.markdown import grid, number, percent
@@ -11,6 +12,30 @@ from bench.steady import mean
 
 from framearray_cli.lights import DIRECTIONAL, POINT, LightArrays
 from framearray_cli.report.metrics import block_mean, errors, relmse, rmse, shadow_edges, squared_bias
+
+SETTINGS = [
+    {"name": "as the job says", "one_light": False, "ms": 5.0, "rmse": 0.1, "bias": 0.01, "noise": 0.09, "flip": 0.05,
+     "flicker_camera": 0.02, "accepted_hits": 13.0, "times_faster_than_scratch": 40.0, "on_the_front": True},
+    {"name": "hits 8", "one_light": False, "ms": 20.0, "rmse": 0.04, "bias": 0.0, "noise": 0.04, "flip": 0.02,
+     "flicker_camera": 0.01, "flicker_light": 0.03, "accepted_hits": 52.0, "times_faster_than_scratch": 55.0,
+     "on_the_front": False},
+    {"name": "from scratch, 14 hits", "one_light": True, "ms": 300.0, "rmse": 0.1, "bias": 0.0, "noise": 0.1,
+     "flip": 0.05, "accepted_hits": 14.0, "times_faster_than_scratch": 1.0, "on_the_front": False},
+]  # fmt: skip
+
+
+def test_a_report_as_a_page():
+    table = {"settings": SETTINGS, "advice": [
+        {"error": 0.1, "settings": "hits 8", "ms": 20.0, "rmse": 0.04, "lines": ["[samples]", "hits = 8"]},
+        {"error": 0.01},
+    ]}  # fmt: skip
+    text = reports.summary(table)
+    assert "5 ms an image with an error of 10 %" in text and "**40x**" in text and "55x, `hits 8`" in text
+    lines = reports.rows(table).splitlines()
+    assert lines[2].startswith("| **as the job says** | 5 | 10 % | 1 % | 9 % | 0.05 | 2 % | 13 | 40x |")
+    assert "| hits 8 | 20 | 4 % | 0 % | 4 % | 0.02 | 1 %, 3 % | 52 | 55x |" in lines
+    said = reports.advice(table)
+    assert "```toml\n[samples]\nhits = 8\n```" in said and "nothing that was tried reaches it" in said
 
 
 def flat(value: float, shape: tuple[int, int] = (40, 60)) -> np.ndarray:

@@ -15,18 +15,18 @@ PACKAGE = Path(framearray_cli.__file__).parent
 FLOW = """
 __init__ errors arrays kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
 compiling files framerate filepatterns fingerprint colour sphere
-jobvalues jobkeys job jobschema jobdocs problems eyefile jobfile
+jobvalues jobkeys jobmethod job jobschema jobdocs problems eyefile jobfile
 meshes/assets meshes/container meshes/model meshes/defaults meshes/cleaning meshes/polygons meshes/merge
 meshes/overrides meshes/textures meshes/opacity meshes/mtl meshes/walk meshes/gltf_materials meshes/gltf_prepare
 meshes/gltf meshes/obj meshes/other meshes/read meshes/__init__
 scene paths camera lights sampling surface
 embree/packets embree/masks embree/native embree/fallback embree/__init__
-rays hits eyehits plan
+rays hits eyehits plan allotment
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
-terms/ambient_area terms/ambient_light terms/ambient_fit
+terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise standarderror compose accumulate window
 imageattributes images manifest outfolder writer
-prepare memory acceptance expected auto render check
+prepare memory acceptance expected auto allot target render check
 moviepath movies assemble
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
@@ -57,7 +57,7 @@ DOORS = {
     "typer": ("cli",),
     "rich": ("screen",),
     "av": ("movies",),
-    "scipy": ("paths", "standarderror"),
+    "scipy": ("paths", "standarderror", "allotment"),
     "psutil": ("memory",),
 }
 # What takes long to import, or may be absent: `framearray --help` does without.

@@ -1,0 +1,224 @@
+"""`samples.error`: a pilot looks how noisy each place is, and native hits are allotted so that images reach a target.
+
+The pilot has random numbers of its own and is thrown away, so that the number of hits of a pixel does not depend on
+what they show: means stay right, and weights know the numbers. It depends on the job alone, so that every run of a
+job allots the same hits.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .acceptance import MOST_DENSE, spread
+from .allot import FEWEST, Witnesses, allot
+from .allotment import Allotment, Blocks, blocks_of
+from .arrays import Float32, Float64, Int32
+from .crew import Crew, Scratch
+from .eyehits import native_hits
+from .lanes import LANES
+from .prepare import Prepared
+from .reuse import outer_hits
+from .shading import estimate_terms
+from .terms.ambient import Ambient
+from .work import INDIRECT, REFLECTIVITY, STEADY, Records, Work, empty_records
+
+# Added to the job's seed for the pilot; no job's seed is as large.
+PILOT_SEED = 1 << 40
+# Frames of the path whose pilot judges what was allotted.
+JUDGED = 32
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Target:
+    """What a wanted error takes.
+
+    Attributes:
+        error: that is wanted of every frame: root mean square over the pixels of all its images, over the array's
+            mean radiance.
+        expected: of the whole array; `worst`: of the worst frame.
+        radiance: mean of the array, as the pilot saw it.
+        hits: native hits a pixel of a frame, mean; `frames`: least and most of a frame's mean.
+        capped: share of all blocks that have as many hits as they may.
+        rays: that the pilot traced.
+    """
+
+    error: float
+    expected: float
+    worst: float
+    radiance: float
+    hits: float
+    frames: tuple[float, float]
+    capped: float
+    rays: int
+
+    def lines(self) -> list[str]:
+        """What a person is told."""
+        least, most = self.frames
+        lines = [
+            f"error: {self.error:.3g} of the mean radiance is wanted; {self.hits:.1f} native hits a pixel "
+            f"({least:.1f} to {most:.1f} by frame) are expected to give {self.expected:.3g}"
+        ]
+        if self.expected > 1.05 * self.error:
+            lines.append(
+                f"  note: {self.capped:.1%} of all places have as many hits as samples.most_hits allows, "
+                "too few for this error"
+            )
+        return lines
+
+    def table(self) -> dict[str, object]:
+        """For the manifest."""
+        return {
+            "error": self.error,
+            "expected": round(self.expected, 5),
+            "expected_worst": round(self.worst, 5),
+            "radiance": self.radiance,
+            "hits": round(self.hits, 3),
+            "hits_by_frame": [round(self.frames[0], 3), round(self.frames[1], 3)],
+            "capped": round(self.capped, 4),
+            "pilot_rays": self.rays,
+        }
+
+
+def aimed(prepared: Prepared, work: Work, ambient: Ambient) -> tuple[Work, Target | None]:
+    """The same work with native hits allotted for `samples.error`; as it is where the job has no target.
+
+    Args:
+        work: of all light positions.
+    """
+    error = prepared.job.samples.error
+    if error is None:
+        return work, None
+    # one frame serves for the whole window of a camera that stands still
+    most = float(prepared.job.samples.most_hits * (2 * prepared.job.n_r + 1 if prepared.still else 1))
+    crew = Crew(work, prepared.threads)
+    try:
+        pilot = _Pilot(work, ambient, blocks_of(work.cams.width, work.cams.height))
+        found = crew.run(pilot.look, range(work.n_frames))
+        rays = crew.rays().total()
+    finally:
+        crew.close()
+    radiance = float(np.mean([frame.radiance for frame in found]))
+    wanted = (error * radiance) ** 2
+    if wanted > 0:
+        u = np.stack([frame.u for frame in found], axis=1)
+        witnesses = [frame.witnesses for frame in found if frame.witnesses]
+        hits, reached = allot(u, pilot.blocks, wanted, most, witnesses)
+    else:  # all is black
+        hits, reached = np.full((work.n_frames, pilot.blocks.n), FEWEST), np.zeros(1)
+    allotment = Allotment(blocks=pilot.blocks, hits=hits.astype(np.float32))
+    means = allotment.mean()
+    least = radiance if radiance > 0 else 1.0
+    target = Target(
+        error=error,
+        expected=float(np.sqrt(reached.mean())) / least,
+        worst=float(np.sqrt(reached.max())) / least,
+        radiance=radiance,
+        hits=float(means.mean()),
+        frames=(float(means.min()), float(means.max())),
+        capped=float((allotment.hits >= most).mean()),
+        rays=rays,
+    )
+    return replace(work, allotment=allotment, per_pixel=means), target
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Found:
+    """What a pilot tells of a frame.
+
+    Attributes:
+        radiance: mean over all its images.
+        u: (2, n_blocks) by each half, see allot.py.
+        witnesses: of some frames.
+    """
+
+    radiance: float
+    u: Float64
+    witnesses: Witnesses | None
+
+
+class _Pilot:
+    """Two hits, independent of each other, of two pixels of each block: one pixel for each half of the pilot."""
+
+    def __init__(self, work: Work, ambient: Ambient, blocks: Blocks) -> None:
+        self.work = replace(work, seed=work.seed + PILOT_SEED)
+        self.ambient = ambient
+        self.blocks = blocks
+        self._judges = frozenset(spread(work.n_frames, JUDGED))
+
+    def look(self, c: int, scratch: Scratch) -> _Found:
+        """What the pilot finds in frame c."""
+        eyes = self.work.frames_around(c, self.work.n_r)
+        random = np.random.default_rng((self.work.seed, c)).random((2, self.blocks.n, 2))
+        pixels = np.concatenate([self.blocks.some_pixel(half) for half in random])
+        n, batch = len(pixels), len(scratch.hits.pixel) // 2
+        mean, variance = 0.0, np.empty(n)
+        block, density = np.empty((2, n, len(eyes)), np.int32), np.empty((2, n, len(eyes)))
+        for first in range(0, n, batch):
+            span = slice(first, min(first + batch, n))
+            pair = _of_samples(span.stop - span.start)
+            radiance = self._radiance(c, pixels[span], scratch)[pair]
+            mean += float(radiance.sum(dtype=np.float64)) / (2 * n * radiance[0, 0].size)
+            # two values of one hit each tell its variance
+            variance[span] = np.square(radiance[0] - radiance[1], dtype=np.float64).mean(axis=(1, 2)) / 2
+            seen, arriving = self._seen(c, eyes, 2 * len(pair[0]), scratch)
+            block[:, span], density[:, span] = seen[pair], arriving[pair]
+        # a hit in every frame of the window is shared by so many
+        shared = (1.0 / density.sum(axis=-1)).mean(axis=0)
+        by_half = (2, self.blocks.n)
+        witnesses = None
+        if c in self._judges:
+            views = (2, *by_half, len(eyes))
+            witnesses = Witnesses(
+                c=c,
+                first_eye=eyes.start,
+                variance=variance.reshape(by_half),
+                block=block.reshape(views).swapaxes(0, 1),
+                density=density.reshape(views).swapaxes(0, 1),
+            )
+        return _Found(radiance=mean, u=(variance * shared).reshape(by_half), witnesses=witnesses)
+
+    def _radiance(self, c: int, pixels: Int32, scratch: Scratch) -> Float32:
+        """What images of two hits of each of some pixels would show, (hits, n_lights, 3); the hits are in `scratch`."""
+        work, n = self.work, 2 * len(pixels)
+        native_hits(
+            work.cams, c, work.seed, pixels, 2, 0, 0, n, work.surfaces, work.tracer, work.depth > 0,
+            scratch.hit_rays.packets, scratch.hits, True,
+        )  # fmt: skip
+        scratch.rays["pilot"] += n
+        records = empty_records(work, n)
+        estimate_terms(work, scratch.hits, n, scratch, records, "pilot", "pilot")
+        return _radiance(work, self.ambient, records)
+
+    def _seen(self, c: int, eyes: range, n: int, scratch: Scratch) -> tuple[Int32, Float64]:
+        """The block that each eye sees each hit in, and its hits there for one of eye c, (n, n_eyes)."""
+        work, own = self.work, c - eyes.start
+        if work.n_r == 0:
+            return self.blocks.of_pixel[scratch.hits.pixel[:n]][:, None], np.ones((n, 1))
+        room = -(-n // LANES) * LANES
+        pixel, density = np.empty((len(eyes), room), np.int32), np.empty((len(eyes), room))
+        scratch.rays["pilot"] += outer_hits(
+            work.cams, c, eyes.start, scratch.hits, n, work.tracer, scratch.test_rays, pixel, density
+        )
+        known = density[own, :n] > 0
+        ratio = np.divide(density[:, :n], density[own, :n], out=np.zeros((len(eyes), n)), where=known)
+        ratio[own] = 1.0
+        pixel[own, :n] = scratch.hits.pixel[:n]
+        return self.blocks.of_pixel[pixel[:, :n]].T, np.minimum(ratio, MOST_DENSE).T
+
+
+def _of_samples(n: int) -> Int32:
+    """Where `native_hits` puts the two hits of each of n pixels, (2, n): by groups of 16 pixels, then by sample."""
+    pixel = np.arange(n)
+    group, members = pixel // LANES * LANES, np.minimum(n - pixel // LANES * LANES, LANES)
+    places: Int32 = np.stack([2 * group + sample * members + pixel - group for sample in range(2)])
+    return places
+
+
+def _radiance(work: Work, ambient: Ambient, records: Records) -> Float32:
+    """What an image of each hit alone would show under every light, (n, n_lights, 3)."""
+    row = records.row.astype(np.float32)
+    triple = {at: row[:, None, at : at + 3] for at in (STEADY, INDIRECT, REFLECTIVITY)}
+    direct = np.swapaxes(records.irradiance, 1, 2) * work.lights.colour / np.float32(np.pi)
+    indirect = ambient.intensity.astype(np.float32) * triple[INDIRECT]
+    radiance: Float32 = triple[STEADY] + triple[REFLECTIVITY] * direct + indirect
+    return radiance

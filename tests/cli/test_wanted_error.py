@@ -1,0 +1,76 @@
+"""Jobs that say an error instead of hits: what is printed, stored, refused, and the same every time."""
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import tiny
+import tomli_w
+from program import run, write_job
+
+LINE = r"^error: 0\.2 of the mean radiance is wanted; ([\d.]+) native hits a pixel \(([\d.]+) to ([\d.]+) by frame\) "
+LINE += r"are expected to give ([\d.]+)$"
+
+
+def wanting(folder: Path, name: str = "job.toml", **samples: Any) -> Path:
+    """A job file with some [samples] in place of a number of hits."""
+    file = write_job(folder, name, camera=tiny.WALK, reuse={"n_r": 2})
+    table = tomllib.loads(file.read_text())
+    table["samples"] = {"obscurance": table["samples"]["obscurance"], **samples}
+    table["output"]["format"] = "exr"
+    file.write_text(tomli_w.dumps(table))
+    return file
+
+
+def stored(folder: Path) -> dict[str, Any]:
+    return tomllib.loads((folder / "manifest.toml").read_text())
+
+
+def images(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.iterdir() if file.suffix != ".toml"}
+
+
+def test_what_it_takes_is_printed_and_stored(tmp_path, capsys):
+    job = wanting(tmp_path, error=0.2, halves=True)
+    told = run(capsys, "render", job)
+    assert (told.code, told.err) == (0, "")
+    hits, least, most, expected = map(float, re.search(LINE, told.out, re.MULTILINE).groups())
+    assert least <= hits <= most
+    summary = stored(tmp_path / "out")["summary"]
+    assert summary["finished"] is True
+    target = summary["target"]
+    assert (target["error"], round(target["hits"], 1)) == (0.2, hits)
+    assert float(f"{target['expected']:.3g}") == expected
+    assert summary["rays"]["target"] == target["pilot_rays"] > 0
+    # a picture of 24 x 18 pixels has 9 blocks: that is about right
+    assert 0.5 < summary["standard_error"]["relative"] / 0.2 < 1.5
+    checked = run(capsys, "check", job)
+    assert (checked.code, checked.err) == (0, "")
+    assert re.search(LINE, checked.out, re.MULTILINE).group() == re.search(LINE, told.out, re.MULTILINE).group()
+
+
+def test_the_array_is_the_same_whatever_the_threads(tmp_path, capsys):
+    job = wanting(tmp_path, error=0.3)
+    assert run(capsys, "render", "-q", job).code == 0
+    first = images(tmp_path / "out")
+    assert run(capsys, "render", "-q", job, "--threads", "1").code == 0
+    assert images(tmp_path / "out") == first
+
+
+def test_another_error_is_another_array(tmp_path, capsys):
+    assert run(capsys, "render", "-q", wanting(tmp_path, error=0.3)).code == 0
+    assert run(capsys, "render", "-q", wanting(tmp_path, error=0.4)).code == 4
+
+
+def test_too_few_hits_are_told(tmp_path, capsys):
+    told = run(capsys, "render", wanting(tmp_path, error=0.001, most_hits=2))
+    assert told.code == 0
+    note = "  note: 100.0% of all places have as many hits as samples.most_hits allows, too few for this error"
+    assert note in told.out.splitlines()
+
+
+def test_hits_and_error_together_are_refused(tmp_path, capsys):
+    told = run(capsys, "render", wanting(tmp_path, hits=2, error=0.1))
+    assert told.code == 2
+    assert "samples.error: expected either hits or error" in told.err
