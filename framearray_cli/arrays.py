@@ -50,10 +50,13 @@ def with_room(shape: tuple[int, ...], dtype: Any, fill: float | None = None) -> 
 
 
 def reshaped(array: Any, shape: tuple[int, ...]) -> Any:
-    """The memory of an array made by `with_room` as one of another shape, or None where that is larger."""
+    """The memory of an array made by `with_room` as one of another shape, or None where that does not fit.
+
+    What fits is not larger, nor so much smaller that more than a quarter would be wasted.
+    """
     size, block = math.prod(shape), array.base
-    room = LINE // block.itemsize
-    return _at_line(block, size).reshape(shape) if size + 16 + room <= block.size else None
+    needed = size + 16 + LINE // block.itemsize
+    return _at_line(block, size).reshape(shape) if needed <= block.size <= 1.25 * needed else None
 
 
 def _at_line(block: Any, size: int) -> Any:

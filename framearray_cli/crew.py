@@ -22,13 +22,16 @@ RAYS = 4096
 
 
 class Shelf:
-    """Arrays of frames that were dropped, for the next frame to use: fresh memory costs the system a page at a time."""
+    """Arrays of frames that were dropped, for the next frame to use: fresh memory costs the system a page at a time.
+
+    Frames have about as many mirror hits as their neighbours; native ones are up to twice as many at the path's ends.
+    """
 
     def __init__(self) -> None:
         self._kept: dict[str, list[Any]] = {}
 
     def take(self, name: str, shape: tuple[int, ...], dtype: Any) -> Any:
-        """An array of a shape, contents arbitrary; kept ones of that name that are too small are let go."""
+        """An array of a shape, contents arbitrary; kept ones of that name that do not fit are let go."""
         kept = self._kept.get(name, [])
         while kept:
             array = reshaped(kept.pop(), shape)
