@@ -155,7 +155,7 @@ class _Pilot:
         block, density = np.empty((2, n, len(eyes)), np.int32), np.empty((2, n, len(eyes)))
         for first in range(0, n, batch):
             span = slice(first, min(first + batch, n))
-            pair = _of_samples(span.stop - span.start)
+            pair = of_samples(span.stop - span.start)
             radiance = self._radiance(c, pixels[span], scratch)[pair]
             mean += float(radiance.sum(dtype=np.float64)) / (2 * n * radiance[0, 0].size)
             # two values of one hit each tell its variance
@@ -206,7 +206,7 @@ class _Pilot:
         return self.blocks.of_pixel[pixel[:, :n]].T, np.minimum(ratio, MOST_DENSE).T
 
 
-def _of_samples(n: int) -> Int32:
+def of_samples(n: int) -> Int32:
     """Where `native_hits` puts the two hits of each of n pixels, (2, n): by groups of 16 pixels, then by sample."""
     pixel = np.arange(n)
     group, members = pixel // LANES * LANES, np.minimum(n - pixel // LANES * LANES, LANES)

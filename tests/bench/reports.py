@@ -23,10 +23,11 @@ QUALITY = 88  # of the crops' JPG
 PAGE = """
 # Speed against error: {name}
 
-`framearray report jobs/{name}.toml`: {cameras} cameras under {lights} light positions, at {width} x {height} pixels,
-against references of {reference_hits:,} hits a pixel, which are themselves off by {reference_noise}. RMSE over the
-mean of the reference; ms an image before writing, of all {n_lights} light positions. {machine}. Written by
-`python -m bench report {name}`, from the folder `tests`.
+What each setting of a job buys and costs: the report of `framearray report jobs/{name}.toml`, as
+`python -m bench report {name}` wrote it, from the folder `tests`. {cameras} cameras under {lights} light positions, at
+{width} x {height} pixels, against references of {reference_hits:,} hits a pixel, which are themselves off by
+{reference_noise}. RMSE over the mean of the reference; ms an image before writing, of all {n_lights} light positions.
+Machine: {machine}.
 
 {summary}
 
@@ -85,7 +86,7 @@ def write(name: str) -> None:
         width=width,
         height=height,
         n_lights=about["n_lights"],
-        machine=about["machine"],
+        machine="{processor}, {cores} cores".format(**about["machine"]),
         reference_hits=table["reference"]["hits"],
         reference_noise=percent(table["reference"]["rmse"], 2),
         summary=summary(table),

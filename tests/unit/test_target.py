@@ -13,11 +13,14 @@ from tiny import WALK
 from framearray_cli.allotment import Allotment, blocks_of
 from framearray_cli.camera import OUTSIDE
 from framearray_cli.errors import JobError
+from framearray_cli.eyehits import native_hits
 from framearray_cli.frame import find_frame
+from framearray_cli.hits import empty_hits
 from framearray_cli.job import Job
 from framearray_cli.memory import require_memory
+from framearray_cli.rays import room_for_hits
 from framearray_cli.reuse import balance_weights, expect_hits, of_one_hit
-from framearray_cli.target import aimed
+from framearray_cli.target import aimed, of_samples
 from framearray_cli.window import Window
 
 
@@ -68,6 +71,22 @@ def test_frames_rest_on_the_hits_that_were_allotted(weights: str) -> None:
                 own, counts = np.diff(frame.places[c].start), work.allotment.counts(c)
                 np.testing.assert_array_equal(own, counts)
                 window.add(frame)
+
+
+@pytest.mark.parametrize("n", [1, 15, 16, 17, 100])
+def test_pairs_are_two_hits_of_one_pixel(n: int) -> None:
+    inputs = tiny.prepared(job(samples={"error": 0.1}))
+    with tiny.open_embree(inputs) as embree:
+        work, _ = tiny.plan_work(inputs, embree)
+        pixels, hits = work.order[:n], empty_hits(2 * n)
+        native_hits(
+            work.cams, 0, 3, pixels, 2, 0, 0, 2 * n, work.surfaces, work.tracer, True,
+            room_for_hits(2 * n).packets, hits, True,
+        )  # fmt: skip
+    pair = of_samples(n)
+    assert sorted(pair.ravel()) == list(range(2 * n))
+    np.testing.assert_array_equal(hits.pixel[pair], [pixels, pixels])
+    np.testing.assert_array_equal(hits.half[pair], [[0] * n, [1] * n])  # even and odd: independent of each other
 
 
 def test_noisier_places_get_more_hits() -> None:
