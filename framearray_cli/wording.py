@@ -22,8 +22,8 @@ def estimate_lines(estimate: "Estimate") -> list[str]:
     return [
         *scene_lines(prepared),
         *(estimate.choice.lines() if estimate.choice else []),
-        *(estimate.target.lines() if estimate.target else []),
         *ambient_lines(estimate.ambient),
+        *(estimate.target.lines() if estimate.target else []),
         f"array: {n_c:,} cameras x {n_l:,} lights = {n_c * n_l:,} images of {width} x {height}",
         f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_blocks(estimate.blocks)}",
         f"disk: about {size(estimate.disk)} in {job.output.directory}, {size(estimate.free)} free",
