@@ -32,7 +32,7 @@ SEEDS = {"average": 10_000, "balance": 20_000, "reference": 2_000_000_000}
 EPSILON = 0.01  # of relative squares: (I - R)^2 / (R^2 + EPSILON)
 USUAL = 2  # native hits a pixel a frame, as jobs have them
 # Times as many runs as the cabin needs: patches of sunlight make most of the noise.
-MORE = {"kitchen": 5, "stairs": 2, "cabin": 1}
+MORE = {"kitchen": 9, "stairs": 2, "cabin": 1}
 # Parts of a picture beside those of `regions`: all of it, and all of it with relative squares.
 WHOLE, RELATIVE = "all", "relative"
 
