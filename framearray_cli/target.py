@@ -216,9 +216,8 @@ def of_samples(n: int) -> Int32:
 
 def _radiance(work: Work, ambient: Ambient, records: Records) -> Float32:
     """What an image of each hit alone would show under every light, (n, n_lights, 3)."""
-    row = records.row.astype(np.float32)
-    triple = {at: row[:, None, at : at + 3] for at in (STEADY, INDIRECT, REFLECTIVITY)}
+    triple = {at: records.row[:, None, at : at + 3] for at in (STEADY, INDIRECT, REFLECTIVITY)}
     direct = np.swapaxes(records.irradiance, 1, 2) * work.lights.colour / np.float32(np.pi)
-    indirect = ambient.intensity.astype(np.float32) * triple[INDIRECT]
+    indirect = ambient.intensity * triple[INDIRECT]
     radiance: Float32 = triple[STEADY] + triple[REFLECTIVITY] * direct + indirect
     return radiance
