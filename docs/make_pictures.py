@@ -16,7 +16,8 @@ from framearray_cli.colour import srgb8_from_linear
 from framearray_cli.images import read_image, read_layers
 from framearray_cli.job import Job
 from framearray_cli.jobfile import job_table, read_job
-from framearray_cli.manifest import Manifest, image_path, layers_path, read_manifest
+from framearray_cli.manifest import Manifest, image_path, layers_path
+from framearray_cli.manifestfile import read_manifest
 from framearray_cli.paths import eyes, lights
 from framearray_cli.render import render
 

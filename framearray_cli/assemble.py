@@ -15,7 +15,8 @@ from .errors import OutputError
 from .files import make_folder, reason
 from .imageattributes import frame_attributes
 from .images import Extension, ImageFormat, read_codes, read_image, write_image
-from .manifest import Manifest, image_path, read_manifest
+from .manifest import Manifest, image_path
+from .manifestfile import read_manifest
 from .moviepath import frame_list, load_movie_path, movie_fps
 from .movies import CONTAINERS, open_movie, require_av
 

@@ -1,11 +1,10 @@
 """Manifest: what a folder of images holds, so that a program which never saw the renderer can use it.
 
-`manifest.toml` is read by people first: short keys on top, then the job, then one block a camera and a light.
+Notation: a place is a tuple of indices, one for each light axis, in the order of `Manifest.axes`.
 """
 
 import math
-import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -15,10 +14,9 @@ import numpy as np
 from .arrays import Float64
 from .errors import OutputError
 from .filepatterns import check_pattern
-from .files import reason, write_bytes
 
 FILE_NAME = "manifest.toml"
-FORMAT = 1  # of the manifest itself; a program that knows format 1 may not understand 2
+MAIN_AXIS = "light"  # the axis of sources that name none
 
 Vector: TypeAlias = tuple[float, float, float]
 Row: TypeAlias = tuple[float, float, float, float]
@@ -75,6 +73,29 @@ class ManifestLight:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ManifestGroup:
+    """Sources whose light is stored by itself, so that it can be changed afterwards.
+
+    Attributes:
+        name: of the group.
+        axis: of light positions that the group's images are numbered along; groups of one axis move together.
+        images: file pattern with {camera} and {light}: the direct light of this group alone.
+        lights: positions along the axis; `ambient` is what this group adds to I_A.
+    """
+
+    name: str
+    axis: str
+    images: str
+    lights: tuple[ManifestLight, ...]
+
+    def __post_init__(self) -> None:
+        for key in ("name", "axis", "images"):
+            value = getattr(self, key)
+            _check(isinstance(value, str) and bool(value), f"{key}: expected text, got {value!r}")
+        _check(bool(self.lights), "lights: expected at least one")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Manifest:
     """What an output folder holds.
 
@@ -82,12 +103,17 @@ class Manifest:
         version: of the program that rendered it.
         name: of the job.
         fingerprint: of job and scene, see fingerprint.py.
-        images: file pattern with {camera} and {light}, relative to the folder, "/" between folders.
+        images: file pattern with {camera} and {light}, relative to the folder, "/" between folders; "" in an array
+            with groups.
         layers: file pattern with {camera}, or "" where no layers were written.
         resolution: width, height, pixels.
         fps: frames per second.
         cameras: N_c eyes.
-        lights: N_l light indices.
+        lights: N_l light indices; none in an array with groups.
+        groups: what is stored in place of `images`, if the job has groups of sources.
+        ambient_images: file pattern with {camera}: R W, which I_A multiplies; "" without groups.
+        background_images: file pattern with {camera}: what comes from the background; "" where that is black.
+        background_ambient: what the background adds to I_A, RGB.
         job: the job as resolved, a plain table.
         scene: what the scene file held, a plain table.
         summary: how the run went, a plain table.
@@ -97,19 +123,23 @@ class Manifest:
     version: str
     name: str
     fingerprint: str
-    images: str
+    images: str = ""
     layers: str = ""
     resolution: tuple[int, int]
     fps: float
     cameras: tuple[ManifestCamera, ...]
-    lights: tuple[ManifestLight, ...]
+    lights: tuple[ManifestLight, ...] = ()
+    groups: tuple[ManifestGroup, ...] = ()
+    ambient_images: str = ""
+    background_images: str = ""
+    background_ambient: Vector = (0.0, 0.0, 0.0)
     job: dict[str, Any] = field(default_factory=dict)
     scene: dict[str, Any] = field(default_factory=dict)
     summary: dict[str, Any] = field(default_factory=dict)
     directory: Path = field(default_factory=Path, compare=False)
 
     def __post_init__(self) -> None:
-        for key in ("version", "name", "fingerprint", "images", "layers"):
+        for key in ("version", "name", "fingerprint", "images", "layers", "ambient_images", "background_images"):
             _check(isinstance(getattr(self, key), str), f"{key}: expected text, got {getattr(self, key)!r}")
         for key in ("job", "scene", "summary"):
             _check(isinstance(getattr(self, key), dict), f"{key}: expected a table, got {getattr(self, key)!r}")
@@ -120,10 +150,28 @@ class Manifest:
         _check(whole, f"resolution: expected 2 positive whole numbers, got {sizes!r}")
         _check(_is_number(self.fps) and self.fps > 0, f"fps: expected a positive number, got {self.fps!r}")
         _check(bool(self.cameras), "cameras: expected at least one")
-        _check(bool(self.lights), "lights: expected at least one")
-        check_pattern("images", self.images, {"camera": self.n_cameras > 1, "light": self.n_lights > 1})
-        if self.layers:
-            check_pattern("layers", self.layers, {"camera": self.n_cameras > 1})
+        ambient = self.background_ambient
+        _check(_is_vector(ambient, 3), f"background_ambient: expected 3 finite numbers, got {ambient!r}")
+        moves = self.n_cameras > 1
+        if self.groups:
+            self._check_groups()
+        else:
+            _check(bool(self.lights), "lights: expected at least one")
+            check_pattern("images", self.images, {"camera": moves, "light": self.n_lights > 1})
+        for key in ("layers", "ambient_images", "background_images"):
+            if pattern := getattr(self, key):
+                check_pattern(key, pattern, {"camera": moves})
+
+    def _check_groups(self) -> None:
+        _check(not self.images and not self.lights, "groups: expected no images and lights beside them")
+        _check(bool(self.ambient_images), "ambient_images: expected file names, as there are groups")
+        names = [group.name for group in self.groups]
+        _check(len(set(names)) == len(names), f"groups: expected different names, got {', '.join(names)}")
+        axes = self.axes
+        for k, group in enumerate(self.groups):
+            n = len(group.lights)
+            _check(n == axes[group.axis], f"groups[{k}]: expected {axes[group.axis]} lights, as others of its axis")
+            check_pattern(f"groups[{k}].images", group.images, {"camera": self.n_cameras > 1, "light": n > 1})
 
     @property
     def n_cameras(self) -> int:
@@ -131,9 +179,17 @@ class Manifest:
         return len(self.cameras)
 
     @property
+    def axes(self) -> dict[str, int]:
+        """Light positions along each axis, by name: the main one first, if anything moves along it."""
+        if not self.groups:
+            return {MAIN_AXIS: len(self.lights)}
+        found = {group.axis: len(group.lights) for group in reversed(self.groups)}
+        return {axis: found[axis] for axis in sorted(found, key=lambda axis: (axis != MAIN_AXIS, axis))}
+
+    @property
     def n_lights(self) -> int:
-        """N_l."""
-        return len(self.lights)
+        """N_l: light positions along the first axis."""
+        return next(iter(self.axes.values()))
 
 
 def matrix_rows(matrix: Float64) -> Matrix:
@@ -142,15 +198,30 @@ def matrix_rows(matrix: Float64) -> Matrix:
     return a, b, c, d  # type: ignore[return-value]  # lengths are checked by ManifestCamera
 
 
-def image_path(manifest: Manifest, c: int, l: int) -> Path:
-    """Find the file of image [c, l].
+def image_path(manifest: Manifest, c: int, l: int, group: ManifestGroup | None = None) -> Path:
+    """Find the file of image [c, l], or that of a group.
 
     Raises:
         OutputError: the array has no such image.
     """
+    if group is None and manifest.groups:
+        names = ", ".join(known.name for known in manifest.groups)
+        raise OutputError(f"{manifest.directory}: images are stored by group of sources; expected one of {names}")
     _check_index(manifest, "camera", c, manifest.n_cameras)
-    _check_index(manifest, "light", l, manifest.n_lights)
-    return manifest.directory / manifest.images.format(camera=c, light=l)
+    _check_index(manifest, "light", l, len(group.lights) if group else manifest.n_lights)
+    pattern = group.images if group else manifest.images
+    return manifest.directory / pattern.format(camera=c, light=l)
+
+
+def array_files(manifest: Manifest) -> Iterator[Path]:
+    """All files of the array but the manifest, whether they exist or not."""
+    for c in range(manifest.n_cameras):
+        for pattern in (manifest.layers, manifest.ambient_images, manifest.background_images):
+            if pattern:
+                yield manifest.directory / pattern.format(camera=c)
+        for group in manifest.groups or (None,):
+            for l in range(len(group.lights) if group else manifest.n_lights):
+                yield image_path(manifest, c, l, group)
 
 
 def layers_path(manifest: Manifest, c: int) -> Path:
@@ -163,112 +234,6 @@ def layers_path(manifest: Manifest, c: int) -> Path:
     if not manifest.layers:
         raise OutputError(f"{manifest.directory}: this frame array was written without layers")
     return manifest.directory / manifest.layers.format(camera=c)
-
-
-def write_manifest(directory: Path, manifest: Manifest) -> Path:
-    """Write `manifest.toml` into a folder, whole or not at all.
-
-    Returns:
-        The file.
-
-    Raises:
-        OutputError: the file cannot be written.
-    """
-    target = directory / FILE_NAME
-    write_bytes(target, to_toml(manifest).encode())
-    return target
-
-
-def read_manifest(place: Path) -> Manifest:
-    """Read the manifest of an output folder, given the folder or the file.
-
-    Raises:
-        OutputError: it is missing, broken, made by a newer program, or leads out of its folder.
-    """
-    path = place / FILE_NAME if place.is_dir() else place
-    try:
-        table = tomllib.loads(path.read_bytes().decode())
-    except FileNotFoundError as error:
-        raise OutputError(f"{path}: no such file; expected the output folder of `framearray render`") from error
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be read: {reason(error)}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        raise OutputError(f"{path}: not valid TOML: {error}; render again, or restore the file") from error
-    found = table.get("format")
-    if found != FORMAT:
-        advice = "; use a newer framearray" if isinstance(found, int) and found > FORMAT else ""
-        raise OutputError(f"{path}: format: expected {FORMAT}, got {found!r}{advice}")
-    try:
-        return _from_table(table, path.parent)
-    except (ValueError, TypeError) as error:
-        raise OutputError(f"{path}: {error}") from error
-
-
-def to_toml(manifest: Manifest) -> str:
-    """Write a manifest as TOML text."""
-    import tomli_w
-
-    head = {
-        "format": FORMAT,
-        "version": manifest.version,
-        "name": manifest.name,
-        "fingerprint": manifest.fingerprint,
-        "images": manifest.images,
-        "layers": manifest.layers,
-        "resolution": list(manifest.resolution),
-        "fps": manifest.fps,
-        "n_cameras": manifest.n_cameras,
-        "n_lights": manifest.n_lights,
-    }
-    tables = {"summary": manifest.summary, "scene": manifest.scene, "job": manifest.job}
-    text = ["# A frame array; docs/manifest.md explains the keys.\n", tomli_w.dumps(_plain(head | tables))]
-    # Written by hand, because a matrix on one line is easier to read than on the 22 lines of tomli_w.
-    for c, camera in enumerate(manifest.cameras):
-        rows = ", ".join(_numbers(row) for row in camera.world_from_camera)
-        text.append(f"\n[[cameras]]  # {c}\nworld_from_camera = [{rows}]\nfov = {float(camera.fov)!r}\n")
-    for l, light in enumerate(manifest.lights):
-        text.append(f"\n[[lights]]  # {l}\nambient = {_numbers(light.ambient)}\n")
-        text.append(f"ambient_error = {_numbers(light.ambient_error)}\nsources = [\n")
-        text.extend(f"    {_inline(_plain(source))},\n" for source in light.sources)
-        text.append("]\n")
-    return "".join(text)
-
-
-def _from_table(table: Mapping[str, Any], directory: Path) -> Manifest:
-    """Build a manifest from what the file says; keys of no concern here are left alone."""
-    cameras = tuple(
-        _built(f"cameras[{c}]", ManifestCamera, camera, ("world_from_camera", "fov"))
-        for c, camera in enumerate(_tables(table, "cameras"))
-    )
-    lights = tuple(
-        _built(f"lights[{l}]", ManifestLight, light, ("ambient", "ambient_error", "sources"))
-        for l, light in enumerate(_tables(table, "lights"))
-    )
-    needed = ("version", "name", "fingerprint", "images", "resolution", "fps")
-    rest = {key: table[key] for key in ("layers", "job", "scene", "summary") if key in table}
-    missing = [key for key in needed if key not in table]
-    _check(not missing, f"expected the keys {', '.join(missing)}, found none")
-    rest |= {key: _frozen(table[key]) for key in needed}
-    manifest = Manifest(cameras=cameras, lights=lights, directory=directory, **rest)
-    for key, count in (("n_cameras", manifest.n_cameras), ("n_lights", manifest.n_lights)):
-        _check(table.get(key, count) == count, f"{key}: says {table.get(key)!r}, but {count} are listed")
-    return manifest
-
-
-def _built(place: str, kind: type[Any], table: Mapping[str, Any], keys: Sequence[str]) -> Any:
-    """Make one camera or light; a ValueError starts with its place in the file."""
-    try:
-        missing = [key for key in keys if key not in table]
-        _check(not missing, f"expected the keys {', '.join(missing)}, found none")
-        return kind(**{key: _frozen(table[key]) for key in keys})
-    except (ValueError, TypeError) as error:
-        raise ValueError(f"{place}: {error}") from error
-
-
-def _tables(table: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
-    found = table.get(key, [])
-    _check(isinstance(found, list) and all(isinstance(item, dict) for item in found), f"{key}: expected tables")
-    return list(found)
 
 
 def _check_index(manifest: Manifest, axis: str, index: int, count: int) -> None:
@@ -287,35 +252,3 @@ def _is_number(value: object) -> bool:
 
 def _is_vector(value: object, length: int) -> bool:
     return isinstance(value, tuple) and len(value) == length and all(_is_number(item) for item in value)
-
-
-def _frozen(value: Any) -> Any:
-    """Turn lists into tuples, all the way down; tables stay."""
-    return tuple(_frozen(item) for item in value) if isinstance(value, list) else value
-
-
-def _plain(value: Any) -> Any:
-    """Turn a value into what TOML can hold: numpy values, tuples and paths become plain, None is left out."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items() if item is not None}
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value if item is not None]
-    return str(value) if isinstance(value, Path) else value
-
-
-def _numbers(values: Sequence[float]) -> str:
-    """Write numbers on one line; `repr` gives the shortest text that reads back as the same float."""
-    return f"[{', '.join(repr(float(value)) for value in values)}]"
-
-
-def _inline(value: Any) -> str:
-    """Write a plain value on one line."""
-    import tomli_w
-
-    if isinstance(value, dict):
-        return f"{{ {', '.join(f'{key} = {_inline(item)}' for key, item in value.items())} }}"
-    if isinstance(value, list):
-        return f"[{', '.join(_inline(item) for item in value)}]"
-    return tomli_w.dumps({"x": value}).removeprefix("x = ").rstrip("\n")

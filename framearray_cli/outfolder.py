@@ -7,7 +7,8 @@ from typing import Any
 
 from .errors import OutputError
 from .files import make_folder, reason
-from .manifest import FILE_NAME, Manifest, image_path, layers_path, read_manifest
+from .manifest import FILE_NAME, Manifest, array_files
+from .manifestfile import read_manifest
 
 
 def claim_folder(folder: Path, name: str, fingerprint: str, output: dict[str, Any], *, restart: bool) -> int:
@@ -63,7 +64,7 @@ def is_same(old: Manifest, name: str, fingerprint: str, output: dict[str, Any]) 
 
 def in_the_way(old: Manifest) -> str:
     """Say what lies in a folder, and what can be done."""
-    images = f"{old.n_cameras} x {old.n_lights} images"
+    images = f"{old.n_cameras} x {' x '.join(map(str, old.axes.values()))} images"
     return (
         f"holds another frame array, {old.name!r} with {images}, made by a different job or from a different scene; "
         "choose another folder with --output, or remove that array with --restart"
@@ -83,11 +84,8 @@ def remove_array(old: Manifest) -> int:
     Raises:
         OSError: one of them cannot be removed.
     """
-    files = [image_path(old, c, l) for c in range(old.n_cameras) for l in range(old.n_lights)]
-    if old.layers:
-        files += [layers_path(old, c) for c in range(old.n_cameras)]
     removed = 0
-    for file in (*files, old.directory / FILE_NAME):
+    for file in (*array_files(old), old.directory / FILE_NAME):
         if file.is_file() or file.is_symlink():
             file.unlink()
             removed += 1

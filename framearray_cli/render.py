@@ -16,7 +16,8 @@ from .filepatterns import file_patterns
 from .frame import find_frame
 from .job import Job
 from .jobfile import job_table
-from .manifest import Manifest, ManifestCamera, ManifestLight, matrix_rows, write_manifest
+from .manifest import Manifest, ManifestCamera, ManifestLight, matrix_rows
+from .manifestfile import write_manifest
 from .memory import light_blocks, mirror_share, peak_memory, require_memory
 from .outfolder import claim_folder
 from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare

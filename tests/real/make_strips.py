@@ -13,7 +13,8 @@ from PIL import Image
 
 from framearray_cli.colour import srgb8_from_linear
 from framearray_cli.images import read_image
-from framearray_cli.manifest import image_path, read_manifest
+from framearray_cli.manifest import image_path
+from framearray_cli.manifestfile import read_manifest
 
 # kind, camera, light; of a scene with fewer, the last one
 CHOSEN = (("sun", 0, 0), ("sun", 3, 2), ("lamp", 2, 0), ("lamp", 5, 3))

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from framearray_cli.images import read_image
 from framearray_cli.job import Job
-from framearray_cli.manifest import image_path, read_manifest
+from framearray_cli.manifest import image_path
+from framearray_cli.manifestfile import read_manifest
 from framearray_cli.render import Listener, render
 from framearray_cli.terms.ambient import Ambient
 

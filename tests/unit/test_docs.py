@@ -12,7 +12,8 @@ from typer.testing import CliRunner
 
 from framearray_cli.cli import app
 from framearray_cli.images import read_codes
-from framearray_cli.manifest import image_path, layers_path, read_manifest
+from framearray_cli.manifest import image_path, layers_path
+from framearray_cli.manifestfile import read_manifest
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

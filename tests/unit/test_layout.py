@@ -25,12 +25,14 @@ rays hits eyehits plan allotment
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
 terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise standarderror compose accumulate window
-imageattributes images manifest outfolder writer
+imageattributes images manifest manifestfile pictures outfolder writer
 prepare memory acceptance expected auto allot target render check
 moviepath movies assemble
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
-screen interrupts wording cli __main__
+screen interrupts wording
+commands/__init__ commands/options commands/render commands/check commands/assemble commands/report commands/schema
+cli __main__
 """
 ORDER = FLOW.split()
 
@@ -49,12 +51,12 @@ DOORS = {
     "trimesh": ("meshes/",),
     "OpenImageIO": ("images",),
     "PIL": ("meshes/", "images"),
-    "tomllib": ("jobfile", "manifest"),
-    "tomli_w": ("manifest", "report/tables"),
+    "tomllib": ("jobfile", "manifestfile"),
+    "tomli_w": ("manifestfile", "report/tables"),
     "matplotlib": ("report/plots",),
     "jinja2": ("report/page",),
     "flip_evaluator": ("report/flip",),
-    "typer": ("cli",),
+    "typer": ("cli", "commands/"),
     "rich": ("screen",),
     "av": ("movies",),
     "scipy": ("paths", "standarderror", "allotment"),

@@ -10,17 +10,8 @@ import pytest
 from framearray_cli.errors import OutputError
 from framearray_cli.filepatterns import file_patterns
 from framearray_cli.fingerprint import fingerprint
-from framearray_cli.manifest import (
-    Manifest,
-    ManifestCamera,
-    ManifestLight,
-    image_path,
-    layers_path,
-    matrix_rows,
-    read_manifest,
-    to_toml,
-    write_manifest,
-)
+from framearray_cli.manifest import Manifest, ManifestCamera, ManifestLight, image_path, layers_path, matrix_rows
+from framearray_cli.manifestfile import read_manifest, to_toml, write_manifest
 
 
 def make_manifest(n_cameras: int = 3, n_lights: int = 2, **changes: Any) -> Manifest:
@@ -174,8 +165,8 @@ def test_a_pattern_may_leave_out_an_axis_of_length_one() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("format = 1", "format = 2", "format: expected 1, got 2; use a newer framearray"),
-        ("format = 1", "", "format: expected 1, got None"),
+        ("format = 1", "format = 3", "format: expected 1 or 2, got 3; use a newer framearray"),
+        ("format = 1", "", "format: expected 1 or 2, got None"),
         ("fps = 23.976", "fps = 0", "fps: expected a positive number, got 0"),
         ("fps = 23.976", "fps = nan", "fps: expected a positive number, got nan"),
         ("fps = 23.976", "", "expected the keys fps, found none"),

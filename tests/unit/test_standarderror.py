@@ -11,7 +11,7 @@ from tiny import WALK
 from framearray_cli.frame import find_frame
 from framearray_cli.images import read_image, read_layers
 from framearray_cli.job import Job
-from framearray_cli.manifest import read_manifest
+from framearray_cli.manifestfile import read_manifest
 from framearray_cli.render import render
 from framearray_cli.standarderror import fill_unknown, half_factors, standard_error, summed_up
 from framearray_cli.window import Window

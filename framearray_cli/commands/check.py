@@ -1,0 +1,18 @@
+"""`framearray check`."""
+
+from ..compiling import compile_clock
+from ..screen import Screen, out, say
+from ..wording import estimate_lines
+from .options import JobFile, Output, Threads, read
+
+
+def check(job_file: JobFile, threads: Threads = None, output: Output = None) -> None:
+    """Validate a job and its scene, and tell its size, memory, disk and time, without rendering it."""
+    job = read(job_file, threads, output)
+    with Screen(out) as screen:
+        screen.wait("reading the scene and rendering a few small frames")
+        from ..check import check as run
+
+        with compile_clock(screen.compiling):
+            estimate = run(job)
+    say(out, estimate_lines(estimate))

@@ -1,0 +1,66 @@
+"""Options and endings that several commands share."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from ..errors import JobError
+from ..screen import err, say
+
+if TYPE_CHECKING:
+    from ..job import Job
+
+MOST_THREADS = 1024  # as in the job file
+
+JobFile = Annotated[Path, typer.Argument(metavar="JOB", help="Job file, TOML.", show_default=False)]
+Threads = Annotated[
+    int | None,
+    typer.Option(
+        "--threads", min=1, max=MOST_THREADS, help="Threads; default: the job's, else one for each core.", metavar="N"
+    ),
+]
+Output = Annotated[
+    str | None,
+    typer.Option("--output", "-o", help="Folder for the images, instead of the job's.", metavar="FOLDER"),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+
+
+def read(job_file: Path, threads: int | None, output: str | None) -> "Job":
+    """Read a job file; options replace what it says."""
+    from ..jobfile import read_job
+
+    job = read_job(job_file)
+    updates: dict[str, Any] = {}
+    if threads is not None:
+        updates["render"] = job.render.model_copy(update={"threads": threads})
+    if output is not None:
+        updates["output"] = job.output.model_copy(update={"directory": place(output).absolute()})
+    return job.model_copy(update=updates)
+
+
+def place(name: str) -> Path:
+    """A file or folder to write to."""
+    if not name.strip():  # most often a shell variable that is not set; Path would make "." of it
+        raise typer.BadParameter("expected a name, got none", param_hint="--output")
+    return Path(name)
+
+
+def problems(error: JobError, outcome: str) -> list[str]:
+    """The problems of a job or path file, and what came of them."""
+    n = len(error.problems)
+    return [*str(error).splitlines(), f"{n} problem{'s' if n > 1 else ''}; {outcome}."]
+
+
+def fail(lines: Sequence[str], code: int) -> NoReturn:
+    """Print what is wrong and end the process."""
+    say(err, lines)
+    sys.exit(code)
+
+
+def notes(error: BaseException) -> list[str]:
+    """What was added to an error on its way."""
+    return list(getattr(error, "__notes__", ()))

@@ -1,0 +1,75 @@
+"""`framearray render`."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..compiling import compile_clock
+from ..errors import OutputError
+from ..screen import Screen, out, say, size
+from ..wording import ambient_lines, scene_lines, summary_lines
+from .options import JobFile, Output, Quiet, Threads, read
+
+if TYPE_CHECKING:
+    from ..auto import Choice
+    from ..prepare import Prepared
+    from ..target import Target
+    from ..terms.ambient import Ambient
+
+LITTLE_SPACE = 64 * 1024 * 1024  # bytes; with less, a full disk is the likely reason of an error
+
+
+def render(
+    job_file: JobFile,
+    threads: Threads = None,
+    output: Output = None,
+    restart: Annotated[bool, typer.Option("--restart", help="Remove the frame array in the folder first.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Render every (camera, light) image of a job into a folder, with a manifest."""
+    job = read(job_file, threads, output)
+    with Screen(out, quiet=quiet) as screen:
+        screen.wait("reading the scene")
+        from ..outfolder import free_space
+        from ..render import Listener
+        from ..render import render as run
+
+        class Shown(Listener):
+            """Prints the scene, then the ambient light, then a progress bar."""
+
+            def prepared(self, prepared: "Prepared") -> None:
+                screen.say(scene_lines(prepared))
+                screen.wait("estimating the ambient light")
+                self.total = prepared.n_cameras * prepared.n_lights
+
+            def removed(self, files: int) -> None:
+                if files:
+                    screen.say([f"removed {files:,} files of the frame array in {job.output.directory}"])
+
+            def settled(self, choice: "Choice") -> None:
+                screen.say(choice.lines())
+
+            def planned(self, ambient: "Ambient") -> None:
+                screen.say(ambient_lines(ambient))
+                self.told = ambient.notes
+                screen.count("rendering", self.total, "image")
+
+            def aimed(self, target: "Target") -> None:
+                screen.say(target.lines())
+
+            def written(self, images: int) -> None:
+                screen.advance(images)
+
+        shown = Shown()
+        try:
+            with compile_clock(screen.compiling):
+                summary = run(job, shown, restart=restart)
+        except BaseException as error:
+            if isinstance(error, OutputError) and (free := free_space(job.output.directory)) < LITTLE_SPACE:
+                error.add_note(f"{size(free)} are free on that disk")
+            if screen.done:
+                done = f"{screen.done:,} of {screen.total:,} images are in {job.output.directory}"
+                error.add_note(f"{done}; its manifest says that it is not finished")
+            raise
+    if not quiet:
+        say(out, summary_lines(summary, shown.told, job))

@@ -1,0 +1,77 @@
+"""`framearray report`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..compiling import compile_clock
+from ..screen import Screen, out, say
+from ..wording import report_lines, scene_lines
+from .options import JobFile, Quiet, Threads, read
+
+if TYPE_CHECKING:
+    from ..report.case import Case
+
+
+def report(
+    job_file: JobFile,
+    folder: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder of the report; default: beside the images.", metavar="FOLDER"),
+    ] = None,
+    camera: Annotated[
+        list[int] | None, typer.Option("--camera", help="A camera to look at; may be repeated.", metavar="C")
+    ] = None,
+    light: Annotated[
+        list[int] | None, typer.Option("--light", help="A light position to look at; may be repeated.", metavar="L")
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary", help="Values of a setting to try: samples.hits=1,2,4; may be repeated.", metavar="KEY=VALUES"
+        ),
+    ] = None,
+    error: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--error", min=1e-6, help="RMSE to find the cheapest settings for: 0.05; may be repeated.", metavar="E"
+        ),
+    ] = None,
+    times: Annotated[
+        float, typer.Option("--times", min=1, help="Samples of a reference over those of a picture.", metavar="N")
+    ] = 100.0,
+    threads: Threads = None,
+    quiet: Quiet = False,
+) -> None:
+    """Measure what each setting of a job buys and costs: speed against error, as a page with tables and plots."""
+    job = read(job_file, threads, None)
+    with Screen(out, quiet=quiet) as screen:
+        screen.wait("reading the scene")
+        from .. import report as reporting
+
+        class Shown(reporting.Listener):
+            """Prints the scene, then a progress bar."""
+
+            def opened(self, case: "Case") -> None:
+                screen.say(scene_lines(case.prepared))
+
+            def planned(self, references: int, settings: int) -> None:
+                screen.count("measuring", references + settings, "step")
+
+            def done(self) -> None:
+                screen.advance()
+
+        wish = reporting.Wish(
+            cameras=camera or (),
+            lights=light or (),
+            vary=dict(reporting.read_vary(option, job) for option in vary or ()),
+            errors=error or (),
+            times=times,
+        )
+        place = folder.absolute() if folder else job.output.directory.with_name(f"{job.output.directory.name}-report")
+        with compile_clock(screen.compiling):
+            made = reporting.make_report(job, place, wish, Shown())
+        reporting.write_report(made)
+    if not quiet:
+        say(out, report_lines(made))

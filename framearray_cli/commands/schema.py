@@ -1,0 +1,12 @@
+"""`framearray schema`."""
+
+from ..screen import out, say
+
+
+def schema() -> None:
+    """Print the JSON Schema of job files, for editors that complete and check them."""
+    import json
+
+    from ..jobfile import job_schema
+
+    say(out, json.dumps(job_schema(), indent=2).splitlines())

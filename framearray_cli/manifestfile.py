@@ -1,0 +1,176 @@
+"""`manifest.toml`: short keys on top, then the job, then one block a camera and a light; people read it first."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .errors import OutputError
+from .files import reason, write_bytes
+from .manifest import FILE_NAME, Manifest, ManifestCamera, ManifestGroup, ManifestLight
+
+# Of the manifest itself; a program that knows format 1 may not understand 2, which has groups of sources.
+FORMAT, FORMAT_OF_GROUPS = 1, 2
+
+_LIGHT_KEYS = ("ambient", "ambient_error", "sources")
+
+
+def write_manifest(directory: Path, manifest: Manifest) -> Path:
+    """Write `manifest.toml` into a folder, whole or not at all.
+
+    Returns:
+        The file.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    target = directory / FILE_NAME
+    write_bytes(target, to_toml(manifest).encode())
+    return target
+
+
+def read_manifest(place: Path) -> Manifest:
+    """Read the manifest of an output folder, given the folder or the file.
+
+    Raises:
+        OutputError: it is missing, broken, made by a newer program, or leads out of its folder.
+    """
+    path = place / FILE_NAME if place.is_dir() else place
+    try:
+        table = tomllib.loads(path.read_bytes().decode())
+    except FileNotFoundError as error:
+        raise OutputError(f"{path}: no such file; expected the output folder of `framearray render`") from error
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be read: {reason(error)}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise OutputError(f"{path}: not valid TOML: {error}; render again, or restore the file") from error
+    found = table.get("format")
+    if found not in (FORMAT, FORMAT_OF_GROUPS):
+        advice = "; use a newer framearray" if isinstance(found, int) and found > FORMAT_OF_GROUPS else ""
+        raise OutputError(f"{path}: format: expected {FORMAT} or {FORMAT_OF_GROUPS}, got {found!r}{advice}")
+    try:
+        return _from_table(table, path.parent)
+    except (ValueError, TypeError) as error:
+        raise OutputError(f"{path}: {error}") from error
+
+
+def to_toml(manifest: Manifest) -> str:
+    """Write a manifest as TOML text."""
+    import tomli_w
+
+    grouped = bool(manifest.groups)
+    keys = ("version", "name", "fingerprint", "images", "layers")
+    more = ("ambient_images", "background_images", "background_ambient", "axes") if grouped else ()
+    head = {"format": FORMAT_OF_GROUPS if grouped else FORMAT}
+    head |= {key: getattr(manifest, key) for key in (*keys, *more) if not (grouped and key == "images")}
+    head |= {key: getattr(manifest, key) for key in ("resolution", "fps", "n_cameras", "n_lights")}
+    tables = {"summary": manifest.summary, "scene": manifest.scene, "job": manifest.job}
+    text = ["# A frame array; docs/manifest.md explains the keys.\n", tomli_w.dumps(_plain(head | tables))]
+    # Written by hand, because a matrix on one line is easier to read than on the 22 lines of tomli_w.
+    for c, camera in enumerate(manifest.cameras):
+        rows = ", ".join(_numbers(row) for row in camera.world_from_camera)
+        text.append(f"\n[[cameras]]  # {c}\nworld_from_camera = [{rows}]\nfov = {float(camera.fov)!r}\n")
+    text.extend(_light_lines("lights", manifest.lights))
+    for group in manifest.groups:
+        names = {"name": group.name, "axis": group.axis, "images": group.images}
+        text.append(f"\n[[groups]]\n{tomli_w.dumps(names)}")
+        text.extend(_light_lines("groups.lights", group.lights))
+    return "".join(text)
+
+
+def _light_lines(key: str, lights: Sequence[ManifestLight]) -> list[str]:
+    """Write a block a light index."""
+    text = []
+    for l, light in enumerate(lights):
+        text.append(f"\n[[{key}]]  # {l}\nambient = {_numbers(light.ambient)}\n")
+        text.append(f"ambient_error = {_numbers(light.ambient_error)}\nsources = [\n")
+        text.extend(f"    {_inline(_plain(source))},\n" for source in light.sources)
+        text.append("]\n")
+    return text
+
+
+def _from_table(table: Mapping[str, Any], directory: Path) -> Manifest:
+    """Build a manifest from what the file says; keys of no concern here are left alone."""
+    cameras = tuple(
+        _built(f"cameras[{c}]", ManifestCamera, camera, ("world_from_camera", "fov"))
+        for c, camera in enumerate(_tables(table, "cameras"))
+    )
+    groups = tuple(_group(k, group) for k, group in enumerate(_tables(table, "groups")))
+    needed = ("version", "name", "fingerprint", "resolution", "fps") + (() if groups else ("images",))
+    optional = ("layers", "job", "scene", "summary", "ambient_images", "background_images", "background_ambient")
+    missing = [key for key in needed if key not in table]
+    _check(not missing, f"expected the keys {', '.join(missing)}, found none")
+    rest = {key: _frozen(table[key]) for key in (*needed, *optional[4:]) if key in table}
+    rest |= {key: table[key] for key in optional[:4] if key in table}
+    lights = _lights("lights", table)
+    manifest = Manifest(cameras=cameras, lights=lights, groups=groups, directory=directory, **rest)
+    for key, count in (("n_cameras", manifest.n_cameras), ("n_lights", manifest.n_lights)):
+        _check(table.get(key, count) == count, f"{key}: says {table.get(key)!r}, but {count} are listed")
+    return manifest
+
+
+def _lights(place: str, table: Mapping[str, Any]) -> tuple[ManifestLight, ...]:
+    lights = _tables(table, "lights")
+    return tuple(_built(f"{place}[{l}]", ManifestLight, light, _LIGHT_KEYS) for l, light in enumerate(lights))
+
+
+def _group(k: int, table: Mapping[str, Any]) -> ManifestGroup:
+    lights = _lights(f"groups[{k}].lights", table)
+    group = {**table, "lights": list(lights)}
+    built: ManifestGroup = _built(f"groups[{k}]", ManifestGroup, group, ("name", "axis", "images", "lights"))
+    return built
+
+
+def _built(place: str, kind: type[Any], table: Mapping[str, Any], keys: Sequence[str]) -> Any:
+    """Make one camera, light or group; a ValueError starts with its place in the file."""
+    try:
+        missing = [key for key in keys if key not in table]
+        _check(not missing, f"expected the keys {', '.join(missing)}, found none")
+        return kind(**{key: _frozen(table[key]) for key in keys})
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{place}: {error}") from error
+
+
+def _tables(table: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
+    found = table.get(key, [])
+    _check(isinstance(found, list) and all(isinstance(item, dict) for item in found), f"{key}: expected tables")
+    return list(found)
+
+
+def _frozen(value: Any) -> Any:
+    """Turn lists into tuples, all the way down; tables stay."""
+    return tuple(_frozen(item) for item in value) if isinstance(value, list) else value
+
+
+def _plain(value: Any) -> Any:
+    """Turn a value into what TOML can hold: numpy values, tuples and paths become plain, None is left out."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items() if item is not None}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value if item is not None]
+    return str(value) if isinstance(value, Path) else value
+
+
+def _numbers(values: Sequence[float]) -> str:
+    """Write numbers on one line; `repr` gives the shortest text that reads back as the same float."""
+    return f"[{', '.join(repr(float(value)) for value in values)}]"
+
+
+def _inline(value: Any) -> str:
+    """Write a plain value on one line."""
+    import tomli_w
+
+    if isinstance(value, dict):
+        return f"{{ {', '.join(f'{key} = {_inline(item)}' for key, item in value.items())} }}"
+    if isinstance(value, list):
+        return f"[{', '.join(_inline(item) for item in value)}]"
+    return tomli_w.dumps({"x": value}).removeprefix("x = ").rstrip("\n")
+
+
+def _check(good: bool, problem: str) -> None:
+    if not good:
+        raise ValueError(problem)
