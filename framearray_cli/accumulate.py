@@ -168,6 +168,7 @@ def compose_pixels(
     smooth: Float32,
     colour: Rgb,
     ambient: Rgb,
+    steady_from: int,
     lowest: Real,
     images: Stored,
     samples: Int32,
@@ -180,7 +181,7 @@ def compose_pixels(
         hits, mirrored: from `sources`: what is averaged by weight, and what is added to that.
         channels: of irradiance, 1 or 3.
         smooth: (n_pixels, 3) R W that replaces the mean, or (0, 3).
-        colour, ambient, lowest, images: see `finish`.
+        colour, ambient, steady_from, lowest, images: see `finish`.
         samples: (n_pixels,) overwritten: hits of each pixel.
         maps: (n_pixels, 9) overwritten with means of W, R W and R, or (0, 9).
 
@@ -203,7 +204,7 @@ def compose_pixels(
                     maps[first + i, 6 + channel] = band.sums[i, REFLECTIVITY + channel]
         if mirrored.shape[0] > 0:
             accumulate(band, first, m, mirrored, channels, n_lights, False)
-        found, l, pixel, large = finish(band, first, m, colour, ambient, lowest, images)
+        found, l, pixel, large = finish(band, first, m, colour, ambient, steady_from, lowest, images)
         if bad == 0 and found > 0:
             bad_light, bad_pixel = l, pixel
         bad, beyond = bad + found, beyond + large
@@ -232,7 +233,15 @@ def weigh_halves(parts: Addresses, half: Int32, first_pixel: int, n: int, weight
 
 @kernel
 def compose_differences(
-    band: Band, first_pixel: int, n: int, parts: Addresses, channels: int, colour: Rgb, ambient: Rgb, images: Float32
+    band: Band,
+    first_pixel: int,
+    n: int,
+    parts: Addresses,
+    channels: int,
+    colour: Rgb,
+    ambient: Rgb,
+    steady_from: int,
+    images: Float32,
 ) -> None:
     """Compose sums of hits, each with its factor, as images, a band at a time; see `standarderror.py`.
 
@@ -240,7 +249,7 @@ def compose_differences(
         band: room for the sums of some pixels.
         parts: from `sources`, with factors.
         channels: of irradiance, 1 or 3.
-        colour, ambient: see `finish`.
+        colour, ambient, steady_from: see `finish`.
         images: (n_lights, n_pixels, 3) overwritten in pixels first_pixel to first_pixel + n - 1.
     """
     for first in range(first_pixel, first_pixel + n, band.hits.shape[0]):
@@ -252,4 +261,4 @@ def compose_differences(
                 for l in range(band.direct.shape[2]):
                     band.direct[i, channel, l] = 0.0
         accumulate(band, first, m, parts, channels, images.shape[0], False)
-        finish(band, first, m, colour, ambient, np.float32(-np.inf), images)
+        finish(band, first, m, colour, ambient, steady_from, np.float32(-np.inf), images)

@@ -11,7 +11,6 @@ import numpy as np
 from .auto import Choice, require_least_memory, settled
 from .compiling import compile_clock
 from .crew import Crew
-from .filepatterns import file_patterns
 from .frame import find_frame
 from .job import Job
 from .jobfile import job_table
@@ -24,7 +23,8 @@ from .memory import (
     window_memory,
 )
 from .outfolder import free_space, in_the_way, is_same, read_array
-from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
+from .prepare import Prepared, composed_with, job_fingerprint, open_embree, plan_work, prepare
+from .stored import array_names
 from .target import Target, aimed
 from .terms.ambient import Ambient
 from .window import Window
@@ -190,7 +190,7 @@ def _probe(prepared: Prepared, work: Work, ambient: Ambient, pixels: int) -> _Pr
         with tempfile.TemporaryDirectory() as name:
             started = time.perf_counter()
             with _writer(prepared, small, Path(name), crew.threads) as writer:
-                window = Window(small, ambient, crew)
+                window = Window(small, composed_with(ambient, prepared.lights), crew)
                 for c in range(n):
                     window.add(find_frame(small, c, crew))
                     for j in window.complete():
@@ -218,7 +218,7 @@ def _writer(prepared: Prepared, small: Work, folder: Path, threads: int) -> Arra
     job = prepared.job
     return ArrayWriter(
         folder,
-        file_patterns(job.name, prepared.n_cameras, prepared.n_lights, job.output.format),
+        array_names(job, prepared.n_cameras, prepared.lights),
         prepared.eyes,
         (small.cams.width, small.cams.height),
         job.output.fps,

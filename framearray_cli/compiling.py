@@ -26,16 +26,19 @@ def compile_clock(begins: Callable[[], None] = lambda: None) -> Iterator[Compile
     from numba.core import event
 
     clock = CompileClock()
+    own: list[float] = []  # of this clock: there may be several
 
     class Listener(event.Listener):
         def on_start(self, event: object) -> None:
-            if not _begun and clock.seconds == 0.0:
+            if not own and clock.seconds == 0.0:
                 begins()
-            _begun.append(time.perf_counter())
+            own.append(time.perf_counter())
+            _begun.append(own[-1])
 
         def on_end(self, event: object) -> None:
-            started = _begun.pop()
-            if not _begun:
+            _begun.pop()
+            started = own.pop()
+            if not own:
                 clock.seconds += time.perf_counter() - started
 
     with event.install_listener("numba:compile", Listener()):

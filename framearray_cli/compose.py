@@ -68,13 +68,14 @@ def as_stored(images: Images) -> Stored:
 
 @kernel
 def finish(
-    band: Band, first_pixel: int, n: int, colour: Rgb, ambient: Rgb, lowest: Real, images: Stored
+    band: Band, first_pixel: int, n: int, colour: Rgb, ambient: Rgb, steady_from: int, lowest: Real, images: Stored
 ) -> tuple[int, int, int, int]:
     """Write the pixels of a band into all images of the frame; the band's direct sums are used up.
 
     Args:
         colour: (3, n_lights) what the direct sums are in units of.
         ambient: (3, n_lights) I_A, radiance.
+        steady_from: the first light position whose images hold what is the same under every light.
         lowest: the least value that is right: 0, or minus infinity where estimates may be negative.
         images: (n_lights, n_pixels of the image, 3), written: float32, or uint16 for the bits of halves, what lies
             beyond the largest half cut to that.
@@ -89,11 +90,13 @@ def finish(
         for channel in range(3):
             indirect, steady = band.sums[i, INDIRECT + channel], band.sums[i, STEADY + channel]
             wrong = large = 0
-            for l in range(n_lights):
-                value = colour[channel, l] * sums[i, channel, l] + ambient[channel, l] * indirect + steady
-                wrong += not (value >= lowest and abs(value) < np.inf)
-                large += HALF_MAX < abs(value) < np.inf
-                sums[i, channel, l] = value
+            for part in range(2):
+                first, end, rest = (0, steady_from, np.float32(0.0)) if part == 0 else (steady_from, n_lights, steady)
+                for l in range(first, end):
+                    value = colour[channel, l] * sums[i, channel, l] + ambient[channel, l] * indirect + rest
+                    wrong += not (value >= lowest and abs(value) < np.inf)
+                    large += HALF_MAX < abs(value) < np.inf
+                    sums[i, channel, l] = value
             beyond += large
             for l in range(n_lights if wrong else 0):
                 if not (sums[i, channel, l] >= lowest and abs(sums[i, channel, l]) < np.inf):

@@ -13,11 +13,22 @@ def file_patterns(name: str, n_cameras: int, n_lights: int, extension: str) -> t
 
     A `glob` of "name.c0007.*" finds the images of camera 7 alone, "name.layers.*" all layers.
     """
-    safe = name.replace("{", "{{").replace("}", "}}")
-    c_digits = max(4, len(str(n_cameras - 1)))
     l_digits = max(3, len(str(n_lights - 1)))
-    camera = f"c{{camera:0{c_digits}d}}"
-    return f"{safe}.{camera}.l{{light:0{l_digits}d}}.{extension}", f"{safe}.layers.{camera}.exr"
+    images = f"{_safe(name)}.{_camera(n_cameras)}.l{{light:0{l_digits}d}}.{extension}"
+    return images, camera_pattern(name, "layers", n_cameras, "exr")
+
+
+def camera_pattern(name: str, what: str, n_cameras: int, extension: str) -> str:
+    """Name files of which there is one a camera."""
+    return f"{_safe(name)}.{what}.{_camera(n_cameras)}.{extension}"
+
+
+def _safe(name: str) -> str:
+    return name.replace("{", "{{").replace("}", "}}")
+
+
+def _camera(n_cameras: int) -> str:
+    return f"c{{camera:0{max(4, len(str(n_cameras - 1)))}d}}"
 
 
 def check_pattern(key: str, pattern: str, fields: Mapping[str, bool]) -> None:

@@ -70,6 +70,7 @@ def frame_attributes(
     fps: float | Fraction,
     c: int,
     l: int | None = None,
+    group: str = "",
     software: str = "framearray",
 ) -> dict[str, Attribute]:
     """Name what belongs into the file of image [c, l], or of camera c where `l` is None.
@@ -81,6 +82,7 @@ def frame_attributes(
         fps: frames per second.
         c: camera index.
         l: light index.
+        group: of sources whose light it is, or what else is stored by itself; "": all light.
         software: program and version.
     """
     attributes: dict[str, Attribute] = {
@@ -93,4 +95,6 @@ def frame_attributes(
     }
     if l is not None:
         attributes["framearray:light"] = l
+    if group:
+        attributes["framearray:group"] = group
     return attributes

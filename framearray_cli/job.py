@@ -27,6 +27,7 @@ from .jobvalues import (
     Bytes,
     Emission,
     FileName,
+    Place,
     Reflectivity,
     Table,
     Triple,
@@ -215,6 +216,7 @@ class Job(Table):
             fail(
                 [(("samples", "halves"), 'expected output.format = "exr": no other format has room for more channels')]
             )
+        self._check_groups()
         if self.samples.halves and self.rests_on < 2:
             fail([(("samples", "halves"), "expected at least two hits for each pixel of an image")])
         job_file = (info.context or {}).get("job_file")
@@ -226,3 +228,20 @@ class Job(Table):
             directory = absolute(Path("..") / "out" / self.name, job_file)
             fill(self, "output", self.output.model_copy(update={"directory": directory}))
         return self
+
+    def _check_groups(self) -> None:
+        """Refuse what does not go with light that is stored by group."""
+        if not self.light.groups:
+            return
+        problems: list[tuple[Place, str]] = []
+        if self.output.format not in ("exr", "tif"):
+            wanted = 'expected "exr" or "tif", as groups of sources are added up afterwards'
+            problems.append((("output", "format"), f'{wanted}, got "{self.output.format}"'))
+        if self.ambient.method == "light" and self.ambient.intensity is None:
+            wanted = 'expected "eye" or "fit": with "light", the ambient light of groups does not add up to that of all'
+            problems.append((("ambient", "method"), wanted))
+        if self.samples.error is not None:
+            wanted = "expected none, as the mean radiance that it is measured by depends on how groups are added up"
+            problems.append((("samples", "error"), wanted))
+        if problems:
+            fail(problems)

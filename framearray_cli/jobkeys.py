@@ -1,15 +1,36 @@
 """The tables of a job that hold key frames: the camera and the light sources."""
 
+import re
 from collections.abc import Sequence
 from itertools import pairwise
 from math import hypot
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from .jobvalues import Direction, Emission, FileName, Place, Point, Size, Table, Triple, computed, fail, fill, shown
 
+MAIN_AXIS = "light"  # of sources that name no axis
+REST_GROUP = "main"  # sources that name no group, where others do
 MOST_EYES = 100_000  # an hour at 24 frames a second; more is a typing error
+
+
+_GROUP_NAME = "[A-Za-z0-9_][A-Za-z0-9_-]{0,39}"
+_TAKEN = ("ambient", "background", "layers", MAIN_AXIS)  # parts of file names, and the first axis
+
+
+def _group_name(name: str) -> str:
+    """Check the name of a group or an axis, which becomes a part of file names."""
+    if not re.fullmatch(_GROUP_NAME, name):
+        fail([((), f'expected at most 40 letters, digits, "_" or "-", got {shown(name)}')])
+    if name in _TAKEN:
+        fail([((), f"expected another name, as {shown(name)} has a meaning of its own")])
+    return name
+
+
+GroupName: TypeAlias = Annotated[
+    str, AfterValidator(_group_name), Field(json_schema_extra={"pattern": f"^{_GROUP_NAME}$", "x-words": "a name"})
+]
 
 
 class CameraKey(Table):
@@ -144,7 +165,24 @@ def _consistent_light_keys(keys: Any) -> Any:
     return keys
 
 
-class PointSource(Table):
+class _Source(Table):
+    """What all kinds of source have."""
+
+    group: GroupName | None = Field(
+        default=None,
+        description="Name of a group. If any source has one, the light of every group is stored by itself, so that its "
+        f'strength and colour can be changed in the finished array; sources without one are the group "{REST_GROUP}".',
+        json_schema_extra=computed("none"),
+    )
+    axis: GroupName | None = Field(
+        default=None,
+        description="Name of a light axis of its own, for all sources of the group: N_c x (N_1 + N_2) images then "
+        "serve N_c x N_1 x N_2 pictures. Key frames count along it.",
+        json_schema_extra=computed("that of all other sources"),
+    )
+
+
+class PointSource(_Source):
     """A small lamp that shines equally in all directions."""
 
     type: Literal["point"] = Field(description="Kind of source.")
@@ -156,7 +194,7 @@ class PointSource(Table):
     )
 
 
-class DirectionalSource(Table):
+class DirectionalSource(_Source):
     """A source infinitely far away, such as the sun."""
 
     type: Literal["directional"] = Field(description="Kind of source.")
@@ -171,6 +209,35 @@ class DirectionalSource(Table):
 Source: TypeAlias = Annotated[PointSource | DirectionalSource, Field(discriminator="type")]
 
 
+class SourceGroup(NamedTuple):
+    """Sources whose light is stored by itself.
+
+    Attributes:
+        axis: MAIN_AXIS, or the group's own.
+        n: light positions along that axis.
+        sources: their places in `light.sources`.
+    """
+
+    name: str
+    axis: str
+    n: int
+    sources: tuple[int, ...]
+
+
+def _group_problems(sources: Sequence[Source]) -> list[tuple[Place, str]]:
+    """Check that the sources of a group move along one axis, and that whatever has an axis has a group."""
+    problems: list[tuple[Place, str]] = []
+    axes: dict[str, tuple[int, str | None]] = {}
+    for i, source in enumerate(sources):
+        if source.axis and not source.group:
+            problems.append(((i, "axis"), 'expected a `group` beside it, as in group = "lamps"'))
+        first, axis = axes.setdefault(source.group or REST_GROUP, (i, source.axis))
+        if source.group and source.axis != axis:
+            wanted = f'"{axis}"' if axis else "no axis"
+            problems.append(((i, "axis"), f"expected {wanted}, as at sources[{first}] of the same group"))
+    return problems
+
+
 class LightTable(Table):
     """The light positions."""
 
@@ -181,6 +248,11 @@ class LightTable(Table):
         description="Number of light positions, N_l.",
         json_schema_extra=computed("the last key's frame + 1"),
     )
+    axes: dict[GroupName, Annotated[int, Field(ge=1, le=MOST_EYES)]] = Field(
+        default={},
+        description="Number of light positions along further axes, by name: { lamps = 12 }.",
+        json_schema_extra={**computed("the last key's frame + 1 of each"), "x-words": "names with whole numbers"},
+    )
     sources: tuple[Source, ...] = Field(
         strict=False, min_length=1, description="One or more sources; all of them shine together at each light index."
     )
@@ -188,16 +260,41 @@ class LightTable(Table):
     @field_validator("sources")
     @classmethod
     def _within_frames(cls, sources: tuple[Source, ...], info: ValidationInfo) -> tuple[Source, ...]:
-        frames = info.data.get("frames", 0)
+        frames, axes = info.data.get("frames", 0), info.data.get("axes", {})
         late = [
-            ((i, "keys", *place), text) for i, s in enumerate(sources) for place, text in _late_keys(s.keys, frames)
+            ((i, "keys", *place), text)
+            for i, s in enumerate(sources)
+            for place, text in _late_keys(s.keys, axes.get(s.axis, 0) if s.axis else frames)
         ]
-        if late:
-            fail(late)
+        if problems := late + _group_problems(sources):
+            fail(problems)
         return sources
 
     @model_validator(mode="after")
     def _fill_frames(self) -> "LightTable":
+        last = {axis: -1 for axis in self.axes}
+        for source in self.sources:
+            last[source.axis or MAIN_AXIS] = max(last.get(source.axis or MAIN_AXIS, -1), source.keys[-1].frame)
+        for axis in self.axes:
+            if last[axis] < 0:
+                fail([(("axes", axis), "expected a source with this axis, found none")])
         if "frames" not in self.model_fields_set:
-            fill(self, "frames", max(source.keys[-1].frame for source in self.sources) + 1)
+            fill(self, "frames", last.get(MAIN_AXIS, 0) + 1)
+        elif MAIN_AXIS not in last:
+            fail([(("frames",), "expected none, as every source has an axis of its own; give `axes`")])
+        fill(self, "axes", {axis: self.axes.get(axis, n + 1) for axis, n in last.items() if axis != MAIN_AXIS})
         return self
+
+    @property
+    def groups(self) -> tuple[SourceGroup, ...]:
+        """The groups, in the order of their first sources; none if no source names one."""
+        if not any(source.group for source in self.sources):
+            return ()
+        found: dict[str, list[int]] = {}
+        for i, source in enumerate(self.sources):
+            found.setdefault(source.group or REST_GROUP, []).append(i)
+        axes = {name: self.sources[numbers[0]].axis for name, numbers in found.items()}
+        return tuple(
+            SourceGroup(name, axis or MAIN_AXIS, self.axes[axis] if axis else self.frames, tuple(found[name]))
+            for name, axis in axes.items()
+        )

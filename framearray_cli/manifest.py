@@ -16,7 +16,8 @@ from .errors import OutputError
 from .filepatterns import check_pattern
 
 FILE_NAME = "manifest.toml"
-MAIN_AXIS = "light"  # the axis of sources that name none
+BACKGROUND = "background"  # stands beside the groups: what comes from outside the scene
+MAIN_AXIS = "light"  # the axis of all sources, or of those that name none; as in the job
 
 Vector: TypeAlias = tuple[float, float, float]
 Row: TypeAlias = tuple[float, float, float, float]
@@ -185,6 +186,11 @@ class Manifest:
             return {MAIN_AXIS: len(self.lights)}
         found = {group.axis: len(group.lights) for group in reversed(self.groups)}
         return {axis: found[axis] for axis in sorted(found, key=lambda axis: (axis != MAIN_AXIS, axis))}
+
+    @property
+    def group_names(self) -> tuple[str, ...]:
+        """Names of all that can be lit anew: the groups, and BACKGROUND where there is one."""
+        return (*(group.name for group in self.groups), *((BACKGROUND,) if self.background_images else ()))
 
     @property
     def n_lights(self) -> int:

@@ -56,16 +56,42 @@ class LightPath:
     intensity: Float64
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LightGroup:
+    """Sources whose light is computed and stored by itself.
+
+    Attributes:
+        axis: light axis that they move along.
+        positions: light indices at which they alone shine.
+        sources: their places in `Lights.sources`.
+    """
+
+    name: str
+    axis: str
+    positions: range
+    sources: tuple[int, ...]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Lights:
-    """All sources; those of one light index l shine together."""
+    """All sources; those of one light index l shine together.
+
+    With groups, every group has light indices of its own, one behind the other, and two more follow at which nothing
+    shines: what is stored there is R W, which the ambient light multiplies, and what comes from the background.
+    """
 
     sources: tuple[LightPath, ...]
+    groups: tuple[LightGroup, ...] = ()
 
     @property
     def n(self) -> int:
-        """Number of light positions, N_l."""
+        """Number of light positions, N_l; with groups, of indices that are computed."""
         return len(self.sources[0].vector)
+
+    @property
+    def n_lit(self) -> int:
+        """Number of indices at which something may shine."""
+        return self.groups[-1].positions.stop if self.groups else self.n
 
 
 def eyes(job: Job) -> Eyes:
@@ -95,9 +121,27 @@ def eyes(job: Job) -> Eyes:
 
 def lights(job: Job) -> Lights:
     """Place and set every source at every light index of a job."""
-    return Lights(
-        sources=tuple(_light_path(source.type, source.keys, job.light.frames) for source in job.light.sources)
-    )
+    table = job.light
+    if not table.groups:
+        return Lights(sources=tuple(_light_path(source.type, source.keys, table.frames) for source in table.sources))
+    n, groups, found = sum(group.n for group in table.groups), [], {}
+    n_all, first = n + (2 if any(job.scene.background) else 1), 0
+    for group in table.groups:
+        positions = range(first, first + group.n)
+        groups.append(LightGroup(name=group.name, axis=group.axis, positions=positions, sources=group.sources))
+        for i in group.sources:
+            source = table.sources[i]
+            found[i] = _within(_light_path(source.type, source.keys, group.n), positions, n_all)
+        first = positions.stop
+    return Lights(sources=tuple(found[i] for i in sorted(found)), groups=tuple(groups))
+
+
+def _within(path: LightPath, positions: range, n: int) -> LightPath:
+    """The same source at some of n light indices; at the others it does not shine."""
+    own = np.clip(np.arange(n) - positions.start, 0, len(positions) - 1)
+    intensity = np.zeros((n, 3))
+    intensity[positions.start : positions.stop] = path.intensity
+    return LightPath(kind=path.kind, vector=path.vector[own], intensity=intensity)
 
 
 def _light_path(

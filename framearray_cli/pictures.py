@@ -1,8 +1,9 @@
 """Pictures of a frame array at any light position, from its files alone: read, blended along the light, lit anew.
 
-    picture = background + sum over groups of factor_g (direct_g + a I_A,g R W) + a I_A,b R W
+    picture = sum over groups of factor_g (direct_g + a I_A,g R W), the background b a group among them
 
-Rendering is linear in each source: `direct_g`, `R W` and the background are files, a is the ambient light's factor.
+Rendering is linear in each source: `direct_g` and `R W` are files, I_A,g is in the manifest, a is the ambient light's
+factor.
 Notation: a position is an index along a light axis that need not be whole; there is one for each of `Manifest.axes`.
 """
 
@@ -19,7 +20,7 @@ import numpy as np
 from .arrays import Image
 from .errors import OutputError
 from .images import read_image
-from .manifest import Manifest, ManifestGroup, ManifestLight, Vector, image_path
+from .manifest import BACKGROUND, Manifest, ManifestGroup, ManifestLight, Vector, image_path
 
 Positions: TypeAlias = Sequence[float]
 
@@ -33,7 +34,7 @@ class Relight:
     """What the light of an array is multiplied with.
 
     Attributes:
-        groups: RGB factor by name of a group; of those that are not named it is 1.
+        groups: RGB factor by name of a group, or of BACKGROUND; of those that are not named it is 1.
         ambient: RGB factor of I_A.
     """
 
@@ -73,7 +74,8 @@ class Pictures:
         if not manifest.groups:
             return self._blended(c, positions[0], None)
         axes = list(manifest.axes)
-        weight = np.asarray(manifest.background_ambient, np.float64)
+        of_background = np.asarray(relight.groups.get(BACKGROUND, WHITE), np.float64)
+        weight = of_background * np.asarray(manifest.background_ambient, np.float64)
         total = np.zeros((*manifest.resolution[::-1], 3), np.float32)
         for group in manifest.groups:
             position = positions[axes.index(group.axis)]
@@ -84,8 +86,8 @@ class Pictures:
         weight = weight * np.asarray(relight.ambient, np.float64)
         if weight.any():
             total += self._steady(manifest.ambient_images, c) * weight.astype(np.float32)
-        if manifest.background_images:
-            total += self._steady(manifest.background_images, c)
+        if manifest.background_images and of_background.any():
+            total += self._steady(manifest.background_images, c) * of_background.astype(np.float32)
         return total
 
     def files(self, c: int, positions: Positions) -> Iterator[Path]:
@@ -112,7 +114,7 @@ class Pictures:
     def _check_relight(self, relight: Relight) -> None:
         if relight.changes_nothing:
             return
-        folder, known = self.manifest.directory, [group.name for group in self.manifest.groups]
+        folder, known = self.manifest.directory, self.manifest.group_names
         if not known:
             raise OutputError(
                 f"{folder}: the light cannot be changed, as this array stores it all together; render again with "

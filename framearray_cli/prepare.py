@@ -2,7 +2,7 @@
 
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -97,7 +97,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
     job, scene = prepared.job, prepared.scene
     cams = eye_cameras(prepared)
     background = np.array(job.scene.background, np.float32)
-    ambient = _ambient(prepared, embree, background)
+    ambient = _named(_ambient(prepared, embree, background), prepared.lights)
     n_r = job.n_r
     if prepared.still:  # one frame, with the hits that its whole window would have
         cams = cams._replace(**{name: getattr(cams, name)[:1] for name in ("position", "right", "up", "forward")})
@@ -127,6 +127,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
         depth=job.specular.depth if mirrors else 0,
         balance=job.reuse.weights == "balance" and not prepared.still,
         background=background,
+        steady_from=prepared.lights.n_lit + 1 if prepared.lights.groups else 0,
         shadow_step=job.samples.shadow_step,
         shadow_unbiased=job.samples.shadow_unbiased,
         layers=job.output.layers,
@@ -134,6 +135,28 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
         halves=_halves(job, still=prepared.still),
     )
     return work, ambient
+
+
+def composed_with(ambient: Ambient, lights: Lights) -> Ambient:
+    """What images are composed with: I_A; with groups, none, and 1 where R W is stored.
+
+    An array with groups has the I_A of each group in its manifest, and adds it when a picture is made.
+    """
+    if not lights.groups:
+        return ambient
+    intensity = np.zeros_like(ambient.intensity)
+    intensity[lights.n_lit] = 1.0
+    return replace(ambient, intensity=intensity)
+
+
+def _named(ambient: Ambient, lights: Lights) -> Ambient:
+    """The same estimate with notes that say which group a light index belongs to."""
+    l = int(ambient.standard_error.argmax())
+    group = next((group for group in lights.groups if l in group.positions), None)
+    if group is None:
+        return ambient
+    name = f"at light {l - group.positions.start} of {group.name} "
+    return replace(ambient, notes=tuple(note.replace(f"at light {l} ", name) for note in ambient.notes))
 
 
 def _halves(job: Job, *, still: bool) -> int:

@@ -4,24 +4,25 @@ import time
 from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from . import __version__
 from .auto import Choice, require_least_memory, settled
 from .crew import Crew
+from .describe import describe
 from .embree import Engine
 from .errors import OutputError
-from .filepatterns import file_patterns
 from .frame import find_frame
 from .job import Job
 from .jobfile import job_table
-from .manifest import Manifest, ManifestCamera, ManifestLight, matrix_rows
+from .manifest import Manifest
 from .manifestfile import write_manifest
 from .memory import light_blocks, mirror_share, peak_memory, require_memory
 from .outfolder import claim_folder
-from .prepare import Prepared, job_fingerprint, open_embree, plan_work, prepare
+from .prepare import Prepared, composed_with, job_fingerprint, open_embree, plan_work, prepare
 from .standarderror import summed_up
+from .stored import array_names
 from .target import Target, aimed
 from .terms.ambient import Ambient
 from .window import Window
@@ -52,7 +53,7 @@ class Summary:
     hits: float
     peak_memory: int
     notes: tuple[str, ...]
-    standard_error: dict[str, float | int]
+    standard_error: dict[str, Any]
 
     @property
     def rays_per_pixel_image(self) -> dict[str, float]:
@@ -110,7 +111,7 @@ def render(job: Job, listener: Listener | None = None, *, engine: Engine = "auto
         if target:
             require_memory(prepared, work.per_pixel)
             listener.aimed(target)
-        manifest = _manifest(prepared, ambient, identity, choice, target)
+        manifest = describe(prepared, ambient, identity, choice, target)
         write_manifest(folder, manifest)
         written: list[int] = []
         try:
@@ -156,12 +157,13 @@ def _frames(
     threads = prepared.threads
     notes, hits, stored = [], 0.0, image_format(job)
     crew = Crew(work, threads)
+    ambient = composed_with(ambient, prepared.lights)
     if work.lights.n_lights < prepared.n_lights:
         ambient = ambient.for_lights(lights)
     window = Window(work, ambient, crew)
     writer = ArrayWriter(
         job.output.directory,
-        _patterns(prepared),
+        array_names(job, prepared.n_cameras, prepared.lights),
         prepared.eyes,
         job.camera.resolution,
         job.output.fps,
@@ -213,64 +215,24 @@ def _summary(
         hits=parts[0].hits,
         peak_memory=peak_memory(),
         notes=(*ambient.notes, *(note for part in parts for note in part.notes)),
-        standard_error=summed_up(errors) if errors else {},
+        standard_error=_standard_error(prepared, errors) if errors else {},
     )
+
+
+def _standard_error(prepared: Prepared, errors: dict[tuple[int, int], tuple[float, float]]) -> dict[str, Any]:
+    """What the manifest says of the errors; with groups, of those of their own light."""
+    lights = prepared.lights
+    found: dict[str, Any] = summed_up({(c, l): error for (c, l), error in errors.items() if l < lights.n_lit})
+    for group in lights.groups:
+        if found["light"] in group.positions:
+            return found | {"light": found["light"] - group.positions.start, "group": group.name}
+    return found
 
 
 def _bad_values(count: int, c: int, first: tuple[int, int] | None, width: int) -> str:
     l, pixel = first or (0, 0)
     where = f"camera {c}, light {l}, pixel ({pixel % width}, {pixel // width})"
     return f"{count} values of camera {c} were not finite and were set to 0; the first: {where}"
-
-
-def _patterns(prepared: Prepared) -> tuple[str, str]:
-    return file_patterns(prepared.job.name, prepared.n_cameras, prepared.n_lights, prepared.job.output.format)
-
-
-def _manifest(
-    prepared: Prepared, ambient: Ambient, identity: str, choice: Choice | None, target: Target | None
-) -> Manifest:
-    """What a program needs that has never seen this one; everything but how the run went."""
-    job, report = prepared.job, prepared.scene.report
-    images, layers = _patterns(prepared)
-    place = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
-    lights = []
-    for l in range(prepared.n_lights):
-        sources = [
-            {"type": s.kind, place[s.kind][0]: s.vector[l].tolist(), place[s.kind][1]: s.intensity[l].tolist()}
-            for s in prepared.lights.sources
-        ]
-        i_a = ambient.intensity[l].astype(float)
-        error = i_a * float(ambient.standard_error[l])
-        lights.append(
-            ManifestLight(ambient=tuple(i_a.tolist()), ambient_error=tuple(error.tolist()), sources=tuple(sources))
-        )
-    return Manifest(
-        version=__version__,
-        name=job.name,
-        fingerprint=identity,
-        images=images,
-        layers=layers if job.output.layers else "",
-        resolution=job.camera.resolution,
-        fps=job.output.fps,
-        cameras=tuple(
-            ManifestCamera(world_from_camera=matrix_rows(matrix), fov=prepared.eyes.fov_deg)
-            for matrix in prepared.eyes.world_from_camera
-        ),
-        lights=tuple(lights),
-        job=job_table(job),
-        scene={
-            "triangles": report.triangles,
-            "materials": report.materials,
-            "textures": report.textures,
-            "dropped": report.dropped,
-            "notes": list(report.notes),
-        },
-        summary={"finished": False, "images": 0, "ambient_paths": ambient.paths}
-        | ({"automatic": choice.table()} if choice else {})
-        | ({"target": target.table()} if target else {}),
-        directory=job.output.directory,
-    )
 
 
 def _with_summary(manifest: Manifest, summary: Summary) -> Manifest:

@@ -132,7 +132,7 @@ class Window:
             try:
                 found: tuple[int, int, int, int] = compose_pixels(
                     sums, first, n, hits, mirrored, work.lights.channels, smooth, self._colour, self._ambient,
-                    self._lowest, flat, samples, maps,
+                    work.steady_from, self._lowest, flat, samples, maps,
                 )  # fmt: skip
             finally:
                 self._bands.append(sums)
@@ -179,7 +179,9 @@ class Window:
 
         def some(task: tuple[int, int], _scratch: Scratch) -> None:
             band = self._bands.pop()
-            compose_differences(band, *task, listed, work.lights.channels, self._colour, self._ambient, images)
+            compose_differences(
+                band, *task, listed, work.lights.channels, self._colour, self._ambient, work.steady_from, images
+            )
             self._bands.append(band)
 
         self._crew.run(some, tasks)

@@ -24,12 +24,21 @@ def estimate_lines(estimate: "Estimate") -> list[str]:
         *(estimate.choice.lines() if estimate.choice else []),
         *ambient_lines(estimate.ambient),
         *(estimate.target.lines() if estimate.target else []),
-        f"array: {n_c:,} cameras x {n_l:,} lights = {n_c * n_l:,} images of {width} x {height}",
+        f"array: {n_c:,} cameras x {_light_count(prepared)} = {n_c * n_l:,} images of {width} x {height}",
         f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_blocks(estimate.blocks)}",
         f"disk: about {size(estimate.disk)} in {job.output.directory}, {size(estimate.free)} free",
         f"time: about {duration(estimate.seconds)} on this machine",
         *(f"warning: {warning}" for warning in estimate.warnings),
     ]
+
+
+def _light_count(prepared: "Prepared") -> str:
+    """What is stored for each camera."""
+    lights = prepared.lights
+    if not lights.groups:
+        return f"{lights.n:,} lights"
+    groups = [f"{len(group.positions):,} of {group.name}" for group in lights.groups]
+    return f"({' + '.join(groups)} + {lights.n - lights.n_lit} of ambient light and background)"
 
 
 def _blocks(n: int) -> str:
@@ -83,6 +92,7 @@ def _error_lines(summary: "Summary") -> list[str]:
     if not found:
         return []
     where = f"camera {found['camera']}, light {found['light']}"
+    where += f" of {found['group']}" if "group" in found else ""
     return [
         f"standard error {found['rms']:.3g}, {found['relative']:.1%} of the mean radiance; "
         f"the largest of an image {found['largest']:.3g} ({where})"

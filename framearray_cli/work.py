@@ -30,6 +30,7 @@ class Work:
         depth: mirror bounces that are followed; 0 in a scene without mirrors.
         balance: weights of hits by the balance heuristic, else all alike.
         background: (3,) radiance outside the scene.
+        steady_from: the first of the kept light positions whose images hold what is the same under every light.
         shadow_step, shadow_unbiased: see `terms/direct_steps.py`; step 1 tests every light position.
         layers: whether normals and depths are kept for the layers.
         denoise: whether W is denoised in composing.
@@ -56,6 +57,7 @@ class Work:
     layers: bool
     denoise: bool = False
     halves: int = 0
+    steady_from: int = 0
     allotment: Allotment | None = None
     order: Int32 = field(init=False)
 
@@ -94,10 +96,11 @@ class Work:
 
         Shadow steps walk along the whole light path wherever a block ends, so all of it is computed, and some is kept.
         """
-        layers = self.layers and block.start == 0
+        steady_from = min(max(self.steady_from - block.start, 0), len(block))
+        work = replace(self, layers=self.layers and block.start == 0, steady_from=steady_from)
         if self.shadow_step > 1:
-            return replace(self, kept=block, layers=layers)
-        return replace(self, lights=some_lights(self.lights, block), kept=range(len(block)), layers=layers)
+            return replace(work, kept=block)
+        return replace(work, lights=some_lights(self.lights, block), kept=range(len(block)))
 
     def frames_around(self, c: int, reach: int) -> range:
         """The frames of the path from c - reach to c + reach."""

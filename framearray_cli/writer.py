@@ -15,6 +15,7 @@ from .images import ImageFormat, write_image, write_layers
 from .job import Job
 from .paths import Eyes
 from .standarderror import square_mean, standard_error
+from .stored import Files
 from .window import Composed, Layers
 
 # Blocks of images in memory: one is filled while the other is written.
@@ -41,7 +42,7 @@ class ArrayWriter:
     def __init__(
         self,
         directory: Path,
-        patterns: tuple[str, str],
+        files: Files,
         eyes: Eyes,
         resolution: tuple[int, int],
         fps: float,
@@ -53,11 +54,11 @@ class ArrayWriter:
         """Start the threads.
 
         Args:
-            patterns: file patterns of images and of layers.
+            files: names of images and layers.
             lights: the light positions that frames are composed for.
             written: called with 1 after each image, from any thread.
         """
-        self._directory, self._patterns, self._eyes = directory, patterns, eyes
+        self._directory, self._files, self._eyes = directory, files, eyes
         self._resolution, self._fps, self._format = resolution, fps, image_format
         self._written, self._lights = written, lights
         self.errors: dict[tuple[int, int], tuple[float, float]] = {}
@@ -111,7 +112,7 @@ class ArrayWriter:
         for task in tasks:
             task.add_done_callback(done)
 
-    def _attributes(self, c: int, l: int | None) -> Attributes:
+    def _attributes(self, c: int, l: int | None, group: str = "") -> Attributes:
         return frame_attributes(
             world_from_camera=self._eyes.world_from_camera[c],
             fov_deg=self._eyes.fov_deg,
@@ -119,10 +120,12 @@ class ArrayWriter:
             fps=self._fps,
             c=c,
             l=l,
+            group=group,
         )
 
     def _write_image(self, composed: Composed, c: int, l: int) -> None:
-        path = self._directory / self._patterns[0].format(camera=c, light=l)
+        stored = self._files.images[l]
+        path = self._directory / stored.file(c)
         at = l - self._lights.start
         image, more = composed.images[at], {}
         if composed.differences is not None:
@@ -132,11 +135,11 @@ class ArrayWriter:
                 "difference": composed.differences[at],
             }
             self.errors[c, l] = square_mean(more["error"]), float(image.mean(dtype=np.float64))
-        write_image(path, image, self._format, self._attributes(c, l), more)
+        write_image(path, image, self._format, self._attributes(c, stored.light, stored.group), more)
         self._written(1)
 
     def _write_layers(self, layers: Layers, c: int) -> None:
-        path = self._directory / self._patterns[1].format(camera=c)
+        path = self._directory / self._files.layers.format(camera=c)
         channels: dict[str, Float32] = {"depth.Z": layers.depth, "samples": layers.samples}
         for name, letters, values in (
             ("obscurance", "RGB", layers.obscurance),

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..auto import settled
 from ..embree import EmbreeScene
+from ..errors import JobError
 from ..job import Job
 from ..lights import some_lights
 from ..prepare import Prepared, open_embree, plan_work, prepare
@@ -42,8 +43,11 @@ def opened(job: Job) -> Iterator[Case]:
     """Open a job for measuring.
 
     Raises:
-        JobError, SceneError: as a render would.
+        JobError, SceneError: as a render would; or the job's light is stored by group.
     """
+    if job.light.groups:
+        problem = "light.sources: expected sources without group and axis, as a report measures pictures of all light"
+        raise JobError(job.file or job.name, [problem])
     with planned(prepare(job)) as case:
         yield case
 

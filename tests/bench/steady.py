@@ -17,9 +17,9 @@ import numpy as np
 
 from framearray_cli.arrays import Int32
 from framearray_cli.crew import Crew
-from framearray_cli.filepatterns import file_patterns
 from framearray_cli.frame import find_frame
 from framearray_cli.images import ImageFormat
+from framearray_cli.stored import plain_names
 from framearray_cli.window import Composed, Window
 from framearray_cli.work import Work
 from framearray_cli.writer import BLOCKS, ArrayWriter
@@ -173,7 +173,7 @@ def _writer(case: Case, folder: Path, image_format: ImageFormat | None) -> Timed
     stored = image_format or ImageFormat()
     writer = TimedWriter(
         folder,
-        file_patterns(job.name, prepared.n_cameras, n_lights, stored.format),
+        plain_names(job.name, prepared.n_cameras, n_lights, stored.format),
         prepared.eyes,
         job.camera.resolution,
         job.output.fps,

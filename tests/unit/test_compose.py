@@ -123,7 +123,7 @@ def composed(
     band = empty_band(N_PIXELS, N_LIGHTS)
     for first, n in bands:
         case.add(band, first, n)
-        bad.append(finish(band, first, n, colour, ambient, np.float32(0), as_stored(images)))
+        bad.append(finish(band, first, n, colour, ambient, 0, np.float32(0), as_stored(images)))
     return images, bad
 
 
@@ -137,7 +137,7 @@ def test_differences_are_sums_with_a_factor_for_each_half(channels: int, weighed
     images = np.full((N_LIGHTS, N_PIXELS, 3), np.nan, np.float32)
     colour, ambient = lights()
     listed = sources([case.source(records, even, odd)])
-    compose_differences(empty_band(16, N_LIGHTS), 0, N_PIXELS, listed, channels, colour, ambient, images)
+    compose_differences(empty_band(16, N_LIGHTS), 0, N_PIXELS, listed, channels, colour, ambient, 0, images)
     factor = np.where(case.half == 1, odd[case.pixel], even[case.pixel]).astype(np.float64)
     value = (
         colour * case.sums(case.direct() * factor[:, None, None])
@@ -241,7 +241,7 @@ def test_a_scale_a_pixel_multiplies_all_its_hits() -> None:
     band, images = empty_band(N_PIXELS, N_LIGHTS), np.empty((N_LIGHTS, N_PIXELS, 3), np.float32)
     case.add(band, 0, N_PIXELS)
     other.add(band, 0, N_PIXELS, scale, mean=False)
-    finish(band, 0, N_PIXELS, colour, ambient, np.float32(0), images)
+    finish(band, 0, N_PIXELS, colour, ambient, 0, np.float32(0), images)
     more = colour * other.sums(other.direct(), scale)
     more = more + ambient * other.sums(other.reflectivity.astype(np.float64) * other.obscurance, scale)[:, :, None]
     more = more + other.sums(other.constant, scale)[:, :, None]

@@ -25,8 +25,8 @@ rays hits eyehits plan allotment
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
 terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise standarderror compose accumulate window
-imageattributes images manifest manifestfile pictures outfolder writer
-prepare memory acceptance expected auto allot target render check
+imageattributes images manifest manifestfile pictures outfolder stored writer
+prepare memory acceptance expected auto allot target describe render check
 moviepath movies assemble
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__

@@ -83,6 +83,10 @@ def test_groups_ambient_and_background_are_summed(array: Manifest) -> None:
         + read(array, "room.background.c0001.exr")
     )
     np.testing.assert_allclose(made, expected, rtol=1e-5)
+    night = Pictures(array).picture(1, (2, 1), Relight(groups={"background": (0.0, 0.5, 1.0)}))
+    day = Pictures(array).picture(1, (2, 1))
+    lost = read(array, "room.background.c0001.exr") + read(array, "room.ambient.c0001.exr") * [0.01, 0.02, 0.03]
+    np.testing.assert_allclose(day - night, lost * [1.0, 0.5, 0.0], atol=1e-5)
 
 
 def test_between_two_positions_pictures_are_blended(array: Manifest) -> None:
@@ -100,7 +104,7 @@ def test_between_two_positions_pictures_are_blended(array: Manifest) -> None:
 
 
 def test_unknown_groups_and_arrays_without_groups_are_named(array: Manifest) -> None:
-    with pytest.raises(OutputError, match=r"no group 'moon'; the array has lamps, sun"):
+    with pytest.raises(OutputError, match=r"no group 'moon'; the array has lamps, sun, background"):
         Pictures(array).picture(0, (0, 0), Relight(groups={"moon": (2.0, 1.0, 1.0)}))
     plain = Manifest(
         version="0",

@@ -1,0 +1,101 @@
+"""What a manifest says of a render: everything that a program needs which has never seen this one."""
+
+from typing import Any
+
+import numpy as np
+
+from . import __version__
+from .arrays import Float64
+from .auto import Choice
+from .jobfile import job_table
+from .manifest import BACKGROUND, Manifest, ManifestCamera, ManifestGroup, ManifestLight, matrix_rows
+from .paths import LightPath
+from .prepare import Prepared
+from .stored import AMBIENT, array_names
+from .target import Target
+from .terms.ambient import Ambient
+
+_KEYS = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
+
+
+def describe(
+    prepared: Prepared, ambient: Ambient, identity: str, choice: Choice | None, target: Target | None
+) -> Manifest:
+    """The manifest of a render that has not begun.
+
+    Args:
+        ambient: the estimate.
+        identity: fingerprint of job and scene.
+    """
+    job, report, files = (
+        prepared.job,
+        prepared.scene.report,
+        array_names(prepared.job, prepared.n_cameras, prepared.lights),
+    )
+    summary: dict[str, Any] = {"finished": False, "images": 0, "ambient_paths": ambient.paths}
+    summary |= {"automatic": choice.table()} if choice else {}
+    summary |= {"target": target.table()} if target else {}
+    return Manifest(
+        version=__version__,
+        name=job.name,
+        fingerprint=identity,
+        layers=files.layers if job.output.layers else "",
+        resolution=job.camera.resolution,
+        fps=job.output.fps,
+        cameras=tuple(
+            ManifestCamera(world_from_camera=matrix_rows(matrix), fov=prepared.eyes.fov_deg)
+            for matrix in prepared.eyes.world_from_camera
+        ),
+        job=job_table(job),
+        scene={
+            "triangles": report.triangles,
+            "materials": report.materials,
+            "textures": report.textures,
+            "dropped": report.dropped,
+            "notes": list(report.notes),
+        },
+        summary=summary,
+        directory=job.output.directory,
+        **_images(prepared, ambient),
+    )
+
+
+def _images(prepared: Prepared, ambient: Ambient) -> dict[str, Any]:
+    """What the images are, and the light of each."""
+    lights, files = prepared.lights, array_names(prepared.job, prepared.n_cameras, prepared.lights)
+    i_a = ambient.intensity.astype(np.float64)
+    if not lights.groups:
+        return {"images": files.pattern(""), "lights": _lights(range(lights.n), lights.sources, i_a, ambient)}
+    dark = i_a[lights.n_lit]  # where nothing shines: what the background adds
+    groups = tuple(
+        ManifestGroup(
+            name=group.name,
+            axis=group.axis,
+            images=files.pattern(group.name),
+            lights=_lights(group.positions, [lights.sources[i] for i in group.sources], i_a - dark, ambient),
+        )
+        for group in lights.groups
+    )
+    return {
+        "groups": groups,
+        "ambient_images": files.pattern(AMBIENT),
+        "background_images": files.pattern(BACKGROUND),
+        "background_ambient": tuple(dark.tolist()),
+    }
+
+
+def _lights(
+    positions: range, sources: "list[LightPath] | tuple[LightPath, ...]", i_a: Float64, ambient: Ambient
+) -> tuple[ManifestLight, ...]:
+    """Sources and I_A, (n_lights, 3), of some light indices."""
+    return tuple(
+        ManifestLight(
+            ambient=tuple(i_a[l].tolist()),
+            ambient_error=tuple((i_a[l] * float(ambient.standard_error[l])).tolist()),
+            sources=tuple(
+                {"type": s.kind, _KEYS[s.kind][0]: s.vector[l].tolist(), _KEYS[s.kind][1]: s.intensity[l].tolist()}
+                for s in sources
+            ),
+        )
+        for l in positions
+    )

@@ -1,0 +1,18 @@
+"""Clocks that measure compiling, one within another."""
+
+import numba
+
+from framearray_cli.compiling import compile_clock, is_compiling
+
+
+def test_each_clock_tells_once_and_measures_by_itself() -> None:
+    told: list[str] = []
+    with compile_clock(lambda: told.append("outer")) as outer, compile_clock(lambda: told.append("inner")) as inner:
+        for k in range(3):
+            numba.njit(lambda x, k=k: x + k)(1)
+            assert not is_compiling()
+    assert sorted(told) == ["inner", "outer"]
+    assert 0 < inner.seconds <= outer.seconds + 1e-3
+    before = outer.seconds
+    numba.njit(lambda x: x - 1)(1)
+    assert outer.seconds == before, "a clock that has ended hears nothing"
