@@ -11,9 +11,9 @@ import numpy as np
 from .auto import Choice, require_least_memory, settled
 from .compiling import compile_clock
 from .crew import Crew
+from .describe import identity_of
 from .frame import find_frame
 from .job import Job
-from .jobfile import job_table
 from .memory import (
     ambient_memory,
     free_memory,
@@ -22,8 +22,8 @@ from .memory import (
     resident_memory,
     window_memory,
 )
-from .outfolder import free_space, in_the_way, is_same, read_array
-from .prepare import Prepared, composed_with, job_fingerprint, open_embree, plan_work, prepare
+from .outfolder import Identity, differences, free_space, in_the_way, read_array
+from .prepare import Prepared, composed_with, open_embree, plan_work, prepare
 from .stored import array_names
 from .target import Target, aimed
 from .terms.ambient import Ambient
@@ -96,7 +96,7 @@ def check(job: Job) -> Estimate:
         require_least_memory(prepared)
         with open_embree(prepared) as embree:
             prepared, choice = settled(prepared, embree)
-            identity = job_fingerprint(prepared)
+            identity = identity_of(prepared)
             work, ambient = plan_work(prepared, embree)
             work, target = aimed(prepared, work, ambient)
             before_frames = time.perf_counter() - started - clock.seconds
@@ -127,7 +127,7 @@ def check(job: Job) -> Estimate:
     )
 
 
-def _warnings(job: Job, identity: str, *, memory_lacks: bool, disk_lacks: bool) -> tuple[str, ...]:
+def _warnings(job: Job, identity: Identity, *, memory_lacks: bool, disk_lacks: bool) -> tuple[str, ...]:
     found = []
     if memory_lacks:  # a job that is far beyond was refused
         found.append("the job may need more memory than is free")
@@ -135,8 +135,8 @@ def _warnings(job: Job, identity: str, *, memory_lacks: bool, disk_lacks: bool) 
         found.append("the images need more space than the disk has free")
     folder = job.output.directory
     old = read_array(folder)
-    if old is not None and not is_same(old, job.name, identity, job_table(job)["output"]):
-        found.append(f"{folder} {in_the_way(old)}")
+    if old is not None and (changed := differences(old, identity)):
+        found.append(f"{folder} {in_the_way(old, changed)}")
     return tuple(found)
 
 

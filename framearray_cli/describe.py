@@ -9,8 +9,10 @@ from .arrays import Float64
 from .auto import Choice
 from .jobfile import job_table
 from .manifest import BACKGROUND, Manifest, ManifestCamera, ManifestGroup, ManifestLight, matrix_rows
+from .manifestfile import plain
+from .outfolder import Identity
 from .paths import LightPath
-from .prepare import Prepared
+from .prepare import Prepared, job_fingerprint, scene_fingerprint
 from .stored import AMBIENT, array_names
 from .target import Target
 from .terms.ambient import Ambient
@@ -18,14 +20,24 @@ from .terms.ambient import Ambient
 _KEYS = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
 
 
+def identity_of(prepared: Prepared) -> Identity:
+    """What decides every byte of the files of a job."""
+    job = prepared.job
+    return Identity(
+        name=job.name,
+        fingerprint=job_fingerprint(prepared),
+        scene=scene_fingerprint(prepared),
+        job=plain(job_table(job)),
+    )
+
+
 def describe(
-    prepared: Prepared, ambient: Ambient, identity: str, choice: Choice | None, target: Target | None
+    prepared: Prepared, ambient: Ambient, identity: Identity, choice: Choice | None, target: Target | None
 ) -> Manifest:
     """The manifest of a render that has not begun.
 
     Args:
         ambient: the estimate.
-        identity: fingerprint of job and scene.
     """
     job, report, files = (
         prepared.job,
@@ -38,7 +50,7 @@ def describe(
     return Manifest(
         version=__version__,
         name=job.name,
-        fingerprint=identity,
+        fingerprint=identity.fingerprint,
         layers=files.layers if job.output.layers else "",
         resolution=job.camera.resolution,
         fps=job.output.fps,
@@ -46,13 +58,14 @@ def describe(
             ManifestCamera(world_from_camera=matrix_rows(matrix), fov=prepared.eyes.fov_deg)
             for matrix in prepared.eyes.world_from_camera
         ),
-        job=job_table(job),
+        job=identity.job,
         scene={
             "triangles": report.triangles,
             "materials": report.materials,
             "textures": report.textures,
             "dropped": report.dropped,
             "notes": list(report.notes),
+            "fingerprint": identity.scene,
         },
         summary=summary,
         directory=job.output.directory,

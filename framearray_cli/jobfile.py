@@ -47,6 +47,22 @@ def job_table(job: Job) -> dict[str, Any]:
     return table
 
 
+def job_of_table(table: dict[str, Any], file: Path, directory: Path) -> Job:
+    """The job that `job_table` wrote, with its images in a folder of its own.
+
+    Args:
+        file: where the table stands, for messages.
+
+    Raises:
+        JobError: the table is no job, of this program at least.
+    """
+    try:
+        job = Job.model_validate(table | {"output": table.get("output", {}) | {"directory": str(directory)}})
+    except ValidationError as error:
+        raise JobError(file, [f"job.{problem}" for problem in problems_of(error, Job)]) from error
+    return job
+
+
 def _plain(value: Any) -> Any:
     """Turn tuples into lists and paths into text."""
     if isinstance(value, dict):

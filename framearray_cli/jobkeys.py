@@ -280,7 +280,7 @@ class LightTable(Table):
                 fail([(("axes", axis), "expected a source with this axis, found none")])
         if "frames" not in self.model_fields_set:
             fill(self, "frames", last.get(MAIN_AXIS, 0) + 1)
-        elif MAIN_AXIS not in last:
+        elif MAIN_AXIS not in last and self.frames != 1:  # 1 is what a job says that was written with all defaults
             fail([(("frames",), "expected none, as every source has an axis of its own; give `axes`")])
         fill(self, "axes", {axis: self.axes.get(axis, n + 1) for axis, n in last.items() if axis != MAIN_AXIS})
         return self

@@ -8,6 +8,7 @@ releases the GIL and is compiled once for all runs.
 `inlined` is for the small functions that kernels are written with.
 """
 
+import platform
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -70,3 +71,10 @@ def _number_at(dtype: Any, element: Any) -> Callable[..., Any]:
 prefetch: Any = intrinsic(_prefetch_of)
 real_at: Any = intrinsic(_number_at(types.float32, ir.FloatType()))
 integer_at: Any = intrinsic(_number_at(types.int32, ir.IntType(32)))
+
+
+def processor() -> str:
+    """Name of this machine and of the processor that kernels are compiled for: those of others round differently."""
+    from llvmlite import binding
+
+    return f"{platform.system()} {platform.machine()} {binding.get_host_cpu_name()}"

@@ -67,7 +67,7 @@ def to_toml(manifest: Manifest) -> str:
     head |= {key: getattr(manifest, key) for key in (*keys, *more) if not (grouped and key == "images")}
     head |= {key: getattr(manifest, key) for key in ("resolution", "fps", "n_cameras", "n_lights")}
     tables = {"summary": manifest.summary, "scene": manifest.scene, "job": manifest.job}
-    text = ["# A frame array; docs/manifest.md explains the keys.\n", tomli_w.dumps(_plain(head | tables))]
+    text = ["# A frame array; docs/manifest.md explains the keys.\n", tomli_w.dumps(plain(head | tables))]
     # Written by hand, because a matrix on one line is easier to read than on the 22 lines of tomli_w.
     for c, camera in enumerate(manifest.cameras):
         rows = ", ".join(_numbers(row) for row in camera.world_from_camera)
@@ -86,7 +86,7 @@ def _light_lines(key: str, lights: Sequence[ManifestLight]) -> list[str]:
     for l, light in enumerate(lights):
         text.append(f"\n[[{key}]]  # {l}\nambient = {_numbers(light.ambient)}\n")
         text.append(f"ambient_error = {_numbers(light.ambient_error)}\nsources = [\n")
-        text.extend(f"    {_inline(_plain(source))},\n" for source in light.sources)
+        text.extend(f"    {_inline(plain(source))},\n" for source in light.sources)
         text.append("]\n")
     return text
 
@@ -144,14 +144,14 @@ def _frozen(value: Any) -> Any:
     return tuple(_frozen(item) for item in value) if isinstance(value, list) else value
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Turn a value into what TOML can hold: numpy values, tuples and paths become plain, None is left out."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items() if item is not None}
+        return {str(key): plain(item) for key, item in value.items() if item is not None}
     if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value if item is not None]
+        return [plain(item) for item in value if item is not None]
     return str(value) if isinstance(value, Path) else value
 
 

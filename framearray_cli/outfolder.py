@@ -1,24 +1,46 @@
 """Whose folder it is: the files of one frame array never mix with those of another."""
 
+import json
 import shutil
 import tempfile
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from . import __version__
 from .errors import OutputError
 from .files import make_folder, reason
 from .manifest import FILE_NAME, Manifest, array_files
 from .manifestfile import read_manifest
+from .record import FOLDER, record_files
+
+# Differences that a message tells, and how long the values of one may be.
+MOST_TOLD, LONGEST_SHOWN = 4, 60
 
 
-def claim_folder(folder: Path, name: str, fingerprint: str, output: dict[str, Any], *, restart: bool) -> int:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identity:
+    """What decides every byte of an array's files.
+
+    Attributes:
+        name: of the job.
+        fingerprint: of all that pixels depend on.
+        scene: fingerprint of the scene alone.
+        job: the job, a plain table.
+    """
+
+    name: str
+    fingerprint: str
+    scene: str
+    job: dict[str, Any]
+
+
+def claim_folder(folder: Path, new: Identity, *, restart: bool) -> int:
     """Make a folder ready for a frame array, and remove what lies there if that is wished.
 
-    The array is the same as the one in the folder if name, fingerprint and the job's output table, but for its
-    directory, are equal. Its images would be the same files: they are simply written again.
-
     Args:
-        name, fingerprint, output: of the array that is to be written; `output` is the job's table.
         restart: remove the array in the folder first, all files that its manifest lists and nothing else.
 
     Returns:
@@ -28,8 +50,8 @@ def claim_folder(folder: Path, name: str, fingerprint: str, output: dict[str, An
         OutputError: another array lies there, its manifest cannot be read, or the folder cannot be written to.
     """
     old = read_array(folder)
-    if old is not None and not restart and not is_same(old, name, fingerprint, output):
-        raise OutputError(f"{folder}: {in_the_way(old)}")
+    if old is not None and not restart and (changed := differences(old, new)):
+        raise OutputError(f"{folder}: {in_the_way(old, changed)}")
     make_folder(folder)
     try:
         with tempfile.TemporaryFile(dir=folder):
@@ -57,16 +79,54 @@ def read_array(folder: Path) -> Manifest | None:
         raise OutputError(f"{known}; remove that file, or choose another folder with --output") from error
 
 
-def is_same(old: Manifest, name: str, fingerprint: str, output: dict[str, Any]) -> bool:
-    """Whether a job gives the very files that a manifest lists."""
-    return (old.name, old.fingerprint, _format(old.job.get("output", {}))) == (name, fingerprint, _format(output))
+def differences(old: Manifest, new: Identity) -> list[str]:
+    """What keeps a job from giving the very files that a manifest lists; nothing where it gives them.
+
+    Where job and scene lie, and the machine that renders, play no part.
+    """
+    found = []
+    if old.version != __version__:
+        found.append(f"program: {old.version} there, {__version__} now")
+    found += _changes(_relevant(old.job), _relevant(new.job))
+    if old.scene.get("fingerprint", new.scene) != new.scene:
+        found.append("scene: another model, texture or material")
+    if not found and (old.name, old.fingerprint) != (new.name, new.fingerprint):
+        found.append("job or scene")
+    return found
 
 
-def in_the_way(old: Manifest) -> str:
-    """Say what lies in a folder, and what can be done."""
+def _relevant(job: Mapping[str, Any]) -> dict[str, Any]:
+    """The part of a job's table that files depend on."""
+    table: dict[str, Any] = json.loads(json.dumps({k: v for k, v in job.items() if k != "render"}, default=str))
+    for section, key in (("output", "directory"), ("scene", "file")):
+        table.get(section, {}).pop(key, None)
+    return table
+
+
+def _changes(old: Mapping[str, Any], new: Mapping[str, Any], place: str = "") -> list[str]:
+    """The keys that two tables disagree on, with both values where these are short."""
+    found = []
+    for key in dict.fromkeys((*old, *new)):
+        a, b = old.get(key), new.get(key)
+        if isinstance(a, Mapping) and isinstance(b, Mapping):
+            found += _changes(a, b, f"{place}{key}.")
+        elif a != b:
+            both = f": {_short(a)} there, {_short(b)} now"
+            found.append(f"{place}{key}{both if len(both) < LONGEST_SHOWN else ''}")
+    return found
+
+
+def _short(value: Any) -> str:
+    return "nothing" if value is None else json.dumps(value)
+
+
+def in_the_way(old: Manifest, changed: Sequence[str]) -> str:
+    """Say what lies in a folder, what of it differs, and what can be done."""
     images = f"{old.n_cameras} x {' x '.join(map(str, old.axes.values()))} images"
+    more = f" and {len(changed) - MOST_TOLD} more" if len(changed) > MOST_TOLD else ""
     return (
-        f"holds another frame array, {old.name!r} with {images}, made by a different job or from a different scene; "
+        f"holds another frame array, {old.name!r} with {images}, made by a different job or from a different scene "
+        f"({'; '.join(changed[:MOST_TOLD])}{more}); "
         "choose another folder with --output, or remove that array with --restart"
     )
 
@@ -85,12 +145,10 @@ def remove_array(old: Manifest) -> int:
         OSError: one of them cannot be removed.
     """
     removed = 0
-    for file in (*array_files(old), old.directory / FILE_NAME):
+    for file in (*array_files(old), *record_files(old.directory), old.directory / FILE_NAME):
         if file.is_file() or file.is_symlink():
             file.unlink()
             removed += 1
+    with suppress(OSError):  # somebody else's files in it
+        (old.directory / FOLDER).rmdir()
     return removed
-
-
-def _format(output: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in output.items() if key != "directory"}

@@ -205,13 +205,14 @@ def _curve(job: Job) -> Curve:
     return Curve(d_max=wanted.range, falloff=FALLOFFS[wanted.falloff], tau=wanted.tau, sky=sky)
 
 
-def job_fingerprint(prepared: Prepared) -> str:
-    """Hash whatever the pixels depend on: the job without its output and machine, and the scene as it was read.
+def scene_fingerprint(prepared: Prepared) -> str:
+    """Hash the scene as it was read: its triangles, materials and textures; where the file lies plays no part."""
+    arrays = (np.ascontiguousarray(array).reshape(-1).view(np.uint8).data for array in prepared.surfaces)
+    return fingerprint(prepared.scene.centre.tobytes(), *arrays)
 
-    Where the scene file lies plays no part.
-    """
+
+def job_fingerprint(prepared: Prepared) -> str:
+    """Hash whatever the pixels depend on: the job without its output and machine, and the scene as it was read."""
     table = {key: value for key, value in job_table(prepared.job).items() if key not in ("output", "render")}
     del table["scene"]["file"]
-    arrays = (np.ascontiguousarray(array).reshape(-1).view(np.uint8).data for array in prepared.surfaces)
-    centre = prepared.scene.centre.tobytes()
-    return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), centre, *arrays)
+    return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), scene_fingerprint(prepared).encode())

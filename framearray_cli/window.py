@@ -6,6 +6,7 @@ contributes (docs/decisions/window.md). A frame is composed as soon as the last 
 what no frame can need any more is dropped: never more than 2 N_r + 1 frames are held.
 """
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from time import perf_counter
@@ -72,11 +73,12 @@ class Composed:
 class Window:
     """At most 2 N_r + 1 frames, and the crew that composes from them."""
 
-    def __init__(self, work: Work, ambient: Ambient, crew: Crew, first: int = 0) -> None:
-        """Make ready to compose frames `first`, `first` + 1, ...
+    def __init__(self, work: Work, ambient: Ambient, crew: Crew, wanted: Sequence[int] | None = None) -> None:
+        """Make ready to compose frames.
 
         Args:
             ambient: of all lights that `work` computes.
+            wanted: frames that are to be composed, in rising order; None: all of the path.
         """
         self._work = work
         # by channel, as the sums are
@@ -87,7 +89,7 @@ class Window:
         # corrections of unbiased shadows may outweigh a dark pixel; cut at 0, their mean would be wrong
         self._lowest = np.float32(-np.inf if work.shadow_unbiased and work.shadow_step > 1 else 0.0)
         self._frames: dict[int, Frame] = {}
-        self._next = first
+        self._wanted = deque(range(work.n_frames) if wanted is None else wanted)
         self._bands = [empty_band(BAND_PIXELS, len(work.kept)) for _ in range(crew.threads)]
 
     def add(self, frame: Frame) -> None:
@@ -96,14 +98,16 @@ class Window:
 
     def complete(self) -> Iterator[int]:
         """Frames that can be composed now, one after another; what no later frame needs is dropped in between."""
-        last = max(self._frames)
-        while self._next < self._work.n_frames and self._work.frames_around(self._next, self._work.n_r)[-1] <= last:
-            yield self._next
-            self._frames[self._next].forget_mirrors(self._crew.shelf)
-            passed = self._frames.pop(self._next - self._work.n_r, None)
-            if passed is not None:
-                passed.put_back(self._crew.shelf)
-            self._next += 1
+        last, shelf = max(self._frames), self._crew.shelf
+        while self._wanted and self._work.frames_around(self._wanted[0], self._work.n_r)[-1] <= last:
+            j = self._wanted[0]
+            yield j
+            self._wanted.popleft()
+            needed = self._wanted[0] - self._work.n_r if self._wanted else last + 1
+            for k in [k for k in self._frames if k <= j or k < needed]:
+                self._frames[k].forget_mirrors(shelf)
+                if k < needed:
+                    self._frames.pop(k).put_back(shelf)
 
     def compose(self, j: int, images: Images, eyes: Sequence[int] | None = None) -> Composed:
         """Compose frame j, once all frames of its window were added.

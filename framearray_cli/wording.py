@@ -9,9 +9,14 @@ if TYPE_CHECKING:
     from .check import Estimate
     from .job import Job
     from .prepare import Prepared
-    from .render import Summary
     from .report import Report
+    from .resume import Found
+    from .summary import Summary
     from .terms.ambient import Ambient
+    from .verify import Verified
+
+
+MOST_DAMAGED = 5  # files that are told by name
 
 
 def estimate_lines(estimate: "Estimate") -> list[str]:
@@ -69,6 +74,18 @@ def summary_lines(summary: "Summary", told: Sequence[str], job: "Job") -> list[s
     Args:
         told: notes that were printed before.
     """
+    there = f"{summary.there:,} of {summary.total:,} images"
+    return [
+        *(_cost_lines(summary) if summary.images else []),
+        *_error_lines(summary),
+        *(f"note: {note}" for note in summary.notes if note not in told),
+        *([f"{there} are there; the rest is left to other runs"] if summary.there < summary.total else []),
+        f"images and manifest: {job.output.directory}",
+    ]
+
+
+def _cost_lines(summary: "Summary") -> list[str]:
+    """What this run took."""
     kinds = summary.rays_per_pixel_image
     mirrors = sum(n for kind, n in kinds.items() if "mirror" in kind or kind == "pilot")
     rays = sum(kinds.values()) - mirrors - kinds["ambient"]
@@ -80,10 +97,18 @@ def summary_lines(summary: "Summary", told: Sequence[str], job: "Job") -> list[s
         f"{summary.images / summary.seconds:.1f} images a second",
         f"{rays:.2f} rays a pixel an image{beside}, {rate:.1f} Mrays/s, "
         f"{summary.hits:.1f} hits a pixel, peak memory {size(summary.peak_memory)}",
-        *_error_lines(summary),
-        *(f"note: {note}" for note in summary.notes if note not in told),
-        f"images and manifest: {job.output.directory}",
     ]
+
+
+def found_lines(found: "Found", wanted: int) -> list[str]:
+    """What of an array is there already."""
+    lines = [f"damaged: {name}: {problem}" for name, problem in found.damaged[:MOST_DAMAGED]]
+    if len(found.damaged) > MOST_DAMAGED:
+        lines.append(f"damaged: {len(found.damaged) - MOST_DAMAGED:,} files more")
+    if found.images:
+        left = f"{wanted:,} are left" if wanted else "nothing is left to do"
+        lines.append(f"{found.images:,} images are there and whole; {left}")
+    return lines
 
 
 def _error_lines(summary: "Summary") -> list[str]:
@@ -109,3 +134,15 @@ def report_lines(made: "Report") -> list[str]:
         found = f"{one.best.named.name}, {one.best.ms:.3g} ms an image" if one.best else "nothing that was tried"
         lines += [f"for an RMSE of {one.error:.1%}: {found}", *(f"  {line}" for line in advice_lines(one.best, made))]
     return [*lines, f"report: {made.folder / 'index.html'}"]
+
+
+def verified_lines(found: "Verified") -> list[str]:
+    """What is wrong with the files of an array, each by name."""
+    folder, n = found.manifest.directory, len(found.wrong)
+    lines = [f"{folder / name}: {problem}" for name, problem in found.wrong]
+    if found.unknown:
+        lines.append(f"note: {found.unknown:,} files are whole, but have no checksum to compare them with")
+    if not n:
+        return [*lines, f"{found.files:,} files of {found.manifest.name} are whole"]
+    advice = "`framearray verify --repair` renders them again"
+    return [*lines, f"{n:,} of {found.files:,} files are missing or damaged; {advice}"]

@@ -1,6 +1,6 @@
 """What the work on frames is given, and what it leaves: settings, records of hits, and where they fall."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -101,6 +101,10 @@ class Work:
         if self.shadow_step > 1:
             return replace(work, kept=block)
         return replace(work, lights=some_lights(self.lights, block), kept=range(len(block)))
+
+    def frames_for(self, wanted: Sequence[int]) -> list[int]:
+        """The frames whose hits are needed to compose some frames, in rising order."""
+        return sorted({k for j in wanted for k in self.frames_around(j, self.n_r)})
 
     def frames_around(self, c: int, reach: int) -> range:
         """The frames of the path from c - reach to c + reach."""

@@ -1,19 +1,25 @@
 """Writes finished frames while the next ones are traced."""
 
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 from types import TracebackType
 from typing import Self
 
 import numpy as np
 
 from .arrays import Float32, Images
+from .errors import OutputError
+from .files import reason
 from .imageattributes import Attributes, frame_attributes
 from .images import ImageFormat, write_image, write_layers
 from .job import Job
 from .paths import Eyes
+from .record import digest
 from .standarderror import square_mean, standard_error
 from .stored import Files
 from .window import Composed, Layers
@@ -30,13 +36,41 @@ def image_format(job: Job) -> ImageFormat:
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Finished:
+    """A camera whose images under some light positions are on disk.
+
+    Attributes:
+        composed: the frame; its images may be overwritten by now.
+        files: name -> size and checksum of every file, layers included.
+        errors: light -> mean square of the standard error, and mean radiance, of images that tell theirs.
+    """
+
+    composed: Composed
+    c: int
+    lights: range
+    files: Mapping[str, tuple[int, str]]
+    errors: Mapping[int, tuple[float, float]]
+
+
+class _Countdown:
+    """Does something when the last of n things is done, in the thread of that one."""
+
+    def __init__(self, n: int, last: Callable[[], None]) -> None:
+        self._left, self._last, self._lock = n, last, threading.Lock()
+
+    def one_less(self) -> None:
+        with self._lock:
+            self._left -= 1
+            done = self._left == 0
+        if done:
+            self._last()
+
+
 class ArrayWriter:
     """A few threads that write images; hands out blocks of memory for frames and takes them back when written.
 
     An error in a thread stops the render at the next frame.
-
-    Attributes:
-        errors: (camera, light) -> mean square of the standard error, and mean radiance, of images that tell theirs.
     """
 
     def __init__(
@@ -50,6 +84,7 @@ class ArrayWriter:
         lights: range,
         threads: int,
         written: Callable[[int], None],
+        finished: "Callable[[Finished], None]" = lambda done: None,
     ) -> None:
         """Start the threads.
 
@@ -57,11 +92,11 @@ class ArrayWriter:
             files: names of images and layers.
             lights: the light positions that frames are composed for.
             written: called with 1 after each image, from any thread.
+            finished: called when all files of a camera are on disk, from any thread.
         """
         self._directory, self._files, self._eyes = directory, files, eyes
         self._resolution, self._fps, self._format = resolution, fps, image_format
-        self._written, self._lights = written, lights
-        self.errors: dict[tuple[int, int], tuple[float, float]] = {}
+        self._written, self._finished, self._lights = written, finished, lights
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="write")
         self._free: SimpleQueue[Images | BaseException] = SimpleQueue()
         width, height = resolution
@@ -85,32 +120,46 @@ class ArrayWriter:
         """Take a block back that is not to be written."""
         self._free.put(block)
 
-    def write(self, composed: Composed, cameras: range, block: Images | None = None) -> None:
+    def write(self, composed: Composed, cameras: Sequence[int], block: Images | None = None) -> None:
         """Write a composed frame as that of each of the given cameras.
 
         Args:
             block: what is free when that is done; the frame's own images if None.
         """
         block = composed.images if block is None else block
-        tasks = [self._pool.submit(self._write_image, composed, c, l) for c in cameras for l in self._lights]
+        unfinished = _Countdown(len(cameras), lambda: self._free.put(block))
+        for c in cameras:
+            self._write_camera(composed, c, unfinished)
+
+    def _write_camera(self, composed: Composed, c: int, unfinished: "_Countdown") -> None:
+        """Write all files of a camera, then tell that they are there."""
+        errors: dict[int, tuple[float, float]] = {}
+        tasks: list[Callable[[], Path]] = [partial(self._write_image, composed, c, l, errors) for l in self._lights]
         if composed.layers is not None:
-            tasks += [self._pool.submit(self._write_layers, composed.layers, c) for c in cameras]
-        unfinished = SimpleQueue[None]()  # one entry fewer than tasks: who finds none left is the last
-        for _ in tasks[1:]:
-            unfinished.put(None)
+            tasks.append(partial(self._write_layers, composed.layers, c))
+        files: dict[str, tuple[int, str]] = {}
 
-        def done(task: Future[None]) -> None:
-            error = None if task.cancelled() else task.exception()
-            if error is not None:
-                self._free.put(error)
-                return
+        def whole() -> None:
+            self._finished(Finished(composed=composed, c=c, lights=self._lights, files=files, errors=errors))
+            unfinished.one_less()
+
+        left = _Countdown(len(tasks), whole)
+
+        def run(task: Callable[[], Path]) -> None:
+            path = task()
             try:
-                unfinished.get_nowait()
-            except Empty:
-                self._free.put(block)
+                files[path.name] = digest(path)
+            except OSError as error:
+                raise OutputError(f"{path}: cannot be read back: {reason(error)}") from error
+            left.one_less()
 
-        for task in tasks:
-            task.add_done_callback(done)
+        for future in [self._pool.submit(run, task) for task in tasks]:
+            future.add_done_callback(self._hand_on_error)
+
+    def _hand_on_error(self, future: Future[None]) -> None:
+        error = None if future.cancelled() else future.exception()
+        if error is not None:
+            self._free.put(error)
 
     def _attributes(self, c: int, l: int | None, group: str = "") -> Attributes:
         return frame_attributes(
@@ -123,7 +172,7 @@ class ArrayWriter:
             group=group,
         )
 
-    def _write_image(self, composed: Composed, c: int, l: int) -> None:
+    def _write_image(self, composed: Composed, c: int, l: int, errors: dict[int, tuple[float, float]]) -> Path:
         stored = self._files.images[l]
         path = self._directory / stored.file(c)
         at = l - self._lights.start
@@ -134,11 +183,12 @@ class ArrayWriter:
                 "error": standard_error(composed.differences[at], hits),
                 "difference": composed.differences[at],
             }
-            self.errors[c, l] = square_mean(more["error"]), float(image.mean(dtype=np.float64))
+            errors[l] = square_mean(more["error"]), float(image.mean(dtype=np.float64))
         write_image(path, image, self._format, self._attributes(c, stored.light, stored.group), more)
         self._written(1)
+        return path
 
-    def _write_layers(self, layers: Layers, c: int) -> None:
+    def _write_layers(self, layers: Layers, c: int) -> Path:
         path = self._directory / self._files.layers.format(camera=c)
         channels: dict[str, Float32] = {"depth.Z": layers.depth, "samples": layers.samples}
         for name, letters, values in (
@@ -149,6 +199,7 @@ class ArrayWriter:
         ):
             channels |= {f"{name}.{letter}": values[..., i] for i, letter in enumerate(letters)}
         write_layers(path, channels, self._attributes(c, None))
+        return path
 
     def finish(self) -> None:
         """Wait until everything is written; all blocks are free again.

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
@@ -33,13 +33,28 @@ def read(job_file: Path, threads: int | None, output: str | None) -> "Job":
     """Read a job file; options replace what it says."""
     from ..jobfile import read_job
 
-    job = read_job(job_file)
-    updates: dict[str, Any] = {}
-    if threads is not None:
-        updates["render"] = job.render.model_copy(update={"threads": threads})
-    if output is not None:
-        updates["output"] = job.output.model_copy(update={"directory": place(output).absolute()})
-    return job.model_copy(update=updates)
+    job = with_threads(read_job(job_file), threads)
+    if output is None:
+        return job
+    table = job.output.model_copy(update={"directory": place(output).absolute()})
+    return job.model_copy(update={"output": table})
+
+
+def with_threads(job: "Job", threads: int | None) -> "Job":
+    """The same job with so many threads, if that is wished."""
+    if threads is None:
+        return job
+    return job.model_copy(update={"render": job.render.model_copy(update={"threads": threads})})
+
+
+def frames_of(text: str, n: int) -> tuple[int, ...]:
+    """The frames of an option `--cameras`."""
+    from ..ranges import parse_frames
+
+    try:
+        return parse_frames(text, n)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--cameras") from error
 
 
 def place(name: str) -> Path:

@@ -1,5 +1,6 @@
 """`framearray render`."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -7,12 +8,14 @@ import typer
 from ..compiling import compile_clock
 from ..errors import OutputError
 from ..screen import Screen, out, say, size
-from ..wording import ambient_lines, scene_lines, summary_lines
-from .options import JobFile, Output, Quiet, Threads, read
+from ..wording import ambient_lines, found_lines, scene_lines, summary_lines
+from .options import JobFile, Output, Quiet, Threads, frames_of, read
 
 if TYPE_CHECKING:
     from ..auto import Choice
+    from ..job import Job
     from ..prepare import Prepared
+    from ..resume import Found
     from ..target import Target
     from ..terms.ambient import Ambient
 
@@ -23,11 +26,21 @@ def render(
     job_file: JobFile,
     threads: Threads = None,
     output: Output = None,
+    cameras: Annotated[
+        str | None,
+        typer.Option("--cameras", help="Some frames of the camera path: 0-47, 0-47x3, 5,8-11.", metavar="RANGE"),
+    ] = None,
     restart: Annotated[bool, typer.Option("--restart", help="Remove the frame array in the folder first.")] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Render every (camera, light) image of a job into a folder, with a manifest."""
+    """Render every (camera, light) image of a job into a folder, with a manifest, or what is missing of them there."""
     job = read(job_file, threads, output)
+    chosen = None if cameras is None else frames_of(cameras, job.camera.frames)
+    render_shown(job, quiet=quiet, restart=restart, cameras=chosen)
+
+
+def render_shown(job: "Job", *, quiet: bool, restart: bool = False, cameras: Sequence[int] | None = None) -> None:
+    """Render, and show on the screen what goes on."""
     with Screen(out, quiet=quiet) as screen:
         screen.wait("reading the scene")
         from ..outfolder import free_space
@@ -37,10 +50,11 @@ def render(
         class Shown(Listener):
             """Prints the scene, then the ambient light, then a progress bar."""
 
+            told: tuple[str, ...] = ()
+
             def prepared(self, prepared: "Prepared") -> None:
                 screen.say(scene_lines(prepared))
                 screen.wait("estimating the ambient light")
-                self.total = prepared.n_cameras * prepared.n_lights
 
             def removed(self, files: int) -> None:
                 if files:
@@ -48,6 +62,10 @@ def render(
 
             def settled(self, choice: "Choice") -> None:
                 screen.say(choice.lines())
+
+            def found(self, found: "Found", wanted: int) -> None:
+                self.total = wanted
+                screen.say(found_lines(found, wanted))
 
             def planned(self, ambient: "Ambient") -> None:
                 screen.say(ambient_lines(ambient))
@@ -63,13 +81,13 @@ def render(
         shown = Shown()
         try:
             with compile_clock(screen.compiling):
-                summary = run(job, shown, restart=restart)
+                summary = run(job, shown, restart=restart, cameras=cameras)
         except BaseException as error:
             if isinstance(error, OutputError) and (free := free_space(job.output.directory)) < LITTLE_SPACE:
                 error.add_note(f"{size(free)} are free on that disk")
             if screen.done:
-                done = f"{screen.done:,} of {screen.total:,} images are in {job.output.directory}"
-                error.add_note(f"{done}; its manifest says that it is not finished")
+                done = f"{screen.done:,} of {screen.total:,} images were written to {job.output.directory}"
+                error.add_note(f"{done}; the same command goes on with the rest")
             raise
     if not quiet:
         say(out, summary_lines(summary, shown.told, job))

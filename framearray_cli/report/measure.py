@@ -68,7 +68,7 @@ def run(case: Case, settings: Settings, cameras: Sequence[int], lights: Sequence
     exact = np.empty(shape, np.float32)
     kept = range(len(lights)) if settings.one_light else lights
     crew = Crew(work, changed.threads)
-    window = Window(work, changed.ambient, crew, first=cameras[0])
+    window = Window(work, changed.ambient, crew, range(cameras[0], work.n_frames))
     images, hits, finding, composing = [], [], [], []
     try:
         first, last = work.frames_around(cameras[0], work.n_r)[0], work.frames_around(cameras[-1], work.n_r)[-1]

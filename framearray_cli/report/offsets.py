@@ -44,7 +44,7 @@ def by_offset(case: Case, c: int, lights: Sequence[int], reference: Reference) -
             work = replace(changed.work, seed=seed)
             crew = Crew(work, changed.threads)
             crews.append(crew)
-            window = Window(work, changed.ambient, crew, first=c)
+            window = Window(work, changed.ambient, crew, [c])
             for k in work.frames_around(c, work.n_r):
                 window.add(find_frame(work, k, crew))
             windows.append(window)

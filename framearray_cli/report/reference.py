@@ -127,7 +127,7 @@ def _pass(work: Work, case: Case, c: int) -> tuple[Float32, Float32, Layers]:
         frame = find_frame(work, c, crew)
         for ambient in (0, 1):
             fixed = replace(case.ambient, intensity=np.full_like(case.ambient.intensity, ambient))
-            window = Window(work, fixed, crew, first=c)
+            window = Window(work, fixed, crew, [c])
             window.add(frame)
             layers = window.compose(c, images[ambient]).layers
     finally:

@@ -189,7 +189,7 @@ def _parts(case: Case, c: int) -> tuple[Image, Image]:
     try:
         for image, level in zip(images, (0, 1), strict=True):
             fixed = replace(case.ambient, intensity=np.full_like(case.ambient.intensity, level))
-            window = Window(work, fixed, crew, first=c)
+            window = Window(work, fixed, crew, [c])
             for other in work.frames_around(c, work.n_r):
                 window.add(find_frame(work, other, crew))
             window.compose(c, image)

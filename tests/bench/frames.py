@@ -21,7 +21,7 @@ def frame(case: Case, c: int, seed: int, *, layers: bool = False, threads: int |
     """
     work = replace(case.work, seed=seed, layers=layers)
     crew = Crew(work, threads or case.threads)
-    window = Window(work, case.ambient, crew, first=c)
+    window = Window(work, case.ambient, crew, range(c, case.work.n_frames))
     out = np.empty((len(work.kept), work.cams.height, work.cams.width, 3), np.float32)
     try:
         for other in work.frames_around(c, work.n_r):

@@ -72,11 +72,12 @@ class TimedWriter(ArrayWriter):
         else:
             self.give_back(composed.images)
 
-    def _write_image(self, composed: Composed, c: int, l: int) -> None:
+    def _write_image(self, composed: Composed, c: int, l: int, errors: dict[int, tuple[float, float]]) -> Path:
         started = time.thread_time()
-        super()._write_image(composed, c, l)
+        path = super()._write_image(composed, c, l, errors)
         with self._lock:
             self.seconds += time.thread_time() - started
+        return path
 
 
 def start_of(case: Case, frames: int, place: float) -> int:
@@ -99,7 +100,7 @@ def steady(case: Case, frames: int, image_format: ImageFormat | None = None, pla
     before = 2 * n_r + 1  # frames that fill the window and compose one frame, so that all is compiled
     first = start_of(case, frames, place)
     crew = Crew(work, case.threads)
-    window = Window(work, case.ambient, crew, first=first + n_r)
+    window = Window(work, case.ambient, crew, range(first + n_r, work.n_frames))
     try:
         with _writer(case, Path(), None) as nothing:
             _pass(work, window, crew, nothing, range(first, first + before))

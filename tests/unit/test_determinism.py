@@ -11,7 +11,6 @@ import tiny
 from tiny import WALK
 
 from framearray_cli.job import Job
-from framearray_cli.manifest import FILE_NAME
 from framearray_cli.render import render
 
 SKY = {"background": [0.3, 0.4, 0.5]}
@@ -39,8 +38,8 @@ def job(scene: Path, out: Path, threads: int, **changes: Any) -> Job:
 
 
 def digests(folder: Path) -> dict[str, str]:
-    """Hash of every file but the manifest, which tells times."""
-    files = sorted(file for file in folder.rglob("*") if file.is_file() and file.name != FILE_NAME)
+    """Hash of every file but the manifest and the records, which tell times."""
+    files = sorted(file for file in folder.rglob("*") if file.is_file() and file.suffix not in (".toml", ".jsonl"))
     return {str(file.relative_to(folder)): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
 
 

@@ -25,13 +25,14 @@ rays hits eyehits plan allotment
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
 terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise standarderror compose accumulate window
-imageattributes images manifest manifestfile pictures outfolder stored writer
-prepare memory acceptance expected auto allot target describe render check
+imageattributes images manifest manifestfile pictures ranges record resume outfolder stored writer
+prepare memory acceptance expected auto allot target describe summary render check verify
 moviepath movies assemble
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
 screen interrupts wording
-commands/__init__ commands/options commands/render commands/check commands/assemble commands/report commands/schema
+commands/__init__ commands/options commands/render commands/check commands/verify
+commands/assemble commands/report commands/schema
 cli __main__
 """
 ORDER = FLOW.split()

@@ -67,7 +67,7 @@ def test_an_array_is_summed_up() -> None:
 def windowed(job: Job, j: int, eyes: Any = None) -> Any:
     """Frame j of a job, of all hits of its window or those of some eyes."""
     with tiny.planned(tiny.prepared(job)) as (work, ambient), tiny.crew_of(work) as crew:
-        window = Window(work, ambient, crew, j)
+        window = Window(work, ambient, crew, range(j, work.n_frames))
         for k in work.frames_around(j, work.n_r):
             window.add(find_frame(work, k, crew))
         shape = (work.lights.n_lights, work.cams.height, work.cams.width, 3)

@@ -48,7 +48,7 @@ def test_memory_of_dropped_frames_is_not_seen_again() -> None:
     with tiny.planned(inputs) as (work, ambient):
         for j in (3, 7):
             with tiny.crew_of(work) as crew:
-                window = Window(work, ambient, crew, j)
+                window = Window(work, ambient, crew, [j])
                 for k in work.frames_around(j, 1):
                     window.add(find_frame(work, k, crew))
                 image = window.compose(j, np.empty(rendered[0].shape, np.float32)).images

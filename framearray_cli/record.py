@@ -1,0 +1,223 @@
+"""What was finished, in the output folder: a line for each frame whose files are all on disk, with their checksums.
+
+Lines are appended, so that one costs the same however many there are. A render that is started again reads them, looks
+whether the files are still what they were, and goes on with the rest. Each run of some part of the camera path writes
+into a file of its own (`records/0000-0047.jsonl`), so that parts may run side by side.
+"""
+
+import hashlib
+import json
+import threading
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from .errors import OutputError
+from .files import make_folder, reason
+
+FOLDER = "records"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """One frame under some light positions, finished.
+
+    Attributes:
+        c: camera.
+        lights: the first light position, and the one after the last.
+        files: name -> size in bytes and checksum, of all files that belong to it.
+        hits: mean hits a pixel.
+        notes: what the user should know of it.
+        errors: light position -> mean square of the standard error and mean radiance; see `standarderror.summed_up`.
+    """
+
+    c: int
+    lights: tuple[int, int]
+    files: Mapping[str, tuple[int, str]]
+    hits: float = 0.0
+    notes: tuple[str, ...] = ()
+    errors: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Session:
+    """One run of the program: what it was to do, and what it took until its last entry.
+
+    Attributes:
+        cameras: those that it was to render, see ranges.py.
+        processor: name of the machine's processor; kernels differ from one to the other.
+        rays: by kind, all that were traced.
+        seconds: of wall time.
+    """
+
+    cameras: str
+    processor: str
+    rays: Mapping[str, int] = field(default_factory=dict)
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Records:
+    """What all records of a folder say of one array; of a frame that was finished twice, the last entry counts."""
+
+    entries: tuple[Entry, ...] = ()
+    sessions: tuple[Session, ...] = ()
+
+    def checksums(self) -> dict[str, tuple[int, str]]:
+        """Size and checksum of every file that was finished."""
+        return {name: known for entry in self.entries for name, known in entry.files.items()}
+
+
+def digest(path: Path) -> tuple[int, str]:
+    """Size and checksum of a file: XXH3, 128 bits, which notices damage and is as fast as memory.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    import xxhash
+
+    with path.open("rb") as file:
+        total = xxhash.xxh3_128()
+        size = 0
+        while block := file.read(1 << 22):
+            total.update(block)
+            size += len(block)
+    return size, total.hexdigest()
+
+
+class RecordWriter:
+    """Appends to a record; lines appear whole, from any thread."""
+
+    def __init__(self, file: Path, fingerprint: str, session: Session) -> None:
+        """Open the record, or begin it.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        self._path, self._lock, self.fingerprint = file, threading.Lock(), fingerprint
+        make_folder(file.parent)
+        try:
+            self._file = open(file, "ab")  # noqa: SIM115  # closed in __exit__
+        except OSError as error:
+            raise OutputError(f"{file}: cannot be written: {reason(error)}") from error
+        # a line of an earlier run may have been cut short
+        self._put({"fingerprint": fingerprint, "cameras": session.cameras, "processor": session.processor}, b"\n")
+
+    def add(self, entry: Entry, rays: Mapping[str, int], seconds: float) -> None:
+        """Note that a frame is finished, and what the session took so far.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        line: dict[str, Any] = {
+            "c": entry.c,
+            "lights": entry.lights,
+            "files": entry.files,
+            "hits": entry.hits,
+            "rays": dict(rays),
+            "seconds": round(seconds, 3),
+        }
+        if entry.notes:
+            line["notes"] = entry.notes
+        if entry.errors:
+            line["errors"] = {str(l): error for l, error in entry.errors.items()}
+        self._put(line)
+
+    def _put(self, line: Mapping[str, Any], before: bytes = b"") -> None:
+        data = before + json.dumps(line, separators=(",", ":")).encode() + b"\n"
+        try:
+            with self._lock:
+                self._file.write(data)
+                self._file.flush()
+        except OSError as error:
+            raise OutputError(f"{self._path}: cannot be written: {reason(error)}") from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with suppress(OSError):  # a full disk; every line was flushed when it was written
+            self._file.close()
+
+
+def record_file(folder: Path, cameras: str) -> Path:
+    """The record of a part of the camera path."""
+    name = cameras if len(cameras) <= 60 else f"{cameras[:40]}-{hashlib.sha256(cameras.encode()).hexdigest()[:12]}"
+    return folder / FOLDER / f"{name}.jsonl"
+
+
+def record_files(folder: Path) -> list[Path]:
+    """All records of a folder."""
+    return sorted((folder / FOLDER).glob("*.jsonl"))
+
+
+def read_records(folder: Path, fingerprint: str) -> Records:
+    """What was finished of the array with this fingerprint; lines of other arrays, and torn ones, do not count.
+
+    Raises:
+        OutputError: a record cannot be read.
+    """
+    entries: dict[tuple[int, int, int], Entry] = {}
+    sessions: list[Session] = []
+    for file in record_files(folder):
+        current = False
+        for line in _lines(file):
+            if "fingerprint" in line:
+                current = line["fingerprint"] == fingerprint
+                if current:
+                    sessions.append(Session(cameras=line.get("cameras", ""), processor=line.get("processor", "")))
+            elif current and (entry := _entry(line)):
+                entries[entry.c, *entry.lights] = entry
+                rays, seconds = line.get("rays", {}), float(line.get("seconds", 0.0))
+                last = sessions[-1]
+                sessions[-1] = Session(cameras=last.cameras, processor=last.processor, rays=rays, seconds=seconds)
+    return Records(entries=tuple(entries.values()), sessions=tuple(sessions))
+
+
+def _lines(file: Path) -> Iterator[dict[str, Any]]:
+    try:
+        data = file.read_bytes()
+    except OSError as error:
+        raise OutputError(f"{file}: cannot be read: {reason(error)}") from error
+    for line in data.splitlines():
+        try:
+            found = json.loads(line)
+        except (ValueError, RecursionError):  # torn, or damaged: what it tells of is made again
+            continue
+        if isinstance(found, dict):
+            yield found
+
+
+def _entry(line: Mapping[str, Any]) -> Entry | None:
+    """An entry, unless the line holds something else."""
+    try:
+        return Entry(
+            c=int(line["c"]),
+            lights=(int(line["lights"][0]), int(line["lights"][1])),
+            files={str(name): (int(size), str(known)) for name, (size, known) in line["files"].items()},
+            hits=float(line["hits"]),
+            notes=tuple(str(note) for note in line.get("notes", ())),
+            errors={int(l): (float(a), float(b)) for l, (a, b) in line.get("errors", {}).items()},
+        )
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError):
+        return None
+
+
+def damaged(folder: Path, checksums: Mapping[str, tuple[int, str]], names: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Files that are not what they were when they were finished, with what is wrong; in the order of `names`."""
+    for name in names:
+        path, (size, known) = folder / name, checksums[name]
+        try:
+            if path.stat().st_size != size:
+                yield name, f"expected {size:,} bytes, found {path.stat().st_size:,}"
+            elif digest(path)[1] != known:
+                yield name, "its bytes have changed"
+        except FileNotFoundError:
+            yield name, "missing"
+        except OSError as error:
+            yield name, f"cannot be read: {reason(error)}"

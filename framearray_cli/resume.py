@@ -1,0 +1,63 @@
+"""Going on where a render stopped: what of an array is on disk and whole, and what is left to render."""
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from .record import Entry, Records, damaged, read_records
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """What lies in an output folder.
+
+    Attributes:
+        records: of what is whole.
+        damaged: names of files that were finished and are missing or changed, with what is wrong.
+    """
+
+    records: Records
+    damaged: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def images(self) -> int:
+        """Images that are on disk."""
+        return sum(len(lights) for lights in _lights_by_camera(self.records).values())
+
+    def missing(self, cameras: Sequence[int], lights: range) -> list[int]:
+        """The cameras, in rising order, of which an image under some light positions is missing."""
+        done = _lights_by_camera(self.records)
+        return [c for c in cameras if not set(lights) <= done.get(c, set())]
+
+
+def _lights_by_camera(records: Records) -> dict[int, set[int]]:
+    done: dict[int, set[int]] = {}
+    for entry in records.entries:
+        done.setdefault(entry.c, set()).update(range(*entry.lights))
+    return done
+
+
+def look(folder: Path, fingerprint: str, threads: int = 1) -> Found:
+    """Read all records of an array, and every file that they name: those that are not what they were do not count.
+
+    Raises:
+        OutputError: a record cannot be read.
+    """
+    records = read_records(folder, fingerprint)
+    checksums = records.checksums()
+
+    def wrong(entry: Entry) -> list[tuple[str, str]]:
+        return list(damaged(folder, checksums, entry.files))
+
+    with ThreadPoolExecutor(threads, thread_name_prefix="verify") as pool:
+        found = list(pool.map(wrong, records.entries))
+    whole = tuple(entry for entry, problems in zip(records.entries, found, strict=True) if not problems)
+    return Found(
+        records=replace(records, entries=whole), damaged=tuple(problem for problems in found for problem in problems)
+    )
+
+
+def unfinished(folder: Path) -> Iterator[Path]:
+    """Temporary files that a run left behind when it was ended by force."""
+    yield from folder.glob(".*.part")

@@ -1,0 +1,132 @@
+"""How a render went, of this run and of all runs that worked on the array: for the user, and for the manifest."""
+
+import math
+from collections import Counter
+from dataclasses import dataclass, replace
+from typing import Any
+
+from .kernel import processor
+from .manifest import Manifest
+from .memory import peak_memory
+from .paths import Lights
+from .prepare import Prepared
+from .record import Records
+from .standarderror import summed_up
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Summary:
+    """How a render went.
+
+    Attributes:
+        images: that this run wrote; `there`: all that are on disk; `total`: of the array.
+        seconds: of this run so far; `stages`: processor seconds by kind of work.
+        rays: number by kind, of this run.
+        pixels: of one image.
+        hits: mean accepted hits a pixel of a frame, native and outer.
+        peak_memory: bytes.
+        notes: what the user should know.
+        standard_error: see `standarderror.summed_up`; empty unless the job asks for it.
+        all_rays, all_seconds: of all runs.
+    """
+
+    images: int
+    there: int
+    total: int
+    seconds: float
+    rays: dict[str, int]
+    stages: dict[str, float]
+    pixels: int
+    hits: float
+    peak_memory: int
+    notes: tuple[str, ...]
+    standard_error: dict[str, Any]
+    all_rays: dict[str, int]
+    all_seconds: float
+
+    @property
+    def rays_per_pixel_image(self) -> dict[str, float]:
+        """Rays a pixel an image, by kind, of this run."""
+        return {kind: n / (self.pixels * max(self.images, 1)) for kind, n in self.rays.items()}
+
+
+def summed(
+    prepared: Prepared,
+    records: Records,
+    *,
+    images: int,
+    seconds: float,
+    rays: Counter[str],
+    stages: dict[str, float],
+    notes: tuple[str, ...],
+) -> Summary:
+    """Put a run together with what all runs left in the folder.
+
+    Args:
+        records: of what is on disk.
+        images, seconds, rays, stages: of this run.
+        notes: of what was planned.
+    """
+    by_camera: dict[int, float] = {}
+    errors: dict[tuple[int, int], tuple[float, float]] = {}
+    there: set[tuple[int, int]] = set()
+    for entry in records.entries:
+        by_camera[entry.c] = entry.hits
+        errors |= {(entry.c, l): error for l, error in entry.errors.items()}
+        there |= {(entry.c, l) for l in range(*entry.lights)}
+    width, height = prepared.job.camera.resolution
+    found = dict.fromkeys(note for entry in sorted(records.entries, key=lambda e: e.c) for note in entry.notes)
+    all_rays = sum((Counter(session.rays) for session in records.sessions), Counter[str]())
+    return Summary(
+        images=images,
+        there=len(there),
+        total=prepared.n_cameras * prepared.n_lights,
+        seconds=seconds,
+        rays=dict(rays),
+        stages=stages,
+        pixels=width * height,
+        hits=math.fsum(by_camera.values()) / max(len(by_camera), 1),
+        peak_memory=peak_memory(),
+        notes=(*notes, *found, *_mixed(records)),
+        standard_error=_standard_error(prepared.lights, errors) if errors else {},
+        all_rays=dict(all_rays) or dict(rays),
+        all_seconds=sum(session.seconds for session in records.sessions) or seconds,
+    )
+
+
+def _mixed(records: Records) -> list[str]:
+    """Say it where processors of several kinds worked on an array: their kernels round differently."""
+    kinds = sorted({session.processor for session in records.sessions} | {processor()})
+    if len(kinds) < 2:
+        return []
+    return [f"rendered on several kinds of processor, whose images may differ in the last bits: {', '.join(kinds)}"]
+
+
+def _standard_error(lights: Lights, errors: dict[tuple[int, int], tuple[float, float]]) -> dict[str, Any]:
+    """What the manifest says of the errors; with groups, of those of their own light."""
+    found: dict[str, Any] = summed_up({(c, l): error for (c, l), error in errors.items() if l < lights.n_lit})
+    for group in lights.groups:
+        if found["light"] in group.positions:
+            return found | {"light": found["light"] - group.positions.start, "group": group.name}
+    return found
+
+
+def with_summary(manifest: Manifest, summary: Summary) -> Manifest:
+    """The manifest of what is on disk after a run."""
+    per_image = summary.pixels * max(summary.there, 1)
+    table = {
+        "finished": summary.there == summary.total,
+        "ambient_paths": manifest.summary["ambient_paths"],
+        "images": summary.there,
+        "seconds": round(summary.all_seconds, 3),
+        "hits_per_pixel": round(summary.hits, 3),
+        "rays": summary.all_rays,
+        "rays_per_pixel_image": {kind: round(n / per_image, 5) for kind, n in summary.all_rays.items()},
+        "peak_memory": summary.peak_memory,
+        "processor": processor(),
+        "notes": list(summary.notes),
+    }
+    if summary.standard_error:
+        table["standard_error"] = summary.standard_error
+    table |= {key: manifest.summary[key] for key in ("automatic", "target") if key in manifest.summary}
+    return replace(manifest, summary=table)

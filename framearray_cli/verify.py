@@ -1,0 +1,75 @@
+"""Looks whether every file of a frame array is there and what it was when it was finished: `framearray verify`."""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from .errors import OutputError
+from .images import read_image, read_layers
+from .manifest import Manifest, array_files
+from .manifestfile import read_manifest
+from .record import damaged, read_records
+
+NEVER = "was never finished"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verified:
+    """What was found.
+
+    Attributes:
+        files: of the whole array.
+        wrong: names of files that are missing, damaged or were never finished, with what is wrong.
+        unknown: files that are whole images but of which no checksum is known.
+    """
+
+    manifest: Manifest
+    files: int
+    wrong: tuple[tuple[str, str], ...]
+    unknown: int
+
+
+def verify(out: Path, threads: int, progress: Callable[[int, int], None]) -> Verified:
+    """Read every file of an array.
+
+    Args:
+        out: output folder of a render, or its manifest.
+        progress: told files done and files in all.
+
+    Raises:
+        OutputError: the manifest or a record cannot be read.
+    """
+    manifest = read_manifest(out)
+    checksums = read_records(manifest.directory, manifest.fingerprint).checksums()
+    names = [file.relative_to(manifest.directory).as_posix() for file in array_files(manifest)]
+
+    def look(name: str) -> list[tuple[str, str]]:
+        if name in checksums:
+            return list(damaged(manifest.directory, checksums, [name]))
+        return list(_without_checksum(manifest, name))
+
+    wrong: list[tuple[str, str]] = []
+    with ThreadPoolExecutor(threads, thread_name_prefix="verify") as pool:
+        for done, found in enumerate(pool.map(look, names), start=1):
+            wrong += found
+            progress(done, len(names))
+    unknown = len(set(names) - set(checksums)) - sum(1 for name, _ in wrong if name not in checksums)
+    return Verified(manifest=manifest, files=len(names), wrong=tuple(wrong), unknown=unknown)
+
+
+def _without_checksum(manifest: Manifest, name: str) -> Iterator[tuple[str, str]]:
+    """A file that no record tells of: whether it is an image of the right size, at least."""
+    path = manifest.directory / name
+    if not path.is_file():
+        yield name, NEVER
+        return
+    try:
+        layers = bool(manifest.layers) and ".layers." in name
+        shape = next(iter(read_layers(path).values())).shape if layers else read_image(path).shape[:2]
+    except OutputError as error:
+        yield name, str(error).removeprefix(f"{path}: ")
+        return
+    width, height = manifest.resolution
+    if shape != (height, width):
+        yield name, f"expected {width} x {height} pixels, found {shape[1]} x {shape[0]}"

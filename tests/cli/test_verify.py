@@ -1,0 +1,76 @@
+"""`verify`: finds whatever is missing or changed, and mends it."""
+
+import random
+from pathlib import Path
+
+import pytest
+import tiny
+from program import run, write_job
+
+WALK = tiny.WALK | {"frames": 4, "keys": [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": 3}]}
+N_FILES = 4 * 3 + 4
+
+
+@pytest.fixture
+def array(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
+    assert run(capsys, "render", "-q", write_job(tmp_path, camera=WALK)).code == 0
+    return tmp_path / "out"
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.glob("tiny.*")}
+
+
+def test_a_whole_array(array, capsys):
+    told = run(capsys, "verify", array)
+    assert (told.code, told.err) == (0, "")
+    assert told.out.endswith(f"{N_FILES} files of tiny are whole\n")
+    assert run(capsys, "verify", "-q", array / "manifest.toml").out == ""
+
+
+def test_every_flipped_byte_is_found_and_mended(array, capsys):
+    before, rng = contents(array), random.Random(5)
+    names = rng.sample(sorted(before), 6)
+    for name in names[:5]:
+        data = bytearray(before[name])
+        data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+        (array / name).write_bytes(data)
+    (array / names[5]).unlink()
+    told = run(capsys, "verify", "-q", array)
+    assert told.code == 5
+    assert told.err.splitlines()[-1].startswith(f"6 of {N_FILES} files are missing or damaged; ")
+    assert {line.split(": ")[0] for line in told.err.splitlines()[:-1]} == {str(array / name) for name in names}
+    mended = run(capsys, "verify", "--repair", array)
+    assert (mended.code, mended.err) == (0, "")
+    assert contents(array) == before
+    assert run(capsys, "verify", "-q", array).code == 0
+
+
+def test_an_unfinished_array_is_finished(array, capsys, tmp_path):
+    job = write_job(tmp_path, "part.toml", camera=WALK, output={"directory": "part"})
+    assert run(capsys, "render", "-q", job, "--cameras", "1-2").code == 0
+    told = run(capsys, "verify", tmp_path / "part")
+    assert told.code == 5
+    assert told.err.count("was never finished") == 2 * (3 + 1)
+    assert run(capsys, "verify", "-q", "--repair", tmp_path / "part").code == 0
+    assert contents(tmp_path / "part") == contents(array)
+
+
+def test_without_records_images_are_looked_at(array, capsys):
+    for file in (array / "records").iterdir():
+        file.unlink()
+    told = run(capsys, "verify", array)
+    assert told.code == 0
+    assert f"{N_FILES} files are whole, but have no checksum" in told.out
+    (array / "tiny.c0001.l001.png").write_bytes((array / "tiny.c0001.l001.png").read_bytes()[:-100])
+    (array / "tiny.layers.c0002.exr").write_bytes(b"no image")
+    assert run(capsys, "verify", array).err.splitlines()[-1].startswith(f"2 of {N_FILES} files are missing or damaged")
+
+
+@pytest.mark.parametrize("cameras", ["0-9", "3-1", "x", ""])
+def test_cameras_that_are_no_range(cameras, tmp_path, capsys):
+    told = run(capsys, "render", "-q", write_job(tmp_path, camera=WALK), "--cameras", cameras)
+    assert told.code == 2
+    assert "--cameras" in told.err
+    assert "expected" in told.err
+    assert not (tmp_path / "out").exists()

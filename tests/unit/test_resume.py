@@ -1,0 +1,198 @@
+"""A render that goes on, or that is split: the same bytes as one that was not."""
+
+import json
+import random
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tiny
+from tiny import WALK
+
+import framearray_cli.render as rendering
+from framearray_cli.errors import OutputError
+from framearray_cli.job import Job
+from framearray_cli.manifestfile import read_manifest
+from framearray_cli.ranges import frames_text, parse_frames
+from framearray_cli.record import damaged, digest, read_records, record_files
+from framearray_cli.render import Listener, render
+from framearray_cli.resume import look
+
+N = 7
+CAMERA = {**WALK, "frames": N, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": N - 1}]}
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tiny.save_glb(tiny.room_meshes(), tmp_path_factory.mktemp("scene") / "room.glb")
+
+
+def job(scene: Path, out: Path, **changes: Any) -> Job:
+    output = {"directory": str(out), "format": "exr"}
+    table = {"scene": {"file": str(scene)}, "camera": CAMERA, "output": output, "reuse": {"n_r": 2}, **changes}
+    return tiny.job(**table)
+
+
+def images(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.glob("*.exr")}
+
+
+@pytest.fixture(scope="module")
+def whole(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("whole")
+    render(job(scene, out))
+    return out
+
+
+class Counting(Listener):
+    """Counts what is written, and stops after some images."""
+
+    def __init__(self, most: float = np.inf) -> None:
+        self.images, self._most = 0, most
+
+    def written(self, images: int) -> None:
+        self.images += images
+        if self.images > self._most:
+            raise OutputError("stopped by the test")
+
+
+def test_parts_in_any_order_are_the_whole(scene: Path, tmp_path: Path, whole: Path) -> None:
+    parts = [(0, 1), (2, 5), (3,), (4, 6)]
+    random.Random(3).shuffle(parts)
+    for k, part in enumerate(parts):
+        assert not (k and read_manifest(tmp_path).summary["finished"])
+        summary = render(job(scene, tmp_path), cameras=part)
+        assert summary.images == 3 * len(part)
+    assert images(tmp_path) == images(whole)
+    summary = read_manifest(tmp_path).summary
+    assert summary["finished"] is True and summary["images"] == 3 * N
+    assert summary["hits_per_pixel"] == pytest.approx(read_manifest(whole).summary["hits_per_pixel"], abs=2e-3)
+    assert sorted(file.stem for file in record_files(tmp_path)) == ["0-1", "2,5", "3", "4,6"]
+
+
+def test_a_stopped_render_goes_on(scene: Path, tmp_path: Path, whole: Path) -> None:
+    runs, written = 0, 0
+    while True:
+        runs += 1
+        counting = Counting(most=5)
+        try:
+            render(job(scene, tmp_path), counting)
+            break
+        except OutputError:
+            written += counting.images
+            assert read_manifest(tmp_path).summary["finished"] is False
+    assert runs > 2, "it was stopped"
+    assert images(tmp_path) == images(whole)
+    assert read_manifest(tmp_path).summary["images"] == 3 * N
+    counting = Counting()
+    summary = render(job(scene, tmp_path), counting)
+    assert (counting.images, summary.images, summary.there) == (0, 0, 3 * N)
+
+
+def test_blocks_of_lights_go_on(scene: Path, tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that was stopped in its second block, and goes on with another limit of memory."""
+    monkeypatch.setattr(rendering, "light_blocks", lambda *_, **__: [range(0, 1), range(1, 3)])
+    with pytest.raises(OutputError, match="stopped"):
+        render(job(scene, tmp_path), Counting(most=N + 5))
+    monkeypatch.setattr(rendering, "light_blocks", lambda *_, **__: [range(0, 2), range(2, 3)])
+    render(job(scene, tmp_path))
+    assert images(tmp_path) == images(whole)
+    assert read_manifest(tmp_path).summary["finished"] is True
+
+
+def test_torn_and_foreign_lines_do_not_count(scene: Path, tmp_path: Path, whole: Path) -> None:
+    render(job(scene, tmp_path), cameras=(0, 1, 2))
+    [file] = record_files(tmp_path)
+    lines = file.read_bytes().splitlines(keepends=True)
+    entries = [k for k, line in enumerate(lines) if b'"c":' in line]
+    for cut in (
+        b"",
+        b"{",
+        b'{"c":0}',
+        b'{"c":0,"lights":[0,3],"files":[1],"hits":0}',
+        b"\xff\xfe",
+        b"[" * 100000,
+        b"7",
+    ):
+        torn = [*lines[: entries[1]], cut + b"\n", *lines[entries[1] : entries[2]], lines[entries[2]][:-20]]
+        file.write_bytes(b"".join(torn))
+        assert look(tmp_path, read_manifest(tmp_path).fingerprint).images == 3 * 2
+        assert read_records(tmp_path, "sha256:other").entries == ()
+    render(job(scene, tmp_path), cameras=(0, 1, 2))
+    render(job(scene, tmp_path))
+    assert images(tmp_path) == images(whole)
+
+
+def test_damage_is_found_and_mended(scene: Path, tmp_path: Path, whole: Path) -> None:
+    render(job(scene, tmp_path))
+    rng = random.Random(7)
+    names = rng.sample(sorted(images(tmp_path)), 6)
+    for k, name in enumerate(names):
+        data = bytearray((tmp_path / name).read_bytes())
+        if k == 0:
+            (tmp_path / name).unlink()
+            continue
+        if k == 1:
+            del data[-1]
+        else:
+            data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+        (tmp_path / name).write_bytes(data)
+    records = read_records(tmp_path, read_manifest(tmp_path).fingerprint)
+    checksums = records.checksums()
+    assert sorted(name for name, _ in damaged(tmp_path, checksums, checksums)) == sorted(names)
+    heard: list[int] = []
+
+    class Hears(Counting):
+        def found(self, found: Any, wanted: int) -> None:
+            heard.append(len(found.damaged))
+
+    render(job(scene, tmp_path), Hears())
+    assert heard == [6]
+    assert images(tmp_path) == images(whole)
+    assert look(tmp_path, read_manifest(tmp_path).fingerprint).damaged == ()
+
+
+def test_another_processor_is_told(scene: Path, tmp_path: Path) -> None:
+    render(job(scene, tmp_path), cameras=(0,))
+    [file] = record_files(tmp_path)
+    lines = file.read_text().splitlines()
+    head = next(k for k, line in enumerate(lines) if "processor" in line)
+    lines[head] = json.dumps(json.loads(lines[head]) | {"processor": "another"})
+    file.write_text("\n".join(lines) + "\n")
+    summary = render(job(scene, tmp_path))
+    assert any("several kinds of processor" in note and "another" in note for note in summary.notes)
+
+
+def test_a_camera_that_stands_still(scene: Path, tmp_path: Path) -> None:
+    still = {"camera": {**CAMERA, "keys": WALK["keys"][:1]}}
+    render(job(scene, tmp_path / "whole", **still))
+    render(job(scene, tmp_path / "parts", **still), cameras=(5, 6))
+    render(job(scene, tmp_path / "parts", **still))
+    assert images(tmp_path / "parts") == images(tmp_path / "whole")
+
+
+def test_a_digest_tells_any_flipped_bit(tmp_path: Path) -> None:
+    data = bytearray(np.random.default_rng(1).bytes(5000))
+    (tmp_path / "a").write_bytes(data)
+    known = digest(tmp_path / "a")
+    for place in range(0, 5000, 37):
+        data[place] ^= 1 << place % 8
+        (tmp_path / "a").write_bytes(data)
+        assert digest(tmp_path / "a") != known
+        data[place] ^= 1 << place % 8
+
+
+@pytest.mark.parametrize(
+    ("text", "frames"),
+    [("0-3", (0, 1, 2, 3)), ("5", (5,)), ("0-9x4", (0, 4, 8)), ("8,0-2, 1", (0, 1, 2, 8)), ("7-7", (7,))],
+)
+def test_ranges(text: str, frames: tuple[int, ...]) -> None:
+    assert parse_frames(text, 10) == frames
+    assert parse_frames(frames_text(frames), 10) == frames
+
+
+@pytest.mark.parametrize("text", ["", "a", "3-1", "0-9x0", "-1", "0-10", "1..3", "1-2-3", "9" * 50])
+def test_what_is_no_range(text: str) -> None:
+    with pytest.raises(ValueError, match="expected"):
+        parse_frames(text, 10)
