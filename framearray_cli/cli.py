@@ -14,6 +14,7 @@ from .commands.options import fail, notes, problems
 from .commands.render import render
 from .commands.report import report
 from .commands.schema import schema
+from .commands.sheet import sheet
 from .errors import FrameArrayError, JobError
 from .interrupts import Stopped, forget, listen
 from .screen import out, say
@@ -28,7 +29,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain text, also in a log file
 )
 
-for command in (render, check, assemble, report, schema):
+for command in (render, check, assemble, sheet, report, schema):
     app.command()(command)
 
 

@@ -28,10 +28,12 @@ reuse work crew shading mirrors frame denoise standarderror compose accumulate w
 imageattributes images manifest manifestfile pictures outfolder stored writer
 prepare memory acceptance expected auto allot target describe render check
 moviepath movies assemble
+places sheet
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
 screen interrupts wording
 commands/__init__ commands/options commands/render commands/check commands/assemble commands/report commands/schema
+commands/sheet
 cli __main__
 """
 ORDER = FLOW.split()
@@ -50,7 +52,7 @@ DOORS = {
     ),  # eyehits: one function that allocates, so no kernel
     "trimesh": ("meshes/",),
     "OpenImageIO": ("images",),
-    "PIL": ("meshes/", "images"),
+    "PIL": ("meshes/", "images", "sheet"),
     "tomllib": ("jobfile", "manifestfile"),
     "tomli_w": ("manifestfile", "report/tables"),
     "matplotlib": ("report/plots",),
