@@ -10,6 +10,7 @@ import typer
 from . import __version__
 from .commands.assemble import assemble
 from .commands.check import check
+from .commands.export import export
 from .commands.options import fail, notes, problems
 from .commands.render import render
 from .commands.report import report
@@ -29,7 +30,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain text, also in a log file
 )
 
-for command in (render, check, assemble, sheet, report, schema):
+for command in (render, check, assemble, sheet, export, report, schema):
     app.command()(command)
 
 

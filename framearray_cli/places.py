@@ -76,10 +76,13 @@ def spread(n: int, most: int) -> tuple[int, ...]:
 
 
 def plain_names(axes: Mapping[str, int]) -> dict[str, str]:
-    """Names of axes for files and columns: letters, digits and _, no two the same; that of the main one is "light"."""
+    """Names of axes for keys and columns, of letters, digits and _: "light" for the main one, "light_..." for others.
+
+    No two are the same.
+    """
     names: dict[str, str] = {}
     for axis in axes:
-        name = MAIN_AXIS if axis == MAIN_AXIS else re.sub(r"[^0-9A-Za-z]+", "_", axis).strip("_") or "axis"
+        name = MAIN_AXIS if axis == MAIN_AXIS else f"light_{re.sub(r'[^0-9A-Za-z]+', '_', axis).strip('_')}"
         while name in names.values():
             name += "_"
         names[axis] = name

@@ -29,11 +29,12 @@ imageattributes images manifest manifestfile pictures outfolder stored writer
 prepare memory acceptance expected auto allot target describe render check
 moviepath movies assemble
 places sheet
+export/selection export/folder export/points export/colmap export/nerfstudio export/cinema export/write export/__init__
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
 screen interrupts wording
 commands/__init__ commands/options commands/render commands/check commands/assemble commands/report commands/schema
-commands/sheet
+commands/sheet commands/export
 cli __main__
 """
 ORDER = FLOW.split()

@@ -65,6 +65,6 @@ def test_unknown_axes_are_named(light: str | None, at: list[str], message: str) 
 
 
 def test_names_of_axes_are_plain_and_differ() -> None:
-    assert plain_names({"light": 2, "lamps": 3}) == {"light": "light", "lamps": "lamps"}
+    assert plain_names({"light": 2, "lamps": 3}) == {"light": "light", "lamps": "light_lamps"}
     names = plain_names({"light": 2, "a b": 3, "a/b": 2, "ö": 1})
-    assert names == {"light": "light", "a b": "a_b", "a/b": "a_b_", "ö": "axis"}
+    assert names == {"light": "light", "a b": "light_a_b", "a/b": "light_a_b_", "ö": "light_"}
