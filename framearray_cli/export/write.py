@@ -130,4 +130,6 @@ def _notes(kind: Kind, layers: bool, n_points: int, wanted: int) -> tuple[str, .
         return ()
     if not layers:
         return ("no points and no depth: the array was rendered without layers (output.layers)",)
-    return () if n_points else ("no points: no two cameras see the same smooth surface",)
+    if n_points:
+        return ()
+    return ("no points: no two cameras see the same smooth surface; with samples.hits below 1 depth has holes",)

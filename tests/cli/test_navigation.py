@@ -1,10 +1,14 @@
 """`sheet` and `export`, as typed: what they say, and how they end."""
 
+import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+import trimesh
 from boxarrays import plain_manifest, write_array
-from program import names, run
+from program import names, run, write_job
+from tiny import WALK
 
 
 @pytest.fixture
@@ -80,3 +84,29 @@ def test_an_export_that_cannot_be_made(array, tmp_path, capsys, monkeypatch, opt
     result = run(capsys, "export", array, *options)
     assert (result.code, message in result.err) == (code, True), result.err
     assert (names(tmp_path), names(array)) == ({"out"}, before)
+
+
+def misses(mesh: trimesh.Trimesh, points: np.ndarray, size: np.ndarray) -> float:
+    """Share of points that are farther from the mesh than a size each."""
+    _, distance, _ = trimesh.proximity.closest_point_naive(mesh, points)
+    return float(np.mean(distance > size))
+
+
+def test_points_of_a_rendered_room_lie_on_its_surfaces(tmp_path, capsys):
+    """Depth is a mean over hits anywhere in a pixel: a point is off by less than what the pixel covers there.
+
+    The pixel of an eye at distance d covers d / f / cos(alpha), alpha the angle to its axis; the bound takes the
+    nearest of all eyes and leaves the cosine out, so it is the stricter.
+    """
+    job = write_job(tmp_path, camera={**WALK, "resolution": [96, 72]})
+    assert run(capsys, "render", job, "-q").code == 0
+    assert run(capsys, "export", tmp_path / "out", "-f", "nerfstudio", "-o", tmp_path / "x", "--points", 400).code == 0
+    table = json.loads((tmp_path / "x/transforms.json").read_text())
+    eyes = np.array([frame["transform_matrix"] for frame in table["frames"]])[:, :3, 3]
+    points = np.array(trimesh.load(tmp_path / "x/points.ply").vertices)
+    assert len(points) > 200
+    mesh = trimesh.load(tmp_path / "tiny.glb").to_geometry()
+    size = np.linalg.norm(points[:, None] - eyes, axis=-1).min(-1) / table["fl_x"]
+    assert misses(mesh, points, size) <= 0.01  # edges whose depth bends little
+    for wrong in ([-1, 1, 1], [1, -1, 1], [1, 1, -1], [1.1, 1.1, 1.1]):  # mirrored, or a tenth too far
+        assert misses(mesh, (points - eyes[0]) * wrong + eyes[0], size) > 0.2
