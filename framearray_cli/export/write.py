@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ..colour import srgb8_from_linear
-from ..errors import JobError
+from ..errors import JobError, OutputError
 from ..images import ImageFormat
 from ..manifestfile import read_manifest
 from ..pictures import Pictures
@@ -85,6 +85,8 @@ def export(
     )
     if kind not in KINDS:
         raise JobError("--format", [f"expected {', '.join(KINDS)}, got {kind!r}"])
+    if target.name in ("", ".."):
+        raise OutputError(f"{target}: expected the name of a folder to be made")
     wanted = image_format or ImageFormat(format="png")
     if kind == "cinema" and target.suffix != cinema.SUFFIX:
         target = target.with_name(f"{target.name}{cinema.SUFFIX}")

@@ -312,6 +312,20 @@ def test_layers_that_are_missing_are_told(array: Manifest, tmp_path: Path) -> No
     assert export(bare.directory, tmp_path / "z", "cinema").notes == ()
 
 
+def test_folders_without_a_name_are_refused(array: Manifest, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(array.directory)
+    for target in (Path("."), Path("..")):
+        with pytest.raises(OutputError, match="expected the name of a folder to be made"):
+            export(array.directory, target, "cinema")
+
+
+def test_no_points_and_one_camera_are_fine(array: Manifest, tmp_path: Path) -> None:
+    result = export(array.directory, tmp_path / "a", "nerfstudio", points=0)
+    assert (result.n_points, result.notes) == (0, ())
+    result = export(array.directory, tmp_path / "b", "nerfstudio", cameras="2", points=200)
+    assert 100 < result.n_points <= 200
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
