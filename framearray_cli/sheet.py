@@ -181,7 +181,7 @@ def _heads(manifest: Manifest, axis: str, place: Sequence[int]) -> Sequence[str]
     counts = [_counted(manifest.n_cameras, "camera")]
     counts += [_counted(n, "light") if name == MAIN_AXIS else f"{n} of {name}" for name, n in manifest.axes.items()]
     text = f"{' x '.join(counts)},  {width} x {height} pixels"
-    beside = [f"{name} {l}" for name, l in zip(manifest.axes, place, strict=True) if name != axis]
+    beside = [f"at {name} {l}" for name, l in zip(manifest.axes, place, strict=True) if name != axis]
     return manifest.name, ",  ".join([text, *beside])
 
 
