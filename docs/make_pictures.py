@@ -20,6 +20,7 @@ from framearray_cli.manifest import Manifest, image_path, layers_path
 from framearray_cli.manifestfile import read_manifest
 from framearray_cli.paths import eyes, lights
 from framearray_cli.render import render
+from framearray_cli.sheet import make_sheet
 
 ROOT = Path(__file__).resolve().parents[1]
 PICTURES = ROOT / "docs" / "pictures"
@@ -119,6 +120,15 @@ def reuse(width: int, folder: Path) -> Image.Image:
     return sheet([parts])
 
 
+def contact_sheet(width: int, folder: Path) -> Image.Image:
+    """What `framearray sheet` draws of the whole small kitchen."""
+    job = read_job(ROOT / "jobs" / "kitchen-small.toml")
+    render(job.model_copy(update={"output": job.output.model_copy(update={"directory": folder / "array"})}))
+    make_sheet(folder / "array", folder / "sheet.png", columns=6, rows=4, width=width)
+    with Image.open(folder / "sheet.png") as image:
+        return image.convert("RGB")
+
+
 def main() -> None:
     """Make all pictures again."""
     PICTURES.mkdir(exist_ok=True)
@@ -130,6 +140,7 @@ def main() -> None:
             "stairs": array_sheet("stairs", [10, 70, 130], [6, 24, 40], 280, out / "stairs"),
             "terms": terms(280, out / "terms"),
             "reuse": reuse(420, out / "reuse"),
+            "sheet": contact_sheet(900, out / "sheet"),
         }
         for name, image in made.items():
             file = PICTURES / f"{name}.jpg"

@@ -10,10 +10,12 @@ import typer
 from . import __version__
 from .commands.assemble import assemble
 from .commands.check import check
+from .commands.export import export
 from .commands.options import fail, notes, problems
 from .commands.render import render
 from .commands.report import report
 from .commands.schema import schema
+from .commands.sheet import sheet
 from .commands.verify import verify
 from .errors import FrameArrayError, JobError
 from .interrupts import Stopped, forget, listen
@@ -29,7 +31,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain text, also in a log file
 )
 
-for command in (render, check, verify, assemble, report, schema):
+for command in (render, check, verify, assemble, sheet, export, report, schema):
     app.command()(command)
 
 

@@ -133,13 +133,18 @@ def _write_exr(
     _write_oiio(path, "openexr", spec, pixels)
 
 
-def write_codes(path: Path, codes: Bytes) -> None:
-    """Write (h, w, 3) 8-bit sRGB codes as PNG, whole or not at all.
+def write_codes(path: Path, codes: Bytes, image_format: ImageFormat | None = None) -> None:
+    """Write (h, w, 3) 8-bit sRGB codes as PNG or JPEG, whole or not at all.
+
+    Args:
+        path: the file.
+        codes: what is shown.
+        image_format: png (what None means) or jpg, and its quality.
 
     Raises:
         OutputError: the file cannot be written.
     """
-    write_bytes(path, _encode8(codes, ImageFormat(format="png"), {}))
+    write_bytes(path, _encode8(codes, image_format or ImageFormat(format="png"), {}))
 
 
 def write_layers(

@@ -27,6 +27,13 @@ Output = Annotated[
     typer.Option("--output", "-o", help="Folder for the images, instead of the job's.", metavar="FOLDER"),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+Exposure = Annotated[
+    float, typer.Option("--exposure", min=-64, max=64, help="Stops added to PNG and JPEG.", metavar="STOPS")
+]
+At = Annotated[
+    list[str] | None,
+    typer.Option("--at", help="Place along another axis of light positions: lamps=3.", metavar="AXIS=PLACE"),
+]
 
 
 def read(job_file: Path, threads: int | None, output: str | None) -> "Job":

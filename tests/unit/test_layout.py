@@ -28,11 +28,13 @@ reuse work crew shading mirrors frame denoise standarderror compose accumulate w
 imageattributes images manifest manifestfile pictures ranges record resume outfolder stored writer
 prepare memory acceptance expected auto allot target describe summary render check verify
 moviepath movies assemble
+places sheet
+export/selection export/folder export/points export/colmap export/nerfstudio export/cinema export/write export/__init__
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
 screen interrupts wording
 commands/__init__ commands/options commands/render commands/check commands/verify
-commands/assemble commands/report commands/schema
+commands/assemble commands/sheet commands/export commands/report commands/schema
 cli __main__
 """
 ORDER = FLOW.split()
@@ -51,7 +53,7 @@ DOORS = {
     ),  # eyehits: one function that allocates, so no kernel
     "trimesh": ("meshes/",),
     "OpenImageIO": ("images",),
-    "PIL": ("meshes/", "images"),
+    "PIL": ("meshes/", "images", "sheet"),
     "tomllib": ("jobfile", "manifestfile"),
     "tomli_w": ("manifestfile", "report/tables"),
     "matplotlib": ("report/plots",),

@@ -1,0 +1,68 @@
+"""`framearray export`."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from ..errors import JobError
+from ..screen import Screen, out, say
+from .options import Exposure, Quiet, fail, place, problems
+
+
+def export(
+    array: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `render` wrote.", show_default=False)],
+    kind: Annotated[
+        Literal["nerfstudio", "colmap", "cinema"],
+        typer.Option("--format", "-f", help="What the folder is for.", show_default=False),
+    ],
+    target: Annotated[
+        str,
+        typer.Option("--output", "-o", help="Folder; cinema adds .cdb.", metavar="FOLDER", show_default=False),
+    ],
+    light: Annotated[
+        str | None,
+        typer.Option(
+            "--light", help="Light positions: all, or 0,3,last,50%; default: all for cinema, else 50%.",
+            metavar="PLACES",
+        ),
+    ] = None,
+    at: Annotated[
+        list[str] | None,
+        typer.Option("--at", help="Places along another axis of light positions: lamps=0,3.", metavar="AXIS=PLACES"),
+    ] = None,
+    cameras: Annotated[str, typer.Option("--cameras", help="Cameras: all, or 0,5,last.", metavar="PLACES")] = "all",
+    image_format: Annotated[
+        Literal["png", "jpg", "exr", "tif"], typer.Option("--image-format", help="Of the pictures.")
+    ] = "png",
+    exposure: Exposure = 0.0,
+    points: Annotated[int, typer.Option("--points", min=0, help="Points of the scene, at most.", metavar="N")] = 10_000,
+    copy: Annotated[bool, typer.Option("--copy", help="Copy images that could be hard links.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an earlier export.")] = False,
+    quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Hand a frame array to other tools: images with cameras, lights, depth and points."""
+    from ..export import export as run
+    from ..images import ImageFormat
+
+    if exposure and image_format not in ("png", "jpg"):
+        raise typer.BadParameter("changes PNG and JPEG alone", param_hint="--exposure")
+    with Screen(out, quiet=quiet) as screen:
+
+        def progress(done: int, total: int) -> None:
+            if not screen.total:
+                screen.count("exporting", total, "image")
+            screen.advance()
+
+        try:
+            made = run(
+                array, place(target), kind, cameras=cameras, light=light, at=at or (),
+                image_format=ImageFormat(format=image_format, exposure=exposure), points=points, copy=copy,
+                force=force, progress=progress,
+            )  # fmt: skip
+        except JobError as error:
+            fail(problems(error, "nothing was written"), error.exit_code)
+    if not quiet:
+        lights = f"{made.n_places} light position{'s' if made.n_places > 1 else ''}"
+        points_too = f", {made.n_points:,} points" if kind != "cinema" else ""
+        say(out, [f"{made.target}: {made.n_cameras} cameras, {lights}{points_too}", *made.notes])

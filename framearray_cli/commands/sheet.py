@@ -1,0 +1,53 @@
+"""`framearray sheet`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import JobError
+from ..screen import Screen, out, say
+from .options import At, Exposure, Quiet, fail, place, problems
+
+
+def sheet(
+    array: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `render` wrote.", show_default=False)],
+    target: Annotated[
+        str,
+        typer.Option(
+            "--output", "-o", help="sheet.png or .jpg; .exr, .tif: linear, no labels.", metavar="FILE",
+            show_default=False,
+        ),
+    ],
+    columns: Annotated[int, typer.Option("--columns", min=1, help="Cameras, at most.", metavar="N")] = 12,
+    rows: Annotated[int, typer.Option("--rows", min=1, help="Light positions, at most.", metavar="N")] = 8,
+    width: Annotated[
+        int, typer.Option("--width", min=1, max=20_000, help="Of the sheet, at most, pixels.", metavar="PIXELS")
+    ] = 2400,
+    exposure: Exposure = 0.0,
+    side: Annotated[
+        str | None, typer.Option("--side", help="Axis from top to bottom; default: the first.", metavar="AXIS")
+    ] = None,
+    at: At = None,
+    quiet: Quiet = False,
+) -> None:  # fmt: skip
+    """Draw a contact sheet: cameras from left to right, light positions from top to bottom."""
+    from ..sheet import make_sheet
+
+    with Screen(out, quiet=quiet) as screen:
+
+        def progress(done: int, total: int) -> None:
+            if not screen.total:
+                screen.count("drawing", total, "image")
+            screen.advance()
+
+        try:
+            made = make_sheet(
+                array, place(target), columns=columns, rows=rows, width=width, exposure=exposure, side=side,
+                at=at or (), progress=progress,
+            )  # fmt: skip
+        except JobError as error:
+            fail(problems(error, "nothing was written"), error.exit_code)
+    if not quiet:
+        shown = f"{len(made.cameras)} cameras, {len(made.places)} light positions"
+        say(out, [f"{made.target}: {shown}, {made.size[0]} x {made.size[1]} pixels"])

@@ -1,0 +1,112 @@
+"""`sheet` and `export`, as typed: what they say, and how they end."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from boxarrays import plain_manifest, write_array
+from program import names, run, write_job
+from tiny import WALK
+
+
+@pytest.fixture
+def array(tmp_path: Path) -> Path:
+    return write_array(plain_manifest(tmp_path / "out")).directory
+
+
+def test_a_sheet_is_drawn(array, tmp_path, capsys):
+    result = run(capsys, "sheet", array, "-o", tmp_path / "s.png", "--columns", 2, "--rows", 2)
+    assert (result.code, result.err) == (0, "")
+    assert result.out.startswith(f"{tmp_path / 's.png'}: 2 cameras, 2 light positions, ")
+    assert run(capsys, "sheet", array, "-o", tmp_path / "t.jpg", "-q").out == ""
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "message"),
+    [
+        (["-o", "s.gif"], 4, "s.gif: expected a .png, .jpg, .exr or .tif"),
+        (["-o", "s.png", "--width", "60"], 2, "--width: 60 pixels are too few for 4 columns; try fewer --columns"),
+        (["-o", "s.png", "--at", "lamps=1"], 2, "--at: expected AXIS=PLACES with one of the axes light (0 to 2)"),
+        (["-o", ""], 2, "expected a name, got none"),
+        (["-o", "s.png", "--columns", "0"], 2, "--columns"),
+    ],
+)
+def test_a_sheet_that_cannot_be_drawn(array, tmp_path, capsys, monkeypatch, options, code, message):
+    monkeypatch.chdir(tmp_path)
+    result = run(capsys, "sheet", array, *options)
+    assert (result.code, message in result.err) == (code, True), result.err
+    assert names(tmp_path) == {"out"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "folder", "said"),
+    [
+        ("nerfstudio", "x", "4 cameras, 1 light position, "),
+        ("colmap", "x", "4 cameras, 1 light position, "),
+        ("cinema", "x.cdb", "4 cameras, 3 light positions"),
+    ],
+)
+def test_an_array_is_exported(array, tmp_path, capsys, kind, folder, said):
+    result = run(capsys, "export", array, "--format", kind, "-o", tmp_path / "x")
+    assert (result.code, result.err) == (0, "")
+    assert result.out.startswith(f"{tmp_path / folder}: {said}")
+    assert ("points" in result.out) == (kind != "cinema")
+    again = run(capsys, "export", array, "-f", kind, "-o", tmp_path / "x")
+    assert again.code == 4
+    assert "an earlier export is there; choose another folder, or give --force to replace it" in again.err
+    forced = run(capsys, "export", array, "-f", kind, "-o", tmp_path / "x", "--force", "-q")
+    assert (forced.code, forced.out) == (0, "")
+    assert names(tmp_path) == {"out", folder}
+
+
+def test_notes_are_printed(tmp_path, capsys):
+    bare = write_array(plain_manifest(tmp_path / "out", layers=False)).directory
+    result = run(capsys, "export", bare, "-f", "colmap", "-o", tmp_path / "x")
+    assert result.code == 0
+    assert result.out.splitlines()[1].startswith("no points and no depth: the array was rendered without layers")
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "message"),
+    [
+        (["-f", "usd", "-o", "x"], 2, "usd"),
+        (["-f", "colmap", "-o", "x", "--light", "7"], 2, "--light: expected 0 to 2, or -3 to -1, got 7"),
+        (["-f", "colmap", "-o", "x", "--light", "noon"], 2, "nothing was written"),
+        (["-f", "colmap", "-o", "x", "--image-format", "exr", "--exposure", "1"], 2, "changes PNG and JPEG alone"),
+        (["-f", "colmap", "-o", "out"], 4, "holds other files, and no sparse/0/images.txt of an earlier export"),
+    ],
+)
+def test_an_export_that_cannot_be_made(array, tmp_path, capsys, monkeypatch, options, code, message):
+    monkeypatch.chdir(tmp_path)
+    before = names(array)
+    result = run(capsys, "export", array, *options)
+    assert (result.code, message in result.err) == (code, True), result.err
+    assert (names(tmp_path), names(array)) == ({"out"}, before)
+
+
+def misses(mesh: trimesh.Trimesh, points: np.ndarray, size: np.ndarray) -> float:
+    """Share of points that are farther from the mesh than a size each."""
+    _, distance, _ = trimesh.proximity.closest_point_naive(mesh, points)
+    return float(np.mean(distance > size))
+
+
+def test_points_of_a_rendered_room_lie_on_its_surfaces(tmp_path, capsys):
+    """Depth is a mean over hits anywhere in a pixel: a point is off by less than what the pixel covers there.
+
+    The pixel of an eye at distance d covers d / f / cos(alpha), alpha the angle to its axis; the bound takes the
+    nearest of all eyes and leaves the cosine out, so it is the stricter.
+    """
+    job = write_job(tmp_path, camera={**WALK, "resolution": [96, 72]})
+    assert run(capsys, "render", job, "-q").code == 0
+    assert run(capsys, "export", tmp_path / "out", "-f", "nerfstudio", "-o", tmp_path / "x", "--points", 400).code == 0
+    table = json.loads((tmp_path / "x/transforms.json").read_text())
+    eyes = np.array([frame["transform_matrix"] for frame in table["frames"]])[:, :3, 3]
+    points = np.array(trimesh.load(tmp_path / "x/points.ply").vertices)
+    assert len(points) > 200
+    mesh = trimesh.load(tmp_path / "tiny.glb").to_geometry()
+    size = np.linalg.norm(points[:, None] - eyes, axis=-1).min(-1) / table["fl_x"]
+    assert misses(mesh, points, size) <= 0.01  # edges whose depth bends little
+    for wrong in ([-1, 1, 1], [1, -1, 1], [1, 1, -1], [1.1, 1.1, 1.1]):  # mirrored, or a tenth too far
+        assert misses(mesh, (points - eyes[0]) * wrong + eyes[0], size) > 0.2
