@@ -37,6 +37,18 @@ class Identity:
     job: dict[str, Any]
 
 
+def check_folder(folder: Path, new: Identity, *, restart: bool) -> Manifest | None:
+    """The array that lies in a folder, if any, once it is known that it may be written to or removed.
+
+    Raises:
+        OutputError: it may not, or its manifest cannot be read.
+    """
+    old = read_array(folder)
+    if old is not None and not restart and (changed := differences(old, new)):
+        raise OutputError(f"{folder}: {in_the_way(old, changed)}")
+    return old
+
+
 def claim_folder(folder: Path, new: Identity, *, restart: bool) -> int:
     """Make a folder ready for a frame array, and remove what lies there if that is wished.
 
@@ -49,9 +61,7 @@ def claim_folder(folder: Path, new: Identity, *, restart: bool) -> int:
     Raises:
         OutputError: another array lies there, its manifest cannot be read, or the folder cannot be written to.
     """
-    old = read_array(folder)
-    if old is not None and not restart and (changed := differences(old, new)):
-        raise OutputError(f"{folder}: {in_the_way(old, changed)}")
+    old = check_folder(folder, new, restart=restart)
     make_folder(folder)
     try:
         with tempfile.TemporaryFile(dir=folder):

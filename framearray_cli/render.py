@@ -3,7 +3,7 @@
 import time
 from collections import Counter
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from threading import Lock
 
@@ -14,13 +14,14 @@ from .crew import Crew
 from .describe import describe, identity_of
 from .embree import EmbreeScene, Engine
 from .errors import OutputError
+from .folderlock import Folder
 from .frame import find_frame
 from .job import Job
 from .kernel import processor
 from .manifest import Manifest
 from .manifestfile import read_manifest, write_manifest
 from .memory import light_blocks, mirror_share, require_memory
-from .outfolder import Identity, claim_folder
+from .outfolder import Identity, check_folder, claim_folder
 from .prepare import Prepared, composed_with, open_embree, plan_work, prepare
 from .ranges import frames_text
 from .record import Entry, RecordWriter, Session, read_records, record_file
@@ -87,31 +88,40 @@ def render(
     require_least_memory(prepared)
     folder = job.output.directory
     chosen = range(prepared.n_cameras) if cameras is None else cameras
-    with open_embree(prepared, engine) as embree:
+    with open_embree(prepared, engine) as embree, ExitStack() as held:
         prepared, choice = settled(prepared, embree)
         identity = identity_of(prepared)
-        listener.removed(claim_folder(folder, identity, restart=restart))
+        session = Session(cameras=frames_text(chosen), processor=processor())
+        check_folder(folder, identity, restart=restart)
+        place = Folder(folder)
+        with place.alone():
+            if restart:
+                place.require_no_other()
+            listener.removed(claim_folder(folder, identity, restart=restart))
+            held.enter_context(place.reserved(chosen, session.cameras))
         if choice:
             listener.settled(choice)
         found = look(folder, identity.fingerprint, prepared.threads)
         wanted = found.missing(chosen, range(prepared.n_lights))
         listener.found(found, len(wanted) * prepared.n_lights)
         if not wanted:
-            return _nothing_to_do(prepared, found, time.perf_counter() - started)
+            with place.alone():
+                return _nothing_to_do(prepared, found, time.perf_counter() - started)
         work, ambient, manifest, rays = _planned(prepared, embree, identity, choice, listener)
-        write_manifest(folder, manifest)
-        session = Session(cameras=frames_text(chosen), processor=processor())
+        with place.alone():
+            write_manifest(folder, manifest)
         with RecordWriter(record_file(folder, session.cameras), identity.fingerprint, session) as record:
             run = _Run(prepared, record, listener, rays, started)
             try:
                 for block in light_blocks(prepared, mirror_share(work), per_pixel=work.per_pixel):
                     run.frames(work.for_lights(block), ambient, block, found.missing(chosen, block))
             except BaseException:
-                with suppress(OutputError):  # what stopped the render is told; this may meet the same full disk
+                with suppress(OutputError), place.alone():  # what stopped the render is told, not what that meets
                     write_manifest(folder, with_summary(manifest, run.summary(found, ambient)))
                 raise
-    summary = run.summary(found, ambient)
-    write_manifest(folder, with_summary(manifest, summary))
+        with place.alone():
+            summary = run.summary(found, ambient)
+            write_manifest(folder, with_summary(manifest, summary))
     return summary
 
 

@@ -25,7 +25,7 @@ rays hits eyehits plan allotment
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
 terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise standarderror compose accumulate window
-imageattributes images manifest manifestfile pictures ranges record resume outfolder stored writer
+imageattributes images manifest manifestfile pictures ranges record resume folderlock outfolder stored writer
 prepare memory acceptance expected auto allot target describe summary render check verify
 moviepath movies assemble
 places sheet
@@ -64,6 +64,8 @@ DOORS = {
     "av": ("movies",),
     "scipy": ("paths", "standarderror", "allotment"),
     "psutil": ("memory",),
+    "xxhash": ("record",),
+    "filelock": ("folderlock",),
 }
 # What takes long to import, or may be absent: `framearray --help` does without.
 HEAVY = ("numba", "llvmlite", "embreex", "trimesh", "OpenImageIO", "PIL", "scipy", "av", "matplotlib", "jinja2")

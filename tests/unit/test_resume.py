@@ -196,3 +196,47 @@ def test_ranges(text: str, frames: tuple[int, ...]) -> None:
 def test_what_is_no_range(text: str) -> None:
     with pytest.raises(ValueError, match="expected"):
         parse_frames(text, 10)
+
+
+class Blocked(Listener):
+    """Starts other runs from within one."""
+
+    def __init__(self, *others: Any) -> None:
+        self.found_others: list[str] = []
+        self._others = list(others)
+
+    def aimed(self, target: Any) -> None:
+        raise AssertionError("no target")
+
+    def planned(self, ambient: Any) -> None:
+        for other in self._others:
+            try:
+                other()
+                self.found_others.append("")
+            except OutputError as error:
+                self.found_others.append(str(error))
+
+
+def test_two_runs_in_one_folder(scene: Path, tmp_path: Path, whole: Path) -> None:
+    """Side by side on other cameras; not on the same ones, and neither is taken away from the other."""
+    whole_job = job(scene, tmp_path)
+    blocked = Blocked(
+        lambda: render(whole_job, cameras=(0, 1)),
+        lambda: render(whole_job, cameras=(3, 4)),
+        lambda: render(whole_job),
+        lambda: render(whole_job, cameras=(0,), restart=True),
+    )
+    render(whole_job, blocked, cameras=(2, 3))
+    assert blocked.found_others[0] == ""
+    for message in blocked.found_others[1:]:
+        assert "another run is rendering cameras 2-3 into this folder" in message
+    render(whole_job)
+    assert images(tmp_path) == images(whole)
+    assert not list((tmp_path / "records").glob("*.lock"))
+
+
+def test_a_lock_of_a_run_that_was_killed_stops_nobody(scene: Path, tmp_path: Path) -> None:
+    (tmp_path / "records").mkdir()
+    (tmp_path / "records" / "0-6.lock").write_text("")
+    assert render(job(scene, tmp_path), cameras=(1,)).images == 3
+    assert not list((tmp_path / "records").glob("*.lock"))
