@@ -3,8 +3,8 @@
 import re
 import secrets
 import shutil
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import get_args
@@ -76,7 +76,7 @@ def write_sequence(
     _check_leftovers(pattern.parent, before, after, set(names))
     part = pattern.parent / f".{before}{secrets.token_hex(4)}.part"
     try:
-        with folder_for(pattern.parent):
+        with folder_for(pattern.parent), _removed_after(part):
             part.mkdir()
             last: tuple[Shot, Relight, Path] | None = None
             for k, (name, shot, relight) in enumerate(zip(names, line.shots, line.relights, strict=True)):
@@ -89,8 +89,15 @@ def write_sequence(
             _move(names, part, pattern.parent)
     except OSError as error:
         raise OutputError(f"{pattern}: cannot be written: {reason(error)}") from error
+
+
+@contextmanager
+def _removed_after(folder: Path) -> Iterator[None]:
+    """Remove a folder and what is in it, whatever happens."""
+    try:
+        yield
     finally:
-        shutil.rmtree(part, ignore_errors=True)
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _check_leftovers(folder: Path, before: str, after: str, names: set[str]) -> None:
