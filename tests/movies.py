@@ -62,8 +62,8 @@ def plain(
     return manifest
 
 
-def grouped(folder: Path, n_lamps: int = 3, seed: int = 7) -> Manifest:
-    """Write an array of 2 eyes with the groups "sun" along "light" (4 positions) and "lamps" along their own axis."""
+def grouped(folder: Path, n_lamp: int = 3, seed: int = 7) -> Manifest:
+    """Write an array of 2 eyes with the groups "sun" along "light" (4 positions) and "lamp" along their own axis."""
 
     def lights(n: int, red: float) -> tuple[ManifestLight, ...]:
         return tuple(
@@ -79,7 +79,7 @@ def grouped(folder: Path, n_lamps: int = 3, seed: int = 7) -> Manifest:
         cameras=(CAMERA,) * 2,
         groups=(
             ManifestGroup(
-                name="lamps", axis="lamps", images="lamps.c{camera:04d}.l{light:03d}.exr", lights=lights(n_lamps, 0.3)
+                name="lamp", axis="lamp", images="lamp.c{camera:04d}.l{light:03d}.exr", lights=lights(n_lamp, 0.3)
             ),
             ManifestGroup(name="sun", axis="light", images="sun.c{camera:04d}.l{light:03d}.exr", lights=lights(4, 0.1)),
         ),

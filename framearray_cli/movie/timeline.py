@@ -111,7 +111,7 @@ def _light_problems(movie: MoviePath, manifest: Manifest) -> list[str]:
             'group = "..." in [[light.sources]]'
             for key in keys
         ]
-    known = [group.name for group in manifest.groups]
+    known = manifest.group_names
     return [
         f"groups.{name}: no such group; the array has {', '.join(known)}" for name in movie.groups if name not in known
     ]

@@ -94,4 +94,4 @@ def test_a_movement_through_an_array_with_groups(tmp_path: Path, capsys) -> None
     assert run(capsys, "assemble", array, "--light", "-o", tmp_path / "m.mov").code == 0
     assert len(decoded(tmp_path / "m.mov").frames) == 4
     told = run(capsys, "assemble", array, "--walk", "--at", "3", "-o", tmp_path / "n.mov")
-    assert told.err.startswith("--at: expected one of 3 places of lamps (0 to 2, or -3 to -1), got 3\n")
+    assert told.err.startswith("--at: expected one of 3 places of lamp (0 to 2, or -3 to -1), got 3\n")

@@ -12,7 +12,8 @@ from movies import grouped, path_file, plain
 
 from framearray_cli.errors import JobError
 from framearray_cli.images import read_codes, read_image
-from framearray_cli.manifest import Manifest
+from framearray_cli.jobfile import read_job
+from framearray_cli.manifest import BACKGROUND, Manifest
 from framearray_cli.movie.assemble import assemble
 from framearray_cli.movie.curves import at, relights
 from framearray_cli.movie.pathfile import MoviePath, load_movie_path
@@ -57,11 +58,11 @@ def test_percentages_reach_from_the_first_frame_to_the_last() -> None:
     found = lit(
         [0.0, 0.5, 1.0, 1.5, 2.0],
         groups={
-            "lamps": {"intensity": [{"time": "25%", "value": 0}, {"time": "100%", "value": 3}], "color": [1, 0.5, 0]}
+            "lamp": {"intensity": [{"time": "25%", "value": 0}, {"time": "100%", "value": 3}], "color": [1, 0.5, 0]}
         },
         ambient={"color": 0.5},
     )
-    assert [relight.groups["lamps"] for relight in found] == [(k, k / 2, 0.0) for k in (0.0, 0.0, 1.0, 2.0, 3.0)]
+    assert [relight.groups["lamp"] for relight in found] == [(k, k / 2, 0.0) for k in (0.0, 0.0, 1.0, 2.0, 3.0)]
     assert {relight.ambient for relight in found} == {(0.5, 0.5, 0.5)}
     assert lit([0.0, 1.0]) == [AS_RENDERED] * 2
 
@@ -74,8 +75,8 @@ positions = "blend"
 frames = 7
 camera = [0, 1]
 light = [0, 3]
-axes = { lamps = [2, 0] }
-[groups.lamps]
+axes = { lamp = [2, 0] }
+[groups.lamp]
 intensity = [{ time = 0, value = 2.0 }, { time = "100%", value = 0.5 }]
 color = [1.0, 0.6, 0.2]
 [ambient]
@@ -85,9 +86,9 @@ intensity = [{ time = 0, value = 1 }, { time = "50%", value = 0 }, { time = "100
     read = {file.name: read_image(file).astype(np.float64) for file in array.directory.glob("*.exr")}
     for k in range(7):
         c, t = (0 if k < 3 else 1), k / 6
-        lamps = (2 - 1.5 * t) * np.array([1.0, 0.6, 0.2])
+        lamp = (2 - 1.5 * t) * np.array([1.0, 0.6, 0.2])
         made, i_a = read[f"back.c{c:04d}.exr"].copy(), np.zeros(3)
-        for name, position, factor in (("lamps", 2 - 2 * t, lamps), ("sun", 3 * t, np.ones(3))):
+        for name, position, factor in (("lamp", 2 - 2 * t, lamp), ("sun", 3 * t, np.ones(3))):
             low = min(int(position + 1e-9), 2 if name == "sun" else 1)
             group = next(group for group in array.groups if group.name == name)
             for l, share in ((low, low + 1 - position), (low + 1, position - low)):
@@ -116,7 +117,7 @@ def test_wrong_light_is_told_before_anything_is_written(array: Manifest, tmp_pat
     with pytest.raises(JobError) as caught:
         assemble(array.directory, path_file(tmp_path, text), tmp_path / "m.mp4")
     assert list(caught.value.problems) == [
-        "groups.moon: no such group; the array has lamps, sun",
+        "groups.moon: no such group; the array has lamp, sun, background",
         "segments[0].light: expected one of 4 lights (0 to 3, or -4 to -1), got 4",
         "groups.sun.intensity[1].time: expected at least that of the one before, 0.0416667 s, got 0.02 s",
     ]
@@ -156,9 +157,17 @@ def test_messages(tmp_path: Path, text: str, problem: str) -> None:
 def test_the_example_with_light_fits_an_array_with_its_groups(array: Manifest) -> None:
     file = JOBS / "relight-movie.toml"
     line = timeline(file, load_movie_path(file), array)
-    assert (len(line.shots), line.shots[0].positions, line.shots[-1].positions) == (240, (0.0, 0), (3.0, 0))
-    assert line.relights[0].groups == {"sun": GREY, "lamps": (0.0, 0.0, 0.0)}
+    assert (len(line.shots), line.shots[0].positions, line.shots[-1].positions) == (240, (0.0, 0.0), (3.0, 2.0))
+    assert line.relights[0].groups == {"sun": GREY, "lamp": (0.0, 0.0, 0.0), "background": GREY}
     assert line.relights[-1].groups["sun"] == (0.0, 0.0, 0.0)
-    assert line.relights[-1].groups["lamps"] == pytest.approx((1.0, 0.75, 0.5))
-    brightness = [relight.groups["lamps"][0] for relight in line.relights]
-    assert sum(b > a + 0.4 for a, b in pairwise(brightness)) == 1  # the jump
+    assert line.relights[-1].groups["lamp"] == pytest.approx((2.0, 1.7, 1.4))
+    lamp = [relight.groups["lamp"][0] for relight in line.relights]
+    assert [k for k, (before, after) in enumerate(pairwise(lamp), start=1) if after > before + 0.4] == [108]  # 4.5 s
+
+
+def test_the_groups_of_the_example_are_those_of_its_job() -> None:
+    job, movie = read_job(JOBS / "kitchen-evening.toml"), load_movie_path(JOBS / "relight-movie.toml")
+    assert movie.groups.keys() <= {source.group for source in job.light.sources} | {BACKGROUND}
+    assert {axis for segment in movie.segments for axis in segment.axes} <= {
+        source.axis for source in job.light.sources
+    }

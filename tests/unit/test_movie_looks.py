@@ -133,10 +133,10 @@ def test_labels_differ_and_fit_into_the_smallest_picture() -> None:
 
 
 def test_labels_say_the_place(tmp_path: Path) -> None:
-    array, lamps = plain(tmp_path / "a", 2, 2), grouped(tmp_path / "b")
+    array, lamp = plain(tmp_path / "a", 2, 2), grouped(tmp_path / "b")
     assert place_text(array, Shot(12, (3,))) == "c 12  l 3"
     assert place_text(array, Shot(12, (3.256,))) == "c 12  l 3.26"
-    assert place_text(lamps, Shot(1, (3.0, 0.5))) == "c 1  light 3  lamps 0.5"
+    assert place_text(lamp, Shot(1, (3.0, 0.5))) == "c 1  light 3  lamp 0.5"
 
 
 def test_every_frame_has_its_own_label(tmp_path: Path) -> None:
