@@ -4,19 +4,16 @@ The door to OpenColorIO, which OpenImageIO brings along.
 """
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from ..arrays import Float32, Image
 from ..colour import srgb_from_linear
 from ..errors import JobError
-
-# Takes linear radiance, (h, w, 3), and gives what a screen is sent, the same shape, 0 to 1.
-Encode: TypeAlias = Callable[[Image], Float32]
+from .cube import Encode, tabled
 
 BUILT_IN = "ocio://default"  # the configuration that OpenColorIO carries: ACES 2.0
 ACES = ("sRGB - Display", "ACES 2.0 - SDR 100 nits (Rec.709)")
@@ -38,11 +35,13 @@ class View:
 
     Attributes:
         name: as it was asked for.
-        encode: radiance to values of the screen.
+        encode: linear radiance, (h, w, 3), to values of the screen, the same shape, 0 to 1.
+        quick: the same, near enough for 8 bits.
     """
 
     name: str
     encode: Encode
+    quick: Encode
 
     @property
     def is_srgb(self) -> bool:
@@ -50,7 +49,7 @@ class View:
         return self.name == "srgb"
 
 
-SRGB = View("srgb", srgb_from_linear)
+SRGB = View("srgb", srgb_from_linear, srgb_from_linear)
 
 
 def find_view(name: str) -> View:
@@ -97,7 +96,7 @@ def _ocio_view(name: str, place: str, display: str, view: str) -> View:
         raise JobError("--view", [f'{place}: no colour space "{LINEAR_REC709[0]}"; expected one, as images have that'])
     encode = partial(_through_ocio, place=place, display=display, view=view, space=found[0])
     encode(np.zeros((1, 1, 3), np.float32))
-    return View(name, encode)
+    return View(name, encode, tabled(encode))
 
 
 def _through_ocio(image: Image, *, place: str, display: str, view: str, space: str) -> Float32:

@@ -49,8 +49,8 @@ def shown(image: Image, look: Look, text: str, bits: Literal[8, 16] = 8) -> NDAr
     if bits == 8 and look.view.is_srgb:
         codes: NDArray[Any] = srgb8_from_linear(exposed)
     else:
-        most, kind = (255, np.uint8) if bits == 8 else (65535, np.uint16)
-        codes = np.rint(look.view.encode(exposed).astype(np.float64) * most).astype(kind)
+        encode, most, kind = (look.view.quick, 255, np.uint8) if bits == 8 else (look.view.encode, 65535, np.uint16)
+        codes = np.rint(encode(exposed).astype(np.float64) * most).astype(kind)
     return burn(codes, text) if look.label else codes
 
 

@@ -29,7 +29,7 @@ imageattributes images manifest manifestfile pictures ranges record resume folde
 prepare memory acceptance expected auto allot target describe summary render check verify
 imagecheck
 movie/__init__ movie/places movie/easing movie/curves movie/pathfile movie/timeline movie/sweep
-movie/display movie/label movie/look movie/yuv movie/video movie/animation movie/sequence movie/assemble
+movie/cube movie/display movie/label movie/look movie/yuv movie/video movie/animation movie/sequence movie/assemble
 places sheet
 export/selection export/folder export/points export/colmap export/nerfstudio export/cinema export/write export/__init__
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure

@@ -68,6 +68,23 @@ def test_aces_is_that_of_opencolorio() -> None:
     np.testing.assert_allclose(grey, 1.055 * 0.1 ** (1 / 2.4) - 0.055, atol=2e-3)
 
 
+def test_the_table_is_as_good_as_the_transform_for_8_bits() -> None:
+    """Over believable colours its error is below that of rounding to codes, 12^-1/2 = 0.29; single ones are off more."""
+    rng = np.random.default_rng(3)
+    view = find_view("aces")
+    bright = np.exp(rng.normal(-1.5, 1.5, (60, 80, 1))).astype(np.float32)
+    tint = rng.uniform(0.15, 1.0, (60, 80, 3)).astype(np.float32)
+    error = 255 * (view.quick(bright * tint) - view.encode(bright * tint))
+    assert np.sqrt((error**2).mean()) < 12**-0.5
+    assert np.abs(error).max() < 3
+    greys = 255 * (view.quick(GREYS) - view.encode(GREYS))
+    assert np.abs(greys).max() < 0.5
+    beyond = np.float32([[[-1.0, 2000.0, 0.0]]])
+    np.testing.assert_allclose(view.quick(beyond), view.quick(np.clip(beyond, 0, 1024)), atol=1e-6)
+    other = 255 * (view.quick(GREYS * 1.05) - view.encode(GREYS))  # a twentieth brighter would be seen
+    assert np.abs(other).max() > 2
+
+
 def test_a_movie_shows_the_view(tmp_path: Path) -> None:
     plain(tmp_path / "out", 1, 1, picture=lambda c, l: np.full((16, 16, 3), 1.0, np.float32))
     path = path_file(tmp_path, "[[segments]]\nframes = 1\n")
