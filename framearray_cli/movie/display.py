@@ -5,7 +5,7 @@ The door to OpenColorIO, which OpenImageIO brings along.
 
 import os
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -87,6 +87,7 @@ def _config(place: str) -> Any:
     return config
 
 
+@cache  # its table takes long to fill
 def _ocio_view(name: str, place: str, display: str, view: str) -> View:
     """Make a view, and try it once: a transform may name files that are missing."""
     config = _config(place)

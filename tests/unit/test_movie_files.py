@@ -1,5 +1,6 @@
 """Movies of every container, decoded again: rate, number of frames, and what each of them shows."""
 
+import sys
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ import pytest
 from movies import Decoded, barred, decoded, path_file, plain, rms
 
 from framearray_cli.colour import srgb8_from_linear, srgb_from_linear
-from framearray_cli.errors import OutputError
+from framearray_cli.errors import MissingExtraError, OutputError
 from framearray_cli.movie.animation import delays
 from framearray_cli.movie.assemble import assemble
 from framearray_cli.movie.yuv import planes_422_10
@@ -108,6 +109,15 @@ def test_frames_of_animations_are_not_all_of_one_length() -> None:
     assert delays(6, Fraction(24), 100) == [4, 4, 4, 5, 4, 4]
     assert sum(delays(2400, Fraction(24000, 1001), 100)) == 10010
     assert set(delays(240, Fraction(24), 1000)) == {41, 42}
+
+
+def test_animations_and_sequences_need_no_pyav(array: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "av", None)
+    path = path_file(tmp_path, "[[segments]]\nframes = 2\n")
+    for name in ("m.gif", "m.webp", "f.#.png"):
+        assert assemble(array, path, tmp_path / name).n_frames == 2
+    with pytest.raises(MissingExtraError, match=r"framearray\[movie\]"):
+        assemble(array, path, tmp_path / "m.mov")
 
 
 def test_ffmpeg_reads_our_gif_as_pillow_does(movies: dict[str, Decoded], array: Path, tmp_path: Path) -> None:

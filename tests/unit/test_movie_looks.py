@@ -69,7 +69,7 @@ def test_aces_is_that_of_opencolorio() -> None:
 
 
 def test_the_table_is_as_good_as_the_transform_for_8_bits() -> None:
-    """Over believable colours its error is below that of rounding to codes, 12^-1/2 = 0.29; single ones are off more."""
+    """In believable colours the error is below rounding to codes, 12^-1/2 = 0.29; single ones are off by up to 3."""
     rng = np.random.default_rng(3)
     view = find_view("aces")
     bright = np.exp(rng.normal(-1.5, 1.5, (60, 80, 1))).astype(np.float32)
