@@ -17,7 +17,7 @@ def assemble(
     array: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `render` wrote.", show_default=False)],
     path_file: Annotated[
         Path | None,
-        typer.Argument(metavar="[PATH]", help="Movie path, TOML; or one of the movements.", show_default=False),
+        typer.Argument(metavar="PATH", help="Movie path, TOML; or one of the movements.", show_default=False),
     ] = None,
     *,
     target: Annotated[
