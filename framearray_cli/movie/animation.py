@@ -38,21 +38,26 @@ class _Kind(Protocol):
     """One format."""
 
     def begin(self, file: BinaryIO, width: int, height: int) -> None: ...
-    def add(self, file: BinaryIO, codes: Bytes, delay: int) -> None: ...
+    def coded(self, codes: Bytes) -> bytes: ...
+    def add(self, file: BinaryIO, coded: bytes, delay: int) -> None: ...
     def end(self, file: BinaryIO) -> None: ...
 
 
 class AnimationWriter:
     """An animation that is being written; made by `open_animation`."""
 
-    __slots__ = ("_delays", "_file", "_kind")
+    __slots__ = ("_coded", "_codes", "_delays", "_file", "_kind")
 
     def __init__(self, file: BinaryIO, kind: _Kind, delays: Iterator[int]) -> None:
         self._file, self._kind, self._delays = file, kind, delays
+        self._codes: NDArray[Any] | None = None
+        self._coded = b""
 
     def add(self, codes: NDArray[Any]) -> None:
-        """Add one picture: (h, w, 3) uint8."""
-        self._kind.add(self._file, codes, next(self._delays))
+        """Add one picture: (h, w, 3) uint8 that stays as it is; given again, it is not coded again."""
+        if codes is not self._codes:
+            self._codes, self._coded = codes, self._kind.coded(codes)
+        self._kind.add(self._file, self._coded, next(self._delays))
 
 
 @contextmanager
@@ -91,7 +96,7 @@ class _Gif:
         file.write(b"GIF89a" + struct.pack("<HHBBB", width, height, 0x70, 0, 0))  # 0x70: 8 bits a colour, no table
         file.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")  # plays for ever
 
-    def add(self, file: BinaryIO, codes: Bytes, delay: int) -> None:
+    def coded(self, codes: Bytes) -> bytes:
         import PIL.Image
 
         picture = PIL.Image.fromarray(codes)
@@ -100,8 +105,11 @@ class _Gif:
         picture.quantize(palette=colours, dither=PIL.Image.Dither.FLOYDSTEINBERG).save(buffer, "GIF", interlace=0)
         table, image = _gif_parts(buffer.getvalue())
         bits = len(table).bit_length() - 3  # 3 * 2^(bits + 1) bytes
+        return image[:9] + bytes([0x80 | bits]) + table + image[10:]  # 0x80: a table of its own
+
+    def add(self, file: BinaryIO, coded: bytes, delay: int) -> None:
         file.write(b"\x21\xf9\x04\x04" + struct.pack("<HBB", delay, 0, 0))  # 0x04: stays until the next one covers it
-        file.write(image[:9] + bytes([0x80 | bits]) + table + image[10:])  # 0x80: a table of its own
+        file.write(coded)
 
     def end(self, file: BinaryIO) -> None:
         file.write(b";")
@@ -128,14 +136,16 @@ class _WebP:
         file.write(b"ANIM" + struct.pack("<IIH", 6, 0, 0))  # black behind; plays for ever
         self._size = _int24(width - 1) + _int24(height - 1)
 
-    def add(self, file: BinaryIO, codes: Bytes, delay: int) -> None:
+    def coded(self, codes: Bytes) -> bytes:
         import PIL.Image
 
         buffer = io.BytesIO()
         PIL.Image.fromarray(codes).save(buffer, "WEBP", **WEBP_OPTIONS)
-        image = buffer.getvalue()[12:]  # the chunk "VP8 " alone
+        return buffer.getvalue()[12:]  # the chunk "VP8 " alone
+
+    def add(self, file: BinaryIO, coded: bytes, delay: int) -> None:
         head = _int24(0) * 2 + self._size + _int24(delay) + b"\x02"  # at 0, 0; 0x02: covers what was there
-        file.write(b"ANMF" + struct.pack("<I", len(head) + len(image)) + head + image)
+        file.write(b"ANMF" + struct.pack("<I", len(head) + len(coded)) + head + coded)
 
     def end(self, file: BinaryIO) -> None:
         size = file.tell() - 8
