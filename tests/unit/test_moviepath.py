@@ -133,6 +133,20 @@ def test_the_papers_first_movie_fits_any_array(size: tuple[int, int]) -> None:
     assert all(0 <= b[0] - a[0] <= 1 and abs(b[1] - a[1]) <= 1 for a, b in pairwise(frames))
 
 
+@pytest.mark.parametrize("size", [(192, 48), (24, 8), (2, 3), (1, 1)])
+def test_the_example_of_easing_fits_any_array(size: tuple[int, int]) -> None:
+    """3 s and a hold, two halves of a walk and a hold, four swings, the walk backwards: 16.5 s."""
+    file = JOBS / "easing-movie.toml"
+    shots = timeline(file, load_movie_path(file), array_of(*size)).shots
+    assert len(shots) == 396
+    light = [shot.positions[0] for shot in shots]
+    assert light[71:84] == [size[1] - 1] * 13  # the end of the light's way, held for half a second
+    assert [light[203 + 36 * k] / max(1, size[1] - 1) for k in range(5)] == [0.5, 1, 0.5, 1, 0.5] or size[1] == 1
+    assert (shots[203].c, shots[348].c, shots[-1].c) == (size[0] - 1, size[0] - 1, 0)
+    assert any(x != int(x) for x in light[:72]) == (size[1] > 1)
+    assert all(x == int(x) for x in light[348:])
+
+
 def test_indices_outside_of_the_array_are_all_named(tmp_path: Path) -> None:
     text = segments("frames = 2\ncamera = [0, 10]\nlight = -6", "frames = 2\nlight = [5, 2]")
     assert problems_of(tmp_path, text) == [
