@@ -54,8 +54,8 @@ DOORS = {
         "eyehits",
     ),  # eyehits: one function that allocates, so no kernel
     "trimesh": ("meshes/",),
-    "OpenImageIO": ("images",),
-    "PIL": ("meshes/", "images", "sheet"),
+    "OpenImageIO": ("images", "movie/display"),
+    "PIL": ("meshes/", "images", "imagecheck", "movie/label", "movie/animation", "sheet"),
     "tomllib": ("jobfile", "manifestfile"),
     "tomli_w": ("manifestfile", "report/tables"),
     "matplotlib": ("report/plots",),
