@@ -34,9 +34,11 @@ def assemble(
     light: Annotated[bool, typer.Option("--light", help="The light moves, the camera stays.")] = False,
     diagonal: Annotated[bool, typer.Option("--diagonal", help="Both move.")] = False,
     at: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option(
-            "--at", help="Where the other stays: an index, first, last or 50%. Default: first.", metavar="PLACE"
+            "--at",
+            help="Where the other stays: an index, first, last or 50%; AXIS=PLACE for one light axis. Default: first.",
+            metavar="PLACE",
         ),
     ] = None,
     seconds: Annotated[
@@ -82,7 +84,7 @@ def assemble(
         try:
             result = run(
                 array,
-                path_file or Sweep(kind=kinds[0], at=at or "first", seconds=seconds),
+                path_file or Sweep(kind=kinds[0], at=tuple(at or ()), seconds=seconds),
                 place(target),
                 look=Look(exposure=exposure, view=find_view(view), label=label),
                 fps=fps,
@@ -96,7 +98,7 @@ def assemble(
         say(out, [f"{result.target}: {result.n_frames} frames from {result.n_images} images, {rate}"])
 
 
-def _check(path_file: Path | None, kinds: Sequence[str], at: str | None, seconds: float | None) -> None:
+def _check(path_file: Path | None, kinds: Sequence[str], at: Sequence[str] | None, seconds: float | None) -> None:
     """Refuse options that do not go together."""
     ways = ([f"the path file {path_file}"] if path_file else []) + [f"--{kind}" for kind in kinds]
     if len(ways) != 1:
@@ -104,5 +106,5 @@ def _check(path_file: Path | None, kinds: Sequence[str], at: str | None, seconds
         raise typer.BadParameter(f"expected a path file, --walk, --light or --diagonal; got {found}", param_hint="PATH")
     if path_file and seconds is not None:
         raise typer.BadParameter("a path file says itself how long its segments are", param_hint="--seconds")
-    if at is not None and kinds in ([], ["diagonal"]):
+    if at and kinds in ([], ["diagonal"]):
         raise typer.BadParameter("goes with --walk and --light, where something stays", param_hint="--at")

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from ..errors import JobError
+from ..jobvalues import shown
 from ..manifest import MAIN_AXIS, Manifest
 from .pathfile import MoviePath, Segment
 from .places import IndexPlace, positions, read_place
@@ -17,12 +18,12 @@ class Sweep:
 
     Attributes:
         kind: what moves: "walk" the camera, "light" the light along all its axes, "diagonal" both.
-        at: where stays what does not move, as in a path file.
+        at: where stays what does not move: places as in a path file; "AXIS=PLACE" is for one light axis alone.
         seconds: how long it takes; None: as many frames as there are images on the way.
     """
 
     kind: Kind
-    at: str = "first"
+    at: tuple[str, ...] = ()
     seconds: float | None = None
 
 
@@ -32,32 +33,46 @@ def swept(sweep: Sweep, manifest: Manifest) -> MoviePath:
     Raises:
         JobError: `at` is no place, or lies outside of the array.
     """
-    stays = _stays(sweep, manifest)
     moves: tuple[IndexPlace, ...] = ("first", "last")
-    camera = stays if sweep.kind == "light" else moves
-    light = stays if sweep.kind == "walk" else moves
-    n_light = max(manifest.axes.values())
-    n = {"walk": manifest.n_cameras, "light": n_light, "diagonal": max(manifest.n_cameras, n_light)}[sweep.kind]
+    sizes = {"camera": manifest.n_cameras, **manifest.axes}
+    staying = {"walk": list(manifest.axes), "light": ["camera"], "diagonal": []}[sweep.kind]
+    spans = dict.fromkeys(sizes, moves) | _stays(sweep, {name: sizes[name] for name in staying})
+    n_frames = max(n for name, n in sizes.items() if name not in staying)
     segment = Segment(
-        frames=n if sweep.seconds is None else None,
+        frames=n_frames if sweep.seconds is None else None,
         seconds=sweep.seconds,
-        camera=camera,
-        light=light if MAIN_AXIS in manifest.axes else None,
-        axes={name: light for name in manifest.axes if name != MAIN_AXIS},
+        camera=spans.pop("camera"),
+        light=spans.pop(MAIN_AXIS, None),
+        axes=spans,
     )
     return MoviePath(segments=(segment,))
 
 
-def _stays(sweep: Sweep, manifest: Manifest) -> tuple[IndexPlace]:
-    """Read the place of what stays, and look whether the array has it."""
-    try:
-        place = read_place(sweep.at)
-    except ValueError as error:
-        raise JobError("--at", [str(error)]) from error
+def _stays(sweep: Sweep, sizes: dict[str, int]) -> dict[str, tuple[IndexPlace, ...]]:
+    """Read where each axis stays, and look whether it has that place.
+
+    Args:
+        sizes: of the axes that stay, by name.
+    """
+    stays: dict[str, IndexPlace] = dict.fromkeys(sizes, "first")
     problems: list[str] = []
-    axes = {"camera": manifest.n_cameras} if sweep.kind == "light" else dict(manifest.axes)
-    for name, n in axes.items() if sweep.kind != "diagonal" else ():
-        positions("--at", (place,), n, f"{name}s" if name in ("camera", MAIN_AXIS) else f"places of {name}", problems)
+    for text in sorted(
+        sweep.at, key=lambda text: "=" in text
+    ):  # what is said of one axis goes over what is said of all
+        name, equals, place = text.rpartition("=")
+        if equals and name not in sizes:
+            problems.append(f"expected PLACE, or AXIS=PLACE with one of {', '.join(sizes)}, got {shown(text)}")
+            continue
+        try:
+            stays |= dict.fromkeys([name] if equals else sizes, read_place(place))
+        except ValueError as error:
+            problems.append(str(error))
+    for name, n in sizes.items():
+        found: list[str] = []
+        positions(
+            "--at", (stays[name],), n, f"{name}s" if name in ("camera", MAIN_AXIS) else f"places of {name}", found
+        )
+        problems += [problem.removeprefix("--at: ") for problem in found]
     if problems:
-        raise JobError("--at", [problem.removeprefix("--at: ") for problem in problems])
-    return (place,)
+        raise JobError("--at", problems)
+    return {name: (place,) for name, place in stays.items()}

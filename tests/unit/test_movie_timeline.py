@@ -205,12 +205,14 @@ def swept_shots(kind: Any, manifest: Manifest = PLAIN, **more: Any) -> list[Shot
 
 
 def test_movements_show_every_image_on_their_way_once() -> None:
-    assert swept_shots("walk", at="last") == [Shot(c, (N_L - 1,)) for c in range(N_C)]
-    assert swept_shots("light", at="-2") == [Shot(N_C - 2, (l,)) for l in range(N_L)]
+    assert swept_shots("walk", at=("last",)) == [Shot(c, (N_L - 1,)) for c in range(N_C)]
+    assert swept_shots("light", at=("-2",)) == [Shot(N_C - 2, (l,)) for l in range(N_L)]
     both = swept_shots("diagonal")
     assert (len(both), both[0], both[-1]) == (N_C, Shot(0, (0,)), Shot(N_C - 1, (N_L - 1,)))
     assert swept_shots("light", GROUPED)[-1] == Shot(0, (N_L - 1, N_LAMPS - 1))
-    assert swept_shots("walk", GROUPED, at="50%")[0] == Shot(0, (4, 2))
+    assert swept_shots("walk", GROUPED, at=("50%",))[0] == Shot(0, (4, 2))
+    assert swept_shots("walk", GROUPED, at=("lamps=1", "-1"))[0] == Shot(0, (8, 1))
+    assert swept_shots("walk", GROUPED, at=("light=3",))[0] == Shot(0, (3, 0))
     assert len(swept_shots("walk", seconds=2.0)) == 48
 
 
@@ -220,12 +222,13 @@ def test_movements_show_every_image_on_their_way_once() -> None:
         ("9", "expected one of 9 lights (0 to 8, or -9 to -1), got 9"),
         ("end", 'expected an index, "first", "last" or a percentage such as "50%", got "end"'),
         ("nan", 'expected an index, "first", "last" or a percentage such as "50%", got "nan"'),
+        ("lamp=2", 'expected PLACE, or AXIS=PLACE with one of light, got "lamp=2"'),
         ("120%", 'expected an index, "first", "last" or a percentage such as "50%", got "120%"'),
     ],
 )
 def test_where_the_other_stays_must_be_a_place(at: str, problem: str) -> None:
     with pytest.raises(JobError) as caught:
-        swept_shots("walk", at=at)
+        swept_shots("walk", at=(at,))
     assert str(caught.value) == f"--at: {problem}"
 
 
