@@ -18,6 +18,8 @@ from framearray_cli.job import Job
 from framearray_cli.jobfile import job_table, read_job
 from framearray_cli.manifest import Manifest, image_path, layers_path
 from framearray_cli.manifestfile import read_manifest
+from framearray_cli.movie.assemble import assemble
+from framearray_cli.movie.look import Look
 from framearray_cli.paths import eyes, lights
 from framearray_cli.render import render
 from framearray_cli.sheet import make_sheet
@@ -129,6 +131,22 @@ def contact_sheet(width: int, folder: Path) -> Image.Image:
         return image.convert("RGB")
 
 
+def evening(folder: Path) -> Path:
+    """Render jobs/kitchen-evening.toml, whole."""
+    job = read_job(ROOT / "jobs" / "kitchen-evening.toml")
+    render(job.model_copy(update={"output": job.output.model_copy(update={"directory": folder})}))
+    return folder
+
+
+def relit(width: int, rendered: Path, folder: Path) -> Image.Image:
+    """Every thirtieth frame of jobs/relight-movie.toml."""
+    assemble(rendered, ROOT / "jobs" / "relight-movie.toml", folder / "f.###.png", look=Look(label=True))
+    frames = [Image.open(folder / f"f.{k:03d}.png") for k in range(15, 240, 30)]
+    size = width, round(frames[0].height * width / frames[0].width)
+    small = [frame.resize(size, Image.Resampling.LANCZOS) for frame in frames]
+    return sheet([small[:4], small[4:]])
+
+
 def main() -> None:
     """Make all pictures again."""
     PICTURES.mkdir(exist_ok=True)
@@ -141,6 +159,7 @@ def main() -> None:
             "terms": terms(280, out / "terms"),
             "reuse": reuse(420, out / "reuse"),
             "sheet": contact_sheet(900, out / "sheet"),
+            "relight": relit(280, evening(out / "evening"), out / "relight"),
         }
         for name, image in made.items():
             file = PICTURES / f"{name}.jpg"

@@ -47,6 +47,24 @@ def make_folder(folder: Path) -> None:
         raise OutputError(f"{folder}: cannot make the folder: {reason(error)}") from error
 
 
+@contextmanager
+def folder_for(folder: Path) -> Iterator[None]:
+    """Make a folder and those above it for what is done inside; on any failure remove those that were made.
+
+    Raises:
+        OutputError: as `make_folder`.
+    """
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
+    try:
+        make_folder(folder)
+        yield
+    except BaseException:
+        for place in made:
+            with suppress(OSError):  # others may have put something there
+                place.rmdir()
+        raise
+
+
 def write_bytes(target: Path, data: bytes | memoryview) -> None:
     """Write a file whole or not at all."""
     with whole_file(target) as part:

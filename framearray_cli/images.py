@@ -133,18 +133,21 @@ def _write_exr(
     _write_oiio(path, "openexr", spec, pixels)
 
 
-def write_codes(path: Path, codes: Bytes, image_format: ImageFormat | None = None) -> None:
-    """Write (h, w, 3) 8-bit sRGB codes as PNG or JPEG, whole or not at all.
+def write_codes(
+    path: Path, codes: Bytes, image_format: ImageFormat | None = None, attributes: Attributes | None = None
+) -> None:
+    """Write (h, w, 3) 8-bit codes as PNG or JPEG, whole or not at all.
 
     Args:
         path: the file.
         codes: what is shown.
         image_format: png (what None means) or jpg, and its quality.
+        attributes: as in `write_image`.
 
     Raises:
         OutputError: the file cannot be written.
     """
-    write_bytes(path, _encode8(codes, image_format or ImageFormat(format="png"), {}))
+    write_bytes(path, _encode8(codes, image_format or ImageFormat(format="png"), attributes or {}))
 
 
 def write_layers(
@@ -219,6 +222,20 @@ def read_layers(path: Path) -> dict[str, Float32]:
     """
     names, pixels = _read_oiio(path)
     return {name: np.ascontiguousarray(pixels[..., i]) for i, name in enumerate(names)}
+
+
+def last_row(path: Path) -> tuple[int, int] | None:
+    """Read the last row of an EXR or TIFF, which one that was cut short has lost: width and height, or None."""
+    oiio = _oiio()
+    source = oiio.ImageInput.open(str(path)) if path.is_file() else None
+    if source is None:
+        oiio.geterror()  # clears what the failed opening left behind
+        return None
+    spec = source.spec()
+    row = source.read_scanlines(spec.height - 1, spec.height, 0, 0, spec.nchannels, oiio.UNKNOWN)
+    message = source.geterror()
+    source.close()
+    return None if row is None or message else (spec.width, spec.height)
 
 
 def _compression(wish: str) -> str:
@@ -315,17 +332,8 @@ def _write_oiio(path: Path, format_name: str, spec: Any, pixels: NDArray[Any]) -
 
 def _check_end(path: Path, part: Path) -> None:
     """Read the last row back (0.15 ms): a disk that is full when the last buffer is flushed goes unreported."""
-    oiio = _oiio()
-    source = oiio.ImageInput.open(str(part))
-    if source is not None:
-        spec = source.spec()
-        last = source.read_scanlines(spec.height - 1, spec.height, 0, 0, spec.nchannels, oiio.UNKNOWN)
-        message = source.geterror()
-        source.close()
-        if last is not None and not message:
-            return
-    oiio.geterror()  # clears what the failed opening left behind
-    raise OutputError(f"{path}: cannot be written: the file is cut short; is the disk full?")
+    if last_row(part) is None:
+        raise OutputError(f"{path}: cannot be written: the file is cut short; is the disk full?")
 
 
 def _read_oiio(path: Path) -> tuple[list[str], Float32]:

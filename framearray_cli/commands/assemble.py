@@ -1,5 +1,6 @@
 """`framearray assemble`."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -9,29 +10,70 @@ from ..errors import JobError
 from ..screen import Screen, out, say
 from .options import Quiet, fail, place, problems
 
+MOST_SECONDS = 40_000.0  # as in a path file
+
 
 def assemble(
     array: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `render` wrote.", show_default=False)],
-    path_file: Annotated[Path, typer.Argument(metavar="PATH", help="Movie path, TOML.", show_default=False)],
+    path_file: Annotated[
+        Path | None,
+        typer.Argument(metavar="PATH", help="Movie path, TOML; or one of the movements.", show_default=False),
+    ] = None,
+    *,
     target: Annotated[
         str,
         typer.Option(
             "--output",
             "-o",
-            help="movie.mp4 (.mov, .mkv, .webm) or a sequence: frame.####.png",
+            help="movie.mp4 (.webm, .mkv, .mov, .gif, .webp) or a sequence: frame.####.png",
             metavar="FILE",
             show_default=False,
         ),
     ],
+    walk: Annotated[bool, typer.Option("--walk", help="The camera moves, the light stays.")] = False,
+    light: Annotated[bool, typer.Option("--light", help="The light moves, the camera stays.")] = False,
+    diagonal: Annotated[bool, typer.Option("--diagonal", help="Both move.")] = False,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--at",
+            help="Where the other stays: an index, first, last or 50%; AXIS=PLACE for one light axis. Default: first.",
+            metavar="PLACE",
+        ),
+    ] = None,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            "--seconds",
+            min=0.001,
+            max=MOST_SECONDS,
+            help="Length of a movement; default: a frame an image.",
+            metavar="S",
+        ),
+    ] = None,
+    fps: Annotated[
+        float | None, typer.Option("--fps", min=0.01, max=1000, help="Frames a second.", metavar="RATE")
+    ] = None,
+    blend: Annotated[bool, typer.Option("--blend", help="Blend between light positions.")] = False,
     exposure: Annotated[
         float,
         typer.Option("--exposure", min=-64, max=64, help="Stops added to movies, PNG and JPEG.", metavar="STOPS"),
     ] = 0.0,
+    view: Annotated[
+        str, typer.Option("--view", help="srgb, aces, or a view of the configuration in $OCIO.", metavar="VIEW")
+    ] = "srgb",
+    label: Annotated[bool, typer.Option("--label", help="Write camera and light index into each picture.")] = False,
     quiet: Quiet = False,
 ) -> None:
     """Cut a movie or an image sequence out of a frame array."""
-    from ..assemble import assemble as run
+    from ..movie.assemble import assemble as run
+    from ..movie.display import find_view
+    from ..movie.look import Look
+    from ..movie.sweep import Kind, Sweep
 
+    choices: dict[Kind, bool] = {"walk": walk, "light": light, "diagonal": diagonal}
+    kinds = [kind for kind, wanted in choices.items() if wanted]
+    _check(path_file, kinds, at, seconds)
     with Screen(out, quiet=quiet) as screen:
 
         def progress(done: int, total: int) -> None:
@@ -40,9 +82,29 @@ def assemble(
             screen.advance()
 
         try:
-            result = run(array, path_file, place(target), exposure=exposure, progress=progress)
+            result = run(
+                array,
+                path_file or Sweep(kind=kinds[0], at=tuple(at or ()), seconds=seconds),
+                place(target),
+                look=Look(exposure=exposure, view=find_view(view), label=label),
+                fps=fps,
+                positions="blend" if blend else None,
+                progress=progress,
+            )
         except JobError as error:
             fail(problems(error, "nothing was written"), error.exit_code)
     if not quiet:
         rate = f"{float(result.fps):g} frames a second"
         say(out, [f"{result.target}: {result.n_frames} frames from {result.n_images} images, {rate}"])
+
+
+def _check(path_file: Path | None, kinds: Sequence[str], at: Sequence[str] | None, seconds: float | None) -> None:
+    """Refuse options that do not go together."""
+    ways = ([f"the path file {path_file}"] if path_file else []) + [f"--{kind}" for kind in kinds]
+    if len(ways) != 1:
+        found = " and ".join(ways) or "none of them"
+        raise typer.BadParameter(f"expected a path file, --walk, --light or --diagonal; got {found}", param_hint="PATH")
+    if path_file and seconds is not None:
+        raise typer.BadParameter("a path file says itself how long its segments are", param_hint="--seconds")
+    if at and kinds in ([], ["diagonal"]):
+        raise typer.BadParameter("goes with --walk and --light, where something stays", param_hint="--at")

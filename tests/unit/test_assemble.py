@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from framearray_cli.assemble import assemble
 from framearray_cli.colour import srgb8_from_linear
 from framearray_cli.errors import JobError, MissingExtraError, OutputError
 from framearray_cli.filepatterns import file_patterns
 from framearray_cli.images import ImageFormat, read_codes, read_image, write_image
 from framearray_cli.manifest import Manifest, ManifestCamera, ManifestLight, image_path
 from framearray_cli.manifestfile import write_manifest
+from framearray_cli.movie.assemble import assemble
+from framearray_cli.movie.look import Look
 
 av = pytest.importorskip("av")
 
@@ -167,7 +168,7 @@ def test_odd_sizes_are_padded(path_file: Path, tmp_path: Path) -> None:
 
 def test_exposure_brightens_a_movie(path_file: Path, tmp_path: Path) -> None:
     make_array(tmp_path / "out", "exr")
-    assemble(tmp_path / "out", path_file, tmp_path / "dark.mp4", exposure=-2)
+    assemble(tmp_path / "out", path_file, tmp_path / "dark.mp4", look=Look(exposure=-2))
     frames, _ = decoded(tmp_path / "dark.mp4")
     expected = srgb8_from_linear(picture(4, 3) / 4)
     assert np.abs(frames[7][4:-4, 4:28].mean(axis=(0, 1)) - expected[0, 0]).max() < 2.5
@@ -311,11 +312,11 @@ def test_converted_exr_frames_carry_the_camera(out: Path, path_file: Path, tmp_p
 
 
 def test_exposure_changes_a_sequence_of_the_same_format(out: Path, path_file: Path, tmp_path: Path) -> None:
-    assemble(out, path_file, tmp_path / "shot.####.png", exposure=-1)
+    assemble(out, path_file, tmp_path / "shot.####.png", look=Look(exposure=-1))
     linear = read_image(out / "tiny.c0000.l000.png")
     np.testing.assert_array_equal(read_codes(tmp_path / "shot.0000.png"), srgb8_from_linear(linear / 2))
     with pytest.raises(OutputError, match="exposure changes movies, PNG and JPEG alone"):
-        assemble(out, path_file, tmp_path / "shot.####.exr", exposure=1)
+        assemble(out, path_file, tmp_path / "shot.####.exr", look=Look(exposure=1))
 
 
 def test_a_sequence_replaces_its_own_files_alone(out: Path, path_file: Path, tmp_path: Path) -> None:

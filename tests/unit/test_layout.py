@@ -27,7 +27,9 @@ terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise standarderror compose accumulate window
 imageattributes images manifest manifestfile pictures ranges record resume folderlock outfolder stored writer
 prepare memory acceptance expected auto allot target describe summary render check verify
-moviepath movies assemble
+imagecheck
+movie/__init__ movie/places movie/easing movie/curves movie/pathfile movie/timeline movie/sweep
+movie/cube movie/display movie/label movie/look movie/yuv movie/video movie/animation movie/sequence movie/assemble
 places sheet
 export/selection export/folder export/points export/colmap export/nerfstudio export/cinema export/write export/__init__
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
@@ -52,8 +54,8 @@ DOORS = {
         "eyehits",
     ),  # eyehits: one function that allocates, so no kernel
     "trimesh": ("meshes/",),
-    "OpenImageIO": ("images",),
-    "PIL": ("meshes/", "images", "sheet"),
+    "OpenImageIO": ("images", "movie/display"),
+    "PIL": ("meshes/", "images", "imagecheck", "movie/label", "movie/animation", "sheet"),
     "tomllib": ("jobfile", "manifestfile"),
     "tomli_w": ("manifestfile", "report/tables"),
     "matplotlib": ("report/plots",),
@@ -61,7 +63,7 @@ DOORS = {
     "flip_evaluator": ("report/flip",),
     "typer": ("cli", "commands/"),
     "rich": ("screen",),
-    "av": ("movies",),
+    "av": ("movie/video",),
     "scipy": ("paths", "standarderror", "allotment"),
     "psutil": ("memory",),
     "xxhash": ("record",),

@@ -1,0 +1,68 @@
+"""A quick look whether an image file is there, whole and of the right size, without decoding all of it."""
+
+import os
+import struct
+from pathlib import Path
+
+from .errors import OutputError
+from .files import reason
+from .images import last_row, read_image
+
+JPEG_END = b"\xff\xd9"
+
+
+def check_image(path: Path, resolution: tuple[int, int]) -> None:
+    """Look at the head and the end of an image file, as one that was cut short has lost its end; of PNG at all sums.
+
+    Where that tells nothing (tiles, bytes behind the end of a JPEG), the whole image is decoded.
+
+    Args:
+        resolution: width and height that are expected, pixels.
+
+    Raises:
+        OutputError: the file is missing, damaged, cut short or of another size.
+    """
+    size: tuple[int, int] | None
+    match path.suffix.lower():
+        case ".png":
+            size = _size_of_png(path)
+        case ".jpg" | ".jpeg":
+            size = _size_of_jpeg(path)
+        case _:
+            size = last_row(path)
+    if size is None:
+        image = read_image(path)
+        size = (image.shape[1], image.shape[0])
+    if size != resolution:
+        width, height = resolution
+        raise OutputError(f"{path}: expected {width} x {height} pixels, got {size[0]} x {size[1]}")
+
+
+def _size_of_png(path: Path) -> tuple[int, int]:
+    """Read the size of a PNG, and check the sum of each chunk, which Pillow does not when it decodes."""
+    import PIL.Image
+
+    try:
+        with PIL.Image.open(path) as picture:
+            size = picture.size
+            picture.verify()
+    except (SyntaxError, ValueError, EOFError, struct.error) as error:  # how Pillow reports broken chunks
+        raise OutputError(f"{path}: damaged: {error}") from error
+    except OSError as error:
+        raise OutputError(f"{path}: not an image, or damaged: {reason(error)}") from error
+    return size
+
+
+def _size_of_jpeg(path: Path) -> tuple[int, int] | None:
+    """Read the size from the head of a JPEG whose end is there; None if either is not found."""
+    import PIL.Image
+
+    try:
+        with path.open("rb") as file:
+            file.seek(-len(JPEG_END), os.SEEK_END)
+            if file.read() != JPEG_END:
+                return None
+        with PIL.Image.open(path) as picture:
+            return picture.size
+    except (OSError, SyntaxError, ValueError):
+        return None

@@ -1,0 +1,154 @@
+"""A path through a frame array -> a movie, or a numbered image sequence; from the manifest alone."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Protocol, TypeAlias
+
+from numpy.typing import NDArray
+
+from ..errors import OutputError
+from ..files import folder_for
+from ..imagecheck import check_image
+from ..manifest import Manifest
+from ..manifestfile import read_manifest
+from ..pictures import Pictures, Relight
+from .animation import ANIMATIONS, open_animation
+from .look import Look, place_text, shown
+from .pathfile import Mode, MoviePath, load_movie_path
+from .sequence import check_look, sequence_pattern, write_sequence
+from .sweep import Sweep, swept
+from .timeline import Shot, Timeline, timeline
+from .video import VIDEOS, open_video, require_av
+
+Progress: TypeAlias = Callable[[int, int], None]  # frames done, frames in all
+
+MOVIES = (*VIDEOS, *ANIMATIONS)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AssembleResult:
+    """What was made.
+
+    Attributes:
+        target: the movie, or the folder of the sequence.
+        n_frames: frames in it.
+        n_images: different places of the array among them.
+        fps: frames per second.
+    """
+
+    target: Path
+    n_frames: int
+    n_images: int
+    fps: Fraction
+
+    @property
+    def time_s(self) -> Fraction:
+        """How long it plays, seconds."""
+        return self.n_frames / self.fps
+
+
+def assemble(
+    out: Path,
+    path: Path | Sweep,
+    target: Path,
+    *,
+    look: Look = Look(),  # noqa: B008  # frozen
+    fps: float | None = None,
+    positions: Mode | None = None,
+    progress: Progress | None = None,
+) -> AssembleResult:
+    """Cut a movie or an image sequence out of a frame array; it appears whole or not at all.
+
+    Args:
+        out: output folder of a render, or its manifest.
+        path: TOML file of segments, see docs/movies.md; or one movement.
+        target: "x.mp4" or another of MOVIES; "x.####.png" (also .exr, .tif, .jpg) with as many digits as "#"; a name
+            without suffix is a folder, filled with "frame.####" in the array's own format.
+        look: how movies, PNG and JPEG are shown.
+        fps: frames per second, in place of the path's or the array's.
+        positions: "nearest" or "blend", in place of what the top of the path says.
+        progress: called after each frame.
+
+    Raises:
+        JobError: the path is broken or asks for what the array has not.
+        OutputError: an image is missing or damaged, or the target cannot be written.
+        MissingExtraError: a movie is asked for and PyAV is not installed.
+    """
+    manifest = read_manifest(out)
+    movie = swept(path, manifest) if isinstance(path, Sweep) else load_movie_path(path)
+    movie = _with(movie, fps, positions)
+    line = timeline(f"--{path.kind}" if isinstance(path, Sweep) else path, movie, manifest)
+    pictures = Pictures(manifest)
+    report = progress or (lambda done, total: None)
+    if target.suffix.lower() in MOVIES:
+        if target.suffix.lower() in VIDEOS:
+            require_av()
+        _check_images(pictures, line)
+        _write_movie(pictures, line, target, look, report)
+    else:
+        pattern = sequence_pattern(target, _own_suffix(manifest), MOVIES)
+        check_look(pattern, look)
+        _check_images(pictures, line)
+        write_sequence(pictures, line, pattern, look, report)
+        target = pattern.parent
+    n_images = len(set(line.shots))
+    return AssembleResult(target=target, n_frames=len(line.shots), n_images=n_images, fps=line.fps)
+
+
+def _with(movie: MoviePath, fps: float | None, positions: Mode | None) -> MoviePath:
+    """Replace what the command line says in another way."""
+    updates = {"fps": fps, "positions": positions}
+    return movie.model_copy(update={key: value for key, value in updates.items() if value is not None})
+
+
+def _own_suffix(manifest: Manifest) -> str:
+    return Path(manifest.groups[0].images if manifest.groups else manifest.images).suffix
+
+
+def _check_images(pictures: Pictures, line: Timeline) -> None:
+    """Look at every image before the first is used: one that is missing or cut short is named at once."""
+    wanted: dict[Path, Shot] = {}
+    for shot in dict.fromkeys(line.shots):
+        wanted.update(dict.fromkeys(pictures.files(shot.c, shot.positions), shot))
+    missing = sorted(path for path in wanted if not path.is_file())
+    if missing:
+        shot = wanted[missing[0]]
+        lights = zip(pictures.manifest.axes, shot.positions, strict=True)
+        place = ", ".join([f"camera {shot.c}", *(f"{axis} {position:g}" for axis, position in lights)])
+        raise OutputError(
+            f"{missing[0]}: no such file ({place}); "
+            f"{len(missing)} of the {len(wanted)} images on the path are missing; render the rest first"
+        )
+    for path in sorted(wanted):
+        check_image(path, pictures.manifest.resolution)
+
+
+class _Writer(Protocol):
+    def add(self, codes: NDArray[Any]) -> None: ...
+
+
+def _write_movie(pictures: Pictures, line: Timeline, target: Path, look: Look, report: Progress) -> None:
+    bits = VIDEOS[target.suffix.lower()].bits if target.suffix.lower() in VIDEOS else 8
+    with folder_for(target.parent), _opened(pictures.manifest, line, target) as movie:
+        last: tuple[Shot, Relight, NDArray[Any]] | None = None
+        for k, (shot, relight) in enumerate(zip(line.shots, line.relights, strict=True)):
+            if last is None or last[:2] != (shot, relight):  # a held picture is made once
+                image = pictures.picture(shot.c, shot.positions, relight)
+                last = (shot, relight, shown(image, look, place_text(pictures.manifest, shot), bits))
+            movie.add(last[2])
+            report(k + 1, len(line.shots))
+
+
+@contextmanager
+def _opened(manifest: Manifest, line: Timeline, target: Path) -> Iterator[_Writer]:
+    """Open a movie of either kind."""
+    width, height = manifest.resolution
+    if target.suffix.lower() in VIDEOS:
+        with open_video(target, width, height, line.fps) as video:
+            yield video
+    else:
+        with open_animation(target, width, height, line.fps, len(line.shots)) as animation:
+            yield animation

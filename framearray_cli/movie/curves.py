@@ -1,0 +1,167 @@
+"""Light that changes over a movie: intensity and colour of groups and of the ambient light, as constants or curves."""
+
+from bisect import bisect_right
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, Any, TypeAlias
+
+from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
+
+from ..jobvalues import Place, Table, Triple, fail, shown
+from ..pictures import AS_RENDERED, Relight
+from .places import percent
+
+STRONGEST = 1e6  # times the light that was rendered; halves overflow before that
+LONGEST_S = 1e6  # seconds; later key frames are typing errors
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """Key frames: (time, RGB) each, where a time is in seconds or "50%" of the movie; one alone is a constant."""
+
+    keys: tuple[tuple[float | str, Triple], ...]
+
+
+def _curve(grey_alone: bool) -> Callable[[object], Curve]:
+    """Make a check for one value or a list of key frames.
+
+    Args:
+        grey_alone: a value is one number; else it may be three.
+    """
+
+    def check(value: object) -> Curve:
+        if not (isinstance(value, list) and any(isinstance(item, dict) for item in value)):
+            return Curve(((0.0, _value(value, grey_alone, ())),))
+        problems: list[tuple[Place, str]] = []
+        keys = [_key(item, grey_alone, k, problems) for k, item in enumerate(value)]
+        if problems:
+            fail(problems)
+        return Curve(tuple(keys))
+
+    return check
+
+
+def _key(item: object, grey_alone: bool, k: int, problems: list[tuple[Place, str]]) -> tuple[float | str, Triple]:
+    """Check one key frame."""
+    if not isinstance(item, dict):
+        problems.append(((k,), f"expected a table with time and value, got {shown(item)}"))
+        return 0.0, (0.0, 0.0, 0.0)
+    for name in item.keys() - {"time", "value"}:
+        problems.append(((k, name), "unknown key; known here: time, value"))
+    time: Any = item.get("time")
+    value = (0.0, 0.0, 0.0)
+    if not _is_time(time):
+        problems.append(((k, "time"), f'expected seconds, or a percentage such as "50%", {_found(item, "time")}'))
+        time = 0.0
+    if "value" not in item:
+        problems.append(((k, "value"), f"missing; expected {_wanted(grey_alone)}"))
+    else:
+        try:
+            value = _value(item["value"], grey_alone, (k, "value"))
+        except ValidationError as error:
+            problems += [(detail["loc"], detail["msg"]) for detail in error.errors()]
+    return time if isinstance(time, str) else float(time), value
+
+
+def _is_time(time: Any) -> bool:
+    if isinstance(time, str):
+        return percent(time) is not None
+    return isinstance(time, int | float) and not isinstance(time, bool) and 0 <= time <= LONGEST_S
+
+
+def _found(item: Mapping[str, object], key: str) -> str:
+    return f"got {shown(item[key])}" if key in item else "got none"
+
+
+def _wanted(grey_alone: bool) -> str:
+    return f"a number {'' if grey_alone else 'or 3 numbers '}from 0 to {STRONGEST:.0f}"
+
+
+def _value(value: object, grey_alone: bool, place: Place) -> Triple:
+    """Check one number, or three."""
+    numbers = [value] * 3 if not isinstance(value, list) else [] if grey_alone else value
+    good = [isinstance(x, int | float) and not isinstance(x, bool) and 0 <= x <= STRONGEST for x in numbers]
+    if len(numbers) != 3 or not all(good):
+        fail([(place, f"expected {_wanted(grey_alone)}, got {shown(value)}")])
+    r, g, b = (float(x) for x in numbers)  # type: ignore[arg-type]  # checked above
+    return r, g, b
+
+
+def _schema(grey_alone: bool) -> WithJsonSchema:
+    number = {"type": "number", "minimum": 0, "maximum": STRONGEST}
+    vector = {"type": "array", "items": number, "minItems": 3, "maxItems": 3}
+    value: dict[str, Any] = number if grey_alone else {"anyOf": [number, vector]}
+    time = {"anyOf": [{"type": "number", "minimum": 0}, {"type": "string"}]}
+    key = {"type": "object", "properties": {"time": time, "value": value}, "required": ["time", "value"]}
+    return WithJsonSchema({"anyOf": [value, {"type": "array", "items": key, "minItems": 1}]})
+
+
+Intensity: TypeAlias = Annotated[Curve, PlainValidator(_curve(True)), _schema(True)]
+Colour: TypeAlias = Annotated[Curve, PlainValidator(_curve(False)), _schema(False)]
+
+_ONE = Curve(((0.0, (1.0, 1.0, 1.0)),))
+
+
+class LightChange(Table):
+    """What the light of a group, or the ambient light, is multiplied with: intensity times colour."""
+
+    intensity: Intensity = Field(default=_ONE, description="Factor; 0 turns the light off.")
+    color: Colour = Field(default=_ONE, description="Factor of red, green and blue, or one for all.")
+
+
+def relights(
+    groups: Mapping[str, LightChange],
+    ambient: LightChange | None,
+    times: Sequence[float],
+    problems: list[str],
+) -> list[Relight]:
+    """Find the light of each frame.
+
+    Args:
+        groups: by name.
+        times: of the frames, seconds, from 0; 100% is the last of them.
+        problems: key frames that are not in order are added.
+    """
+    if not times or not (groups or ambient):
+        return [AS_RENDERED] * len(times)
+    by_group = {name: _factors(f"groups.{name}", change, times, problems) for name, change in groups.items()}
+    of_ambient = _factors("ambient", ambient or LightChange(), times, problems)
+    return [
+        Relight(groups={name: factors[k] for name, factors in by_group.items()}, ambient=of_ambient[k])
+        for k in range(len(times))
+    ]
+
+
+def _factors(key: str, change: LightChange, times: Sequence[float], problems: list[str]) -> list[Triple]:
+    """Multiply intensity and colour at each time."""
+    intensity = _timed(f"{key}.intensity", change.intensity, times[-1], problems)
+    color = _timed(f"{key}.color", change.color, times[-1], problems)
+    found = []
+    for time in times:
+        r, g, b = (float(x * y) for x, y in zip(at(intensity, time), at(color, time), strict=True))
+        found.append((r, g, b))
+    return found
+
+
+Timed: TypeAlias = tuple[list[float], list[Triple]]  # times in seconds, in order, and values
+
+
+def _timed(key: str, curve: Curve, end: float, problems: list[str]) -> Timed:
+    """Turn times into seconds; a key frame before the one above it is a problem."""
+    seconds = [end * (percent(time) or 0.0) / 100 if isinstance(time, str) else time for time, _ in curve.keys]
+    for k, (before, time) in enumerate(pairwise(seconds), start=1):
+        if time < before:
+            problems.append(f"{key}[{k}].time: expected at least that of the one before, {before:g} s, got {time:g} s")
+    return seconds, [value for _, value in curve.keys]
+
+
+def at(curve: Timed, time: float) -> Triple:
+    """Find the value at a time: linear between key frames, held outside; of two at one time the later one."""
+    times, values = curve
+    k = bisect_right(times, time)
+    if k in (0, len(times)):
+        return values[max(k - 1, 0)]
+    share = (time - times[k - 1]) / (times[k] - times[k - 1])
+    r, g, b = (x + (y - x) * share for x, y in zip(values[k - 1], values[k], strict=True))
+    return r, g, b

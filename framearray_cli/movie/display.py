@@ -1,0 +1,112 @@
+"""How linear radiance looks on a screen: the sRGB curve, ACES, or a view of an OpenColorIO configuration.
+
+The door to OpenColorIO, which OpenImageIO brings along.
+"""
+
+import os
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Float32, Image
+from ..colour import srgb_from_linear
+from ..errors import JobError
+from .cube import Encode, tabled
+
+BUILT_IN = "ocio://default"  # the configuration that OpenColorIO carries: ACES 2.0
+ACES = ("sRGB - Display", "ACES 2.0 - SDR 100 nits (Rec.709)")
+# What configurations call linear light with Rec. 709 primaries: OpenColorIO's own, ACES 1.2 and Blender, Filmic.
+LINEAR_REC709 = (
+    "Linear Rec.709 (sRGB)",
+    "lin_rec709",
+    "lin_srgb",
+    "Utility - Linear - sRGB",
+    "Linear Rec.709",
+    "Linear",
+)
+MOST_NAMES = 12  # in a message
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A way from radiance to a screen.
+
+    Attributes:
+        name: as it was asked for.
+        encode: linear radiance, (h, w, 3), to values of the screen, the same shape, 0 to 1.
+        quick: the same, near enough for 8 bits.
+    """
+
+    name: str
+    encode: Encode
+    quick: Encode
+
+    @property
+    def is_srgb(self) -> bool:
+        """Whether this is the bare sRGB curve."""
+        return self.name == "srgb"
+
+
+SRGB = View("srgb", srgb_from_linear, srgb_from_linear)
+
+
+def find_view(name: str) -> View:
+    """Find a view by name: "srgb", "aces", or "VIEW" or "DISPLAY/VIEW" of the configuration that $OCIO names.
+
+    Without $OCIO names are those of the configuration that OpenColorIO carries; "aces" is always from there.
+
+    Raises:
+        JobError: there is no such view, or $OCIO names no configuration.
+    """
+    if name == "srgb":
+        return SRGB
+    if name == "aces":
+        return _ocio_view(name, BUILT_IN, *ACES)
+    place = os.environ.get("OCIO") or BUILT_IN
+    config = _config(place)
+    for display in (config.getDefaultDisplayName(), *config.getDisplayNames()):
+        for view in config.getViewNames(display):
+            if name in (view, f"{display}/{view}"):
+                return _ocio_view(name, place, display, view)
+    known = [f"{display}/{view}" for display in config.getDisplayNames() for view in config.getViewNames(display)]
+    more = f" and {len(known) - MOST_NAMES} more" if len(known) > MOST_NAMES else ""
+    raise JobError(
+        "--view", [f'expected srgb, aces or a view of {place} ({"; ".join(known[:MOST_NAMES])}{more}), got "{name}"']
+    )
+
+
+def _config(place: str) -> Any:
+    """Open a configuration."""
+    import OpenImageIO as oiio
+
+    config = oiio.ColorConfig(place)
+    if message := config.geterror():
+        raise JobError("--view", [f"$OCIO: {place}: cannot be read: {message.strip().splitlines()[0]}"])
+    return config
+
+
+@cache  # its table takes long to fill
+def _ocio_view(name: str, place: str, display: str, view: str) -> View:
+    """Make a view, and try it once: a transform may name files that are missing."""
+    config = _config(place)
+    spaces = set(config.getColorSpaceNames())
+    found = [space for space in (config.resolve(known) for known in LINEAR_REC709) if space in spaces]
+    if not found:
+        raise JobError("--view", [f'{place}: no colour space "{LINEAR_REC709[0]}"; expected one, as images have that'])
+    encode = partial(_through_ocio, place=place, display=display, view=view, space=found[0])
+    encode(np.zeros((1, 1, 3), np.float32))
+    return View(name, encode, tabled(encode))
+
+
+def _through_ocio(image: Image, *, place: str, display: str, view: str, space: str) -> Float32:
+    """Apply a display transform; (h, w, 3) -> the same shape, clipped to 0 to 1."""
+    import OpenImageIO as oiio
+
+    buffer = oiio.ImageBuf(np.ascontiguousarray(image, np.float32))
+    result = oiio.ImageBufAlgo.ociodisplay(buffer, display, view, space, colorconfig=place)
+    if result.has_error:
+        raise JobError("--view", [f"{place}: {display}/{view}: {result.geterror().strip().splitlines()[0]}"])
+    shown: Float32 = np.clip(np.asarray(result.get_pixels(oiio.FLOAT), np.float32), 0, 1)
+    return shown

@@ -1,0 +1,46 @@
+"""A text burnt into the lower left corner of a picture, in Pillow's own font."""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Float32
+
+LINES_A_PICTURE = 18  # heights of the text in that of the picture
+SMALLEST = 10  # pixels; smaller letters cannot be read
+SHADE = 0.35  # of the picture's own brightness behind the text
+
+
+def burn(codes: NDArray[Any], text: str) -> NDArray[Any]:
+    """Write a text into a picture.
+
+    Args:
+        codes: (h, w, 3) uint8 or uint16.
+
+    Returns:
+        A copy with white letters on a darkened ground; what does not fit into the picture is cut off.
+    """
+    letters = _letters(text, max(SMALLEST, codes.shape[0] // LINES_A_PICTURE))[: codes.shape[0], : codes.shape[1]]
+    height, width = letters.shape
+    white = np.iinfo(codes.dtype).max
+    ground = codes[-height:, :width] * np.float32(SHADE)
+    share = letters[..., None]
+    burnt = codes.copy()
+    burnt[-height:, :width] = np.rint(ground * (1 - share) + white * share).astype(codes.dtype)
+    return burnt
+
+
+@lru_cache(64)
+def _letters(text: str, size: int) -> Float32:
+    """Draw a text with a margin around it: (h, w), 1 where a letter is."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    font = ImageFont.load_default(size)
+    margin = size // 3
+    _, top, right, bottom = font.getbbox("0123456789clp" + text)
+    right = font.getbbox(text)[2]
+    sheet = Image.new("L", (int(right) + 2 * margin, int(bottom - top) + 2 * margin), 0)
+    ImageDraw.Draw(sheet).text((margin, margin - top), text, fill=255, font=font)
+    return np.asarray(sheet, np.float32) / np.float32(255)

@@ -1,0 +1,62 @@
+"""How pictures are shown: exposure, view, label; radiance -> codes of 8 or 16 bits."""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Image
+from ..colour import srgb8_from_linear
+from ..manifest import MAIN_AXIS, Manifest
+from .display import SRGB, View
+from .label import burn
+from .timeline import Shot
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Look:
+    """How radiance is shown.
+
+    Attributes:
+        exposure: stops added.
+        view: from radiance to a screen.
+        label: whether the place in the array is written into each picture.
+    """
+
+    exposure: float = 0.0
+    view: View = SRGB
+    label: bool = False
+
+    @property
+    def changes(self) -> list[str]:
+        """The options by which it differs from the plain one."""
+        parts = {"exposure": bool(self.exposure), "view": not self.view.is_srgb, "label": self.label}
+        return [name for name, changed in parts.items() if changed]
+
+
+def shown(image: Image, look: Look, text: str, bits: Literal[8, 16] = 8) -> NDArray[Any]:
+    """Find the codes that a screen is sent.
+
+    Args:
+        image: (h, w, 3), linear radiance.
+        text: of the label, where the look has one.
+
+    Returns:
+        (h, w, 3) uint8 or uint16.
+    """
+    exposed = image * np.float32(2.0**look.exposure) if look.exposure else image
+    if bits == 8 and look.view.is_srgb:
+        codes: NDArray[Any] = srgb8_from_linear(exposed)
+    else:
+        encode, most, kind = (look.view.quick, 255, np.uint8) if bits == 8 else (look.view.encode, 65535, np.uint16)
+        codes = np.rint(encode(exposed).astype(np.float64) * most).astype(kind)
+    return burn(codes, text) if look.label else codes
+
+
+def place_text(manifest: Manifest, shot: Shot) -> str:
+    """Say what a frame shows: "c 12  l 3", or "c 12  light 3.25  lamps 1" where there are several light axes."""
+    axes = list(manifest.axes)
+    names = ["l"] if axes == [MAIN_AXIS] else axes
+    places = [f"{name} {round(position, 2):g}" for name, position in zip(names, shot.positions, strict=True)]
+    return "  ".join([f"c {shot.c}", *places])

@@ -1,0 +1,104 @@
+"""The file that tells a movie's path through a frame array: TOML, segments, light; see docs/movies.md."""
+
+from fractions import Fraction
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from pydantic import Field, ValidationError, field_validator, model_validator
+
+from ..errors import JobError
+from ..framerate import frame_rate
+from ..jobfile import load_toml
+from ..jobvalues import Table, fail
+from ..manifest import MAIN_AXIS, Manifest
+from ..problems import problems_of
+from .curves import LightChange
+from .easing import Ease
+from .places import Span
+
+MOST_FRAMES = 1_000_000  # eleven hours at 24 frames a second; more is a typing error
+MOST_SECONDS = 40_000.0
+MOST_LOOPS = 10_000
+
+Mode: TypeAlias = Literal["nearest", "blend"]
+
+
+class Segment(Table):
+    """A stretch of the movie in which camera and light each stay or move."""
+
+    frames: int | None = Field(default=None, ge=1, le=MOST_FRAMES, description="Number of frames; or give `seconds`.")
+    seconds: float | None = Field(
+        default=None, gt=0, le=MOST_SECONDS, description="Length, rounded to whole frames, at least one."
+    )
+    camera: Span | None = Field(
+        default=None, description="A place, or a list of places at even times. Left out: stays, at first at 0."
+    )
+    light: Span | None = Field(default=None, description="Likewise.")
+    axes: dict[str, Span] = Field(default={}, description="The same for further light axes, by name.")
+    ease: Ease = Field(default="linear", description="How the movement starts and ends.")
+    hold: float = Field(
+        default=0.0, ge=0, le=MOST_SECONDS, description="Seconds that the last picture stays, added to the length."
+    )
+    reverse: bool = Field(default=False, description="Played backwards.")
+    loops: int | None = Field(
+        default=None, ge=1, le=MOST_LOOPS, description="How often it is played; 1, or 2 if back and forth."
+    )
+    back_and_forth: bool = Field(default=False, description="Every second time it is played the other way round.")
+    positions: Mode | None = Field(default=None, description="In place of that of the whole movie.")
+
+    @model_validator(mode="after")
+    def _one_length(self) -> "Segment":
+        if (self.frames is None) == (self.seconds is None):
+            fail([((), f"expected either frames or seconds, got {'neither' if self.frames is None else 'both'}")])
+        if MAIN_AXIS in self.axes:
+            fail([(("axes", MAIN_AXIS), f"expected it outside of axes: {MAIN_AXIS} = ...")])
+        return self
+
+    @property
+    def n_passes(self) -> int:
+        """How often it is played."""
+        return self.loops if self.loops is not None else 2 if self.back_and_forth else 1
+
+    def n_frames(self, fps: Fraction) -> int:
+        """Count the frames of one pass."""
+        return self.frames if self.frames is not None else max(1, round(Fraction(self.seconds or 0) * fps))
+
+    def n_held(self, fps: Fraction) -> int:
+        """Count the frames that the last picture stays."""
+        return round(Fraction(self.hold) * fps)
+
+
+class MoviePath(Table):
+    """What a path file holds."""
+
+    fps: float | None = Field(
+        default=None, ge=0.01, le=1000, description="Frames per second; left out: those of the frame array."
+    )
+    positions: Mode = Field(default="nearest", description="What is shown between two light positions.")
+    segments: tuple[Segment, ...] = Field(strict=False, description="Played one after another; at least one.")
+    groups: dict[str, LightChange] = Field(default={}, description="Changes of the light of groups, by name.")
+    ambient: LightChange | None = Field(default=None, description="Change of the ambient light.")
+
+    @field_validator("segments")
+    @classmethod
+    def _some(cls, segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
+        if not segments:
+            fail([((), "expected a list of at least 1 table, got none")])
+        return segments
+
+
+def load_movie_path(file: Path) -> MoviePath:
+    """Read a path file.
+
+    Raises:
+        JobError: the file is missing or broken; every problem is named.
+    """
+    try:
+        return MoviePath.model_validate(load_toml(file))
+    except ValidationError as error:
+        raise JobError(file, problems_of(error, MoviePath)) from error
+
+
+def movie_fps(movie: MoviePath, manifest: Manifest) -> Fraction:
+    """Choose the frame rate: that of the path file, else that of the frame array."""
+    return frame_rate(movie.fps if movie.fps is not None else manifest.fps)

@@ -1,0 +1,136 @@
+"""A movie path and an array -> what each frame shows: eye, light positions, and how bright the light is."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from ..errors import JobError
+from ..manifest import MAIN_AXIS, Manifest
+from ..pictures import Relight
+from .curves import relights
+from .easing import eased
+from .pathfile import MOST_FRAMES, MoviePath, Segment, movie_fps
+from .places import IndexPlace, along, nearest, positions
+
+# Blended positions are rounded to a millionth of a step: far less than a picture can show, and then the same place
+# reached in two ways is the same.
+DECIMALS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """What of the array a frame shows.
+
+    Attributes:
+        c: camera index.
+        positions: one for each light axis, in the order of `Manifest.axes`; fractional ones are blended.
+    """
+
+    c: int
+    positions: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Timeline:
+    """All frames of a movie.
+
+    Attributes:
+        shots: of each frame.
+        relights: of each frame.
+        fps: frames per second.
+    """
+
+    shots: tuple[Shot, ...]
+    relights: tuple[Relight, ...]
+    fps: Fraction
+
+
+def timeline(source: Path | str, movie: MoviePath, manifest: Manifest) -> Timeline:
+    """Find what each frame shows.
+
+    A pass through a segment shows both ends of its spans. Where it goes on from exactly where the one before ended, it
+    does not show that picture again: steps are then 1/n of the way instead of 1/(n - 1), and a movement cut in two runs
+    on evenly.
+
+    Args:
+        source: the path file, or what else messages should start with.
+        movie: what it holds.
+        manifest: of the frame array.
+
+    Raises:
+        JobError: the path asks for what the array has not; every such place is named.
+    """
+    fps = movie_fps(movie, manifest)
+    problems = _light_problems(movie, manifest)
+    total = sum(segment.n_passes * segment.n_frames(fps) + segment.n_held(fps) for segment in movie.segments)
+    if total > MOST_FRAMES:
+        raise JobError(source, [f"segments: expected at most {MOST_FRAMES} frames in all, got {total}", *problems])
+    shots: list[Shot] = []
+    now = [0.0] * (1 + len(manifest.axes))  # where the last pass ended: camera, then each light axis
+    for k, segment in enumerate(movie.segments):
+        spans = _spans(f"segments[{k}]", segment, manifest, now, problems)
+        blends = (segment.positions or movie.positions) == "blend"
+        for p in range(segment.n_passes):
+            backwards = segment.reverse != (segment.back_and_forth and p % 2 == 1)
+            goes_on = shots[-1:] == [_shot(_at(spans, 0.0, segment, backwards), blends)]
+            for t in _steps(segment.n_frames(fps), goes_on):
+                now = _at(spans, t, segment, backwards)
+                shots.append(_shot(now, blends))
+        shots += shots[-1:] * segment.n_held(fps)
+    lit = relights(movie.groups, movie.ambient, [float(k / fps) for k in range(len(shots))], problems)
+    if problems:
+        raise JobError(source, problems)
+    return Timeline(shots=tuple(shots), relights=tuple(lit), fps=fps)
+
+
+def _spans(
+    key: str, segment: Segment, manifest: Manifest, now: list[float], problems: list[str]
+) -> list[tuple[float, ...]]:
+    """Resolve the spans of a segment: camera, then each light axis."""
+    axes = manifest.axes
+    found: list[tuple[float, ...]] = [(here,) for here in now]
+    given: dict[str, Sequence[IndexPlace] | None] = {"camera": segment.camera, MAIN_AXIS: segment.light, **segment.axes}
+    for k, (name, n) in enumerate({"camera": manifest.n_cameras, **axes}.items()):
+        if (span := given.pop(name, None)) is not None:
+            place, noun = (name, f"{name}s") if name in ("camera", MAIN_AXIS) else (f"axes.{name}", f"places of {name}")
+            found[k] = positions(f"{key}.{place}", span, n, noun, problems)
+    for name, span in given.items():
+        if span is not None:
+            place = MAIN_AXIS if name == MAIN_AXIS else f"axes.{name}"
+            problems.append(f"{key}.{place}: no such light axis; the array has {', '.join(axes)}")
+    return found
+
+
+def _light_problems(movie: MoviePath, manifest: Manifest) -> list[str]:
+    """What is asked of the light that the array cannot give."""
+    if not manifest.groups:
+        keys = [f"groups.{name}" for name in movie.groups] + (["ambient"] if movie.ambient else [])
+        return [
+            f"{key}: this array stores its light all together, so that it cannot be changed; render again with "
+            'group = "..." in [[light.sources]]'
+            for key in keys
+        ]
+    known = manifest.group_names
+    return [
+        f"groups.{name}: no such group; the array has {', '.join(known)}" for name in movie.groups if name not in known
+    ]
+
+
+def _at(spans: list[tuple[float, ...]], t: float, segment: Segment, backwards: bool) -> list[float]:
+    """Find the positions at a share t of the time of a pass."""
+    u = eased(1 - t if backwards else t, segment.ease)
+    return [along(span, u) for span in spans]
+
+
+def _shot(now: list[float], blends: bool) -> Shot:
+    """Find what is shown at a position: the nearest eye, and the nearest light or a blend."""
+    lights = (round(x, DECIMALS) if blends else nearest(x) for x in now[1:])
+    return Shot(nearest(now[0]), tuple(lights))
+
+
+def _steps(n: int, goes_on: bool) -> list[float]:
+    """Space n frames evenly over [0, 1]: the last is 1; the first is 0, or one step on where 0 was shown before."""
+    if goes_on:
+        return [(k + 1) / n for k in range(n)]
+    return [k / (n - 1) for k in range(n)] if n > 1 else [0.0]

@@ -1,0 +1,162 @@
+"""Encode pictures as a movie: the only door to PyAV, which is the optional extra `movie`."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import MissingExtraError, OutputError
+from ..files import whole_file
+from .yuv import planes_422_10
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Container:
+    """How one kind of movie file is made.
+
+    Attributes:
+        format: the container's name, since a temporary file has no suffix of its own.
+        codec: the encoder.
+        pixels: the pixel format, in FFmpeg's words.
+        stream: options of the encoder.
+        file: options of the container.
+    """
+
+    format: str
+    codec: str
+    pixels: Literal["yuv420p", "yuv422p10le"] = "yuv420p"
+    stream: dict[str, str]
+    file: dict[str, str]
+
+    @property
+    def bits(self) -> Literal[8, 16]:
+        """Bits of the codes that it is fed with."""
+        return 8 if self.pixels == "yuv420p" else 16
+
+
+# crf is the quality, lower is better. faststart puts the index first, so that a browser plays while it loads.
+_H264 = {"crf": "16", "preset": "medium"}
+_FAST_START = {"movflags": "+faststart"}
+VIDEOS = {
+    ".mp4": Container(format="mp4", codec="libx264", stream=_H264, file=_FAST_START),
+    ".mkv": Container(format="matroska", codec="libx264", stream=_H264, file={}),
+    ".webm": Container(format="webm", codec="libvpx-vp9", stream={"crf": "20", "b": "0", "row-mt": "1"}, file={}),
+    # "apl0" is what cutting programs expect of a ProRes stream's maker.
+    ".mov": Container(
+        format="mov",
+        codec="prores_ks",
+        pixels="yuv422p10le",
+        stream={"profile": "hq", "vendor": "apl0"},
+        file=_FAST_START,
+    ),
+}
+
+_BT709 = 1  # the number that H.264, VP9 and ProRes give to the primaries, curve and matrix of Rec. 709
+
+
+def require_av() -> ModuleType:
+    """Import PyAV.
+
+    Raises:
+        MissingExtraError: it is not installed.
+    """
+    try:
+        import av
+    except ImportError as error:
+        raise MissingExtraError(f'movies need PyAV ({error}); pip install "framearray[movie]"') from error
+    module: ModuleType = av
+    return module
+
+
+class VideoWriter:
+    """A movie that is being encoded; made by `open_video`."""
+
+    __slots__ = ("_container", "_n", "_stream")
+
+    def __init__(self, container: Any, stream: Any) -> None:
+        self._container = container
+        self._stream = stream
+        self._n = 0
+
+    def add(self, codes: NDArray[Any]) -> None:
+        """Add one picture: (h, w, 3) codes of the movie's size, uint8 or uint16 as its container takes them."""
+        frame = self._frame_of(codes)
+        frame.pts = self._n
+        frame.time_base = 1 / self._stream.codec_context.framerate
+        self._n += 1
+        self._container.mux(self._stream.encode(frame))
+
+    def _frame_of(self, codes: NDArray[Any]) -> Any:
+        """Convert a picture to the stream's pixels; odd sizes grow by one row or column."""
+        av = require_av()
+        context = self._stream.codec_context
+        more = (context.height - codes.shape[0], context.width - codes.shape[1])
+        if any(more):
+            codes = np.pad(codes, ((0, more[0]), (0, more[1]), (0, 0)), mode="edge")
+        if codes.dtype == np.uint8:
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(codes), format="rgb24")
+            # The default matrix is that of Rec. 601, which would shift greens and reds.
+            return frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
+        frame = av.VideoFrame(context.width, context.height, "yuv422p10le")
+        for plane, values in zip(frame.planes, planes_422_10(codes), strict=True):
+            rows = np.zeros((plane.height, plane.line_size // 2), "<u2")
+            rows[:, : values.shape[1]] = values
+            plane.update(rows.tobytes())
+        # ProRes writes into each picture what that says of itself, whatever the stream says.
+        frame.colorspace = _BT709
+        with suppress(AttributeError):  # older PyAV cannot say these two
+            frame.color_primaries = frame.color_trc = _BT709
+        return frame
+
+    def finish(self) -> None:
+        """Write what the encoder still holds, and the index."""
+        self._container.mux(self._stream.encode(None))
+        self._container.close()
+
+
+@contextmanager
+def open_video(target: Path, width: int, height: int, fps: Fraction) -> Iterator[VideoWriter]:
+    """Open a movie that appears under its name once it is whole; on any failure nothing is left.
+
+    Args:
+        target: its suffix, one of VIDEOS, decides the format.
+        width: pixels of a picture, before padding.
+        height: pixels of a picture, before padding.
+        fps: frames per second, kept exactly.
+
+    Raises:
+        MissingExtraError: PyAV is not installed.
+        OutputError: the movie cannot be written.
+    """
+    av = require_av()
+    kind = VIDEOS[target.suffix.lower()]
+    with whole_file(target) as part:
+        try:
+            container = av.open(str(part), "w", format=kind.format, options=kind.file)
+        except av.FFmpegError as error:
+            raise OutputError(f"{target}: cannot be written: {error.strerror}") from error
+        try:
+            stream = container.add_stream(kind.codec, rate=fps, options=kind.stream)
+            # A chroma sample belongs to two columns, in yuv420p to two rows, too.
+            stream.width = width + width % 2
+            stream.height = height + (height % 2 if kind.pixels == "yuv420p" else 0)
+            stream.pix_fmt = kind.pixels
+            stream.time_base = 1 / fps
+            context = stream.codec_context
+            context.color_primaries = context.color_trc = context.colorspace = _BT709
+            context.color_range = 1  # "limited": 16 to 235 in 8 bits
+            writer = VideoWriter(container, stream)
+            yield writer
+            writer.finish()
+        except BaseException as error:
+            with suppress(av.FFmpegError):  # closing writes, too
+                container.close()
+            if isinstance(error, av.FFmpegError):
+                raise OutputError(f"{target}: cannot be written: {error.strerror}") from error
+            raise

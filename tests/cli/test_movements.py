@@ -1,0 +1,97 @@
+"""`framearray assemble` on the command line: with a path file and without, its options, its messages."""
+
+import re
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from movies import decoded, grouped, path_file, plain
+from program import names, run
+
+
+@pytest.fixture
+def array(tmp_path: Path) -> Path:
+    return plain(tmp_path / "out", 5, 4).directory
+
+
+@pytest.mark.parametrize(
+    ("options", "said", "rate"),
+    [
+        (["--walk"], "5 frames from 5 images, 24 frames a second", 24),
+        (["--light", "--at", "50%"], "4 frames from 4 images, 24 frames a second", 24),
+        (["--diagonal", "--fps", "12.5"], "5 frames from 5 images, 12.5 frames a second", Fraction(25, 2)),
+        (["--light", "--seconds", "1", "--blend", "--label"], "24 frames from 24 images, 24 frames a second", 24),
+        (["--walk", "--seconds", "0.5", "--at", "-1"], "12 frames from 5 images, 24 frames a second", 24),
+        (["--walk", "--view", "aces", "--exposure", "1"], "5 frames from 5 images, 24 frames a second", 24),
+    ],
+)
+def test_movements(array: Path, tmp_path: Path, capsys, options: list[str], said: str, rate: Fraction) -> None:
+    told = run(capsys, "assemble", array, *options, "-o", tmp_path / "m.mkv")
+    assert (told.code, told.err) == (0, "")
+    assert told.out.endswith(f"m.mkv: {said}\n")
+    movie = decoded(tmp_path / "m.mkv")
+    assert (len(movie.frames), movie.rate) == (int(said.split()[0]), rate)
+
+
+def test_a_path_file_with_another_rate_and_blends(array: Path, tmp_path: Path, capsys) -> None:
+    path = path_file(tmp_path, "fps = 30\n[[segments]]\nseconds = 1\nlight = [0, 3]\n")
+    told = run(capsys, "assemble", array, path, "--fps", "12", "--blend", "-o", tmp_path / "m.webp", "-q")
+    assert (told.code, told.out, told.err) == (0, "", "")
+    assert decoded(tmp_path / "m.webp").length == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ([], "expected a path file, --walk, --light or --diagonal; got none of them"),
+        (
+            ["path.toml", "--walk"],
+            "expected a path file, --walk, --light or --diagonal; got the path file path.toml and",
+        ),
+        (["--walk", "--light"], "expected a path file, --walk, --light or --diagonal; got --walk and --light"),
+        (["path.toml", "--seconds", "2"], "a path file says itself how long its segments are"),
+        (["path.toml", "--at", "2"], "goes with --walk and --light, where something stays"),
+        (["--diagonal", "--at", "2"], "goes with --walk and --light, where something stays"),
+        (["--walk", "--seconds", "0"], "Invalid value for '--seconds'"),
+        (["--walk", "--fps", "0"], "Invalid value for '--fps'"),
+    ],
+)
+def test_wrong_usage(array: Path, tmp_path: Path, capsys, monkeypatch, options: list[str], message: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    path_file(tmp_path, "[[segments]]\nframes = 2\n")
+    told = run(capsys, "assemble", "out", *options, "-o", "m.mp4")
+    assert (told.code, told.out) == (2, "")
+    assert "Usage: framearray assemble" in told.err
+    assert message in re.sub(r"\s+", " ", told.err)
+    assert names(tmp_path) == {"out", "path.toml"}
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--walk", "--at", "4"], "--at: expected one of 4 lights (0 to 3, or -4 to -1), got 4\n"),
+        (["--light", "--at", "5"], "--at: expected one of 5 cameras (0 to 4, or -5 to -1), got 5\n"),
+        (
+            ["--light", "--at", "end"],
+            '--at: expected an index, "first", "last" or a percentage such as "50%", got "end"\n',
+        ),
+        (["--walk", "--view", "filmic"], "--view: expected srgb, aces or a view of ocio://default ("),
+    ],
+)
+def test_what_the_array_or_the_screen_has_not(
+    array: Path, tmp_path: Path, capsys, monkeypatch, options: list[str], message: str
+) -> None:
+    monkeypatch.delenv("OCIO", raising=False)
+    told = run(capsys, "assemble", array, *options, "-o", tmp_path / "m.mp4")
+    assert (told.code, told.out) == (2, "")
+    assert told.err.startswith(message)
+    assert told.err.endswith("1 problem; nothing was written.\n")
+    assert names(tmp_path) == {"out"}
+
+
+def test_a_movement_through_an_array_with_groups(tmp_path: Path, capsys) -> None:
+    array = grouped(tmp_path / "out").directory
+    assert run(capsys, "assemble", array, "--light", "-o", tmp_path / "m.mov").code == 0
+    assert len(decoded(tmp_path / "m.mov").frames) == 4
+    told = run(capsys, "assemble", array, "--walk", "--at", "3", "-o", tmp_path / "n.mov")
+    assert told.err.startswith("--at: expected one of 3 places of lamp (0 to 2, or -3 to -1), got 3\n")
