@@ -33,6 +33,7 @@ class Folder:
         Raises:
             OutputError: the folder cannot be written to, or another run does not let go.
         """
+        make_folder(self._folder.parent)  # what is in its way is told first
         make_folder(self._folder)
         guard = self._folder / ".guard"
         try:

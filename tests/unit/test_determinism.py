@@ -39,7 +39,7 @@ def job(scene: Path, out: Path, threads: int, **changes: Any) -> Job:
 
 def digests(folder: Path) -> dict[str, str]:
     """Hash of every file but the manifest and the records, which tell times."""
-    files = sorted(file for file in folder.rglob("*") if file.is_file() and file.suffix not in (".toml", ".jsonl"))
+    files = sorted(file for file in folder.rglob("*") if file.is_file() and file.suffix == ".exr")
     return {str(file.relative_to(folder)): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
 
 
