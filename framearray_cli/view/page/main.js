@@ -22,9 +22,10 @@ class Page {
   constructor(array) {
     this.array = array;
     this.view = fromHash(array, location.hash);
-    this.picture = new Picture(byId("picture"), array.resolution);
-    this.map = new ColourMap(array);
     this.store = new Store(memoryBudget(), (url) => this.arrived(url));
+    this.store.want(wishes(array, this.view, [0, 0]));
+    this.picture = new Picture(byId("picture"), array.resolution); // 0.2 s without a graphics card, while tiles load
+    this.map = new ColourMap(array);
     this.sheets = new Map(); // url of a sheet -> [stream, c]
     for (const stream of array.streams) {
       for (let c = 0; c < array.nCameras; c++) this.sheets.set(array.sheetUrl(stream, c), [stream, c]);
@@ -67,7 +68,9 @@ class Page {
     this.steps.push({ c: this.view.c, l: this.l, show: this.view.show, at: time, first: null, full: null });
     if (this.steps.length > 4000) this.steps.shift();
     this.store.want(wishes(this.array, this.view, this.velocity));
-    this.map.changed = true;
+    const look = groundLook(this.array, this.view);
+    if (look !== this.look) this.map.changed = true;
+    this.look = look;
     this.dirty();
   }
 
@@ -196,6 +199,12 @@ class Page {
     byId("link").textContent = told;
     setTimeout(() => (byId("link").textContent = "Copy link"), 1500);
   }
+}
+
+// What the pad's ground depends on: all of the view but the place on the pad.
+function groundLook(array, view) {
+  const others = array.others.map((axis) => view.places[axis.name]);
+  return JSON.stringify([view.show, view.exposure, view.tints, view.ambient, others]);
 }
 
 function figure(value) {
