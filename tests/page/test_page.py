@@ -1,5 +1,6 @@
 """The page in a browser: what is shown where, by pointer, keys and touch; links, layers, exposure, groups."""
 
+import handmade
 import numpy as np
 import pytest
 from chromium import PHONE, shown
@@ -7,7 +8,10 @@ from expected import bounds, outside
 from handmade import N_C, N_L, soft
 
 from framearray_cli.colour import linear_from_srgb, srgb8_from_linear
+from framearray_cli.images import write_image
+from framearray_cli.manifest import image_path
 from framearray_cli.pictures import Pictures, Relight, ambient_at
+from framearray_cli.view.run import open_tiles, serving
 
 ONE = (1.0, 1.0, 1.0)
 
@@ -190,15 +194,58 @@ def test_groups_are_lit_anew_as_by_pictures(browser, grouped):
 def test_play_goes_there_and_back(browser, plain):
     with shown(browser, plain.url) as page:
         page.all_loaded()
-        before = len(page.get("framearray.steps"))
         page.page.click("#play-camera")
-        page.wait(f"framearray.steps.length > {before + 2 * N_C}")
+        page.wait("framearray.view.c === framearray.array.nCameras - 1")
+        page.wait("framearray.view.c <= 1")
         page.page.click("#play-camera")
         assert page.get("document.getElementById('play-camera').ariaPressed") == "false"
-        cameras = [step["c"] for step in page.get("framearray.steps")[before:]]
-        there_and_back = [*range(1, N_C), *range(N_C - 2, -1, -1), 1]
-        assert cameras[: len(there_and_back)] == there_and_back
-        page.page.keyboard.press("Escape"), page.page.focus("#pad"), page.page.keyboard.press("l")
+        place = page.place
+        page.page.focus("#pad")
+        page.page.keyboard.press("l")
         page.wait("framearray.l === 3")
         page.page.keyboard.press("l")
+        assert page.place[0] == place[0], "camera and light play by themselves"
         page.check(plain.url)
+
+
+def test_turning_round_at_the_ends(browser, plain):
+    with shown(browser, plain.url) as page:
+        walk = """import("./player.js").then(({ bounce }) => {
+            let at = 0, direction = 1;
+            return Array.from({ length: 9 }, () => {
+                ({ to: at, direction } = bounce(at, STEPS * direction, 4));
+                return at;
+            });
+        })"""
+        assert page.get(walk.replace("STEPS", "1")) == [1, 2, 3, 2, 1, 0, 1, 2, 3]
+        assert page.get(walk.replace("STEPS", "2")) == [2, 2, 0, 2, 2, 0, 2, 2, 0], "a slow screen leaves images out"
+
+
+def test_memory_stays_within_its_budget(browser, plain):
+    """The sheets and pictures of all places take more than 0.1 MiB, which is allowed here."""
+    with shown(browser, f"{plain.url}?memory=0.1") as page:
+        for l in range(N_L):
+            page.drag([(0, l), (N_C - 1, l)], steps=N_C)
+        page.drag([(5, 2)])
+        assert nearest_place(page.pixels()) == (5, 2)
+        most, budget = page.get("[framearray.store.most, framearray.store.budget]")
+        needed = 4 * 64 * 48 * N_C * N_L
+        assert 0 < most <= budget < needed
+        page.check(plain.url)
+
+
+def test_a_missing_image_is_told(browser, tmp_path):
+    manifest = handmade.plain(tmp_path, n_c=3, n_l=2, layers=False)
+    image_path(manifest, 1, 0).unlink()
+    with serving(open_tiles(tmp_path, None, 1)) as server, shown(browser, server.url) as page:
+        page.page.keyboard.press("ArrowRight")
+        page.wait("!document.getElementById('note').hidden")
+        assert "c0001.l000.exr" in page.get("document.getElementById('note').textContent")
+        page.page.keyboard.press("ArrowRight")
+        page.settle()
+        assert page.get("document.getElementById('note').hidden")
+        page.page.keyboard.press("ArrowLeft")
+        page.wait("!document.getElementById('note').hidden")
+        write_image(image_path(manifest, 1, 0), handmade.soft(1, 0, 6.0), handmade.FLOAT)
+        assert nearest_place(page.pixels()) == (1, 0), "rendered meanwhile, it comes by itself"
+        assert all("404" in error for error in page.errors), page.errors

@@ -16,6 +16,8 @@ import { wishes } from "./wishes.js";
 const HASH_DELAY = 300; // ms after the last change; browsers refuse more than some hundred addresses a minute
 const STILL_AFTER = 250; // ms without a change: the movement is over
 
+const RETRY_AFTER = 5000; // ms, where there is no picture
+
 const byId = (id) => document.getElementById(id);
 
 class Page {
@@ -126,6 +128,15 @@ class Page {
     const wrong = full.map((url) => this.store.missing.get(url)).find((text) => text);
     byId("note").hidden = !wrong;
     byId("note").textContent = wrong ? `No picture here. ${wrong}` : "";
+    if (wrong) this.retry ??= setTimeout(() => this.askAgain(), RETRY_AFTER);
+  }
+
+  // A render may have gone on, or the server have come back.
+  askAgain() {
+    this.retry = undefined;
+    this.store.forgetMissing();
+    this.store.want(wishes(this.array, this.view, [0, 0]));
+    this.dirty();
   }
 
   // Show the view's numbers and set the controls.

@@ -1,4 +1,4 @@
-// Plays along an axis, there and back, or along the path. It waits for pictures: none is skipped unseen.
+// Plays along an axis, there and back, or along the path. It waits for pictures that are not loaded.
 
 export class Player {
   // isReady(): whether what is asked for is on the screen; go(change): asks for another view.

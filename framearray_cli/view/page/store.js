@@ -37,12 +37,12 @@ export class Store {
     this.wanted = [];
     for (const item of list) {
       if (seen.has(item.url)) continue;
+      if (bytes + item.bytes > SHARE * this.budget && !item.needed) break;
       bytes += item.bytes;
-      if (bytes > SHARE * this.budget && this.wanted.length > URGENT) break;
       seen.add(item.url);
       this.wanted.push(item);
     }
-    // What is wanted counts as used, the most wanted last; only a list that fits can be kept whole.
+    // What is wanted counts as used, the most wanted last: what makes room for the rest of it is not wanted.
     for (let i = this.wanted.length - 1; i >= 0; i--) this.get(this.wanted[i].url);
     for (const [url, controller] of this.inFlight) if (!seen.has(url)) controller.abort();
     this.next = 0;

@@ -3,7 +3,8 @@
 const AHEAD = 8; // steps of a movement that are looked ahead
 const RING = 6; // full pictures around the place, each way
 
-// view: the place; velocity: [cameras, lights] a step. Returns [{ url, bytes }].
+// view: the place; velocity: [cameras, lights] a step. Returns [{ url, bytes, needed }].
+// What is needed is loaded even where the budget is too small for it.
 export function wishes(array, view, velocity) {
   const [dc, dl] = velocity;
   const moving = dc !== 0 || dl !== 0;
@@ -19,7 +20,8 @@ export function wishes(array, view, velocity) {
     const c = view.c + offset;
     if (c < 0 || c >= array.nCameras) return;
     for (const stream of streams) {
-      list.push({ url: array.fullUrl(stream, c, position(stream, dlight)), bytes: array.bytes(stream, false) });
+      const url = array.fullUrl(stream, c, position(stream, dlight));
+      list.push({ url, bytes: array.bytes(stream, false), needed: offset === 0 && dlight === 0 });
     }
   };
   const sheet = (c) => {
