@@ -1,6 +1,7 @@
 """The page of `framearray view` on an array of the paper's size: `python -m bench view`, from the folder `tests`.
 
-Prints: time and size of what is prepared, time to the first picture, times of drag steps and keys, memory.
+Prints: time and size of what is prepared, time to the first picture, times of drag steps and keys, memory; and the
+share of the cores that other programs took just before and after.
 """
 
 import random
@@ -23,15 +24,16 @@ from framearray_cli.view.prepare import prepare_all
 from framearray_cli.view.run import open_tiles, serving
 from framearray_cli.view.tiles import TILES, Tiles
 
-from .markdown import grid
+from .machine import quiet
+from .markdown import grid, percent
 from .results import ROOT
 
 sys.path.insert(0, str(ROOT / "tests" / "page"))
 from chromium import Shown, browser, shown
 
 N_C, N_L, SIZE = 192, 48, (400, 300)
-OPENINGS = 7  # of the page, for the time to the first picture
-STEPS = 300  # of each kind of drag
+OPENINGS = 5  # of the page, for the time to the first picture
+STEPS = 200  # of each kind of drag
 THREADS = psutil.cpu_count() or 1
 PACE_S = 0.016  # between two moves of the pointer, as a screen of 60 Hz gives them
 
@@ -64,35 +66,47 @@ def synthesised(folder: Path) -> Path:
     return folder
 
 
-def run(places: Sequence[str]) -> None:
-    """Measure the page on the arrays in some folders; without one, on a synthesised array."""
+def run(places: Sequence[str], patience: float) -> None:
+    """Measure the page on the arrays in some folders; without one, on a synthesised array.
+
+    Args:
+        patience: seconds to wait for a busy machine, before each measurement.
+    """
     for out in [Path(place) for place in places] or [synthesised(ROOT / "out" / "bench" / "page-array")]:
         print(f"\n{out}\n")
-        print(grid(["", "median", "95 %", "most"], _rows(out)))
+        for line in grid(["", "median", "95 %", "most", "others"], []).splitlines():
+            print(line)
+        for row in _rows(out, patience):
+            print(f"| {' | '.join(row)} |", flush=True)
 
 
-def _rows(out: Path) -> Iterator[list[str]]:
+def _rows(out: Path, patience: float) -> Iterator[list[str]]:
     with browser() as chromium, tempfile.TemporaryDirectory() as cache:
         tiles = open_tiles(out, Path(cache), THREADS)
-        yield _row("first picture, nothing prepared, ms", [_first_picture(chromium, tiles)])
-        started = time.perf_counter()
-        problems = prepare_all(tiles, THREADS, lambda n: None)
-        seconds = time.perf_counter() - started
+        with _others(patience) as share:
+            first = _first_picture(chromium, tiles)
+        yield [*_row("first picture, nothing prepared, ms", [first]), share()]
+        with _others(patience) as share:
+            started = time.perf_counter()
+            problems = prepare_all(tiles, THREADS, lambda n: None)
+            seconds = time.perf_counter() - started
         assert not problems, problems[0]
-        yield [f"preparing {tiles.n_pictures:,} pictures, {THREADS} threads, s", f"{seconds:.0f}", "", ""]
+        yield [*_one(f"preparing {tiles.n_pictures:,} pictures, {THREADS} threads, s", f"{seconds:.0f}"), share()]
         for kind, pattern in (("pictures", "*.l*.jpg"), ("sheets", "c????.jpg")):
             size = sum(file.stat().st_size for file in (tiles.folder / TILES).rglob(pattern))
-            yield [f"{kind} on the disk, MB", f"{size / 1e6:.0f}", "", ""]
-        yield _row("first picture, ms", [_first_picture(chromium, tiles) for _ in range(OPENINGS)])
+            yield [*_one(f"{kind} on the disk, MB", f"{size / 1e6:.0f}"), ""]
+        with _others(patience) as share:
+            first_pictures = [_first_picture(chromium, tiles) for _ in range(OPENINGS)]
+        yield [*_row(f"first picture, {OPENINGS} times, ms", first_pictures), share()]
         with _opened(chromium, tiles) as page:
             started = time.perf_counter()
             page.all_loaded()
-            yield ["loading all that fits, s", f"{time.perf_counter() - started:.1f}", "", ""]
+            yield [*_one("loading all that fits, s", f"{time.perf_counter() - started:.1f}"), ""]
             page.get("framearray.measures = true")
-            yield from _steps(page, "slow drag", _dragged(page, _walk(tiles.manifest, 1)))
-            yield from _steps(page, "fast drag", _dragged(page, _walk(tiles.manifest, 9)))
-            yield from _steps(page, "drag to anywhere", _dragged(page, _walk(tiles.manifest, 10**6)))
-            yield from _steps(page, "arrow key", lambda: _keys(page))
+            yield from _steps(page, patience, "slow drag", _dragged(page, _walk(tiles.manifest, 1)))
+            yield from _steps(page, patience, "fast drag", _dragged(page, _walk(tiles.manifest, 9)))
+            yield from _steps(page, patience, "drag to anywhere", _dragged(page, _walk(tiles.manifest, 10**6)))
+            yield from _steps(page, patience, "arrow key", lambda: _keys(page))
             _dragged(page, _everywhere(tiles.manifest))()
             page.all_loaded()
             yield from _memory(page)
@@ -126,9 +140,9 @@ def _walk(manifest: Manifest, most: int) -> list[tuple[int, int]]:
 
 
 def _everywhere(manifest: Manifest) -> list[tuple[int, int]]:
-    """To and fro over all cameras, for every fourth light."""
-    rows = range(0, manifest.n_lights, 4)
-    return [(c, l) for l in rows for c in range(manifest.n_cameras)[:: 1 if l % 8 == 0 else -1]]
+    """To and fro over all cameras, for every eighth light."""
+    rows = range(0, manifest.n_lights, 8)
+    return [(c, l) for l in rows for c in range(manifest.n_cameras)[:: 1 if l % 16 == 0 else -1]]
 
 
 def _dragged(page: Shown, places: Sequence[tuple[int, int]]) -> Callable[[], None]:
@@ -147,23 +161,26 @@ def _dragged(page: Shown, places: Sequence[tuple[int, int]]) -> Callable[[], Non
 
 
 def _keys(page: Shown) -> None:
+    page.page.keyboard.press("Home")
     for _ in range(STEPS // 4):
         for key in ("ArrowRight", "ArrowDown", "ArrowRight", "ArrowUp"):
             page.page.keyboard.press(key)
             time.sleep(PACE_S)
 
 
-def _steps(page: Shown, name: str, move: Callable[[], None]) -> Iterator[list[str]]:
+def _steps(page: Shown, patience: float, name: str, move: Callable[[], None]) -> Iterator[list[str]]:
     """Time from the event to the picture of its place, drawn: as small or full picture, and in full size."""
     page.settle()
     page.get("framearray.steps.length = 0")
-    move()
+    with _others(patience) as share:
+        move()
     steps = page.get("framearray.steps")
     page.settle()
     drawn = [step["first"] for step in steps if step["first"] is not None]
     full = [step["full"] for step in steps if step["full"] is not None]
-    yield _row(f"{name}, {len(steps)} steps, {len(steps) - len(drawn)} overtaken before they were drawn: ms", drawn)
-    yield _row(f"{name}, full size ({len(full)} of them), ms", full)
+    overtaken = len(steps) - len(drawn)
+    yield [*_row(f"{name}, {len(steps)} steps, {overtaken} overtaken before they were drawn, ms", drawn), share()]
+    yield [*_row(f"{name}, in full size ({len(full)} of them), ms", full), ""]
 
 
 def _memory(page: Shown) -> Iterator[list[str]]:
@@ -179,10 +196,22 @@ def _memory(page: Shown) -> Iterator[list[str]]:
         for process in psutil.Process().children(recursive=True)
         if "--type=renderer" in " ".join(process.cmdline())
     ]
-    yield ["JavaScript heap, MB", f"{metrics['JSHeapUsedSize'] / 1e6:.1f}", "", ""]
-    yield ["decoded pictures, MB", "", "", f"{most / 1e6:.0f} of {budget / 1e6:.0f}"]
-    yield ["textures, MB", f"{textures / 1e6:.0f}", "", ""]
-    yield ["process of the page, MB", f"{max(renderers) / 1e6:.0f}", "", ""]
+    yield [*_one("JavaScript heap, MB", f"{metrics['JSHeapUsedSize'] / 1e6:.1f}"), ""]
+    yield [f"decoded pictures, of {budget / 1e6:.0f} MB", "", "", f"{most / 1e6:.0f}", ""]
+    yield [*_one("textures, MB", f"{textures / 1e6:.0f}"), ""]
+    yield [*_one("process of the page, MB", f"{max(renderers) / 1e6:.0f}"), ""]
+
+
+@contextmanager
+def _others(patience: float) -> Iterator[Callable[[], str]]:
+    """Wait for a quiet machine; afterwards the function tells what other programs took before and after."""
+    shares = [quiet(patience)]
+    yield lambda: percent(max(shares), 2)
+    shares.append(quiet(0.0))
+
+
+def _one(name: str, value: str) -> list[str]:
+    return [name, value, "", ""]
 
 
 def _row(name: str, values: Sequence[float]) -> list[str]:
