@@ -18,6 +18,7 @@ ReadLayers = Callable[[Path], dict[str, Float32]]
 
 # Pictures that the coding is chosen from, spread over the array: 3 to 8 ms each, before the page opens.
 SAMPLES = 24
+LAYER_SAMPLES = 6  # files of layers are larger: 20 ms each
 # Layers by their name in the file: name on the page, channels, and whether exposure applies to them.
 LAYERS = {
     "obscurance": ("Obscurance", "RGB", True),
@@ -126,7 +127,8 @@ def _some(manifest: Manifest, stream: Stream, read_layers: ReadLayers) -> Iterat
     """A few pictures of a stream, spread over both axes."""
     total = manifest.n_cameras * stream.n
     # Even steps could meet the same few lights again and again; those of the golden ratio do not.
-    places = {int(total * ((k * 0.6180339887498949) % 1)) for k in range(min(SAMPLES, total))}
+    count = LAYER_SAMPLES if stream.role == "layer" else SAMPLES
+    places = {int(total * ((k * 0.6180339887498949) % 1)) for k in range(min(count, total))}
     for place in sorted(places):
         try:
             yield read_values(manifest, stream, *divmod(place, stream.n), read_layers)

@@ -12,6 +12,7 @@ import json
 import os
 import shutil
 import threading
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import lru_cache
@@ -25,7 +26,7 @@ from ..errors import OutputError
 from ..files import reason, whole_file, write_bytes
 from ..images import encode_jpeg, read_layers
 from ..manifest import Manifest, layers_path
-from .coding import encode
+from .coding import Coding, encode
 from .index import index_table, sheet_layout
 from .streams import Stream, choose_coding, layer_streams, read_values, source_file, streams_of
 
@@ -33,7 +34,7 @@ INDEX = "index.json"
 TILES = "tiles"
 # 4:4:4. At 90 files are a quarter larger, for an error of 3.3 codes in place of 4.1 in a noisy picture.
 QUALITY = 85
-KEPT_LAYER_FILES = 8  # one for each thread; a file holds all layers of a camera
+KEPT_LAYER_FILES = 6  # a file holds all layers of a camera; codings are chosen from as many
 
 
 class Tiles:
@@ -73,9 +74,16 @@ class Tiles:
                 if path.is_file():
                     found += layer_streams(self._read_layers(path))
                     break
+        # Layers one after the other: they are in the same files.
+        pictures = [stream for stream in found if stream.role != "layer"]
+        layers = [stream for stream in found if stream.role == "layer"]
         with ThreadPoolExecutor(threads) as pool:
-            codings = pool.map(lambda stream: choose_coding(manifest, stream, self._read_layers), found)
-            return [replace(stream, coding=coding) for stream, coding in zip(found, codings, strict=True)]
+            tasks = [pool.submit(self._codings, some) for some in (layers, *([stream] for stream in pictures))]
+            codings = {key: coding for task in tasks for key, coding in task.result().items()}
+        return [replace(stream, coding=codings[stream.key]) for stream in found]
+
+    def _codings(self, streams: Sequence[Stream]) -> dict[str, Coding]:
+        return {stream.key: choose_coding(self.manifest, stream, self._read_layers) for stream in streams}
 
     @property
     def n_pictures(self) -> int:
