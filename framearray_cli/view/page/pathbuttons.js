@@ -10,8 +10,9 @@ export function addPathButtons(page) {
   const told = () => {
     const { path } = page;
     const count = path.segments.length;
-    const is = count ? `${count} segment${count > 1 ? "s" : ""}` : path.isEmpty ? "none drawn" : "1 place";
+    const is = count ? `${count} segment${count > 1 ? "s" : ""}` : "1 place";
     byId("path-told").value = is;
+    byId("path-row").hidden = path.isEmpty;
     for (const id of ["play-path", "save-path", "seconds"]) byId(id).disabled = !count;
     byId("clear-path").disabled = path.isEmpty;
     byId("seconds").value = count ? page.path.seconds.toFixed(1) : "";
