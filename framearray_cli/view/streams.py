@@ -103,6 +103,8 @@ def read_values(manifest: Manifest, stream: Stream, c: int, l: int, read_layers:
         if missing:
             raise OutputError(f"{path}: expected the channels {', '.join(names)}, found no {missing[0]}")
         values = np.stack([channels[name] for name in names], axis=-1)
+        if stream.key == "depth" and not stream.coding.scale:
+            values = np.where(values > 0, values, stream.coding.high)  # nothing is hit: as far as can be
     else:
         values = read_image(path)
     width, height = manifest.resolution

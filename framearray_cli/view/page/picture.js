@@ -34,14 +34,21 @@ vec3 radiance(vec3 c, float scale, float white) {  // coding.py explains the cur
   vec3 y = linear(c), rest = 1.0 - y;
   return scale * 2.0 * y / (rest + sqrt(rest * rest + 4.0 * y / (white * white)));
 }
-vec3 heat(float t) {  // black, violet, orange, white: brighter is more, also without colours
-  return clamp(vec3(1.6 * t, 2.2 * t * t * t + 0.15 * t, 0.9 * sin(3.6 * t) + t * t * t * t), 0.0, 1.0);
+vec3 heat(float t) {  // matplotlib's inferno, to 0.05: black, violet, orange, yellow; brighter is more
+  vec3 c = vec3(25.093, -12.222, -23.116);
+  c = c * t + vec3(-71.288, 32.554, 73.588);
+  c = c * t + vec3(77.157, -33.416, -82.254);
+  c = c * t + vec3(-41.709, 17.458, 44.645);
+  c = c * t + vec3(11.617, -3.948, -16.257);
+  c = c * t + vec3(0.106, 0.566, 4.118);
+  c = c * t + vec3(0.000, 0.002, -0.037);
+  return clamp(c, 0.0, 1.0);
 }
 `;
 
 const LIGHT_MAIN = "void main() {\n  vec3 sum = vec3(0.0);\n#SUM  shown = vec4(srgb(sum * exp2(exposure)), 1.0);\n}";
 const DATA_MAINS = {
-  depth: "float t = code(image0, part0).r; shown = vec4(srgb(vec3(t > 0.0 ? 0.02 + 0.9 * pow(1.0 - t, 2.5) : 0.0)), 1.0);",
+  depth: "shown = vec4(srgb(vec3(0.01 + 0.9 * pow(1.0 - code(image0, part0).r, 2.5))), 1.0);",
   samples: "shown = vec4(heat(code(image0, part0).r), 1.0);",
   normal: "shown = vec4(code(image0, part0), 1.0);",
 };
