@@ -40,7 +40,7 @@ export function addKeys(page) {
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
     const at = event.target;
-    const isPad = at.id === "pad";
+    const isPad = at.id === "pad" || at === document.body;
     const typing = at.matches("input[type=number], select");
     const sliding = at.matches("input");
     const pressing = at.matches("button, input[type=color]");
