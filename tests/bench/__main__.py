@@ -48,7 +48,7 @@ def main() -> None:
         ambient.run(args.what, args.jobs, args.quick)
         return
     if args.what == "view":
-        viewpage.run(args.jobs, args.patience)
+        viewpage.run(args.jobs, args.patience, args.quick)
         return
     if args.what == "peak":
         print(json.dumps(peak(args.jobs[0], variant_named(args.variant), args)))

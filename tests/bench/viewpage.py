@@ -66,24 +66,26 @@ def synthesised(folder: Path) -> Path:
     return folder
 
 
-def run(places: Sequence[str], patience: float) -> None:
+def run(places: Sequence[str], patience: float, quick: bool) -> None:
     """Measure the page on the arrays in some folders; without one, on a synthesised array.
 
     Args:
         patience: seconds to wait for a busy machine, before each measurement.
+        quick: take tiles that are beside the images, and measure the page alone.
     """
     for out in [Path(place) for place in places] or [synthesised(ROOT / "out" / "bench" / "page-array")]:
         print(f"\n{out}\n")
         for line in grid(["", "median", "95 %", "most", "others"], []).splitlines():
             print(line)
-        for row in _rows(out, patience):
+        for row in _page(out, patience) if quick else _all(out, patience):
             print(f"| {' | '.join(row)} |", flush=True)
 
 
-def _rows(out: Path, patience: float) -> Iterator[list[str]]:
-    with browser() as chromium, tempfile.TemporaryDirectory() as cache:
+def _all(out: Path, patience: float) -> Iterator[list[str]]:
+    """Measure preparation, in a folder that is empty at first, and the page."""
+    with tempfile.TemporaryDirectory() as cache:
         tiles = open_tiles(out, Path(cache), THREADS)
-        with _others(patience) as share:
+        with browser() as chromium, _others(patience) as share:
             first = _first_picture(chromium, tiles)
         yield [*_row("first picture, nothing prepared, ms", [first]), share()]
         with _others(patience) as share:
@@ -95,6 +97,18 @@ def _rows(out: Path, patience: float) -> Iterator[list[str]]:
         for kind, pattern in (("pictures", "*.l*.jpg"), ("sheets", "c????.jpg")):
             size = sum(file.stat().st_size for file in (tiles.folder / TILES).rglob(pattern))
             yield [*_one(f"{kind} on the disk, MB", f"{size / 1e6:.0f}"), ""]
+        yield from _shown(tiles, patience)
+
+
+def _page(out: Path, patience: float) -> Iterator[list[str]]:
+    tiles = open_tiles(out, None, THREADS)
+    prepare_all(tiles, THREADS, lambda n: None)
+    return _shown(tiles, patience)
+
+
+def _shown(tiles: Tiles, patience: float) -> Iterator[list[str]]:
+    """Measure the page on prepared tiles."""
+    with browser() as chromium:
         with _others(patience) as share:
             first_pictures = [_first_picture(chromium, tiles) for _ in range(OPENINGS)]
         yield [*_row(f"first picture, {OPENINGS} times, ms", first_pictures), share()]
