@@ -87,6 +87,7 @@ def write_page(
     Raises:
         OutputError: the target holds other files or cannot be written.
     """
+    target = target.resolve()  # "." has no name to put another beside
     check_target(target)
     problems = prepare_all(tiles, threads, progress)
     return export(tiles, target), problems

@@ -14,6 +14,7 @@ import shutil
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -68,12 +69,10 @@ class Tiles:
     def _coded(self, threads: int) -> list[Stream]:
         manifest = self.manifest
         found = streams_of(manifest)
-        if manifest.layers:
-            for c in range(manifest.n_cameras):
-                path = layers_path(manifest, c)
-                if path.is_file():
-                    found += layer_streams(self._read_layers(path))
-                    break
+        for c in range(manifest.n_cameras if manifest.layers else 0):
+            with suppress(OutputError):  # not rendered yet, or damaged
+                found += layer_streams(self._read_layers(layers_path(manifest, c)))
+                break
         # Layers one after the other: they are in the same files.
         pictures = [stream for stream in found if stream.role != "layer"]
         layers = [stream for stream in found if stream.role == "layer"]

@@ -54,12 +54,13 @@ def bounds_of_copy(tiles, folder):
     return bounds(copy, 2, [("light", 1, (1.0, 1.0, 1.0))])
 
 
-def test_an_export_replaces_its_like_and_nothing_else(tmp_path):
+def test_an_export_replaces_its_like_and_nothing_else(tmp_path, monkeypatch):
     manifest = handmade.plain(tmp_path / "array", n_c=2, n_l=1, layers=False)
     tiles = open_tiles(manifest.directory, None, 1)
     target = tmp_path / "page"
-    for _ in range(2):
-        write_page(tiles, target, threads=1, progress=lambda n: None)
+    for place in (target, Path()):  # the second time from within
+        write_page(tiles, place, threads=1, progress=lambda n: None)
+        monkeypatch.chdir(target)
         assert len(list(target.rglob("*.jpg"))) == 4
     assert {entry.name for entry in tmp_path.iterdir()} == {"array", "page"}
     (target / "letter.txt").write_text("dear")

@@ -16,7 +16,7 @@ import pytest
 from framearray_cli.colour import srgb8_from_linear
 from framearray_cli.errors import OutputError
 from framearray_cli.images import ImageFormat, read_codes, write_image
-from framearray_cli.manifest import image_path
+from framearray_cli.manifest import image_path, layers_path
 from framearray_cli.view.coding import MOST_WHITE, Coding, coding_for, data_coding, decode, encode
 from framearray_cli.view.index import sheet_layout
 from framearray_cli.view.prepare import prepare_all
@@ -116,6 +116,15 @@ def test_images_that_are_missing_or_damaged_are_told(tmp_path):
     assert tiles.tile("light", 0, None).is_file(), "the others are there"
     with pytest.raises(OutputError, match=r"c0000\.l001\.exr"):
         tiles.tile("light", 0, 1)
+
+
+def test_a_damaged_file_of_layers_is_told(tmp_path):
+    manifest = handmade.plain(tmp_path, n_c=2, n_l=1)
+    layers_path(manifest, 0).write_bytes(b"no layers")
+    tiles = open_tiles(tmp_path, None, 1)
+    assert [stream.key for stream in tiles.streams][1:3] == ["obscurance", "indirect"]
+    problems = prepare_all(tiles, 1, lambda n: None)
+    assert len(problems) == 6 and all("room.layers.c0000.exr" in str(problem) for problem in problems)
 
 
 @pytest.fixture
