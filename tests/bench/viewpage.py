@@ -10,7 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +33,7 @@ from chromium import Shown, browser, shown
 
 N_C, N_L, SIZE = 192, 48, (400, 300)
 OPENINGS = 5  # of the page, for the time to the first picture
-STEPS = 200  # of each kind of drag
+STEPS = 150  # of each kind of drag
 THREADS = psutil.cpu_count() or 1
 PACE_S = 0.016  # between two moves of the pointer, as a screen of 60 Hz gives them
 
@@ -154,9 +154,9 @@ def _walk(manifest: Manifest, most: int) -> list[tuple[int, int]]:
 
 
 def _everywhere(manifest: Manifest) -> list[tuple[int, int]]:
-    """To and fro over all cameras, for every eighth light."""
-    rows = range(0, manifest.n_lights, 8)
-    return [(c, l) for l in rows for c in range(manifest.n_cameras)[:: 1 if l % 16 == 0 else -1]]
+    """To and fro over all cameras, for every twelfth light."""
+    rows = range(0, manifest.n_lights, 12)
+    return [(c, l) for l in rows for c in range(manifest.n_cameras)[:: 1 if l % 24 == 0 else -1]]
 
 
 def _dragged(page: Shown, places: Sequence[tuple[int, int]]) -> Callable[[], None]:
@@ -187,7 +187,9 @@ def _steps(page: Shown, patience: float, name: str, move: Callable[[], None]) ->
     page.settle()
     page.get("framearray.steps.length = 0")
     with _others(patience) as share:
+        spent = -_processor_ms()
         move()
+        spent += _processor_ms()
     steps = page.get("framearray.steps")
     page.settle()
     drawn = [step["first"] for step in steps if step["first"] is not None]
@@ -195,6 +197,7 @@ def _steps(page: Shown, patience: float, name: str, move: Callable[[], None]) ->
     overtaken = len(steps) - len(drawn)
     yield [*_row(f"{name}, {len(steps)} steps, {overtaken} overtaken before they were drawn, ms", drawn), share()]
     yield [*_row(f"{name}, in full size ({len(full)} of them), ms", full), ""]
+    yield [*_one(f"{name}, processor time of Chromium a step, ms", f"{spent / len(steps):.0f}"), ""]
 
 
 def _memory(page: Shown) -> Iterator[list[str]]:
@@ -206,14 +209,28 @@ def _memory(page: Shown) -> Iterator[list[str]]:
     most, budget, textures = page.get("[framearray.store.most, framearray.store.budget, framearray.picture.bytes]")
     assert most <= budget
     renderers = [
-        process.memory_info().rss
-        for process in psutil.Process().children(recursive=True)
-        if "--type=renderer" in " ".join(process.cmdline())
+        process.memory_info().rss for process in _chromium() if "--type=renderer" in " ".join(process.cmdline())
     ]
     yield [*_one("JavaScript heap, MB", f"{metrics['JSHeapUsedSize'] / 1e6:.1f}"), ""]
     yield [f"decoded pictures, of {budget / 1e6:.0f} MB", "", "", f"{most / 1e6:.0f}", ""]
     yield [*_one("textures, MB", f"{textures / 1e6:.0f}"), ""]
     yield [*_one("process of the page, MB", f"{max(renderers) / 1e6:.0f}"), ""]
+
+
+def _chromium() -> list[psutil.Process]:
+    """Its processes; what has ended meanwhile is left out."""
+    found = []
+    for process in psutil.Process().children(recursive=True):
+        with suppress(psutil.NoSuchProcess):
+            if "chrom" in process.name():
+                found.append(process)
+    return found
+
+
+def _processor_ms() -> float:
+    """What all processes of Chromium have spent, ms; unlike times, it does not depend on what others do."""
+    times = [process.cpu_times() for process in _chromium()]
+    return 1e3 * sum(one.user + one.system for one in times)
 
 
 @contextmanager

@@ -70,6 +70,7 @@ class Shown:
 
     def all_loaded(self) -> None:
         """Wait until there is nothing left to load."""
+        time.sleep(0.1)  # until the page is calm
         self.wait("!framearray.store.inFlight.size && framearray.store.next >= framearray.store.wanted.length")
 
     @property

@@ -16,6 +16,7 @@ import { wishes } from "./wishes.js";
 const HASH_DELAY = 300; // ms after the last change; browsers refuse more than some hundred addresses a minute
 const STILL_AFTER = 250; // ms without a change: the movement is over
 
+const CALM_AFTER = 60; // ms without a change: pictures around the place are loaded too
 const RETRY_AFTER = 5000; // ms, where there is no picture
 
 const byId = (id) => document.getElementById(id);
@@ -25,7 +26,7 @@ class Page {
     this.array = array;
     this.view = fromHash(array, location.hash);
     this.store = new Store(memoryBudget(), (url) => this.arrived(url));
-    this.store.want(wishes(array, this.view, [0, 0]));
+    this.store.want(wishes(array, this.view, [0, 0], false));
     this.picture = new Picture(byId("picture"), array.resolution); // 0.2 s without a graphics card, while tiles load
     this.map = new ColourMap(array);
     this.sheets = new Map(); // url of a sheet -> [stream, c]
@@ -69,11 +70,17 @@ class Page {
     this.level = 0;
     this.steps.push({ c: this.view.c, l: this.l, show: this.view.show, at: time, first: null, full: null });
     if (this.steps.length > 4000) this.steps.shift();
-    this.store.want(wishes(this.array, this.view, this.velocity));
+    this.wish(false);
+    clearTimeout(this.calmTimer);
+    this.calmTimer = setTimeout(() => this.wish(true), CALM_AFTER);
     const look = groundLook(this.array, this.view);
     if (look !== this.look) this.map.changed = true;
     this.look = look;
     this.dirty();
+  }
+
+  wish(calm) {
+    this.store.want(wishes(this.array, this.view, this.velocity, calm));
   }
 
   dirty() {
@@ -135,7 +142,7 @@ class Page {
   askAgain() {
     this.retry = undefined;
     this.store.forgetMissing();
-    this.store.want(wishes(this.array, this.view, [0, 0]));
+    this.wish(true);
     this.dirty();
   }
 

@@ -3,9 +3,10 @@
 const AHEAD = 8; // steps of a movement that are looked ahead
 const RING = 6; // full pictures around the place, each way
 
-// view: the place; velocity: [cameras, lights] a step. Returns [{ url, bytes, needed }].
+// view: the place; velocity: [cameras, lights] a step; calm: nothing has changed for a moment, else pictures around the
+// place wait, as they would take the processor from what is shown. Returns [{ url, bytes, needed }].
 // What is needed is loaded even where the budget is too small for it.
-export function wishes(array, view, velocity) {
+export function wishes(array, view, velocity, calm) {
   const [dc, dl] = velocity;
   const moving = dc !== 0 || dl !== 0;
   const streams = array.parts(view).map((part) => part.stream);
@@ -40,9 +41,9 @@ export function wishes(array, view, velocity) {
     }
   }
   for (let k = 1; k <= 3; k++) for (const c of [view.c - k, view.c + k]) sheet(c);
-  for (let k = 1; k <= 2; k++) ring(k, full);
+  if (calm) for (let k = 1; k <= 2; k++) ring(k, full);
   for (let k = 4; k < array.nCameras; k++) for (const c of [view.c - k, view.c + k]) sheet(c);
-  for (let k = 3; k <= RING; k++) ring(k, full);
+  if (calm) for (let k = 3; k <= RING; k++) ring(k, full);
   return list;
 }
 
