@@ -103,7 +103,7 @@ class Shown:
 
     def check(self, base: str) -> None:
         """Nothing went wrong, and everything came from one place."""
-        assert self.errors == []
+        assert self.errors == [], self.errors[:3]
         assert [url for url in self.requests if not url.startswith((base, "blob:"))] == []
 
 
