@@ -17,6 +17,7 @@ from .commands.report import report
 from .commands.schema import schema
 from .commands.sheet import sheet
 from .commands.verify import verify
+from .commands.view import view
 from .errors import FrameArrayError, JobError
 from .interrupts import Stopped, forget, listen
 from .screen import out, say
@@ -31,7 +32,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain text, also in a log file
 )
 
-for command in (render, check, verify, assemble, sheet, export, report, schema):
+for command in (render, check, verify, assemble, view, sheet, export, report, schema):
     app.command()(command)
 
 

@@ -150,6 +150,11 @@ def write_codes(
     write_bytes(path, _encode8(codes, image_format or ImageFormat(format="png"), attributes or {}))
 
 
+def encode_jpeg(codes: Bytes, quality: int) -> memoryview:
+    """Encode (h, w, 3) 8-bit codes as JPEG without chroma subsampling; a file in memory."""
+    return _encode8(codes, ImageFormat(format="jpg", quality=quality), {})
+
+
 def write_layers(
     path: Path, layers: Mapping[str, Float32], attributes: Attributes | None = None, compression: str = "zip"
 ) -> None:

@@ -102,6 +102,12 @@ class Screen:
         with suppress(OutputError):  # no reason to end a long render
             say(self._console, [line])
 
+    def end(self) -> None:
+        """Take the moving line away; what is counted is done."""
+        self._end_wait()
+        if self._bar is not None:
+            self._bar.stop()
+
     def _end_wait(self) -> None:
         if self._status is not None:
             self._status.stop()
@@ -113,9 +119,7 @@ class Screen:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._end_wait()
-        if self._bar is not None:
-            self._bar.stop()
+        self.end()
 
 
 def say(console: Console, lines: Iterable[str]) -> None:

@@ -64,10 +64,10 @@ def frames_of(text: str, n: int) -> tuple[int, ...]:
         raise typer.BadParameter(str(error), param_hint="--cameras") from error
 
 
-def place(name: str) -> Path:
+def place(name: str, option: str = "--output") -> Path:
     """A file or folder to write to."""
     if not name.strip():  # most often a shell variable that is not set; Path would make "." of it
-        raise typer.BadParameter("expected a name, got none", param_hint="--output")
+        raise typer.BadParameter("expected a name, got none", param_hint=option)
     return Path(name)
 
 

@@ -21,6 +21,7 @@
                   against path-traced pictures; ambient_page.py and ambient_plots.py write docs/ambient.md
     pathtraced.py pictures by Mitsuba's path tracer
     reports.py    reports of the three jobs -> docs/report-*.md
+    viewpage.py   the page of `framearray view` in Chromium
     machine.py    what all this ran on, and how busy that was
     results.py    results on the disk
     markdown.py   numbers and tables as text

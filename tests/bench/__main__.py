@@ -18,6 +18,7 @@ from . import (
     speed,
     table,
     told,
+    viewpage,
 )
 from .cases import FRAME_ARRAY, JOBS, Variant, job_named, opened, variant_named, varied, with_resolution
 from .results import folder, load, save
@@ -26,14 +27,14 @@ from .steady import steady
 PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
 PARTS = ("speed", "error", "peers", "memory", "startup")
 TRACES = ("trace", "trace-means")
-OTHERS = ("scaling", "report", "bias", "told", "page", "peak", *TRACES, *ambient.PARTS)
+OTHERS = ("scaling", "report", "bias", "told", "page", "peak", "view", *TRACES, *ambient.PARTS)
 
 
 def main() -> None:
     """Measure what is asked for, and write the page."""
     parser = argparse.ArgumentParser(prog="bench", description="Measure what an image costs, and write docs/speed.md.")
     parser.add_argument("what", nargs="?", default="all", choices=("all", *OTHERS, *PROGRAMS, *PARTS))
-    parser.add_argument("jobs", nargs="*", help="some of the jobs, or of the scenes of `ambient`")
+    parser.add_argument("jobs", nargs="*", help="some of the jobs, of the scenes of `ambient`, or arrays for `view`")
     parser.add_argument("--quick", action="store_true", help="a small picture, once; the page goes to out/bench/quick")
     parser.add_argument("--runs", type=int, default=speed.RUNS, help="how often each thing is measured")
     parser.add_argument("--patience", type=float, default=0.0, help="seconds to wait for a busy machine, each time")
@@ -45,6 +46,9 @@ def main() -> None:
     args = parser.parse_args()
     if args.what in ambient.PARTS:
         ambient.run(args.what, args.jobs, args.quick)
+        return
+    if args.what == "view":
+        viewpage.run(args.jobs, args.patience, args.quick)
         return
     if args.what == "peak":
         print(json.dumps(peak(args.jobs[0], variant_named(args.variant), args)))

@@ -32,11 +32,14 @@ movie/__init__ movie/places movie/easing movie/curves movie/pathfile movie/timel
 movie/cube movie/display movie/label movie/look movie/yuv movie/video movie/animation movie/sequence movie/assemble
 places sheet
 export/selection export/folder export/points export/colmap export/nerfstudio export/cinema export/write export/__init__
+view/coding view/streams view/index view/tiles view/prepare view/pagefiles view/server view/export view/run
+view/__init__
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
 screen interrupts wording
 commands/__init__ commands/options commands/render commands/check commands/verify
 commands/assemble commands/sheet commands/export commands/report commands/schema
+commands/view
 cli __main__
 """
 ORDER = FLOW.split()

@@ -1,0 +1,87 @@
+"""Makes the pictures of docs/view.md, of the page in Chromium: `python docs/make_page_pictures.py`.
+
+Three of the jobs are rendered into out/page-pictures/, unless they are there.
+"""
+
+import io
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from PIL import Image
+
+from framearray_cli.jobfile import read_job
+from framearray_cli.manifest import FILE_NAME
+from framearray_cli.render import render
+from framearray_cli.view.prepare import prepare_all
+from framearray_cli.view.run import open_tiles, serving
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "tests" / "page"))
+from chromium import DESKTOP, PHONE, Shown, browser, shown  # noqa: E402
+
+PICTURES = ROOT / "docs" / "pictures"
+ARRAYS = ROOT / "out" / "page-pictures"
+QUALITY = 82  # of JPEG
+TALL = (1280, 860)  # pixels; all that groups bring
+THREADS = 2
+
+
+def array(name: str) -> Path:
+    """Render jobs/NAME.toml, unless that was done."""
+    folder = ARRAYS / name
+    if not (folder / FILE_NAME).is_file():
+        job = read_job(ROOT / "jobs" / f"{name}.toml")
+        render(job.model_copy(update={"output": job.output.model_copy(update={"directory": folder})}))
+    return folder
+
+
+def desktop(page: Shown) -> None:
+    """A path drawn over the pad."""
+    page.page.click("#draw")
+    page.drag([(2 + 0.4 * k, 6 - 4 * math.sin(0.14 * k)) for k in range(48)], steps=2)
+    page.page.mouse.move(400, 760)
+
+
+def phone(page: Shown) -> None:
+    """As it opens."""
+
+
+def groups(page: Shown) -> None:
+    """The sun dimmed, the lamp tinted; the lamp's own axis."""
+    page.page.locator("#group-sun").fill("0.35")
+    page.page.locator("#group-lamp").fill("2")
+    page.page.locator("#group-lamp-color").fill("#ffd0a0")
+    page.page.focus("#pad")
+
+
+SHOTS: dict[str, tuple[str, str, tuple[int, int], Callable[[Shown], None]]] = {
+    "page-desktop": ("kitchen-small", "#camera=9&light=4", DESKTOP, desktop),
+    "page-phone": ("stairs-small", "#camera=9&light=3", PHONE, phone),
+    "page-groups": ("kitchen-evening", "#camera=8&light=4&axis.lamp=2&exposure=-0.3", TALL, groups),
+}
+
+
+def main() -> None:
+    """Make all pictures again."""
+    for name, (job, place, size, prepare) in SHOTS.items():
+        tiles = open_tiles(array(job), None, THREADS)
+        prepare_all(tiles, THREADS, lambda n: None)
+        touch = {"has_touch": True, "is_mobile": True} if size == PHONE else {}
+        with (
+            browser() as chromium,
+            serving(tiles) as server,
+            shown(chromium, server.url + place, size, **touch) as page,
+        ):
+            prepare(page)
+            page.all_loaded()
+            page.settle()
+            image = Image.open(io.BytesIO(page.page.screenshot())).convert("RGB")
+        file = PICTURES / f"{name}.jpg"
+        image.save(file, "JPEG", quality=QUALITY, optimize=True)
+        print(f"{file}: {image.width} x {image.height}, {file.stat().st_size:,} bytes")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,74 @@
+"""`framearray view`."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..interrupts import Stopped, forget
+from ..screen import Screen, out, say, size
+from .options import MOST_THREADS, Quiet, place
+
+if TYPE_CHECKING:
+    from ..errors import OutputError
+
+MOST_PROBLEMS = 5  # told in full
+
+
+def view(
+    array: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `render` wrote.", show_default=False)],
+    target: Annotated[
+        str | None,
+        typer.Option("--export", help="Write the page as files for any web server.", metavar="FOLDER"),
+    ] = None,
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port; 0: one that is free.")] = 0,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+    cache: Annotated[
+        str | None,
+        typer.Option("--cache", help="Folder for prepared pictures; default: OUT/.view.", metavar="FOLDER"),
+    ] = None,
+    threads: Annotated[
+        int | None,
+        typer.Option("--threads", min=1, max=MOST_THREADS, help="Threads; default: one for each core.", metavar="N"),
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Walk through a frame array in the browser."""
+    from ..view.run import open_tiles, show, write_page
+
+    workers = threads or os.cpu_count() or 1
+    tiles = open_tiles(array, place(cache, "--cache") if cache is not None else None, workers)
+    with Screen(out, quiet=quiet) as screen:
+        if target is not None:
+            screen.count("preparing", tiles.n_pictures, "picture")
+            n_bytes, problems = write_page(tiles, place(target, "--export"), threads=workers, progress=screen.advance)
+            screen.say([*_problem_lines(problems), f"{target}: the page, {size(n_bytes)}; any web server can show it"])
+            return
+
+        def opened(url: str) -> None:
+            say(out, [f"{url}  Ctrl-C ends"])
+            screen.count("preparing", tiles.n_pictures, "picture")
+
+        def prepared(problems: list["OutputError"]) -> None:
+            screen.end()
+            screen.say([*_problem_lines(problems), f"all pictures are prepared, in {tiles.folder}"])
+
+        try:
+            show(
+                tiles,
+                port=port,
+                browser=browser,
+                threads=workers,
+                opened=opened,
+                progress=screen.advance,
+                prepared=prepared,
+            )
+        except Stopped:  # the way to end it
+            forget()
+
+
+def _problem_lines(problems: list["OutputError"]) -> list[str]:
+    rest = len(problems) - MOST_PROBLEMS
+    more = [f"warning: {rest} more images are missing or damaged"] if rest > 0 else []
+    return [*(f"warning: {problem}" for problem in problems[:MOST_PROBLEMS]), *more]

@@ -1,0 +1,96 @@
+"""How the page's pictures keep radiance in 8 bits, with room above white for the exposure slider.
+
+    y = x (1 + x / w^2) / (1 + x),   x = radiance / scale,   code = 255 sRGB(y)       ([Reinhard02] eq. 4)
+
+y is 1 where x = w, so w is the brightest x that survives. Dark values keep their sRGB codes (dy/dx = 1 at 0), 1 is at
+code 188 for large w, and w = 1 is the plain sRGB curve.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Bytes, Float32
+from ..colour import linear_from_srgb8, srgb_from_linear
+
+# Beyond it a step of the code is more than a tenth of the value, and a lamp seen directly is white at any exposure.
+MOST_WHITE = 64.0
+# White over the largest value of the pictures that were looked at; others may be brighter.
+MARGIN = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coding:
+    """How one kind of picture is coded.
+
+    Attributes:
+        scale: radiance that counts as x = 1; 0: no radiance, but data coded evenly from `low` to `high`.
+        white: the largest x, w.
+        low, high: range of data.
+    """
+
+    scale: float = 1.0
+    white: float = 1.0
+    low: float = 0.0
+    high: float = 1.0
+
+
+PLAIN = Coding()
+
+
+def coding_for(largest: float) -> Coding:
+    """Choose the coding of radiance up to a largest value; dark pictures use all codes too.
+
+    It goes in powers of two, so that an array which is rendered again, a little brighter, keeps its tiles.
+    """
+    if not 0 < largest < np.inf:
+        return PLAIN
+    scale = min(1.0, _power_of_two(largest))
+    return Coding(scale=scale, white=min(_power_of_two(MARGIN * largest / scale), MOST_WHITE))
+
+
+def data_coding(largest: float) -> Coding:
+    """Choose the coding of data from 0 to a largest value, which is rounded up to two figures."""
+    if not 0 < largest < np.inf:
+        return Coding(scale=0.0)
+    step = 10.0 ** (math.floor(math.log10(largest)) - 1)
+    return Coding(scale=0.0, high=float(f"{math.ceil(largest / step * (1 - 1e-6)) * step:.6g}"))
+
+
+def _power_of_two(value: float) -> float:
+    """The least power of two that is not below a value."""
+    return float(2.0 ** math.ceil(math.log2(value)))
+
+
+def encode(values: Float32, coding: Coding) -> Bytes:
+    """Code values of any shape; what lies outside of the range is cut to it, NaN becomes 0."""
+    if not coding.scale:
+        span = max(coding.high - coding.low, float(np.finfo(np.float32).tiny))
+        shares = np.nan_to_num((values - coding.low) / span, nan=0.0)
+        codes: Bytes = np.rint(255 * np.clip(shares, 0, 1)).astype(np.uint8)
+        return codes
+    with np.errstate(over="ignore"):
+        half = (values * np.float32(1 / coding.scale)).astype(np.float16)
+    return np.take(_code_of_half(coding.white), half.view(np.uint16))
+
+
+def decode(codes: Bytes, coding: Coding) -> Float32:
+    """Give the values of codes, as the page's shader does: the inverse of `encode`, to half a code."""
+    if not coding.scale:
+        return np.asarray(coding.low + (coding.high - coding.low) * codes.astype(np.float32) / 255, np.float32)
+    y = linear_from_srgb8(codes)
+    x = 2 * y / ((1 - y) + np.sqrt((1 - y) ** 2 + 4 * y / coding.white**2))
+    return np.asarray(coding.scale * x, np.float32)
+
+
+@lru_cache(maxsize=64)
+def _code_of_half(white: float) -> Bytes:
+    """Tabulate the code of each of the 65536 halves; the rounding to half moves a code by at most 0.06."""
+    halves = np.arange(65536, dtype=np.uint16).view(np.float16).astype(np.float64)
+    x = np.clip(np.nan_to_num(halves, nan=0.0, posinf=white), 0, white)
+    codes: NDArray[Any] = np.rint(255 * srgb_from_linear(x * (1 + x / white**2) / (1 + x)))
+    return codes.astype(np.uint8)

@@ -1,0 +1,62 @@
+"""The page and its tiles as a folder of plain files, for any web server."""
+
+import os
+import secrets
+import shutil
+from pathlib import Path
+
+from ..errors import OutputError
+from ..files import make_folder, reason
+from .pagefiles import page_files
+from .tiles import INDEX, TILES, Tiles
+
+
+def check_target(target: Path) -> None:
+    """Refuse a folder that holds anything but an earlier export.
+
+    Raises:
+        OutputError: it does.
+    """
+    ours = {INDEX, TILES, *page_files()}
+    try:
+        found = sorted(entry.name for entry in target.iterdir()) if target.exists() else []
+    except OSError as error:
+        raise OutputError(f"{target}: cannot be read as a folder: {reason(error)}") from error
+    strangers = [name for name in found if name not in ours]
+    if strangers or (found and INDEX not in found):
+        name = (strangers or found)[0]
+        raise OutputError(f"{target}: holds other files, {name!r} for one; choose a new or empty folder")
+
+
+def export(tiles: Tiles, target: Path) -> int:
+    """Write the page with all tiles; the folder appears whole or not at all, in place of an earlier export.
+
+    Args:
+        tiles: all of them prepared.
+
+    Returns:
+        Bytes written.
+
+    Raises:
+        OutputError: the target holds other files, or cannot be written.
+    """
+    check_target(target)
+    make_folder(target.parent)
+    token = secrets.token_hex(4)
+    part, old = (target.with_name(f".{target.name}.{token}.{end}") for end in ("part", "old"))
+    try:
+        part.mkdir()
+        for name, data in page_files().items():
+            (part / name).write_bytes(data)
+        shutil.copyfile(tiles.folder / INDEX, part / INDEX)
+        shutil.copytree(tiles.folder / TILES, part / TILES, ignore=shutil.ignore_patterns(".*"))
+        if target.exists():
+            os.replace(target, old)
+        os.replace(part, target)
+    except (OSError, shutil.Error) as error:
+        why = reason(error) if isinstance(error, OSError) and error.strerror else str(error)
+        raise OutputError(f"{target}: cannot be written: {why}") from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+        shutil.rmtree(old, ignore_errors=True)
+    return sum(file.stat().st_size for file in target.rglob("*") if file.is_file())

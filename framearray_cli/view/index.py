@@ -1,0 +1,100 @@
+"""What the page must know of an array: `index.json`, and how the small pictures lie in a sheet."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Float32
+from ..manifest import Manifest
+from .streams import LAYERS, Stream
+
+FORMAT = 1  # of the index and the tiles; another number makes them all anew
+SMALL_PIXELS = 100 * 75  # of a small picture, about: a quarter of 400 x 300 each way
+SHEET_PIXELS = 1 << 21  # of a sheet at most: 8 MiB when decoded
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SheetLayout:
+    """Small pictures in rows.
+
+    Attributes:
+        factor: pixels of a full picture to one of a small one, each way.
+        width, height: of a small picture, pixels.
+        columns: small pictures in a row.
+    """
+
+    factor: int
+    width: int
+    height: int
+    columns: int
+
+    def sheet(self, n: int) -> tuple[int, int]:
+        """Height and width of a sheet of n small pictures."""
+        columns = min(n, self.columns)
+        return -(-n // columns) * self.height, columns * self.width
+
+    def part(self, l: int) -> tuple[slice, slice]:
+        """Rows and columns of the small picture of position l."""
+        row, column = divmod(l, self.columns)
+        top, left = row * self.height, column * self.width
+        return slice(top, top + self.height), slice(left, left + self.width)
+
+    def reduced(self, values: Float32) -> Float32:
+        """Average blocks of factor x factor pixels; smaller ones at the right and lower edge."""
+        for axis in (0, 1):
+            starts = np.arange(0, values.shape[axis], self.factor)
+            counts = np.diff(np.append(starts, values.shape[axis])).astype(np.float32)
+            sums = np.add.reduceat(values, starts, axis=axis)
+            values = np.asarray(sums / counts.reshape((-1, 1, 1) if axis == 0 else (1, -1, 1)), np.float32)
+        return values
+
+
+def sheet_layout(resolution: tuple[int, int], n: int) -> SheetLayout:
+    """Choose the size of small pictures: about SMALL_PIXELS, less where n of them would not fit in a sheet."""
+    width, height = resolution
+    wanted = min(SMALL_PIXELS, max(1, SHEET_PIXELS // n))
+    factor = max(1, round(math.sqrt(width * height / wanted)))
+    small = -(-width // factor), -(-height // factor)
+    columns = max(1, min(n, math.ceil(math.sqrt(n * small[1] / small[0]))))
+    return SheetLayout(factor=factor, width=small[0], height=small[1], columns=columns)
+
+
+def index_table(manifest: Manifest, streams: Sequence[Stream], layout: SheetLayout) -> dict[str, Any]:
+    """What `index.json` holds."""
+    return {
+        "format": FORMAT,
+        "fingerprint": manifest.fingerprint,
+        "name": manifest.name,
+        "resolution": list(manifest.resolution),
+        "fps": manifest.fps,
+        "n_cameras": manifest.n_cameras,
+        "axes": [{"name": name, "n": n} for name, n in manifest.axes.items()],
+        "exposure": _exposure(manifest),
+        "small": asdict(layout),
+        "streams": [_stream(stream) for stream in streams],
+        "background_ambient": list(manifest.background_ambient),
+        "ambient": {group.name: [list(light.ambient) for light in group.lights] for group in manifest.groups},
+    }
+
+
+def _exposure(manifest: Manifest) -> float:
+    """Stops that the job brightens PNG and JPEG by; those images have it in them, others show it on the page."""
+    output = manifest.job.get("output", {})
+    linear = manifest.groups or not manifest.images.lower().endswith((".png", ".jpg", ".jpeg"))
+    value = output.get("exposure", 0.0) if isinstance(output, dict) and linear else 0.0
+    return float(value) if isinstance(value, int | float) else 0.0
+
+
+def _stream(stream: Stream) -> dict[str, Any]:
+    return {
+        "key": stream.key,
+        "role": stream.role,
+        "label": stream.label,
+        "axis": stream.axis,
+        "n": stream.n,
+        "exposed": stream.role != "layer" or LAYERS[stream.key][2],
+        **asdict(stream.coding),
+    }

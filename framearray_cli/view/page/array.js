@@ -1,0 +1,101 @@
+// What index.json says of a frame array: its axes, where its tiles are, and what a picture is the sum of.
+
+export const WHITE = [1, 1, 1];
+
+export async function loadArray() {
+  const answer = await fetch("index.json", { cache: "no-cache" });
+  if (!answer.ok) throw new Error(`index.json: ${answer.status} ${answer.statusText}`);
+  return new FrameArray(await answer.json());
+}
+
+export class FrameArray {
+  constructor(index) {
+    Object.assign(this, index); // name, resolution, fps, axes, streams, small, exposure, ...
+    this.nCameras = index.n_cameras;
+    this.main = index.axes[0]; // along the pad's second side
+    this.others = index.axes.slice(1);
+    this.layers = index.streams.filter((stream) => stream.role === "layer");
+    this.groups = index.streams.filter((stream) => stream.role === "group");
+  }
+
+  fullUrl(stream, c, l) {
+    return `tiles/${stream.key}/c${pad(c, 4)}.l${pad(l, 3)}.jpg`;
+  }
+
+  sheetUrl(stream, c) {
+    return `tiles/${stream.key}/c${pad(c, 4)}.jpg`;
+  }
+
+  // Bytes of a decoded tile or sheet.
+  bytes(stream, sheet) {
+    const [width, height] = this.resolution;
+    if (!sheet) return 4 * width * height;
+    const columns = Math.min(stream.n, this.small.columns);
+    return 4 * columns * this.small.width * Math.ceil(stream.n / columns) * this.small.height;
+  }
+
+  // Where the small picture of position l lies in its sheet: left, top, width, height as shares of the sheet.
+  // Its last column and row may stand for less than `factor` pixels, so the picture ends before them.
+  smallPart(stream, l) {
+    const columns = Math.min(stream.n, this.small.columns);
+    const rows = Math.ceil(stream.n / columns);
+    const [width, height] = this.resolution;
+    const share = [width / this.small.factor / this.small.width, height / this.small.factor / this.small.height];
+    return [(l % columns) / columns, Math.floor(l / columns) / rows, share[0] / columns, share[1] / rows];
+  }
+
+  // The streams whose sum is the picture at a view, each with its position and RGB factor: pictures.py's equation
+  //     picture = background + sum of factor_g (direct_g + a I_A,g R W) + a I_A,b R W.
+  parts(view) {
+    if (view.show !== "picture") {
+      const layer = this.layers.find((stream) => stream.key === view.show);
+      if (layer) return [{ stream: layer, l: 0, factor: WHITE }];
+    }
+    return this.streams.filter((stream) => stream.role !== "layer").map((stream) => ({
+      stream,
+      l: stream.axis ? view.places[stream.axis] : 0,
+      factor: this.factor(stream, view),
+    }));
+  }
+
+  factor(stream, view) {
+    if (stream.role === "group") return tint(view.tints[stream.label]);
+    if (stream.role !== "ambient") return WHITE;
+    const weight = [...this.background_ambient];
+    for (const group of this.groups) {
+      const light = this.ambient[group.label][view.places[group.axis]];
+      const by = tint(view.tints[group.label]);
+      for (let i = 0; i < 3; i++) weight[i] += by[i] * light[i];
+    }
+    const by = tint(view.ambient);
+    return weight.map((value, i) => value * by[i]);
+  }
+}
+
+// RGB factor of an intensity and a colour such as "#ffcc88", which is sRGB.
+export function tint({ intensity, color }) {
+  return linearColor(color).map((value) => intensity * value);
+}
+
+export function linearColor(color) {
+  return [1, 3, 5].map((start) => linear(parseInt(color.slice(start, start + 2), 16) / 255));
+}
+
+export function linear(encoded) {
+  return encoded <= 0.04045 ? encoded / 12.92 : ((encoded + 0.055) / 1.055) ** 2.4;
+}
+
+export function srgb(value) {
+  const x = Math.min(1, Math.max(0, value));
+  return x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055;
+}
+
+// Radiance of a code from 0 to 1; coding.py explains the curve.
+export function decode(code, { scale, white }) {
+  const y = linear(code);
+  return (scale * 2 * y) / (1 - y + Math.sqrt((1 - y) ** 2 + (4 * y) / white ** 2));
+}
+
+function pad(number, digits) {
+  return String(number).padStart(digits, "0");
+}

@@ -1,0 +1,99 @@
+// Sliders and buttons: what the array has decides which there are. They change the view and call `changed`.
+
+const MOST_INTENSITY = 4;
+
+export class Controls {
+  constructor(array, view, changed) {
+    this.array = array;
+    this.update = []; // functions that show a view
+    this.layers(changed);
+    this.exposure(changed);
+    this.axes(changed);
+    this.groups(changed);
+    this.show(view);
+  }
+
+  // Set all controls to a view.
+  show(view) {
+    for (const update of this.update) update(view);
+  }
+
+  layers(changed) {
+    const box = document.getElementById("layers");
+    const all = [{ key: "picture", label: "Picture" }, ...this.array.layers];
+    box.parentElement.querySelector("h2").hidden = box.hidden = all.length === 1;
+    for (const { key, label } of all) {
+      const input = element("input", { type: "radio", name: "layer", value: key });
+      const holder = element("label", {}, input, element("span", {}, label));
+      input.addEventListener("change", () => changed((view) => (view.show = key)));
+      this.update.push((view) => (input.checked = view.show === key));
+      box.append(holder);
+    }
+  }
+
+  exposure(changed) {
+    const input = document.getElementById("exposure");
+    const told = document.getElementById("exposure-told");
+    input.addEventListener("input", () => changed((view) => (view.exposure = Number(input.value))));
+    this.update.push((view) => {
+      input.value = view.exposure;
+      told.value = (view.exposure > 0 ? "+" : "") + view.exposure.toFixed(1).replace("-", "\u2212");
+      input.setAttribute("aria-valuetext", `${view.exposure} stops`);
+    });
+  }
+
+  axes(changed) {
+    const box = document.getElementById("axes");
+    if (this.array.others.length) box.append(element("h2", {}, "More lights"));
+    for (const { name, n } of this.array.others) {
+      const { input, told, holder } = slider(name, { min: 0, max: n - 1, step: 1, id: `axis-${name}` });
+      input.addEventListener("input", () => changed((view) => (view.places[name] = Number(input.value))));
+      this.update.push((view) => {
+        input.value = view.places[name];
+        told.value = `${view.places[name] + 1} / ${n}`;
+        input.setAttribute("aria-valuetext", `position ${view.places[name] + 1} of ${n}`);
+      });
+      box.append(holder);
+    }
+  }
+
+  groups(changed) {
+    const { groups } = this.array;
+    if (!groups.length) return;
+    const box = document.getElementById("groups");
+    box.append(element("h2", {}, "Light"));
+    for (const { label } of groups) this.tint(box, label, `group-${label}`, changed, (view) => view.tints[label]);
+    this.tint(box, "Ambient", "ambient", changed, (view) => view.ambient);
+  }
+
+  tint(box, name, id, changed, of) {
+    const { input, told, holder } = slider(name, { min: 0, max: MOST_INTENSITY, step: 0.05, id });
+    const color = element("input", { type: "color", id: `${id}-color`, "aria-label": `${name}, colour` });
+    holder.classList.add("coloured");
+    const row = element("div", { class: "slider coloured" }, ...holder.children, color);
+    row.querySelector("span").id = `${id}-name`;
+    input.setAttribute("aria-labelledby", `${id}-name`);
+    input.addEventListener("input", () => changed((view) => (of(view).intensity = Number(input.value))));
+    color.addEventListener("input", () => changed((view) => (of(view).color = color.value)));
+    this.update.push((view) => {
+      input.value = of(view).intensity;
+      color.value = of(view).color;
+      told.value = of(view).intensity.toFixed(2);
+    });
+    box.append(row);
+  }
+}
+
+function slider(name, attributes) {
+  const input = element("input", { type: "range", ...attributes });
+  const told = element("output", {});
+  const holder = element("label", { class: "slider" }, element("span", { title: name }, name), input, told);
+  return { input, told, holder };
+}
+
+export function element(tag, attributes, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  made.append(...children);
+  return made;
+}

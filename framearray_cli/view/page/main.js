@@ -1,0 +1,239 @@
+// The page: wires array, store, picture, pad, path and controls; one loop draws what changed.
+
+import { loadArray } from "./array.js";
+import { Controls } from "./controls.js";
+import { addKeys } from "./keys.js";
+import { ColourMap } from "./map.js";
+import { Pad } from "./pad.js";
+import { addPathButtons } from "./pathbuttons.js";
+import { Path } from "./path.js";
+import { Picture } from "./picture.js";
+import { Player } from "./player.js";
+import { memoryBudget, Store } from "./store.js";
+import { firstView, fromHash, toHash } from "./view.js";
+import { wishes } from "./wishes.js";
+
+const HASH_DELAY = 300; // ms after the last change; browsers refuse more than some hundred addresses a minute
+const STILL_AFTER = 250; // ms without a change: the movement is over
+
+const CALM_AFTER = 60; // ms without a change: pictures around the place are loaded too
+const RETRY_AFTER = 5000; // ms, where there is no picture
+
+const byId = (id) => document.getElementById(id);
+
+class Page {
+  constructor(array) {
+    this.array = array;
+    this.view = fromHash(array, location.hash);
+    this.store = new Store(memoryBudget(), (url) => this.arrived(url));
+    this.store.want(wishes(array, this.view, [0, 0], false));
+    this.picture = new Picture(byId("picture"), array.resolution); // 0.2 s without a graphics card, while tiles load
+    this.map = new ColourMap(array);
+    this.sheets = new Map(); // url of a sheet -> [stream, c]
+    for (const stream of array.streams) {
+      for (let c = 0; c < array.nCameras; c++) this.sheets.set(array.sheetUrl(stream, c), [stream, c]);
+    }
+    this.path = new Path();
+    this.isDrawing = false;
+    this.velocity = [0, 0];
+    this.steps = []; // of the last places: { c, l, first, full }, ms until shown small and full
+    this.player = new Player(array, () => this.level > 0, (change) => this.change(change), (what) => this.ended(what));
+    this.controls = new Controls(array, this.view, (change) => this.change(change));
+    this.pad = new Pad(byId("pad"), array, this.map, (place, phase, event) => this.pointer(place, phase, event));
+    this.pad.onresize = () => this.dirty();
+    this.level = 0; // of what is on the screen for the view: 0 another place, 1 small, 2 full size
+    addPathButtons(this);
+    addKeys(this);
+    this.addButtons();
+    this.say();
+    this.asked(performance.now());
+    requestAnimationFrame((now) => this.frame(now));
+  }
+
+  get l() {
+    return this.view.places[this.array.main.name];
+  }
+
+  // Change the view; what is shown follows with the next frame of the screen.
+  change(change, time = performance.now()) {
+    const { c } = this.view, { l } = this;
+    change(this.view);
+    this.velocity = time - this.changedAt < STILL_AFTER ? [this.view.c - c, this.l - l] : [0, 0];
+    this.asked(time);
+    this.say();
+    clearTimeout(this.hashTimer);
+    this.hashTimer = setTimeout(() => history.replaceState(null, "", toHash(this.array, this.view)), HASH_DELAY);
+  }
+
+  asked(time) {
+    this.changedAt = time;
+    this.level = 0;
+    this.steps.push({ c: this.view.c, l: this.l, show: this.view.show, at: time, first: null, full: null });
+    if (this.steps.length > 4000) this.steps.shift();
+    this.wish(false);
+    clearTimeout(this.calmTimer);
+    this.calmTimer = setTimeout(() => this.wish(true), CALM_AFTER);
+    const look = groundLook(this.array, this.view);
+    if (look !== this.look) this.map.changed = true;
+    this.look = look;
+    this.dirty();
+  }
+
+  wish(calm) {
+    this.store.want(wishes(this.array, this.view, this.velocity, calm));
+  }
+
+  dirty() {
+    this.isDirty = true;
+  }
+
+  arrived(url) {
+    const sheet = this.sheets.get(url);
+    if (sheet && this.store.has(url)) this.map.add(...sheet, this.store.get(url));
+    this.dirty();
+  }
+
+  frame(now) {
+    requestAnimationFrame((later) => this.frame(later));
+    this.player.tick(now);
+    if (!this.isDirty) return;
+    this.isDirty = false;
+    this.drawPicture();
+    const ground = this.map.changed && (now - (this.groundAt ?? -1e9) > 100 || !this.store.inFlight.size);
+    if (ground) this.groundAt = now;
+    if (this.map.changed && !ground) this.dirty();
+    this.pad.draw(this.view, this.path.strokes, ground);
+    byId("memory").value = `${Math.round((this.store.bytes + this.picture.bytes) / 2 ** 20)} MiB`;
+  }
+
+  // Draw the view from what is there: full tiles, else small ones, else what was drawn before stays.
+  drawPicture() {
+    const { array, store, view } = this;
+    let level = 2;
+    const parts = array.parts(view).map((part) => {
+      const url = array.fullUrl(part.stream, view.c, part.l);
+      const full = store.get(url);
+      if (full) return { ...part, url, bitmap: full, part: [0, 0, 1, 1] };
+      const sheet = array.sheetUrl(part.stream, view.c);
+      const small = store.get(sheet);
+      level = Math.min(level, small ? 1 : 0);
+      return { ...part, url: sheet, bitmap: small, part: array.smallPart(part.stream, part.l) };
+    });
+    this.tell(parts);
+    if (!level) return;
+    this.picture.draw(parts, view.exposure + array.exposure);
+    if (this.measures) this.picture.pixels(1); // waits for the drawing
+    this.level = level;
+    const step = this.steps.at(-1), ms = performance.now() - step.at;
+    step.first ??= ms;
+    if (level === 2) step.full ??= ms;
+  }
+
+  // Say what is wrong, if anything is.
+  tell(parts) {
+    const full = parts.map((part) => this.array.fullUrl(part.stream, this.view.c, part.l));
+    const wrong = full.map((url) => this.store.missing.get(url)).find((text) => text);
+    byId("note").hidden = !wrong;
+    byId("note").textContent = wrong ? `No picture here. ${wrong}` : "";
+    if (wrong) this.retry ??= setTimeout(() => this.askAgain(), RETRY_AFTER);
+  }
+
+  // A render may have gone on, or the server have come back.
+  askAgain() {
+    this.retry = undefined;
+    this.store.forgetMissing();
+    this.wish(true);
+    this.dirty();
+  }
+
+  // Show the view's numbers and set the controls.
+  say() {
+    const { array, view } = this;
+    const text = `camera ${view.c + 1} / ${array.nCameras}, ${array.main.name} ${this.l + 1} / ${array.main.n}`;
+    byId("where").textContent = text;
+    byId("pad").setAttribute("aria-label", `Pad: ${text}`);
+    byId("picture").setAttribute("aria-label", `Picture of ${array.name}: ${text}`);
+    const shown = array.layers.find((layer) => layer.key === view.show);
+    const range = shown && !shown.scale && shown.key !== "normal";
+    byId("legend").hidden = !range;
+    if (range) byId("legend").textContent = `${shown.label}: ${figure(shown.low)} to ${figure(shown.high)}`;
+    byId("exposure").disabled = Boolean(shown && !shown.exposed);
+    this.controls.show(view);
+  }
+
+  pointer(place, phase, event) {
+    this.player.stop();
+    if (this.isDrawing) this.drawPath(place, phase, event);
+    else if (phase === "up") return;
+    this.change((view) => {
+      view.c = Math.round(place.c);
+      view.places[this.array.main.name] = Math.round(place.l);
+    }, event.timeStamp);
+  }
+
+  play(what) {
+    if (this.player.what === what) this.player.stop();
+    else {
+      this.player.start(what, this.path);
+      if (this.player.what) byId(`play-${what}`).setAttribute("aria-pressed", "true");
+    }
+  }
+
+  ended(what) {
+    byId(`play-${what}`).setAttribute("aria-pressed", "false");
+  }
+
+  addButtons() {
+    for (const what of ["camera", "light"]) {
+      byId(`play-${what}`).addEventListener("click", () => this.play(what));
+      byId(`play-${what}`).disabled = this.player.length(what) < 2;
+    }
+    byId("speed").addEventListener("change", (event) => (this.player.speed = Number(event.target.value)));
+    byId("reset").addEventListener("click", () => {
+      const { c, places } = this.view;
+      this.change((view) => Object.assign(view, firstView(this.array), { c, places }));
+    });
+    byId("link").addEventListener("click", () => this.copyLink());
+    byId("help").addEventListener("click", () => {
+      byId("keys").hidden = !byId("keys").hidden;
+      byId("help").setAttribute("aria-expanded", String(!byId("keys").hidden));
+    });
+    addEventListener("hashchange", () => {
+      this.change((view) => Object.assign(view, fromHash(this.array, location.hash)));
+    });
+    byId("name").textContent = document.title = this.array.name;
+    byId("pad-light").textContent = this.array.main.name;
+  }
+
+  async copyLink() {
+    const link = new URL(toHash(this.array, this.view), location.href).href;
+    history.replaceState(null, "", link);
+    let told = "Copied";
+    try {
+      await navigator.clipboard.writeText(link);
+    } catch {
+      told = "In the address bar"; // no clipboard without https, or without leave
+    }
+    byId("link").textContent = told;
+    setTimeout(() => (byId("link").textContent = "Copy link"), 1500);
+  }
+}
+
+// What the pad's ground depends on: all of the view but the place on the pad.
+function groundLook(array, view) {
+  const others = array.others.map((axis) => view.places[axis.name]);
+  return JSON.stringify([view.show, view.exposure, view.tints, view.ambient, others]);
+}
+
+function figure(value) {
+  return Number(value.toPrecision(3)).toString();
+}
+
+try {
+  const page = new Page(await loadArray());
+  globalThis.framearray = page; // for the console, and for tests
+} catch (error) {
+  byId("note").hidden = false;
+  byId("note").textContent = `The page cannot start. ${error.message}`;
+  console.error(error);
+}

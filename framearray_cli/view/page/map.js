@@ -1,0 +1,63 @@
+// Mean colour of every picture, from the sheets as they arrive: the pad's ground.
+
+import { decode, srgb } from "./array.js";
+
+export class ColourMap {
+  constructor(array) {
+    this.array = array;
+    this.means = new Map(); // stream key -> Float32Array (cameras, positions, 3), NaN where not loaded yet
+    for (const stream of array.streams) {
+      this.means.set(stream.key, new Float32Array(3 * array.nCameras * stream.n).fill(NaN));
+    }
+    this.canvas = new OffscreenCanvas(array.nCameras, array.main.n);
+    this.small = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
+    this.changed = true;
+  }
+
+  // Take the means of a sheet: it is drawn with one pixel a picture.
+  add(stream, c, sheet) {
+    const means = this.means.get(stream.key);
+    if (!Number.isNaN(means[3 * c * stream.n])) return;
+    const columns = Math.min(stream.n, this.array.small.columns);
+    const rows = Math.ceil(stream.n / columns);
+    const { small } = this;
+    small.canvas.width = columns;
+    small.canvas.height = rows;
+    small.imageSmoothingQuality = "high";
+    small.drawImage(sheet, 0, 0, columns, rows);
+    const codes = small.getImageData(0, 0, columns, rows).data;
+    for (let l = 0; l < stream.n; l++) {
+      for (let i = 0; i < 3; i++) {
+        const code = codes[4 * l + i] / 255;
+        means[3 * (c * stream.n + l) + i] = stream.scale ? decode(code, stream) : code;
+      }
+    }
+    this.changed = true;
+  }
+
+  // Colours as the view shows them, on a canvas with a pixel for each camera and light; transparent where unknown.
+  drawn(view) {
+    const { array } = this;
+    const { width, height } = this.canvas;
+    const shown = new ImageData(width, height);
+    const gain = 2 ** (view.exposure + array.exposure);
+    for (let l = 0; l < height; l++) {
+      const places = { ...view.places, [array.main.name]: l };
+      const parts = array.parts({ ...view, places });
+      const linear = parts[0].stream.scale > 0;
+      for (let c = 0; c < width; c++) {
+        const sum = [0, 0, 0];
+        for (const { stream, l: at, factor } of parts) {
+          const means = this.means.get(stream.key);
+          for (let i = 0; i < 3; i++) sum[i] += factor[i] * means[3 * (c * stream.n + at) + i];
+        }
+        const start = 4 * (l * width + c);
+        for (let i = 0; i < 3; i++) shown.data[start + i] = 255 * (linear ? srgb(sum[i] * gain) : sum[i]);
+        shown.data[start + 3] = Number.isNaN(sum[0]) ? 0 : 255;
+      }
+    }
+    this.canvas.getContext("2d").putImageData(shown, 0, 0);
+    this.changed = false;
+    return this.canvas;
+  }
+}

@@ -1,0 +1,69 @@
+// Buttons of the path: draw, play, clear, save; and what a pointer draws on the pad.
+
+const CLICK = 4; // pixels that the pointer may move in a click
+
+export function addPathButtons(page) {
+  const byId = (id) => document.getElementById(id);
+  let samples = [];
+  let from = [0, 0];
+
+  const told = () => {
+    const { path } = page;
+    const count = path.segments.length;
+    const is = count ? `${count} segment${count > 1 ? "s" : ""}` : "1 place";
+    byId("path-told").value = is;
+    byId("path-row").hidden = path.isEmpty;
+    for (const id of ["play-path", "save-path", "seconds"]) byId(id).disabled = !count;
+    byId("clear-path").disabled = path.isEmpty;
+    byId("seconds").value = count ? page.path.seconds.toFixed(1) : "";
+    page.dirty();
+  };
+
+  page.setDrawing = (drawing) => {
+    page.isDrawing = drawing;
+    byId("draw").setAttribute("aria-pressed", String(drawing));
+    byId("draw-help").hidden = !drawing;
+    byId("pad").classList.toggle("drawing", drawing);
+  };
+
+  page.drawPath = (place, phase, event) => {
+    const sample = { ...place, s: event.timeStamp / 1000 };
+    if (phase === "down") {
+      samples = [];
+      from = [event.clientX, event.clientY];
+    }
+    samples.push(sample);
+    if (phase !== "up") return;
+    const far = Math.hypot(event.clientX - from[0], event.clientY - from[1]) > CLICK;
+    if (far || samples.some((one) => Math.hypot(one.c - sample.c, one.l - sample.l) > 0.5)) {
+      page.path.addStroke(samples, page.view.places);
+    } else page.path.addPlace({ c: Math.round(place.c), l: Math.round(place.l) }, page.view.places);
+    told();
+  };
+
+  page.addHere = () => {
+    page.path.addPlace({ c: page.view.c, l: page.l }, page.view.places);
+    told();
+  };
+
+  byId("draw").addEventListener("click", () => page.setDrawing(!page.isDrawing));
+  byId("play-path").addEventListener("click", () => page.play("path"));
+  byId("clear-path").addEventListener("click", () => {
+    page.player.stop();
+    page.path.clear();
+    told();
+  });
+  byId("seconds").addEventListener("change", (event) => {
+    const seconds = Number(event.target.value);
+    if (seconds >= 0.1 && seconds <= 10000) page.path.stretch(seconds);
+    told();
+  });
+  byId("save-path").addEventListener("click", () => {
+    const text = page.path.toToml(page.array, page.view);
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([text], { type: "application/toml" }));
+    link.download = `${page.array.name.replace(/[^\w.-]+/g, "-")}-path.toml`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  });
+}

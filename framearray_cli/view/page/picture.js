@@ -1,0 +1,166 @@
+// Draws a picture: the sum of coded tiles times factors, exposed and shown in sRGB, in one pass of WebGL 2.
+
+const KEPT_TEXTURES = 24; // beside the decoded tiles; a few steps back and forth upload nothing
+
+const VERTEX = `#version 300 es
+out vec2 at;
+void main() {
+  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
+  at = vec2(corner.x, 1.0 - corner.y);  // row 0 of a tile is at the top
+  gl_Position = vec4(2.0 * corner - 1.0, 0.0, 1.0);
+}`;
+
+const HEAD = `#version 300 es
+precision highp float;
+precision highp sampler2D;
+in vec2 at;
+out vec4 shown;
+uniform float exposure;
+
+vec3 linear(vec3 c) {
+  return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045)));
+}
+vec3 srgb(vec3 x) {
+  x = clamp(x, 0.0, 1.0);
+  return mix(12.92 * x, 1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, greaterThan(x, vec3(0.0031308)));
+}
+// Between the texel centres of one small picture: its neighbours in the sheet must not shine in.
+vec3 code(sampler2D image, vec4 part) {
+  vec2 inset = 0.5 / vec2(textureSize(image, 0));
+  vec2 low = part.xy + inset, high = max(part.xy + part.zw - inset, part.xy + inset);
+  return texture(image, clamp(part.xy + at * part.zw, low, high)).rgb;
+}
+vec3 radiance(vec3 c, float scale, float white) {  // coding.py explains the curve
+  vec3 y = linear(c), rest = 1.0 - y;
+  return scale * 2.0 * y / (rest + sqrt(rest * rest + 4.0 * y / (white * white)));
+}
+vec3 heat(float t) {  // matplotlib's inferno, to 0.05: black, violet, orange, yellow; brighter is more
+  vec3 c = vec3(25.093, -12.222, -23.116);
+  c = c * t + vec3(-71.288, 32.554, 73.588);
+  c = c * t + vec3(77.157, -33.416, -82.254);
+  c = c * t + vec3(-41.709, 17.458, 44.645);
+  c = c * t + vec3(11.617, -3.948, -16.257);
+  c = c * t + vec3(0.106, 0.566, 4.118);
+  c = c * t + vec3(0.000, 0.002, -0.037);
+  return clamp(c, 0.0, 1.0);
+}
+`;
+
+const LIGHT_MAIN = "void main() {\n  vec3 sum = vec3(0.0);\n#SUM  shown = vec4(srgb(sum * exp2(exposure)), 1.0);\n}";
+const DATA_MAINS = {
+  depth: "shown = vec4(srgb(vec3(0.01 + 0.9 * pow(1.0 - code(image0, part0).r, 2.5))), 1.0);",
+  samples: "shown = vec4(heat(code(image0, part0).r), 1.0);",
+  normal: "shown = vec4(code(image0, part0), 1.0);",
+};
+
+export class Picture {
+  constructor(canvas, [width, height]) {
+    canvas.width = width;
+    canvas.height = height;
+    const options = { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true };
+    this.gl = canvas.getContext("webgl2", options);
+    if (!this.gl) throw new Error("This page needs WebGL 2, and this browser has none, or it is switched off.");
+    this.programs = new Map();
+    this.textures = new Map(); // url -> texture, the least recently used first
+    this.bytes = 0;
+    canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+    canvas.addEventListener("webglcontextrestored", () => {
+      this.programs.clear();
+      this.textures.clear();
+      this.bytes = 0;
+    });
+    this.most = this.gl.getParameter(this.gl.MAX_TEXTURE_IMAGE_UNITS);
+  }
+
+  // parts: [{ stream, factor, url, bitmap, part: [left, top, width, height] }]
+  draw(parts, exposure) {
+    const { gl } = this;
+    if (parts.length > this.most) throw new Error(`This device adds up ${this.most} pictures, not ${parts.length}.`);
+    const program = this.program(parts);
+    gl.useProgram(program);
+    parts.forEach((one, i) => {
+      gl.activeTexture(gl.TEXTURE0 + i);
+      this.bind(one.url, one.bitmap);
+      gl.uniform1i(gl.getUniformLocation(program, `image${i}`), i);
+      gl.uniform4fv(gl.getUniformLocation(program, `part${i}`), one.part);
+      gl.uniform3fv(gl.getUniformLocation(program, `factor${i}`), one.factor);
+      gl.uniform2f(gl.getUniformLocation(program, `curve${i}`), one.stream.scale, one.stream.white);
+    });
+    gl.uniform1f(gl.getUniformLocation(program, "exposure"), exposure);
+    gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+    this.forget(parts.length);
+  }
+
+  // The picture as drawn: RGBA, row 0 at the top. Waits until it is drawn.
+  pixels(rows = this.gl.drawingBufferHeight) {
+    const { gl } = this;
+    const width = gl.drawingBufferWidth, height = gl.drawingBufferHeight;
+    const flipped = new Uint8Array(4 * width * rows);
+    gl.readPixels(0, height - rows, width, rows, gl.RGBA, gl.UNSIGNED_BYTE, flipped);
+    const data = new Uint8Array(flipped.length);
+    for (let y = 0; y < rows; y++) data.set(flipped.subarray(4 * width * (rows - 1 - y), 4 * width * (rows - y)), 4 * width * y);
+    return data;
+  }
+
+  bind(url, bitmap) {
+    const { gl } = this;
+    let texture = this.textures.get(url);
+    if (texture) {
+      this.textures.delete(url);
+      this.textures.set(url, texture);
+      gl.bindTexture(gl.TEXTURE_2D, texture.name);
+      return;
+    }
+    texture = { name: gl.createTexture(), bytes: 4 * bitmap.width * bitmap.height };
+    gl.bindTexture(gl.TEXTURE_2D, texture.name);
+    gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
+    for (const [key, value] of [["MIN_FILTER", "LINEAR"], ["MAG_FILTER", "LINEAR"], ["WRAP_S", "CLAMP_TO_EDGE"], ["WRAP_T", "CLAMP_TO_EDGE"]])
+      gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_${key}`], gl[value]);
+    this.textures.set(url, texture);
+    this.bytes += texture.bytes;
+  }
+
+  forget(needed) {
+    for (const [url, texture] of this.textures) {
+      if (this.textures.size <= Math.max(KEPT_TEXTURES, needed)) return;
+      this.gl.deleteTexture(texture.name);
+      this.textures.delete(url);
+      this.bytes -= texture.bytes;
+    }
+  }
+
+  // One program for each number of parts, and one for each kind of data.
+  program(parts) {
+    const { stream } = parts[0];
+    const kind = stream.scale ? parts.length : stream.key;
+    if (this.programs.has(kind)) return this.programs.get(kind);
+    const count = stream.scale ? parts.length : 1;
+    let uniforms = "", sum = "";
+    for (let i = 0; i < count; i++) {
+      uniforms += `uniform sampler2D image${i};\nuniform vec4 part${i};\nuniform vec3 factor${i};\nuniform vec2 curve${i};\n`;
+      sum += `  sum += factor${i} * radiance(code(image${i}, part${i}), curve${i}.x, curve${i}.y);\n`;
+    }
+    const main = stream.scale ? LIGHT_MAIN.replace("#SUM", sum) : `void main() { ${DATA_MAINS[stream.key]} }`;
+    const program = link(this.gl, VERTEX, HEAD + uniforms + main);
+    this.programs.set(kind, program);
+    return program;
+  }
+}
+
+function link(gl, vertex, fragment) {
+  const program = gl.createProgram();
+  for (const [type, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+    const shader = gl.createShader(type);
+    gl.shaderSource(shader, text);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+  }
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
+    const logs = gl.getAttachedShaders(program).map((shader) => gl.getShaderInfoLog(shader));
+    throw new Error(`shader: ${gl.getProgramInfoLog(program)} ${logs.join(" ")}`);
+  }
+  return program;
+}

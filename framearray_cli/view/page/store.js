@@ -1,0 +1,110 @@
+// Loads tiles, the most wanted first, and keeps decoded ones within a budget of bytes.
+
+const PARALLEL = 6; // connections that a browser opens to one server
+const PARALLEL_LATER = 4; // of them for what is not urgent, so that a drag never waits for all six
+const URGENT = 6; // items at the head of the list
+// Part of the budget that a list of wishes may fill: the rest is for what was shown just now.
+const SHARE = 0.8;
+
+export class Store {
+  constructor(budget, loaded) {
+    this.budget = budget;
+    this.loaded = loaded; // called with a url when it is there, or known to be missing
+    this.bytes = 0;
+    this.most = 0; // bytes at their most
+    this.entries = new Map(); // url -> { bitmap, bytes }; the least recently used first
+    this.missing = new Map(); // url -> what the server said
+    this.inFlight = new Map(); // url -> AbortController
+    this.wanted = [];
+  }
+
+  get(url) {
+    const entry = this.entries.get(url);
+    if (!entry) return null;
+    this.entries.delete(url); // to the end of the map: used last
+    this.entries.set(url, entry);
+    return entry.bitmap;
+  }
+
+  has(url) {
+    return this.entries.has(url);
+  }
+
+  // Load these, in this order; what was asked for before and is not among them is given up.
+  want(list) {
+    let bytes = 0;
+    const seen = new Set();
+    this.wanted = [];
+    for (const item of list) {
+      if (seen.has(item.url)) continue;
+      if (bytes + item.bytes > SHARE * this.budget && !item.needed) break;
+      bytes += item.bytes;
+      seen.add(item.url);
+      this.wanted.push(item);
+    }
+    // What is wanted counts as used, the most wanted last: what makes room for the rest of it is not wanted.
+    for (let i = this.wanted.length - 1; i >= 0; i--) this.get(this.wanted[i].url);
+    for (const [url, controller] of this.inFlight) if (!seen.has(url)) controller.abort();
+    this.next = 0;
+    this.pump();
+  }
+
+  pump() {
+    while (this.next < this.wanted.length) {
+      if (this.inFlight.size >= (this.next < URGENT ? PARALLEL : PARALLEL_LATER)) return;
+      const item = this.wanted[this.next++];
+      const known = this.entries.has(item.url) || this.inFlight.has(item.url) || this.missing.has(item.url);
+      if (!known) this.load(item.url);
+    }
+  }
+
+  async load(url) {
+    const controller = new AbortController();
+    this.inFlight.set(url, controller);
+    try {
+      const answer = await fetch(url, { signal: controller.signal });
+      if (!answer.ok) {
+        this.missing.set(url, (await answer.text()).trim() || answer.statusText);
+      } else {
+        // Codes as they are in the file: the shader knows what they mean.
+        const options = { premultiplyAlpha: "none", colorSpaceConversion: "none" };
+        this.add(url, await createImageBitmap(await answer.blob(), options));
+      }
+    } catch (error) {
+      if (error.name !== "AbortError") this.missing.set(url, `cannot be loaded: ${error.message}`);
+    }
+    if (this.inFlight.get(url) === controller) this.inFlight.delete(url);
+    if (this.entries.has(url) || this.missing.has(url)) this.loaded(url);
+    this.pump();
+  }
+
+  add(url, bitmap) {
+    if (this.entries.has(url)) {
+      bitmap.close();
+      return;
+    }
+    const bytes = 4 * bitmap.width * bitmap.height;
+    for (const [old, entry] of this.entries) {
+      if (this.bytes + bytes <= this.budget) break;
+      this.entries.delete(old);
+      this.bytes -= entry.bytes;
+      entry.bitmap.close();
+    }
+    this.entries.set(url, { bitmap, bytes });
+    this.bytes += bytes;
+    this.most = Math.max(this.most, this.bytes);
+  }
+
+  // Ask again for what was missing; a render may have gone on.
+  forgetMissing() {
+    this.missing.clear();
+  }
+}
+
+// Bytes of decoded pictures: less on phones, and whatever ?memory=MIB in the address says.
+export function memoryBudget() {
+  const asked = Number(new URLSearchParams(location.search).get("memory"));
+  if (asked > 0) return asked * 2 ** 20;
+  const small = matchMedia("(max-width: 760px), (pointer: coarse)").matches || navigator.deviceMemory < 4;
+  return (small ? 96 : 384) * 2 ** 20;
+}

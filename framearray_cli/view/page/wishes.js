@@ -1,0 +1,59 @@
+// Which tiles to load, the most wanted first: what is shown, what comes next, then sheets and pictures around it.
+
+const AHEAD = 8; // steps of a movement that are looked ahead
+const RING = 6; // full pictures around the place, each way
+
+// view: the place; velocity: [cameras, lights] a step; calm: nothing has changed for a moment, else pictures around the
+// place wait, as they would take the processor from what is shown. Returns [{ url, bytes, needed }].
+// What is needed is loaded even where the budget is too small for it.
+export function wishes(array, view, velocity, calm) {
+  const [dc, dl] = velocity;
+  const moving = dc !== 0 || dl !== 0;
+  const streams = array.parts(view).map((part) => part.stream);
+  const list = [];
+
+  const position = (stream, dlight) => {
+    if (!stream.axis) return 0;
+    const l = view.places[stream.axis] + (stream.axis === array.main.name ? dlight : 0);
+    return Math.min(stream.n - 1, Math.max(0, l));
+  };
+  const full = (offset, dlight) => {
+    const c = view.c + offset;
+    if (c < 0 || c >= array.nCameras) return;
+    for (const stream of streams) {
+      const url = array.fullUrl(stream, c, position(stream, dlight));
+      list.push({ url, bytes: array.bytes(stream, false), needed: offset === 0 && dlight === 0 });
+    }
+  };
+  const sheet = (c) => {
+    if (c < 0 || c >= array.nCameras) return;
+    for (const stream of streams) list.push({ url: array.sheetUrl(stream, c), bytes: array.bytes(stream, true) });
+  };
+
+  if (moving) sheet(view.c);
+  full(0, 0);
+  sheet(view.c);
+  if (moving) {
+    const near = Math.abs(dc) <= 2 && Math.abs(dl) <= 2; // faster than that full pictures are not seen
+    for (let k = 1; k <= AHEAD; k++) {
+      if (near) full(Math.round(k * dc), Math.round(k * dl));
+      sheet(view.c + Math.round(k * dc));
+    }
+  }
+  for (let k = 1; k <= 3; k++) for (const c of [view.c - k, view.c + k]) sheet(c);
+  if (calm) for (let k = 1; k <= 2; k++) ring(k, full);
+  for (let k = 4; k < array.nCameras; k++) for (const c of [view.c - k, view.c + k]) sheet(c);
+  if (calm) for (let k = 3; k <= RING; k++) ring(k, full);
+  return list;
+}
+
+function ring(k, full) {
+  for (let i = -k; i <= k; i++) {
+    full(i, -k);
+    full(i, k);
+    if (Math.abs(i) < k) {
+      full(-k, i);
+      full(k, i);
+    }
+  }
+}

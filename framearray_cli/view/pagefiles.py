@@ -1,0 +1,21 @@
+"""The files of the page itself: HTML, CSS and JavaScript, part of the package."""
+
+from importlib.resources import files
+from pathlib import PurePosixPath
+
+TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".svg": "image/svg+xml",
+}
+
+
+def page_files() -> dict[str, bytes]:
+    """Name -> content."""
+    return {entry.name: entry.read_bytes() for entry in (files(__package__) / "page").iterdir() if entry.is_file()}
+
+
+def content_type(name: str) -> str:
+    """What a browser is told that a file is."""
+    return TYPES[PurePosixPath(name).suffix]

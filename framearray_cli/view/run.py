@@ -1,0 +1,93 @@
+"""Shows an array in the browser, or exports the page: the only file that wires tiles, server and export."""
+
+import threading
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..errors import OutputError
+from ..files import make_folder
+from ..manifestfile import read_manifest
+from .export import check_target, export
+from .prepare import prepare_all
+from .server import PageServer
+from .tiles import Tiles
+
+FOLDER = ".view"  # of the tiles, beside the images
+
+
+def open_tiles(out: Path, cache: Path | None, threads: int) -> Tiles:
+    """Read an array's manifest and open its tiles.
+
+    Args:
+        out: output folder of a render, or its manifest.
+        cache: folder of the tiles; None: beside the images.
+
+    Raises:
+        OutputError: the manifest cannot be read, or the folder not written to.
+    """
+    manifest = read_manifest(out)
+    folder = manifest.directory / FOLDER if cache is None else cache
+    try:
+        make_folder(folder)
+        return Tiles(manifest, folder, threads)
+    except OutputError as error:
+        if cache is None:
+            error.add_note("--cache FOLDER keeps what the page needs elsewhere")
+        raise
+
+
+@contextmanager
+def serving(tiles: Tiles, port: int = 0) -> Iterator[PageServer]:
+    """Serve the page while the context lasts."""
+    with PageServer(tiles, port) as server:
+        thread = threading.Thread(target=server.serve_forever, args=(0.1,), daemon=True)
+        thread.start()
+        try:
+            yield server
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+def show(
+    tiles: Tiles,
+    *,
+    port: int,
+    browser: bool,
+    threads: int,
+    opened: Callable[[str], None],
+    progress: Callable[[int], None],
+    prepared: Callable[[list[OutputError]], None],
+) -> None:
+    """Serve the page until the process is asked to end; the tiles are made meanwhile.
+
+    Args:
+        opened: called with the address.
+        progress: called with the number of pictures that became ready.
+        prepared: called once all are, with what is wrong with images.
+    """
+    with serving(tiles, port) as server:
+        opened(server.url)
+        if browser:
+            webbrowser.open(server.url)
+        prepared(prepare_all(tiles, threads, progress))
+        threading.Event().wait()
+
+
+def write_page(
+    tiles: Tiles, target: Path, *, threads: int, progress: Callable[[int], None]
+) -> tuple[int, list[OutputError]]:
+    """Export the page.
+
+    Returns:
+        Bytes written, and what is wrong with images.
+
+    Raises:
+        OutputError: the target holds other files or cannot be written.
+    """
+    target = target.resolve()  # "." has no name to put another beside
+    check_target(target)
+    problems = prepare_all(tiles, threads, progress)
+    return export(tiles, target), problems

@@ -1,0 +1,119 @@
+"""Serves the page and the tiles of one array to browsers on this machine, and nothing else.
+
+A request never becomes a file name: it is looked up among the page's files, or read as key, camera and position.
+"""
+
+import re
+from email.utils import formatdate, parsedate_to_datetime
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+from urllib.parse import urlsplit
+
+from ..errors import OutputError
+from ..files import reason
+from .pagefiles import content_type, page_files
+from .tiles import INDEX, Tiles
+
+HOST = "127.0.0.1"
+TILE = re.compile(r"/tiles/([\w-]+)/c(\d{4,9})(?:\.l(\d{3,9}))?\.jpg", re.ASCII)
+# Names that this machine calls itself. Others could be those of a page elsewhere that points its own name here.
+HOSTS = ("127.0.0.1", "localhost")
+
+
+class PageServer(ThreadingHTTPServer):
+    """Answers requests, each connection in a thread of its own, until it is shut down."""
+
+    daemon_threads = True
+    request_queue_size = 64  # browsers open several connections at once
+
+    def __init__(self, tiles: Tiles, port: int) -> None:
+        """Listen.
+
+        Args:
+            port: 0 takes one that is free.
+
+        Raises:
+            OutputError: the port is taken.
+        """
+        self.tiles, self.page = tiles, page_files()
+        try:
+            super().__init__((HOST, port), _Handler)
+        except (OSError, OverflowError) as error:
+            why = reason(error) if isinstance(error, OSError) else str(error)
+            raise OutputError(f"port {port}: cannot be used: {why}; --port 0 takes one that is free") from error
+
+    @property
+    def url(self) -> str:
+        return f"http://{HOST}:{self.server_port}/"
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing: a browser that leaves closes its connections in the middle of answers."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: PageServer
+    protocol_version = "HTTP/1.1"  # connections are kept: a drag asks for hundreds of files
+    disable_nagle_algorithm = True  # else the end of an answer waits 40 ms for an acknowledgement
+    wbufsize = -1  # head and body leave together
+
+    def do_GET(self) -> None:
+        self._answer(body=True)
+
+    def do_HEAD(self) -> None:
+        self._answer(body=False)
+
+    def _answer(self, body: bool) -> None:
+        host = self.headers.get("Host", "").rpartition(":")[0] or self.headers.get("Host", "")
+        if host not in HOSTS:
+            self._send(HTTPStatus.MISDIRECTED_REQUEST, b"not this host\n", "text/plain", body=body)
+            return
+        path = urlsplit(self.path).path
+        try:
+            data, kind, time_s = self._found(path)
+        except (OutputError, OSError) as error:
+            self._send(HTTPStatus.NOT_FOUND, f"{error}\n".encode(errors="replace"), "text/plain", body=body)
+            return
+        if time_s is not None and self._known(time_s):
+            self._send(HTTPStatus.NOT_MODIFIED, b"", kind, time_s, body=False)
+        else:
+            self._send(HTTPStatus.OK, data, kind, time_s, body=body)
+
+    def _found(self, path: str) -> tuple[bytes, str, int | None]:
+        """Content, its type, and its time in whole seconds, of tiles alone."""
+        tiles = self.server.tiles
+        if match := TILE.fullmatch(path):
+            key, c, l = match.groups()
+            file = tiles.tile(key, int(c), None if l is None else int(l))
+            return file.read_bytes(), "image/jpeg", int(file.stat().st_mtime)
+        if path == f"/{INDEX}":
+            return (tiles.folder / INDEX).read_bytes(), "application/json", None
+        name = path.removeprefix("/") or "index.html"
+        if name not in self.server.page:
+            raise OutputError(f"{path}: no such file")
+        return self.server.page[name], content_type(name), None
+
+    def _known(self, time_s: int) -> bool:
+        since = self.headers.get("If-Modified-Since", "")
+        try:
+            return int(parsedate_to_datetime(since).timestamp()) == time_s
+        except (TypeError, ValueError):
+            return False
+
+    def _send(
+        self, status: HTTPStatus, data: bytes, kind: str, time_s: int | None = None, *, body: bool = True
+    ) -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Cache-Control", "no-cache")  # ask again: the array may have been rendered anew
+        self.send_header("X-Content-Type-Options", "nosniff")
+        if time_s is not None:
+            self.send_header("Last-Modified", formatdate(time_s, usegmt=True))
+        if status != HTTPStatus.NOT_MODIFIED:
+            self.send_header("Content-Length", str(len(data)))
+        self.end_headers()
+        if body:
+            self.wfile.write(data)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Say nothing: the terminal shows how far the tiles are."""

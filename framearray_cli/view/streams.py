@@ -1,0 +1,147 @@
+"""What the page shows: streams of pictures of one kind, each with a picture for a camera and a place along its axis."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ..arrays import Float32, Image
+from ..errors import OutputError
+from ..images import read_image
+from ..manifest import Manifest, ManifestGroup, image_path, layers_path
+from .coding import PLAIN, Coding, coding_for, data_coding
+
+Role = Literal["image", "group", "ambient", "background", "layer"]
+ReadLayers = Callable[[Path], dict[str, Float32]]
+
+# Pictures that the coding is chosen from, spread over the array: 3 to 8 ms each, before the page opens.
+SAMPLES = 24
+LAYER_SAMPLES = 6  # files of layers are larger: 20 ms each
+# Layers by their name in the file: name on the page, channels, and whether exposure applies to them.
+LAYERS = {
+    "obscurance": ("Obscurance", "RGB", True),
+    "indirect": ("Indirect", "RGB", True),
+    "reflectivity": ("Reflectivity", "RGB", True),
+    "depth": ("Depth", "Z", False),
+    "samples": ("Samples", "", False),
+    "normal": ("Normals", "XYZ", False),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stream:
+    """Pictures of one kind.
+
+    Attributes:
+        key: its folder, and its name in the index.
+        role: what it is to the picture on the screen.
+        label: its name on the page.
+        axis: of light positions; "" where the light changes nothing.
+        n: positions along it, 1 without an axis.
+        group: of sources, of role "group" alone.
+        coding: of its values.
+    """
+
+    key: str
+    role: Role
+    label: str
+    axis: str = ""
+    n: int = 1
+    group: ManifestGroup | None = None
+    coding: Coding = PLAIN
+
+
+def streams_of(manifest: Manifest) -> list[Stream]:
+    """All streams of an array, without their codings; layers only where the first file of them has them."""
+    axes = manifest.axes
+    found = []
+    if manifest.groups:
+        for k, group in enumerate(manifest.groups):
+            n = axes[group.axis]
+            found.append(Stream(key=f"g{k}", role="group", label=group.name, axis=group.axis, n=n, group=group))
+        found.append(Stream(key="ambient", role="ambient", label="Ambient"))
+        if manifest.background_images:
+            found.append(Stream(key="background", role="background", label="Background"))
+    else:
+        ((axis, n),) = axes.items()
+        found.append(Stream(key="light", role="image", label="Picture", axis=axis, n=n))
+    return found
+
+
+def layer_streams(channels: dict[str, Float32]) -> list[Stream]:
+    """Streams of the layers that a file has."""
+    return [
+        Stream(key=name, role="layer", label=label)
+        for name, (label, letters, _) in LAYERS.items()
+        if all(channel in channels for channel in _channels(name, letters))
+    ]
+
+
+def source_file(manifest: Manifest, stream: Stream, c: int, l: int) -> Path:
+    """The file of the array that a picture comes from."""
+    if stream.role in ("image", "group"):
+        return image_path(manifest, c, l, stream.group)
+    if stream.role == "layer":
+        return layers_path(manifest, c)
+    pattern = manifest.ambient_images if stream.role == "ambient" else manifest.background_images
+    return manifest.directory / pattern.format(camera=c)
+
+
+def read_values(manifest: Manifest, stream: Stream, c: int, l: int, read_layers: ReadLayers) -> Float32:
+    """Read a picture: (h, w, 3), or (h, w, 1) for layers of one channel.
+
+    Raises:
+        OutputError: the file is missing, damaged, or of another size.
+    """
+    path = source_file(manifest, stream, c, l)
+    if stream.role == "layer":
+        channels = read_layers(path)
+        names = _channels(stream.key, LAYERS[stream.key][1])
+        missing = [name for name in names if name not in channels]
+        if missing:
+            raise OutputError(f"{path}: expected the channels {', '.join(names)}, found no {missing[0]}")
+        values = np.stack([channels[name] for name in names], axis=-1)
+        if stream.key == "depth" and not stream.coding.scale:
+            values = np.where(values > 0, values, stream.coding.high)  # nothing is hit: as far as can be
+    else:
+        values = read_image(path)
+    width, height = manifest.resolution
+    if values.shape[:2] != (height, width):
+        raise OutputError(f"{path}: expected {width} x {height} pixels, got {values.shape[1]} x {values.shape[0]}")
+    return values
+
+
+def choose_coding(manifest: Manifest, stream: Stream, read_layers: ReadLayers) -> Coding:
+    """Choose how a stream is coded, from a few pictures of it that are there."""
+    if stream.key == "normal" and stream.role == "layer":
+        return Coding(scale=0.0, low=-1.0, high=1.0)
+    if _is_clipped(manifest, stream):
+        return PLAIN
+    largest = max((float(values.max()) for values in _some(manifest, stream, read_layers)), default=0.0)
+    if stream.role == "layer" and not LAYERS[stream.key][2]:
+        return data_coding(largest)
+    return coding_for(largest)
+
+
+def _some(manifest: Manifest, stream: Stream, read_layers: ReadLayers) -> Iterator[Image]:
+    """A few pictures of a stream, spread over both axes."""
+    total = manifest.n_cameras * stream.n
+    # Even steps could meet the same few lights again and again; those of the golden ratio do not.
+    count = LAYER_SAMPLES if stream.role == "layer" else SAMPLES
+    places = {int(total * ((k * 0.6180339887498949) % 1)) for k in range(min(count, total))}
+    for place in sorted(places):
+        try:
+            yield read_values(manifest, stream, *divmod(place, stream.n), read_layers)
+        except OutputError:  # not rendered yet, or damaged; told when it is prepared
+            continue
+
+
+def _is_clipped(manifest: Manifest, stream: Stream) -> bool:
+    """Whether the array itself keeps nothing beyond 1."""
+    return stream.role != "layer" and source_file(manifest, stream, 0, 0).suffix.lower() in (".png", ".jpg", ".jpeg")
+
+
+def _channels(name: str, letters: str) -> list[str]:
+    return [f"{name}.{letter}" for letter in letters] or [name]

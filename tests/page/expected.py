@@ -1,0 +1,30 @@
+"""What the page must show, computed from the tiles by numpy, with how far the browser may be off."""
+
+import numpy as np
+
+from framearray_cli.arrays import Bytes, Float64
+from framearray_cli.colour import srgb_from_linear
+from framearray_cli.images import read_codes
+from framearray_cli.view.coding import decode
+from framearray_cli.view.tiles import Tiles
+
+Part = tuple[str, int, tuple[float, float, float]]  # key of a stream, position, RGB factor
+
+
+def bounds(tiles: Tiles, c: int, parts: list[Part], exposure: float = 0.0) -> tuple[Float64, Float64]:
+    """Lowest and highest 8-bit sRGB values of a sum of tiles, if decoders of JPEG differ by one code."""
+    coding = {stream.key: stream.coding for stream in tiles.streams}
+    ends = []
+    for step in (-1, 1):
+        total = np.zeros((*tiles.manifest.resolution[::-1], 3))
+        for key, l, factor in parts:
+            codes = read_codes(tiles.tile(key, c, l)).astype(np.int16) + step
+            total += decode(np.clip(codes, 0, 255).astype(np.uint8), coding[key]) * np.array(factor)
+        # half a code where the browser rounds
+        ends.append(255 * srgb_from_linear(total * 2.0**exposure) + 0.5 * step)
+    return ends[0], ends[1]
+
+
+def outside(pixels: Bytes, low: Float64, high: Float64) -> float:
+    """Share of values that are not within bounds."""
+    return float(np.mean((pixels < low) | (pixels > high)))
