@@ -15,11 +15,11 @@ PACKAGE = Path(framearray_cli.__file__).parent
 FLOW = """
 __init__ errors arrays kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
 compiling files framerate filepatterns fingerprint colour sphere
-jobvalues jobkeys jobmethod job jobschema jobdocs problems eyefile jobfile
+jobvalues jobtimes jobkeys jobmethod job jobschema jobdocs problems eyefile jobfile
 meshes/assets meshes/container meshes/model meshes/defaults meshes/cleaning meshes/polygons meshes/merge
 meshes/overrides meshes/textures meshes/opacity meshes/mtl meshes/walk meshes/gltf_materials meshes/gltf_prepare
 meshes/gltf meshes/obj meshes/other meshes/read meshes/__init__
-scene paths camera lights sampling surface
+scene sun paths camera lights sampling surface
 embree/packets embree/masks embree/native embree/fallback embree/__init__
 rays hits eyehits plan allotment
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
@@ -66,9 +66,22 @@ DOORS = {
     "psutil": ("memory",),
     "xxhash": ("record",),
     "filelock": ("folderlock",),
+    "pvlib": ("sun",),
 }
 # What takes long to import, or may be absent: `framearray --help` does without.
-HEAVY = ("numba", "llvmlite", "embreex", "trimesh", "OpenImageIO", "PIL", "scipy", "av", "matplotlib", "jinja2")
+HEAVY = (
+    "numba",
+    "llvmlite",
+    "embreex",
+    "trimesh",
+    "OpenImageIO",
+    "PIL",
+    "scipy",
+    "av",
+    "matplotlib",
+    "jinja2",
+    "pvlib",
+)
 
 FILES = {path.relative_to(PACKAGE).with_suffix("").as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}
 
