@@ -16,7 +16,10 @@ from framearray_cli.errors import JobError, MissingExtraError
 from framearray_cli.job import Job
 from framearray_cli.jobfile import job_table, read_job
 from framearray_cli.lights import light_arrays
+from framearray_cli.manifestfile import read_manifest
 from framearray_cli.paths import lights
+from framearray_cli.pictures import Pictures
+from framearray_cli.render import render
 from framearray_cli.sun import daylight, sun_at, sun_between
 
 pytest.importorskip("pvlib", reason="the extra `sun` is not installed")
@@ -212,3 +215,23 @@ def no_pvlib(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def test_without_the_library_it_is_named() -> None:
     with pytest.raises(MissingExtraError, match=r'pip install "framearray\[sun\]"'):
         lights(job())
+
+
+@pytest.mark.parametrize("group", [None, "sun"])
+def test_an_array_tells_where_the_sun_stood_and_is_dark_before_it_rises(group: str | None, tmp_path: Path) -> None:
+    tiny.save_glb(tiny.room_meshes(), tmp_path / "tiny.glb")
+    wanted = job(
+        3, scene={"file": str(tmp_path / "tiny.glb")}, start="02:00", stop="12:00", group=group, irradiance=6.0
+    )
+    output = wanted.output.model_copy(update={"directory": tmp_path / "out"})
+    render(wanted.model_copy(update={"output": output}))
+    manifest = read_manifest(tmp_path / "out")
+    noted = manifest.groups[0].lights if group else manifest.lights
+    sources = [light.sources[0] for light in noted]
+    assert [source["time"] for source in sources] == [f"2026-06-21T{hour:02}:00:00+02:00" for hour in (2, 7, 12)]
+    sun = sun_between("2026-06-21", "02:00:00", "12:00:00", "Europe/Berlin", (52.52, 13.405), 3)
+    np.testing.assert_allclose([source["azimuth"] for source in sources], sun.azimuth_deg, atol=1e-4)
+    np.testing.assert_allclose([source["elevation"] for source in sources], sun.elevation_deg, atol=1e-4)
+    pictures = [Pictures(manifest).picture(0, (l,)) for l in range(3)]
+    assert pictures[0].max() == 0  # the sky is black here
+    assert min(picture.max() for picture in pictures[1:]) > 0.1
