@@ -11,6 +11,7 @@ from . import __version__
 from .commands.assemble import assemble
 from .commands.check import check
 from .commands.export import export
+from .commands.init import init
 from .commands.options import fail, notes, problems
 from .commands.render import render
 from .commands.report import report
@@ -31,7 +32,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain text, also in a log file
 )
 
-for command in (render, check, verify, assemble, sheet, export, report, schema):
+for command in (init, render, check, verify, assemble, sheet, export, report, schema):
     app.command()(command)
 
 

@@ -18,6 +18,7 @@ compiling files framerate filepatterns fingerprint colour sphere
 jobvalues jobtimes jobkeys jobmethod job jobschema jobdocs problems eyefile jobfile
 meshes/assets meshes/container meshes/model meshes/defaults meshes/cleaning meshes/polygons meshes/merge
 meshes/overrides meshes/textures meshes/opacity meshes/mtl meshes/walk meshes/gltf_materials meshes/gltf_prepare
+meshes/gltf_motion meshes/gltf_stage
 meshes/gltf meshes/obj meshes/other meshes/read meshes/__init__
 scene sun paths camera lights sampling surface
 embree/packets embree/masks embree/native embree/fallback embree/__init__
@@ -27,13 +28,15 @@ terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise standarderror compose accumulate window
 imageattributes images manifest manifestfile pictures ranges record resume folderlock outfolder stored writer
 prepare memory acceptance expected auto allot target describe summary render check verify
+start/rays start/sample start/views start/room start/orbit start/model start/staged start/expose start/plan
+start/text start/__init__
 moviepath movies assemble
 places sheet
 export/selection export/folder export/points export/colmap export/nerfstudio export/cinema export/write export/__init__
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
 screen interrupts wording
-commands/__init__ commands/options commands/render commands/check commands/verify
+commands/__init__ commands/options commands/init commands/render commands/check commands/verify
 commands/assemble commands/sheet commands/export commands/report commands/schema
 cli __main__
 """
