@@ -11,6 +11,7 @@ from . import __version__
 from .commands.assemble import assemble
 from .commands.check import check
 from .commands.export import export
+from .commands.init import init
 from .commands.options import fail, notes, problems
 from .commands.render import render
 from .commands.report import report
@@ -32,7 +33,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain text, also in a log file
 )
 
-for command in (render, check, verify, assemble, view, sheet, export, report, schema):
+for command in (render, check, verify, init, assemble, view, sheet, export, report, schema):
     app.command()(command)
 
 

@@ -107,6 +107,7 @@ def _lights(
             ambient_error=tuple((i_a[l] * float(ambient.standard_error[l])).tolist()),
             sources=tuple(
                 {"type": s.kind, _KEYS[s.kind][0]: s.vector[l].tolist(), _KEYS[s.kind][1]: s.intensity[l].tolist()}
+                | (s.notes[l] if s.notes else {})
                 for s in sources
             ),
         )

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
+from .jobtimes import Clock, Date, Zone
 from .jobvalues import Direction, Emission, FileName, Place, Point, Size, Table, Triple, computed, fail, fill, shown
 
 MAIN_AXIS = "light"  # of sources that name no axis
@@ -206,7 +207,42 @@ class DirectionalSource(_Source):
     )
 
 
-Source: TypeAlias = Annotated[PointSource | DirectionalSource, Field(discriminator="type")]
+class SunSource(_Source):
+    """The sun over a place on Earth on one day; below the horizon it shines 0. It needs the extra `sun`."""
+
+    type: Literal["sun"] = Field(description="Kind of source.")
+    latitude: float = Field(ge=-90, le=90, description="Of the place, degrees; north is positive.")
+    longitude: float = Field(ge=-180, le=180, description="Of the place, degrees; east is positive.")
+    date: Date = Field(description="The day.")
+    timezone: Zone = Field(description="Whose clocks show the times: a name of the IANA, or the hours ahead of UTC.")
+    start: Clock = Field(description="Local time of the first light position.")
+    stop: Clock = Field(
+        description="Local time of the last. The positions of `[light] frames` are evenly spaced in time between them."
+    )
+    north: Direction | None = Field(
+        default=None,
+        description="Direction in the scene that points north; what of it is up does not count.",
+        json_schema_extra=computed("-z in a scene with y up, y in one with z up, so that east is x"),
+    )
+    irradiance: Emission = Field(
+        description="Irradiance of a surface that faces the sun, W/m2; one number means white. Clear air lets about "
+        "1000 W/m2 through; choose what suits the exposure."
+    )
+
+    @field_validator("stop")
+    @classmethod
+    def _after_start(cls, stop: str, info: ValidationInfo) -> str:
+        if stop <= info.data.get("start", ""):
+            fail([((), f"expected a time after the start, {info.data['start']}, got {stop}")])
+        return stop
+
+    @property
+    def keys(self) -> tuple[DirectionalKey, ...]:
+        """No key frames: the positions follow from the times."""
+        return ()
+
+
+Source: TypeAlias = Annotated[PointSource | DirectionalSource | SunSource, Field(discriminator="type")]
 
 
 class SourceGroup(NamedTuple):
@@ -273,11 +309,17 @@ class LightTable(Table):
     @model_validator(mode="after")
     def _fill_frames(self) -> "LightTable":
         last = {axis: -1 for axis in self.axes}
+        counted = {*self.axes, *([MAIN_AXIS] if "frames" in self.model_fields_set else [])}
         for source in self.sources:
-            last[source.axis or MAIN_AXIS] = max(last.get(source.axis or MAIN_AXIS, -1), source.keys[-1].frame)
-        for axis in self.axes:
-            if last[axis] < 0:
+            axis = source.axis or MAIN_AXIS
+            last[axis] = max(last.get(axis, -1), source.keys[-1].frame if source.keys else 0)
+            counted |= {axis} if source.keys else set()
+        for axis, frame in last.items():
+            if frame < 0:
                 fail([(("axes", axis), "expected a source with this axis, found none")])
+            if axis not in counted:
+                place = ("frames",) if axis == MAIN_AXIS else ("axes", axis)
+                fail([(place, "missing; expected the number of positions of the sun, which has no key frames")])
         if "frames" not in self.model_fields_set:
             fill(self, "frames", last.get(MAIN_AXIS, 0) + 1)
         elif MAIN_AXIS not in last and self.frames != 1:  # 1 is what a job says that was written with all defaults

@@ -108,12 +108,12 @@ def words(root: Schema, node: Schema) -> str:
     if "x-words" in node:
         return str(node["x-words"])
     if choices := node.get("enum", [node["const"]] if "const" in node else list(variants(root, node))):
-        return "a table" if "oneOf" in node else _either([f'"{choice}"' for choice in choices])
+        return "a table" if "oneOf" in node else either([f'"{choice}"' for choice in choices])
     if "anyOf" in node:
         first, *others = node["anyOf"]
         if others and others[0].get("items") == first:  # grey or RGB: the bounds are said once
             return f"a number or {others[0]['minItems']} numbers {_range(first)}".rstrip()
-        return _either([words(root, option) for option in node["anyOf"]])
+        return either([words(root, option) for option in node["anyOf"]])
     match node.get("type"):
         case "integer":
             return f"a whole number {_range(node)}".rstrip()
@@ -143,7 +143,7 @@ def _range(node: Schema) -> str:
     return between(low, high)
 
 
-def _either(options: list[str]) -> str:
+def either(options: list[str]) -> str:
     """Join options as a sentence does."""
     return options[0] if len(options) == 1 else f"{', '.join(options[:-1])} or {options[-1]}"
 

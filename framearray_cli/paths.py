@@ -7,15 +7,16 @@ Before the first and after the last key everything rests.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from .arrays import Float64, WorldPoints
 from .errors import JobError
 from .job import Job
-from .jobkeys import CameraKey, DirectionalKey, PointKey
+from .jobkeys import CameraKey, DirectionalKey, PointKey, SunSource
 from .sphere import directions_between, unit
+from .sun import NEVER, daylight, sun_between, to_sun
 
 # Look and up closer to parallel than this (radians) leave no digits to tell what is right of the picture.
 PARALLEL = 1e-6
@@ -49,11 +50,13 @@ class LightPath:
         kind: "point" or "directional".
         vector: (n, 3) position in scene units, or unit direction in which the light travels.
         intensity: (n, 3) linear RGB, times the source's colour: W/sr of a point, W/m2 of a directional source.
+        notes: what else the manifest says of each position, n tables; or none.
     """
 
     kind: Literal["point", "directional"]
     vector: Float64
     intensity: Float64
+    notes: tuple[dict[str, Any], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,18 +123,22 @@ def eyes(job: Job) -> Eyes:
 
 
 def lights(job: Job) -> Lights:
-    """Place and set every source at every light index of a job."""
+    """Place and set every source at every light index of a job.
+
+    Raises:
+        JobError: a sun that never shines, or whose north points up.
+        MissingExtraError: there is a sun, and pvlib is not installed.
+    """
     table = job.light
     if not table.groups:
-        return Lights(sources=tuple(_light_path(source.type, source.keys, table.frames) for source in table.sources))
+        return Lights(sources=tuple(_placed(job, i, table.frames) for i in range(len(table.sources))))
     n, groups, found = sum(group.n for group in table.groups), [], {}
     n_all, first = n + (2 if any(job.scene.background) else 1), 0
     for group in table.groups:
         positions = range(first, first + group.n)
         groups.append(LightGroup(name=group.name, axis=group.axis, positions=positions, sources=group.sources))
         for i in group.sources:
-            source = table.sources[i]
-            found[i] = _within(_light_path(source.type, source.keys, group.n), positions, n_all)
+            found[i] = _within(_placed(job, i, group.n), positions, n_all)
         first = positions.stop
     return Lights(sources=tuple(found[i] for i in sorted(found)), groups=tuple(groups))
 
@@ -141,7 +148,44 @@ def _within(path: LightPath, positions: range, n: int) -> LightPath:
     own = np.clip(np.arange(n) - positions.start, 0, len(positions) - 1)
     intensity = np.zeros((n, 3))
     intensity[positions.start : positions.stop] = path.intensity
-    return LightPath(kind=path.kind, vector=path.vector[own], intensity=intensity)
+    notes = tuple(path.notes[k] for k in own) if path.notes else ()
+    return LightPath(kind=path.kind, vector=path.vector[own], intensity=intensity, notes=notes)
+
+
+def _placed(job: Job, i: int, n: int) -> LightPath:
+    """Place and set source i at n light positions."""
+    source = job.light.sources[i]
+    if isinstance(source, SunSource):
+        return _sun_path(source, job, f"light.sources[{i}]", n)
+    return _light_path(source.type, source.keys, n)
+
+
+def _sun_path(source: SunSource, job: Job, name: str, n: int) -> LightPath:
+    """Place the sun."""
+    up_dir = np.array([0.0, 0.0, 1.0] if job.scene.up == "z" else [0.0, 1.0, 0.0])
+    north_vec = unit(np.array(source.north or ((0.0, 1.0, 0.0) if job.scene.up == "z" else (0.0, 0.0, -1.0))))
+    north_vec = north_vec - (north_vec @ up_dir) * up_dir
+    if np.linalg.norm(north_vec) <= PARALLEL:
+        problem = f'{name}.north: expected a direction that is not up, got the up axis of the scene, "{job.scene.up}"'
+        raise JobError(job.file or job.name, [problem])
+    place = (source.latitude, source.longitude)
+    sun = sun_between(source.date, source.start, source.stop, source.timezone, place, n)
+    if not sun.is_up.any():
+        hours = daylight(source.date, source.timezone, place)
+        when = "it does not rise on that day" if hours == NEVER else f"on {source.date} it is up from {hours}"
+        problem = f"{name}: the sun is below the horizon from {source.start} to {source.stop}; {when}"
+        raise JobError(job.file or job.name, [problem])
+    return LightPath(
+        kind="directional",
+        vector=-to_sun(sun, up_dir, unit(north_vec)),
+        intensity=sun.is_up[:, None] * np.array(source.irradiance),
+        notes=tuple(
+            {"azimuth": round(azimuth, 4), "elevation": round(elevation, 4), "time": time.isoformat(timespec="seconds")}
+            for azimuth, elevation, time in zip(
+                sun.azimuth_deg.tolist(), sun.elevation_deg.tolist(), sun.times, strict=True
+            )
+        ),
+    )
 
 
 def _light_path(

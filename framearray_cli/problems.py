@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from .jobschema import Schema, dotted, file_schema, find, sections, variants, words
+from .jobschema import Schema, dotted, either, file_schema, find, sections, variants, words
 from .jobvalues import FARTHEST, shown
 
 # Words from other programs, for keys whose spelling is too far from ours to be found as a typing error.
@@ -76,7 +76,7 @@ def _problem(root: Schema, details: ErrorDetails) -> str:
 
 def _kinds(root: Schema, node: Schema) -> str:
     """List the values of the `type` key of a table."""
-    return " or ".join(f'"{kind}"' for kind in variants(root, node))
+    return either([f'"{kind}"' for kind in variants(root, node)])
 
 
 def _unknown_key(root: Schema, place: tuple[int | str, ...]) -> str:

@@ -1,10 +1,11 @@
 """Mesh files -> triangles, materials and textures; the only door to trimesh."""
 
 from .cleaning import finite, has_area, repeated
+from .gltf_stage import Stage, StageCamera, StageLight
 from .merge import Merged, merge, near_uvs, unit_normals, untextured_variants
 from .model import Material, Meshes, Notes, Part
 from .overrides import Override, overridden
-from .read import read_meshes
+from .read import read_meshes, read_stage
 
 __all__ = [
     "Material",
@@ -13,12 +14,16 @@ __all__ = [
     "Notes",
     "Override",
     "Part",
+    "Stage",
+    "StageCamera",
+    "StageLight",
     "finite",
     "has_area",
     "merge",
     "near_uvs",
     "overridden",
     "read_meshes",
+    "read_stage",
     "repeated",
     "unit_normals",
     "untextured_variants",

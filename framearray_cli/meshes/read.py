@@ -11,7 +11,10 @@ import numpy as np
 
 from ..errors import SceneError
 from .assets import AssetError, Assets
+from .container import open_gltf
 from .gltf import read_gltf
+from .gltf_prepare import check_readable
+from .gltf_stage import Stage, read_gltf_stage
 from .model import Meshes
 from .obj import read_obj
 from .other import read_other, readable_formats
@@ -28,26 +31,47 @@ def read_meshes(file: Path) -> Meshes:
     """
     data = _bytes_of(file)
     extension = file.suffix[1:].lower()
-    assets = Assets(folder=file.parent)
-    with _quiet() as messages, np.errstate(all="ignore"):
-        try:
-            meshes = _read(data, extension, assets)
-        except SceneError as error:
-            raise SceneError(f"{file}: {error}") from error
-        except ImportError as error:
-            package = "Pillow" if (error.name or "").startswith("PIL") else error.name
-            raise SceneError(f"{file}: reading it needs {package}; pip install {package}") from error
-        except MemoryError as error:
-            raise SceneError(f"{file}: does not fit into memory, or its header claims more than it holds") from error
-        except AssetError as error:
-            raise SceneError(f"{file}: {error}") from error
-        except Exception as error:  # readers of broken files raise whatever comes first
-            reason = " ".join(f"{type(error).__name__}: {error}".split())[:MAX_REASON].rstrip(" :")
-            raise SceneError(f"{file}: broken, or not {extension.upper()} ({reason}); export it anew") from error
+    with _quiet() as messages, np.errstate(all="ignore"), _told(file, extension):
+        meshes = _read(data, extension, Assets(folder=file.parent))
     if not any(len(part.corners) for part in meshes.parts):
         found = "; ".join((*meshes.notes, *(f"{n} triangles with {why}" for why, n in meshes.dropped.items())))
         raise SceneError(f"{file}: expected triangles, got none" + (f" ({found})" if found else ""))
     return replace(meshes, notes=meshes.notes + tuple(f"while reading: {message}" for message in messages))
+
+
+def read_stage(file: Path) -> Stage:
+    """Read the cameras and lights of a scene file; only glTF has any that are read.
+
+    Raises:
+        SceneError: missing, a folder, or broken.
+    """
+    extension = file.suffix[1:].lower()
+    if extension not in ("glb", "gltf"):
+        return Stage()
+    data = _bytes_of(file)
+    with np.errstate(all="ignore"), _told(file, extension):
+        gltf = open_gltf(data, Assets(folder=file.parent))
+        check_readable(gltf)
+        return read_gltf_stage(gltf)
+
+
+@contextmanager
+def _told(file: Path, extension: str) -> Iterator[None]:
+    """Turn whatever readers raise into a SceneError that names the file."""
+    try:
+        yield
+    except SceneError as error:
+        raise SceneError(f"{file}: {error}") from error
+    except ImportError as error:
+        package = "Pillow" if (error.name or "").startswith("PIL") else error.name
+        raise SceneError(f"{file}: reading it needs {package}; pip install {package}") from error
+    except MemoryError as error:
+        raise SceneError(f"{file}: does not fit into memory, or its header claims more than it holds") from error
+    except AssetError as error:
+        raise SceneError(f"{file}: {error}") from error
+    except Exception as error:  # readers of broken files raise whatever comes first
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:MAX_REASON].rstrip(" :")
+        raise SceneError(f"{file}: broken, or not {extension.upper()} ({reason}); export it anew") from error
 
 
 def _bytes_of(file: Path) -> bytes:

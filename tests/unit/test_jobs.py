@@ -22,7 +22,7 @@ from framearray_cli.scene import Scene, load_scene
 JOBS = Path(__file__).resolve().parents[2] / "jobs"
 ROOMS = ("cabin", "kitchen", "stairs")
 SCENES = (*ROOMS, "furnace")
-WALKS = ("smoke", *(f"{room}{size}" for room in ROOMS for size in ("", "-small")))
+WALKS = ("smoke", "kitchen-sun", *(f"{room}{size}" for room in ROOMS for size in ("", "-small")))
 FURNACES = ("furnace-20", "furnace-50", "furnace-80")
 CLEARANCE = 0.15  # metres between an eye and the nearest surface
 LAMP_CLEARANCE = 0.25  # a lamp nearer to a surface than this would burn a white spot into it

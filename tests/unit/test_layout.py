@@ -15,11 +15,12 @@ PACKAGE = Path(framearray_cli.__file__).parent
 FLOW = """
 __init__ errors arrays kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
 compiling files framerate filepatterns fingerprint colour sphere
-jobvalues jobkeys jobmethod job jobschema jobdocs problems eyefile jobfile
+jobvalues jobtimes jobkeys jobmethod job jobschema jobdocs problems eyefile jobfile
 meshes/assets meshes/container meshes/model meshes/defaults meshes/cleaning meshes/polygons meshes/merge
 meshes/overrides meshes/textures meshes/opacity meshes/mtl meshes/walk meshes/gltf_materials meshes/gltf_prepare
+meshes/gltf_motion meshes/gltf_stage
 meshes/gltf meshes/obj meshes/other meshes/read meshes/__init__
-scene paths camera lights sampling surface
+scene sun paths camera lights sampling surface
 embree/packets embree/masks embree/native embree/fallback embree/__init__
 rays hits eyehits plan allotment
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
@@ -27,6 +28,8 @@ terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise standarderror compose accumulate window
 imageattributes images manifest manifestfile pictures ranges record resume folderlock outfolder stored writer
 prepare memory acceptance expected auto allot target describe summary render check verify
+start/rays start/sample start/views start/room start/orbit start/model start/staged start/expose start/plan
+start/text start/__init__
 imagecheck
 movie/__init__ movie/places movie/easing movie/curves movie/pathfile movie/timeline movie/sweep
 movie/cube movie/display movie/label movie/look movie/yuv movie/video movie/animation movie/sequence movie/assemble
@@ -37,7 +40,7 @@ view/__init__
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
 screen interrupts wording
-commands/__init__ commands/options commands/render commands/check commands/verify
+commands/__init__ commands/options commands/init commands/render commands/check commands/verify
 commands/assemble commands/sheet commands/export commands/report commands/schema
 commands/view
 cli __main__
@@ -71,9 +74,22 @@ DOORS = {
     "psutil": ("memory",),
     "xxhash": ("record",),
     "filelock": ("folderlock",),
+    "pvlib": ("sun",),
 }
 # What takes long to import, or may be absent: `framearray --help` does without.
-HEAVY = ("numba", "llvmlite", "embreex", "trimesh", "OpenImageIO", "PIL", "scipy", "av", "matplotlib", "jinja2")
+HEAVY = (
+    "numba",
+    "llvmlite",
+    "embreex",
+    "trimesh",
+    "OpenImageIO",
+    "PIL",
+    "scipy",
+    "av",
+    "matplotlib",
+    "jinja2",
+    "pvlib",
+)
 
 FILES = {path.relative_to(PACKAGE).with_suffix("").as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}
 

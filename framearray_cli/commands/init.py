@@ -1,0 +1,57 @@
+"""`framearray init`."""
+
+import shlex
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..compiling import compile_clock
+from ..errors import JobError
+from ..screen import Screen, out, say
+from .options import Quiet, fail, place, problems
+
+MOST = 1000  # frames or lights of a first job
+
+
+def init(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file: GLB, OBJ, STL, ...", show_default=False)],
+    target: Annotated[
+        str | None,
+        typer.Option("--output", "-o", help="Job file; default: the scene's name, here.", metavar="JOB"),
+    ] = None,
+    camera: Annotated[
+        str | None, typer.Option("--camera", help="Which camera of the file; default: the first.", metavar="NAME")
+    ] = None,
+    frames: Annotated[
+        int | None,
+        typer.Option("--frames", min=1, max=MOST, help="Frames of the camera.", metavar="N", show_default=False),
+    ] = None,
+    lights: Annotated[
+        int | None,
+        typer.Option("--lights", min=1, max=MOST, help="Positions of the light.", metavar="N", show_default=False),
+    ] = None,
+    inside: Annotated[
+        bool | None,
+        typer.Option("--inside/--outside", help="Take the scene for a room, or for a thing to look at."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a job file that is there.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a first job for a scene: camera, lights and exposure are found or chosen."""
+    job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else place(target)
+    with Screen(out, quiet=quiet) as screen:
+        screen.wait("looking around in the scene")
+        from ..start import Wishes
+        from ..start import init as run
+
+        try:
+            with compile_clock(screen.compiling):
+                wishes = Wishes(camera=camera, frames=frames, lights=lights, inside=inside)
+                start = run(scene, job_file, wishes, force=force)
+        except JobError as error:
+            fail(problems(error, "nothing was written"), error.exit_code)
+    if not quiet:
+        images = start.camera.frames * start.light_frames
+        size = f"{start.camera.frames} eyes x {start.light_frames} lights = {images} images"
+        say(out, [*start.about, f"{job_file}: {size}; next: framearray render {shlex.quote(str(job_file))}"])

@@ -1,0 +1,91 @@
+"""Dates, times of day and time zones of a job file: kept as plain text, so that a job stays plain tables."""
+
+import datetime
+import re
+from difflib import get_close_matches
+from typing import Annotated, TypeAlias
+from zoneinfo import ZoneInfo, available_timezones
+
+from pydantic import PlainValidator, WithJsonSchema
+
+from .jobvalues import fail, shown
+
+MOST_OFFSET = 14.0  # hours; no place on Earth is farther from UTC
+YEARS = (1000, 3000)  # farther away nobody knows how the Earth turns to a second, and its calendar was another
+
+
+def _date(value: object) -> str:
+    """Check a date: TOML's own, or text such as "2026-06-21"."""
+    if isinstance(value, str) and re.fullmatch(r"\d{4}-\d{2}-\d{2}", value.strip()):
+        try:
+            value = datetime.date.fromisoformat(value.strip())
+        except ValueError:
+            fail([((), f"expected a date that the calendar has, got {shown(value)}")])
+    if not isinstance(value, datetime.date) or isinstance(value, datetime.datetime):
+        fail([((), f"expected a date such as 2026-06-21, got {shown(value)}")])
+    if not YEARS[0] <= value.year <= YEARS[1]:
+        fail([((), f"expected a year from {YEARS[0]} to {YEARS[1]}, got {value.year}")])
+    return value.isoformat()
+
+
+def _clock(value: object) -> str:
+    """Check a time of day: TOML's own, or text such as "09:30"."""
+    if isinstance(value, datetime.time) and value.tzinfo is None:
+        return value.isoformat(timespec="seconds")
+    if isinstance(value, str) and re.fullmatch(r"\d{1,2}:\d{2}(:\d{2})?", value.strip()):
+        try:
+            return datetime.time.fromisoformat(value.strip().zfill(5)).isoformat(timespec="seconds")
+        except ValueError:
+            pass
+    fail([((), f'expected a time of day from "00:00" to "23:59", got {shown(value)}')])
+
+
+def _zone(value: object) -> str | float:
+    """Check a time zone: a name of the IANA, or hours ahead of UTC."""
+    if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= MOST_OFFSET:
+        return float(value)
+    if isinstance(value, str) and value.strip():
+        try:
+            return ZoneInfo(value.strip()).key
+        except (KeyError, ValueError, OSError):  # unknown, not a relative path, or a folder of the data
+            _unknown_zone(value)
+    text = f'expected a time zone such as "Europe/Berlin", or hours from -{MOST_OFFSET:g} to {MOST_OFFSET:g}'
+    fail([((), f"{text}, got {shown(value)}")])
+
+
+def _unknown_zone(value: str) -> None:
+    """Tell what is wrong with a name, and which was probably meant."""
+    known = available_timezones()
+    if not known:  # Windows has no such data of its own
+        fail([((), "this machine has no list of time zones; pip install tzdata, or give the hours ahead of UTC")])
+    by_city = {name.rpartition("/")[2].lower(): name for name in sorted(known)}
+    city = value.strip().rpartition("/")[2].lower().replace(" ", "_")
+    close = get_close_matches(city, by_city, n=1, cutoff=0.7)
+    meant = f'; did you mean "{by_city[close[0]]}"?' if close else '; expected a name such as "Europe/Berlin"'
+    fail([((), f"unknown time zone {shown(value)}{meant}")])
+
+
+def zone_of(value: str | float) -> datetime.tzinfo:
+    """The time zone that a checked value names."""
+    if isinstance(value, str):
+        return ZoneInfo(value)
+    return datetime.timezone(datetime.timedelta(hours=value))
+
+
+def moment(date: str, clock: str, zone: datetime.tzinfo) -> datetime.datetime:
+    """The moment at which clocks of a zone show a checked date and time."""
+    day, time = datetime.date.fromisoformat(date), datetime.time.fromisoformat(clock)
+    return datetime.datetime.combine(day, time, tzinfo=zone)
+
+
+_DATE = WithJsonSchema({"type": "string", "format": "date", "x-words": "a date such as 2026-06-21"})
+_CLOCK = WithJsonSchema({"type": "string", "x-words": 'a time of day such as "09:30"'})
+_ZONE = WithJsonSchema(
+    {
+        "anyOf": [{"type": "string"}, {"type": "number", "minimum": -MOST_OFFSET, "maximum": MOST_OFFSET}],
+        "x-words": 'a name such as "Europe/Berlin", or hours ahead of UTC',
+    }
+)
+Date: TypeAlias = Annotated[str, PlainValidator(_date), _DATE]
+Clock: TypeAlias = Annotated[str, PlainValidator(_clock), _CLOCK]
+Zone: TypeAlias = Annotated[str | float, PlainValidator(_zone), _ZONE]

@@ -1,0 +1,123 @@
+"""Cameras and lights that a glTF file brings along, and where they are at any time."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from ..arrays import Float64
+from .container import Gltf, Tree
+from .gltf_motion import Motion, read_motion
+
+PUNCTUAL = "KHR_lights_punctual"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageCamera:
+    """A perspective camera; it looks along -z of its node, y is up in the picture.
+
+    Attributes:
+        fov_deg: vertical field of view, degrees.
+        aspect: width over height, where the file says it.
+    """
+
+    name: str
+    node: int
+    fov_deg: float
+    aspect: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageLight:
+    """A light; directional light travels along -z of its node.
+
+    Attributes:
+        intensity: (3,) linear RGB: candela of a point or spot, lux of a directional light.
+    """
+
+    name: str
+    node: int
+    kind: Literal["point", "directional", "spot"]
+    intensity: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stage:
+    """Cameras and lights of a scene file, in the order of its nodes; both may be missing.
+
+    Attributes:
+        motion: None where the format has none.
+        notes: what was found and cannot be used.
+    """
+
+    cameras: tuple[StageCamera, ...] = ()
+    lights: tuple[StageLight, ...] = ()
+    motion: Motion | None = None
+    notes: tuple[str, ...] = ()
+
+    def world_from(self, node: int, times: list[float]) -> Float64:
+        """(n, 4, 4) transform of a camera's or light's node at n times, seconds."""
+        assert self.motion is not None
+        return self.motion.world_from_node(node, times)
+
+    def span(self, nodes: list[int]) -> tuple[float, float] | None:
+        """First and last time, seconds, of what moves any of some nodes."""
+        return self.motion.span(nodes) if self.motion else None
+
+
+def read_gltf_stage(gltf: Gltf) -> Stage:
+    """Find the cameras and lights of the file's default scene.
+
+    Raises:
+        ValueError, KeyError, IndexError, ...: a broken file.
+    """
+    motion = read_motion(gltf)
+    lights_table = ((gltf.tree.get("extensions") or {}).get(PUNCTUAL) or {}).get("lights") or []
+    cameras: list[StageCamera] = []
+    lights: list[StageLight] = []
+    notes: list[str] = []
+    for index in _shown(gltf):
+        node = motion.nodes[index]
+        if "camera" in node:
+            camera = _camera(index, node, gltf.items("cameras")[node["camera"]], notes)
+            cameras += [camera] if camera else []
+        punctual = (node.get("extensions") or {}).get(PUNCTUAL)
+        if punctual is not None:
+            lights.append(_light(index, node, lights_table[punctual["light"]]))
+    return Stage(cameras=tuple(cameras), lights=tuple(lights), motion=motion, notes=tuple(notes))
+
+
+def _shown(gltf: Gltf) -> list[int]:
+    """Numbers of the nodes that the default scene shows; every node once, whatever the graph is like."""
+    nodes, scenes = gltf.items("nodes"), gltf.items("scenes")
+    waiting = list(scenes[gltf.tree.get("scene", 0)].get("nodes") or []) if scenes else []
+    found: set[int] = set()
+    while waiting:
+        index = waiting.pop()
+        if index not in found:
+            found.add(index)
+            waiting += nodes[index].get("children") or []
+    return sorted(found)
+
+
+def _camera(index: int, node: Tree, entry: Tree, notes: list[str]) -> StageCamera | None:
+    """Read a camera, or note why it cannot be used."""
+    name = str(node.get("name") or entry.get("name") or f"camera {index}")
+    if entry.get("type") != "perspective":
+        notes.append(f"camera {name}: is not a perspective camera and is left out")
+        return None
+    lens = entry["perspective"]
+    fov, aspect = math.degrees(float(lens["yfov"])), lens.get("aspectRatio")
+    if not 0.001 <= fov <= 179.9:  # what a job takes
+        notes.append(f"camera {name}: has a field of view of {fov:g} degrees and is left out")
+        return None
+    return StageCamera(name=name, node=index, fov_deg=fov, aspect=float(aspect) if aspect else None)
+
+
+def _light(index: int, node: Tree, entry: Tree) -> StageLight:
+    kind = entry["type"]
+    if kind not in ("point", "directional", "spot"):
+        raise ValueError(f"a light has the unknown type {kind!r}")
+    strength = float(entry.get("intensity", 1.0))
+    red, green, blue = (max(strength * float(channel), 0.0) for channel in entry.get("color", (1.0, 1.0, 1.0)))
+    name = str(node.get("name") or entry.get("name") or f"light {index}")
+    return StageLight(name=name, node=index, kind=kind, intensity=(red, green, blue))

@@ -1,0 +1,36 @@
+"""A scene file -> a first job file that renders well at once: `framearray init`."""
+
+from pathlib import Path
+
+from ..errors import OutputError, SceneError
+from ..files import write_bytes
+from ..job import Job
+from .model import Start, table_of
+from .plan import Wishes, plan_start
+from .text import to_text
+
+__all__ = ["Start", "Wishes", "init"]
+
+
+def init(scene: Path, job_file: Path, wishes: Wishes, *, force: bool = False) -> Start:
+    """Write a first job for a scene.
+
+    Args:
+        force: take the place of a file that is there.
+
+    Raises:
+        SceneError: the scene cannot be read, or nothing can be seen or lit in it.
+        JobError: no camera has the name that is wished for.
+        OutputError: the job file is there already, or cannot be written.
+    """
+    if job_file.exists() and not force:
+        raise OutputError(f"{job_file}: is there already; give another name with --output, or --force to replace it")
+    if not scene.exists():
+        raise SceneError(f"{scene}: no such scene file")
+    start = plan_start(scene, wishes)
+    try:
+        Job.model_validate(table_of(start))
+    except ValueError as error:  # a path in the file that no job can follow, such as a camera that flips over
+        raise SceneError(f"{scene}: its cameras or lights do not make a job: {error}") from error
+    write_bytes(job_file, to_text(start, job_file).encode("utf-8"))
+    return start

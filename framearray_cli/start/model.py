@@ -1,0 +1,132 @@
+"""A first job, before it is text: what was chosen, and why. All places are in the scene file's own coordinates."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from ..arrays import Float64
+
+Vector = tuple[float, float, float]
+POWERS = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
+DIGITS = 6  # significant, of positions and directions; a thousandth of a pixel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EyeKey:
+    """The camera at a frame; `up` is None for a level camera."""
+
+    frame: int
+    eye: Vector
+    target: Vector
+    up: Vector | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Camera:
+    """The camera's path.
+
+    Attributes:
+        about: comment lines.
+    """
+
+    keys: tuple[EyeKey, ...]
+    frames: int
+    fov_deg: float
+    resolution: tuple[int, int]
+    about: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """A light's path: its frames, its places or directions, and its power at each."""
+
+    kind: Literal["point", "directional"]
+    frames: tuple[int, ...]
+    vectors: tuple[Vector, ...]
+    powers: tuple[Vector, ...]
+    about: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MaterialNote:
+    """A material as read; `more` says what its reflectivity is multiplied with, or is empty."""
+
+    name: str
+    reflectivity: Vector
+    specular: Vector
+    more: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Start:
+    """A whole first job.
+
+    Attributes:
+        inside: whether the scene was taken for a room.
+        about: comment lines at the top.
+    """
+
+    name: str
+    file: Path
+    up: Literal["y", "z"]
+    background: Vector
+    camera: Camera
+    light_frames: int
+    sources: tuple[Source, ...]
+    range: float
+    inside: bool
+    about: tuple[str, ...]
+    materials: tuple[MaterialNote, ...]
+
+    @property
+    def outside(self) -> str:
+        """Where rays that meet nothing get their light: of a thing under the sky, from the sky."""
+        return "average" if self.inside else "background"
+
+
+def rounded(values: Any) -> Vector:
+    """Three numbers that read well and mean the same."""
+    x, y, z = (float(f"{float(value):.{DIGITS}g}") for value in values)
+    return x + 0.0, y + 0.0, z + 0.0  # no -0.0
+
+
+def tidy(points: Float64, size: float) -> list[Vector]:
+    """Points (n, 3) in file coordinates, rounded to a ten-thousandth of the size of the scene."""
+    step = 10.0 ** _floor_log10(size * 1e-4)
+    return [tuple(float(f"{round(float(v) / step) * step:.12g}") + 0.0 for v in point) for point in points]  # type: ignore[misc]
+
+
+def _floor_log10(value: float) -> int:
+    return int(f"{value:e}".split("e")[1])
+
+
+def table_of(start: Start) -> dict[str, Any]:
+    """The tables of the job file that says the same."""
+    camera = start.camera
+    return {
+        "name": start.name,
+        "scene": {"file": str(start.file), "up": start.up, "background": list(start.background)},
+        "camera": {
+            "resolution": list(camera.resolution),
+            "fov": camera.fov_deg,
+            "frames": camera.frames,
+            "keys": [
+                {"frame": k.frame, "eye": list(k.eye), "target": list(k.target)} | ({"up": list(k.up)} if k.up else {})
+                for k in camera.keys
+            ],
+        },
+        "light": {
+            "frames": start.light_frames,
+            "sources": [{"type": s.kind, "keys": source_keys(s)} for s in start.sources],
+        },
+        "obscurance": {"range": start.range, "outside": start.outside},
+    }
+
+
+def source_keys(source: Source) -> list[dict[str, Any]]:
+    """The key frames of a source."""
+    place, power = POWERS[source.kind]
+    return [
+        {"frame": frame, place: list(vector), power: list(strength)}
+        for frame, vector, strength in zip(source.frames, source.vectors, source.powers, strict=True)
+    ]

@@ -1,0 +1,99 @@
+"""Rays into a scene from anywhere, for questions such as "what is around this point?"; all in centred coordinates."""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Float64, Int32
+from ..embree import EmbreeScene
+from ..embree.packets import (
+    DIRECTION,
+    GEOMETRY,
+    HIT_ROWS,
+    MASKED,
+    MISS,
+    ORIGIN,
+    RAY_ROWS,
+    TFAR,
+    TRIANGLE,
+    empty_packets,
+    intersect,
+    occlude,
+)
+from ..lanes import LANES
+from ..scene import Scene
+
+SHORTENED = 1e-4  # of a segment, left out at both of its ends, so that it does not meet what it starts or ends on
+
+
+class Seen(NamedTuple):
+    """What n rays met.
+
+    Attributes:
+        distance: (n,) in lengths of the directions; inf where nothing is met.
+        triangle: (n,) -1 where nothing is met.
+        front: (n,) whether it is met from the side its corners run counter-clockwise on.
+    """
+
+    distance: Float64
+    triangle: Int32
+    front: NDArray[np.bool_]
+
+    @property
+    def hit(self) -> NDArray[np.bool_]:
+        """(n,) whether a ray met anything."""
+        return self.triangle >= 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Probe:
+    """A scene that rays can be sent into."""
+
+    scene: Scene
+    embree: EmbreeScene
+
+    def first_hits(self, origins: Any, directions: Any) -> Seen:
+        """Trace rays; origins and directions are (n, 3) or (3,)."""
+        packets, n = _filled(HIT_ROWS, origins, directions, np.inf)
+        intersect(self.embree.tracer, packets, n)
+        bits = packets.view(np.int32)
+        distance, triangle = _rows(packets, TFAR)[:n], _rows(bits, TRIANGLE)[:n].copy()
+        triangle[_rows(bits, GEOMETRY)[:n] == MASKED] += self.embree.tracer.first_masked
+        missed = _rows(bits, TRIANGLE)[:n] == MISS
+        triangle[missed] = -1
+        against = (self.normals(triangle) * np.broadcast_to(directions, (n, 3))).sum(axis=1) < 0
+        return Seen(np.where(missed, np.inf, distance.astype(np.float64)), triangle, against & ~missed)
+
+    def normals(self, triangle: Int32) -> Float64:
+        """(n, 3) normals by winding, not of unit length."""
+        corners = self.scene.corners[triangle].astype(np.float64)
+        return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+    def blocked(self, start: Any, end: Any) -> NDArray[np.bool_]:
+        """(n,) whether anything lies between two points, (n, 3) or (3,) each."""
+        start, end = np.broadcast_arrays(np.asarray(start, np.float64), np.asarray(end, np.float64))
+        step = end - start
+        packets, n = _filled(RAY_ROWS, start + SHORTENED * step, step, 1 - 2 * SHORTENED)
+        occlude(self.embree.tracer, packets, n)
+        return np.asarray(_rows(packets, TFAR)[:n] < 0)
+
+
+def _filled(rows: int, origins: Any, directions: Any, tfar: float) -> tuple[Any, int]:
+    """Packets that hold the rays, and how many there are."""
+    origins, directions = np.broadcast_arrays(np.atleast_2d(origins), np.atleast_2d(directions))
+    n = len(origins)
+    packets = empty_packets(-(-n // LANES), rows)
+    for axis in range(3):
+        for row, values in ((ORIGIN + axis, origins[:, axis]), (DIRECTION + axis, directions[:, axis])):
+            padded = np.ones(len(packets) * LANES, np.float32)
+            padded[:n] = values
+            packets[:, row] = padded.reshape(-1, LANES)
+    packets[:, TFAR] = tfar
+    return packets, n
+
+
+def _rows(packets: Any, row: int) -> Any:
+    """One row of every packet, ray after ray."""
+    return packets[:, row].reshape(-1)

@@ -1,0 +1,110 @@
+"""Cameras and lights that a scene file brings along -> paths of a job, a key for each frame of what moves."""
+
+import numpy as np
+
+from ..arrays import Float64
+from ..errors import JobError, SceneError
+from ..meshes import Stage, StageCamera, StageLight
+from .model import Camera, EyeKey, Source, rounded
+
+FPS = 24.0  # of the job; times of animations are seconds
+HEIGHT = 240  # pixels of a first picture
+ASPECTS = (0.25, 4.0)  # pictures beyond it are taken for a mistake in the file
+MOST_FRAMES = 1000  # of a camera: forty seconds; longer paths are sampled more coarsely
+MOST_LIGHTS = 48  # positions of lights, as in [FA]; each makes a picture for every frame of the camera
+
+
+def chosen_camera(stage: Stage, name: str | None, file: object) -> StageCamera | None:
+    """The camera of that name, or the first; None where there is none.
+
+    Raises:
+        JobError: no camera has that name.
+    """
+    if name is None:
+        return stage.cameras[0] if stage.cameras else None
+    for camera in stage.cameras:
+        if camera.name == name:
+            return camera
+    known = ", ".join(f'"{camera.name}"' for camera in stage.cameras) or "no camera"
+    raise JobError(str(file), [f'--camera: expected a camera of the file, got "{name}"; it has {known}'])
+
+
+def frame_times(span: tuple[float, float] | None, wanted: int | None, most: int) -> list[float]:
+    """The times, in seconds, that frames of a path stand for: each frame of it, or as many as are wanted."""
+    if span is None:
+        return [0.0] * (wanted or 1)
+    n = wanted or min(round((span[1] - span[0]) * FPS) + 1, most)
+    return [float(time) for time in np.linspace(*span, n)]
+
+
+def staged_camera(stage: Stage, camera: StageCamera, wanted: int | None, depth: float) -> Camera:
+    """The path of a camera of the file.
+
+    Args:
+        wanted: number of frames; None: as many as its animation has.
+        depth: distance from the eye to its target, scene units.
+
+    Raises:
+        SceneError: a camera that is flat or nowhere.
+    """
+    span = stage.span([camera.node])
+    times = frame_times(span, wanted, MOST_FRAMES)
+    matrices = stage.world_from(camera.node, times)
+    look, up = _units(-matrices[:, :3, 2], camera.name), _units(matrices[:, :3, 1], camera.name)
+    keys = [
+        EyeKey(frame=frame, eye=rounded(eye), target=rounded(eye + way * depth), up=rounded(above))
+        for frame, (eye, way, above) in enumerate(zip(matrices[:, :3, 3], look, up, strict=True))
+    ]
+    low, high = ASPECTS
+    aspect = min(max(camera.aspect or 4 / 3, low), high)
+    about = [f'the camera "{camera.name}" of the file']
+    if span:
+        about.append(f"animated from {span[0]:g} to {span[1]:g} s; a key for each of {len(times)} frames")
+    others = [other.name for other in stage.cameras if other is not camera]
+    about += [f'the file also has the camera "{name}": --camera "{name}"' for name in others[:20]]
+    return Camera(
+        keys=tuple(keys) if (matrices != matrices[0]).any() else (keys[0],),
+        frames=len(times),
+        fov_deg=round(camera.fov_deg, 4),
+        resolution=(max(2 * round(HEIGHT * aspect / 2), 2), HEIGHT),
+        about=tuple(about),
+    )
+
+
+def staged_lights(stage: Stage, wanted: int | None) -> tuple[tuple[Source, ...], int]:
+    """The paths of the lights of the file that shine, with the file's own strengths; and the number of positions."""
+    shining = [light for light in stage.lights if max(light.intensity) > 0]
+    span = stage.span([light.node for light in shining])
+    times = frame_times(span, wanted, MOST_LIGHTS)
+    return tuple(_source(stage, light, times) for light in shining), len(times)
+
+
+def _source(stage: Stage, light: StageLight, times: list[float]) -> Source:
+    matrices = stage.world_from(light.node, times)
+    if light.kind == "directional":
+        vectors = _units(-matrices[:, :3, 2], light.name)
+    else:
+        vectors = matrices[:, :3, 3]
+        if not np.isfinite(vectors).all():
+            raise SceneError(f'the light "{light.name}" is nowhere: its node has no finite place')
+    moves = bool((vectors != vectors[0]).any())
+    n = len(times) if moves else 1
+    unit = "lx" if light.kind == "directional" else "cd"
+    about = [f'the {light.kind} light "{light.name}" of the file, there {max(light.intensity):.4g} {unit}']
+    if light.kind == "spot":
+        about.append("a spot: here it shines to all sides, as there are no spots")
+    return Source(
+        kind="directional" if light.kind == "directional" else "point",
+        frames=tuple(range(n)),
+        vectors=tuple(rounded(vector) for vector in vectors[:n]),
+        powers=(light.intensity,) * n,
+        about=tuple(about),
+    )
+
+
+def _units(vectors: Float64, name: str) -> Float64:
+    """Directions of length 1."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    if not (np.isfinite(vectors).all() and (length > 0).all()):
+        raise SceneError(f'"{name}" looks nowhere: its node, or one above it, has a scale of 0')
+    return np.asarray(vectors / length)

@@ -1,0 +1,162 @@
+"""A first job as TOML text, with a comment for every key: it is read, and changed, before anything else of the program.
+
+Written by hand, because comments are half of it; a test reads it back and compares.
+"""
+
+import json
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from .model import Camera, MaterialNote, Source, Start, source_keys
+
+MOST_STEPS_UP = 2  # folders that a relative name of the scene may climb; beyond, it is absolute
+COLUMN = 42  # where comments behind a key start
+
+
+def to_text(start: Start, job_file: Path) -> str:
+    """Write a job.
+
+    Args:
+        job_file: where it will lie; the scene is named from there.
+    """
+    low = start.about
+    return "\n".join(
+        [
+            f"# A first job for {_one_line(start.file.name)}, made by `framearray init`. Change it, then:",
+            f"#   framearray render {_one_line(job_file.name)}",
+            *_comments(low),
+            _line("name", _text(start.name), "starts every file name"),
+            _line("seed", "0", "of all random numbers"),
+            "",
+            "[scene]",
+            _line("file", _text(scene_name(start.file, job_file)), "relative to this file"),
+            _line("up", _text(start.up), "the axis that points up"),
+            _line("background", _numbers(start.background), "radiance of what lies outside: the sky"),
+            *_materials(start.materials),
+            "",
+            *_camera(start.camera),
+            "",
+            *_lights(start),
+            "",
+            "[samples]",
+            _line("hits", "2", "samples of a pixel in a frame; more: less noise, more time"),
+            _line("obscurance", "5", "rays of a sample for its indirect light"),
+            "",
+            "[reuse]",
+            _line("n_r", "3", "frames before and after that share their samples"),
+            "",
+            "[obscurance]",
+            _line("range", f"{start.range:g}", "how far surfaces darken and colour each other, scene units"),
+            _line("outside", _text(start.outside), _outside(start)),
+            "",
+            "[output]",
+            _line("directory", _text(f"out/{start.name}"), "relative to this file"),
+            _line("format", '"png"', '"exr" keeps the linear light, for work after the render'),
+            _line("fps", "24", "frames a second of movies"),
+            "",
+        ]
+    )
+
+
+def scene_name(file: Path, job_file: Path) -> str:
+    """The scene's name as the job says it: relative where both lie close together."""
+    file, folder = Path(os.path.abspath(file)), Path(os.path.abspath(job_file)).parent
+    try:
+        name = Path(os.path.relpath(file, folder))
+    except ValueError:  # another drive
+        return file.as_posix()
+    return name.as_posix() if name.parts[: MOST_STEPS_UP + 1].count("..") <= MOST_STEPS_UP else file.as_posix()
+
+
+def _outside(start: Start) -> str:
+    if start.inside:
+        return 'what rays bring that meet nothing so near; "background" where the sky matters'
+    return "rays that leave the scene bring the sky's light"
+
+
+def _camera(camera: Camera) -> list[str]:
+    width, height = camera.resolution
+    keys = [
+        {"frame": k.frame, "eye": list(k.eye), "target": list(k.target)} | ({"up": list(k.up)} if k.up else {})
+        for k in camera.keys
+    ]
+    return [
+        "[camera]",
+        *_comments(camera.about),
+        _line("resolution", f"[{width}, {height}]", "width and height, pixels"),
+        _line("fov", repr(float(camera.fov_deg)), "how much is seen from bottom to top, degrees"),
+        _line("frames", str(camera.frames), "eyes along the path"),
+        "keys = [                                  # where the eye is at some frames; between them it moves smoothly",
+        *(f"  {_inline(key)}," for key in keys),
+        "]",
+    ]
+
+
+def _lights(start: Start) -> list[str]:
+    lines = ["[light]", _line("frames", str(start.light_frames), "positions of the light; each gives a picture an eye")]
+    for source in start.sources:
+        lines += ["", "[[light.sources]]", *_comments(source.about), *_source(source)]
+    return lines
+
+
+def _source(source: Source) -> list[str]:
+    unit = "W/sr" if source.kind == "point" else "W/m2 of a surface that faces the light"
+    power = "intensity" if source.kind == "point" else "irradiance"
+    lines = [
+        _line("type", _text(source.kind), '"point": a lamp; "directional": the sun; "sun": by place and time'),
+        f"keys = [                                  # {power}: red, green, blue, {unit}",
+        *(f"  {_inline(key)}," for key in source_keys(source)),
+        "]",
+    ]
+    if len(source.frames) == 1:
+        lines.append(
+            "# It stands still. A second key, such as { frame = 11, ... }, and more `frames` above make it move."
+        )
+    return lines
+
+
+def _materials(materials: Sequence[MaterialNote]) -> list[str]:
+    """Every material, commented out."""
+    lines = [
+        "",
+        "# The materials as they were read. To change one, remove the # before its lines and edit the numbers:",
+    ]
+    lines.append(
+        "# reflectivity: diffuse, 0 is black and 1 white; specular: above 0 it is a mirror; their sum is at most 1."
+    )
+    for material in materials:
+        lines.append(f"# [scene.materials.{_text(material.name)}]")
+        more = f"  # {material.more}, which these numbers replace" if material.more else ""
+        lines.append(f"# reflectivity = {_numbers(material.reflectivity)}{more}")
+        if max(material.specular) > 0:
+            lines.append(f"# specular = {_numbers(material.specular)}")
+    return lines
+
+
+def _comments(lines: Iterable[str]) -> list[str]:
+    return [f"# {_one_line(line)}" for line in lines]
+
+
+def _one_line(text: str) -> str:
+    """Text as it can stand in a comment: no control characters."""
+    return "".join(c if c.isprintable() else "?" for c in text)
+
+
+def _line(key: str, value: str, comment: str) -> str:
+    return f"{f'{key} = {value}':<{COLUMN - 1}} # {comment}"
+
+
+def _text(value: str) -> str:
+    """A TOML string; control characters are escaped, and halves of characters, which TOML cannot hold, replaced."""
+    whole = value.encode("utf-8", "replace").decode("utf-8")
+    return json.dumps(whole, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return f"[{', '.join(f'{float(value)!r}' for value in values)}]"
+
+
+def _inline(table: dict[str, object]) -> str:
+    cells = (f"{k} = {v if isinstance(v, int) else _numbers(v)}" for k, v in table.items())  # type: ignore[arg-type]
+    return f"{{ {', '.join(cells)} }}"

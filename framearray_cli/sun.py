@@ -1,0 +1,124 @@
+"""Where the sun stands: the door to pvlib, and from its angles to directions in a scene.
+
+Elevations are apparent: the air bends sunlight, so the sun shines from above where it stands, by half a degree at the
+horizon and a fiftieth of a degree halfway up. Azimuths run from north over east. See docs/decisions/sun.md.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta, tzinfo
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from .arrays import Float64
+from .errors import MissingExtraError
+from .jobtimes import moment, zone_of
+
+PRESSURE_HPA, TEMPERATURE_C = 1013.25, 12.0  # of the air that bends the light, standard at sea level; pvlib's defaults
+REFRACTION_DEG = 0.5667  # at the horizon, pvlib's default
+NEVER = "never"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SunPath:
+    """The sun at n moments.
+
+    Attributes:
+        times: local.
+        azimuth_deg: (n,) clockwise from north.
+        elevation_deg: (n,) apparent, of the centre of the disc.
+    """
+
+    times: tuple[datetime, ...]
+    azimuth_deg: Float64
+    elevation_deg: Float64
+
+    @property
+    def is_up(self) -> Float64:
+        """(n,) 1 where the sun is above the horizon, else 0."""
+        return np.asarray(self.elevation_deg > 0, dtype=np.float64)
+
+
+def require_pvlib() -> Any:
+    """Import the solar position algorithm.
+
+    Raises:
+        MissingExtraError: pvlib is not installed.
+    """
+    try:
+        from pvlib import spa
+    except ImportError as error:
+        raise MissingExtraError(
+            'a source of type "sun" needs pvlib, which is not installed; install it with: pip install "framearray[sun]"'
+        ) from error
+    return spa
+
+
+def sun_at(times: Sequence[datetime], latitude: float, longitude: float) -> SunPath:
+    """Find the sun at some moments, by NREL's solar position algorithm [Reda04].
+
+    Args:
+        times: with their time zones.
+        latitude, longitude: degrees, north and east positive.
+
+    Raises:
+        MissingExtraError: pvlib is not installed.
+    """
+    spa = require_pvlib()
+    seconds = np.array([time.timestamp() for time in times])
+    delta_t = spa.calculate_deltat(times[0].year, times[0].month)
+    rows = spa.solar_position(
+        seconds, latitude, longitude, 0.0, PRESSURE_HPA, TEMPERATURE_C, delta_t, REFRACTION_DEG, numthreads=1
+    )
+    elevation, azimuth = np.asarray(rows[2], dtype=np.float64), np.asarray(rows[4], dtype=np.float64)
+    return SunPath(times=tuple(times), azimuth_deg=azimuth, elevation_deg=elevation)
+
+
+def sun_between(date: str, start: str, stop: str, timezone: str | float, place: tuple[float, float], n: int) -> SunPath:
+    """Find the sun at n moments, evenly spaced from start to stop; one moment is the start.
+
+    Args:
+        date, start, stop, timezone: as a job has them; clocks of that zone.
+        place: latitude and longitude, degrees.
+
+    Raises:
+        MissingExtraError: pvlib is not installed.
+    """
+    zone = zone_of(timezone)
+    first = moment(date, start, zone).astimezone(UTC)  # spaced in UTC: a clock that is changed on the way does not jump
+    span = moment(date, stop, zone).astimezone(UTC) - first
+    times = [(first + span * (k / max(n - 1, 1))).astimezone(zone) for k in range(n)]
+    return sun_at(times, *place)
+
+
+def daylight(date: str, timezone: str | float, place: tuple[float, float]) -> str:
+    """Say when the sun is up on a day, "06:12 to 18:05", to the minute; or that it never is."""
+    zone = zone_of(timezone)
+    minutes = _minutes(date, zone)
+    sun = sun_at(minutes, *place)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0.0], sun.is_up, [0.0]])))
+    spans = list(pairwise(edges))[::2]
+    return " and ".join(f"{minutes[a]:%H:%M} to {minutes[b - 1]:%H:%M}" for a, b in spans) or NEVER
+
+
+def _minutes(date: str, zone: tzinfo) -> list[datetime]:
+    """All minutes of a day as clocks of a zone show it."""
+    first = moment(date, "00:00:00", zone).astimezone(UTC)
+    last = moment(date, "23:59:00", zone).astimezone(UTC)
+    count = int((last - first).total_seconds()) // 60 + 1
+    return [(first + timedelta(minutes=k)).astimezone(zone) for k in range(count)]
+
+
+def to_sun(sun: SunPath, up_dir: Float64, north_dir: Float64) -> Float64:
+    """Turn angles into unit directions from the scene to the sun, (n, 3).
+
+    Args:
+        up_dir: (3,) unit, up in the scene.
+        north_dir: (3,) unit, north in the scene, normal to `up_dir`.
+    """
+    azimuth, elevation = np.radians(sun.azimuth_deg)[:, None], np.radians(sun.elevation_deg)[:, None]
+    east_dir = np.cross(north_dir, up_dir)
+    level = np.cos(azimuth) * north_dir + np.sin(azimuth) * east_dir
+    return np.asarray(np.cos(elevation) * level + np.sin(elevation) * up_dir)

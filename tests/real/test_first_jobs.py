@@ -1,0 +1,63 @@
+"""`framearray init` and then `render`, with no edit in between: on real scenes, where they are, and on broken files."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from nasty import nasty_files
+from scenes import scenes_folder
+
+from framearray_cli.cli import main
+from framearray_cli.errors import SceneError
+from framearray_cli.images import read_codes, read_layers
+from framearray_cli.jobfile import read_job
+from framearray_cli.manifest import image_path, layers_path
+from framearray_cli.manifestfile import read_manifest
+from framearray_cli.start import Wishes, init
+
+JOBS = Path(__file__).resolve().parents[2] / "jobs"
+KINDS = (".glb", ".obj", ".stl")
+REAL = sorted(file for file in scenes_folder().glob("*/*.*") if file.suffix in KINDS and file.parent.name != "nasty")
+OWN = [JOBS / "scenes" / f"{name}.glb" for name in ("cabin", "kitchen", "stairs")]
+NASTY = nasty_files(scenes_folder())
+FEW = ("--frames", "5", "--lights", "3", "--quiet")
+# Of 255. A picture that one can recognise has a mean in the middle of the scale, hardly a pixel without any light, few
+# that clip but for the sky, and contrast: a wall before the eye has a spread of 5 or less.
+MEAN, BLACK, CLIPPED, SPREAD = (64, 170), 0.10, 0.10, 15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", [*REAL, *OWN], ids=lambda scene: scene.name)
+def test_a_first_job_gives_pictures_that_one_can_recognise(scene: Path, tmp_path: Path) -> None:
+    job_file = tmp_path / "job.toml"
+    for command in (["init", str(scene), "-o", str(job_file), *FEW], ["render", str(job_file), "--quiet"]):
+        with pytest.raises(SystemExit) as ended:
+            main(command)
+        assert not ended.value.code
+    manifest = read_manifest(read_job(job_file).output.directory)
+    for c in range(5):
+        depth = read_layers(layers_path(manifest, c))["depth.Z"]
+        surface = depth > 0
+        assert surface.mean() > 0.2
+        # nothing fills the picture from close by, as where an eye is inside of a thing
+        assert np.percentile(depth[surface], 50) > 0.5 * read_job(job_file).obscurance.range
+        for l in range(3):
+            codes = read_codes(image_path(manifest, c, l)).astype(float)[..., :3]
+            assert MEAN[0] < codes.mean() < MEAN[1], (c, l)
+            assert (codes.max(axis=-1) < 4)[surface].mean() < BLACK, (c, l)
+            assert (codes.max(axis=-1) == 255)[surface].mean() < CLIPPED, (c, l)
+            assert codes.mean(axis=-1).std() > SPREAD, (c, l)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NASTY)
+def test_broken_files_make_a_job_or_one_clear_error(name: str, tmp_path: Path) -> None:
+    job_file = tmp_path / "job.toml"
+    try:
+        init(scenes_folder() / "nasty" / name, job_file, Wishes(frames=2, lights=2))
+    except SceneError as error:
+        assert str(error).startswith(str(scenes_folder() / "nasty" / name))
+        assert "\n" not in str(error)
+        assert not job_file.exists()
+    else:
+        read_job(job_file)
