@@ -20,7 +20,7 @@ from .commands.sheet import sheet
 from .commands.verify import verify
 from .commands.view import view
 from .errors import FrameArrayError, JobError
-from .interrupts import Stopped, forget, listen
+from .interrupts import Stopped, forget, listen, stopped_by
 from .screen import out, say
 
 OUT_OF_MEMORY = 2  # the job asks for more than the machine has
@@ -68,6 +68,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except MemoryError as error:
         less = "a smaller resolution, n_r or fewer lights take less; `framearray check` tells how much a job needs"
         fail([f"not enough memory; {less}", *notes(error)], OUT_OF_MEMORY)
-    except Stopped as stopped:
+    except (Stopped, RuntimeError) as error:
+        stopped = stopped_by(error)
+        if stopped is None:
+            raise
         forget()
-        fail([stopped.word, *notes(stopped)], stopped.exit_code)
+        fail([stopped.word, *notes(error)], stopped.exit_code)

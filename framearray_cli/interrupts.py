@@ -30,6 +30,17 @@ def listen() -> None:
             signal.signal(getattr(signal, name), stop)
 
 
+def stopped_by(error: BaseException | None) -> Stopped | None:
+    """The signal that an exception goes back to, if any.
+
+    Python's own locks may fail when a signal interrupts them at the wrong moment ("cannot release un-acquired lock");
+    the error that they raise then comes while `Stopped` is handled.
+    """
+    while error is not None and not isinstance(error, Stopped):
+        error = error.__context__
+    return error
+
+
 def forget() -> None:
     """Raise no `Stopped` again for a signal that was heard."""
     if hasattr(signal, "setitimer"):

@@ -172,3 +172,27 @@ def test_an_exception_is_not_raised_where_it_would_be_forgotten(module):
     with pytest.raises(interrupts.Stopped):
         time.sleep(5)
     signal.setitimer(signal.ITIMER_REAL, 0)
+
+
+def test_a_lock_that_a_signal_broke_counts_as_the_signal(monkeypatch, capsys):
+    """What happened once in some hundred runs, when a signal came while a thread pool took in work."""
+    from framearray_cli import cli
+
+    def broken(*_: object, **__: object) -> None:
+        try:
+            raise interrupts.Stopped(signal.SIGTERM)
+        finally:
+            raise RuntimeError("cannot release un-acquired lock")
+
+    monkeypatch.setattr(cli, "app", broken)
+    with pytest.raises(SystemExit) as end:
+        cli.main([])
+    assert end.value.code == 128 + signal.SIGTERM
+    assert capsys.readouterr().err == "terminated\n"
+
+    def wrong(*_: object, **__: object) -> None:
+        raise RuntimeError("something else")
+
+    monkeypatch.setattr(cli, "app", wrong)
+    with pytest.raises(RuntimeError, match="something else"):
+        cli.main([])
