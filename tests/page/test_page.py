@@ -180,12 +180,14 @@ def test_groups_are_lit_anew_as_by_pictures(browser, grouped):
             page.page.keyboard.press("ArrowLeft")  # a twentieth each
         page.page.locator("#group-lamps-color").fill("#ffcc88")
         page.page.locator("#ambient").fill("2")
+        page.page.locator("#group-background").fill("0.25")
         pixels = page.pixels()
         page.check(grouped.url)
-    i_a = lamps * 0.1 + ambient_at(manifest.groups[1].lights, 1) + manifest.background_ambient
-    parts = [("g0", 1, tuple(lamps)), ("g1", 1, ONE), ("ambient", 0, tuple(2 * i_a)), ("background", 0, ONE)]
+    sky = (0.25, 0.25, 0.25)
+    i_a = lamps * 0.1 + ambient_at(manifest.groups[1].lights, 1) + 0.25 * np.array(manifest.background_ambient)
+    parts = [("g0", 1, tuple(lamps)), ("g1", 1, ONE), ("ambient", 0, tuple(2 * i_a)), ("background", 0, sky)]
     assert outside(pixels, *bounds(grouped.tiles, 2, parts)) == 0.0
-    relight = Relight(groups={"lamps": tuple(lamps)}, ambient=(2.0, 2.0, 2.0))
+    relight = Relight(groups={"lamps": tuple(lamps), "background": sky}, ambient=(2.0, 2.0, 2.0))
     for shown_, wanted, other in ((pixels, relight, Relight()), (as_rendered, Relight(), relight)):
         right, wrong = (srgb8_from_linear(Pictures(manifest).picture(2, (1, 1), light)) for light in (wanted, other))
         assert np.abs(right - shown_.astype(float)).mean() < 1.0 < np.abs(wrong - shown_.astype(float)).mean()

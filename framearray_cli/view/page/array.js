@@ -16,6 +16,9 @@ export class FrameArray {
     this.others = index.axes.slice(1);
     this.layers = index.streams.filter((stream) => stream.role === "layer");
     this.groups = index.streams.filter((stream) => stream.role === "group");
+    // Names of all that can be lit anew: the groups, and what comes from the background.
+    this.tinted = this.groups.map((group) => group.label);
+    if (index.streams.some((stream) => stream.role === "background")) this.tinted.push("background");
   }
 
   fullUrl(stream, c, l) {
@@ -45,7 +48,7 @@ export class FrameArray {
   }
 
   // The streams whose sum is the picture at a view, each with its position and RGB factor: pictures.py's equation
-  //     picture = background + sum of factor_g (direct_g + a I_A,g R W) + a I_A,b R W.
+  //     picture = sum of factor_g (direct_g + a I_A,g R W) over groups g, the background among them.
   parts(view) {
     if (view.show !== "picture") {
       const layer = this.layers.find((stream) => stream.key === view.show);
@@ -60,8 +63,10 @@ export class FrameArray {
 
   factor(stream, view) {
     if (stream.role === "group") return tint(view.tints[stream.label]);
+    if (stream.role === "background") return tint(view.tints.background);
     if (stream.role !== "ambient") return WHITE;
-    const weight = [...this.background_ambient];
+    const sky = view.tints.background ? tint(view.tints.background) : WHITE;
+    const weight = this.background_ambient.map((value, i) => value * sky[i]);
     for (const group of this.groups) {
       const light = this.ambient[group.label][view.places[group.axis]];
       const by = tint(view.tints[group.label]);

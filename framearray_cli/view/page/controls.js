@@ -58,11 +58,11 @@ export class Controls {
   }
 
   groups(changed) {
-    const { groups } = this.array;
-    if (!groups.length) return;
+    const { tinted } = this.array;
+    if (!tinted.length) return;
     const box = document.getElementById("groups");
     box.append(element("h2", {}, "Light"));
-    for (const { label } of groups) this.tint(box, label, `group-${label}`, changed, (view) => view.tints[label]);
+    for (const name of tinted) this.tint(box, name, `group-${name}`, changed, (view) => view.tints[name]);
     this.tint(box, "Ambient", "ambient", changed, (view) => view.ambient);
   }
 

@@ -124,7 +124,9 @@ class Page {
     this.picture.draw(parts, view.exposure + array.exposure);
     if (this.measures) this.picture.pixels(1); // waits for the drawing
     this.level = level;
-    const step = this.steps.at(-1), ms = performance.now() - step.at;
+    const step = this.steps.at(-1);
+    if (!step) return;
+    const ms = performance.now() - step.at;
     step.first ??= ms;
     if (level === 2) step.full ??= ms;
   }

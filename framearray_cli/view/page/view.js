@@ -8,7 +8,7 @@ export function firstView(array) {
     places: Object.fromEntries(array.axes.map((axis) => [axis.name, 0])),
     show: "picture",
     exposure: 0,
-    tints: Object.fromEntries(array.groups.map((group) => [group.label, { ...PLAIN }])),
+    tints: Object.fromEntries(array.tinted.map((name) => [name, { ...PLAIN }])),
     ambient: { ...PLAIN },
   };
 }
