@@ -32,7 +32,7 @@ def test_a_drawn_path_is_played(browser, plain):
         page.page.click("#draw")
         page.drag([(0, 0), (3, 2), (6, 0)], steps=10)
         page.page.click("#draw")
-        page.page.locator("#seconds").fill("1")
+        page.page.locator("#seconds").fill("4")  # slow: a screen that lags leaves places out
         page.page.locator("#seconds").press("Enter")
         before = len(page.get("framearray.steps"))
         page.page.click("#play-path")

@@ -48,7 +48,8 @@ export class Path {
   // Add what was drawn by hand. samples: [{ s, c, l }], s in seconds.
   addStroke(samples, places) {
     const seconds = Math.max(SHORTEST, samples.at(-1).s - samples[0].s);
-    const count = Math.min(MOST_PLACES, Math.max(2, Math.round(seconds * PLACES_A_SECOND) + 1));
+    // at least as many places as were seen: a quick stroke keeps its corners
+    const count = Math.min(MOST_PLACES, Math.max(2, samples.length, Math.round(seconds * PLACES_A_SECOND) + 1));
     const camera = [], light = [];
     for (let k = 0, i = 0; k < count; k++) {
       const s = samples[0].s + ((samples.at(-1).s - samples[0].s) * k) / (count - 1);
