@@ -51,6 +51,22 @@ def test_a_disk_that_becomes_full(file_format, disk, tmp_path):
     assert summary["images"] % 3 == 0 and summary["images"] <= images
 
 
+def test_a_render_goes_on_once_there_is_space(disk, tmp_path):
+    camera = tiny.WALK | {"resolution": [120, 90], "frames": 40}
+    whole = write_job(tmp_path, camera=camera, output={"format": "exr", "directory": "whole"})
+    assert finish(start("render", "-q", whole)).code == 0
+    job = write_job(tmp_path, "job2.toml", camera=camera, output={"format": "exr", "directory": "disk/out"})
+    assert finish(start("render", "-q", job)).code == 4
+    subprocess.run(["mount", "-o", "remount,size=64m", str(disk)], check=True)
+    assert finish(start("render", "-q", job)).code == 0
+
+    def contents(folder: Path) -> dict[str, bytes]:
+        return {file.name: file.read_bytes() for file in folder.glob("tiny.*")}
+
+    assert contents(disk / "out") == contents(tmp_path / "whole")
+    assert len(contents(disk / "out")) == 40 * 4
+
+
 def test_a_disk_that_is_full(disk, tmp_path):
     (disk / "fill").write_bytes(b"")
     with pytest.raises(OSError, match="No space left"), (disk / "fill").open("ab", buffering=0) as file:

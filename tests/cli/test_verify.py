@@ -74,3 +74,24 @@ def test_cameras_that_are_no_range(cameras, tmp_path, capsys):
     assert "--cameras" in told.err
     assert "expected" in told.err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_one_flipped_byte_in_each_of_a_hundred_images(tmp_path, capsys):
+    walk = tiny.WALK | {"frames": 40, "keys": [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": 39}]}
+    for k, image_format in enumerate(("exr", "png")):
+        out, rng = tmp_path / image_format, random.Random(k)
+        job = write_job(tmp_path, camera=walk, output={"format": image_format, "directory": image_format})
+        assert run(capsys, "render", "-q", job).code == 0
+        before = contents(out)
+        names = rng.sample(sorted(before), 100)
+        for name in names:
+            data = bytearray(before[name])
+            place = rng.randrange(len(data))
+            data[place] = (data[place] + rng.randrange(1, 256)) % 256
+            (out / name).write_bytes(data)
+        told = run(capsys, "verify", "-q", out)
+        assert told.code == 5
+        assert {line.split(": ")[0] for line in told.err.splitlines()[:-1]} == {str(out / name) for name in names}
+        assert run(capsys, "verify", "-q", "--repair", out).code == 0
+        assert contents(out) == before
