@@ -72,9 +72,9 @@ def layer_channels(c: int) -> dict[str, Image]:
     return channels | normal | {"depth.Z": 8 * soft(c, 0)[..., 0], "samples": 30 * soft(c, 3)[..., 1]}
 
 
-def grouped(folder: Path) -> Manifest:
+def grouped_manifest(folder: Path) -> Manifest:
     """Lamps with an axis of their own, the sun on the main one, ambient light and a background."""
-    manifest = Manifest(
+    return Manifest(
         **PLAIN,
         fingerprint="sha256:2",
         cameras=cameras(4),
@@ -97,6 +97,11 @@ def grouped(folder: Path) -> Manifest:
         background_ambient=(0.01, 0.02, 0.03),
         directory=folder,
     )
+
+
+def grouped(folder: Path) -> Manifest:
+    """Images of `grouped_manifest`."""
+    manifest = grouped_manifest(folder)
     for c in range(4):
         for group, top in zip(manifest.groups, (0.6, 2.5), strict=True):
             for l in range(len(group.lights)):

@@ -1,56 +1,24 @@
 """Pictures put together from the files of an array."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from handmade import cameras, grouped_manifest, light
 
 from framearray_cli.errors import OutputError
 from framearray_cli.images import ImageFormat, write_image
-from framearray_cli.manifest import Manifest, ManifestCamera, ManifestGroup, ManifestLight, array_files, matrix_rows
+from framearray_cli.manifest import Manifest, array_files
 from framearray_cli.manifestfile import read_manifest, write_manifest
 from framearray_cli.pictures import Pictures, Relight
 
 SIZE = (6, 4)
 
 
-def light(*ambient: float) -> ManifestLight:
-    return ManifestLight(ambient=ambient, ambient_error=(0.0, 0.0, 0.0), sources=({"type": "point"},))
-
-
-def grouped(folder: Path, background: bool = True) -> Manifest:
-    camera = ManifestCamera(world_from_camera=matrix_rows(np.eye(4)), fov=60.0)
-    return Manifest(
-        version="0",
-        name="room",
-        fingerprint="sha256:0",
-        resolution=SIZE,
-        fps=24.0,
-        cameras=(camera, camera),
-        groups=(
-            ManifestGroup(
-                name="lamps",
-                axis="lamps",
-                images="room.lamps.c{camera:04d}.l{light:03d}.exr",
-                lights=(light(0.5, 0.4, 0.3), light(0.1, 0.1, 0.1)),
-            ),
-            ManifestGroup(
-                name="sun",
-                axis="light",
-                images="room.sun.c{camera:04d}.l{light:03d}.exr",
-                lights=tuple(light(0.1 * l, 0.2, 0.3) for l in range(3)),
-            ),
-        ),
-        ambient_images="room.ambient.c{camera:04d}.exr",
-        background_images="room.background.c{camera:04d}.exr" if background else "",
-        background_ambient=(0.01, 0.02, 0.03),
-        directory=folder,
-    )
-
-
 @pytest.fixture
 def array(tmp_path: Path) -> Manifest:
-    manifest = grouped(tmp_path)
+    manifest = replace(grouped_manifest(tmp_path), resolution=SIZE, cameras=cameras(2))
     rng = np.random.default_rng(5)
     for file in array_files(manifest):
         write_image(file, rng.random((*SIZE[::-1], 3), np.float32), ImageFormat(half="never"))
