@@ -1,5 +1,6 @@
 """What a manifest says of a render: everything that a program needs which has never seen this one."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from .manifestfile import plain
 from .outfolder import Identity
 from .paths import LightPath
 from .prepare import Prepared, job_fingerprint, scene_fingerprint
-from .stored import AMBIENT, array_names
+from .stored import AMBIENT, Files, array_names
 from .target import Target
 from .terms.ambient import Ambient
 
@@ -22,11 +23,11 @@ _KEYS = {"point": ("position", "intensity"), "directional": ("direction", "irrad
 
 def identity_of(prepared: Prepared) -> Identity:
     """What decides every byte of the files of a job."""
-    job = prepared.job
+    job, scene = prepared.job, scene_fingerprint(prepared)
     return Identity(
         name=job.name,
-        fingerprint=job_fingerprint(prepared),
-        scene=scene_fingerprint(prepared),
+        fingerprint=job_fingerprint(prepared, scene),
+        scene=scene,
         job=plain(job_table(job)),
     )
 
@@ -39,11 +40,8 @@ def describe(
     Args:
         ambient: the estimate.
     """
-    job, report, files = (
-        prepared.job,
-        prepared.scene.report,
-        array_names(prepared.job, prepared.n_cameras, prepared.lights),
-    )
+    job, report = prepared.job, prepared.scene.report
+    files = array_names(job, prepared.n_cameras, prepared.lights)
     summary: dict[str, Any] = {"finished": False, "images": 0, "ambient_paths": ambient.paths}
     summary |= {"automatic": choice.table()} if choice else {}
     summary |= {"target": target.table()} if target else {}
@@ -69,13 +67,13 @@ def describe(
         },
         summary=summary,
         directory=job.output.directory,
-        **_images(prepared, ambient),
+        **_images(prepared, ambient, files),
     )
 
 
-def _images(prepared: Prepared, ambient: Ambient) -> dict[str, Any]:
+def _images(prepared: Prepared, ambient: Ambient, files: Files) -> dict[str, Any]:
     """What the images are, and the light of each."""
-    lights, files = prepared.lights, array_names(prepared.job, prepared.n_cameras, prepared.lights)
+    lights = prepared.lights
     i_a = ambient.intensity.astype(np.float64)
     if not lights.groups:
         return {"images": files.pattern(""), "lights": _lights(range(lights.n), lights.sources, i_a, ambient)}
@@ -98,7 +96,7 @@ def _images(prepared: Prepared, ambient: Ambient) -> dict[str, Any]:
 
 
 def _lights(
-    positions: range, sources: "list[LightPath] | tuple[LightPath, ...]", i_a: Float64, ambient: Ambient
+    positions: range, sources: Sequence[LightPath], i_a: Float64, ambient: Ambient
 ) -> tuple[ManifestLight, ...]:
     """Sources and I_A, (n_lights, 3), of some light indices."""
     return tuple(

@@ -10,7 +10,6 @@ Notation: a position is an index along a light axis that need not be whole; ther
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from itertools import product
 from math import floor
 from pathlib import Path
 from typing import TypeAlias
@@ -106,10 +105,6 @@ class Pictures:
         if self.manifest.groups or not relight.changes_nothing or positions[0] != floor(positions[0]):
             return None
         return image_path(self.manifest, c, int(positions[0]))
-
-    def places(self) -> Iterator[tuple[int, ...]]:
-        """All light places: one index for each axis."""
-        return product(*(range(n) for n in self.manifest.axes.values()))
 
     def _check_relight(self, relight: Relight) -> None:
         if relight.changes_nothing:

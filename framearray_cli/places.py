@@ -3,7 +3,6 @@
 Notation: a place on one axis is an index; a light place is a tuple of them, one for each axis of `Manifest.axes`.
 """
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from itertools import product
@@ -11,10 +10,12 @@ from typing import TypeAlias
 
 from .errors import JobError
 from .manifest import MAIN_AXIS, Manifest
+from .movie.places import nearest, position_of, read_place
 
 LightPlace: TypeAlias = tuple[int, ...]
 
 ALL, MIDDLE = "all", "50%"
+_PLACE = r"[+-]?\d{1,9}|first|last|[\d.]+ ?%"  # whole indices alone: nothing is blended here
 _WANTED = '"all", or indices, "first", "last" or percentages with commas between them'
 
 
@@ -104,10 +105,9 @@ def _told(axes: Mapping[str, int], at: Sequence[str]) -> dict[str, tuple[str, st
 
 def _index(place: str, n: int) -> int | None:
     """The index that a place means, which may lie outside; None if it means nothing."""
-    if re.fullmatch(r"[+-]?\d{1,9}", place):
-        index = int(place)
-        return index + n if index < 0 else index
-    share = {"first": 0.0, "last": 1.0}.get(place)
-    if share is None and (found := re.fullmatch(r"(\d{1,3}(?:\.\d{1,9})?) ?%", place)):
-        share = float(found[1]) / 100
-    return math.floor((n - 1) * share + 0.5) if share is not None and share <= 1 else None
+    if not re.fullmatch(_PLACE, place):
+        return None
+    try:
+        return nearest(position_of(read_place(place), n))
+    except ValueError:  # more than 100 %
+        return None

@@ -211,8 +211,13 @@ def scene_fingerprint(prepared: Prepared) -> str:
     return fingerprint(prepared.scene.centre.tobytes(), *arrays)
 
 
-def job_fingerprint(prepared: Prepared) -> str:
-    """Hash whatever the pixels depend on: the job without its output and machine, and the scene as it was read."""
+def job_fingerprint(prepared: Prepared, scene: str | None = None) -> str:
+    """Hash whatever the pixels depend on: the job without its output and machine, and the scene as it was read.
+
+    Args:
+        scene: its fingerprint, where it is known.
+    """
     table = {key: value for key, value in job_table(prepared.job).items() if key not in ("output", "render")}
     del table["scene"]["file"]
-    return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), scene_fingerprint(prepared).encode())
+    scene = scene or scene_fingerprint(prepared)
+    return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), scene.encode())

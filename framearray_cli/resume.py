@@ -1,6 +1,6 @@
 """Going on where a render stopped: what of an array is on disk and whole, and what is left to render."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -56,8 +56,3 @@ def look(folder: Path, fingerprint: str, threads: int = 1) -> Found:
     return Found(
         records=replace(records, entries=whole), damaged=tuple(problem for problems in found for problem in problems)
     )
-
-
-def unfinished(folder: Path) -> Iterator[Path]:
-    """Temporary files that a run left behind when it was ended by force."""
-    yield from folder.glob(".*.part")

@@ -68,7 +68,7 @@ def positions(key: str, span: Sequence[IndexPlace], n: int, noun: str, problems:
     """
     found = []
     for place in span:
-        position = _position(place, n)
+        position = position_of(place, n)
         if not 0 <= position <= n - 1:
             indices = f"0 to {n - 1}, or -{n} to -1" if n > 1 else "0 or -1"
             problem = f"{key}: expected one of {n} {noun} ({indices}), got {shown(place)}"
@@ -106,7 +106,7 @@ def _is_place(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _position(place: IndexPlace, n: int) -> float:
+def position_of(place: IndexPlace, n: int) -> float:
     """Resolve a place on an axis of n indices; the result may lie outside."""
     if isinstance(place, int | float):
         return float(place + n if place < 0 else place)
