@@ -7,6 +7,7 @@ into a file of its own (`records/0000-0047.jsonl`), so that parts may run side b
 
 import hashlib
 import json
+import re
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -19,6 +20,7 @@ from .errors import OutputError
 from .files import make_folder, reason
 
 FOLDER = "records"
+_SEAL = re.compile(rb'\{"check":"([0-9a-f]{16})",')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,7 +129,7 @@ class RecordWriter:
         self._put(line)
 
     def _put(self, line: Mapping[str, Any], before: bytes = b"") -> None:
-        data = before + json.dumps(line, separators=(",", ":")).encode() + b"\n"
+        data = before + sealed(line) + b"\n"
         try:
             with self._lock:
                 self._file.write(data)
@@ -185,12 +187,36 @@ def _lines(file: Path) -> Iterator[dict[str, Any]]:
     except OSError as error:
         raise OutputError(f"{file}: cannot be read: {reason(error)}") from error
     for line in data.splitlines():
-        try:
-            found = json.loads(line)
-        except (ValueError, RecursionError):  # torn, or damaged: what it tells of is made again
-            continue
-        if isinstance(found, dict):
+        found = unsealed(line)
+        if found is not None:  # else torn, or damaged: what it tells of is made again
             yield found
+
+
+def sealed(table: Mapping[str, Any]) -> bytes:
+    """A line of a record: JSON that begins with a checksum of all the rest."""
+    body = json.dumps(table, separators=(",", ":")).encode()
+    return b'{"check":"' + _check(body) + b'",' + body[1:]
+
+
+def unsealed(line: bytes) -> dict[str, Any] | None:
+    """What `sealed` made a line of; None where the line is not what it was."""
+    match = _SEAL.match(line)
+    if not match:
+        return None
+    body = b"{" + line[match.end() :]
+    if _check(body) != match[1]:
+        return None
+    try:
+        found = json.loads(body)
+    except (ValueError, RecursionError):
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def _check(body: bytes) -> bytes:
+    import xxhash
+
+    return xxhash.xxh3_64_hexdigest(body).encode()
 
 
 def _entry(line: Mapping[str, Any]) -> Entry | None:

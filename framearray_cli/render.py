@@ -101,7 +101,7 @@ def render(
             held.enter_context(place.reserved(chosen, session.cameras))
         if choice:
             listener.settled(choice)
-        found = look(folder, identity.fingerprint, prepared.threads)
+        found = look(folder, identity.fingerprint, prepared.threads, frozenset(chosen))
         wanted = found.missing(chosen, range(prepared.n_lights))
         listener.found(found, len(wanted) * prepared.n_lights)
         if not wanted:

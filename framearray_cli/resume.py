@@ -1,6 +1,6 @@
 """Going on where a render stopped: what of an array is on disk and whole, and what is left to render."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,8 +38,11 @@ def _lights_by_camera(records: Records) -> dict[int, set[int]]:
     return done
 
 
-def look(folder: Path, fingerprint: str, threads: int = 1) -> Found:
-    """Read all records of an array, and every file that they name: those that are not what they were do not count.
+def look(folder: Path, fingerprint: str, threads: int = 1, cameras: Container[int] | None = None) -> Found:
+    """Read all records of an array, and the files that they name: those that are not what they were do not count.
+
+    Args:
+        cameras: whose files are read; what records say of others is believed. None: of all.
 
     Raises:
         OutputError: a record cannot be read.
@@ -48,7 +51,8 @@ def look(folder: Path, fingerprint: str, threads: int = 1) -> Found:
     checksums = records.checksums()
 
     def wrong(entry: Entry) -> list[tuple[str, str]]:
-        return list(damaged(folder, checksums, entry.files))
+        wanted = cameras is None or entry.c in cameras
+        return list(damaged(folder, checksums, entry.files)) if wanted else []
 
     with ThreadPoolExecutor(threads, thread_name_prefix="verify") as pool:
         found = list(pool.map(wrong, records.entries))
