@@ -47,6 +47,9 @@ class Listener:
     def settled(self, choice: Choice) -> None:
         """What the job leaves open was chosen."""
 
+    def looking(self, files: int) -> None:
+        """So many files of the array are there, and are compared with their checksums."""
+
     def found(self, found: Found, wanted: int) -> None:
         """What of the array is there already, and how many images will be rendered."""
 
@@ -101,7 +104,7 @@ def render(
             held.enter_context(place.reserved(chosen, session.cameras))
         if choice:
             listener.settled(choice)
-        found = look(folder, identity.fingerprint, prepared.threads, frozenset(chosen))
+        found = look(folder, identity.fingerprint, prepared.threads, frozenset(chosen), listener.looking)
         wanted = found.missing(chosen, range(prepared.n_lights))
         listener.found(found, len(wanted) * prepared.n_lights)
         if not wanted:

@@ -54,7 +54,7 @@ def render_shown(job: "Job", *, quiet: bool, restart: bool = False, cameras: Seq
 
             def prepared(self, prepared: "Prepared") -> None:
                 screen.say(scene_lines(prepared))
-                screen.wait("estimating the ambient light")
+                screen.wait("looking at the output folder")
 
             def removed(self, files: int) -> None:
                 if files:
@@ -63,9 +63,13 @@ def render_shown(job: "Job", *, quiet: bool, restart: bool = False, cameras: Seq
             def settled(self, choice: "Choice") -> None:
                 screen.say(choice.lines())
 
+            def looking(self, files: int) -> None:
+                screen.wait(f"looking whether {files:,} files are whole")
+
             def found(self, found: "Found", wanted: int) -> None:
                 self.total = wanted
                 screen.say(found_lines(found, wanted))
+                screen.wait("estimating the ambient light")
 
             def planned(self, ambient: "Ambient") -> None:
                 screen.say(ambient_lines(ambient))

@@ -170,11 +170,14 @@ def test_damage_is_found_and_mended(scene: Path, tmp_path: Path, whole: Path) ->
     heard: list[int] = []
 
     class Hears(Counting):
+        def looking(self, files: int) -> None:
+            heard.append(files)
+
         def found(self, found: Any, wanted: int) -> None:
             heard.append(len(found.damaged))
 
     render(job(scene, tmp_path), Hears())
-    assert heard == [6]
+    assert heard == [len(images(whole)), 6]
     assert images(tmp_path) == images(whole)
     assert look(tmp_path, read_manifest(tmp_path).fingerprint).damaged == ()
 
