@@ -1,5 +1,6 @@
 """`manifest.toml`: short keys on top, then the job, then one block a camera and a light; people read it first."""
 
+import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -37,7 +38,7 @@ def read_manifest(place: Path) -> Manifest:
     Raises:
         OutputError: it is missing, broken, made by a newer program, or leads out of its folder.
     """
-    path = place / FILE_NAME if place.is_dir() else place
+    path = place / FILE_NAME if os.path.isdir(place) else place
     try:
         table = tomllib.loads(path.read_bytes().decode())
     except FileNotFoundError as error:
