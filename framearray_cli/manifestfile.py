@@ -45,7 +45,7 @@ def read_manifest(place: Path) -> Manifest:
         raise OutputError(f"{path}: no such file; expected the output folder of `framearray render`") from error
     except OSError as error:
         raise OutputError(f"{path}: cannot be read: {reason(error)}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # the first: no UTF-8, no TOML, or a number of too many digits
         raise OutputError(f"{path}: not valid TOML: {error}; render again, or restore the file") from error
     found = table.get("format")
     if found not in (FORMAT, FORMAT_OF_GROUPS):
