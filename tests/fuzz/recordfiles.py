@@ -60,7 +60,7 @@ def cases(rng: Random, folder: Path) -> Iterator[Case]:
 
 
 def _wrong(own: Path, like: Path | None, outcome: Outcome) -> str | None:
-            lines[rng.randrange(len(lines))] = rng.choice((b"{}", b"[]", b"null", b'{"c":0}', b'{"check":"0",}'))
+    """Whether files elsewhere were touched, or a render made other images than one that was not stopped."""
     if like and outcome.code == 0:
         for file in like.glob("*.exr"):
             if (
