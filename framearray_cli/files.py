@@ -54,7 +54,7 @@ def folder_for(folder: Path) -> Iterator[None]:
     Raises:
         OutputError: as `make_folder`.
     """
-    made = [place for place in (folder, *folder.parents) if not place.exists()]
+    made = [place for place in (folder, *folder.parents) if not os.path.exists(place)]
     try:
         make_folder(folder)
         yield

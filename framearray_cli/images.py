@@ -6,6 +6,7 @@ reads half a JPEG without a word, so PNG and JPEG go through Pillow, in memory.
 
 import io
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -232,7 +233,7 @@ def read_layers(path: Path) -> dict[str, Float32]:
 def last_row(path: Path) -> tuple[int, int] | None:
     """Read the last row of an EXR or TIFF, which one that was cut short has lost: width and height, or None."""
     oiio = _oiio()
-    source = oiio.ImageInput.open(str(path)) if path.is_file() else None
+    source = oiio.ImageInput.open(str(path)) if os.path.isfile(path) else None
     if source is None:
         oiio.geterror()  # clears what the failed opening left behind
         return None
@@ -344,7 +345,7 @@ def _check_end(path: Path, part: Path) -> None:
 def _read_oiio(path: Path) -> tuple[list[str], Float32]:
     """Read all channels as float32: names and (h, w, channels)."""
     oiio = _oiio()
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise OutputError(f"{path}: no such file")
     source = oiio.ImageInput.open(str(path))
     if source is None:

@@ -1,6 +1,7 @@
 """A scene file -> Meshes, or one SceneError; nothing is printed on the way."""
 
 import logging
+import os
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -75,7 +76,7 @@ def _told(file: Path, extension: str) -> Iterator[None]:
 
 
 def _bytes_of(file: Path) -> bytes:
-    if file.is_dir():
+    if os.path.isdir(file):
         raise SceneError(f"{file}: expected a scene file, got a folder")
     try:
         data = file.read_bytes()

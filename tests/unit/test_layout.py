@@ -14,7 +14,7 @@ PACKAGE = Path(framearray_cli.__file__).parent
 # Every file, in the order in which data flows; a file imports only from those before it.
 FLOW = """
 __init__ errors arrays kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
-compiling files framerate filepatterns fingerprint colour sphere
+compiling files framerate fingerprint colour sphere
 jobvalues jobtimes jobkeys jobmethod job jobschema jobdocs problems eyefile jobfile
 meshes/assets meshes/container meshes/model meshes/defaults meshes/cleaning meshes/polygons meshes/merge
 meshes/overrides meshes/textures meshes/opacity meshes/mtl meshes/walk meshes/gltf_materials meshes/gltf_prepare
@@ -26,7 +26,8 @@ rays hits eyehits plan allotment
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
 terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise standarderror compose accumulate window
-imageattributes images manifest manifestfile pictures ranges record resume folderlock outfolder stored writer
+imageattributes images filepatterns manifest manifestfile pictures ranges record resume folderlock
+outfolder stored writer
 prepare memory acceptance expected auto allot target describe summary render check verify
 start/rays start/sample start/views start/room start/orbit start/model start/staged start/expose start/plan
 start/text start/__init__
