@@ -1,0 +1,54 @@
+"""The command: `python -m fuzz KIND --cases N --seed S`, from the folder `tests`; `python -m fuzz page` afterwards."""
+
+import argparse
+import importlib
+import os
+import random
+import sys
+import tempfile
+from pathlib import Path
+
+from bench.results import ROOT, save
+
+from . import page
+from .run import run
+
+# What is mutated, and the module that does it.
+KINDS = {
+    "jobs": "jobfiles",
+    "scenes": "scenefiles",
+    "paths": "pathfiles",
+    "manifests": "manifests",
+    "records": "recordfiles",
+}
+RESULTS = ROOT / "out" / "fuzz"  # git ignores it
+
+
+def main() -> None:
+    """Run cases of one kind and keep what came of them, or write the page."""
+    parser = argparse.ArgumentParser(prog="fuzz", description="Broken input by the thousand; writes docs/fuzzing.md.")
+    parser.add_argument("what", choices=(*KINDS, "page"))
+    parser.add_argument("--cases", type=int, default=100, help="how many")
+    parser.add_argument("--seed", type=int, default=0, help="results of every seed are kept")
+    parser.add_argument("--minutes", type=float, default=60.0, help="no case is begun after that time")
+    parser.add_argument("--only", default="", help="only cases whose mutation has this text in its name")
+    args = parser.parse_args()
+    if args.what == "page":
+        page.write(RESULTS)
+        return
+    os.environ["NUMBA_NUM_THREADS"] = "1"
+    kept = RESULTS / f"{args.what}-{args.seed}"
+    cases = importlib.import_module(f"fuzz.{KINDS[args.what]}").cases
+    with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
+        made = cases(random.Random(f"{args.what} {args.seed}"), Path(name))
+        wanted = (case for case in made if args.only in case.mutation)
+        table = run(wanted, args.cases, 60 * args.minutes, kept, Path(name))
+    save(RESULTS, kept.name, {"kind": args.what, "seed": args.seed, **table})
+    for bad in table["bad"]:
+        print(f"{bad['mutation']}: {bad['verdict']}; kept in {bad['folder']}")
+    print(f"{table['cases']} cases in {table['seconds']:.0f} s, {len(table['bad'])} bad")
+    sys.exit(bool(table["bad"]))
+
+
+if __name__ == "__main__":
+    main()

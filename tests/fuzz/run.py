@@ -1,0 +1,91 @@
+"""Runs cases one after the other, and counts how they ended."""
+
+import shlex
+import shutil
+import time
+from collections import Counter, defaultdict
+from collections.abc import Iterable
+from pathlib import Path
+
+from bench.results import Table
+
+from .case import Case
+from .outcome import Outcome, outcome_of
+
+MESSAGES = 400  # that are kept to be read, the latest of them
+SLOWEST = 5
+
+
+def run(cases: Iterable[Case], n: int, seconds: float, kept: Path, scratch: Path) -> Table:
+    """Run at most n cases for at most so long.
+
+    Args:
+        kept: folder for what belongs to cases that ended badly; emptied first.
+        scratch: folder for what they print.
+
+    Returns:
+        What `page` makes tables from.
+    """
+    shutil.rmtree(kept, ignore_errors=True)
+    begin = time.monotonic()
+    counts: dict[str, Counter[str]] = defaultdict(Counter)
+    times: list[tuple[float, str]] = []
+    bad: list[Table] = []
+    messages: list[list[str]] = []
+    for case in cases:
+        outcome, verdict = judged(case, scratch / "stderr.txt")
+        counts[case.mutation][_column(case, outcome, verdict)] += 1
+        times = sorted([*times, (outcome.seconds, case.mutation)], reverse=True)[:SLOWEST]
+        if outcome.verdict == "refused":
+            messages = [*messages[1 - MESSAGES :], [case.mutation, outcome.message]]
+        if verdict not in ("accepted", "refused"):
+            bad.append(_keep(case, outcome, verdict, kept / f"{len(bad):03d}"))
+        else:
+            remove(case.folder)
+        if sum(map(Counter.total, counts.values())) >= n or time.monotonic() - begin > seconds:
+            break
+    return {
+        "cases": sum(map(Counter.total, counts.values())),
+        "seconds": time.monotonic() - begin,
+        "mutations": {name: dict(counts[name]) for name in sorted(counts)},
+        "slowest": times,
+        "bad": bad,
+        "messages": messages,
+    }
+
+
+def judged(case: Case, log: Path) -> tuple[Outcome, str]:
+    """Run a case: how it ended, and the verdict with what else is wrong."""
+    outcome = outcome_of(case.arguments, log, before=case.before)
+    if outcome.verdict == "hang":  # once more: another program may have had the processor
+        outcome = outcome_of(case.arguments, log, before=case.before)
+    wrong = None if outcome.bad else case.wrong(outcome)
+    return outcome, wrong or outcome.verdict
+
+
+def _column(case: Case, outcome: Outcome, verdict: str) -> str:
+    """What a case counts as: "render accepted", "check refused 2", or a verdict."""
+    if verdict == "accepted":
+        return f"{case.arguments[0]} accepted"
+    return f"refused {outcome.code}" if verdict == "refused" else verdict
+
+
+def _keep(case: Case, outcome: Outcome, verdict: str, place: Path) -> Table:
+    """Move the files of a case to where they stay."""
+    place.parent.mkdir(parents=True, exist_ok=True)
+    command = shlex.join(str(argument) for argument in case.arguments)
+    if case.folder.exists():
+        shutil.move(case.folder, place)
+    else:
+        place.mkdir()
+    (place / "case.txt").write_text(f"{verdict}\n{command}\n\n{outcome.message}", errors="backslashreplace")
+    return {"mutation": case.mutation, "verdict": verdict, "folder": str(place), "message": outcome.message}
+
+
+def remove(folder: Path) -> None:
+    """Remove a folder whatever the case did to it."""
+    if not folder.exists():
+        return
+    for place in (folder, *(p for p in folder.rglob("*") if p.is_dir() and not p.is_symlink())):
+        place.chmod(0o700)
+    shutil.rmtree(folder)
