@@ -36,8 +36,9 @@ Images: TypeAlias = NDArray[np.float32] | NDArray[np.float16]  # (n_lights, heig
 
 def is_number(value: object) -> bool:
     """Whether a value from a file is a number that float64 holds: not NaN, infinite or a whole number beyond."""
-    right = isinstance(value, int | float) and not isinstance(value, bool)
-    return right and abs(value) <= sys.float_info.max  # type: ignore[operator, arg-type]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= sys.float_info.max
 
 
 def with_room(shape: tuple[int, ...], dtype: Any, fill: float | None = None) -> Any:

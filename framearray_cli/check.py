@@ -16,10 +16,8 @@ from .frame import find_frame
 from .job import Job
 from .memory import (
     ambient_memory,
-    free_memory,
     light_blocks,
     mirror_share,
-    resident_memory,
     window_memory,
 )
 from .outfolder import Identity, differences, free_space, in_the_way, read_array
@@ -27,6 +25,7 @@ from .prepare import Prepared, composed_with, open_embree, plan_work, prepare
 from .stored import array_names
 from .target import Target, aimed
 from .terms.ambient import Ambient
+from .usage import free_memory, resident_memory
 from .window import Window
 from .work import Work
 from .writer import ArrayWriter, image_format

@@ -81,6 +81,14 @@ class SceneTable(Table):
         default=(0.0, 0.0, 0.0),
         description="Radiance of what lies outside the scene, W/(m2 sr); one number means grey.",
     )
+    folders: tuple[FileName, ...] = Field(
+        default=(),
+        strict=False,
+        max_length=100,
+        description="Further folders, with all below them, where files that the scene names may lie, such as textures. "
+        "Without them a scene reads only what lies beside it, or below.",
+        json_schema_extra={"x-words": "a list of folders"},
+    )
     materials: dict[str, MaterialTable] = Field(
         default_factory=dict, description="Materials to override, by their names in the scene file."
     )

@@ -1,10 +1,6 @@
-"""How much memory this process used, and how much a job will need."""
-
-import sys
-from pathlib import Path
+"""How much memory a job will need."""
 
 import numpy as np
-import psutil
 
 from .arrays import Float64
 from .errors import JobError
@@ -15,6 +11,7 @@ from .plan import flag_mirrors, frame_hits
 from .prepare import Prepared
 from .rays import room_for_hits
 from .terms.ambient import BATCH
+from .usage import free_memory, resident_memory
 from .work import Work
 from .writer import BLOCKS, image_format
 
@@ -25,30 +22,6 @@ GROWTH = 256 * 2**20
 # Mirrors are looked for in this many frames of the path, this many rays at a time.
 PILOT_FRAMES, PILOT_BATCH = 8, 2048
 LAYER_CHANNELS = 14
-
-
-def peak_memory() -> int:
-    """Largest resident size of this process so far, bytes."""
-    if sys.platform == "win32":
-        return int(psutil.Process().memory_info().peak_wset)
-    if sys.platform == "linux":  # what getrusage tells includes the process that started this one
-        for line in Path("/proc/self/status").read_text().splitlines():
-            if line.startswith("VmHWM:"):
-                return int(line.split()[1]) * 1024
-    import resource
-
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return int(peak if sys.platform == "darwin" else peak * 1024)  # bytes on macOS, KiB elsewhere
-
-
-def free_memory() -> int:
-    """Bytes that this process can still get, swap included."""
-    return int(psutil.virtual_memory().available + psutil.swap_memory().free)
-
-
-def resident_memory() -> int:
-    """Bytes that this process holds now: the program, the scene, and Embree's tree once it is built."""
-    return int(psutil.Process().memory_info().rss)
 
 
 def taken_memory() -> int:

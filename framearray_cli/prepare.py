@@ -24,10 +24,13 @@ from .terms.ambient_eye import EyeWalks, ambient_by_eye, fixed_ambient
 from .terms.ambient_fit import Curve, ambient_by_fit
 from .terms.ambient_light import ambient_by_light
 from .terms.obscurance import FALLOFFS, ObscuranceSettings
+from .usage import resident_memory
 from .work import BY_SAMPLE, Work
 
 # Native hits of a pixel of a frame from which on they are sampled in two halves.
 FEWEST_SPLIT = 4
+# A limit that leaves less than this is refused as a whole, once it is known what the frames take.
+LEAST_SCENE_MEMORY = 64 * 2**20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,7 +77,7 @@ def prepare(job: Job) -> Prepared:
     if job.denoise.obscurance:
         require_denoiser()
     job_eyes, job_lights = eyes(job), lights(job)
-    scene = load_scene(job.scene.file, job.scene.materials)
+    scene = load_scene(job.scene.file, job.scene.materials, job.scene.folders, _scene_memory(job))
     moved = job_eyes.world_from_camera != job_eyes.world_from_camera[:1]
     return Prepared(
         job=job,
@@ -85,6 +88,12 @@ def prepare(job: Job) -> Prepared:
         surfaces=surfaces(scene),
         still=not moved.any(),
     )
+
+
+def _scene_memory(job: Job) -> int | None:
+    """Bytes that reading the scene may take: what the job leaves beside what the program holds already."""
+    limit = job.render.memory
+    return None if limit is None else max(limit - resident_memory(), LEAST_SCENE_MEMORY)
 
 
 def open_embree(prepared: Prepared, engine: Engine = "auto") -> EmbreeScene:
@@ -218,6 +227,7 @@ def job_fingerprint(prepared: Prepared, scene: str | None = None) -> str:
         scene: its fingerprint, where it is known.
     """
     table = {key: value for key, value in job_table(prepared.job).items() if key not in ("output", "render")}
-    del table["scene"]["file"]
+    for where in ("file", "folders"):
+        table["scene"].pop(where, None)
     scene = scene or scene_fingerprint(prepared)
     return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), scene.encode())

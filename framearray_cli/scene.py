@@ -98,17 +98,24 @@ class Scene:
         return bool((self.specular[np.unique(self.material)] > 0).any())
 
 
-def load_scene(file: Path, overrides: Mapping[str, Override] | None = None) -> Scene:
+def load_scene(
+    file: Path,
+    overrides: Mapping[str, Override] | None = None,
+    folders: Sequence[Path] = (),
+    memory: int | None = None,
+) -> Scene:
     """Read a scene file, clean it and move it to its own centre.
 
     Args:
         file: any format that trimesh reads.
         overrides: by material name; a value replaces factor, texture and corner colours of that part.
+        folders: that files named by the scene may lie in, beside its own.
+        memory: bytes that reading may take; None: what is free.
 
     Raises:
         SceneError: a file that cannot be read, holds nothing to render, or lacks an overridden material.
     """
-    meshes = read_meshes(file)
+    meshes = read_meshes(file, folders, memory)
     try:
         return build_scene(meshes, overrides or {})
     except SceneError as error:

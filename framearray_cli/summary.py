@@ -7,11 +7,11 @@ from typing import Any
 
 from .kernel import processor
 from .manifest import Manifest
-from .memory import peak_memory
 from .paths import Lights
 from .prepare import Prepared
 from .record import Records
 from .standarderror import summed_up
+from .usage import peak_memory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -30,7 +30,7 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
     gltf = open_gltf(data, assets)
     check_readable(gltf)
     note_unread(gltf, notes)
-    textures = TextureTable(notes)
+    textures = TextureTable(notes, assets.limit)
     materials = read_materials(gltf, used_materials(gltf), assets, textures, notes)
     plain, coloured = len(materials), len(materials) + 1
     prepare(gltf, materials, plain, coloured, notes)

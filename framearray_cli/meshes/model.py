@@ -7,6 +7,7 @@ from ..arrays import Bytes, Float32, Float64
 
 GREY = 0.5  # reflectivity of surfaces without any material: neither black nor a white that hides all shading
 NAMES_IN_A_NOTE = 6  # names that one note lists before it says "and n more"
+MOST_NOTES = 50  # more would scroll away what matters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,17 +73,20 @@ class Meshes:
 class Notes:
     """Collects what the user should know; one sentence a kind of finding, with the names it concerns."""
 
-    found: dict[str, list[str]] = field(default_factory=dict)
+    found: dict[str, dict[str, None]] = field(default_factory=dict)  # sentence -> names, in the order found
 
     def add(self, sentence: str, name: str = "") -> None:
         """Note a finding; the same sentence with several names becomes one line."""
-        names = self.found.setdefault(sentence, [])
-        if name and name not in names:
-            names.append(name)
+        names = self.found.setdefault(sentence, {})
+        if name:
+            names[name] = None
 
     def lines(self) -> tuple[str, ...]:
-        """One line a finding, in the order found."""
-        return tuple(f"{sentence}: {listed(names)}" if names else sentence for sentence, names in self.found.items())
+        """One line a finding, in the order found; of very many, the first ones."""
+        shown = list(self.found.items())[:MOST_NOTES]
+        lines = [f"{sentence}: {listed(list(names))}" if names else sentence for sentence, names in shown]
+        more = len(self.found) - len(shown)
+        return (*lines, *([f"and {more} more notes"] if more else []))
 
 
 def listed(names: Sequence[str], limit: int = NAMES_IN_A_NOTE) -> str:

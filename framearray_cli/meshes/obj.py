@@ -21,6 +21,8 @@ from .textures import TextureTable
 
 Indices = NDArray[np.int64]
 
+MOST_LIBRARIES = 1000  # a scene has one or two; each takes a look at the disk
+
 
 @dataclass(slots=True)
 class ObjText:
@@ -58,7 +60,7 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
     corners, face = corners[inside], face[inside]
     material_of = np.array(text.face_material, dtype=np.int64)[face] if len(face) else np.zeros(0, dtype=np.int64)
 
-    textures = TextureTable(notes)
+    textures = TextureTable(notes, assets.limit)
     library = _libraries(text.libraries, assets, notes)
     materials: list[Material] = []
     parts: list[Part] = []
@@ -217,7 +219,10 @@ def _pick(table: Float64, index: Indices) -> Float64 | None:
 def _libraries(names: Sequence[str], assets: Assets, notes: Notes) -> dict[str, MtlEntry]:
     """All materials of all `mtllib` lines; the first of a name counts."""
     entries: dict[str, MtlEntry] = {}
-    for name in names:
+    different = list(dict.fromkeys(names))
+    if len(different) > MOST_LIBRARIES:
+        raise ValueError(f"expected at most {MOST_LIBRARIES} material libraries, got {len(different)}")
+    for name in different:
         plain = name.split("#", 1)[0].strip()
         for data in _first_readable(([name], [plain], plain.split()), assets, notes):
             for key, entry in parse_mtl(decode_text(data)).items():
@@ -228,9 +233,12 @@ def _libraries(names: Sequence[str], assets: Assets, notes: Notes) -> dict[str, 
 def _first_readable(readings: Sequence[list[str]], assets: Assets, notes: Notes) -> list[bytes]:
     """The files of the first reading of a line (one name with spaces, or several names) whose files all exist."""
     reason: AssetError | None = None
+    before = len(assets.refused)
     for names in readings:
         try:
-            return [assets.read(name) for name in names]
+            found = [assets.read(name) for name in names]
+            del assets.refused[before:]  # by other readings of the line
+            return found
         except AssetError as error:
             reason = reason or error
     notes.add(f"material library left out, {reason}")

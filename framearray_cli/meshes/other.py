@@ -7,12 +7,12 @@ import numpy as np
 
 from ..arrays import Float32
 from ..errors import SceneError
-from .assets import Assets
+from .assets import AssetError, Assets
 from .defaults import clean_colours, default_material
 from .model import Material, Meshes, Notes, Part
 from .mtl import limited
 from .opacity import blended
-from .textures import TextureTable, rgba
+from .textures import TextureTable
 from .walk import instances, place
 
 BYTE = 255.0
@@ -22,12 +22,17 @@ HINT = "; install it (for COLLADA: pip install pycollada), or convert the file t
 class Folder:
     """Gives trimesh's loaders the files beside the scene, and no others."""
 
-    def __init__(self, assets: Assets) -> None:
+    def __init__(self, assets: Assets, notes: Notes) -> None:
         self.assets = assets
+        self.notes = notes
 
     def get(self, name: str) -> bytes:
         """The bytes of a named file."""
-        return self.assets.read(name)
+        try:
+            return self.assets.read(name)
+        except AssetError as error:
+            self.notes.add(f"texture left out, {error}")
+            raise
 
     def __getitem__(self, name: str) -> bytes:
         return self.get(name)
@@ -45,14 +50,14 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
     import trimesh
 
     notes = Notes()
-    folder: Any = Folder(assets)  # it has what loaders use of trimesh's own resolvers
+    folder: Any = Folder(assets, notes)  # it has what loaders use of trimesh's own resolvers
     if extension == "ply":
         data = _without_blank_lines(data)
     try:
         scene = trimesh.load_scene(io.BytesIO(data), file_type=extension, resolver=folder, process=False)
     except ImportError as error:
         raise SceneError(f"trimesh needs a further package for this format ({error}){HINT}") from error
-    textures = TextureTable(notes)
+    textures = TextureTable(notes, assets.limit)
     materials: list[Material] = []
     numbers: dict[Any, int] = {}
     parts: list[Part] = []
@@ -121,7 +126,7 @@ def _material(source: Any, number: int, textures: TextureTable, notes: Notes) ->
     """Map a trimesh material: its main colour and its image."""
     name = str(getattr(source, "name", None) or f"material {number}")
     image = getattr(source, "baseColorTexture", None) or getattr(source, "image", None)
-    texture = -1 if image is None else textures.add(("trimesh", id(image)), rgba(image))
+    texture = -1 if image is None else textures.add(("trimesh", id(image)), f"material {name}", image)
     colour = np.asarray(source.main_color, dtype=np.float64) / BYTE
     if texture >= 0 and getattr(source, "diffuse", None) is not None:
         colour = np.array([1.0, 1.0, 1.0, colour[3]])  # trimesh's default grey must not darken an image

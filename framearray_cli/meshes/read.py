@@ -1,9 +1,8 @@
 """A scene file -> Meshes, or one SceneError; nothing is printed on the way."""
 
 import logging
-import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -16,32 +15,45 @@ from .container import open_gltf
 from .gltf import read_gltf
 from .gltf_prepare import check_readable
 from .gltf_stage import Stage, read_gltf_stage
+from .limit import Limit
 from .model import Meshes
 from .obj import read_obj
 from .other import read_other, readable_formats
 
 LOGGERS = ("trimesh", "PIL")
+# What images take is counted here, and a texture that is left out is told with its name.
+UNTOLD_WARNINGS = ("DeprecationWarning", "DecompressionBombWarning")
+UNTOLD = ("unable to load image!",)
 MAX_REASON = 200  # characters of a library's own message that an error repeats
 
 
-def read_meshes(file: Path) -> Meshes:
+def read_meshes(file: Path, folders: Sequence[Path] = (), memory: int | None = None) -> Meshes:
     """Read a scene file of any format.
 
+    Args:
+        folders: that files named by the scene may lie in, beside its own.
+        memory: bytes that may be taken; None: what is free.
+
     Raises:
-        SceneError: missing, a folder, of an unknown kind, broken, or without triangles.
+        SceneError: missing, a folder, of an unknown kind, broken, without triangles, too large, or one that wants to
+            read files elsewhere.
     """
-    data = _bytes_of(file)
+    assets = _assets(file, folders, memory)
     extension = file.suffix[1:].lower()
     with _quiet() as messages, np.errstate(all="ignore"), _told(file, extension):
-        meshes = _read(data, extension, Assets(folder=file.parent))
+        meshes = _read(_bytes_of(file, assets.limit), extension, assets)
+        assets.require_inside()
     if not any(len(part.corners) for part in meshes.parts):
         found = "; ".join((*meshes.notes, *(f"{n} triangles with {why}" for why, n in meshes.dropped.items())))
         raise SceneError(f"{file}: expected triangles, got none" + (f" ({found})" if found else ""))
     return replace(meshes, notes=meshes.notes + tuple(f"while reading: {message}" for message in messages))
 
 
-def read_stage(file: Path) -> Stage:
+def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
     """Read the cameras and lights of a scene file; only glTF has any that are read.
+
+    Args:
+        folders: that files named by the scene may lie in, beside its own.
 
     Raises:
         SceneError: missing, a folder, or broken.
@@ -49,9 +61,9 @@ def read_stage(file: Path) -> Stage:
     extension = file.suffix[1:].lower()
     if extension not in ("glb", "gltf"):
         return Stage()
-    data = _bytes_of(file)
+    assets = _assets(file, folders, None)
     with np.errstate(all="ignore"), _told(file, extension):
-        gltf = open_gltf(data, Assets(folder=file.parent))
+        gltf = open_gltf(_bytes_of(file, assets.limit), assets)
         check_readable(gltf)
         return read_gltf_stage(gltf)
 
@@ -75,18 +87,27 @@ def _told(file: Path, extension: str) -> Iterator[None]:
         raise SceneError(f"{file}: broken, or not {extension.upper()} ({reason}); export it anew") from error
 
 
-def _bytes_of(file: Path) -> bytes:
-    if os.path.isdir(file):
-        raise SceneError(f"{file}: expected a scene file, got a folder")
+def _assets(file: Path, folders: Sequence[Path], memory: int | None) -> Assets:
+    limit = Limit() if memory is None else Limit(most=memory)
+    return Assets(folder=file.parent, folders=tuple(folders), limit=limit)
+
+
+def _bytes_of(file: Path, limit: Limit) -> bytes:
+    """The bytes of a scene file; pipes and devices, which may never end, are none."""
     try:
-        data = file.read_bytes()
-    except FileNotFoundError as error:
-        raise SceneError(f"{file}: no such scene file; paths are relative to the job file") from error
+        if not file.exists():
+            raise SceneError("no such scene file; paths are relative to the job file")
+        if file.is_dir():
+            raise SceneError("expected a scene file, got a folder")
+        if not file.is_file():
+            raise SceneError("expected a scene file, got a pipe or a device")
+        size = file.stat().st_size
+        if not size:
+            raise SceneError("expected a scene, got an empty file")
+        limit.take("files", size)
+        return file.read_bytes()
     except OSError as error:
-        raise SceneError(f"{file}: cannot be read: {error.strerror or error}") from error
-    if not data:
-        raise SceneError(f"{file}: expected a scene, got an empty file")
-    return data
+        raise SceneError(f"cannot be read: {error.strerror or error}") from error
 
 
 def _read(data: bytes, extension: str, assets: Assets) -> Meshes:
@@ -111,7 +132,7 @@ def _quiet() -> Iterator[list[str]]:
     class Collect(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
             note = record.getMessage()
-            if note not in messages:
+            if note not in (*messages, *UNTOLD):
                 messages.append(note)
 
     handler = Collect(level=logging.WARNING)
@@ -126,7 +147,7 @@ def _quiet() -> Iterator[list[str]]:
             yield messages
         for warning in caught:
             text = " ".join(str(warning.message).split())
-            if text not in messages and not issubclass(warning.category, DeprecationWarning):
+            if text not in messages and warning.category.__name__ not in UNTOLD_WARNINGS:
                 messages.append(text)
     finally:
         for logger, before in zip(loggers, propagate, strict=True):

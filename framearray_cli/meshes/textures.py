@@ -1,5 +1,6 @@
 """Images -> RGBA texels, through Pillow."""
 
+import hashlib
 import io
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
@@ -10,10 +11,21 @@ import numpy as np
 from ..arrays import Bytes, Float64
 from ..errors import SceneError
 from .assets import AssetError
+from .limit import Limit
 from .model import Notes
 
 MAX_TEXELS = 2**31 - 1  # texel indices are int32
 MAX_BYTE = 255.0
+# Kinds of images that scenes come with. Pillow opens others too, some of them with programs of other people (EPS).
+FORMATS = tuple(
+    ["PNG", "JPEG", "WEBP", "TGA", "BMP", "TIFF", "GIF", "DDS", "JPEG2000", "AVIF", "PSD", "PPM", "PCX", "SGI"]
+)
+SEVERAL = "MPO"  # what Pillow calls a JPEG of several pictures, as phones write them
+KEPT = 8  # bytes a texel: RGBA, twice while the textures of a scene are joined
+DECODING = 16  # bytes a texel while an image is decoded: as Pillow holds it, as RGBA, and copies on the way
+# A picture of a camera has ten scans at most; each of a thousand takes as long as the whole picture.
+MOST_SCANS = 100
+SCAN = b"\xff\xda"
 
 
 @dataclass(slots=True)
@@ -21,6 +33,7 @@ class TextureTable:
     """The textures of one scene; each image is decoded once."""
 
     notes: Notes
+    limit: Limit
     textures: list[Bytes] = field(default_factory=list)
     indices: dict[Hashable, int] = field(default_factory=dict)
 
@@ -33,17 +46,20 @@ class TextureTable:
             read: gives the encoded image; may raise AssetError.
 
         Raises:
-            SceneError: an image so large that reading it could exhaust the memory.
+            SceneError: an image that takes more memory than there is.
         """
         if key not in self.indices:
-            texels = self._decode(label, read)
-            self.indices[key] = -1 if texels is None else self._append(texels)
+            self.indices[key] = self._index(label, read)
         return self.indices[key]
 
-    def add(self, key: Hashable, texels: Bytes) -> int:
-        """Return the index of texels that are decoded already."""
+    def add(self, key: Hashable, label: str, image: Any) -> int:
+        """As `index`, for an image that Pillow has opened."""
         if key not in self.indices:
-            self.indices[key] = self._append(texels)
+            try:
+                self.indices[key] = self._append(decoded(image, label, self.limit))
+            except AssetError as error:
+                self.notes.add(f"texture left out, {error}")
+                self.indices[key] = -1
         return self.indices[key]
 
     def cutout(self, key: Hashable, label: str, read: Callable[[], bytes]) -> int:
@@ -72,9 +88,22 @@ class TextureTable:
         texels = self._decode(label, read)
         return None if texels is None else np.asarray(texels.reshape(-1, 4).mean(axis=0, dtype=np.float64) / MAX_BYTE)
 
+    def _index(self, label: str, read: Callable[[], bytes]) -> int:
+        """Decode an image unless its bytes are known by another key."""
+        try:
+            data = read()
+        except AssetError as error:
+            self.notes.add(f"texture left out, {error}")
+            return -1
+        same = ("bytes", hashlib.sha256(data).digest())
+        if same not in self.indices:
+            texels = self._decode(label, lambda: data)
+            self.indices[same] = -1 if texels is None else self._append(texels)
+        return self.indices[same]
+
     def _decode(self, label: str, read: Callable[[], bytes]) -> Bytes | None:
         try:
-            return decode_image(read(), label)
+            return decode_image(read(), label, self.limit)
         except AssetError as error:
             self.notes.add(f"texture left out, {error}")
             return None
@@ -83,29 +112,57 @@ class TextureTable:
         n_texels = sum(texture.shape[0] * texture.shape[1] for texture in self.textures)
         if n_texels + texels.shape[0] * texels.shape[1] > MAX_TEXELS:
             raise SceneError(f"the textures have more than {MAX_TEXELS} texels in all; make them smaller")
+        self.limit.take("textures", KEPT * texels.shape[0] * texels.shape[1])
         self.textures.append(texels)
         return len(self.textures) - 1
 
 
-def decode_image(data: bytes, label: str) -> Bytes:
-    """Decode an image of any kind that Pillow reads.
+def decode_image(data: bytes, label: str, limit: Limit) -> Bytes:
+    """Decode an image of a kind that scenes come with.
 
     Returns:
         (height, width, 4) uint8 RGBA, row 0 on top.
 
     Raises:
         AssetError: not an image, or a broken one.
-        SceneError: larger than Pillow's limit against decompression bombs.
+        SceneError: it takes more memory than there is.
     """
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     try:
-        with Image.open(io.BytesIO(data)) as image:
-            return rgba(image)
+        with Image.open(io.BytesIO(data), formats=FORMATS) as image:
+            if image.format in ("JPEG", SEVERAL) and data.count(SCAN) > MOST_SCANS:
+                raise AssetError(f"{label}: expected an image of at most {MOST_SCANS} scans, got {data.count(SCAN)}")
+            return decoded(image, label, limit)
+    except (AssetError, SceneError):
+        raise
     except Image.DecompressionBombError as error:
-        raise SceneError(f"{label}: {error}; make the image smaller") from error
-    except Exception as error:
+        raise SceneError(f"{label}: {str(error).rstrip('.')}; make the image smaller") from error
+    except UnidentifiedImageError as error:
+        raise AssetError(f"{label}: not an image that can be read; PNG and JPEG are") from error
+    except Exception as error:  # Pillow's readers of broken images raise whatever comes first
         raise AssetError(f"{label}: not an image that can be read ({type(error).__name__}: {error})") from error
+
+
+def decoded(image: Any, label: str, limit: Limit) -> Bytes:
+    """The texels of an image that Pillow has opened; its size is known before any of it is decoded.
+
+    Raises:
+        AssetError: of a kind that scenes do not come with, empty, or broken.
+        SceneError: it takes more memory than there is.
+    """
+    texels = image.width * image.height
+    if image.format not in (*FORMATS, SEVERAL) or not texels:
+        raise AssetError(
+            f"{label}: expected a PNG or JPEG, got {image.format} of {image.width} x {image.height} pixels"
+        )
+    with limit.lent(f"an image of {image.width} x {image.height} pixels", (KEPT + DECODING) * texels):
+        try:
+            return rgba(image)
+        except MemoryError:
+            raise
+        except Exception as error:  # as above
+            raise AssetError(f"{label}: not an image that can be read ({type(error).__name__}: {error})") from error
 
 
 def rgba(image: Any) -> Bytes:

@@ -14,9 +14,9 @@ PACKAGE = Path(framearray_cli.__file__).parent
 # Every file, in the order in which data flows; a file imports only from those before it.
 FLOW = """
 __init__ errors arrays kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
-compiling files framerate fingerprint colour sphere
+compiling files framerate fingerprint colour sphere usage
 jobvalues jobtimes jobkeys jobmethod job jobschema jobdocs problems eyefile jobfile
-meshes/assets meshes/container meshes/model meshes/defaults meshes/cleaning meshes/polygons meshes/merge
+meshes/limit meshes/model meshes/assets meshes/container meshes/defaults meshes/cleaning meshes/polygons meshes/merge
 meshes/overrides meshes/textures meshes/opacity meshes/mtl meshes/walk meshes/gltf_materials meshes/gltf_prepare
 meshes/gltf_motion meshes/gltf_stage
 meshes/gltf meshes/obj meshes/other meshes/read meshes/__init__
@@ -72,7 +72,7 @@ DOORS = {
     "rich": ("screen",),
     "av": ("movie/video",),
     "scipy": ("paths", "standarderror", "allotment"),
-    "psutil": ("memory",),
+    "psutil": ("usage",),
     "xxhash": ("record",),
     "filelock": ("folderlock",),
     "pvlib": ("sun",),

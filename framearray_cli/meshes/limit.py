@@ -1,0 +1,53 @@
+"""How much memory reading a scene may take: counted before it is taken, as a small file can hold a huge scene."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from ..errors import SceneError
+from ..usage import free_memory
+
+MIB, GIB = 2**20, 2**30
+
+
+@dataclass(slots=True, kw_only=True)
+class Limit:
+    """Bytes that may be taken, and what they were taken for.
+
+    Attributes:
+        most: bytes; by default, what is free.
+        taken: kind of data -> bytes.
+    """
+
+    most: int = field(default_factory=free_memory)
+    taken: dict[str, int] = field(default_factory=dict)
+
+    def take(self, kind: str, size: int) -> None:
+        """Count bytes that are about to be taken.
+
+        Raises:
+            SceneError: they are more than are left.
+        """
+        self.taken[kind] = self.taken.get(kind, 0) + size
+        if sum(self.taken.values()) > self.most:
+            kinds = ", ".join(f"{kind} {amount(size)}" for kind, size in self.taken.items())
+            raise SceneError(
+                f"reading it takes {amount(sum(self.taken.values()))} of memory or more ({kinds}), {amount(self.most)} "
+                "may be used; make the scene smaller, or allow more with render.memory"
+            )
+
+    @contextmanager
+    def lent(self, kind: str, size: int) -> Iterator[None]:
+        """Count bytes that are given back at the end."""
+        self.take(kind, size)
+        try:
+            yield
+        finally:
+            self.taken[kind] -= size
+
+
+def amount(size: int) -> str:
+    """A number of bytes for people."""
+    if size >= 0.1 * GIB:
+        return f"{size / GIB:,.1f} GiB"
+    return f"{max(size, 0) / MIB:.1f} MiB"

@@ -1,0 +1,30 @@
+"""How much memory this process takes, and how much it can still get."""
+
+import sys
+from pathlib import Path
+
+import psutil
+
+
+def peak_memory() -> int:
+    """Largest resident size of this process so far, bytes."""
+    if sys.platform == "win32":
+        return int(psutil.Process().memory_info().peak_wset)
+    if sys.platform == "linux":  # what getrusage tells includes the process that started this one
+        for line in Path("/proc/self/status").read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1]) * 1024
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return int(peak if sys.platform == "darwin" else peak * 1024)  # bytes on macOS, KiB elsewhere
+
+
+def free_memory() -> int:
+    """Bytes that this process can still get, swap included."""
+    return int(psutil.virtual_memory().available + psutil.swap_memory().free)
+
+
+def resident_memory() -> int:
+    """Bytes that this process holds now: the program, the scene, and Embree's tree once it is built."""
+    return int(psutil.Process().memory_info().rss)

@@ -1,0 +1,149 @@
+"""Broken scene files: small whole ones with something wrong in them, and some that were made to do harm."""
+
+import json
+from collections.abc import Callable, Iterator
+from itertools import count
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import tomli_w
+
+from .case import Case
+from .mutations import BYTES, TEXT, TREE, mutate_text, mutate_tree, recoded
+from .outcome import Outcome
+from .sceneseeds import Seed, made_seeds, real_seeds, split_glb
+
+JOB = {
+    "name": "fuzz",
+    "scene": {"background": [0.5, 0.5, 0.5]},
+    "camera": {
+        "resolution": [12, 9],
+        "fov": 70.0,
+        "frames": 2,
+        "keys": [
+            {"frame": 0, "eye": [1.0, 1.0, 5.0], "target": [0.5, 0.5, 0.0]},
+            {"frame": 1, "eye": [1.2, 1.0, 5.0], "target": [0.5, 0.5, 0.0]},
+        ],
+    },
+    "light": {
+        "frames": 2,
+        "sources": [
+            {
+                "type": "point",
+                "keys": [
+                    {"frame": 0, "position": [0.0, 3.0, 3.0], "intensity": [20.0, 20.0, 20.0]},
+                    {"frame": 1, "position": [1.0, 3.0, 3.0], "intensity": [20.0, 20.0, 20.0]},
+                ],
+            }
+        ],
+    },
+    "samples": {"hits": 1, "obscurance": 4},
+    "reuse": {"n_r": 1},
+    "obscurance": {"range": 2.0},
+    "ambient": {"paths": 32},
+    "output": {"format": "exr", "layers": False},
+    "render": {"threads": 1},
+}
+TEXTS = (".obj", ".off", ".gltf")
+
+
+def cases(rng: Random, folder: Path) -> Iterator[Case]:
+    """Mutated scene files, each in a folder of its own beside its job."""
+    made = made_seeds(folder)
+    real = list(real_seeds())
+    _load_program(folder, made[0])
+    for k in count():
+        seed = rng.choice(real if real and rng.random() < 0.3 else made)
+        own = folder / f"{k:06d}"
+        own.mkdir()
+        mutation, files = _mutated(rng, seed, rng.choice(made))
+        yield case_of(rng, mutation, own, f"scene{seed.suffix}", files)
+
+
+def _load_program(folder: Path, seed: Seed) -> None:
+    """Render and begin a job in this process, so that no case has to load what is compiled."""
+    from framearray_cli.cli import main
+
+    own = folder / "first"
+    own.mkdir()
+    first = case_of(Random(0), "", own, f"scene{seed.suffix}", {f"scene{seed.suffix}": seed.data})
+    for arguments in (
+        ("render", own / "job.toml", "-o", own / "out"),
+        ("init", own / "scene.glb", "-o", own / "a.toml"),
+    ):
+        try:
+            main([*map(str, arguments), "--quiet"])
+        except SystemExit as end:
+            assert not end.code, f"{first.folder}: the first render ended with {end.code}"
+
+
+def case_of(rng: Random, mutation: str, own: Path, scene: str, files: dict[str, bytes]) -> Case:
+    """Write files of a scene, and choose the command that meets them; most often `render`."""
+    for name, data in files.items():
+        (own / name).write_bytes(data)
+    job = own / "job.toml"
+    job.write_text(tomli_w.dumps({**JOB, "scene": {"file": scene, **JOB["scene"]}}))
+    command = rng.choices(("render", "check", "init"), (8, 1, 3))[0]
+    if command == "init":
+        return Case(arguments=("init", own / scene, "-o", own / "made.toml"), mutation=mutation, folder=own)
+    wrong = finite(own / "out") if command == "render" else Case.wrong
+    return Case(arguments=(command, job, "-o", own / "out"), mutation=mutation, folder=own, wrong=wrong)
+
+
+def finite(out: Path) -> Callable[[Outcome], str | None]:
+    """Whether what was rendered is pictures: four, of numbers that are not negative."""
+
+    def wrong(outcome: Outcome) -> str | None:
+        if outcome.verdict != "accepted":
+            return "pictures of a scene that was refused" if list(out.glob("*.exr")) else None
+        from framearray_cli.images import read_image
+
+        images = [read_image(file) for file in sorted(out.glob("*.exr"))]
+        if len(images) != 4:
+            return f"{len(images)} pictures"
+        good = all(np.isfinite(image).all() and (image >= 0).all() for image in images)
+        return None if good else "pictures that are no numbers"
+
+    return wrong
+
+
+def _mutated(rng: Random, seed: Seed, other: Seed) -> tuple[str, dict[str, bytes]]:
+    """What was done, and all files of the scene."""
+    files = {f"scene{seed.suffix}": seed.data, **seed.beside}
+    target = rng.choice([*files, f"scene{seed.suffix}", f"scene{seed.suffix}"])
+    data = files[target]
+    kind = f"{seed.suffix[1:]}: " if target.startswith("scene.") else f"{seed.suffix[1:]}, {Path(target).suffix}: "
+    ways: list[str] = []
+    if target.endswith((".glb", ".gltf")) and rng.random() < 0.75 and (tree := _tree(data)) is not None:
+        how = rng.choice([*TREE])
+        files[target] = _with_tree(data, json.dumps(mutate_tree(rng, tree, how)).encode())
+        return f"{kind}{how}", files
+    if target.endswith((*TEXTS, ".mtl", ".ply", ".stl")) and rng.random() < 0.75:
+        ways = [*TEXT, "another encoding"]
+        how = rng.choice(ways)
+        files[target] = recoded(rng, data) if how == "another encoding" else mutate_text(rng, data, how)
+        return f"{kind}{how}", files
+    how = rng.choice([*BYTES])
+    if data:
+        files[target] = BYTES[how](rng, data, other.data)
+    return f"{kind}{how}", files
+
+
+def _tree(data: bytes) -> object:
+    """The JSON of a glTF; None where it is broken already."""
+    try:
+        return split_glb(data)[0] if data[:4] == b"glTF" else json.loads(data)
+    except ValueError:
+        return None
+
+
+def _with_tree(data: bytes, text: bytes) -> bytes:
+    """A glTF with another JSON."""
+    if data[:4] != b"glTF":
+        return text
+    size = int.from_bytes(data[12:16], "little")
+    text += b" " * (-len(text) % 4)
+    rest = data[20 + size :]
+    header = b"glTF" + (2).to_bytes(4, "little") + (20 + len(text) + len(rest)).to_bytes(4, "little")
+    return header + len(text).to_bytes(4, "little") + b"JSON" + text + rest
