@@ -1,5 +1,6 @@
 """Files that appear whole or not at all: written beside the target, then renamed onto it."""
 
+import errno
 import os
 import secrets
 from collections.abc import Iterator
@@ -7,6 +8,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .errors import OutputError
+
+REMEDIES = {errno.EMFILE: "`ulimit -n 1024` lets this program open more"}
 
 
 @contextmanager
@@ -72,5 +75,6 @@ def write_bytes(target: Path, data: bytes | memoryview) -> None:
 
 
 def reason(error: OSError) -> str:
-    """Say what the system said, without the path that the caller's message starts with."""
-    return error.strerror or str(error) or type(error).__name__
+    """Say what the system said, without the path that the caller's message starts with, and what to do against it."""
+    said = error.strerror or str(error) or type(error).__name__
+    return f"{said}; {REMEDIES[error.errno]}" if error.errno in REMEDIES else said

@@ -13,8 +13,8 @@ PACKAGE = Path(framearray_cli.__file__).parent
 
 # Every file, in the order in which data flows; a file imports only from those before it.
 FLOW = """
-__init__ errors arrays kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
-compiling files framerate filepatterns fingerprint colour sphere
+__init__ errors arrays files limits kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
+compiling framerate filepatterns fingerprint colour sphere
 jobvalues jobtimes jobkeys jobmethod job jobschema jobdocs problems eyefile jobfile
 meshes/assets meshes/container meshes/model meshes/defaults meshes/cleaning meshes/polygons meshes/merge
 meshes/overrides meshes/textures meshes/opacity meshes/mtl meshes/walk meshes/gltf_materials meshes/gltf_prepare
