@@ -9,6 +9,7 @@ from pathlib import Path
 
 from .errors import OutputError
 
+HEAD = 2**16  # bytes of a file beside its pixels, at most
 REMEDIES = {errno.EMFILE: "`ulimit -n 1024` lets this program open more"}
 
 
@@ -72,6 +73,23 @@ def write_bytes(target: Path, data: bytes | memoryview) -> None:
     """Write a file whole or not at all."""
     with whole_file(target) as part:
         part.write_bytes(data)
+
+
+def refusal(part: Path, n_bytes: int) -> str:
+    """Why the system does not let a library write, found by writing as much over what it left; "" if that succeeds.
+
+    Libraries tell that writing failed, and seldom why: a full disk, a quota.
+
+    Args:
+        part: a file that is of no more use.
+        n_bytes: of its pixels.
+    """
+    try:
+        with part.open("wb") as file:
+            file.write(bytes(n_bytes + HEAD))
+    except OSError as error:
+        return reason(error)
+    return ""
 
 
 def reason(error: OSError) -> str:
