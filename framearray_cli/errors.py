@@ -44,6 +44,12 @@ class CheckError(FrameArrayError):
     exit_code = 5
 
 
+class LimitError(FrameArrayError):
+    """The system lets this process have less than it needs: memory, address space, threads."""
+
+    exit_code = 2
+
+
 class MissingExtraError(FrameArrayError):
     """An optional package is needed and not installed; the message names the extra."""
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from .arrays import Bytes, Float32, Image
 from .colour import linear_from_srgb8, srgb8_from_linear
 from .errors import OutputError
-from .files import reason, whole_file, write_bytes
+from .files import reason, refusal, whole_file, write_bytes
 from .imageattributes import FIXED_DATE, Attribute, Attributes
 
 Extension = Literal["exr", "png", "tif", "jpg"]
@@ -332,14 +332,16 @@ def _write_oiio(path: Path, format_name: str, spec: Any, pixels: NDArray[Any]) -
         done = output.close() and done
         message = output.geterror()
         if not done or message:
-            raise OutputError(f"{path}: cannot be written: {_first_line(message, part)}")
-        _check_end(path, part)
+            why = refusal(part, pixels.nbytes) or _first_line(message, part)
+            raise OutputError(f"{path}: cannot be written: {why}")
+        _check_end(path, part, pixels.nbytes)
 
 
-def _check_end(path: Path, part: Path) -> None:
+def _check_end(path: Path, part: Path, n_bytes: int) -> None:
     """Read the last row back (0.15 ms): a disk that is full when the last buffer is flushed goes unreported."""
     if last_row(part) is None:
-        raise OutputError(f"{path}: cannot be written: the file is cut short; is the disk full?")
+        why = refusal(part, n_bytes) or "the file is cut short; is the disk full?"
+        raise OutputError(f"{path}: cannot be written: {why}")
 
 
 def _read_oiio(path: Path) -> tuple[list[str], Float32]:

@@ -144,9 +144,23 @@ def in_the_way(old: Manifest, changed: Sequence[str]) -> str:
 
 def free_space(folder: Path) -> int:
     """Bytes free on the disk of a folder, or of the nearest one above it that exists."""
+    return shutil.disk_usage(_existing(folder)).free
+
+
+def takes_files(folder: Path) -> bool:
+    """Whether the disk of a folder has room for one more file, however small; some count files, too."""
+    if not hasattr(os, "statvfs"):  # Windows
+        return True
+    disk = os.statvfs(_existing(folder))
+    return disk.f_files == 0 or disk.f_favail > 0
+
+
+def _existing(folder: Path) -> Path:
+    """A folder, or the nearest one above it that exists."""
+    # unlike Path.exists, os.path.exists is false for a name that is too long
     while not os.path.exists(folder) and folder != folder.parent:
         folder = folder.parent
-    return shutil.disk_usage(folder).free
+    return folder
 
 
 def remove_array(old: Manifest) -> int:

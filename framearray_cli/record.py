@@ -102,11 +102,15 @@ class RecordWriter:
         self._path, self._lock, self.fingerprint = file, threading.Lock(), fingerprint
         make_folder(file.parent)
         try:
-            self._file = open(file, "ab")  # noqa: SIM115  # closed in __exit__
+            self._file = open(file, "ab", buffering=0)  # noqa: SIM115  # closed in __exit__
         except OSError as error:
             raise OutputError(f"{file}: cannot be written: {reason(error)}") from error
-        # a line of an earlier run may have been cut short
-        self._put({"fingerprint": fingerprint, "cameras": session.cameras, "processor": session.processor}, b"\n")
+        self._torn = True  # a line of an earlier run may have been cut short
+        try:
+            self._put({"fingerprint": fingerprint, "cameras": session.cameras, "processor": session.processor})
+        except BaseException:
+            self._file.close()
+            raise
 
     def add(self, entry: Entry, rays: Mapping[str, int], seconds: float) -> None:
         """Note that a frame is finished, and what the session took so far.
@@ -128,12 +132,15 @@ class RecordWriter:
             line["errors"] = {str(l): error for l, error in entry.errors.items()}
         self._put(line)
 
-    def _put(self, line: Mapping[str, Any], before: bytes = b"") -> None:
-        data = before + sealed(line) + b"\n"
+    def _put(self, line: Mapping[str, Any]) -> None:
+        text = sealed(line) + b"\n"
         try:
             with self._lock:
-                self._file.write(data)
-                self._file.flush()
+                left = memoryview(b"\n" + text if self._torn else text)
+                self._torn = True
+                while left:  # a disk that becomes full takes a part
+                    left = left[self._file.write(left) :]
+                self._torn = False
         except OSError as error:
             raise OutputError(f"{self._path}: cannot be written: {reason(error)}") from error
 
@@ -143,7 +150,7 @@ class RecordWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with suppress(OSError):  # a full disk; every line was flushed when it was written
+        with suppress(OSError):  # a disk that has gone
             self._file.close()
 
 

@@ -1,6 +1,8 @@
 """`framearray render`."""
 
 from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -43,7 +45,6 @@ def render_shown(job: "Job", *, quiet: bool, restart: bool = False, cameras: Seq
     """Render, and show on the screen what goes on."""
     with Screen(out, quiet=quiet) as screen:
         screen.wait("reading the scene")
-        from ..outfolder import free_space
         from ..render import Listener
         from ..render import render as run
 
@@ -87,11 +88,22 @@ def render_shown(job: "Job", *, quiet: bool, restart: bool = False, cameras: Seq
             with compile_clock(screen.compiling):
                 summary = run(job, shown, restart=restart, cameras=cameras)
         except BaseException as error:
-            if isinstance(error, OutputError) and (free := free_space(job.output.directory)) < LITTLE_SPACE:
-                error.add_note(f"{size(free)} are free on that disk")
+            if isinstance(error, OutputError):
+                _add_space(error, job.output.directory)
             if screen.done:
                 done = f"{screen.done:,} of {screen.total:,} images were written to {job.output.directory}"
                 error.add_note(f"{done}; the same command goes on with the rest")
             raise
     if not quiet:
         say(out, summary_lines(summary, shown.told, job))
+
+
+def _add_space(error: OutputError, folder: Path) -> None:
+    """Say it where little space is left on the disk that could not be written to."""
+    from ..outfolder import free_space, takes_files
+
+    with suppress(OSError):  # that disk may have gone
+        if (free := free_space(folder)) < LITTLE_SPACE:
+            error.add_note(f"{size(free)} are free on that disk")
+        if not takes_files(folder):
+            error.add_note("that disk takes no more files: all of its inodes are used")
