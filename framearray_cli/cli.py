@@ -12,6 +12,7 @@ from .commands.assemble import assemble
 from .commands.check import check
 from .commands.export import export
 from .commands.init import init
+from .commands.openjd import openjd
 from .commands.options import fail, notes, problems
 from .commands.render import render
 from .commands.report import report
@@ -36,7 +37,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain text, also in a log file
 )
 
-for command in (render, check, verify, init, assemble, view, sheet, export, report, schema):
+for command in (render, check, verify, init, assemble, view, sheet, export, openjd, report, schema):
     app.command()(command)
 
 

@@ -54,3 +54,13 @@ class MissingExtraError(FrameArrayError):
     """An optional package is needed and not installed; the message names the extra."""
 
     exit_code = 2
+
+
+class BusyError(OutputError):
+    """Another run works on the same cameras of a folder."""
+
+
+class WorkerError(FrameArrayError):
+    """Workers that cannot render, or that were lost with what they had not finished."""
+
+    exit_code = 4

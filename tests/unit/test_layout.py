@@ -41,8 +41,9 @@ view/__init__
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
 screen interrupts wording
+parts/chunks parts/openjd parts/worker parts/cluster parts/run parts/__init__
 commands/__init__ commands/options commands/init commands/render commands/check commands/verify
-commands/assemble commands/sheet commands/export commands/report commands/schema
+commands/assemble commands/sheet commands/export commands/openjd commands/report commands/schema
 commands/view
 cli __main__
 """
@@ -76,6 +77,7 @@ DOORS = {
     "xxhash": ("record",),
     "filelock": ("folderlock",),
     "pvlib": ("sun",),
+    "distributed": ("parts/worker", "parts/cluster", "parts/run"),
 }
 # What takes long to import, or may be absent: `framearray --help` does without.
 HEAVY = (
@@ -90,6 +92,7 @@ HEAVY = (
     "matplotlib",
     "jinja2",
     "pvlib",
+    "distributed",
 )
 
 FILES = {path.relative_to(PACKAGE).with_suffix("").as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}
