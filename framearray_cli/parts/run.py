@@ -18,11 +18,11 @@ from ..interrupts import forget
 from ..job import Job
 from ..jobfile import job_table
 from ..manifestfile import read_manifest, write_manifest
-from ..memory import free_memory
 from ..prepare import Prepared
 from ..record import FOLDER, digest, read_records
 from ..render import Begun, Listener, begun, nothing_to_do
 from ..summary import Summary, summed, with_summary
+from ..usage import free_memory
 from .chunks import Chunks, default_size, in_chunks
 from .cluster import connected, cores, local, require_dask
 
