@@ -19,6 +19,7 @@ Check = Callable[[Any, str, Tree], Iterator[str]]  # value, its place, the whole
 COMPONENTS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 MOST_SHOWN = 3  # problems of a file; the next ones are most often the same
+LARGEST_FLOAT = 1.7e308
 LARGEST = 2**53  # whole numbers beyond are not whole in JSON
 LIGHTS = "lights"  # of the extension, beside the top-level lists
 TRIANGLES = (4, 5, 6)  # modes: list, strip, fan
@@ -69,7 +70,7 @@ def _number(low: float = -math.inf, high: float = math.inf, *, whole: bool = Fal
     expected = kind + bounds if math.isfinite(low) else kind
 
     def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        good = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 10**300
+        good = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST_FLOAT
         good = good or (isinstance(value, float) and not math.isfinite(value) and not whole)  # told where it matters
         good = good and (not whole or isinstance(value, int))
         if not good or value < low or value > high:
