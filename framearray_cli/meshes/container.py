@@ -9,14 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .assets import Assets
-
-Tree = dict[str, Any]
+from .assets import AssetError, Assets, shortened
+from .gltf_check import COMPONENTS, WIDTHS, Tree, check_gltf
 
 MAGIC = b"glTF"
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
-COMPONENTS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
-WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 
 @dataclass(slots=True)
@@ -70,6 +67,8 @@ class Gltf:
             place_type = np.dtype(COMPONENTS[where["componentType"]]).newbyteorder("<")
             n = int(sparse["count"])
             places = self._rows(where["bufferView"], where.get("byteOffset", 0), place_type, n, 1)[:, 0]
+            if places.size and places.max() >= count:
+                raise ValueError(f"accessors[{index}]: expected sparse places below {count}, got {places.max()}")
             values = values.copy()
             values[places] = self._rows(what["bufferView"], what.get("byteOffset", 0), dtype, n, width)
         if accessor.get("normalized") and dtype.kind in "iu":
@@ -105,15 +104,16 @@ def open_gltf(data: bytes, assets: Assets) -> Gltf:
 
     Raises:
         ValueError: not glTF 2, cut short, or a buffer shorter than it says.
+        SceneError: a tree that cannot be read as it is.
         AssetError: a buffer file that is missing.
     """
     text, binary = _split_glb(data) if data[:4] == MAGIC else (data, None)
-    tree = json.loads(text.decode("utf-8-sig"))
-    if not isinstance(tree, dict):
-        raise ValueError(f"expected a JSON object, got {type(tree).__name__}")
-    version = str(tree.get("asset", {}).get("version", "2.0"))
+    tree = _parsed(text)
+    asset = tree.get("asset")
+    version = str(asset.get("version", "2.0")) if isinstance(asset, dict) else "2.0"
     if not version.startswith("2"):
-        raise ValueError(f"expected glTF 2, got version {version}; convert it")
+        raise ValueError(f"expected glTF 2, got version {version[:10]}; convert it")
+    check_gltf(tree, assets.limit)
     starts, blocks, size = [], [], 0
     for index, buffer in enumerate(tree.get("buffers") or []):
         block = _buffer(buffer, index, binary, assets)
@@ -125,6 +125,21 @@ def open_gltf(data: bytes, assets: Assets) -> Gltf:
         view["byteOffset"] = view.get("byteOffset", 0) + starts[view["buffer"]]
         view["buffer"] = 0
     return Gltf(tree, b"".join(blocks))
+
+
+def _parsed(text: bytes) -> Tree:
+    """The JSON of a glTF without keys whose value is null."""
+    try:
+        tree = json.loads(text.decode("utf-8-sig"), object_hook=_without_null if b"null" in text else None)
+    except RecursionError as error:
+        raise ValueError("lists or objects are nested too deeply") from error
+    if not isinstance(tree, dict):
+        raise ValueError(f"expected a JSON object, got {type(tree).__name__}")
+    return tree
+
+
+def _without_null(table: Tree) -> Tree:
+    return {key: value for key, value in table.items() if value is not None}
 
 
 def _split_glb(data: bytes) -> tuple[bytes, bytes | None]:
@@ -168,5 +183,8 @@ def _buffer(buffer: Tree, index: int, binary: bytes | None, assets: Assets) -> b
 def uri_bytes(uri: str, assets: Assets) -> bytes:
     """The bytes behind a URI: embedded data, or a file beside the scene."""
     if uri.startswith("data:"):
-        return base64.b64decode(uri.split(",", 1)[1])
+        head, comma, data = uri.partition(",")
+        if not comma or not head.endswith(";base64"):
+            raise AssetError(f"{shortened(head)}: expected data in base64")
+        return base64.b64decode(data)
     return assets.read(uri)

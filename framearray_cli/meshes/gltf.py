@@ -33,7 +33,7 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
     textures = TextureTable(notes, assets.limit)
     materials = read_materials(gltf, used_materials(gltf), assets, textures, notes)
     plain, coloured = len(materials), len(materials) + 1
-    prepare(gltf, materials, plain, coloured, notes)
+    prepare(gltf, materials, plain, coloured, notes, assets.limit)
     scene = trimesh.load_scene(io.BytesIO(gltf.to_glb()), file_type="glb", process=False)
 
     parts: list[Part] = []

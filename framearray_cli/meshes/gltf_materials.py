@@ -9,7 +9,8 @@ import numpy as np
 
 from ..arrays import Float64
 from .assets import AssetError, Assets
-from .container import Gltf, Tree, uri_bytes
+from .container import Gltf, uri_bytes
+from .gltf_check import Tree
 from .model import Material, Notes
 from .mtl import Rgb3, limited
 from .opacity import CUTOFF, Opacity, blended, masked

@@ -11,7 +11,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from ..arrays import Float64
-from .container import Gltf, Tree
+from .container import Gltf
+from .gltf_check import Tree
 
 PATHS = ("translation", "rotation", "scale")
 AT_REST: dict[str, Sequence[float]] = {
@@ -91,6 +92,19 @@ class Motion:
         return matrix
 
 
+def at_rest(node: Tree) -> Float64:
+    """(4, 4) transform of a node in its parent, unmoved; a rotation of any length is taken as one of length 1."""
+    if node.get("matrix") is not None:
+        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+    parts = {path: np.array(node.get(path) or AT_REST[path], dtype=np.float64) for path in PATHS}
+    length = np.linalg.norm(parts["rotation"])
+    turn = parts["rotation"] / length if length > 0 else np.array(AT_REST["rotation"])
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotations(turn[None])[0] * parts["scale"]
+    matrix[:3, 3] = parts["translation"]
+    return matrix
+
+
 def read_motion(gltf: Gltf) -> Motion:
     """Gather the hierarchy and the channels of every animation; where two move the same property, the first counts."""
     nodes = gltf.items("nodes")
@@ -100,7 +114,7 @@ def read_motion(gltf: Gltf) -> Motion:
             parents[child] = index
     channels: dict[tuple[int, str], Channel] = {}
     for animation in gltf.items("animations"):
-        for entry in animation["channels"]:
+        for entry in animation.get("channels") or []:
             target = entry["target"]
             place = (int(target.get("node", -1)), str(target["path"]))
             if place[0] >= 0 and place[1] in PATHS and place not in channels:

@@ -1,8 +1,9 @@
 """Edits a glTF tree so that trimesh reads all of it, and reads it right.
 
 trimesh ignores sparse and normalised accessors, skips triangle fans, fails on index counts that are no multiple
-of three, loses what hangs below a camera, and knows neither GPU instances nor a second set of texture
-coordinates. Each of these is rewritten here into a form that it does read.
+of three, loses what hangs below a camera, takes time that grows with the square of the depth of a node graph,
+and knows neither GPU instances nor a second set of texture coordinates. Each of these is rewritten here into a
+form that it does read.
 """
 
 import importlib.util
@@ -10,13 +11,21 @@ import importlib.util
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Float64
 from ..errors import SceneError
-from .container import Gltf, Tree
+from .container import Gltf
+from .gltf_check import Tree
 from .gltf_materials import KNOWN, SILENT, GltfMaterial
+from .gltf_motion import AT_REST, PATHS, at_rest, rotations
+from .limit import Limit
 from .model import Notes
 
 FLOAT, UINT = 5126, 5125
 POINTS, TRIANGLES, STRIP, FAN = 0, 4, 5, 6
+# Memory that a triangle takes while a scene is read, at least: measured 460 to 800 bytes, with texture coordinates,
+# normals and colours; and a node, as JSON and in trimesh's graph.
+TRIANGLE_BYTES, NODE_BYTES = 450, 3000
+INSTANCE_KEYS = {"TRANSLATION": "translation", "ROTATION": "rotation", "SCALE": "scale"}
 HANDLED = KNOWN | SILENT | {"KHR_texture_transform", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}
 HANDLED |= {"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_materials_unlit"}
 
@@ -86,7 +95,7 @@ def note_unread(gltf: Gltf, notes: Notes) -> None:
         notes.add("morph targets are left out")
 
 
-def prepare(gltf: Gltf, materials: list[GltfMaterial], plain: int, coloured: int, notes: Notes) -> None:
+def prepare(gltf: Gltf, materials: list[GltfMaterial], plain: int, coloured: int, notes: Notes, limit: Limit) -> None:
     """Edit the tree in place.
 
     Args:
@@ -95,8 +104,11 @@ def prepare(gltf: Gltf, materials: list[GltfMaterial], plain: int, coloured: int
         plain: material number for primitives without material.
         coloured: the same for those with vertex colours.
         notes: takes what is left out.
+        limit: counts triangles and nodes, before they are there.
+
+    Raises:
+        SceneError: they take more memory than there is.
     """
-    _prepare_instances(gltf)
     for mesh in gltf.items("meshes"):
         mesh["primitives"] = [
             primitive
@@ -104,10 +116,7 @@ def prepare(gltf: Gltf, materials: list[GltfMaterial], plain: int, coloured: int
             if _prepare_primitive(gltf, primitive, materials, plain, coloured, notes)
         ]
     _prepare_accessors(gltf)
-    for node in gltf.items("nodes"):
-        node.pop("camera", None)
-        if "mesh" in node and not gltf.tree["meshes"][node["mesh"]]["primitives"]:
-            del node["mesh"]  # trimesh would lose the node's children
+    _flatten(gltf, limit)
     # trimesh hands materials back by name: their number; images are read apart
     gltf.tree["materials"] = [{"name": str(number)} for number in range(coloured + 1)]
     for key in ("images", "textures", "samplers", "cameras", "animations", "skins"):
@@ -127,6 +136,10 @@ def _prepare_primitive(
     if "POSITION" not in attributes:
         notes.add("primitives without positions are left out")
         return False
+    count = gltf.tree["accessors"][attributes["POSITION"]]["count"]
+    for name in [name for name in attributes if gltf.tree["accessors"][attributes[name]]["count"] != count]:
+        notes.add(f"{name} of another length than POSITION is left out")
+        del attributes[name]
     draco = "KHR_draco_mesh_compression" in (primitive.get("extensions") or {})
     if not draco and not _prepare_indices(gltf, primitive, mode, notes):
         return False
@@ -184,21 +197,59 @@ def _prepare_accessors(gltf: Gltf) -> None:
         gltf.tree["accessors"][index] = gltf.tree["accessors"][new]
 
 
-def _prepare_instances(gltf: Gltf) -> None:
-    """Replace GPU instances by child nodes, one an instance."""
-    nodes = gltf.items("nodes")
-    for node in list(nodes):
-        instancing = (node.get("extensions") or {}).get("EXT_mesh_gpu_instancing")
-        if instancing is None or "mesh" not in node:
+def _flatten(gltf: Gltf, limit: Limit) -> None:
+    """Replace the nodes of the default scene by one for each place where a mesh stands, all below the root."""
+    nodes, meshes = gltf.items("nodes"), gltf.items("meshes")
+    triangles = [sum(_triangles(gltf, primitive) for primitive in mesh["primitives"]) for mesh in meshes]
+    scene = gltf.tree["scenes"][gltf.tree.get("scene") or 0]
+    waiting = [(node, np.eye(4)) for node in reversed(scene.get("nodes") or [])]
+    placed: list[Tree] = []
+    seen: set[int] = set()
+    while waiting:
+        index, world_from_parent = waiting.pop()
+        if index in seen:
             continue
-        keys = {"TRANSLATION": "translation", "ROTATION": "rotation", "SCALE": "scale"}
-        tables = {
-            keys[name]: gltf.read_accessor(accessor)
-            for name, accessor in instancing["attributes"].items()
-            if name in keys
-        }
-        mesh = node.pop("mesh")
-        children = node.setdefault("children", [])
-        for row in range(min(len(table) for table in tables.values())):
-            children.append(len(nodes))
-            nodes.append({"mesh": mesh} | {key: table[row].tolist() for key, table in tables.items()})
+        seen.add(index)
+        node = nodes[index]
+        world_from_node = world_from_parent @ at_rest(node)
+        waiting += [(child, world_from_node) for child in reversed(node.get("children") or [])]
+        mesh = node.get("mesh")
+        if mesh is None or not meshes[mesh]["primitives"]:
+            continue
+        places = _places(gltf, node, limit)
+        limit.take("triangles", TRIANGLE_BYTES * triangles[mesh] * len(places))
+        limit.take("nodes", NODE_BYTES * len(places))
+        placed += [{"mesh": mesh, "matrix": m.T.reshape(16).tolist()} for m in world_from_node @ places]
+    gltf.tree["nodes"] = placed
+    gltf.tree["scenes"], gltf.tree["scene"] = [{"nodes": list(range(len(placed)))}], 0
+
+
+def _triangles(gltf: Gltf, primitive: Tree) -> int:
+    """How many triangles a primitive has, whose corners were counted already."""
+    corners = gltf.tree["accessors"][primitive.get("indices", primitive["attributes"]["POSITION"])]["count"]
+    return int(corners // 3 if primitive.get("mode", TRIANGLES) == TRIANGLES else max(corners - 2, 0))
+
+
+def _places(gltf: Gltf, node: Tree, limit: Limit) -> Float64:
+    """(n, 4, 4) transforms of the instances of a node in the node; of a plain node, one that changes nothing."""
+    instancing = (node.get("extensions") or {}).get("EXT_mesh_gpu_instancing")
+    if instancing is None:
+        return np.eye(4)[None]
+    found = {INSTANCE_KEYS[name]: number for name, number in instancing["attributes"].items() if name in INSTANCE_KEYS}
+    if not found:
+        raise ValueError("EXT_mesh_gpu_instancing: expected TRANSLATION, ROTATION or SCALE, got none of them")
+    count = min(gltf.tree["accessors"][number]["count"] for number in found.values())
+    limit.take("instances", NODE_BYTES * count)
+    tables = {path: np.tile(np.array(AT_REST[path], dtype=np.float64), (count, 1)) for path in PATHS}
+    for path, number in found.items():
+        table = gltf.read_accessor(number)
+        if table.shape[1] != tables[path].shape[1]:
+            raise ValueError(f"EXT_mesh_gpu_instancing: expected {tables[path].shape[1]} numbers for each {path}")
+        tables[path] = table[:count].astype(np.float64)
+    with np.errstate(all="ignore"):
+        length = np.linalg.norm(tables["rotation"], axis=1, keepdims=True)
+        turn = np.where(length > 0, tables["rotation"] / length, AT_REST["rotation"])
+    places = np.tile(np.eye(4), (count, 1, 1))
+    places[:, :3, :3] = rotations(turn) * tables["scale"][:, None, :]
+    places[:, :3, 3] = tables["translation"]
+    return places

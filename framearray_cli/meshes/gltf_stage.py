@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ..arrays import Float64
-from .container import Gltf, Tree
+from .container import Gltf
+from .gltf_check import Tree
 from .gltf_motion import Motion, read_motion
 
 PUNCTUAL = "KHR_lights_punctual"

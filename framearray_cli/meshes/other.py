@@ -9,6 +9,7 @@ from ..arrays import Float32
 from ..errors import SceneError
 from .assets import AssetError, Assets
 from .defaults import clean_colours, default_material
+from .headers import check_headers, one_solid
 from .model import Material, Meshes, Notes, Part
 from .mtl import limited
 from .opacity import blended
@@ -51,8 +52,11 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
 
     notes = Notes()
     folder: Any = Folder(assets, notes)  # it has what loaders use of trimesh's own resolvers
+    check_headers(data, extension, assets.limit)
     if extension == "ply":
         data = _without_blank_lines(data)
+    elif extension == "stl":
+        data = one_solid(data)
     try:
         scene = trimesh.load_scene(io.BytesIO(data), file_type=extension, resolver=folder, process=False)
     except ImportError as error:

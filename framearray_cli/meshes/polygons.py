@@ -1,5 +1,7 @@
 """Polygons -> triangles, concave ones too."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,13 +10,27 @@ from ..arrays import Float64
 Indices = NDArray[np.int64]
 
 
-def triangulate(corners: Float64) -> Indices:
+# Cutting ears off one polygon takes time that grows with the square of its corners; for this many squared, 3 s.
+MOST_WORK = 50_000_000
+
+
+@dataclass(slots=True)
+class Ears:
+    """How much cutting of ears is left for a file, and how many concave polygons were too large for it."""
+
+    work: int = MOST_WORK
+    fans: int = 0
+
+
+def triangulate(corners: Float64, ears: Ears) -> Indices:
     """Split m polygons of k corners each.
 
-    Convex polygons become fans, all at once. Concave ones lose one ear after the other.
+    Convex polygons become fans, all at once. Concave ones lose one ear after the other; quads are cut at the reflex
+    corner.
 
     Args:
         corners: (m, k, 3) positions, k at least 3.
+        ears: work is taken off; concave polygons for which none is left become fans.
 
     Returns:
         (m, k - 2, 3) corner numbers from 0 to k - 1.
@@ -24,20 +40,32 @@ def triangulate(corners: Float64) -> Indices:
     fan = np.stack([np.zeros_like(middle), middle, middle + 1], axis=1)
     triangles = np.broadcast_to(fan, (m, k - 2, 3)).copy()
     if k > 3:
-        for polygon in np.flatnonzero(_concave(corners)):
-            triangles[polygon] = _clip_ears(corners[polygon])
+        concave, reflex = _concave(corners)
+        if k == 4:
+            triangles[concave & (reflex % 2 == 1)] = OTHER_DIAGONAL
+            return triangles
+        for polygon in np.flatnonzero(concave):
+            if ears.work < k * k:
+                ears.fans += 1
+            else:
+                ears.work -= k * k
+                triangles[polygon] = _clip_ears(corners[polygon])
     return triangles
 
 
-def _concave(corners: Float64) -> NDArray[np.bool_]:
-    """(m,) whether a polygon turns both ways along its outline."""
+OTHER_DIAGONAL = np.array([[1, 2, 3], [1, 3, 0]])
+
+
+def _concave(corners: Float64) -> tuple[NDArray[np.bool_], Indices]:
+    """(m,) whether a polygon turns both ways along its outline, and the corner where it turns back most."""
     with np.errstate(all="ignore"):  # non-finite corners compare false: their triangles are dropped later anyway
         centred = corners - corners.mean(axis=1, keepdims=True)
         normal = np.cross(centred, np.roll(centred, -1, axis=1)).sum(axis=1)  # (m, 3), Newell
         ahead = np.roll(corners, -1, axis=1) - corners
         turn = np.einsum("mkc,mc->mk", np.cross(np.roll(ahead, 1, axis=1), ahead), normal)
         # rounding must not make a flat quad concave
-        return np.asarray((turn < -1e-9 * np.abs(turn).max(axis=1, keepdims=True)).any(axis=1))
+        concave = (turn < -1e-9 * np.abs(turn).max(axis=1, keepdims=True)).any(axis=1)
+    return np.asarray(concave), np.asarray(turn.argmin(axis=1))
 
 
 def _clip_ears(corners: Float64) -> Indices:

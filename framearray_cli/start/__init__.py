@@ -5,8 +5,7 @@ from pathlib import Path
 
 from ..errors import OutputError, SceneError
 from ..files import write_bytes
-from ..job import Job
-from .model import Start, table_of
+from .model import Start, checked, table_of
 from .plan import Wishes, plan_start
 from .text import to_text
 
@@ -29,9 +28,6 @@ def init(scene: Path, job_file: Path, wishes: Wishes, *, force: bool = False) ->
     if not os.path.exists(scene):
         raise SceneError(f"{scene}: no such scene file")
     start = plan_start(scene, wishes)
-    try:
-        Job.model_validate(table_of(start))
-    except ValueError as error:  # a path in the file that no job can follow, such as a camera that flips over
-        raise SceneError(f"{scene}: its cameras or lights do not make a job: {error}") from error
+    checked(table_of(start), scene)
     write_bytes(job_file, to_text(start, job_file).encode("utf-8"))
     return start

@@ -10,14 +10,13 @@ from ..colour import srgb_from_linear
 from ..crew import Crew
 from ..embree import EmbreeScene
 from ..frame import find_frame
-from ..job import Job
 from ..lights import light_arrays
 from ..paths import LightPath, Lights, eyes, lights
 from ..prepare import Prepared, plan_work
 from ..scene import Scene
 from ..surface import surfaces
 from ..window import Window
-from .model import Start, table_of
+from .model import Start, checked, table_of
 
 PICTURES = 3  # eyes, and light positions, that are tried
 SIZE = (64, 48)  # pixels
@@ -96,7 +95,7 @@ def _pictures(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[Float64,
     table = table_of(start)
     table["camera"]["resolution"] = list(SIZE)
     table |= {"samples": {"hits": HITS}, "reuse": {"n_r": 0}, "ambient": {"paths": WALKS}}
-    job = Job.model_validate(table)
+    job = checked(table, start.file)
     job_eyes, job_lights = eyes(job), lights(job)
     some = _spread(job_eyes.n)
     few_eyes = replace(job_eyes, position=job_eyes.position[some], world_from_camera=job_eyes.world_from_camera[some])

@@ -4,8 +4,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from ..arrays import Float64
+from pydantic import ValidationError
 
+from ..arrays import Float64
+from ..errors import SceneError
+from ..job import Job
+from ..problems import problems_of
+
+MOST_PROBLEMS = 3  # that are told of a job; a light that is nowhere has one for every key
 Vector = tuple[float, float, float]
 POWERS = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
 DIGITS = 6  # significant, of positions and directions; a thousandth of a pixel
@@ -121,6 +127,21 @@ def table_of(start: Start) -> dict[str, Any]:
         },
         "obscurance": {"range": start.range, "outside": start.outside},
     }
+
+
+def checked(table: dict[str, Any], file: Path) -> Job:
+    """The job of such tables.
+
+    Raises:
+        SceneError: the cameras or lights of the scene file make no job, such as a light that is too far away.
+    """
+    try:
+        return Job.model_validate(table)
+    except ValidationError as error:
+        problems = problems_of(error, Job)
+        more = f"; and {len(problems) - MOST_PROBLEMS} more problems" if len(problems) > MOST_PROBLEMS else ""
+        told = "; ".join(problems[:MOST_PROBLEMS]) + more
+        raise SceneError(f"{file}: its cameras or lights do not make a job: {told}") from error
 
 
 def source_keys(source: Source) -> list[dict[str, Any]]:

@@ -16,9 +16,10 @@ FLOW = """
 __init__ errors arrays files limits kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
 compiling framerate fingerprint colour sphere usage
 jobvalues jobtimes jobkeys jobmethod job jobschema jobdocs problems eyefile jobfile
-meshes/limit meshes/model meshes/assets meshes/container meshes/defaults meshes/cleaning meshes/polygons meshes/merge
-meshes/overrides meshes/textures meshes/opacity meshes/mtl meshes/walk meshes/gltf_materials meshes/gltf_prepare
-meshes/gltf_motion meshes/gltf_stage
+meshes/limit meshes/model meshes/assets meshes/gltf_check meshes/container meshes/headers
+meshes/defaults meshes/cleaning
+meshes/polygons meshes/merge meshes/overrides meshes/textures meshes/opacity meshes/mtl meshes/walk
+meshes/gltf_materials meshes/gltf_motion meshes/gltf_prepare meshes/gltf_stage
 meshes/gltf meshes/obj meshes/other meshes/read meshes/__init__
 scene sun paths camera lights sampling surface
 embree/packets embree/masks embree/native embree/fallback embree/__init__

@@ -31,7 +31,7 @@ ERRORS = {
     "assimp/glTF2/MissingBin/BoxTextured.gltf": "BoxTextured0.bin",
     "assimp/glTF2/RecursiveNodes/RecursiveNodes.gltf": "cycle",
     "assimp/glTF2/TestNoRootNode/NoScene.gltf": "expected a scene",
-    "assimp/glTF2/wrongTypes/badArray.gltf": "BoxTextured0.bin",
+    "assimp/glTF2/wrongTypes/badArray.gltf": "primitives: expected a list, got an object",
     "assimp/invalid/empty.ply": "empty file",
     "assimp/invalid/OutOfMemory.off": "broken",
     "assimp/OBJ/number_formats.obj": "1 degenerate",

@@ -228,6 +228,15 @@ def test_lights_that_light_nothing_give_way_to_chosen_ones(tmp_path: Path) -> No
     assert np.abs(lights(job).sources[0].vector).max() < 3
 
 
+@pytest.mark.parametrize("place", [[1e13, 0.0, 0.0], [1e300, 1e300, 1e300]])
+def test_lights_that_are_nowhere_are_one_error(tmp_path: Path, place: list[float]) -> None:
+    glb = room()
+    glb.node(name="Far", translation=place, **light(glb, intensity=1000.0))
+    with pytest.raises(SceneError, match=r"scene\.glb: its cameras or lights do not make a job: light") as caught:
+        started(glb, tmp_path)
+    assert "\n" not in str(caught.value)
+
+
 def test_exposure_makes_the_mean_right_and_spares_highlights() -> None:
     def mean(factor: float, lit: Any, dark: Any) -> float:
         return float((srgb_from_linear(factor * lit + dark) @ LUMINANCE).mean())
