@@ -4,6 +4,7 @@ numpy's types carry the dtype; the shape stands in the alias's name and comment.
 """
 
 import math
+import sys
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -31,6 +32,13 @@ CornerUvs: TypeAlias = Float32  # (n_triangles, 3, 2), v upwards
 Rgb: TypeAlias = Float32  # (n, 3), linear, Rec. 709 primaries
 Image: TypeAlias = Float32  # (height, width, 3), linear radiance, row 0 at the top
 Images: TypeAlias = NDArray[np.float32] | NDArray[np.float16]  # (n_lights, height, width, 3)
+
+
+def is_number(value: object) -> bool:
+    """Whether a value from a file is a number that float64 holds: not NaN, infinite or a whole number beyond."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= sys.float_info.max
 
 
 def with_room(shape: tuple[int, ...], dtype: Any, fill: float | None = None) -> Any:

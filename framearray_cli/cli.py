@@ -12,6 +12,7 @@ from .commands.assemble import assemble
 from .commands.check import check
 from .commands.export import export
 from .commands.init import init
+from .commands.openjd import openjd
 from .commands.options import fail, notes, problems
 from .commands.render import render
 from .commands.report import report
@@ -21,9 +22,12 @@ from .commands.verify import verify
 from .commands.view import view
 from .errors import FrameArrayError, JobError
 from .interrupts import Stopped, forget, listen, stopped_by
+from .limits import READS, RENDERS, require_address_space
 from .screen import out, say
 
 OUT_OF_MEMORY = 2  # the job asks for more than the machine has
+NO_THREADS = "can't start new thread"  # what Python says
+RENDERING = ("render", "check", "init", "report")  # commands that may trace rays
 
 app = typer.Typer(
     name="framearray",
@@ -33,7 +37,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain text, also in a log file
 )
 
-for command in (render, check, verify, init, assemble, view, sheet, export, report, schema):
+for command in (render, check, verify, init, assemble, view, sheet, export, openjd, report, schema):
     app.command()(command)
 
 
@@ -45,11 +49,13 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def _options(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    pass
+    if context.invoked_subcommand != "schema":
+        require_address_space(RENDERS if context.invoked_subcommand in RENDERING else READS)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -66,10 +72,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except FrameArrayError as error:
         fail([*str(error).splitlines(), *notes(error)], error.exit_code)
     except MemoryError as error:
-        less = "a smaller resolution, n_r or fewer lights take less; `framearray check` tells how much a job needs"
+        less = (
+            "a render takes less with a smaller resolution or n_r, or fewer lights; `framearray check` tells how much"
+        )
         fail([f"not enough memory; {less}", *notes(error)], OUT_OF_MEMORY)
     except (Stopped, RuntimeError) as error:
         stopped = stopped_by(error)
+        if stopped is None and NO_THREADS in str(error):
+            limits = "`ulimit -u`, `ulimit -v` or a container's limit"
+            fail(
+                [
+                    f"no more threads can be started; --threads 1 takes the fewest; the limit may be {limits}",
+                    *notes(error),
+                ],
+                OUT_OF_MEMORY,
+            )
         if stopped is None:
             raise
         forget()

@@ -44,7 +44,23 @@ class CheckError(FrameArrayError):
     exit_code = 5
 
 
+class LimitError(FrameArrayError):
+    """The system lets this process have less than it needs: memory, address space, threads."""
+
+    exit_code = 2
+
+
 class MissingExtraError(FrameArrayError):
     """An optional package is needed and not installed; the message names the extra."""
 
     exit_code = 2
+
+
+class BusyError(OutputError):
+    """Another run works on the same cameras of a folder."""
+
+
+class WorkerError(FrameArrayError):
+    """Workers that cannot render, or that were lost with what they had not finished."""
+
+    exit_code = 4

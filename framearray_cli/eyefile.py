@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 from pydantic import ValidationError
 
 from .jobkeys import MOST_EYES, CameraKey
-from .problems import problems_of
+from .problems import cut, problems_of
 
 LARGEST_FILE = 64 * 1024 * 1024  # bytes; MOST_EYES rows of nine long numbers are 20 MB
 MOST_PROBLEMS = 10  # a column that is wrong is wrong in every row
@@ -47,22 +47,25 @@ def read_eyes(path: Path) -> list[dict[str, Any]]:
     if not 1 <= len(rows) <= MOST_EYES:
         raise EyeFileError(f"expected 1 to {MOST_EYES} eyes, got {len(rows)}")
     if problems := _row_problems(rows):
-        more = [f"and {len(problems) - MOST_PROBLEMS} more problems"] if len(problems) > MOST_PROBLEMS else []
-        raise EyeFileError(*problems[:MOST_PROBLEMS], *more)
+        raise EyeFileError(*problems)
     return [{"frame": frame, **row} for frame, (_, row) in enumerate(rows)]
 
 
 def _row_problems(rows: list[PlacedRow]) -> list[str]:
     """Check each row by itself, and that all of them give the same values."""
-    problems = []
+    problems: list[str] = []
+    n = 0
     for frame, (place, row) in enumerate(rows):
         if ("up" in row) != ("up" in rows[0][1]):
             problems.append(f"{place}: up: expected in every row or in none")
+            n += 1
         try:
             CameraKey.model_validate({"frame": frame, **row})
         except ValidationError as error:
-            problems += [f"{place}: {problem}" for problem in problems_of(error, CameraKey)]
-    return problems
+            n += error.error_count()
+            if len(problems) < MOST_PROBLEMS:
+                problems += [f"{place}: {problem}" for problem in problems_of(error, CameraKey)]
+    return cut(problems[:MOST_PROBLEMS], n)
 
 
 def _read_text(path: Path) -> str:

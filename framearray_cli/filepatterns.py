@@ -5,6 +5,8 @@ import string
 from collections.abc import Mapping
 from pathlib import PurePosixPath
 
+from .jobvalues import shown
+
 _FIELD = re.compile(r"\{[^{}]*\}")  # one field with its format, whose colon is no part of a name
 
 
@@ -50,17 +52,17 @@ def check_pattern(key: str, pattern: str, fields: Mapping[str, bool]) -> None:
         or not path.name
         or re.search(r"[\\:\x00-\x1f]", _FIELD.sub("", pattern))
     ):
-        raise ValueError(f"{key}: expected file names inside the folder, got {pattern!r}")
+        raise ValueError(f"{key}: expected file names inside the folder, got {shown(pattern)}")
     try:
         parts = [(name, spec, conversion) for _, name, spec, conversion in string.Formatter().parse(pattern)]
     except ValueError as error:
-        raise ValueError(f"{key}: broken pattern {pattern!r}: {error}") from error
+        raise ValueError(f"{key}: broken pattern {shown(pattern)}: {error}") from error
     names = [name for name, _, _ in parts if name is not None]
     for name, spec, conversion in parts:
         # Anything else, such as {camera.__class__}, would let a manifest look into this program.
         if name is not None and (name not in fields or conversion or not re.fullmatch(r"(0?[1-9]d)?", spec or "")):
             allowed = " and ".join(f"{{{known}:04d}}" for known in fields)
-            raise ValueError(f"{key}: expected no other fields than {allowed}, got {pattern!r}")
+            raise ValueError(f"{key}: expected no other fields than {allowed}, got {shown(pattern)}")
     for name, must in fields.items():
         if must and name not in names:
-            raise ValueError(f"{key}: expected {{{name}}} in {pattern!r}")
+            raise ValueError(f"{key}: expected {{{name}}} in {shown(pattern)}")

@@ -1,5 +1,6 @@
 """Files that appear whole or not at all: written beside the target, then renamed onto it."""
 
+import errno
 import os
 import secrets
 from collections.abc import Iterator
@@ -7,6 +8,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .errors import OutputError
+
+HEAD = 2**16  # bytes of a file beside its pixels, at most
+REMEDIES = {errno.EMFILE: "`ulimit -n 1024` lets this program open more"}
 
 
 @contextmanager
@@ -54,7 +58,7 @@ def folder_for(folder: Path) -> Iterator[None]:
     Raises:
         OutputError: as `make_folder`.
     """
-    made = [place for place in (folder, *folder.parents) if not place.exists()]
+    made = [place for place in (folder, *folder.parents) if not os.path.exists(place)]
     try:
         make_folder(folder)
         yield
@@ -71,6 +75,24 @@ def write_bytes(target: Path, data: bytes | memoryview) -> None:
         part.write_bytes(data)
 
 
+def refusal(part: Path, n_bytes: int) -> str:
+    """Why the system does not let a library write, found by writing as much over what it left; "" if that succeeds.
+
+    Libraries tell that writing failed, and seldom why: a full disk, a quota.
+
+    Args:
+        part: a file that is of no more use.
+        n_bytes: of its pixels.
+    """
+    try:
+        with part.open("wb") as file:
+            file.write(bytes(n_bytes + HEAD))
+    except OSError as error:
+        return reason(error)
+    return ""
+
+
 def reason(error: OSError) -> str:
-    """Say what the system said, without the path that the caller's message starts with."""
-    return error.strerror or str(error) or type(error).__name__
+    """Say what the system said, without the path that the caller's message starts with, and what to do against it."""
+    said = error.strerror or str(error) or type(error).__name__
+    return f"{said}; {REMEDIES[error.errno]}" if error.errno in REMEDIES else said

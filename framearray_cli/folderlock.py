@@ -10,7 +10,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from .errors import OutputError
+from .errors import BusyError, OutputError
 from .files import make_folder, reason
 from .ranges import parse_frames
 from .record import FOLDER, record_file
@@ -53,12 +53,12 @@ class Folder:
             text: their range.
 
         Raises:
-            OutputError: another run works on some of them.
+            BusyError: another run works on some of them.
         """
         own = record_file(self._folder.parent, text).with_suffix(".lock")
         for other in self.others():
             if not set(cameras).isdisjoint(_cameras_of(other)):
-                raise OutputError(
+                raise BusyError(
                     f"{self._folder.parent}: another run is rendering cameras {other.stem} into this folder; "
                     "wait for it, or give both runs other cameras with --cameras"
                 )

@@ -6,6 +6,7 @@ reads half a JPEG without a word, so PNG and JPEG go through Pillow, in memory.
 
 import io
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from .arrays import Bytes, Float32, Image
 from .colour import linear_from_srgb8, srgb8_from_linear
 from .errors import OutputError
-from .files import reason, whole_file, write_bytes
+from .files import reason, refusal, whole_file, write_bytes
 from .imageattributes import FIXED_DATE, Attribute, Attributes
 
 Extension = Literal["exr", "png", "tif", "jpg"]
@@ -232,7 +233,7 @@ def read_layers(path: Path) -> dict[str, Float32]:
 def last_row(path: Path) -> tuple[int, int] | None:
     """Read the last row of an EXR or TIFF, which one that was cut short has lost: width and height, or None."""
     oiio = _oiio()
-    source = oiio.ImageInput.open(str(path)) if path.is_file() else None
+    source = oiio.ImageInput.open(str(path)) if os.path.isfile(path) else None
     if source is None:
         oiio.geterror()  # clears what the failed opening left behind
         return None
@@ -331,20 +332,22 @@ def _write_oiio(path: Path, format_name: str, spec: Any, pixels: NDArray[Any]) -
         done = output.close() and done
         message = output.geterror()
         if not done or message:
-            raise OutputError(f"{path}: cannot be written: {_first_line(message, part)}")
-        _check_end(path, part)
+            why = refusal(part, pixels.nbytes) or _first_line(message, part)
+            raise OutputError(f"{path}: cannot be written: {why}")
+        _check_end(path, part, pixels.nbytes)
 
 
-def _check_end(path: Path, part: Path) -> None:
+def _check_end(path: Path, part: Path, n_bytes: int) -> None:
     """Read the last row back (0.15 ms): a disk that is full when the last buffer is flushed goes unreported."""
     if last_row(part) is None:
-        raise OutputError(f"{path}: cannot be written: the file is cut short; is the disk full?")
+        why = refusal(part, n_bytes) or "the file is cut short; is the disk full?"
+        raise OutputError(f"{path}: cannot be written: {why}")
 
 
 def _read_oiio(path: Path) -> tuple[list[str], Float32]:
     """Read all channels as float32: names and (h, w, channels)."""
     oiio = _oiio()
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise OutputError(f"{path}: no such file")
     source = oiio.ImageInput.open(str(path))
     if source is None:

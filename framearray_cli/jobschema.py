@@ -14,6 +14,8 @@ from .jobvalues import Place, between, number
 
 Schema: TypeAlias = dict[str, Any]
 
+LONGEST_KEY = 100  # characters of a key in a message
+
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -98,8 +100,10 @@ def find(root: Schema, place: Place) -> tuple[str, Schema]:
 
 
 def dotted(key: str) -> str:
-    """Write a key as TOML does: bare where that is possible, else quoted."""
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else json.dumps(key[:100], ensure_ascii=False)
+    """Write a key as TOML does: bare where that is possible, else quoted; a long one is shortened."""
+    if len(key) > LONGEST_KEY:
+        key = f"{key[:LONGEST_KEY]}..."
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else json.dumps(key, ensure_ascii=False)
 
 
 def words(root: Schema, node: Schema) -> str:

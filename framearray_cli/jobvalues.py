@@ -22,6 +22,7 @@ FARTHEST = 1e12  # scene units; squares and cubes of it still fit in float32 (3e
 BRIGHTEST = 1e20  # W/sr, W/m2 or radiance; times any reflectivity and over any squared distance it stays finite
 SHORTEST = 1e-12  # scene units; a shorter direction is taken for zero
 LONGEST_SHOWN = 40  # characters of a found value in a message
+LONGEST_NAME = 1000  # characters of a file name with its folders; systems take 1024, some 4096
 
 
 def fail(problems: Sequence[tuple[Place, str]]) -> NoReturn:
@@ -113,6 +114,8 @@ def _file_name(value: object, info: ValidationInfo) -> Path:
     """Make a path absolute; a relative one starts at the folder of the job file."""
     if not isinstance(value, str | Path) or not str(value).strip() or "\0" in str(value):
         fail([((), f"expected a file name, got {shown(value)}")])
+    if len(str(value)) > LONGEST_NAME:
+        fail([((), f"expected a file name of at most {LONGEST_NAME} characters, got one of {len(str(value))}")])
     job_file = (info.context or {}).get("job_file")
     return absolute(Path(value), job_file)
 
@@ -163,7 +166,7 @@ def _hits(value: object) -> float | Auto:
     if value == "auto":
         return "auto"
     if isinstance(value, int | float) and not isinstance(value, bool):
-        if value >= 1 and value == int(value) and value <= MOST_HITS:
+        if 1 <= value <= MOST_HITS and value == int(value):
             return float(value)
         for share in SHARES:
             if abs(value - share) < 1e-3:  # 0.333 means a third

@@ -20,13 +20,13 @@ from numba.extending import intrinsic
 
 from .kernelcache import use_own_cache
 
-use_own_cache()  # before the first kernel is declared
+CACHED = use_own_cache()  # before the first kernel is declared
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 _LINE = 64  # bytes
 _njit: Any = nb.njit  # its stubs do not know `_nrt`
-_OPTIONS = {"nogil": True, "cache": True, "error_model": "numpy", "_nrt": False}
+_OPTIONS = {"nogil": True, "cache": CACHED, "error_model": "numpy", "_nrt": False}
 
 
 def kernel(function: F) -> F:

@@ -3,7 +3,6 @@
 Notation: a place is a tuple of indices, one for each light axis, in the order of `Manifest.axes`.
 """
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,13 +10,17 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from .arrays import Float64
+from .arrays import Float64, is_number
 from .errors import OutputError
 from .filepatterns import check_pattern
+from .jobvalues import shown
 
 FILE_NAME = "manifest.toml"
 BACKGROUND = "background"  # stands beside the groups: what comes from outside the scene
 MAIN_AXIS = "light"  # the axis of all sources, or of those that name none; as in the job
+
+LARGEST = 65535  # pixels of a side; a job has at most 16384
+FPS = (0.01, 1000.0)  # as in a job
 
 Vector: TypeAlias = tuple[float, float, float]
 Row: TypeAlias = tuple[float, float, float, float]
@@ -41,7 +44,7 @@ class ManifestCamera:
         rows = self.world_from_camera
         square = isinstance(rows, tuple) and len(rows) == 4 and all(_is_vector(row, 4) for row in rows)
         _check(square, "world_from_camera: expected 4 rows of 4 finite numbers")
-        _check(_is_number(self.fov) and 0 < self.fov < 180, f"fov: expected degrees in (0, 180), got {self.fov!r}")
+        _check(is_number(self.fov) and 0 < self.fov < 180, f"fov: expected degrees in (0, 180), got {shown(self.fov)}")
 
     @property
     def matrix(self) -> Float64:
@@ -65,9 +68,10 @@ class ManifestLight:
     sources: tuple[dict[str, Any], ...]
 
     def __post_init__(self) -> None:
-        _check(_is_vector(self.ambient, 3), f"ambient: expected 3 finite numbers, got {self.ambient!r}")
+        _check(_is_vector(self.ambient, 3), f"ambient: expected 3 finite numbers, got {shown(self.ambient)}")
         _check(
-            _is_vector(self.ambient_error, 3), f"ambient_error: expected 3 finite numbers, got {self.ambient_error!r}"
+            _is_vector(self.ambient_error, 3),
+            f"ambient_error: expected 3 finite numbers, got {shown(self.ambient_error)}",
         )
         typed = all(isinstance(source, dict) and isinstance(source.get("type"), str) for source in self.sources)
         _check(typed, "sources: expected tables with a type")
@@ -92,7 +96,7 @@ class ManifestGroup:
     def __post_init__(self) -> None:
         for key in ("name", "axis", "images"):
             value = getattr(self, key)
-            _check(isinstance(value, str) and bool(value), f"{key}: expected text, got {value!r}")
+            _check(isinstance(value, str) and bool(value), f"{key}: expected text, got {shown(value)}")
         _check(bool(self.lights), "lights: expected at least one")
 
 
@@ -141,18 +145,22 @@ class Manifest:
 
     def __post_init__(self) -> None:
         for key in ("version", "name", "fingerprint", "images", "layers", "ambient_images", "background_images"):
-            _check(isinstance(getattr(self, key), str), f"{key}: expected text, got {getattr(self, key)!r}")
+            _check(isinstance(getattr(self, key), str), f"{key}: expected text, got {shown(getattr(self, key))}")
         for key in ("job", "scene", "summary"):
-            _check(isinstance(getattr(self, key), dict), f"{key}: expected a table, got {getattr(self, key)!r}")
+            _check(isinstance(getattr(self, key), dict), f"{key}: expected a table, got {shown(getattr(self, key))}")
         sizes = self.resolution
         whole = (
-            isinstance(sizes, tuple) and len(sizes) == 2 and all(isinstance(size, int) and size > 0 for size in sizes)
+            isinstance(sizes, tuple)
+            and len(sizes) == 2
+            and all(isinstance(size, int) and 0 < size <= LARGEST for size in sizes)
         )
-        _check(whole, f"resolution: expected 2 positive whole numbers, got {sizes!r}")
-        _check(_is_number(self.fps) and self.fps > 0, f"fps: expected a positive number, got {self.fps!r}")
+        _check(whole, f"resolution: expected 2 whole numbers from 1 to {LARGEST}, got {shown(sizes)}")
+        slow, fast = FPS
+        good = is_number(self.fps) and slow <= self.fps <= fast
+        _check(good, f"fps: expected a number from {slow:g} to {fast:g}, got {shown(self.fps)}")
         _check(bool(self.cameras), "cameras: expected at least one")
         ambient = self.background_ambient
-        _check(_is_vector(ambient, 3), f"background_ambient: expected 3 finite numbers, got {ambient!r}")
+        _check(_is_vector(ambient, 3), f"background_ambient: expected 3 finite numbers, got {shown(ambient)}")
         moves = self.n_cameras > 1
         if self.groups:
             self._check_groups()
@@ -252,9 +260,5 @@ def _check(good: bool, problem: str) -> None:
         raise ValueError(problem)
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
 def _is_vector(value: object, length: int) -> bool:
-    return isinstance(value, tuple) and len(value) == length and all(_is_number(item) for item in value)
+    return isinstance(value, tuple) and len(value) == length and all(is_number(item) for item in value)

@@ -1,5 +1,6 @@
 """`manifest.toml`: short keys on top, then the job, then one block a camera and a light; people read it first."""
 
+import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -37,14 +38,14 @@ def read_manifest(place: Path) -> Manifest:
     Raises:
         OutputError: it is missing, broken, made by a newer program, or leads out of its folder.
     """
-    path = place / FILE_NAME if place.is_dir() else place
+    path = place / FILE_NAME if os.path.isdir(place) else place
     try:
         table = tomllib.loads(path.read_bytes().decode())
     except FileNotFoundError as error:
         raise OutputError(f"{path}: no such file; expected the output folder of `framearray render`") from error
     except OSError as error:
         raise OutputError(f"{path}: cannot be read: {reason(error)}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # the first: no UTF-8, no TOML, or a number of too many digits
         raise OutputError(f"{path}: not valid TOML: {error}; render again, or restore the file") from error
     found = table.get("format")
     if found not in (FORMAT, FORMAT_OF_GROUPS):

@@ -31,8 +31,10 @@ def taken_memory() -> int:
 
 def memory_limit(prepared: Prepared) -> int:
     """Bytes that frames under way may take: what the limit leaves beside the rest, or a share of what is free."""
-    limit = prepared.job.render.memory
-    return limit - taken_memory() if limit else int(FREE_SHARE * free_memory())
+    if prepared.job.render.memory:
+        return prepared.job.render.memory - taken_memory()
+    free = free_memory()
+    return min(int(FREE_SHARE * free), free - GROWTH)
 
 
 def require_memory(prepared: Prepared, per_pixel: Float64 | None = None) -> None:
@@ -46,17 +48,20 @@ def require_memory(prepared: Prepared, per_pixel: Float64 | None = None) -> None
     """
     needed, limit = window_memory(prepared, 1, per_pixel=per_pixel), memory_limit(prepared)
     if prepared.job.render.memory is None:
-        needed, limit = max(needed, ambient_memory(prepared)), free_memory()
+        needed, limit = max(needed, ambient_memory(prepared)) + GROWTH, free_memory()
     else:  # told as the job's limit is: of the whole program
         needed, limit = needed + taken_memory(), prepared.job.render.memory
     if needed > limit:
         less = "a smaller camera.resolution, reuse.n_r or samples.hits takes less"
         if prepared.job.samples.error is not None:
             less = "a larger samples.error, or a smaller camera.resolution, reuse.n_r or samples.most_hits takes less"
-        problem = (
-            f"rendering needs at least {needed / 2**30:.1f} GiB of memory, {limit / 2**30:.1f} GiB may be used; {less}"
-        )
+        problem = f"rendering needs at least {_gib(needed)} GiB of memory, {_gib(limit)} GiB may be used; {less}"
         raise JobError(prepared.job.file or prepared.job.name, [problem])
+
+
+def _gib(n_bytes: int) -> str:
+    """Gibibytes, small amounts with a digit more."""
+    return f"{n_bytes / 2**30:.{1 if n_bytes >= 2**30 else 2}f}"
 
 
 def ambient_memory(prepared: Prepared) -> int:

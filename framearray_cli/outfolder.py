@@ -1,6 +1,7 @@
 """Whose folder it is: the files of one frame array never mix with those of another."""
 
 import json
+import os
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -143,9 +144,23 @@ def in_the_way(old: Manifest, changed: Sequence[str]) -> str:
 
 def free_space(folder: Path) -> int:
     """Bytes free on the disk of a folder, or of the nearest one above it that exists."""
-    while not folder.exists() and folder != folder.parent:
+    return shutil.disk_usage(_existing(folder)).free
+
+
+def takes_files(folder: Path) -> bool:
+    """Whether the disk of a folder has room for one more file, however small; some count files, too."""
+    if not hasattr(os, "statvfs"):  # Windows
+        return True
+    disk = os.statvfs(_existing(folder))
+    return disk.f_files == 0 or disk.f_favail > 0
+
+
+def _existing(folder: Path) -> Path:
+    """A folder, or the nearest one above it that exists."""
+    # unlike Path.exists, os.path.exists is false for a name that is too long
+    while not os.path.exists(folder) and folder != folder.parent:
         folder = folder.parent
-    return shutil.disk_usage(folder).free
+    return folder
 
 
 def remove_array(old: Manifest) -> int:
@@ -156,7 +171,7 @@ def remove_array(old: Manifest) -> int:
     """
     removed = 0
     for file in (*array_files(old), *record_files(old.directory), old.directory / FILE_NAME):
-        if file.is_file() or file.is_symlink():
+        if os.path.lexists(file) and not file.is_dir():
             file.unlink()
             removed += 1
     with suppress(OSError):  # somebody else's files in it

@@ -1,6 +1,6 @@
 """What is wrong with a file, in plain words, each problem with its place: `camera.fov: expected ..., got ...`."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from typing import Any
 
@@ -9,6 +9,8 @@ from pydantic_core import ErrorDetails
 
 from .jobschema import Schema, dotted, either, file_schema, find, sections, variants, words
 from .jobvalues import FARTHEST, shown
+
+MOST_PROBLEMS = 50  # of a file; more would scroll away what matters
 
 # Words from other programs, for keys whose spelling is too far from ours to be found as a typing error.
 SYNONYMS = {
@@ -36,10 +38,20 @@ SYNONYMS = {
 }
 
 
-def problems_of(error: ValidationError, model: type[BaseModel]) -> list[str]:
-    """Translate every problem that pydantic found in a table of type `model`, in the order of the file's keys."""
+def problems_of(error: ValidationError, model: type[BaseModel], most: int = MOST_PROBLEMS) -> list[str]:
+    """Translate the problems that pydantic found in a table of type `model`, in the order of the file's keys.
+
+    Args:
+        most: that are told; the rest, which a wrong file may have by the hundred thousand, are counted.
+    """
     root = file_schema(model)
-    return [_problem(root, details) for details in error.errors(include_url=False) if not _is_echo(details)]
+    found = [details for details in error.errors(include_url=False) if not _is_echo(details)]
+    return cut([_problem(root, details) for details in found[:most]], len(found))
+
+
+def cut(told: Sequence[str], n: int) -> list[str]:
+    """The problems that are told, and how many more there are of n."""
+    return [*told, f"and {n - len(told)} more problems"] if n > len(told) else list(told)
 
 
 def _is_echo(details: ErrorDetails) -> bool:

@@ -1,10 +1,14 @@
-"""Ranges of frames as OpenCue writes them: "0-47", "0-47x3" (every third), "5", and several of them: "0-9,20-47x2"."""
+"""Ranges of frames as OpenCue writes them, several of them with commas in between.
+
+"5", "0-47", "0-47x3" (every third), "0-47y3" (all but every third), "0-47:3" (all; OpenCue would render them in another
+order), "47-0x-3" (downwards). Order plays no part here: frames are rendered as they follow each other on the path.
+"""
 
 import re
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 
-_PART = re.compile(r"(\d{1,6})(?:-(\d{1,6})(?:x(\d{1,6}))?)?")
+_PART = re.compile(r"(\d{1,6})(?:-(\d{1,6})(?:([xy:])(-?\d{1,6}))?)?")
 
 
 def parse_frames(text: str, n: int) -> tuple[int, ...]:
@@ -21,14 +25,17 @@ def parse_frames(text: str, n: int) -> tuple[int, ...]:
         match = _PART.fullmatch(part)
         if not match:
             raise ValueError(f'expected frames such as "0-47", "0-47x3" or "0-9,20-47", got {text[:60]!r}')
-        first, last, step = int(match[1]), int(match[2] or match[1]), int(match[3] or 1)
-        if first > last or step == 0:
-            raise ValueError(
-                f"expected a first frame, a last one that is not before it, and a step above 0, got {part!r}"
-            )
-        if last >= n:
+        first, last = int(match[1]), int(match[2] or match[1])
+        way = 1 if first <= last else -1
+        kind, step = match[3], int(match[4] or way)
+        if step * way <= 0:
+            raise ValueError(f"expected a step that leads from {first} to {last}, got {part!r}")
+        if max(first, last) >= n:
             raise ValueError(f"expected frames from 0 to {n - 1}, got {part!r}")
-        found.update(range(first, last + 1, step))
+        every, stepped = range(first, last + way, way), range(first, last + way, step)
+        found.update(stepped if kind == "x" else set(every).difference(stepped) if kind == "y" else every)
+    if not found:
+        raise ValueError(f"expected at least one frame, got {text[:60]!r}, which leaves all out")
     return tuple(sorted(found))
 
 

@@ -7,6 +7,7 @@ into a file of its own (`records/0000-0047.jsonl`), so that parts may run side b
 
 import hashlib
 import json
+import re
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -19,6 +20,7 @@ from .errors import OutputError
 from .files import make_folder, reason
 
 FOLDER = "records"
+_SEAL = re.compile(rb'\{"check":"([0-9a-f]{16})",')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,11 +102,15 @@ class RecordWriter:
         self._path, self._lock, self.fingerprint = file, threading.Lock(), fingerprint
         make_folder(file.parent)
         try:
-            self._file = open(file, "ab")  # noqa: SIM115  # closed in __exit__
+            self._file = open(file, "ab", buffering=0)  # noqa: SIM115  # closed in __exit__
         except OSError as error:
             raise OutputError(f"{file}: cannot be written: {reason(error)}") from error
-        # a line of an earlier run may have been cut short
-        self._put({"fingerprint": fingerprint, "cameras": session.cameras, "processor": session.processor}, b"\n")
+        self._torn = True  # a line of an earlier run may have been cut short
+        try:
+            self._put({"fingerprint": fingerprint, "cameras": session.cameras, "processor": session.processor})
+        except BaseException:
+            self._file.close()
+            raise
 
     def add(self, entry: Entry, rays: Mapping[str, int], seconds: float) -> None:
         """Note that a frame is finished, and what the session took so far.
@@ -126,12 +132,15 @@ class RecordWriter:
             line["errors"] = {str(l): error for l, error in entry.errors.items()}
         self._put(line)
 
-    def _put(self, line: Mapping[str, Any], before: bytes = b"") -> None:
-        data = before + json.dumps(line, separators=(",", ":")).encode() + b"\n"
+    def _put(self, line: Mapping[str, Any]) -> None:
+        text = sealed(line) + b"\n"
         try:
             with self._lock:
-                self._file.write(data)
-                self._file.flush()
+                left = memoryview(b"\n" + text if self._torn else text)
+                self._torn = True
+                while left:  # a disk that becomes full takes a part
+                    left = left[self._file.write(left) :]
+                self._torn = False
         except OSError as error:
             raise OutputError(f"{self._path}: cannot be written: {reason(error)}") from error
 
@@ -141,7 +150,7 @@ class RecordWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with suppress(OSError):  # a full disk; every line was flushed when it was written
+        with suppress(OSError):  # a disk that has gone
             self._file.close()
 
 
@@ -185,12 +194,36 @@ def _lines(file: Path) -> Iterator[dict[str, Any]]:
     except OSError as error:
         raise OutputError(f"{file}: cannot be read: {reason(error)}") from error
     for line in data.splitlines():
-        try:
-            found = json.loads(line)
-        except (ValueError, RecursionError):  # torn, or damaged: what it tells of is made again
-            continue
-        if isinstance(found, dict):
+        found = unsealed(line)
+        if found is not None:  # else torn, or damaged: what it tells of is made again
             yield found
+
+
+def sealed(table: Mapping[str, Any]) -> bytes:
+    """A line of a record: JSON that begins with a checksum of all the rest."""
+    body = json.dumps(table, separators=(",", ":")).encode()
+    return b'{"check":"' + _check(body) + b'",' + body[1:]
+
+
+def unsealed(line: bytes) -> dict[str, Any] | None:
+    """What `sealed` made a line of; None where the line is not what it was."""
+    match = _SEAL.match(line)
+    if not match:
+        return None
+    body = b"{" + line[match.end() :]
+    if _check(body) != match[1]:
+        return None
+    try:
+        found = json.loads(body)
+    except (ValueError, RecursionError):
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def _check(body: bytes) -> bytes:
+    import xxhash
+
+    return xxhash.xxh3_64_hexdigest(body).encode()
 
 
 def _entry(line: Mapping[str, Any]) -> Entry | None:

@@ -2,9 +2,9 @@
 
 import time
 from collections import Counter
-from collections.abc import Sequence
-from contextlib import ExitStack, suppress
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, replace
 from threading import Lock
 
 import numpy as np
@@ -47,6 +47,9 @@ class Listener:
     def settled(self, choice: Choice) -> None:
         """What the job leaves open was chosen."""
 
+    def looking(self, files: int) -> None:
+        """So many files of the array are there, and are compared with their checksums."""
+
     def found(self, found: Found, wanted: int) -> None:
         """What of the array is there already, and how many images will be rendered."""
 
@@ -58,6 +61,18 @@ class Listener:
 
     def written(self, images: int) -> None:
         """That many more images are on disk."""
+
+    def waits(self, what: str) -> None:
+        """In parts: something is waited for."""
+
+    def handed_out(self, line: str) -> None:
+        """In parts: the camera path was cut, and workers begin."""
+
+    def heard(self, lines: Sequence[str]) -> None:
+        """In parts: what the first of them tells of the whole array."""
+
+    def compiling(self) -> None:
+        """In parts: a worker compiles kernels."""
 
 
 def render(
@@ -81,8 +96,62 @@ def render(
         OutputError: something could not be written; images that were finished stay, and the next run goes on with the
             rest.
     """
-    listener = listener or Listener()
-    started = time.perf_counter()
+    listener, started = listener or Listener(), time.perf_counter()
+    with begun(job, listener, engine, restart=restart, cameras=cameras) as start:
+        prepared, found, place, folder = start.prepared, start.found, start.place, job.output.directory
+        if not start.wanted:
+            with place.alone():
+                return nothing_to_do(prepared, found, time.perf_counter() - started)
+        work, ambient, manifest, rays = _planned(start, listener)
+        with place.alone():
+            write_manifest(folder, manifest)
+        fingerprint = start.identity.fingerprint
+        with RecordWriter(record_file(folder, start.session.cameras), fingerprint, start.session) as record:
+            run = _Run(prepared, record, listener, rays, started)
+            try:
+                for block in light_blocks(prepared, mirror_share(work), per_pixel=work.per_pixel):
+                    wanted = found.missing(start.chosen, block)
+                    run.frames(work.for_lights(block), ambient, block, wanted)
+            except BaseException:
+                with suppress(OutputError), place.alone():  # what stopped the render is told, not what that meets
+                    write_manifest(folder, with_summary(manifest, run.summary(found, ambient)))
+                raise
+        with place.alone():
+            summary = run.summary(found, ambient)
+            write_manifest(folder, with_summary(manifest, summary))
+    return summary
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Begun:
+    """A render that knows what it has to do.
+
+    Attributes:
+        choice: of what the job leaves open; `prepared` has numbers for it.
+        place: the output folder; `found`: what is there.
+        chosen: cameras that were asked for; `wanted`: those of them of which something is missing.
+    """
+
+    prepared: Prepared
+    embree: EmbreeScene
+    choice: Choice | None
+    identity: Identity
+    session: Session
+    place: Folder
+    found: Found
+    chosen: Sequence[int]
+    wanted: list[int]
+
+
+@contextmanager
+def begun(
+    job: Job, listener: Listener, engine: Engine = "auto", *, restart: bool, cameras: Sequence[int] | None
+) -> Iterator[Begun]:
+    """Read what a job names, claim its folder, keep other runs off its cameras, and look what is there; see `render`.
+
+    Raises:
+        JobError, SceneError, OutputError: as `render`.
+    """
     prepared = prepare(job)
     listener.prepared(prepared)
     require_least_memory(prepared)
@@ -101,35 +170,19 @@ def render(
             held.enter_context(place.reserved(chosen, session.cameras))
         if choice:
             listener.settled(choice)
-        found = look(folder, identity.fingerprint, prepared.threads)
+        found = look(folder, identity.fingerprint, prepared.threads, frozenset(chosen), listener.looking)
         wanted = found.missing(chosen, range(prepared.n_lights))
         listener.found(found, len(wanted) * prepared.n_lights)
-        if not wanted:
-            with place.alone():
-                return _nothing_to_do(prepared, found, time.perf_counter() - started)
-        work, ambient, manifest, rays = _planned(prepared, embree, identity, choice, listener)
-        with place.alone():
-            write_manifest(folder, manifest)
-        with RecordWriter(record_file(folder, session.cameras), identity.fingerprint, session) as record:
-            run = _Run(prepared, record, listener, rays, started)
-            try:
-                for block in light_blocks(prepared, mirror_share(work), per_pixel=work.per_pixel):
-                    run.frames(work.for_lights(block), ambient, block, found.missing(chosen, block))
-            except BaseException:
-                with suppress(OutputError), place.alone():  # what stopped the render is told, not what that meets
-                    write_manifest(folder, with_summary(manifest, run.summary(found, ambient)))
-                raise
-        with place.alone():
-            summary = run.summary(found, ambient)
-            write_manifest(folder, with_summary(manifest, summary))
-    return summary
+        yield Begun(
+            prepared=prepared, embree=embree, choice=choice, identity=identity, session=session, place=place,
+            found=found, chosen=chosen, wanted=wanted,
+        )  # fmt: skip
 
 
-def _planned(
-    prepared: Prepared, embree: EmbreeScene, identity: Identity, choice: Choice | None, listener: Listener
-) -> tuple[Work, Ambient, Manifest, Counter[str]]:
+def _planned(start: Begun, listener: Listener) -> tuple[Work, Ambient, Manifest, Counter[str]]:
     """Ambient light, hits and manifest of the whole array, and the rays that they took."""
-    work, ambient = plan_work(prepared, embree)
+    prepared = start.prepared
+    work, ambient = plan_work(prepared, start.embree)
     listener.planned(ambient)
     work, target = aimed(prepared, work, ambient)
     rays = Counter({"ambient": ambient.rays})
@@ -137,10 +190,10 @@ def _planned(
         require_memory(prepared, work.per_pixel)
         listener.aimed(target)
         rays["target"] = target.rays
-    return work, ambient, describe(prepared, ambient, identity, choice, target), rays
+    return work, ambient, describe(prepared, ambient, start.identity, start.choice, target), rays
 
 
-def _nothing_to_do(prepared: Prepared, found: Found, seconds: float) -> Summary:
+def nothing_to_do(prepared: Prepared, found: Found, seconds: float) -> Summary:
     """All that is wanted is on disk; the manifest may not say so yet."""
     folder = prepared.job.output.directory
     summary = summed(prepared, found.records, images=0, seconds=seconds, rays=Counter(), stages={}, notes=())

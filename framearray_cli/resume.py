@@ -1,6 +1,6 @@
 """Going on where a render stopped: what of an array is on disk and whole, and what is left to render."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Container, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,8 +38,18 @@ def _lights_by_camera(records: Records) -> dict[int, set[int]]:
     return done
 
 
-def look(folder: Path, fingerprint: str, threads: int = 1) -> Found:
-    """Read all records of an array, and every file that they name: those that are not what they were do not count.
+def look(
+    folder: Path,
+    fingerprint: str,
+    threads: int = 1,
+    cameras: Container[int] | None = None,
+    looking: Callable[[int], None] = lambda files: None,
+) -> Found:
+    """Read all records of an array, and the files that they name: those that are not what they were do not count.
+
+    Args:
+        cameras: whose files are read; what records say of others is believed. None: of all.
+        looking: told how many files are read, before that.
 
     Raises:
         OutputError: a record cannot be read.
@@ -47,12 +57,17 @@ def look(folder: Path, fingerprint: str, threads: int = 1) -> Found:
     records = read_records(folder, fingerprint)
     checksums = records.checksums()
 
+    read = [entry for entry in records.entries if cameras is None or entry.c in cameras]
+    if files := sum(len(entry.files) for entry in read):
+        looking(files)
+
     def wrong(entry: Entry) -> list[tuple[str, str]]:
         return list(damaged(folder, checksums, entry.files))
 
     with ThreadPoolExecutor(threads, thread_name_prefix="verify") as pool:
-        found = list(pool.map(wrong, records.entries))
-    whole = tuple(entry for entry, problems in zip(records.entries, found, strict=True) if not problems)
+        found = list(pool.map(wrong, read))
+    bad = {id(entry) for entry, problems in zip(read, found, strict=True) if problems}
+    whole = tuple(entry for entry in records.entries if id(entry) not in bad)
     return Found(
         records=replace(records, entries=whole), damaged=tuple(problem for problems in found for problem in problems)
     )

@@ -15,6 +15,7 @@ from rich.text import Text
 
 from .errors import OutputError
 from .files import reason
+from .kernelcache import problem
 
 out, err = Console(), Console(stderr=True)
 
@@ -65,7 +66,8 @@ class Screen:
 
     def compiling(self) -> None:
         """Tell why the first run on a machine starts slowly."""
-        self.say(["compiling for this machine; that takes up to a minute, the first time only"])
+        when = "each time" if problem() else "the first time only"
+        self.say([f"compiling for this machine; that takes up to a minute, {when}"])
 
     def count(self, label: str, total: int, unit: str) -> None:
         """Start to count."""
@@ -120,6 +122,8 @@ class Screen:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.end()
+        if error is None and (why := problem()):
+            self.say([f"note: compiled kernels cannot be kept: {why}; NUMBA_CACHE_DIR names another folder for them"])
 
 
 def say(console: Console, lines: Iterable[str]) -> None:

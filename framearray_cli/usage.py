@@ -5,6 +5,8 @@ from pathlib import Path
 
 import psutil
 
+from .limits import address_space, group_memory
+
 
 def peak_memory() -> int:
     """Largest resident size of this process so far, bytes."""
@@ -21,8 +23,12 @@ def peak_memory() -> int:
 
 
 def free_memory() -> int:
-    """Bytes that this process can still get, swap included."""
-    return int(psutil.virtual_memory().available + psutil.swap_memory().free)
+    """Bytes that this process can still get: what the machine has, swap included, or less where a limit says so.
+
+    Limits are those of a container or of `ulimit`; see limits.py.
+    """
+    machine = int(psutil.virtual_memory().available + psutil.swap_memory().free)
+    return min([machine, *(left for left in (group_memory(), address_space()) if left is not None)])
 
 
 def resident_memory() -> int:

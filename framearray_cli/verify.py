@@ -1,5 +1,6 @@
 """Looks whether every file of a frame array is there and what it was when it was finished: `framearray verify`."""
 
+import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -61,7 +62,7 @@ def verify(out: Path, threads: int, progress: Callable[[int, int], None]) -> Ver
 def _without_checksum(manifest: Manifest, name: str) -> Iterator[tuple[str, str]]:
     """A file that no record tells of: whether it is an image of the right size, at least."""
     path = manifest.directory / name
-    if not path.is_file():
+    if not os.path.isfile(path):
         yield name, NEVER
         return
     try:

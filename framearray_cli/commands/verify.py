@@ -40,9 +40,11 @@ def verify(
             say(out, lines)
         return
     from ..jobfile import job_of_table
+    from ..limits import RENDERS, require_address_space
     from ..manifest import FILE_NAME
     from .render import render_shown
 
+    require_address_space(RENDERS)
     if not quiet:
         say(out, lines)
     folder = found.manifest.directory

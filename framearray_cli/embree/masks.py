@@ -11,6 +11,7 @@ import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
+from ..kernel import CACHED
 from ..scene import Scene
 from ..surface import Surfaces, is_cut_out, surfaces
 
@@ -33,7 +34,7 @@ _numba: Any = nb  # its stubs know neither of these two
 _carray, _cfunc = _numba.carray, _numba.cfunc
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=CACHED)
 def _surfaces_at(table: Any) -> Surfaces:
     """Rebuild `Surfaces` from the addresses and lengths that `MaskTable` wrote down."""
     n, m, n_texels, n_textures = table[0], table[1], table[2], table[3]
@@ -72,7 +73,7 @@ def _filter() -> Any:
                 if is_cut_out(s, triangle, hits[_HIT_U, lane], hits[_HIT_V, lane]):
                     valid[lane] = 0
 
-    return _cfunc(types.void(types.intp), nopython=True, cache=True)(filter_masked)
+    return _cfunc(types.void(types.intp), nopython=True, cache=CACHED)(filter_masked)
 
 
 class MaskTable:

@@ -38,12 +38,12 @@ def whole_folder(target: Path, mark: str, *, force: bool) -> Iterator[Path]:
         yield part
         if old:
             target.rename(aside)
-        elif target.is_dir():
+        elif os.path.isdir(target):
             target.rmdir()
         part.rename(target)
     except BaseException as error:
         shutil.rmtree(part, ignore_errors=True)
-        if aside.is_dir() and not target.exists():
+        if os.path.isdir(aside) and not os.path.exists(target):
             with suppress(OSError):
                 aside.rename(target)
         if isinstance(error, OSError):
@@ -54,9 +54,9 @@ def whole_folder(target: Path, mark: str, *, force: bool) -> Iterator[Path]:
 
 def _in_the_way(target: Path, mark: str, force: bool) -> bool:
     """Whether an earlier export is to be replaced."""
-    if target.is_symlink() or (target.exists() and not target.is_dir()):
+    if os.path.lexists(target) and (os.path.islink(target) or not os.path.isdir(target)):
         raise OutputError(f"{target}: a file of that name is there; choose another name")
-    if not target.is_dir() or not any(target.iterdir()):
+    if not os.path.isdir(target) or not any(target.iterdir()):
         return False
     if not (target / mark).is_file():
         raise OutputError(f"{target}: holds other files, and no {mark} of an earlier export; choose another folder")

@@ -1,5 +1,6 @@
 """A path through a frame array -> a movie, or a numbered image sequence; from the manifest alone."""
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -113,7 +114,7 @@ def _check_images(pictures: Pictures, line: Timeline) -> None:
     wanted: dict[Path, Shot] = {}
     for shot in dict.fromkeys(line.shots):
         wanted.update(dict.fromkeys(pictures.files(shot.c, shot.positions), shot))
-    missing = sorted(path for path in wanted if not path.is_file())
+    missing = sorted(path for path in wanted if not os.path.isfile(path))
     if missing:
         shot = wanted[missing[0]]
         lights = zip(pictures.manifest.axes, shot.positions, strict=True)

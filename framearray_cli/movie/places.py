@@ -10,6 +10,7 @@ from typing import Annotated, Any, TypeAlias
 
 from pydantic import PlainValidator, WithJsonSchema
 
+from ..arrays import is_number
 from ..jobvalues import fail, shown
 
 # An index (negative: from the end; 3.25 is a quarter of the way from 3 to 4), "first", "last", or a percentage of the
@@ -103,7 +104,7 @@ def percent(text: str) -> float | None:
 def _is_place(value: object) -> bool:
     if isinstance(value, str):
         return value in ("first", "last") or percent(value) is not None
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    return is_number(value)
 
 
 def position_of(place: IndexPlace, n: int) -> float:

@@ -1,5 +1,6 @@
 """Write a numbered image sequence, whole or not at all; images that stay as they are become hard links."""
 
+import os
 import re
 import secrets
 import shutil
@@ -35,7 +36,7 @@ def sequence_pattern(target: Path, own_suffix: str, movies: Sequence[str]) -> Pa
     Raises:
         OutputError: it is no pattern.
     """
-    if not target.suffix or target.is_dir():
+    if not target.suffix or os.path.isdir(target):
         return target / f"frame.####{own_suffix}"
     images = ", ".join(f".{name}" for name in get_args(Extension))
     if kind(target)[1:] not in get_args(Extension):
@@ -103,7 +104,7 @@ def _removed_after(folder: Path) -> Iterator[None]:
 def _check_leftovers(folder: Path, before: str, after: str, names: set[str]) -> None:
     """Refuse to leave frames of an earlier, longer sequence behind the last one of this."""
     number = re.compile(re.escape(before) + r"\d+" + re.escape(after))
-    entries = sorted(entry.name for entry in folder.iterdir()) if folder.is_dir() else []
+    entries = sorted(entry.name for entry in folder.iterdir()) if os.path.isdir(folder) else []
     left = [name for name in entries if number.fullmatch(name) and name not in names]
     if left:
         raise OutputError(

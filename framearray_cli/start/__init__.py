@@ -1,5 +1,6 @@
 """A scene file -> a first job file that renders well at once: `framearray init`."""
 
+import os
 from pathlib import Path
 
 from ..errors import OutputError, SceneError
@@ -22,9 +23,9 @@ def init(scene: Path, job_file: Path, wishes: Wishes, *, force: bool = False) ->
         JobError: no camera has the name that is wished for.
         OutputError: the job file is there already, or cannot be written.
     """
-    if job_file.exists() and not force:
+    if os.path.exists(job_file) and not force:
         raise OutputError(f"{job_file}: is there already; give another name with --output, or --force to replace it")
-    if not scene.exists():
+    if not os.path.exists(scene):
         raise SceneError(f"{scene}: no such scene file")
     start = plan_start(scene, wishes)
     checked(table_of(start), scene)

@@ -76,6 +76,11 @@ def plan_start(file: Path, wishes: Wishes) -> Start:
         probe = Probe(scene=scene, embree=embree)
         axis = 2 if up == "z" else 1
         room, share = (None, 0.0) if wishes.inside is False else find_room(probe, axis)
+        if wishes.inside:  # perhaps its faces are turned outwards, and only cupboards are closed from their fronts
+            turned = replace(probe, turned=True)
+            other, more = find_room(turned, axis)
+            if more > share:
+                probe, room, share = turned, other, more
         if wishes.inside and room is None:
             raise SceneError(f"{file}: --inside: nothing in it looks like the inside of a room")
         place = _Place(probe=probe, up=axis, room=room, size=size)

@@ -34,7 +34,7 @@ class Seen(NamedTuple):
     Attributes:
         distance: (n,) in lengths of the directions; inf where nothing is met.
         triangle: (n,) -1 where nothing is met.
-        front: (n,) whether it is met from the side its corners run counter-clockwise on.
+        front: (n,) whether it is met from its front, the side its corners run counter-clockwise on.
     """
 
     distance: Float64
@@ -49,10 +49,15 @@ class Seen(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Probe:
-    """A scene that rays can be sent into."""
+    """A scene that rays can be sent into.
+
+    Attributes:
+        turned: whether the front of a surface is the side that its corners run clockwise on.
+    """
 
     scene: Scene
     embree: EmbreeScene
+    turned: bool = False
 
     def first_hits(self, origins: Any, directions: Any) -> Seen:
         """Trace rays; origins and directions are (n, 3) or (3,)."""
@@ -64,7 +69,8 @@ class Probe:
         missed = _rows(bits, TRIANGLE)[:n] == MISS
         triangle[missed] = -1
         against = (self.normals(triangle) * np.broadcast_to(directions, (n, 3))).sum(axis=1) < 0
-        return Seen(np.where(missed, np.inf, distance.astype(np.float64)), triangle, against & ~missed)
+        front = (against != self.turned) & ~missed
+        return Seen(np.where(missed, np.inf, distance.astype(np.float64)), triangle, front)
 
     def normals(self, triangle: Int32) -> Float64:
         """(n, 3) normals by winding, not of unit length."""

@@ -19,7 +19,7 @@ def check_target(target: Path) -> None:
     """
     ours = {INDEX, TILES, *page_files()}
     try:
-        found = sorted(entry.name for entry in target.iterdir()) if target.exists() else []
+        found = sorted(entry.name for entry in target.iterdir()) if os.path.exists(target) else []
     except OSError as error:
         raise OutputError(f"{target}: cannot be read as a folder: {reason(error)}") from error
     strangers = [name for name in found if name not in ours]

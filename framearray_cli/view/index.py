@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Float32
+from ..arrays import Float32, is_number
 from ..manifest import Manifest
 from .streams import LAYERS, Stream
 
@@ -85,7 +85,7 @@ def _exposure(manifest: Manifest) -> float:
     output = manifest.job.get("output", {})
     linear = manifest.groups or not manifest.images.lower().endswith((".png", ".jpg", ".jpeg"))
     value = output.get("exposure", 0.0) if isinstance(output, dict) and linear else 0.0
-    return float(value) if isinstance(value, int | float) else 0.0
+    return float(value) if is_number(value) else 0.0
 
 
 def _stream(stream: Stream) -> dict[str, Any]:

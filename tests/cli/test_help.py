@@ -12,7 +12,7 @@ from framearray_cli import __version__, errors
 from framearray_cli.cli import app
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "cli.md"
-COMMANDS = ["assemble", "check", "export", "init", "render", "report", "schema", "sheet", "verify", "view"]
+COMMANDS = ["assemble", "check", "export", "init", "openjd", "render", "report", "schema", "sheet", "verify", "view"]
 
 
 def section(page: str, command: str) -> str:

@@ -67,7 +67,7 @@ def test_without_records_images_are_looked_at(array, capsys):
     assert run(capsys, "verify", array).err.splitlines()[-1].startswith(f"2 of {N_FILES} files are missing or damaged")
 
 
-@pytest.mark.parametrize("cameras", ["0-9", "3-1", "x", ""])
+@pytest.mark.parametrize("cameras", ["0-9", "3-1x1", "x", ""])
 def test_cameras_that_are_no_range(cameras, tmp_path, capsys):
     told = run(capsys, "render", "-q", write_job(tmp_path, camera=WALK), "--cameras", cameras)
     assert told.code == 2

@@ -12,6 +12,7 @@ from bench.results import ROOT, save
 
 from . import page
 from .run import run
+from .warm import warm
 
 # What is mutated, and the module that does it.
 KINDS = {
@@ -36,10 +37,11 @@ def main() -> None:
     if args.what == "page":
         page.write(RESULTS)
         return
-    os.environ["NUMBA_NUM_THREADS"] = "1"
     kept = RESULTS / f"{args.what}-{args.seed}"
     cases = importlib.import_module(f"fuzz.{KINDS[args.what]}").cases
     with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
+        os.environ["TMPDIR"] = tempfile.tempdir = name  # what stopped cases leave there is removed, too
+        warm(Path(name))
         made = cases(random.Random(f"{args.what} {args.seed}"), Path(name))
         wanted = (case for case in made if args.only in case.mutation)
         table = run(wanted, args.cases, 60 * args.minutes, kept, Path(name))

@@ -24,6 +24,7 @@ class Case:
         mutation: what was done to the input, in a few words; cases are counted by it.
         folder: holds whatever the case reads and writes; removed when the case ended well, kept when it did not.
         before: called in the process of the command, first; for limits, or another working directory.
+        accepted: called after a case that was accepted: what was done, in a word.
         wrong: called afterwards, however the command ended: what else is wrong, or None.
     """
 
@@ -31,6 +32,7 @@ class Case:
     mutation: str
     folder: Path
     before: Callable[[], None] = lambda: None
+    accepted: Callable[[], str] = lambda: "accepted"
     wrong: Callable[[Outcome], str | None] = _nothing
 
 

@@ -3,6 +3,7 @@
 The process is a copy of this one, in which the program is loaded already, so a case costs hundredths of a second.
 """
 
+import faulthandler
 import os
 import resource
 import signal
@@ -66,6 +67,7 @@ def _become(arguments: list[str], log: Path, before: Callable[[], None]) -> None
         used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        faulthandler.dump_traceback_later(0.9 * SECONDS)  # what it does when it hangs
         from framearray_cli.cli import main
 
         before()

@@ -64,10 +64,10 @@ def judged(case: Case, log: Path) -> tuple[Outcome, str]:
 
 
 def _column(case: Case, outcome: Outcome, verdict: str) -> str:
-    """What a case counts as: "render accepted", "check refused 2", or a verdict."""
+    """What a case counts as: what `accepted` says, an exit code, or a verdict."""
     if verdict == "accepted":
-        return f"{case.arguments[0]} accepted"
-    return f"refused {outcome.code}" if verdict == "refused" else verdict
+        return case.accepted()
+    return f"exit code {outcome.code}" if verdict == "refused" else verdict
 
 
 def _keep(case: Case, outcome: Outcome, verdict: str, place: Path) -> Table:

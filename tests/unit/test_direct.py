@@ -203,12 +203,10 @@ def test_a_hit_at_the_lamp_itself_stays_finite_or_is_zero() -> None:
 @pytest.mark.parametrize("n_lights", [1, 3, 16, 48])
 @pytest.mark.parametrize("room", [16, 64, 4096])
 def test_any_room_for_rays_gives_the_same(room: int, n_lights: int) -> None:
-    hits = floor_points(100)
-    lights = arrays(
-        lamps(np.random.default_rng(n_lights).uniform(-1.5, 1.5, (n_lights, 3)) * [1, 0.3, 1] + [0, 1.5, 0])
-    )
-    scene = tiny.room()
-    hits.position[:] -= scene.centre.astype(np.float32)
+    rng, scene = np.random.default_rng(n_lights), tiny.room()
+    hits = points(400, -scene.centre, UP)
+    hits.position[:] += rng.uniform(-2, 2, (400, 3)).astype(np.float32) * [1, 0, 1]
+    lights = arrays(lamps(rng.uniform(-1.5, 1.5, (n_lights, 3)) * [1, 0.3, 1] + [0, 1.5, 0] - scene.centre))
     expected, rays = lit(scene, hits, lights)
     found, again = lit(scene, hits, lights, room)
     np.testing.assert_array_equal(found, expected)

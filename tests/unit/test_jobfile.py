@@ -1,6 +1,7 @@
 """Reading job files: what is not a job file, all problems at once, file names, files of eyes, the round trip."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ import tomli_w
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import framearray_cli.problems
 from framearray_cli.errors import JobError
 from framearray_cli.job import Job
 from framearray_cli.jobfile import job_table, load_toml, read_job
@@ -51,6 +53,9 @@ BROKEN = [
     (b"glTF\x02\0\0\0", "expected UTF-8 text, got a binary file"),
     (b"a = " + b"[" * 20000, "tables or lists are nested too deeply"),
     (b"a = " + b"9" * 5000, "a number has too many digits"),
+    (b"\na" + b".a" * 100_000 + b" = 1", "line 2: expected at most 6 keys with dots between them, got more"),
+    (b"[a" + b" . 'a'" * 6 + b"]", "line 1: expected at most 6 keys with dots between them, got more"),
+    (b"x = [{ a" + b'."a.b"' * 6 + b"= 1 }]", "line 1: expected at most 6 keys with dots between them, got more"),
     (b"#" * (4 * 1024 * 1024 + 1), "expected a TOML file of at most 4 MB, got a bigger one"),
 ]
 
@@ -102,6 +107,41 @@ def test_a_flood_of_problems_is_cut(tmp_path):
     found = problems(path)
     assert len(found) == 51
     assert found[-1] == "and 30 more problems"
+
+
+def test_dots_within_a_text_are_no_keys(tmp_path):
+    path = tmp_path / "x.toml"
+    path.write_text(
+        'a = "1.2.3.4.5.6.7.8.9"\nb.c."d.e.f.g.h.i.j.k" = [0.1, 0.2, 0.3]  # 1.2.3.4.5.6.7.8.9\n', encoding="utf-8"
+    )
+    assert load_toml(path) == {"a": "1.2.3.4.5.6.7.8.9", "b": {"c": {"d.e.f.g.h.i.j.k": [0.1, 0.2, 0.3]}}}
+
+
+@pytest.mark.parametrize(
+    "more", ["k{} = 1\n", "[k{}]\n", "[scene.materials.k{}]\nx = 1\n", "[[light.sources]]\nx{} = 1\n"]
+)
+def test_a_hundred_thousand_problems_are_not_all_put_into_words(tmp_path, more, monkeypatch):
+    told = []
+    whole = framearray_cli.problems._problem
+    monkeypatch.setattr(framearray_cli.problems, "_problem", lambda *given: told.append(given) or whole(*given))
+    path = write(tmp_path)
+    path.write_text(path.read_text() + "".join(more.format(k) for k in range(5000)))
+    assert re.fullmatch(r"and \d{4,5} more problems", problems(path)[-1])
+    assert len(told) == 50
+
+
+def test_a_long_key_is_told_shortly(tmp_path):
+    [found] = problems(write(tmp_path, KEYS + "\n" + "x" * 100_000 + " = 1"))
+    assert found.startswith('camera."' + "x" * 100 + '...": unknown key;')
+
+
+@pytest.mark.parametrize("hits", ["inf", "-inf", "nan", "1e308"])
+def test_no_number_of_hits_is_too_large_to_be_told(tmp_path, hits):
+    path = write(tmp_path)
+    path.write_text(f"{path.read_text()}[samples]\nhits = {hits}\n")
+    assert problems(path) == [
+        f'samples.hits: expected a whole number from 1 to 65000, 1/2, 1/3, ... 1/8 or "auto", got {float(hits):g}'
+    ]
 
 
 def test_file_names_start_at_the_job_file(tmp_path, monkeypatch):
@@ -191,6 +231,13 @@ def test_a_wrong_column_is_told_only_a_few_times(tmp_path):
     found = problems(eyes_of(tmp_path, "eyes.csv", HEADER + "x,0,0,0,0,1\n" * 100))
     assert len(found) == 11
     assert found[-1] == 'camera.file: "eyes.csv": and 90 more problems'
+
+
+def test_wrong_rows_are_counted(tmp_path):
+    rows = "".join('{"eye": [0, 0, 5], "target": "x", "a": 1, "b": 2},' for _ in range(100))
+    found = problems(eyes_of(tmp_path, "eyes.json", f"[{rows[:-1]}]"))
+    assert len(found) == 11
+    assert found[-1] == 'camera.file: "eyes.json": and 290 more problems'
 
 
 def again(job, folder):

@@ -13,8 +13,8 @@ PACKAGE = Path(framearray_cli.__file__).parent
 
 # Every file, in the order in which data flows; a file imports only from those before it.
 FLOW = """
-__init__ errors arrays kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
-compiling files framerate filepatterns fingerprint colour sphere usage
+__init__ errors arrays files limits kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
+compiling framerate fingerprint colour sphere usage
 jobvalues jobtimes jobkeys jobmethod job jobschema jobdocs problems eyefile jobfile
 meshes/limit meshes/model meshes/assets meshes/gltf_check meshes/container meshes/headers
 meshes/defaults meshes/cleaning
@@ -27,7 +27,8 @@ rays hits eyehits plan allotment
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
 terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise standarderror compose accumulate window
-imageattributes images manifest manifestfile pictures ranges record resume folderlock outfolder stored writer
+imageattributes images filepatterns manifest manifestfile pictures ranges record resume folderlock
+outfolder stored writer
 prepare memory acceptance expected auto allot target describe summary render check verify
 start/rays start/sample start/views start/room start/orbit start/model start/staged start/expose start/plan
 start/text start/__init__
@@ -41,8 +42,9 @@ view/__init__
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
 screen interrupts wording
+parts/chunks parts/openjd parts/worker parts/cluster parts/run parts/__init__
 commands/__init__ commands/options commands/init commands/render commands/check commands/verify
-commands/assemble commands/sheet commands/export commands/report commands/schema
+commands/assemble commands/sheet commands/export commands/openjd commands/report commands/schema
 commands/view
 cli __main__
 """
@@ -76,6 +78,7 @@ DOORS = {
     "xxhash": ("record",),
     "filelock": ("folderlock",),
     "pvlib": ("sun",),
+    "distributed": ("parts/worker", "parts/cluster", "parts/run"),
 }
 # What takes long to import, or may be absent: `framearray --help` does without.
 HEAVY = (
@@ -90,6 +93,7 @@ HEAVY = (
     "matplotlib",
     "jinja2",
     "pvlib",
+    "distributed",
 )
 
 FILES = {path.relative_to(PACKAGE).with_suffix("").as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}

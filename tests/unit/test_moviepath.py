@@ -207,3 +207,12 @@ def test_messages_help(tmp_path: Path) -> None:
 def test_a_missing_file_is_a_job_error(tmp_path: Path) -> None:
     with pytest.raises(JobError, match="no such file"):
         load_movie_path(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize("place", ["camera", "light"])
+def test_a_place_beyond_all_numbers_is_told(tmp_path: Path, place: str) -> None:
+    [found] = problems_of(tmp_path, segments(f"frames = 2\n{place} = [0, {10**400}]"))
+    assert found == (
+        f'segments[0].{place}[1]: expected an index, "first", "last" or a percentage such as "50%", '
+        "got a number beyond 64 bits"
+    )

@@ -1,6 +1,5 @@
 """A render that goes on, or that is split: the same bytes as one that was not."""
 
-import json
 import random
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from framearray_cli.errors import OutputError
 from framearray_cli.job import Job
 from framearray_cli.manifestfile import read_manifest
 from framearray_cli.ranges import frames_text, parse_frames
-from framearray_cli.record import damaged, digest, read_records, record_files
+from framearray_cli.record import damaged, digest, read_records, record_files, sealed, unsealed
 from framearray_cli.render import Listener, render
 from framearray_cli.resume import look
 
@@ -110,7 +109,8 @@ def test_torn_and_foreign_lines_do_not_count(scene: Path, tmp_path: Path, whole:
         b"",
         b"{",
         b'{"c":0}',
-        b'{"c":0,"lights":[0,3],"files":[1],"hits":0}',
+        sealed({"c": 0}),
+        sealed({"c": 0, "lights": [0, 3], "files": [1], "hits": 0}),
         b"\xff\xfe",
         b"[" * 100000,
         b"7",
@@ -120,6 +120,32 @@ def test_torn_and_foreign_lines_do_not_count(scene: Path, tmp_path: Path, whole:
         assert look(tmp_path, read_manifest(tmp_path).fingerprint).images == 3 * 2
         assert read_records(tmp_path, "sha256:other").entries == ()
     render(job(scene, tmp_path), cameras=(0, 1, 2))
+    render(job(scene, tmp_path))
+    assert images(tmp_path) == images(whole)
+
+
+def test_no_flipped_bit_of_a_record_is_believed(scene: Path, tmp_path: Path) -> None:
+    render(job(scene, tmp_path), cameras=(0, 1))
+    [file] = record_files(tmp_path)
+    fingerprint, data = read_manifest(tmp_path).fingerprint, file.read_bytes()
+    known = read_records(tmp_path, fingerprint).entries
+    assert len(known) == 2
+    rng = random.Random(5)
+    for place in rng.sample(range(len(data)), 200):
+        flipped = bytearray(data)
+        flipped[place] ^= 1 << rng.randrange(8)
+        file.write_bytes(flipped)
+        found = read_records(tmp_path, fingerprint).entries
+        assert set(map(repr, found)) <= set(map(repr, known))
+
+
+def test_a_part_reads_its_own_files_alone(scene: Path, tmp_path: Path, whole: Path) -> None:
+    """Else parts of a long path would read all of it, each of them."""
+    render(job(scene, tmp_path), cameras=(0, 1))
+    name = sorted(images(tmp_path))[0]
+    (tmp_path / name).write_bytes(b"")
+    assert render(job(scene, tmp_path), cameras=(3, 4)).there == 3 * 4
+    assert (tmp_path / name).read_bytes() == b""
     render(job(scene, tmp_path))
     assert images(tmp_path) == images(whole)
 
@@ -144,11 +170,14 @@ def test_damage_is_found_and_mended(scene: Path, tmp_path: Path, whole: Path) ->
     heard: list[int] = []
 
     class Hears(Counting):
+        def looking(self, files: int) -> None:
+            heard.append(files)
+
         def found(self, found: Any, wanted: int) -> None:
             heard.append(len(found.damaged))
 
     render(job(scene, tmp_path), Hears())
-    assert heard == [6]
+    assert heard == [len(images(whole)), 6]
     assert images(tmp_path) == images(whole)
     assert look(tmp_path, read_manifest(tmp_path).fingerprint).damaged == ()
 
@@ -156,10 +185,10 @@ def test_damage_is_found_and_mended(scene: Path, tmp_path: Path, whole: Path) ->
 def test_another_processor_is_told(scene: Path, tmp_path: Path) -> None:
     render(job(scene, tmp_path), cameras=(0,))
     [file] = record_files(tmp_path)
-    lines = file.read_text().splitlines()
-    head = next(k for k, line in enumerate(lines) if "processor" in line)
-    lines[head] = json.dumps(json.loads(lines[head]) | {"processor": "another"})
-    file.write_text("\n".join(lines) + "\n")
+    lines = file.read_bytes().splitlines()
+    head = next(k for k, line in enumerate(lines) if b"processor" in line)
+    lines[head] = sealed({**(unsealed(lines[head]) or {}), "processor": "another"})
+    file.write_bytes(b"\n".join(lines) + b"\n")
     summary = render(job(scene, tmp_path))
     assert any("several kinds of processor" in note and "another" in note for note in summary.notes)
 
@@ -185,14 +214,26 @@ def test_a_digest_tells_any_flipped_bit(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "frames"),
-    [("0-3", (0, 1, 2, 3)), ("5", (5,)), ("0-9x4", (0, 4, 8)), ("8,0-2, 1", (0, 1, 2, 8)), ("7-7", (7,))],
+    [
+        ("0-3", (0, 1, 2, 3)),
+        ("5", (5,)),
+        ("0-9x4", (0, 4, 8)),
+        ("0-9y4", (1, 2, 3, 5, 6, 7, 9)),
+        ("0-3:2", (0, 1, 2, 3)),
+        ("9-0x-4", (1, 5, 9)),
+        ("3-1", (1, 2, 3)),
+        ("8,0-2, 1", (0, 1, 2, 8)),
+        ("7-7", (7,)),
+    ],
 )
 def test_ranges(text: str, frames: tuple[int, ...]) -> None:
     assert parse_frames(text, 10) == frames
     assert parse_frames(frames_text(frames), 10) == frames
 
 
-@pytest.mark.parametrize("text", ["", "a", "3-1", "0-9x0", "-1", "0-10", "1..3", "1-2-3", "9" * 50])
+@pytest.mark.parametrize(
+    "text", ["", "a", "3-1x1", "1-3x-1", "0-9x0", "0-9y1", "-1", "0-10", "10-0", "1..3", "1-2-3", "9" * 50]
+)
 def test_what_is_no_range(text: str) -> None:
     with pytest.raises(ValueError, match="expected"):
         parse_frames(text, 10)

@@ -129,16 +129,34 @@ def test_a_thing_is_whole_in_every_picture(tmp_path: Path) -> None:
     assert (lights(job).sources[0].vector[:, 1] < -0.4).all()  # light comes from above
 
 
-@pytest.mark.parametrize(("glb", "inside"), [(room, False), (thing, True)])
-def test_what_the_user_says_counts(glb: Any, inside: bool, tmp_path: Path) -> None:
-    wishes = Wishes(frames=2, lights=1, inside=inside)
-    if inside:
-        with pytest.raises(SceneError, match="--inside: nothing in it looks like the inside of a room"):
-            started(glb(), tmp_path, wishes)
-    else:
-        start, job = started(glb(), tmp_path, wishes)
-        assert not start.inside
-        assert (job.camera.frames, job.light.frames) == (2, 1)
+def test_what_the_user_says_counts(tmp_path: Path) -> None:
+    start, job = started(room(), tmp_path, Wishes(frames=2, lights=1, inside=False))
+    assert not start.inside
+    assert (job.camera.frames, job.light.frames) == (2, 1)
+
+
+def test_a_room_whose_faces_are_turned_outwards_is_one_where_the_user_says_so(tmp_path: Path) -> None:
+    glb = Glb()
+    add(glb, box([-2.5, 0, -2], [2.5, 2.5, 2]), "Wall", [0.7, 0.7, 0.6])
+    (tmp_path / "first").mkdir()
+    start, _ = started(glb, tmp_path / "first", Wishes(frames=2, lights=2))
+    assert not start.inside
+    # closed from their fronts are the insides of furniture alone, then
+    add(glb, box([-2.4, 0.01, -1.9], [-1.6, 2.0, -0.9], inwards=True), "Cupboard", [0.5, 0.3, 0.2])
+    start, job = started(glb, tmp_path, Wishes(frames=2, lights=2, inside=True))
+    assert start.inside
+    for points in (eyes(job).position, lights(job).sources[0].vector):
+        assert (np.abs(points) < [2.5, 2.5, 2]).all()
+        outside = np.maximum(np.array([-2.4, 0.01, -1.9]) - points, points - np.array([-1.6, 2.0, -0.9])).max(axis=1)
+        assert (outside > 0).all()
+
+
+def test_nothing_is_closed_around_a_table_top(tmp_path: Path) -> None:
+    glb = Glb()
+    add(glb, box([-1, 0.7, -1], [1, 0.70001, 1])[:6], "Top", [0.6, 0.5, 0.3])
+    add(glb, tiny.quad((-2, 0, 2), (2, 0, 2), (2, 0, -2), (-2, 0, -2)).reshape(-1, 3), "Floor", [0.6, 0.5, 0.3])
+    with pytest.raises(SceneError, match="--inside: nothing in it looks like the inside of a room"):
+        started(glb, tmp_path, Wishes(frames=2, lights=1, inside=True))
 
 
 def test_an_animated_camera_comes_in_as_it_is(tmp_path: Path) -> None:

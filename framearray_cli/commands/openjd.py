@@ -1,0 +1,50 @@
+"""`framearray openjd`."""
+
+import shlex
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..screen import Screen, out, say
+from .options import MOST_THREADS, JobFile, Quiet, place, read
+
+
+def openjd(
+    job_file: JobFile,
+    target: Annotated[
+        str | None,
+        typer.Option("--output", "-o", help="Template; default: the job file's name, here.", metavar="FILE"),
+    ] = None,
+    chunk: Annotated[
+        int | None,
+        typer.Option("--chunk", min=1, help="Frames of a chunk; default: 8 N_r, at least 16.", metavar="N"),
+    ] = None,
+    threads: Annotated[
+        int | None,
+        typer.Option(
+            "--threads", min=1, max=MOST_THREADS, help="Threads of a chunk; default: the machine's cores.", metavar="N"
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a template that is there.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write an Open Job Description template that renders a job in chunks on a farm."""
+    job = read(job_file, threads, None)
+    file = Path(f"{job_file.stem}.openjd.json") if target is None else place(target)
+    frames = job.camera.frames
+    if chunk is not None and chunk > frames:
+        raise typer.BadParameter(
+            f"expected at most {frames}, the frames of the camera, got {chunk}", param_hint="--chunk"
+        )
+    with Screen(out, quiet=quiet) as screen:
+        screen.wait("reading the job")
+        from ..parts.chunks import default_size, in_chunks, reach, stands_still
+        from ..parts.openjd import template, write_template
+
+        n_r, still = reach(job), stands_still(job)
+        size = chunk or (frames if still else default_size(frames, n_r))
+        chunks = in_chunks(range(frames), size, frames, n_r, still=still)
+        write_template(file, template(job, job_file, file.parent, size, job.render.threads), force=force)
+    if not quiet:
+        say(out, [chunks.line(), f"{file}; next: openjd run {shlex.quote(str(file))}"])

@@ -1,0 +1,116 @@
+"""The camera path in chunks of consecutive frames, and what their halos cost.
+
+A chunk is rendered by itself. The hits of N_r frames on either side of it, its halo, reach into it too; they are found
+again by the neighbours, who have them as frames of their own.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import SceneError
+from ..job import Job
+from ..paths import eyes
+from ..plan import frame_hits
+from ..prepare import open_embree, prepare
+
+# Frames of a chunk for each frame of N_r unless somebody says: the halo of 2 N_r frames is a quarter of it then.
+FRAMES_A_REACH = 8
+# Without reuse there is no halo; reading the scene and estimating the ambient light is what each chunk repeats.
+FEWEST = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chunks:
+    """A camera path in chunks.
+
+    Attributes:
+        each: the cameras of every chunk, in rising order.
+        more: hits that are found beside those of the whole in one run, over these; 0 for one chunk.
+    """
+
+    each: tuple[tuple[int, ...], ...]
+    more: float
+
+    def line(self) -> str:
+        """What a person is told: "4 chunks of 24 frames; halos add 19 % to the hits"."""
+        n, sizes = len(self.each), sorted({len(chunk) for chunk in self.each})
+        frames = f"{' to '.join(map(str, sizes))} frame{'s' if sizes[-1] > 1 else ''}"
+        if n == 1:
+            return f"1 chunk of {frames}"
+        return f"{n:,} chunks of {frames}; halos add {self.more:.0%} to the hits"
+
+
+def cut(cameras: Sequence[int], size: int) -> list[tuple[int, ...]]:
+    """Cut cameras into as few chunks of at most `size` as there can be, of almost the same length.
+
+    Lengths are those of the Open Job Description for contiguous chunks.
+
+    Args:
+        cameras: in rising order.
+    """
+    n = len(cameras)
+    count = -(-n // size)
+    smaller, longer = divmod(n, count) if n else (0, 0)
+    lengths = [smaller] * count
+    for i in range(longer):
+        lengths[i * count // longer] += 1
+    ends = np.cumsum(lengths).tolist()
+    return [tuple(cameras[end - length : end]) for end, length in zip(ends, lengths, strict=True)]
+
+
+def default_size(n: int, n_r: int, workers: int = 1) -> int:
+    """Frames of a chunk unless somebody says: at most `FRAMES_A_REACH` N_r, and a whole number of chunks a worker.
+
+    Args:
+        n: frames that are wanted.
+    """
+    most = max(FRAMES_A_REACH * n_r, FEWEST)
+    return max(-(-n // (workers * -(-n // (workers * most)))), 1) if n else 1
+
+
+def in_chunks(cameras: Sequence[int], size: int, n_c: int, n_r: int, *, still: bool = False) -> Chunks:
+    """Cut cameras into chunks, and tell what that costs.
+
+    Args:
+        n_c: cameras of the whole path.
+        still: whether the camera never moves, so that every chunk finds the one frame that there is.
+    """
+    each = cut(cameras, size)
+    if still or not each:
+        return Chunks(each=tuple(each), more=float(max(len(each) - 1, 0)))
+    hits = frame_hits(n_c, n_r, 1.0)
+
+    def found(chunk: Sequence[int]) -> float:
+        frames = np.asarray(chunk)[:, None] + np.arange(-n_r, n_r + 1)
+        return float(hits[np.unique(frames[(frames >= 0) & (frames < n_c)])].sum())
+
+    return Chunks(each=tuple(each), more=sum(map(found, each)) / found(cameras) - 1.0)
+
+
+def reach(job: Job) -> int:
+    """N_r of a job whose scene is there; where it says "auto", what a render will choose.
+
+    Raises:
+        JobError, SceneError: that cannot be found out, or there is no scene.
+    """
+    if not job.scene.file.is_file():
+        raise SceneError(f"{job.scene.file}: no such file")
+    if job.reuse.n_r != "auto":
+        return job.n_r
+    from ..auto import settled
+
+    prepared = prepare(job)
+    with open_embree(prepared) as embree:
+        return settled(prepared, embree)[0].job.n_r
+
+
+def stands_still(job: Job) -> bool:
+    """Whether the camera of a job never moves.
+
+    Raises:
+        JobError: its path cannot be followed.
+    """
+    matrices = eyes(job).world_from_camera
+    return bool((matrices == matrices[:1]).all())

@@ -1,0 +1,104 @@
+"""Dask: a scheduler that somebody runs, or one with workers on this machine, as long as a render takes."""
+
+import logging
+import os
+import threading
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from ..errors import JobError, MissingExtraError
+
+PATIENCE = 5.0  # seconds in which a scheduler must answer
+
+
+def require_dask() -> Any:
+    """The library, if it is there.
+
+    Raises:
+        MissingExtraError: Dask distributed is not installed.
+    """
+    try:
+        import distributed
+    except ImportError as error:
+        raise MissingExtraError(
+            "--workers and --dask need Dask distributed, which is not installed; "
+            'install it with: pip install "framearray[dask]"'
+        ) from error
+    for name in ("distributed", "tornado", "asyncio"):  # what matters is told by this program, in its own words
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    return distributed
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def connected(address: str) -> Iterator[Any]:
+    """A client of a scheduler.
+
+    Raises:
+        JobError: none answers at that address.
+    """
+    distributed = require_dask()
+    found: SimpleQueue[Any] = SimpleQueue()
+
+    def connect() -> None:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                found.put(distributed.Client(address, timeout=PATIENCE, set_as_default=False))
+        except Exception as error:  # of any kind, where something else than a scheduler answers
+            found.put(error)
+
+    # Dask's own limit of time does not hold where something else than a scheduler answers
+    threading.Thread(target=connect, name="connect", daemon=True).start()
+    try:
+        client = found.get(timeout=PATIENCE + 1.0)
+    except Empty:
+        client = TimeoutError()
+    if isinstance(client, Exception):
+        late = isinstance(client, OSError | MemoryError)  # Dask takes what others answer for a huge message
+        why = f"none answered within {PATIENCE:.0f} s" if late else str(client)
+        wanted = 'expected the address of a Dask scheduler, such as "tcp://host:8786"'
+        raise JobError(f"--dask {address}", [f"{wanted}; {why}"]) from client
+    try:
+        yield client
+    finally:
+        _close(client)
+
+
+@contextmanager
+def local(workers: int) -> Iterator[Any]:
+    """A client of a scheduler of its own, with so many worker processes; a worker that dies is replaced."""
+    distributed = require_dask()
+    from .worker import DeafToSignals
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        cluster = distributed.LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            memory_limit=0,  # chunks know theirs; Dask would end a worker that is above
+            dashboard_address=None,
+            host="127.0.0.1",
+            silence_logs=logging.CRITICAL + 1,
+        )
+        try:
+            client = distributed.Client(cluster, set_as_default=False)
+            client.register_plugin(DeafToSignals())
+            yield client
+        finally:
+            with suppress(NameError):
+                _close(client)
+            cluster.close(timeout=PATIENCE)
+
+
+def _close(client: Any) -> None:
+    with suppress(OSError, TimeoutError):
+        client.close(timeout=PATIENCE)

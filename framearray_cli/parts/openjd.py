@@ -1,0 +1,146 @@
+"""An Open Job Description template that renders a job in chunks on a farm.
+
+Specification 2023-09 with the extension TASK_CHUNKING, which farms and openjd-cli understand. It is JSON, which YAML
+readers read too.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from ..errors import OutputError
+from ..files import write_bytes
+from ..job import Job
+from ..ranges import frames_text
+
+SUFFIXES = (".json", ".yaml", ".yml")  # what readers of templates go by
+
+# Seconds after which a farm gives up: no chunk should take a day, nor should reading all files again take four hours.
+LONGEST_CHUNK, LONGEST_VERIFY = 24 * 3600, 4 * 3600
+# Seconds from the signal that ends a chunk to the one that kills it. A render stops within about one.
+NOTICE = 30
+
+
+def template(job: Job, job_file: Path, folder: Path, chunk: int, threads: int | None = None) -> dict[str, Any]:
+    """A template of two steps: the chunks, then a look at every file.
+
+    Args:
+        folder: where the template will lie; files in it are named from there, so that it can be moved with them.
+        chunk: frames of a chunk, at most.
+        threads: of each chunk; None: as many as the machine has.
+    """
+    memory = job.render.memory
+    needs = [{"name": "amount.worker.vcpu", "min": threads}] if threads else []
+    needs += [{"name": "amount.worker.memory", "min": -(-memory // 2**20)}] if memory else []
+    render = ["render", "{{Param.JobFile}}", "--output", "{{Param.OutputFolder}}"]
+    render += ["--cameras", "{{Task.Param.Cameras}}"]
+    render += ["--threads", "{{Param.Threads}}"] if threads else []
+    return {
+        "specificationVersion": "jobtemplate-2023-09",
+        "extensions": ["TASK_CHUNKING"],
+        "name": job.name,
+        "description": (
+            f"The frame array {job.name}: {job.camera.frames} cameras, rendered in chunks of the camera path. Each "
+            "finds the hits of its halo, N_r frames on either side, by itself. All machines must see the job file, the "
+            "scene and the output folder. A chunk that was stopped goes on where it was when it is run again."
+        ),
+        "parameterDefinitions": _parameters(job, job_file, folder, chunk, threads),
+        "steps": [
+            {
+                "name": "Render",
+                "description": "Renders one chunk of the camera path.",
+                "parameterSpace": {
+                    "taskParameterDefinitions": [
+                        {
+                            "name": "Cameras",
+                            "type": "CHUNK[INT]",
+                            "range": frames_text(range(job.camera.frames)),
+                            "chunks": {
+                                "defaultTaskCount": "{{Param.ChunkSize}}",
+                                "rangeConstraint": "CONTIGUOUS",
+                            },
+                        }
+                    ]
+                },
+                **({"hostRequirements": {"amounts": needs}} if needs else {}),
+                "script": {"actions": {"onRun": _action(render, LONGEST_CHUNK)}},
+            },
+            {
+                "name": "Verify",
+                "description": "Compares every file with its checksum; fails if one is missing or damaged.",
+                "dependencies": [{"dependsOn": "Render"}],
+                "script": {"actions": {"onRun": _action(["verify", "{{Param.OutputFolder}}"], LONGEST_VERIFY)}},
+            },
+        ],
+    }
+
+
+def _action(arguments: list[str], timeout: int) -> dict[str, Any]:
+    return {
+        "command": "framearray",
+        "args": arguments,
+        "timeout": timeout,
+        "cancelation": {"mode": "NOTIFY_THEN_TERMINATE", "notifyPeriodInSeconds": NOTICE},
+    }
+
+
+def _parameters(job: Job, job_file: Path, folder: Path, chunk: int, threads: int | None) -> list[dict[str, Any]]:
+    """What can be changed when the template is submitted."""
+
+    def number(name: str, value: int, most: int, label: str, description: str) -> dict[str, Any]:
+        return {
+            "name": name,
+            "type": "INT",
+            "default": value,
+            "minValue": 1,
+            "maxValue": most,
+            "description": description,
+            "userInterface": {"control": "SPIN_BOX", "label": label},
+        }
+
+    def path(name: str, place: Path, label: str, description: str, **more: str) -> dict[str, Any]:
+        return {
+            "name": name,
+            "type": "PATH",
+            **more,
+            "default": _from(folder, place),
+            "description": description,
+            "userInterface": {
+                "control": "CHOOSE_INPUT_FILE" if more["objectType"] == "FILE" else "CHOOSE_DIRECTORY",
+                "label": label,
+            },
+        }
+
+    into = {"objectType": "FILE", "dataFlow": "IN"}
+    return [
+        path("JobFile", job_file, "Job file", "What to render.", **into),
+        path(
+            "SceneFile", job.scene.file, "Scene file",
+            "The scene that the job file names; here so that a farm which copies files takes it along.", **into,
+        ),
+        path(
+            "OutputFolder", job.output.directory, "Output folder", "One folder for all chunks.",
+            objectType="DIRECTORY", dataFlow="OUT",
+        ),
+        number("ChunkSize", chunk, job.camera.frames, "Frames a chunk", "Frames of a chunk of the camera path."),
+        *([number("Threads", threads, 1024, "Threads", "Threads of each chunk.")] if threads else []),
+    ]  # fmt: skip
+
+
+def _from(folder: Path, place: Path) -> str:
+    """A place as the template names it: from its own folder on if it is in there, else from the root."""
+    place, folder = place.absolute(), folder.absolute()
+    return place.relative_to(folder).as_posix() if place.is_relative_to(folder) else str(place)
+
+
+def write_template(target: Path, made: dict[str, Any], *, force: bool) -> None:
+    """Write a template, whole or not at all.
+
+    Raises:
+        OutputError: there is a file already, or it cannot be written.
+    """
+    if target.suffix.lower() not in SUFFIXES:
+        raise OutputError(f"{target}: expected a name that ends in {', '.join(SUFFIXES)}")
+    if target.exists() and not force:
+        raise OutputError(f"{target}: is there already; --force replaces it")
+    write_bytes(target, (json.dumps(made, indent=2, ensure_ascii=False) + "\n").encode())

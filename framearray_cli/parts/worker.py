@@ -1,0 +1,213 @@
+"""What a Dask worker does: renders one chunk, tells how far it is, and stops when nobody wants the chunk any more."""
+
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from distributed import Reschedule, Worker, WorkerPlugin, get_worker
+
+from .. import __version__
+from ..compiling import compile_clock
+from ..errors import BusyError, FrameArrayError, JobError
+from ..job import Job
+from ..jobfile import job_of_table
+from ..prepare import Prepared
+from ..record import digest
+from ..render import Listener, render
+from ..resume import Found
+from ..summary import Summary
+from ..target import Target
+from ..terms.ambient import Ambient
+from ..wording import ambient_lines
+
+# Seconds between two looks whether the chunk is still wanted, and between two messages on how far it is.
+LOOK_EVERY, TELL_EVERY = 0.2, 0.5
+# Seconds that a chunk waits for one that still runs in this process before it is given to another worker.
+TURN = 1.0
+# Seconds that a chunk waits for cameras which a run that is about to end still holds.
+PATIENCE = 60.0
+
+_one_at_a_time = threading.Lock()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Common:
+    """What all chunks of a render share.
+
+    Attributes:
+        version: of the program that hands out the chunks.
+        table: the job, see `jobfile.job_table`; `file`: where it was read, for messages.
+        folder: of the images; `probe`: a file in it, which only those see who see the same folder.
+        scene: size and checksum of the scene file.
+        threads: of a chunk; None: those that the worker was given.
+        memory: bytes that a chunk may take; None: as the job says.
+        topic: that messages go to.
+    """
+
+    version: str
+    table: dict[str, Any]
+    file: str
+    folder: str
+    probe: str
+    scene: tuple[int, str]
+    threads: int | None
+    memory: int | None
+    topic: str
+
+    def job(self, threads: int) -> Job:
+        """The job of a chunk, on a worker with so many threads."""
+        found = job_of_table(self.table, Path(self.file), Path(self.folder))
+        machine = {"threads": self.threads or found.render.threads or threads}
+        machine |= {"memory": self.memory} if self.memory else {}
+        return found.model_copy(update={"render": found.render.model_copy(update=machine)})
+
+
+def unfit(common: dict[str, Any]) -> str:
+    """Why a worker cannot render chunks of a job; "" if it can."""
+    here = f"worker {socket.gethostname()}"
+    if common["version"] != __version__:
+        return f"{here}: has framearray {__version__}, expected {common['version']}; install the same version"
+    if not Path(common["probe"]).exists():
+        return (
+            f"{here}: does not see the output folder {common['folder']}; expected one folder for all machines, "
+            "under the same name"
+        )
+    scene = Path(common["table"]["scene"]["file"])
+    try:
+        same = digest(scene) == tuple(common["scene"])
+    except OSError:
+        return f"{here}: does not see the scene {scene}; expected it on all machines, under the same name"
+    return "" if same else f"{here}: has another file {scene} than the machine that hands out the chunks"
+
+
+def render_chunk(common: dict[str, Any], cameras: tuple[int, ...]) -> dict[str, Any]:
+    """Render some cameras of a job; runs on a worker.
+
+    What goes wrong is returned, so that Dask neither logs it nor tries again.
+
+    Args:
+        common: the fields of `Common`.
+
+    Returns:
+        "error": name of its class, "problems" and "notes", or "summary": what `render` gave, a plain table.
+    """
+    worker = get_worker()
+    if not _one_at_a_time.acquire(timeout=TURN):
+        raise Reschedule
+    try:
+        if problem := unfit(common):
+            return {"error": "WorkerError", "problems": [problem], "notes": []}
+        telling = _Telling(worker, Common(**common), cameras)
+        with telling.watching(), compile_clock(lambda: telling.tell(compiling=True)):
+            job = telling.common.job(worker.state.nthreads)
+            summary = _patiently(lambda: render(job, telling, cameras=cameras))
+        return {"notes": list(telling.notes), "peak_memory": summary.peak_memory}
+    except FrameArrayError as error:
+        problems = list(error.problems) if isinstance(error, JobError) else [str(error)]
+        notes = list(getattr(error, "__notes__", ()))
+        return {"error": type(error).__name__, "problems": problems, "notes": notes}
+    except MemoryError:
+        return {"error": "MemoryError", "problems": [], "notes": []}
+    except _Unwanted:
+        return {}  # nobody reads it
+    finally:
+        _one_at_a_time.release()
+
+
+def _patiently(run: Callable[[], Summary]) -> Summary:
+    """Wait for cameras that are held: by a run that was stopped, or a worker that lost its scheduler."""
+    end = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return run()
+        except BusyError:
+            if time.monotonic() > end:
+                raise
+            time.sleep(TURN)
+
+
+class _Unwanted(BaseException):
+    """The chunk was taken back."""
+
+
+class _Telling(Listener):
+    """Tells how many images are left, and ends the render when the chunk was taken back."""
+
+    def __init__(self, worker: Worker, common: Common, cameras: tuple[int, ...]) -> None:
+        self._worker, self.common, self._first = worker, common, cameras[0]
+        self._key = worker.get_current_task()
+        self._lock, self._left, self._last = threading.Lock(), 0, 0.0
+        self._unwanted = False
+        self.notes: tuple[str, ...] = ()
+
+    def tell(self, **message: Any) -> None:
+        """Send something to the one who hands out the chunks."""
+        self._worker.log_event(self.common.topic, {"chunk": self._first, **message})
+
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """Look from time to time whether the chunk is still wanted."""
+        done = threading.Event()
+
+        def watch() -> None:
+            while not done.wait(LOOK_EVERY):
+                task = self._worker.state.tasks.get(self._key)
+                if task is None or task.state != "executing":
+                    self._unwanted = True
+                    return
+
+        thread = threading.Thread(target=watch, name="wanted", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            done.set()
+            thread.join()
+
+    def _go_on(self) -> None:
+        if self._unwanted:
+            raise _Unwanted
+
+    def prepared(self, prepared: Prepared) -> None:
+        self._go_on()
+
+    def found(self, found: Found, wanted: int) -> None:
+        self._left = wanted
+        self.tell(left=wanted)
+
+    def planned(self, ambient: Ambient) -> None:
+        self._go_on()
+        self.notes = ambient.notes
+        self.tell(ambient=ambient_lines(ambient))
+
+    def aimed(self, target: Target) -> None:
+        self._go_on()
+        self.tell(target=target.lines())
+
+    def written(self, images: int) -> None:
+        self._go_on()
+        with self._lock:
+            self._left -= images
+            now = time.monotonic()
+            if self._left and now - self._last < TELL_EVERY:
+                return
+            self._last = now
+            left = self._left
+        self.tell(left=left)
+
+
+class DeafToSignals(WorkerPlugin):
+    """Workers of this machine get Ctrl-C from the terminal too; the program that started them ends them."""
+
+    name = "framearray-signals"
+
+    def setup(self, worker: Worker) -> None:
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(number, signal.SIG_IGN)

@@ -1,0 +1,47 @@
+"""A small disk that is real: a tmpfs with a file on it that takes the rest of its space."""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PAGE = 4096  # bytes; a tmpfs gives whole ones
+
+
+class SmallDisk:
+    """A mounted disk of 64 MB."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self._ballast = folder, folder / "ballast"
+
+    def leave(self, n_bytes: int) -> None:
+        """Fill it up but for so many bytes."""
+        self._ballast.unlink(missing_ok=True)
+        disk = os.statvfs(self.folder)
+        fill = disk.f_bavail * disk.f_frsize // PAGE - -(-n_bytes // PAGE)
+        with self._ballast.open("wb") as file:
+            for _ in range(fill):
+                file.write(bytes(PAGE))
+
+    def free(self) -> None:
+        """Take the ballast away."""
+        self._ballast.unlink()
+
+    def remount(self, options: str) -> None:
+        subprocess.run(["mount", "-o", f"remount,{options}", str(self.folder)], check=True)
+
+
+def mounted(folder: Path, options: str = "size=64m") -> Iterator[SmallDisk]:
+    """Mount one while a test runs; skips the test where this user may not."""
+    folder.mkdir()
+    mount = shutil.which("mount")
+    command = [str(mount), "-t", "tmpfs", "-o", options, "tmpfs", str(folder)]
+    if mount is None or subprocess.run(command, capture_output=True, check=False).returncode:
+        pytest.skip("this user may not mount a small disk")
+    try:
+        yield SmallDisk(folder)
+    finally:
+        subprocess.run(["umount", "--lazy", str(folder)], check=True)

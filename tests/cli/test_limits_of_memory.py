@@ -1,0 +1,123 @@
+"""Less memory, address space or threads than a job takes: said before anything is rendered; no process is killed."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import tiny
+from program import PACKAGE_PARENT, Result, finish, start, write_job
+
+resource = pytest.importorskip("resource")
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of other kinds there")
+
+MIB = 2**20
+LARGE = {"camera": tiny.WALK | {"resolution": [240, 180]}, "light": {"frames": 24}, "reuse": {"n_r": 3}}
+# Renders without asking what is free: what becomes of the same job then.
+BLIND = """
+import sys
+from framearray_cli import auto, memory, render
+from framearray_cli.jobfile import read_job
+from pathlib import Path
+for module in (auto, render):
+    module.require_memory = lambda *_: None
+memory.free_memory = lambda: 2**40
+render.render(read_job(Path(sys.argv[1])))
+"""
+
+
+@pytest.fixture
+def group() -> Iterator[Path]:
+    """A control group below that of the tests."""
+    own = {line.split(":", 2)[1]: line.split(":", 2)[2] for line in Path("/proc/self/cgroup").read_text().splitlines()}
+    if "memory" not in own:
+        pytest.skip("no control groups of version 1 here")
+    folder = Path(f"/sys/fs/cgroup/memory{own['memory']}/framearray-{os.getpid()}")
+    try:
+        folder.mkdir()
+    except OSError as error:
+        pytest.skip(f"this user may not make control groups: {error}")
+    yield folder
+    end = time.monotonic() + 10
+    while (folder / "cgroup.procs").read_text() and time.monotonic() < end:
+        time.sleep(0.05)
+    folder.rmdir()
+
+
+def joined(group: Path, most: int) -> Callable[[], object]:
+    """What a process does first, to be bound by the group."""
+    (group / "memory.limit_in_bytes").write_text(str(most))
+    return lambda: (group / "cgroup.procs").write_text(str(os.getpid()))
+
+
+def rendered(job: Path, out: Path, **options: object) -> Result:
+    told = finish(start("render", "-q", job, **options))
+    assert (out / "manifest.toml").exists() == (told.code == 0)
+    return told
+
+
+def test_a_group_that_is_too_small_is_told_beforehand(group, tmp_path):
+    """And the very job is killed where nobody asks."""
+    job = write_job(tmp_path, output={"format": "exr"}, **LARGE)
+    told = rendered(job, tmp_path / "out", preexec_fn=joined(group, 300 * MIB))
+    assert told.code == 2
+    assert told.err.startswith(f"{job}: rendering needs at least 0.")
+    assert " GiB may be used; a smaller camera.resolution" in told.err
+    assert not (tmp_path / "out").exists()
+    environment = os.environ | {"PYTHONPATH": str(PACKAGE_PARENT)}
+    blind = subprocess.run(
+        [sys.executable, "-c", BLIND, str(job)], env=environment, preexec_fn=joined(group, 300 * MIB), check=False
+    )
+    assert blind.returncode == -signal.SIGKILL
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("most", [250, 300, 350, 400, 450, 500, 600, 800])
+def test_no_group_of_any_size_kills_a_render(most, group, tmp_path):
+    job = write_job(tmp_path, output={"format": "exr"}, **LARGE)
+    told = rendered(job, tmp_path / "out", preexec_fn=joined(group, most * MIB))
+    assert told.code in (0, 2), told.err
+    print(f"{most} MiB: {'rendered' if told.code == 0 else told.err.splitlines()[0]}")
+
+
+@pytest.mark.parametrize(("name", "flag", "most"), [("RLIMIT_AS", "-v", 600 * MIB), ("RLIMIT_DATA", "-d", 200 * MIB)])
+def test_an_address_space_that_is_too_small(name, flag, most, tmp_path):
+    def limit() -> None:
+        resource.setrlimit(getattr(resource, name), (most, most))
+
+    job = write_job(tmp_path)
+    for command in (["render", "-q", job], ["check", job], ["init", tmp_path / "tiny.glb", "-o", tmp_path / "a.toml"]):
+        told = finish(start(*command, preexec_fn=limit))
+        assert told.code == 2
+        assert told.err.startswith(f"`ulimit {flag}` lets this program have ")
+        assert told.err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_job_that_does_not_fit_into_the_address_space(tmp_path):
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (2 * 1024 * MIB,) * 2)
+
+    job = write_job(tmp_path, camera=tiny.WALK | {"resolution": [3840, 2160]}, reuse={"n_r": 3})
+    told = rendered(job, tmp_path / "out", preexec_fn=limit)
+    assert told.code == 2
+    assert "rendering needs at least" in told.err
+
+
+def test_threads_that_cannot_be_started(tmp_path, monkeypatch, capsys):
+    """Simulated: who runs as root has no such limit."""
+    from program import run
+
+    from framearray_cli import cli
+
+    def refused(*_: object, **__: object) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(cli, "app", refused)
+    told = run(capsys, "render", tmp_path / "job.toml")
+    assert told.code == 2
+    assert told.err.startswith("no more threads can be started; --threads 1 takes the fewest; ")

@@ -1,0 +1,71 @@
+"""Names that the system refuses to look up: a message, whatever the name is for."""
+
+import pytest
+from program import names, run, write_job
+
+LONG = "x" * 300  # characters; file systems take 255
+OUT, OTHER = "out", "other.png"
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory):
+    """A folder with a job, and its frame array in `out`."""
+    from framearray_cli.jobfile import read_job
+    from framearray_cli.render import render
+
+    folder = tmp_path_factory.mktemp("array")
+    render(read_job(write_job(folder)))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (["render", LONG], 2),
+        (["check", LONG], 2),
+        (["render", "job.toml", "-o", LONG], 4),
+        (["render", "job.toml", "-o", f"{LONG}/a"], 4),
+        (["check", "job.toml", "-o", LONG], 4),
+        (["verify", LONG], 4),
+        (["init", LONG], 3),
+        (["init", "tiny.glb", "-o", LONG], 4),
+        (["assemble", LONG, "--walk", "-o", "a.png"], 4),
+        (["assemble", OUT, LONG, "-o", "a.gif"], 2),
+        (["assemble", OUT, "--walk", "-o", LONG], 4),
+        (["assemble", OUT, "--walk", "-o", f"{LONG}.gif"], 4),
+        (["assemble", OUT, "--walk", "-o", f"{LONG}/a.gif"], 4),
+        (["assemble", OUT, "--walk", "-o", f"{LONG}.####.png"], 4),
+        (["assemble", OUT, "--walk", "-o", f"{LONG}/a.####.png"], 4),
+        (["sheet", OUT, "-o", f"{LONG}.png"], 4),
+        (["sheet", LONG, "-o", OTHER], 4),
+        (["export", OUT, "-f", "nerfstudio", "-o", LONG], 4),
+        (["export", OUT, "-f", "cinema", "-o", LONG], 4),
+        (["view", OUT, "--export", LONG], 4),
+        (["view", OUT, "--cache", LONG, "--export", "page"], 4),
+        (["view", LONG, "--export", "page"], 4),
+    ],
+    ids=lambda value: " ".join(value).replace(LONG, "LONG") if isinstance(value, list) else None,
+)
+def test_a_long_name_is_told(arguments, code, rendered, capsys, monkeypatch):
+    monkeypatch.chdir(rendered)
+    before = names(rendered)
+    told = run(capsys, *arguments)
+    assert told.code == code
+    assert LONG in told.err
+    assert "File name too long" in told.err or "no such" in told.err
+    assert names(rendered) == before
+
+
+def test_a_long_name_in_a_job_is_told(tmp_path, capsys):
+    told = run(capsys, "check", write_job(tmp_path, scene={"file": f"{LONG}.glb"}))
+    assert (told.code, told.out) == (3, "")
+    assert told.err.endswith(f"{LONG}.glb: cannot be read: File name too long\n")
+
+
+@pytest.mark.parametrize("key", ["scene.file", "output.directory"])
+def test_no_file_has_a_name_of_thousands_of_letters(key, tmp_path, capsys):
+    table, name = key.split(".")
+    told = run(capsys, "check", write_job(tmp_path, **{table: {name: "a/" * 5000}}))
+    assert (told.code, told.out) == (2, "")
+    assert f"{key}: " in told.err
+    assert len(told.err) < 1000

@@ -1,0 +1,128 @@
+"""Open Job Description: the template that `framearray openjd` writes, checked and run by openjd-cli."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tiny
+from program import PACKAGE_PARENT, run, write_job
+
+N = 6
+OPENJD = shutil.which("openjd", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))
+needs_openjd = pytest.mark.skipif(OPENJD is None, reason="openjd-cli is not installed (extra dev)")
+JOB = {"camera": tiny.WALK, "reuse": {"n_r": 1}, "ambient": {"paths": 64}, "output": {"format": "exr"}}
+
+
+def openjd(folder: Path, *arguments: str | Path) -> str:
+    """Run openjd-cli where `framearray` is the program under test."""
+    assert OPENJD is not None
+    command = folder / "framearray"
+    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m framearray_cli "$@"\n')
+    command.chmod(0o755)
+    environment = os.environ | {
+        "PATH": os.pathsep.join([str(folder), os.environ.get("PATH", "")]),
+        "PYTHONPATH": os.pathsep.join([str(PACKAGE_PARENT), os.environ.get("PYTHONPATH", "")]),
+    }
+    done = subprocess.run(
+        [OPENJD, *map(str, arguments)], capture_output=True, text=True, env=environment, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def written(file: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(file.read_text())
+    return found
+
+
+def parameters(template: dict[str, Any]) -> dict[str, Any]:
+    return {parameter["name"]: parameter["default"] for parameter in template["parameterDefinitions"]}
+
+
+def test_what_is_written(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    job = write_job(tmp_path, **(JOB | {"render": {"threads": 2, "memory": "3 GiB"}}))
+    told = run(capsys, "openjd", job, "--chunk", "3")
+    assert (told.code, told.err) == (0, "")
+    # frames 0 and 5 count twice, for those that are missing beyond the ends; each half finds one of the other
+    assert told.out.splitlines()[0] == "2 chunks of 3 frames; halos add 25% to the hits"
+    template = written(tmp_path / "job.openjd.json")
+    defaults = {"JobFile": "job.toml", "SceneFile": "tiny.glb", "OutputFolder": "out", "ChunkSize": 3, "Threads": 2}
+    assert parameters(template) == defaults
+    render, verify = template["steps"]
+    [cameras] = render["parameterSpace"]["taskParameterDefinitions"]
+    assert (cameras["range"], cameras["chunks"]["rangeConstraint"]) == ("0-5", "CONTIGUOUS")
+    needs = {need["name"]: need["min"] for need in render["hostRequirements"]["amounts"]}
+    assert needs == {"amount.worker.vcpu": 2, "amount.worker.memory": 3072}
+    assert verify["dependencies"] == [{"dependsOn": "Render"}]
+    for step in (render, verify):
+        action = step["script"]["actions"]["onRun"]
+        assert action["cancelation"]["mode"] == "NOTIFY_THEN_TERMINATE" and action["timeout"] > 0
+
+
+def test_files_elsewhere_are_named_from_the_root(tmp_path, capsys):
+    job = write_job(tmp_path, **JOB)
+    (tmp_path / "farm").mkdir()
+    file = tmp_path / "farm" / "walk.yaml"
+    assert run(capsys, "openjd", job, "-o", file, "-q").out == ""
+    found = parameters(written(file))
+    assert found["JobFile"] == str(job) and found["OutputFolder"] == str(tmp_path / "out")
+    assert found["ChunkSize"] == N and "Threads" in found
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["--chunk", "0"], 2, "--chunk"),
+        (["--chunk", "7"], 2, "expected at most 6, the frames of the camera, got 7"),
+        (["-o", "walk.txt"], 4, "walk.txt: expected a name that ends in .json, .yaml, .yml"),
+        (["-o", "there.json/walk.json"], 4, "there.json: a file of that name is in the way of the folder"),
+        (["-o", "there.json"], 4, "there.json: is there already; --force replaces it"),
+    ],
+)
+def test_bad_options(arguments, code, message, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "there.json").write_text("mine")
+    told = run(capsys, "openjd", write_job(tmp_path, **JOB), *arguments)
+    assert told.code == code and message in told.err and "Traceback" not in told.err
+    assert (tmp_path / "there.json").read_text() == "mine"
+    assert not (tmp_path / "job.openjd.json").exists()
+
+
+def test_bad_jobs(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    job = write_job(tmp_path, **JOB)
+    (tmp_path / "tiny.glb").unlink()
+    told = run(capsys, "openjd", job)
+    assert told.code == 3 and "tiny.glb" in told.err
+    job.write_text(job.read_text().replace("resolution", "resolutoin"))
+    told = run(capsys, "openjd", job)
+    assert told.code == 2 and 'did you mean "resolution"' in told.err
+    assert not (tmp_path / "job.openjd.json").exists()
+
+
+def test_what_a_render_chooses_is_known(tmp_path, capsys):
+    job = write_job(tmp_path, **(JOB | {"reuse": {"n_r": "auto"}}))
+    told = run(capsys, "openjd", job, "--chunk", "3", "-o", tmp_path / "a.json")
+    assert told.code == 0 and told.out.startswith("2 chunks of 3 frames; halos add ")
+
+
+@needs_openjd
+@pytest.mark.parametrize("n_r", [0, 2])
+def test_a_farm_renders_the_same_bytes(n_r, tmp_path, capsys):
+    job = write_job(tmp_path, **(JOB | {"reuse": {"n_r": n_r}}))
+    template = tmp_path / "job.openjd.json"
+    assert run(capsys, "openjd", job, "--chunk", "4", "-o", template).code == 0
+    assert run(capsys, "render", job, "-o", tmp_path / "whole", "-q").code == 0
+    openjd(tmp_path, "check", template)
+    said = openjd(tmp_path, "run", template)
+    assert "Cameras(CHUNK[INT]) = 0-2" in said and "24 files of tiny are whole" in said
+    files = {file.name: file.read_bytes() for file in (tmp_path / "whole").glob("tiny.*")}
+    assert {file.name: file.read_bytes() for file in (tmp_path / "out").glob("tiny.*")} == files
+    assert len(files) == N * 4
+    assert sorted(file.stem for file in (tmp_path / "out/records").glob("*.jsonl")) == ["0-2", "3-5"]

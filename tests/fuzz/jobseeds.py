@@ -1,0 +1,109 @@
+"""Job files that are right, to be broken: small ones that say everything a job can say, and those of `jobs/`."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import tiny
+import tomli_w
+from bench.results import ROOT
+
+SUN = {
+    "type": "sun",
+    "latitude": 41.9,
+    "longitude": 12.5,
+    "date": "2026-06-21",
+    "timezone": "Europe/Rome",
+    "start": "08:30",
+    "stop": "15:30",
+    "north": [-1.0, 0.0, 0.0],
+    "irradiance": [24.0, 22.5, 19.5],
+}
+GROUPED = {
+    "frames": 2,
+    "axes": {"lamps": 2},
+    "sources": [
+        {**tiny.SUN, "group": "sky"},
+        {**tiny.RED, "group": "lamp", "axis": "lamps"},
+        {"type": "point", "keys": [{"frame": 0, "position": [0, 2, 0], "intensity": 3.0, "color": [1, 0.5, 0]}]},
+    ],
+}
+FOUR_KEYS = {
+    "frames": 8,
+    "keys": [
+        {"frame": 0, "eye": [0.2, 1.3, 1.7], "target": [-0.1, 0.9, -1.0], "up": [0, 1, 0]},
+        {"frame": 2, "eye": [0.3, 1.3, 1.5], "target": [-0.1, 0.9, -1.0], "up": [0, 1, 0.2]},
+        {"frame": 3, "eye": [0.3, 1.3, 1.5], "target": [-0.1, 0.7, -1.0], "up": [0.1, 1, 0]},
+        {"frame": 7, "eye": [0.5, 1.4, 1.2], "target": [0.1, 0.8, -1.0], "up": [0, 1, 0]},
+    ],
+}
+EXR = {"format": "exr"}
+
+
+def tables(scene: str) -> dict[str, dict[str, Any]]:
+    """Small jobs by name; between them they use every key of the schema."""
+    small = {"resolution": [12, 9]}
+    jobs = {
+        "plain": tiny.table(camera=small),
+        "walk": tiny.table(camera=small | tiny.WALK, reuse={"n_r": 2, "weights": "average"}, output=EXR),
+        "spline": tiny.table(
+            camera=small | FOUR_KEYS,
+            light={"sources": [tiny.SUN, tiny.RED], "frames": 3},
+            samples={"hits": 0.5, "obscurance": 3, "shadow_step": 2, "shadow_unbiased": True},
+            reuse={"n_r": 3, "weights": "balance"},
+            specular={"depth": 2, "hits": 4},
+            output={"format": "tif", "fps": 23.976, "layers": False},
+        ),
+        "groups": tiny.table(
+            camera=small | tiny.WALK,
+            scene={"background": [0.2, 0.3, 0.4]},
+            light=GROUPED,
+            reuse={"n_r": 1},
+            obscurance={"range": 1.0, "falloff": "exponential", "tau": 5.0, "outside": "background"},
+            output=EXR | {"compression": "zip", "half": "never"},
+        ),
+        "sun": tiny.table(camera=small, light={"sources": [SUN], "frames": 3}, ambient={"method": "fit", "paths": 64}),
+        "automatic": tiny.table(
+            camera=small | tiny.WALK, samples={"hits": "auto", "obscurance": 4}, reuse={"n_r": "auto"}, output=EXR
+        ),
+        "wanted error": tiny.table(
+            camera=small | tiny.WALK, samples={"error": 0.5, "most_hits": 4}, reuse={"n_r": 1}, output=EXR
+        ),
+        "halves": tiny.table(
+            camera=small | tiny.WALK,
+            scene={"materials": {"Mirror": {"reflectivity": 0.1, "specular": [0.8, 0.8, 0.8]}, "Plain": {}}},
+            samples={"hits": 4, "halves": True},
+            ambient={"method": "light", "paths": 16},
+            output=EXR | {"half": "always"},
+        ),
+        "fixed": tiny.table(
+            camera=small,
+            scene={"up": "z"},
+            light={"sources": [tiny.RED], "frames": 2},
+            ambient={"intensity": [0.1, 0.2, 0.3]},
+            render={"memory": "2 GiB", "threads": 2},
+            output={"format": "jpg", "quality": 60, "exposure": 1.5},
+        ),
+    }
+    del jobs["wanted error"]["samples"]["hits"]
+    del jobs["fixed"]["ambient"]["paths"]
+    for name, job in jobs.items():
+        job["scene"] = {**job["scene"], "file": scene}
+        job["name"] = re.sub(" ", "-", name)
+    return jobs
+
+
+def texts(scene: str) -> list[str]:
+    """The same as text, and the files of `jobs/` with another scene and less to render."""
+    found = [tomli_w.dumps(table) for table in tables(scene).values()]
+    for file in sorted((ROOT / "jobs").glob("*.toml")):
+        text = file.read_text(encoding="utf-8")
+        if "[scene]" in text:  # the others are paths of movies
+            text = re.sub(r"^file = .*", f'file = "{scene}"', text, count=1, flags=re.MULTILINE)
+            found.append(re.sub(r"^resolution = .*", "resolution = [16, 12]", text, count=1, flags=re.MULTILINE))
+    return found
+
+
+def with_scene(folder: Path) -> Path:
+    """The scene of all of them."""
+    return tiny.save_glb(tiny.room_meshes(), folder / "tiny.glb")

@@ -1,0 +1,40 @@
+"""What the processes of all cases share: the program with its kernels, loaded before the first case."""
+
+import importlib
+import pkgutil
+from pathlib import Path
+
+import tomli_w
+
+import framearray_cli
+from framearray_cli.cli import main
+
+from . import jobseeds
+
+
+def load() -> None:
+    """Import every file of the program."""
+    for module in pkgutil.walk_packages(framearray_cli.__path__, "framearray_cli."):
+        if not module.name.endswith("__main__"):
+            importlib.import_module(module.name)
+
+
+def warm(folder: Path) -> None:
+    """Import the program, and render every small job once, so that each kernel is compiled and in memory.
+
+    A process that is copied from this one has all that; it starts its own threads.
+    """
+    load()
+    scene = str(jobseeds.with_scene(folder))
+    for name, table in jobseeds.tables(scene).items():
+        for more in (
+            {},
+            {"samples": {**table["samples"], "shadow_step": 2}},
+            {"obscurance": {"range": 1.0, "outside": "background"}},
+        ):
+            job = folder / "warm.toml"
+            job.write_text(tomli_w.dumps({**table, **more}))
+            try:
+                main(["render", str(job), "--quiet", "--restart", "--output", str(folder / f"warm-{name}")])
+            except SystemExit as end:
+                assert not end.code, f"the job {name!r} is wrong"

@@ -1,0 +1,103 @@
+"""Limits of the system: made-up control groups of both versions, and real limits of address space."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from framearray_cli import limits, usage
+from framearray_cli.errors import LimitError
+from framearray_cli.limits import group_memory, require_address_space
+
+resource = pytest.importorskip("resource")
+
+HUGE = 9223372036854771712  # how version 1 writes "no limit"
+
+
+def group(folder: Path, limit: object, used: int, cached: int, *, version: int) -> None:
+    names = ("memory.max", "memory.current", "") if version == 2 else (
+        "memory.limit_in_bytes", "memory.usage_in_bytes", "total_"
+    )  # fmt: skip
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / names[0]).write_text(f"{limit}\n")
+    (folder / names[1]).write_text(f"{used}\n")
+    (folder / "memory.stat").write_text(f"anon 5\n{names[2]}inactive_file {cached}\ninactive_file 1\n")
+
+
+def own(tmp_path: Path, *lines: str) -> Path:
+    file = tmp_path / "self"
+    file.write_text("".join(f"{line}\n" for line in lines))
+    return file
+
+
+def test_the_tightest_of_nested_groups_counts(tmp_path):
+    (tmp_path / "cgroup.controllers").write_text("memory cpu")
+    group(tmp_path / "pods/job", "max", 300, 10, version=2)
+    group(tmp_path / "pods", 1000, 700, 50, version=2)
+    assert group_memory(tmp_path, own(tmp_path, "0::/pods/job")) == 1000 - 700 + 50
+    group(tmp_path / "pods/job", 320, 300, 10, version=2)
+    assert group_memory(tmp_path, own(tmp_path, "0::/pods/job")) == 30
+    group(tmp_path / "pods/job", 250, 300, 10, version=2)
+    assert group_memory(tmp_path, own(tmp_path, "0::/pods/job")) == 0, "over its limit for a moment"
+
+
+def test_in_a_container_the_group_is_the_root(tmp_path):
+    (tmp_path / "cgroup.controllers").write_text("memory")
+    group(tmp_path, 1000, 400, 0, version=2)
+    assert group_memory(tmp_path, own(tmp_path, "0::/")) == 600
+
+
+def test_groups_of_version_1(tmp_path):
+    """Beside others; and in a container, where the name is that outside."""
+    group(tmp_path / "memory", HUGE, 10**9, 0, version=1)
+    group(tmp_path / "memory/docker/abc", 1000, 600, 100, version=1)
+    lines = ("9:name=systemd:/x", "5:cpu,memory:/docker/abc", "3:cpuset:/", "0::/")
+    assert group_memory(tmp_path, own(tmp_path, *lines)) == 500
+    group(tmp_path / "memory", 2000, 1900, 0, version=1)
+    assert group_memory(tmp_path, own(tmp_path, "5:memory:/elsewhere/abc")) == 100
+
+
+def test_without_limits(tmp_path):
+    assert group_memory(tmp_path, tmp_path / "missing") is None
+    assert group_memory(tmp_path, own(tmp_path, "0::/")) is None
+    assert group_memory(tmp_path, own(tmp_path, "3:cpuset:/")) is None
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of the address space elsewhere are not kept")
+def test_free_memory_without_any_limit_is_the_machine_s(monkeypatch):
+    monkeypatch.setattr(usage, "group_memory", lambda: None)
+    monkeypatch.setattr(usage, "address_space", lambda: None)
+    assert usage.free_memory() > 2**20
+    monkeypatch.setattr(usage, "group_memory", lambda: 5)
+    assert usage.free_memory() == 5
+
+
+def test_free_memory_is_what_the_address_space_has_left():
+    code = (
+        "import resource; from framearray_cli.usage import free_memory; a = free_memory();"
+        "resource.setrlimit(resource.RLIMIT_AS, (3 << 30,) * 2); b = free_memory();"
+        "kept = bytearray(1 << 30); print(a, b, b - free_memory())"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
+    without, with_limit, less = map(int, run.stdout.split())
+    assert without > 3 << 30 > with_limit > 1 << 30
+    assert less == pytest.approx(1 << 30, rel=0.01)
+
+
+@pytest.mark.parametrize(("name", "flag"), [("RLIMIT_AS", "-v"), ("RLIMIT_DATA", "-d")])
+def test_too_little_address_space_is_told_beforehand(name, flag, monkeypatch):
+    monkeypatch.setattr(limits.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(limits, "_limits", lambda: {name: 2**28 + 1})
+    with pytest.raises(LimitError, match=rf"^`ulimit {flag}` lets this program have 0.25 GiB; it needs") as error:
+        require_address_space({"RLIMIT_AS": 2**29, "RLIMIT_DATA": 2**29})
+    assert error.value.exit_code == 2
+    require_address_space({name: 2**28})
+    monkeypatch.setattr(limits.os, "cpu_count", lambda: 4)
+    with pytest.raises(LimitError, match=r"0\.41 GiB"):  # a quarter, and 2 * 80 MiB
+        require_address_space({name: 2**28})
+
+
+def test_no_limit_is_infinite():
+    soft = {name: resource.getrlimit(getattr(resource, name))[0] for name in limits.ULIMIT}
+    assert set(limits._limits()) == {name for name, value in soft.items() if value != resource.RLIM_INFINITY}

@@ -1,0 +1,89 @@
+"""Chunks of the camera path: where it is cut, and what halos cost."""
+
+import importlib
+
+import numpy as np
+import pytest
+
+from framearray_cli.parts.chunks import cut, default_size, in_chunks
+from framearray_cli.plan import frame_hits
+
+
+@pytest.mark.parametrize(("n", "size"), [(1, 1), (5, 9), (24, 24), (25, 24), (96, 24), (100, 24), (101, 7), (8, 1)])
+def test_chunks_are_few_and_alike(n, size):
+    cameras = tuple(range(3, 3 + n))
+    chunks = cut(cameras, size)
+    assert sum(chunks, ()) == cameras
+    lengths = [len(chunk) for chunk in chunks]
+    assert len(chunks) == -(-n // size)
+    assert max(lengths) <= size and max(lengths) - min(lengths) <= 1
+
+
+@pytest.mark.parametrize(("n", "size"), [(96, 24), (100, 24), (101, 7), (14, 4)])
+def test_a_farm_cuts_in_the_same_places(n, size):
+    """The extension TASK_CHUNKING, as openjd-model reads it."""
+    model = pytest.importorskip("openjd.model._step_param_space_iter")
+    chunks = [f"{chunk[0]}-{chunk[-1]}" for chunk in cut(range(n), size)]
+    assert chunks == model.divide_int_list_into_contiguous_chunks(size, list(range(n)))
+
+
+def test_nothing_is_cut_into_nothing():
+    assert cut((), 4) == []
+    assert default_size(0, 3) == 1
+
+
+def test_cameras_with_gaps_are_cut_too():
+    assert cut((0, 3, 6, 9, 12), 2) == [(0, 3), (6, 9), (12,)]
+
+
+@pytest.mark.parametrize("n_r", [0, 1, 3, 9])
+@pytest.mark.parametrize("size", [1, 4, 24, 100])
+def test_the_cost_is_that_of_the_frames_that_are_found(n_r, size):
+    n = 60
+    hits = frame_hits(n, n_r, 1.0)
+    chunks = in_chunks(range(n), size, n, n_r)
+    found = 0.0
+    for chunk in chunks.each:
+        found += sum(hits[c] for c in range(n) if any(abs(c - j) <= n_r for j in chunk))
+    assert chunks.more == pytest.approx(found / hits.sum() - 1)
+    assert (chunks.more == 0) == (n_r == 0 or size >= n)
+
+
+def test_halos_of_long_chunks_cost_about_2_n_r_over_their_length():
+    chunks = in_chunks(range(2400), 24, 2400, 3)
+    assert chunks.more == pytest.approx(6 / 24, rel=0.02)
+    assert chunks.line() == "100 chunks of 24 frames; halos add 25% to the hits"
+
+
+def test_what_is_told():
+    assert in_chunks(range(5), 9, 5, 2).line() == "1 chunk of 5 frames"
+    assert in_chunks(range(1), 9, 1, 0).line() == "1 chunk of 1 frame"
+    assert in_chunks(range(5), 2, 5, 0).line() == "3 chunks of 1 to 2 frames; halos add 0% to the hits"
+
+
+def test_a_camera_that_stands_still_has_one_frame_to_find():
+    assert in_chunks(range(8), 2, 8, 3, still=True).more == 3.0
+
+
+@pytest.mark.parametrize("workers", [1, 2, 3, 7])
+@pytest.mark.parametrize(("n", "n_r"), [(1, 0), (5, 3), (96, 3), (288, 3), (1000, 16), (20000, 0)])
+def test_by_default_all_workers_have_work_to_the_end(workers, n, n_r):
+    size = default_size(n, n_r, workers)
+    assert 1 <= size <= max(8 * n_r, 16)
+    count = len(cut(range(n), size))
+    rounds = -(-count // workers)
+    assert count > (rounds - 1) * workers
+    assert size * rounds * workers >= n
+    if n >= 16 * workers:
+        assert np.isclose(count / workers, rounds, atol=0.5)
+
+
+def test_dask_is_named_where_it_is_missing(monkeypatch):
+    import sys
+
+    from framearray_cli.errors import MissingExtraError
+
+    cluster = importlib.import_module("framearray_cli.parts.cluster")
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(MissingExtraError, match=r'pip install "framearray\[dask\]"'):
+        cluster.require_dask()
