@@ -144,8 +144,9 @@ def node_graph(rng: Random) -> Files:
 def many(rng: Random) -> Files:
     """Instances, values or triangles by the million in a small file."""
     glb = Glb()
-    corners = np.random.default_rng(0).random((3 * rng.choice((1, 10_000)), 3)).astype(np.float32)
-    mesh = glb.mesh(positions=corners, faces=None)
+    places = np.random.default_rng(0).random((rng.choice((1, 10_000)), 1, 3))
+    corners = places + 0.01 * np.random.default_rng(1).random((len(places), 3, 3))  # small: rays meet few of them
+    mesh = glb.mesh(positions=corners.reshape(-1, 3).astype(np.float32), faces=None)
     if rng.random() < 0.5:
         rows = glb.add("accessors", {"componentType": 5126, "count": rng.choice((10, 10**6, 2**31)), "type": "VEC3"})
         glb.node(mesh, extensions={"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": rows}}})
