@@ -70,9 +70,8 @@ def _number(low: float = -math.inf, high: float = math.inf, *, whole: bool = Fal
     expected = kind + bounds if math.isfinite(low) else kind
 
     def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        good = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST_FLOAT
-        good = good or (isinstance(value, float) and not math.isfinite(value) and not whole)  # told where it matters
-        good = good and (not whole or isinstance(value, int))
+        good = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
+        good = good and abs(value) <= LARGEST_FLOAT  # neither infinite nor NaN, which are no JSON
         if not good or value < low or value > high:
             yield f"{place}: expected {expected}, got {_got(value)}"
 

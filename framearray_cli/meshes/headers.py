@@ -58,7 +58,10 @@ def _check_ply(data: bytes) -> None:
     lines = [line.split() for line in head.decode("latin-1").splitlines() if line.strip()]
     if not mark or lines[0][0].lower() != "ply":
         raise SceneError("broken PLY: expected a header from 'ply' to 'end_header', got none; export it anew")
+    if not head.isascii():
+        raise SceneError("broken PLY: expected a header of plain letters, got other bytes in it; export it anew")
     text, least, count, row = False, 0, 0, 0  # bytes of the shortest body, rows of an element, bytes of a row
+    missing = {"x", "y", "z"}
     for words in lines[1:]:
         if words[0] == "format":
             text = "ascii" in words
@@ -72,6 +75,10 @@ def _check_ply(data: bytes) -> None:
             if len(words) != 2 * len(kinds) + 1 or any(kind not in PLY_KINDS for kind in kinds):
                 raise SceneError(f"broken PLY: expected 'property KIND NAME', got {_line(words)}; export it anew")
             row += 1 if text else PLY_KINDS[kinds[0]]  # of a list, its length
+            missing -= {words[-1]}
+    if missing:
+        names = ", ".join(sorted(missing))
+        raise SceneError(f"broken PLY: expected the properties x, y and z, got no {names}; export it anew")
     least, left = least + count * row, len(data) - len(head)
     if least > left:
         raise SceneError(f"broken PLY: its header promises {least} bytes or more, {left} follow; export it anew")

@@ -83,7 +83,8 @@ def _told(file: Path, extension: str) -> Iterator[None]:
     except AssetError as error:
         raise SceneError(f"{file}: {error}") from error
     except Exception as error:  # readers of broken files raise whatever comes first
-        reason = " ".join(f"{type(error).__name__}: {error}".split())[:MAX_REASON].rstrip(" :")
+        kind = "" if type(error) is ValueError and str(error) else f"{type(error).__name__}: "
+        reason = " ".join(f"{kind}{error}".split())[:MAX_REASON].rstrip(" :")
         raise SceneError(f"{file}: broken, or not {extension.upper()} ({reason}); export it anew") from error
 
 

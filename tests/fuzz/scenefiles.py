@@ -9,7 +9,8 @@ from random import Random
 import numpy as np
 import tomli_w
 
-from .case import Case
+from .case import Arguments, Case
+from .hostile import HOSTILE, PICTURE
 from .mutations import BYTES, TEXT, TREE, mutate_text, mutate_tree, recoded
 from .outcome import Outcome
 from .sceneseeds import Seed, made_seeds, real_seeds, split_glb
@@ -53,12 +54,17 @@ def cases(rng: Random, folder: Path) -> Iterator[Case]:
     made = made_seeds(folder)
     real = list(real_seeds())
     _load_program(folder, made[0])
+    (folder / "secret.png").write_bytes(PICTURE)
     for k in count():
-        seed = rng.choice(real if real and rng.random() < 0.3 else made)
         own = folder / f"{k:06d}"
         own.mkdir()
-        mutation, files = _mutated(rng, seed, rng.choice(made))
-        yield case_of(rng, mutation, own, f"scene{seed.suffix}", files)
+        if rng.random() < 0.2:
+            how = rng.choice([*HOSTILE])
+            mutation, files = f"made to do harm: {how}", HOSTILE[how](rng)
+        else:
+            seed = rng.choice(real if real and rng.random() < 0.3 else made)
+            mutation, files = _mutated(rng, seed, rng.choice(made))
+        yield case_of(rng, mutation, own, files)
 
 
 def _load_program(folder: Path, seed: Seed) -> None:
@@ -67,7 +73,7 @@ def _load_program(folder: Path, seed: Seed) -> None:
 
     own = folder / "first"
     own.mkdir()
-    first = case_of(Random(0), "", own, f"scene{seed.suffix}", {f"scene{seed.suffix}": seed.data})
+    first = case_of(Random(0), "", own, {"scene.glb": seed.data})
     for arguments in (
         ("render", own / "job.toml", "-o", own / "out"),
         ("init", own / "scene.glb", "-o", own / "a.toml"),
@@ -78,17 +84,28 @@ def _load_program(folder: Path, seed: Seed) -> None:
             assert not end.code, f"{first.folder}: the first render ended with {end.code}"
 
 
-def case_of(rng: Random, mutation: str, own: Path, scene: str, files: dict[str, bytes]) -> Case:
-    """Write files of a scene, and choose the command that meets them; most often `render`."""
+def case_of(rng: Random, mutation: str, own: Path, files: dict[str, bytes]) -> Case:
+    """Write files of a scene, itself first, and choose the command that meets them; most often `render`."""
     for name, data in files.items():
         (own / name).write_bytes(data)
+    scene = next(iter(files))
     job = own / "job.toml"
     job.write_text(tomli_w.dumps({**JOB, "scene": {"file": scene, **JOB["scene"]}}))
     command = rng.choices(("render", "check", "init"), (8, 1, 3))[0]
-    if command == "init":
-        return Case(arguments=("init", own / scene, "-o", own / "made.toml"), mutation=mutation, folder=own)
     wrong = finite(own / "out") if command == "render" else Case.wrong
-    return Case(arguments=(command, job, "-o", own / "out"), mutation=mutation, folder=own, wrong=wrong)
+    if mutation.endswith("files elsewhere"):
+        wrong = refused
+    if command == "init":
+        arguments: Arguments = ("init", own / scene, "-o", own / "made.toml")
+    else:
+        arguments = (command, job, "-o", own / "out")
+    return Case(arguments=arguments, mutation=mutation, folder=own, wrong=wrong)
+
+
+def refused(outcome: Outcome) -> str | None:
+    """Whether a scene that wants files elsewhere was told so."""
+    told = outcome.code == 3 and "refused" in outcome.message
+    return None if told else "a file elsewhere was not refused"
 
 
 def finite(out: Path) -> Callable[[Outcome], str | None]:
@@ -117,7 +134,7 @@ def _mutated(rng: Random, seed: Seed, other: Seed) -> tuple[str, dict[str, bytes
     ways: list[str] = []
     if target.endswith((".glb", ".gltf")) and rng.random() < 0.75 and (tree := _tree(data)) is not None:
         how = rng.choice([*TREE])
-        files[target] = _with_tree(data, json.dumps(mutate_tree(rng, tree, how)).encode())
+        files[target] = with_tree(data, json.dumps(mutate_tree(rng, tree, how)).encode())
         return f"{kind}{how}", files
     if target.endswith((*TEXTS, ".mtl", ".ply", ".stl")) and rng.random() < 0.75:
         ways = [*TEXT, "another encoding"]
@@ -138,7 +155,7 @@ def _tree(data: bytes) -> object:
         return None
 
 
-def _with_tree(data: bytes, text: bytes) -> bytes:
+def with_tree(data: bytes, text: bytes) -> bytes:
     """A glTF with another JSON."""
     if data[:4] != b"glTF":
         return text

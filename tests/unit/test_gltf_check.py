@@ -42,6 +42,8 @@ def changed(glb: Glb, place: str, value: Any) -> Glb:
         ("nodes.0.matrix", [1.0] * 15, "nodes[0].matrix: expected 16 numbers, got a list of 15 values"),
         ("nodes.0.scale", [1, 1, "1"], 'nodes[0].scale: expected a number, got "1"'),
         ("nodes.0.rotation", [0, 0, 0, 10**400], "nodes[0].rotation: expected a number, got a number beyond 64 bits"),
+        ("nodes.0.translation", [0, float("nan"), 0], "nodes[0].translation: expected a number, got nan"),
+        ("materials.0.alphaCutoff", float("inf"), "materials[0].alphaCutoff: expected a number, got inf"),
         ("nodes", {"0": {}}, "nodes: expected a list, got an object"),
         ("scene", 1, "scene: expected the number of one of 1 scenes, from 0, got 1"),
         ("meshes.0", 3, "meshes[0]: expected an object, got 3"),

@@ -34,6 +34,11 @@ ROWS = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
         (PLY.format("ascii", "9" * 30, "float"), "expected 'element NAME COUNT', got 'element vertex 9999"),
         (PLY.format("ascii", 3, "quad"), "expected 'property KIND NAME', got 'property quad y'"),
         (PLY.format("ascii", 3, "list float"), "expected 'property KIND NAME', got 'property list float y'"),
+        (
+            PLY.format("ascii", 3, "float").replace("float y", "float v"),
+            "expected the properties x, y and z, got no y",
+        ),
+        (PLY.format("ascii", 3, "float").replace("face", "fac\xe9"), "expected a header of plain letters"),
         (PLY.format("ascii", 3, "float")[:100], "expected a header from 'ply' to 'end_header'"),
         ("", "expected a header from 'ply' to 'end_header'"),
     ],

@@ -467,6 +467,16 @@ def test_polygons_concave_and_convex():
         assert area(parts) == pytest.approx(total)
 
 
+@pytest.mark.parametrize(
+    ("kd", "ks", "expected"),
+    [("inf inf 0", "0 0 0", [1, 1, 0]), ("nan 1 1e999", "0 0 0", [0, 1, 1]), ("inf inf inf", "inf 0 0", [0.5, 1, 1])],
+)
+def test_reflectivities_that_are_no_numbers(tmp_path, kd, ks, expected):
+    (tmp_path / "a.mtl").write_text(f"newmtl M\nKd {kd}\nKs {ks}\nillum 3\n")
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl M\nf 1 2 3\n")
+    assert read_meshes(tmp_path / "a.obj").materials[0].reflectivity == pytest.approx(expected)
+
+
 def test_concave_polygons_beyond_the_work_that_is_left_become_fans():
     """Cutting ears takes time that grows with the square of the corners: 40 s for 50 outlines of 4,000."""
     angle = np.linspace(0, 2 * np.pi, 100, endpoint=False)
