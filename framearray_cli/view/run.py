@@ -1,5 +1,6 @@
 """Shows an array in the browser, or exports the page: the only file that wires tiles, server and export."""
 
+import os
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
@@ -87,7 +88,7 @@ def write_page(
     Raises:
         OutputError: the target holds other files or cannot be written.
     """
-    target = target.resolve()  # "." has no name to put another beside
+    target = Path(os.path.realpath(target))  # "." has no name to put another beside
     check_target(target)
     problems = prepare_all(tiles, threads, progress)
     return export(tiles, target), problems
