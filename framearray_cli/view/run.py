@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..errors import OutputError
 from ..files import make_folder
+from ..images import require_writer
 from ..manifestfile import read_manifest
 from .export import check_target, export
 from .prepare import prepare_all
@@ -29,6 +30,7 @@ def open_tiles(out: Path, cache: Path | None, threads: int) -> Tiles:
         OutputError: the manifest cannot be read, or the folder not written to.
     """
     manifest = read_manifest(out)
+    require_writer("jpg")
     folder = manifest.directory / FOLDER if cache is None else cache
     try:
         make_folder(folder)
