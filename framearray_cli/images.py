@@ -75,6 +75,7 @@ def require_writer(name: Extension) -> None:
     """
     if name in _OIIO_NAMES:
         good, library = _oiio().ImageOutput.create(_OIIO_NAMES[name]) is not None, "OpenImageIO"
+        _oiio().geterror()  # clears what a failed attempt left behind
     else:
         import PIL.features
 
