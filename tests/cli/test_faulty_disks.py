@@ -65,7 +65,8 @@ def fail_and_go_on(
     shutil.rmtree(out)
 
 
-@pytest.mark.parametrize("number", [errno.EIO, pytest.param(errno.ESTALE, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [errno.EIO, errno.ESTALE])
 def test_a_disk_that_fails(number, library, tmp_path, capsys):
     """As one that is broken, or a folder of a server that has gone."""
     fail_and_go_on(library, "png", number, 30, tmp_path, capsys)

@@ -69,7 +69,9 @@ def size(folder: Path) -> int:
 @pytest.mark.parametrize(
     "share", [0.0, pytest.param(0.3, marks=pytest.mark.slow), pytest.param(0.7, marks=pytest.mark.slow)]
 )
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "job.toml" else []) for name in FILES]
+)
 def test_a_file(name, share, array, disk, capsys):
     file = disk.folder / name
     command = [*words(FILES[name], array, disk.folder), str(file)]

@@ -45,6 +45,7 @@ def hiding(library: str, *arguments: str | Path) -> tuple[int, str]:
     return told.returncode, told.stderr
 
 
+@pytest.mark.slow
 def test_libraries_that_are_not_installed(array, tmp_path):
     """Every extra, each where it is needed; and the one that images need."""
     sun = {"type": "sun", "date": "2026-06-21", "start": "06:00", "stop": "20:00", "irradiance": 3.0}

@@ -156,6 +156,7 @@ def test_an_array_on_a_disk_that_is_read_only(array, tmp_path, capsys):
     disks.close()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("setpriv") or os.geteuid() != 0, reason="who is not root cannot become another")
 def test_a_folder_of_somebody_else(array):
     """As another user, who may read the program wherever it is, and write nothing of ours."""
