@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from framearray_cli import check, render
 from framearray_cli.auto import require_least_memory
 from framearray_cli.images import read_image, read_layers
 from framearray_cli.manifest import array_files
@@ -15,8 +16,9 @@ from framearray_cli.verify import verify
 
 # A job is rendered where it takes at most so much, checked up to FAR_MORE times as much, and beyond that only prepared:
 # read, with its scene, and its memory estimated.
-MOST_IMAGES, MOST_PIXELS, MOST_RAYS, MOST_WALKS, MOST_THREADS = 300, 100_000, 3_000_000, 2_000_000, 64
+MOST_IMAGES, MOST_LIGHTS, MOST_PIXELS, MOST_RAYS, MOST_WALKS, MOST_THREADS = 300, 60, 100_000, 3_000_000, 2_000_000, 64
 FAR_MORE = 10
+whole_render, whole_check, PROBE_RAYS = render.render, check.check, check.PROBE_RAYS
 DONE = "done"  # a file in the folder of a case that says which of these it was
 
 
@@ -28,10 +30,7 @@ def render_small(folder: Path) -> Callable[[], None]:
     """
 
     def hook() -> None:
-        from framearray_cli import check, render
-
-        whole_render, whole_check = render.render, check.check
-        check.PROBE_RAYS, check.MOST_PIXELS = check.PROBE_RAYS // 100, check.FEWEST_PIXELS
+        check.PROBE_RAYS, check.MOST_PIXELS = PROBE_RAYS // 100, check.FEWEST_PIXELS
 
         def small_check(job: Any) -> Any:
             if size(job) <= FAR_MORE:
@@ -74,6 +73,7 @@ def size(job: Any) -> float:
     hits = max(hits, 1) * (2 * n_r + 1 if frames == 1 else 1) + job.specular.hits * max(job.specular.depth, 1)
     return max(
         frames * lights / MOST_IMAGES,
+        lights / MOST_LIGHTS,
         pixels / MOST_PIXELS,
         pixels * frames * hits * (job.samples.obscurance + 4 * n_r + lights) / MOST_RAYS,
         (job.ambient.paths or 4096) * lights / MOST_WALKS,
