@@ -89,7 +89,8 @@ def render_in_parts(
             work.stop()
             with suppress(OutputError):  # what stopped the render is told, not what that meets
                 there = _summary(start, work, time.perf_counter() - started).there
-                listener.written(there - start.found.images - work.images)  # of which no message came
+                if missed := there - start.found.images - work.images:  # of which no message came
+                    listener.written(missed)
             raise
     return _summary(start, work, time.perf_counter() - started)
 

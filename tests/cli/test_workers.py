@@ -1,7 +1,6 @@
 """`render --workers`: the bytes of the whole, also when workers are killed, and clear ends when something is wrong."""
 
 import random
-import resource
 import signal
 import subprocess
 import sys
@@ -11,8 +10,9 @@ from pathlib import Path
 import psutil
 import pytest
 import tiny
-from handed import JOB, WALK, N, begun_again, contents, finished, lines, manifest, same
+from handed import JOB, WALK, N, begun_again, finished, lines, manifest, same
 from program import finish, run, start, wait_for, write_job
+from smalldisk import mounted
 
 pytest.importorskip("distributed", reason="Dask distributed is not installed (extra dask)")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 there")
@@ -143,21 +143,19 @@ def test_a_signal_ends_all_workers(number, place, tmp_path):
     assert same(out, place / "whole")
 
 
-def test_what_a_worker_meets_is_told_as_here(place, tmp_path):
-    """No file may grow beyond some KB, so images cannot be written."""
-    limit = 24 * 1024
-    assert max(map(len, contents(place / "whole").values())) > limit
-
-    def few_bytes() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-
-    command = ["render", "-q", place / "job.toml", "-o", tmp_path / "out"]
-    alone = finish(start(*command, preexec_fn=few_bytes))
-    handed = finish(start(*command, "--workers", 2, preexec_fn=few_bytes))
-    assert alone.code == handed.code == 4
-    for told in (alone, handed):
-        assert ": cannot be written: " in told.err.splitlines()[0] and f"{tmp_path}" in told.err
-    assert len(handed.err.splitlines()) == len(alone.err.splitlines())
+def test_a_full_disk_is_told_as_without_workers(place, tmp_path):
+    for disk in mounted(tmp_path / "disk", "size=1m"):
+        out = disk.folder / "out"
+        told = finish(start("render", "-q", place / "job.toml", "-o", out, "--workers", 2, "--chunk", 6))
+        assert (told.code, told.out) == (4, "")
+        first, free, kept = told.err.splitlines()
+        assert first.startswith(f"{out}/") and ": cannot be written: " in first
+        assert free.endswith(" are free on that disk")
+        done = sum(finished(out).values()) * 3
+        assert kept == f"{done} of {3 * N} images were written to {out}; the same command goes on with the rest"
+        disk.remount("size=64m")
+        assert finish(start("render", "-q", place / "job.toml", "-o", out, "--workers", 2, "--chunk", 6)).code == 0
+        assert same(out, place / "whole")
 
 
 def test_memory_is_shared(tmp_path, capsys):
