@@ -1,7 +1,6 @@
 """Dask: a scheduler that somebody runs, or one with workers on this machine, as long as a render takes."""
 
 import logging
-import os
 import threading
 import warnings
 from collections.abc import Iterator
@@ -32,11 +31,6 @@ def require_dask() -> Any:
         if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
             logging.getLogger(name).setLevel(SILENT)
     return distributed
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager

@@ -33,6 +33,15 @@ def count_workers(client: Any) -> int:
     raise WorkerError(LOST)
 
 
+def lacks_program(error: BaseException | None) -> bool:
+    """Whether a worker could not load what it was to run; Dask may hand on no more than the words of the error."""
+    while error is not None:
+        if isinstance(error, ImportError) or "ModuleNotFoundError" in str(error) or "ImportError" in str(error):
+            return True
+        error = error.__cause__
+    return False
+
+
 class HandedOut:
     """The chunks of a render: those that wait, and those that workers are at."""
 
@@ -82,8 +91,11 @@ class HandedOut:
         except KilledWorker:
             self._once_more(chunk)
             return
-        except ImportError as error:
-            raise WorkerError(f"a worker lacks framearray {self._common['version']} ({error}); install it") from error
+        except Exception as error:
+            if not lacks_program(error):
+                raise
+            version = self._common["version"]
+            raise WorkerError(f"a worker that came later: lacks framearray {version}; install it there") from error
         if "error" in result:
             raise self._error(result)
         self._hear_left(chunk[0], 0, last=True)

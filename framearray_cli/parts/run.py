@@ -23,8 +23,8 @@ from ..render import Begun, Listener, begun, nothing_to_do
 from ..summary import Summary, summed, with_summary
 from ..usage import free_memory
 from .chunks import Chunks, default_size, in_chunks
-from .cluster import connected, cores, local, require_dask
-from .handout import LOOK_EVERY, HandedOut, count_workers
+from .cluster import connected, local, require_dask
+from .handout import LOOK_EVERY, HandedOut, count_workers, lacks_program
 
 # Share of the free memory that workers get; the rest is for files that the system keeps in memory.
 SHARE = 0.9
@@ -140,7 +140,7 @@ def _common(job: Job, start: Begun, hands: Hands, memory: int | None) -> Iterato
     folder, scene = job.output.directory, job.scene.file
     token = secrets.token_hex(4)
     probe = folder / FOLDER / f"{PROBE}{token}"
-    threads = None if hands.address else job.render.threads or max(cores() // hands.workers, 1)
+    threads = None if hands.address else job.render.threads or max(start.prepared.threads // hands.workers, 1)
     try:
         known = digest(scene)
     except OSError as error:
@@ -180,8 +180,8 @@ def _require_fit(client: Any, common: dict[str, Any]) -> None:
     from .worker import unfit
 
     for address, found in client.run(unfit, common, on_error="return").items():
-        if isinstance(found, ImportError):
-            found = f"worker {address}: lacks framearray {common['version']} ({found}); install it there"
+        if isinstance(found, BaseException) and lacks_program(found):
+            found = f"worker {address}: lacks framearray {common['version']}; install it there"
         elif isinstance(found, BaseException):
             found = f"worker {address}: {found}"
         if found:

@@ -38,7 +38,8 @@ class Cluster:
         command = [sys.executable, "-m", f"distributed.cli.dask_{what}", "--scheduler-file", str(self._file), *options]
         path = os.pathsep.join([str(python_path), os.environ.get("PYTHONPATH", "")])
         environment = os.environ | {"PYTHONPATH": path}
-        return subprocess.Popen(command, stdout=self._log, stderr=self._log, env=environment)
+        # Python looks for modules where it is started, first of all
+        return subprocess.Popen(command, stdout=self._log, stderr=self._log, env=environment, cwd=self._file.parent)
 
     def start_worker(self, python_path: Path = PACKAGE_PARENT) -> subprocess.Popen[bytes]:
         options = ("--no-nanny", "--nthreads", "1", "--no-dashboard")
@@ -135,8 +136,17 @@ def test_a_worker_without_the_program(place, tmp_path):
         time.sleep(3.0)
         told = finish(start("render", "-q", place / "job.toml", "--dask", dask.address, "-o", tmp_path / "out"))
     assert told.code == 4
-    assert f"lacks framearray {framearray_cli.__version__}" in told.err and "install it there" in told.err
+    assert f"lacks framearray {framearray_cli.__version__}; install it there" in told.err
     assert len(told.err.splitlines()) == 1
+
+
+def test_what_says_that_the_program_is_not_there():
+    from framearray_cli.parts.handout import lacks_program
+
+    words = RuntimeError("Error during deserialization of the task")
+    words.__cause__ = ModuleNotFoundError("No module named 'framearray_cli'")
+    assert lacks_program(words) and lacks_program(Exception(repr(words.__cause__)))
+    assert not lacks_program(ValueError("something else")) and not lacks_program(None)
 
 
 @pytest.mark.parametrize(
