@@ -12,7 +12,6 @@ from .. import __version__
 from ..auto import require_least_memory
 from ..errors import JobError, OutputError, SceneError, WorkerError
 from ..files import reason
-from ..folderlock import Folder
 from ..interrupts import forget
 from ..job import Job
 from ..jobfile import job_table
@@ -88,11 +87,14 @@ def render_in_parts(
             forget()  # a signal that was heard must not break off what follows
             work.stop()
             with suppress(OutputError):  # what stopped the render is told, not what that meets
-                there = _summary(start, work, time.perf_counter() - started).there
-                if missed := there - start.found.images - work.images:  # of which no message came
+                summary = _summed(start, work, time.perf_counter() - started)
+                if missed := summary.there - start.found.images - work.images:  # of which no message came
                     listener.written(missed)
+                _write_manifest(start, summary)
             raise
-    return _summary(start, work, time.perf_counter() - started)
+    summary = _summed(start, work, time.perf_counter() - started)
+    _write_manifest(start, summary)
+    return summary
 
 
 def _told(n: int) -> str:
@@ -188,17 +190,20 @@ def _require_fit(client: Any, common: dict[str, Any]) -> None:
             raise WorkerError(found)
 
 
-def _summary(start: Begun, work: HandedOut, seconds: float) -> Summary:
-    """Put together what all chunks left in the folder, and write the manifest of the whole."""
-    prepared, folder = start.prepared, start.prepared.job.output.directory
-    before = start.found
-    with Folder(folder).alone():
-        records = read_records(folder, start.identity.fingerprint)
-        rays = sum((Counter(session.rays) for session in records.sessions), Counter[str]())
-        rays -= sum((Counter(session.rays) for session in before.records.sessions), Counter[str]())
-        rays["ambient"] += 0
-        summary = summed(prepared, records, images=0, seconds=seconds, rays=rays, stages={}, notes=work.notes)
-        summary = replace(summary, images=work.images, peak_memory=work.peak_memory)
+def _summed(start: Begun, work: HandedOut, seconds: float) -> Summary:
+    """Put together what all chunks left in the folder."""
+    prepared, before = start.prepared, start.found.records
+    records = read_records(prepared.job.output.directory, start.identity.fingerprint)
+    rays = sum((Counter(session.rays) for session in records.sessions), Counter[str]())
+    rays -= sum((Counter(session.rays) for session in before.sessions), Counter[str]())
+    rays["ambient"] += 0
+    summary = summed(prepared, records, images=work.images, seconds=seconds, rays=rays, stages={}, notes=work.notes)
+    return replace(summary, peak_memory=work.peak_memory)
+
+
+def _write_manifest(start: Begun, summary: Summary) -> None:
+    """Write the manifest of the whole over those of the chunks."""
+    folder = start.prepared.job.output.directory
+    with start.place.alone():
         manifest = replace(read_manifest(folder), job=start.identity.job)
         write_manifest(folder, with_summary(manifest, summary))
-    return summary

@@ -40,23 +40,22 @@ def images(out: Path) -> int:
     return len(list(out.glob("tiny.c*")))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [
-        pytest.param({}, marks=pytest.mark.slow),
+        {},
         {"reuse": {"n_r": "auto"}, "samples": {"hits": "auto"}, "ambient": {"paths": 512}},
         {"samples": {"error": 0.1}},
-        pytest.param({"samples": {"halves": True, "hits": 4}}, marks=pytest.mark.slow),
-        pytest.param({"camera": WALK | {"keys": WALK["keys"][:1]}}, marks=pytest.mark.slow),
+        {"samples": {"halves": True, "hits": 4}},
+        {"camera": WALK | {"keys": WALK["keys"][:1]}},
     ],
     ids=["plain", "auto", "error", "halves", "still"],
 )
 def test_the_bytes_are_those_of_the_whole(changes, tmp_path, monkeypatch):
     if "error" in changes.get("samples", {}):  # in place of hits
         monkeypatch.setitem(tiny.TABLE, "samples", {"obscurance": 5})
-    job = write_job(
-        tmp_path, **({"camera": WALK | {"resolution": [24, 18]}} | {k: v for k, v in (JOB | changes).items()})
-    )
+    job = write_job(tmp_path, **(JOB | {"camera": WALK | {"resolution": [24, 18]}} | changes))
     whole = finish(start("render", job, "-o", tmp_path / "whole"))
     parts = finish(start("render", job, "--workers", 2, "--chunk", 7, "-o", tmp_path / "parts"))
     assert (whole.code, parts.code, parts.err) == (0, 0, "")
@@ -108,7 +107,7 @@ def test_a_chunk_that_kills_all_workers_is_given_up(place, tmp_path, monkeypatch
     """Dask gives it up at the first death here; then it is tried again for as long as it gets further."""
     monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "0")
     out = tmp_path / "out"
-    process = start("render", "-q", place / "job.toml", "--workers", 1, "-o", out)
+    process = start("render", "-q", place / "job.toml", "--workers", 1, "--chunk", N, "-o", out)
     for kill in range(3):  # each once it has planned, and before its first image
         wait_for(lambda kill=kill: sum(begun_again(out).values()) + bool(lines(out)) > kill, process)
         workers_of(process)[0].kill()
@@ -120,7 +119,8 @@ def test_a_chunk_that_kills_all_workers_is_given_up(place, tmp_path, monkeypatch
     assert same(out, place / "whole")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_all_workers(number, place, tmp_path):
     """Sent to all processes, as a terminal does with Ctrl-C."""
     out = tmp_path / "out"
@@ -143,6 +143,7 @@ def test_a_signal_ends_all_workers(number, place, tmp_path):
     assert same(out, place / "whole")
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_told_as_without_workers(place, tmp_path):
     for disk in mounted(tmp_path / "disk", "size=1m"):
         out = disk.folder / "out"
