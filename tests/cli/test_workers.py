@@ -120,7 +120,7 @@ def test_a_chunk_that_kills_all_workers_is_given_up(place, tmp_path, monkeypatch
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_all_workers(number, place, tmp_path):
     """Sent to all processes, as a terminal does with Ctrl-C."""
     out = tmp_path / "out"
@@ -132,7 +132,7 @@ def test_a_signal_ends_all_workers(number, place, tmp_path):
     told = finish(process)
     assert time.monotonic() - sent < 5.0
     assert told.code == 128 + number
-    word = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}[number]
+    word = "interrupted" if number == signal.SIGINT else "terminated"
     done = sum(finished(out).values()) * 3
     kept = f"{done} of {3 * N} images were written to {out}; the same command goes on with the rest"
     assert told.err.splitlines() == [word, kept]
