@@ -43,6 +43,7 @@ def describe(
     job, report = prepared.job, prepared.scene.report
     files = array_names(job, prepared.n_cameras, prepared.lights)
     summary: dict[str, Any] = {"finished": False, "images": 0, "ambient_paths": ambient.paths}
+    summary |= {"notes": list(ambient.notes)}
     summary |= {"automatic": choice.table()} if choice else {}
     summary |= {"target": target.table()} if target else {}
     return Manifest(

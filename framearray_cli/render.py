@@ -199,8 +199,10 @@ def _planned(start: Begun, listener: Listener) -> tuple[Work, Ambient, Manifest,
 def nothing_to_do(prepared: Prepared, found: Found, seconds: float) -> Summary:
     """All that is wanted is on disk; the manifest may not say so yet."""
     folder = prepared.job.output.directory
-    summary = summed(prepared, found.records, images=0, seconds=seconds, rays=Counter(), stages={}, notes=())
     manifest = read_manifest(folder)
+    known = manifest.summary.get("notes")
+    notes = tuple(note for note in known if isinstance(note, str)) if isinstance(known, list) else ()
+    summary = summed(prepared, found.records, images=0, seconds=seconds, rays=Counter(), stages={}, notes=notes)
     if manifest.summary.get("images") != summary.there or not manifest.summary.get("finished"):
         write_manifest(folder, with_summary(manifest, summary))
     return summary

@@ -95,7 +95,7 @@ class Screen:
                 self._bar.advance(self._task, units)
                 return
             now = time.monotonic()
-            if self._quiet or now - self._last < SECONDS_BETWEEN_LINES:
+            if self._quiet or self.done <= 0 or now - self._last < SECONDS_BETWEEN_LINES:
                 return
             self._last = now
             rate = self.done / (now - self._started)

@@ -87,7 +87,7 @@ def summed(
         pixels=width * height,
         hits=math.fsum(by_camera.values()) / max(len(by_camera), 1),
         peak_memory=peak_memory(),
-        notes=(*notes, *found, *_mixed(records)),
+        notes=tuple(dict.fromkeys((*notes, *found, *_mixed(records)))),
         standard_error=_standard_error(prepared.lights, errors) if errors else {},
         all_rays=dict(all_rays) or dict(rays),
         all_seconds=sum(session.seconds for session in records.sessions) or seconds,

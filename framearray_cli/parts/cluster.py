@@ -1,7 +1,6 @@
 """Dask: a scheduler that somebody runs, or one with workers on this machine, as long as a render takes."""
 
 import logging
-import os
 import threading
 import warnings
 from collections.abc import Iterator
@@ -12,6 +11,7 @@ from typing import Any
 from ..errors import JobError, MissingExtraError
 
 PATIENCE = 5.0  # seconds in which a scheduler must answer
+SILENT = logging.CRITICAL + 1
 
 
 def require_dask() -> Any:
@@ -27,14 +27,10 @@ def require_dask() -> Any:
             "--workers and --dask need Dask distributed, which is not installed; "
             'install it with: pip install "framearray[dask]"'
         ) from error
-    for name in ("distributed", "tornado", "asyncio"):  # what matters is told by this program, in its own words
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    for name in list(logging.root.manager.loggerDict):  # what matters is told by this program, in its own words
+        if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
+            logging.getLogger(name).setLevel(SILENT)
     return distributed
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager
@@ -87,7 +83,7 @@ def local(workers: int) -> Iterator[Any]:
             memory_limit=0,  # chunks know theirs; Dask would end a worker that is above
             dashboard_address=None,
             host="127.0.0.1",
-            silence_logs=logging.CRITICAL + 1,
+            silence_logs=SILENT,
         )
         try:
             client = distributed.Client(cluster, set_as_default=False)

@@ -1,7 +1,6 @@
 """A render whose chunks are handed out to Dask workers, on this machine or on others that share its folders."""
 
 import secrets
-import threading
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -9,11 +8,10 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from .. import __version__, errors
+from .. import __version__
 from ..auto import require_least_memory
 from ..errors import JobError, OutputError, SceneError, WorkerError
 from ..files import reason
-from ..folderlock import Folder
 from ..interrupts import forget
 from ..job import Job
 from ..jobfile import job_table
@@ -24,14 +22,13 @@ from ..render import Begun, Listener, begun, nothing_to_do
 from ..summary import Summary, summed, with_summary
 from ..usage import free_memory
 from .chunks import Chunks, default_size, in_chunks
-from .cluster import connected, cores, local, require_dask
+from .cluster import connected, local, require_dask
+from .handout import LOOK_EVERY, HandedOut, count_workers, lacks_program
 
 # Share of the free memory that workers get; the rest is for files that the system keeps in memory.
 SHARE = 0.9
-# Seconds between two looks at what goes on, and for which workers get to stop by themselves.
-LOOK_EVERY, STOPPING = 0.5, 5.0
-# Deaths of workers that a chunk survives without an image more, after those that Dask itself allows.
-MOST_DEATHS = 2
+PROBE = ".parts-"  # begins the name of a file in the folder, which workers look for
+LOST = "the Dask scheduler has gone away"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,17 +80,21 @@ def render_in_parts(
         _require_fit(client, common)
         chunks = _cut(start, hands, n_workers)
         listener.handed_out(f"{_told(n_workers)}, {chunks.line()}")
-        work = _HandedOut(client, common, chunks, start, listener)
+        work = HandedOut(client, common, chunks, start, listener)
         try:
             work.all_done()
         except BaseException:
             forget()  # a signal that was heard must not break off what follows
             work.stop()
             with suppress(OutputError):  # what stopped the render is told, not what that meets
-                there = _summary(start, work, time.perf_counter() - started).there
-                listener.written(there - start.found.images - work.images)  # of which no message came
+                summary = _summed(start, work, time.perf_counter() - started)
+                if missed := summary.there - start.found.images - work.images:  # of which no message came
+                    listener.written(missed)
+                _write_manifest(start, summary)
             raise
-    return _summary(start, work, time.perf_counter() - started)
+    summary = _summed(start, work, time.perf_counter() - started)
+    _write_manifest(start, summary)
+    return summary
 
 
 def _told(n: int) -> str:
@@ -126,17 +127,11 @@ def _memory(prepared: Prepared, workers: int) -> int:
 
 def _some_workers(client: Any, hands: Hands, listener: Listener) -> int:
     """How many workers there are, once there is one."""
-    if not client.nthreads():
-        listener.waits(f"waiting for workers of {hands.address or 'this machine'}")
-    while not (n := len(client.nthreads())):
-        _require_scheduler(client)
+    if not count_workers(client):
+        listener.heard([f"waiting for workers of {hands.address or 'this machine'}"])
+    while not (n := count_workers(client)):
         time.sleep(LOOK_EVERY)
     return max(n, 1 if hands.address else hands.workers)
-
-
-def _require_scheduler(client: Any) -> None:
-    if client.status != "running":
-        raise WorkerError("the Dask scheduler has gone away")
 
 
 @contextmanager
@@ -146,8 +141,8 @@ def _common(job: Job, start: Begun, hands: Hands, memory: int | None) -> Iterato
 
     folder, scene = job.output.directory, job.scene.file
     token = secrets.token_hex(4)
-    probe = folder / FOLDER / f".parts-{token}"
-    threads = None if hands.address else job.render.threads or max(cores() // hands.workers, 1)
+    probe = folder / FOLDER / f"{PROBE}{token}"
+    threads = None if hands.address else job.render.threads or max(start.prepared.threads // hands.workers, 1)
     try:
         known = digest(scene)
     except OSError as error:
@@ -164,6 +159,10 @@ def _common(job: Job, start: Begun, hands: Hands, memory: int | None) -> Iterato
         topic=f"framearray-{token}",
     )
     try:
+        with start.place.alone():
+            if not start.place.others():  # nobody works here, so what a killed program left may go
+                for old in probe.parent.glob(f"{PROBE}*"):
+                    old.unlink()
         probe.touch()
     except OSError as error:
         raise OutputError(f"{probe}: cannot be written: {reason(error)}") from error
@@ -183,137 +182,28 @@ def _require_fit(client: Any, common: dict[str, Any]) -> None:
     from .worker import unfit
 
     for address, found in client.run(unfit, common, on_error="return").items():
-        if isinstance(found, ImportError):
-            found = f"worker {address}: lacks framearray {common['version']} ({found}); install it there"
+        if isinstance(found, BaseException) and lacks_program(found):
+            found = f"worker {address}: lacks framearray {common['version']}; install it there"
         elif isinstance(found, BaseException):
             found = f"worker {address}: {found}"
         if found:
             raise WorkerError(found)
 
 
-class _HandedOut:
-    """The chunks of a render: those that wait, and those that workers are at."""
-
-    def __init__(self, client: Any, common: dict[str, Any], chunks: Chunks, start: Begun, listener: Listener) -> None:
-        self._client, self._common, self._listener = client, common, listener
-        self._place, self._n_lights = start.place, start.prepared.n_lights
-        self._waiting = list(reversed(chunks.each))
-        self._at_work: dict[Any, tuple[int, ...]] = {}
-        self._left = {chunk[0]: len(chunk) * self._n_lights for chunk in chunks.each}
-        self._something = threading.Event()  # a chunk came back
-        self._deaths: dict[int, tuple[int, int]] = {}  # by chunk: how many, and images left at the last
-        self._said: set[str] = set()
-        self.notes: tuple[str, ...] = ()
-        self.peak_memory = self.images = 0
-        client.subscribe_topic(common["topic"], self._hear)
-
-    def all_done(self) -> None:
-        """Hand out chunks until all are rendered.
-
-        Raises:
-            FrameArrayError: what a worker met, the first time that one met something.
-        """
-        while self._waiting or self._at_work:
-            _require_scheduler(self._client)
-            for _ in range(max(len(self._client.nthreads()), 1) - len(self._at_work)):
-                if self._waiting:
-                    self._hand_out(self._waiting.pop())
-            self._something.wait(LOOK_EVERY)
-            self._something.clear()
-            for future in [future for future in self._at_work if future.done()]:
-                self._take_back(future, self._at_work.pop(future))
-
-    def _hand_out(self, chunk: tuple[int, ...]) -> None:
-        from .worker import render_chunk
-
-        future = self._client.submit(render_chunk, self._common, chunk, pure=False)
-        self._at_work[future] = chunk
-        future.add_done_callback(lambda _: self._something.set())
-
-    def _take_back(self, future: Any, chunk: tuple[int, ...]) -> None:
-        """Look at what became of a chunk."""
-        from distributed import KilledWorker
-
-        try:
-            result = future.result()
-        except KilledWorker as error:
-            deaths, left = self._deaths.get(chunk[0], (0, -1))
-            deaths = deaths + 1 if self._left[chunk[0]] == left else 1
-            if deaths > MOST_DEATHS:
-                cameras = f"{chunk[0]}-{chunk[-1]}"
-                raise WorkerError(
-                    f"cameras {cameras}: workers died on them again and again, most likely of too little memory; "
-                    "see what they say, or have fewer workers"
-                ) from error
-            self._deaths[chunk[0]] = deaths, self._left[chunk[0]]
-            self._waiting.append(chunk)
-            return
-        except ImportError as error:
-            raise WorkerError(f"a worker lacks framearray {self._common['version']} ({error}); install it") from error
-        if "error" in result:
-            raise self._error(result)
-        self._hear_left(chunk[0], 0)
-        self.notes = tuple(dict.fromkeys((*self.notes, *result["notes"])))
-        self.peak_memory = max(self.peak_memory, result["peak_memory"])
-
-    def _error(self, result: dict[str, Any]) -> BaseException:
-        """What a worker met, as if it were met here."""
-        problems, kind = result["problems"], result["error"]
-        found: BaseException
-        if kind == "MemoryError":
-            return MemoryError()
-        if kind == "JobError":
-            prefix = f"{self._common['file']}: "
-            found = JobError(self._common["file"], [problem.removeprefix(prefix) for problem in problems])
-        else:
-            found = getattr(errors, kind)(*problems)
-        for note in result["notes"]:
-            found.add_note(note)
-        return found
-
-    def _hear(self, event: tuple[float, dict[str, Any]]) -> None:
-        """Take a message of a worker; in a thread of Dask."""
-        message = event[1]
-        if "left" in message:
-            self._hear_left(message["chunk"], message["left"])
-        for kind in ("ambient", "target"):
-            if kind in message and kind not in self._said:
-                self._said.add(kind)
-                self._listener.heard(message[kind])
-        if "compiling" in message and "compiling" not in self._said:
-            self._said.add("compiling")
-            self._listener.compiling()
-
-    def _hear_left(self, chunk: int, left: int) -> None:
-        written, self._left[chunk] = self._left[chunk] - left, left
-        if written:
-            self.images += written
-            self._listener.written(written)
-
-    def stop(self) -> None:
-        """Take all chunks back, and wait a moment until workers have let go of the folder."""
-        with suppress(Exception):  # the scheduler may be gone; what stopped the render is told
-            self._client.cancel(list(self._at_work), force=True)
-        end = time.monotonic() + STOPPING
-        with suppress(OutputError):
-            while time.monotonic() < end:
-                with self._place.alone():
-                    if not self._place.others():
-                        return
-                time.sleep(0.1)
+def _summed(start: Begun, work: HandedOut, seconds: float) -> Summary:
+    """Put together what all chunks left in the folder."""
+    prepared, before = start.prepared, start.found.records
+    records = read_records(prepared.job.output.directory, start.identity.fingerprint)
+    rays = sum((Counter(session.rays) for session in records.sessions), Counter[str]())
+    rays -= sum((Counter(session.rays) for session in before.sessions), Counter[str]())
+    rays["ambient"] += 0
+    summary = summed(prepared, records, images=work.images, seconds=seconds, rays=rays, stages={}, notes=work.notes)
+    return replace(summary, peak_memory=work.peak_memory)
 
 
-def _summary(start: Begun, work: _HandedOut, seconds: float) -> Summary:
-    """Put together what all chunks left in the folder, and write the manifest of the whole."""
-    prepared, folder = start.prepared, start.prepared.job.output.directory
-    before = start.found
-    with Folder(folder).alone():
-        records = read_records(folder, start.identity.fingerprint)
-        rays = sum((Counter(session.rays) for session in records.sessions), Counter[str]())
-        rays -= sum((Counter(session.rays) for session in before.records.sessions), Counter[str]())
-        rays["ambient"] += 0
-        summary = summed(prepared, records, images=0, seconds=seconds, rays=rays, stages={}, notes=work.notes)
-        summary = replace(summary, images=work.images, peak_memory=work.peak_memory)
+def _write_manifest(start: Begun, summary: Summary) -> None:
+    """Write the manifest of the whole over those of the chunks."""
+    folder = start.prepared.job.output.directory
+    with start.place.alone():
         manifest = replace(read_manifest(folder), job=start.identity.job)
         write_manifest(folder, with_summary(manifest, summary))
-    return summary

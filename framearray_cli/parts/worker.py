@@ -209,5 +209,6 @@ class DeafToSignals(WorkerPlugin):
 
     def setup(self, worker: Worker) -> None:
         if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
-                signal.signal(number, signal.SIG_IGN)
+            for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+                if hasattr(signal, name):  # Windows lacks the last
+                    signal.signal(getattr(signal, name), signal.SIG_IGN)

@@ -113,7 +113,7 @@ def test_what_a_render_chooses_is_known(tmp_path, capsys):
 
 
 @needs_openjd
-@pytest.mark.parametrize("n_r", [0, 2])
+@pytest.mark.parametrize("n_r", [2, pytest.param(0, marks=pytest.mark.slow)])
 def test_a_farm_renders_the_same_bytes(n_r, tmp_path, capsys):
     job = write_job(tmp_path, **(JOB | {"reuse": {"n_r": n_r}}))
     template = tmp_path / "job.openjd.json"

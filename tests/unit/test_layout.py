@@ -42,7 +42,7 @@ view/__init__
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
 screen interrupts wording
-parts/chunks parts/openjd parts/worker parts/cluster parts/run parts/__init__
+parts/chunks parts/openjd parts/worker parts/cluster parts/handout parts/run parts/__init__
 commands/__init__ commands/options commands/init commands/render commands/check commands/verify
 commands/assemble commands/sheet commands/export commands/openjd commands/report commands/schema
 commands/view
@@ -78,7 +78,7 @@ DOORS = {
     "xxhash": ("record",),
     "filelock": ("folderlock",),
     "pvlib": ("sun",),
-    "distributed": ("parts/worker", "parts/cluster", "parts/run"),
+    "distributed": ("parts/",),
 }
 # What takes long to import, or may be absent: `framearray --help` does without.
 HEAVY = (

@@ -12,11 +12,13 @@ from tiny import WALK
 import framearray_cli.render as rendering
 from framearray_cli.errors import OutputError
 from framearray_cli.job import Job
+from framearray_cli.manifest import Manifest
 from framearray_cli.manifestfile import read_manifest
 from framearray_cli.ranges import frames_text, parse_frames
 from framearray_cli.record import damaged, digest, read_records, record_files, sealed, unsealed
 from framearray_cli.render import Listener, render
 from framearray_cli.resume import look
+from framearray_cli.terms import ambient
 
 N = 7
 CAMERA = {**WALK, "frames": N, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": N - 1}]}
@@ -191,6 +193,24 @@ def test_another_processor_is_told(scene: Path, tmp_path: Path) -> None:
     file.write_bytes(b"\n".join(lines) + b"\n")
     summary = render(job(scene, tmp_path))
     assert any("several kinds of processor" in note and "another" in note for note in summary.notes)
+
+
+def test_notes_stay_where_only_the_manifest_was_missing(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A render that was killed after its last image and before it wrote the manifest."""
+    begun: list[Manifest] = []
+    keep = rendering.write_manifest
+    monkeypatch.setattr(rendering, "write_manifest", lambda folder, m: (begun.append(m), keep(folder, m)))
+    few = {"ambient": {"paths": None}, "light": {"sources": [{**tiny.SUN}]}}
+    monkeypatch.setattr(ambient, "TARGET_ERROR", 1e-9)
+    render(job(scene, tmp_path, **few))
+    whole = read_manifest(tmp_path).summary
+    assert any("set ambient.paths for more" in note for note in whole["notes"])
+    keep(tmp_path, begun[0])
+    assert render(job(scene, tmp_path, **few)).images == 0
+    assert read_manifest(tmp_path).summary["notes"] == whole["notes"]
+    assert read_manifest(tmp_path).summary["finished"] is True
 
 
 def test_a_camera_that_stands_still(scene: Path, tmp_path: Path) -> None:

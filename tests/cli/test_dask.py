@@ -1,0 +1,194 @@
+"""`render --dask`: workers that somebody started, which die, lack something, or lose their scheduler."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from handed import JOB, N, begun_again, finished, same
+from program import PACKAGE_PARENT, finish, start, wait_for, write_job
+
+import framearray_cli
+from framearray_cli.record import digest
+
+pytest.importorskip("distributed", reason="Dask distributed is not installed (extra dask)")
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 there")
+
+
+class Cluster:
+    """A scheduler of its own process, and workers that are started one by one, without anybody who replaces them."""
+
+    def __init__(self, folder: Path) -> None:
+        self._file, self._log = folder / "scheduler.json", (folder / "log").open("wb")
+        self.scheduler = self._run("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
+        self.workers: list[subprocess.Popen[bytes]] = []
+        end = time.monotonic() + 60
+        while not self._file.exists():
+            assert self.scheduler.poll() is None and time.monotonic() < end
+            time.sleep(0.02)
+        self.address = str(json.loads(self._file.read_text())["address"])
+
+    def _run(self, what: str, *options: str, python_path: Path = PACKAGE_PARENT) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", f"distributed.cli.dask_{what}", "--scheduler-file", str(self._file), *options]
+        path = os.pathsep.join([str(python_path), os.environ.get("PYTHONPATH", "")])
+        environment = os.environ | {"PYTHONPATH": path}
+        # Python looks for modules where it is started, first of all
+        return subprocess.Popen(command, stdout=self._log, stderr=self._log, env=environment, cwd=self._file.parent)
+
+    def start_worker(self, python_path: Path = PACKAGE_PARENT) -> subprocess.Popen[bytes]:
+        options = ("--no-nanny", "--nthreads", "1", "--no-dashboard")
+        self.workers.append(self._run("worker", *options, python_path=python_path))
+        return self.workers[-1]
+
+    def close(self) -> None:
+        for process in (*self.workers, self.scheduler):
+            process.kill()
+            process.wait()
+        self._log.close()
+
+
+@contextmanager
+def cluster(folder: Path, workers: int = 2) -> Iterator[Cluster]:
+    found = Cluster(folder)
+    try:
+        for _ in range(workers):
+            found.start_worker()
+        yield found
+    finally:
+        found.close()
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a job, and with its array rendered in one run."""
+    folder = tmp_path_factory.mktemp("dask")
+    job = write_job(folder, **JOB)
+    assert finish(start("render", "-q", job, "-o", folder / "whole")).code == 0
+    return folder
+
+
+def test_a_worker_that_dies_is_not_missed(place, tmp_path):
+    """The other one renders the rest; then one comes that was not there at the beginning."""
+    out = tmp_path / "out"
+    with cluster(tmp_path) as dask:
+        process = start("render", "-q", place / "job.toml", "--dask", dask.address, "--chunk", 4, "-o", out)
+        wait_for(lambda: len(finished(out)) >= 5, process)
+        dask.workers[0].send_signal(signal.SIGKILL)
+        dask.start_worker()
+        told = finish(process)
+    assert (told.code, told.out, told.err) == (0, "", "")
+    assert same(out, place / "whole")
+    times = finished(out)
+    assert len(times) == N and set(times.values()) == {1}
+    assert sum(begun_again(out).values()) <= 1
+    assert not list((out / "records").glob(".parts-*"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_workers_stop_when_nobody_wants_their_chunks(number, place, tmp_path):
+    out = tmp_path / "out"
+    with cluster(tmp_path) as dask:
+        command = ["render", "-q", place / "job.toml", "--dask", dask.address, "--chunk", 12, "-o", out]
+        process = start(*command)
+        wait_for(lambda: len(finished(out)) >= 4, process)
+        process.send_signal(number)
+        told = finish(process)
+        assert told.code == (143 if number == signal.SIGTERM else -number)
+        time.sleep(3.0)  # the scheduler notices, and so do the workers
+        there = finished(out)
+        time.sleep(2.0)
+        assert finished(out) == there and len(there) < N
+        assert finish(start(*command)).code == 0
+        assert same(out, place / "whole")
+        assert not list((out / "records").glob(".parts-*"))
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_goes_away(place, tmp_path):
+    out = tmp_path / "out"
+    with cluster(tmp_path) as dask:
+        process = start("render", "-q", place / "job.toml", "--dask", dask.address, "--chunk", 12, "-o", out)
+        wait_for(lambda: len(finished(out)) >= 4, process)
+        dask.scheduler.kill()
+        told = finish(process)
+    assert told.code == 4
+    assert told.err.splitlines()[0] == "the Dask scheduler has gone away"
+    assert told.err.splitlines()[1].endswith("; the same command goes on with the rest")
+    assert len(told.err.splitlines()) == 2
+    assert finish(start("render", "-q", place / "job.toml", "-o", out)).code == 0
+    assert same(out, place / "whole")
+
+
+@pytest.mark.slow
+def test_a_worker_without_the_program(place, tmp_path):
+    """Something of that name is installed there, of another version."""
+    (tmp_path / "old/framearray_cli").mkdir(parents=True)
+    (tmp_path / "old/framearray_cli/__init__.py").write_text('__version__ = "0.0.1"\n')
+    with cluster(tmp_path, workers=1) as dask:
+        dask.start_worker(python_path=tmp_path / "old")
+        time.sleep(3.0)
+        told = finish(start("render", "-q", place / "job.toml", "--dask", dask.address, "-o", tmp_path / "out"))
+    assert told.code == 4
+    assert f"lacks framearray {framearray_cli.__version__}; install it there" in told.err
+    assert len(told.err.splitlines()) == 1
+
+
+def test_what_says_that_the_program_is_not_there():
+    from framearray_cli.parts.handout import lacks_program
+
+    words = RuntimeError("Error during deserialization of the task")
+    words.__cause__ = ModuleNotFoundError("No module named 'framearray_cli'")
+    assert lacks_program(words) and lacks_program(Exception(repr(words.__cause__)))
+    assert not lacks_program(ValueError("something else")) and not lacks_program(None)
+
+
+@pytest.mark.parametrize(
+    "address", ["nonsense", "ftp://a:1", pytest.param("tcp://127.0.0.1:9", marks=pytest.mark.slow)]
+)
+def test_wrong_addresses(address, tmp_path):
+    begun = time.monotonic()
+    told = finish(start("render", write_job(tmp_path, **JOB), "--dask", address))
+    assert time.monotonic() - begun < 15
+    assert told.code == 2
+    assert told.err.startswith(
+        f'--dask {address}: expected the address of a Dask scheduler, such as "tcp://host:8786"; '
+    )
+    assert len(told.err.splitlines()) == 2
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_a_worker_must_see(tmp_path):
+    from framearray_cli.parts.worker import unfit
+
+    scene, probe = tmp_path / "scene.glb", tmp_path / "out/records/.parts-1"
+    scene.write_bytes(b"scene")
+    probe.parent.mkdir(parents=True)
+    probe.touch()
+    good = {
+        "version": framearray_cli.__version__,
+        "table": {"scene": {"file": str(scene)}},
+        "folder": str(tmp_path / "out"),
+        "probe": str(probe),
+        "scene": digest(scene),
+    }
+    assert unfit(good) == ""
+    assert "has framearray" in unfit(good | {"version": "0.0.1"})
+    assert f"does not see the output folder {tmp_path / 'out'}" in unfit(good | {"probe": str(probe) + "2"})
+    assert "does not see the scene" in unfit(good | {"table": {"scene": {"file": str(tmp_path / "other.glb")}}})
+    scene.write_bytes(b"scenf")
+    assert "has another file" in unfit(good)
+
+
+def test_dask_is_not_loaded_without_it(tmp_path, capsys):
+    code = "import sys; from framearray_cli.cli import main\ntry: main()\nfinally: print('distributed' in sys.modules)"
+    job = write_job(tmp_path, **(JOB | {"camera": {"resolution": [24, 18]}}))
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(PACKAGE_PARENT), os.environ.get("PYTHONPATH", "")])}
+    command = [sys.executable, "-c", code, "render", "-q", str(job)]
+    assert subprocess.run(command, capture_output=True, text=True, env=environment, check=True).stdout == "False\n"

@@ -1,0 +1,175 @@
+"""`render --workers`: the bytes of the whole, also when workers are killed, and clear ends when something is wrong."""
+
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+import tiny
+from handed import JOB, WALK, N, begun_again, finished, lines, manifest, same
+from program import finish, run, start, wait_for, write_job
+from smalldisk import mounted
+
+pytest.importorskip("distributed", reason="Dask distributed is not installed (extra dask)")
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 there")
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a job, and with its array rendered in one run."""
+    folder = tmp_path_factory.mktemp("workers")
+    job = write_job(folder, **JOB)
+    assert finish(start("render", "-q", job, "-o", folder / "whole")).code == 0
+    return folder
+
+
+def workers_of(process: subprocess.Popen[str]) -> list[psutil.Process]:
+    """The worker processes of a render, in no order."""
+    try:
+        children = psutil.Process(process.pid).children(recursive=True)
+        return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+    except psutil.NoSuchProcess:
+        return []
+
+
+def images(out: Path) -> int:
+    return len(list(out.glob("tiny.c*")))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"reuse": {"n_r": "auto"}, "samples": {"hits": "auto"}, "ambient": {"paths": 512}},
+        {"samples": {"error": 0.1}},
+        {"samples": {"halves": True, "hits": 4}},
+        {"camera": WALK | {"keys": WALK["keys"][:1]}},
+    ],
+    ids=["plain", "auto", "error", "halves", "still"],
+)
+def test_the_bytes_are_those_of_the_whole(changes, tmp_path, monkeypatch):
+    if "error" in changes.get("samples", {}):  # in place of hits
+        monkeypatch.setitem(tiny.TABLE, "samples", {"obscurance": 5})
+    job = write_job(tmp_path, **(JOB | {"camera": WALK | {"resolution": [24, 18]}} | changes))
+    whole = finish(start("render", job, "-o", tmp_path / "whole"))
+    parts = finish(start("render", job, "--workers", 2, "--chunk", 7, "-o", tmp_path / "parts"))
+    assert (whole.code, parts.code, parts.err) == (0, 0, "")
+    assert same(tmp_path / "parts", tmp_path / "whole")
+    assert len(finished(tmp_path / "parts")) == N and not begun_again(tmp_path / "parts")
+    said = [line for line in whole.out.splitlines() if line.startswith(("ambient", "automatic", "error"))]
+    assert said and set(said) <= set(parts.out.splitlines())
+
+
+def test_a_difference_is_found(place, tmp_path):
+    """The comparison can fail."""
+    for name in ("whole", "other"):
+        (tmp_path / name).mkdir()
+        for file in (place / "whole").glob("*.*"):
+            (tmp_path / name / file.name).write_bytes(file.read_bytes())
+    assert same(tmp_path / "other", tmp_path / "whole")
+    file = next((tmp_path / "other").glob("tiny.c*"))
+    data = bytearray(file.read_bytes())
+    data[-1] ^= 1
+    file.write_bytes(data)
+    assert not same(tmp_path / "other", tmp_path / "whole")
+    file.unlink()
+    assert not same(tmp_path / "other", tmp_path / "whole")
+
+
+@pytest.mark.parametrize(
+    ("seed", "kills"),
+    [(1, 1), *(pytest.param(seed, kills, marks=pytest.mark.slow) for seed, kills in [(2, 1), (3, 2), (4, 3), (5, 5)])],
+)
+def test_a_killed_worker_costs_its_chunk(seed, kills, place, tmp_path):
+    rng, out = random.Random(seed), tmp_path / "out"
+    process = start("render", "-q", place / "job.toml", "--workers", 2, "--chunk", 6, "-o", out)
+    for kill in range(1, kills + 1):
+        enough = 3 * N * (kill - 1 + rng.uniform(0.2, 0.8)) / kills
+        wait_for(lambda enough=enough: images(out) >= enough, process)
+        rng.choice(workers_of(process)).send_signal(signal.SIGKILL)
+    told = finish(process)
+    assert (told.code, told.out, told.err) == (0, "", "")
+    assert same(out, place / "whole")
+    times = finished(out)
+    assert len(times) == N and set(times.values()) == {1}, "what was finished was not rendered anew"
+    again = begun_again(out)
+    assert sum(again.values()) <= kills
+    print(f"{kills} kills; chunks begun again: {again}")
+
+
+@pytest.mark.slow
+def test_a_chunk_that_kills_all_workers_is_given_up(place, tmp_path, monkeypatch):
+    """Dask gives it up at the first death here; then it is tried again for as long as it gets further."""
+    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "0")
+    out = tmp_path / "out"
+    process = start("render", "-q", place / "job.toml", "--workers", 1, "--chunk", N, "-o", out)
+    for kill in range(3):  # each once it has planned, and before its first image
+        wait_for(lambda kill=kill: sum(begun_again(out).values()) + bool(lines(out)) > kill, process)
+        workers_of(process)[0].kill()
+    told = finish(process)
+    assert (told.code, told.out) == (4, "")
+    assert told.err.startswith("cameras 0-23: workers died on them again and again")
+    monkeypatch.delenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES")
+    assert finish(start("render", "-q", place / "job.toml", "--workers", 1, "-o", out)).code == 0
+    assert same(out, place / "whole")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_all_workers(number, place, tmp_path):
+    """Sent to all processes, as a terminal does with Ctrl-C."""
+    out = tmp_path / "out"
+    process = start("render", place / "job.toml", "--workers", 2, "--chunk", 6, "-o", out, start_new_session=True)
+    wait_for(lambda: len(finished(out)) >= 4, process)
+    workers, sent = workers_of(process), time.monotonic()
+    for one in [process, *workers]:
+        one.send_signal(number)
+    told = finish(process)
+    assert time.monotonic() - sent < 5.0
+    assert told.code == 128 + number
+    word = "interrupted" if number == signal.SIGINT else "terminated"
+    done = sum(finished(out).values()) * 3
+    kept = f"{done} of {3 * N} images were written to {out}; the same command goes on with the rest"
+    assert told.err.splitlines() == [word, kept]
+    assert len(workers) == 2 and not any(worker.is_running() for worker in workers)
+    assert manifest(out)["summary"]["images"] == done
+    assert not [file for file in out.rglob(".*") if file.name != ".guard"]
+    assert finish(start("render", "-q", place / "job.toml", "-o", out)).code == 0
+    assert same(out, place / "whole")
+
+
+@pytest.mark.slow
+def test_a_full_disk_is_told_as_without_workers(place, tmp_path):
+    for disk in mounted(tmp_path / "disk", "size=1m"):
+        out = disk.folder / "out"
+        told = finish(start("render", "-q", place / "job.toml", "-o", out, "--workers", 2, "--chunk", 6))
+        assert (told.code, told.out) == (4, "")
+        first, free, kept = told.err.splitlines()
+        assert first.startswith(f"{out}/") and ": cannot be written: " in first
+        assert free.endswith(" are free on that disk")
+        done = sum(finished(out).values()) * 3
+        assert kept == f"{done} of {3 * N} images were written to {out}; the same command goes on with the rest"
+        disk.remount("size=64m")
+        assert finish(start("render", "-q", place / "job.toml", "-o", out, "--workers", 2, "--chunk", 6)).code == 0
+        assert same(out, place / "whole")
+
+
+def test_memory_is_shared(tmp_path, capsys):
+    job = write_job(tmp_path, **(JOB | {"render": {"memory": "1 GiB"}}))
+    told = run(capsys, "render", job, "--workers", 8)
+    assert told.code == 2
+    assert "8 workers share 1.0 GiB, fewer have more each" in told.err
+    assert not (tmp_path / "out/manifest.toml").exists()
+
+
+def test_options_that_do_not_go_together(tmp_path, capsys):
+    job = write_job(tmp_path, **JOB)
+    for options in (["--chunk", "3"], ["--workers", "2", "--dask", "tcp://a:1"], ["--dask", " "], ["--workers", "0"]):
+        told = run(capsys, "render", job, *options)
+        assert told.code == 2 and "--" in told.err
+    assert not (tmp_path / "out").exists()
