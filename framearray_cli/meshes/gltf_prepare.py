@@ -109,7 +109,9 @@ def prepare(gltf: Gltf, materials: list[GltfMaterial], plain: int, coloured: int
     Raises:
         SceneError: they take more memory than there is.
     """
-    for mesh in gltf.items("meshes"):
+    for number, mesh in enumerate(gltf.items("meshes")):
+        mesh["name"] = str(number)  # trimesh fails on some names, and takes `extras` for its own
+        mesh.pop("extras", None)
         mesh["primitives"] = [
             primitive
             for primitive in mesh["primitives"]
