@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from .arrays import Bytes, Float32, Image
 from .colour import linear_from_srgb8, srgb8_from_linear
-from .errors import OutputError
+from .errors import MissingExtraError, OutputError
 from .files import reason, refusal, whole_file, write_bytes
 from .imageattributes import FIXED_DATE, Attribute, Attributes
 
@@ -28,6 +28,7 @@ Extension = Literal["exr", "png", "tif", "jpg"]
 HALF_MAX = 65504.0  # the largest half; what lies beyond becomes infinite
 EXR_COMPRESSIONS = ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
 FLOAT_LAYERS = ("depth", "samples")  # layers that need more than the 11 bits of a half
+_OIIO_NAMES = {"exr": "openexr", "tif": "tiff"}
 _PILLOW_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
@@ -64,6 +65,26 @@ class ImageFormat:
             raise ValueError(f"expected exr, png, tif or jpg, got {self.format!r}")
         if not 1 <= self.quality <= 100:
             raise ValueError(f"expected a quality from 1 to 100, got {self.quality}")
+
+
+def require_writer(name: Extension) -> None:
+    """Make sure that a format can be written here, before any work is done: libraries may be built without it.
+
+    Raises:
+        MissingExtraError: it cannot.
+    """
+    if name in _OIIO_NAMES:
+        good, library = _oiio().ImageOutput.create(_OIIO_NAMES[name]) is not None, "OpenImageIO"
+        _oiio().geterror()  # clears what a failed attempt left behind
+    else:
+        import PIL.features
+
+        good, library = PIL.features.check_codec("jpg" if name == "jpg" else "zlib"), "Pillow"
+    if not good:
+        raise MissingExtraError(
+            f"{library} is built without {name.upper()} here; pip install --force-reinstall {library} brings a build "
+            "that has it, or choose another format"
+        )
 
 
 def write_image(
@@ -286,8 +307,10 @@ def _encode8(codes: Bytes, image_format: ImageFormat, attributes: Attributes) ->
 @cache
 def _oiio() -> Any:
     """Import OpenImageIO, with its own threads off: callers write several files at once instead."""
-    import OpenImageIO
-
+    try:
+        import OpenImageIO
+    except ImportError as error:
+        raise MissingExtraError(f"images need OpenImageIO ({error}); pip install OpenImageIO") from error
     OpenImageIO.attribute("threads", 1)
     OpenImageIO.attribute("exr_threads", -1)  # -1: compress in the calling thread; 1 would hand it to another
     return OpenImageIO

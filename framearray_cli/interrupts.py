@@ -3,9 +3,11 @@
 import os
 import signal
 import threading
+from contextlib import suppress
 from types import FrameType
 
 from .compiling import is_compiling
+from .errors import OutputError
 from .screen import err, out, say
 
 PATIENCE = 1.0  # seconds that threads get to end by themselves after a signal
@@ -24,10 +26,11 @@ class Stopped(BaseException):
 
 
 def listen() -> None:
-    """Turn signals into `Stopped` from now on."""
+    """Turn signals into `Stopped` from now on; a terminal may close without consequence where `nohup` says so."""
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):  # Windows lacks the last
-            signal.signal(getattr(signal, name), stop)
+        number = getattr(signal, name, None)  # Windows lacks the last
+        if number is not None and (name != "SIGHUP" or signal.getsignal(number) != signal.SIG_IGN):
+            signal.signal(number, stop)
 
 
 def stopped_by(error: BaseException | None) -> Stopped | None:
@@ -74,6 +77,7 @@ def _interrupt(signum: int, frame: FrameType | None) -> None:
 
 def _leave(stopped: Stopped) -> None:
     """End the process whatever its threads are doing."""
-    out.show_cursor()
-    say(err, [stopped.word])
+    with suppress(OutputError, OSError):  # a terminal that was closed
+        out.show_cursor()
+        say(err, [stopped.word])
     os._exit(stopped.exit_code)

@@ -147,12 +147,12 @@ def free_space(folder: Path) -> int:
     return shutil.disk_usage(_existing(folder)).free
 
 
-def takes_files(folder: Path) -> bool:
-    """Whether the disk of a folder has room for one more file, however small; some count files, too."""
+def free_files(folder: Path) -> int | None:
+    """How many more files the disk of a folder takes, however small; None where it does not count them."""
     if not hasattr(os, "statvfs"):  # Windows
-        return True
+        return None
     disk = os.statvfs(_existing(folder))
-    return disk.f_files == 0 or disk.f_favail > 0
+    return disk.f_favail if disk.f_files else None
 
 
 def _existing(folder: Path) -> Path:

@@ -7,6 +7,7 @@ into a file of its own (`records/0000-0047.jsonl`), so that parts may run side b
 
 import hashlib
 import json
+import os
 import re
 import threading
 from collections.abc import Iterable, Iterator, Mapping
@@ -141,6 +142,8 @@ class RecordWriter:
                 while left:  # a disk that becomes full takes a part
                     left = left[self._file.write(left) :]
                 self._torn = False
+                if not os.fstat(self._file.fileno()).st_nlink:
+                    raise OutputError(f"{self._path}: was removed while it was written; what it said is rendered again")
         except OSError as error:
             raise OutputError(f"{self._path}: cannot be written: {reason(error)}") from error
 

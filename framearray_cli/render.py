@@ -16,6 +16,7 @@ from .embree import EmbreeScene, Engine
 from .errors import OutputError
 from .folderlock import Folder
 from .frame import find_frame
+from .images import require_writer
 from .job import Job
 from .kernel import processor
 from .manifest import Manifest
@@ -181,7 +182,9 @@ def begun(
 
 def _planned(start: Begun, listener: Listener) -> tuple[Work, Ambient, Manifest, Counter[str]]:
     """Ambient light, hits and manifest of the whole array, and the rays that they took."""
-    prepared = start.prepared
+    prepared, output = start.prepared, start.prepared.job.output
+    for name in {output.format, "exr"} if output.layers else {output.format}:
+        require_writer(name)
     work, ambient = plan_work(prepared, start.embree)
     listener.planned(ambient)
     work, target = aimed(prepared, work, ambient)

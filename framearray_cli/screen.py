@@ -106,9 +106,10 @@ class Screen:
 
     def end(self) -> None:
         """Take the moving line away; what is counted is done."""
-        self._end_wait()
-        if self._bar is not None:
-            self._bar.stop()
+        with suppress(OSError):  # a terminal that was closed
+            self._end_wait()
+            if self._bar is not None:
+                self._bar.stop()
 
     def _end_wait(self) -> None:
         if self._status is not None:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias, get_args
 
@@ -12,9 +11,10 @@ import numpy as np
 from .arrays import Bytes, Float32, Image
 from .colour import srgb8_from_linear
 from .errors import JobError, OutputError
-from .images import Extension, ImageFormat, write_codes, write_image
+from .images import Extension, ImageFormat, require_writer, write_codes, write_image
 from .manifest import MAIN_AXIS, Manifest
 from .manifestfile import read_manifest
+from .movie.label import typeface
 from .pictures import Pictures
 from .places import MIDDLE, light_places, spread
 
@@ -80,8 +80,10 @@ def make_sheet(
     Raises:
         JobError: an axis or a place is not known, or nothing would be seen at that width.
         OutputError: an image is missing or damaged, or the target cannot be written.
+        MissingExtraError: labels cannot be drawn here, or the format not written.
     """
     image_format = _image_format(target, exposure)
+    require_writer(image_format.format)
     manifest = read_manifest(out)
     axis = side if side is not None else next(iter(manifest.axes))
     place = _place_beside(manifest, axis, at)
@@ -208,7 +210,7 @@ def _drawn(tiles: Float32, cameras: Sequence[int], labels: Sequence[str], heads:
     picture = PIL.Image.fromarray(sheet)
     draw = PIL.ImageDraw.Draw(picture)
     _write_heads(draw, heads, width)
-    font, grey = _font(LABEL_TEXT), (LABEL,) * 3
+    font, grey = typeface(LABEL_TEXT), (LABEL,) * 3
     names = [f"camera {c}" for c in cameras]
     if max(_length(name) for name in names) + LABEL_TEXT > step_x:
         names = [str(c) for c in cameras]
@@ -228,13 +230,13 @@ def _write_heads(draw: Any, heads: Sequence[str], width: int) -> None:
         shown = text
         while shown and left + _length(shown, size) > right:
             shown = shown.removesuffix("...")[:-1] and f"{shown.removesuffix('...')[:-1]}..."
-        draw.text((left, base), shown, font=_font(size), fill=(code,) * 3, anchor="ls")
+        draw.text((left, base), shown, font=typeface(size), fill=(code,) * 3, anchor="ls")
         left += _length(shown, size) + HEAD_TEXT
 
 
 def _length(text: str, size: int = LABEL_TEXT) -> float:
     """Pixels that a text takes."""
-    return float(_font(size).getlength(text))
+    return float(typeface(size).getlength(text))
 
 
 def _gutter(labels: Sequence[str]) -> int:
@@ -245,11 +247,3 @@ def _gutter(labels: Sequence[str]) -> int:
 def _every(length: float, step: int) -> int:
     """One label for how many images, so that they do not touch."""
     return max(1, math.ceil(length / step))
-
-
-@cache
-def _font(size: int) -> Any:
-    """Pillow's own typeface, the same everywhere; it has Latin letters alone."""
-    import PIL.ImageFont
-
-    return PIL.ImageFont.load_default(size)

@@ -2,12 +2,13 @@
 
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from ..errors import JobError
+from ..errors import JobError, OutputError
 from ..screen import err, say
 
 if TYPE_CHECKING:
@@ -78,8 +79,9 @@ def problems(error: JobError, outcome: str) -> list[str]:
 
 
 def fail(lines: Sequence[str], code: int) -> NoReturn:
-    """Print what is wrong and end the process."""
-    say(err, lines)
+    """Print what is wrong and end the process; the exit code tells it where nobody can read it."""
+    with suppress(OutputError, OSError):  # a terminal that was closed
+        say(err, lines)
     sys.exit(code)
 
 

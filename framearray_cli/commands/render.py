@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ..terms.ambient import Ambient
 
 LITTLE_SPACE = 64 * 1024 * 1024  # bytes; with less, a full disk is the likely reason of an error
+FEW_FILES = 100  # fewer than a run has open, and leaves when it fails
 
 
 def render(
@@ -155,10 +156,10 @@ def render_shown(
 
 def _add_space(error: OutputError, folder: Path) -> None:
     """Say it where little space is left on the disk that could not be written to."""
-    from ..outfolder import free_space, takes_files
+    from ..outfolder import free_files, free_space
 
     with suppress(OSError):  # that disk may have gone
         if (free := free_space(folder)) < LITTLE_SPACE:
             error.add_note(f"{size(free)} are free on that disk")
-        if not takes_files(folder):
-            error.add_note("that disk takes no more files: all of its inodes are used")
+        if (files := free_files(folder)) is not None and files < FEW_FILES:
+            error.add_note(f"that disk takes {files} more files (inodes)")

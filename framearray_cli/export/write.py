@@ -9,7 +9,7 @@ import numpy as np
 
 from ..colour import srgb8_from_linear
 from ..errors import JobError, OutputError
-from ..images import ImageFormat
+from ..images import ImageFormat, require_writer
 from ..manifestfile import read_manifest
 from ..pictures import Pictures
 from ..places import ALL, MIDDLE, indices, light_places
@@ -90,6 +90,7 @@ def export(
     wanted = image_format or ImageFormat(format="png")
     if kind == "cinema" and target.suffix != cinema.SUFFIX:
         target = target.with_name(f"{target.name}{cinema.SUFFIX}")
+    require_writer(wanted.format)
     pictures, frames = Pictures(manifest), selection.frames
     with whole_folder(target, _MARKS[kind], force=force) as folder:
         (folder / "images").mkdir()

@@ -1,4 +1,4 @@
-"""GLB or glTF bytes <-> a JSON tree and one block of binary data."""
+"""GLB or glTF bytes -> a JSON tree and one block of binary data."""
 
 import base64
 import json
@@ -18,12 +18,11 @@ JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
 
 @dataclass(slots=True)
 class Gltf:
-    """A glTF file in memory: its JSON, which may be edited, and all its buffers as one block."""
+    """A glTF file in memory: its JSON and all its buffers as one block."""
 
     tree: Tree
     blob: bytes
-    extra: list[bytes] = field(default_factory=list)  # data appended behind `blob`
-    extra_size: int = 0
+    _read: dict[int, NDArray[Any]] = field(default_factory=dict)  # accessors, each of which is read once
 
     def items(self, key: str) -> list[Tree]:
         """A top-level list of the JSON, empty where it is missing."""
@@ -36,25 +35,13 @@ class Gltf:
         start = view.get("byteOffset", 0)
         return self.blob[start : start + view["byteLength"]]
 
-    def append_accessor(self, values: NDArray[Any], component: int, kind: str) -> int:
-        """Store an array behind the file's data; return the index of its new accessor."""
-        data = np.ascontiguousarray(values, dtype=COMPONENTS[component]).tobytes()
-        view = {"buffer": 0, "byteOffset": len(self.blob) + self.extra_size, "byteLength": len(data)}
-        padded = data + b"\0" * (-len(data) % 4)
-        self.extra.append(padded)
-        self.extra_size += len(padded)
-        self.tree.setdefault("bufferViews", []).append(view)
-        accessor = {
-            "bufferView": len(self.tree["bufferViews"]) - 1,
-            "componentType": component,
-            "count": len(values),
-            "type": kind,
-        }
-        self.tree.setdefault("accessors", []).append(accessor)
-        return len(self.tree["accessors"]) - 1
-
     def read_accessor(self, index: int) -> NDArray[Any]:
         """(count, width) values of an accessor; normalised integers become floats, sparse values are filled in."""
+        if index not in self._read:
+            self._read[index] = self._values(index)
+        return self._read[index]
+
+    def _values(self, index: int) -> NDArray[Any]:
         accessor = self.tree["accessors"][index]
         dtype = np.dtype(COMPONENTS[accessor["componentType"]]).newbyteorder("<")
         width, count = WIDTHS[accessor["type"]], int(accessor["count"])
@@ -71,20 +58,7 @@ class Gltf:
                 raise ValueError(f"accessors[{index}]: expected sparse places below {count}, got {places.max()}")
             values = values.copy()
             values[places] = self._rows(what["bufferView"], what.get("byteOffset", 0), dtype, n, width)
-        if accessor.get("normalized") and dtype.kind in "iu":
-            largest = 2.0 ** (8 * dtype.itemsize - (dtype.kind == "i")) - 1.0
-            return np.asarray(np.maximum(values.astype(np.float64) / largest, -1.0))
-        return np.asarray(values)
-
-    def to_glb(self) -> bytes:
-        """Serialise as one GLB with one binary chunk."""
-        blob = b"".join([self.blob, *self.extra])
-        self.tree["buffers"] = [{"byteLength": len(blob)}]
-        text = json.dumps(self.tree).encode()
-        text += b" " * (-len(text) % 4)
-        chunks = struct.pack("<II", len(text), JSON_CHUNK) + text
-        chunks += struct.pack("<II", len(blob), BIN_CHUNK)
-        return MAGIC + struct.pack("<II", 2, 12 + len(chunks) + len(blob)) + chunks + blob
+        return normalised(values, accessor)
 
     def _rows(self, view_index: int, offset: int, dtype: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
         """(count, width) copy of strided data; raises ValueError where the view is too short."""
@@ -97,6 +71,14 @@ class Gltf:
             raise ValueError(f"bufferViews[{view_index}] is too short for {count} elements")
         rows = np.lib.stride_tricks.as_strided(data, (count, row), (stride, 1))
         return np.ascontiguousarray(rows).view(dtype).reshape(count, width)
+
+
+def normalised(values: NDArray[Any], accessor: Tree) -> NDArray[Any]:
+    """Values of an accessor; integers that stand for numbers from 0 or -1 to 1 become these."""
+    if accessor.get("normalized") and values.dtype.kind in "iu":
+        largest = 2.0 ** (8 * values.dtype.itemsize - (values.dtype.kind == "i")) - 1.0
+        return np.asarray(np.maximum(values.astype(np.float64) / largest, -1.0))
+    return np.asarray(values)
 
 
 def open_gltf(data: bytes, assets: Assets) -> Gltf:

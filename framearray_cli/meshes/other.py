@@ -14,7 +14,7 @@ from .model import Material, Meshes, Notes, Part
 from .mtl import limited
 from .opacity import blended
 from .textures import TextureTable
-from .walk import instances, place
+from .walk import file_normals, instances, place
 
 BYTE = 255.0
 HINT = "; install it (for COLLADA: pip install pycollada), or convert the file to GLB"
@@ -48,6 +48,7 @@ def readable_formats() -> set[str]:
 
 def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
     """Read a file of any format that trimesh knows."""
+    import PIL.Image  # noqa: F401  (trimesh reads no texture without it, and does not say so)
     import trimesh
 
     notes = Notes()
@@ -81,16 +82,21 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
                 else default_material(coloured, notes)
             )
         uv = mesh.visual.uv if textured and materials[numbers[key]].texture >= 0 else None
-        part, lost = place(
-            mesh,
-            world_from_mesh,
-            numbers[key],
-            uvs=None if uv is None else np.array(uv, dtype=np.float64),
-            colours=vertex_colours,
-            face_colours=face_colours,
+        vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+        inside = ((faces >= 0) & (faces < len(vertices))).all(axis=1)
+        outside += int((~inside).sum())
+        parts.append(
+            place(
+                vertices,
+                faces[inside],
+                world_from_mesh,
+                numbers[key],
+                normals=file_normals(mesh),
+                uvs=None if uv is None else np.array(uv, dtype=np.float64),
+                colours=vertex_colours,
+                face_colours=None if face_colours is None else face_colours[inside],
+            )
         )
-        parts.append(part)
-        outside += lost
     return Meshes(
         parts=tuple(parts),
         materials=tuple(materials),

@@ -13,7 +13,7 @@ from ..errors import SceneError
 from .assets import AssetError, Assets
 from .container import open_gltf
 from .gltf import read_gltf
-from .gltf_prepare import check_readable
+from .gltf_nodes import check_readable
 from .gltf_stage import Stage, read_gltf_stage
 from .limit import Limit
 from .model import Meshes
@@ -112,8 +112,6 @@ def _bytes_of(file: Path, limit: Limit) -> bytes:
 
 
 def _read(data: bytes, extension: str, assets: Assets) -> Meshes:
-    import PIL.Image  # noqa: F401  (trimesh reads no texture without it, and does not say so)
-
     if extension in ("glb", "gltf"):
         return read_gltf(data, assets)
     if extension == "obj":

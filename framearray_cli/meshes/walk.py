@@ -1,9 +1,10 @@
-"""trimesh scene -> its triangle meshes in place, one an instance."""
+"""Meshes into their places in the scene; and those of a trimesh scene, one an instance."""
 
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Float32, Float64
 from .model import Part
@@ -21,56 +22,50 @@ def instances(scene: Any) -> Iterator[tuple[Any, Float64]]:
 
 
 def place(
-    mesh: Any,
+    vertices: Float64,
+    faces: NDArray[np.int64],
     world_from_mesh: Float64,
     material: int,
     *,
+    normals: Float64 | None,
     uvs: Float64 | None,
     colours: Float32 | None,
     face_colours: Float32 | None = None,
-) -> tuple[Part, int]:
+) -> Part:
     """Put a mesh where its node says, in float64, one row a triangle corner.
 
     A mirrored transform turns triangles inside out: their winding is turned back. Normals go with the
     cofactors of the matrix, which are its inverse transpose times its determinant and exist for flat matrices too.
 
     Args:
-        mesh: a trimesh.Trimesh.
+        vertices: (v, 3).
+        faces: (f, 3), all of them between 0 and v.
         world_from_mesh: (4, 4).
         material: number that the part gets.
+        normals: (v, 3) that the file gives.
         uvs: (v, 2) a vertex.
         colours: (v, 3) a vertex.
         face_colours: (f, 3) a face; count where `colours` is None.
-
-    Returns:
-        The part, and how many triangles have an index out of range.
     """
-    vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
-    inside = ((faces >= 0) & (faces < len(vertices))).all(axis=1)
-    lost = int((~inside).sum())
-    faces = faces[inside]
     linear = world_from_mesh[:3, :3]
     with np.errstate(all="ignore"):  # non-finite vertices are counted and dropped by whoever takes the part
         world = vertices @ linear.T + world_from_mesh[:3, 3]
         determinant = float(np.linalg.det(linear))
+        if normals is not None:
+            normals = normals @ (cofactors(linear) * (-1.0 if determinant < 0 else 1.0)).T
     if determinant < 0:
         faces = faces[:, ::-1]
-    normals = file_normals(mesh)
-    if normals is not None:
-        with np.errstate(all="ignore"):
-            normals = normals @ (cofactors(linear) * (-1.0 if determinant < 0 else 1.0)).T
     if colours is not None:
         colours = colours[faces]
     elif face_colours is not None:
-        colours = np.repeat(face_colours[inside][:, None], 3, axis=1)
-    part = Part(
+        colours = np.repeat(face_colours[:, None], 3, axis=1)
+    return Part(
         material=material,
         corners=world[faces],
         normals=None if normals is None else normals[faces],
         uvs=None if uvs is None else uvs[faces],
         colours=colours,
     )
-    return part, lost
 
 
 def cofactors(matrix: Float64) -> Float64:

@@ -16,7 +16,7 @@ from typing import Any, BinaryIO, Protocol
 from numpy.typing import NDArray
 
 from ..arrays import Bytes
-from ..errors import OutputError
+from ..errors import MissingExtraError, OutputError
 from ..files import whole_file
 
 GIF_UNITS, WEBP_UNITS = 100, 1000  # of time, a second
@@ -32,6 +32,23 @@ def delays(n: int, fps: Fraction, units: int) -> list[int]:
     """Spread n frames over whole units of time, so that none is off by more than half a unit, nor the whole length."""
     ends = [round(k * units / fps) for k in range(n + 1)]
     return [end - start for start, end in pairwise(ends)]
+
+
+def require_animation(suffix: str) -> None:
+    """Make sure that a kind of animation can be made here.
+
+    Args:
+        suffix: one of ANIMATIONS.
+
+    Raises:
+        MissingExtraError: Pillow is built without WebP.
+    """
+    import PIL.features
+
+    if suffix == ".webp" and not PIL.features.check("webp"):
+        raise MissingExtraError(
+            "Pillow is built without WebP here; pip install --force-reinstall Pillow brings it, or choose another kind"
+        )
 
 
 class _Kind(Protocol):

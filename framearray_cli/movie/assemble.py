@@ -13,16 +13,18 @@ from numpy.typing import NDArray
 from ..errors import OutputError
 from ..files import folder_for
 from ..imagecheck import check_image
+from ..images import require_writer
 from ..manifest import Manifest
 from ..manifestfile import read_manifest
 from ..pictures import Pictures, Relight
-from .animation import ANIMATIONS, open_animation
+from .animation import ANIMATIONS, open_animation, require_animation
+from .label import SMALLEST, typeface
 from .look import Look, place_text, shown
 from .pathfile import Mode, MoviePath, load_movie_path
-from .sequence import check_look, sequence_pattern, write_sequence
+from .sequence import check_look, kind, sequence_pattern, write_sequence
 from .sweep import Sweep, swept
 from .timeline import Shot, Timeline, timeline
-from .video import VIDEOS, open_video, require_av
+from .video import VIDEOS, open_video, require_encoder
 
 Progress: TypeAlias = Callable[[int, int], None]  # frames done, frames in all
 
@@ -76,22 +78,27 @@ def assemble(
     Raises:
         JobError: the path is broken or asks for what the array has not.
         OutputError: an image is missing or damaged, or the target cannot be written.
-        MissingExtraError: a movie is asked for and PyAV is not installed.
+        MissingExtraError: a movie is asked for and PyAV is not installed, or an encoder or typeface is missing.
     """
     manifest = read_manifest(out)
     movie = swept(path, manifest) if isinstance(path, Sweep) else load_movie_path(path)
     movie = _with(movie, fps, positions)
     line = timeline(f"--{path.kind}" if isinstance(path, Sweep) else path, movie, manifest)
     pictures = Pictures(manifest)
+    if look.label:
+        typeface(SMALLEST)
     report = progress or (lambda done, total: None)
     if target.suffix.lower() in MOVIES:
         if target.suffix.lower() in VIDEOS:
-            require_av()
+            require_encoder(target.suffix.lower())
+        else:
+            require_animation(target.suffix.lower())
         _check_images(pictures, line)
         _write_movie(pictures, line, target, look, report)
     else:
         pattern = sequence_pattern(target, _own_suffix(manifest), MOVIES)
         check_look(pattern, look)
+        require_writer(kind(pattern)[1:])  # type: ignore[arg-type]  # checked by sequence_pattern
         _check_images(pictures, line)
         write_sequence(pictures, line, pattern, look, report)
         target = pattern.parent

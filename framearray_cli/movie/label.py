@@ -1,12 +1,13 @@
 """A text burnt into the lower left corner of a picture, in Pillow's own font."""
 
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Float32
+from ..errors import MissingExtraError
 
 LINES_A_PICTURE = 18  # heights of the text in that of the picture
 SMALLEST = 10  # pixels; smaller letters cannot be read
@@ -32,12 +33,32 @@ def burn(codes: NDArray[Any], text: str) -> NDArray[Any]:
     return burnt
 
 
+@cache
+def typeface(size: int) -> Any:
+    """Pillow's own typeface, the same everywhere; it has Latin letters alone.
+
+    Args:
+        size: of the letters, pixels.
+
+    Raises:
+        MissingExtraError: Pillow is built without FreeType, which draws it.
+    """
+    from PIL import ImageFont
+
+    try:
+        return ImageFont.load_default(size)
+    except ImportError as error:
+        raise MissingExtraError(
+            f"labels need Pillow with FreeType ({error}); pip install --force-reinstall Pillow brings it"
+        ) from error
+
+
 @lru_cache(64)
 def _letters(text: str, size: int) -> Float32:
     """Draw a text with a margin around it: (h, w), 1 where a letter is."""
-    from PIL import Image, ImageDraw, ImageFont
+    from PIL import Image, ImageDraw
 
-    font = ImageFont.load_default(size)
+    font = typeface(size)
     margin = size // 3
     _, top, right, bottom = font.getbbox("0123456789clp" + text)
     right = font.getbbox(text)[2]

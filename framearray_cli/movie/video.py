@@ -74,6 +74,35 @@ def require_av() -> ModuleType:
     return module
 
 
+def require_encoder(suffix: str) -> None:
+    """Make sure that a kind of movie can be made here; PyAV may be built without an encoder.
+
+    Args:
+        suffix: one of VIDEOS.
+
+    Raises:
+        MissingExtraError: it cannot.
+    """
+    if _can_make(suffix):
+        return
+    others = [other for other in VIDEOS if _can_make(other)]
+    choose = f"; {', '.join(others)} can be made here" if others else ""
+    raise MissingExtraError(
+        f"{suffix}: PyAV is built without {VIDEOS[suffix].codec} here; pip install --force-reinstall av brings a build "
+        f"that has it{choose}"
+    )
+
+
+def _can_make(suffix: str) -> bool:
+    av, kind = require_av(), VIDEOS[suffix]
+    try:
+        av.Codec(kind.codec, "w")
+        av.ContainerFormat(kind.format, "w")
+    except ValueError:
+        return False
+    return True
+
+
 class VideoWriter:
     """A movie that is being encoded; made by `open_video`."""
 

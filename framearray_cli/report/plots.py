@@ -1,9 +1,11 @@
 """The door to matplotlib: a report's plots, as SVG."""
 
+import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from ..files import write_bytes
 from .measure import Measured
 from .run import Report
 from .settings import LIGHT_REUSE, SCRATCH
@@ -13,7 +15,11 @@ CYCLE = ("#2b6cb0", "#2f855a", "#b7791f", "#6b46c1", "#0987a0", "#b83280", "#9c4
 
 
 def draw_plots(report: Report) -> dict[str, str]:
-    """Draw every plot into the report's folder; returns what it shows -> file name."""
+    """Draw every plot into the report's folder; returns what it shows -> file name.
+
+    Raises:
+        OutputError: one cannot be written.
+    """
     import matplotlib
 
     matplotlib.use("svg")
@@ -41,7 +47,9 @@ def _draw(file: Path, draw: Callable[[Report, Any], None], report: Report) -> bo
         if not axes.has_data():
             return False
         axes.grid(alpha=0.3, which="both")
-        figure.savefig(file, metadata={"Date": None, "Creator": None})
+        drawn = io.BytesIO()
+        figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
+        write_bytes(file, drawn.getvalue())
     finally:
         pyplot.close(figure)
     return True

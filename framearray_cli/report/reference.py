@@ -5,6 +5,7 @@ stays right when the estimate of I_A changes, and says what a light alone does.
 """
 
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
@@ -81,7 +82,7 @@ def reference(case: Case, c: int, l: Sequence[int], folder: Path, passes: int = 
     key = fingerprint(pixels, average, repr((c, list(l), HITS, passes, case.work.cams.width)).encode())
     file = folder / f"reference-{sha256(key.encode()).hexdigest()[:16]}.npz"
     names = ("light", "indirect", "reflectivity", "normal", "depth")
-    if file.is_file():
+    if os.path.isfile(file):
         with np.load(file) as kept:
             return Reference(**{name: kept[name] for name in names}, hits=HITS * passes)
     made = _render(under(case, l), c, passes)

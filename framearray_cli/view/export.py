@@ -49,14 +49,23 @@ def export(tiles: Tiles, target: Path) -> int:
         for name, data in page_files().items():
             (part / name).write_bytes(data)
         shutil.copyfile(tiles.folder / INDEX, part / INDEX)
-        shutil.copytree(tiles.folder / TILES, part / TILES, ignore=shutil.ignore_patterns(".*"))
+        _copy_tiles(tiles.folder / TILES, part / TILES)
         if target.exists():
             os.replace(target, old)
         os.replace(part, target)
-    except (OSError, shutil.Error) as error:
-        why = reason(error) if isinstance(error, OSError) and error.strerror else str(error)
-        raise OutputError(f"{target}: cannot be written: {why}") from error
+    except OSError as error:
+        raise OutputError(f"{target}: cannot be written: {reason(error)}") from error
     finally:
         shutil.rmtree(part, ignore_errors=True)
         shutil.rmtree(old, ignore_errors=True)
     return sum(file.stat().st_size for file in target.rglob("*") if file.is_file())
+
+
+def _copy_tiles(source: Path, target: Path) -> None:
+    """Copy all tiles; `shutil.copytree` would try every file of thousands on a full disk."""
+    for folder, _, names in os.walk(source):
+        there = target / Path(folder).relative_to(source)
+        there.mkdir()
+        for name in names:
+            if not name.startswith("."):
+                shutil.copyfile(Path(folder, name), there / name)

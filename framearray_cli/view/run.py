@@ -1,5 +1,6 @@
 """Shows an array in the browser, or exports the page: the only file that wires tiles, server and export."""
 
+import os
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
@@ -8,6 +9,7 @@ from pathlib import Path
 
 from ..errors import OutputError
 from ..files import make_folder
+from ..images import require_writer
 from ..manifestfile import read_manifest
 from .export import check_target, export
 from .prepare import prepare_all
@@ -28,6 +30,7 @@ def open_tiles(out: Path, cache: Path | None, threads: int) -> Tiles:
         OutputError: the manifest cannot be read, or the folder not written to.
     """
     manifest = read_manifest(out)
+    require_writer("jpg")
     folder = manifest.directory / FOLDER if cache is None else cache
     try:
         make_folder(folder)
@@ -87,7 +90,7 @@ def write_page(
     Raises:
         OutputError: the target holds other files or cannot be written.
     """
-    target = target.resolve()  # "." has no name to put another beside
+    target = Path(os.path.realpath(target))  # "." has no name to put another beside
     check_target(target)
     problems = prepare_all(tiles, threads, progress)
     return export(tiles, target), problems

@@ -19,7 +19,7 @@ jobvalues jobtimes jobkeys jobmethod job jobschema jobdocs problems eyefile jobf
 meshes/limit meshes/model meshes/assets meshes/gltf_check meshes/container meshes/headers
 meshes/defaults meshes/cleaning
 meshes/polygons meshes/merge meshes/overrides meshes/textures meshes/opacity meshes/mtl meshes/walk
-meshes/gltf_materials meshes/gltf_motion meshes/gltf_prepare meshes/gltf_stage
+meshes/gltf_materials meshes/gltf_motion meshes/gltf_triangles meshes/gltf_nodes meshes/gltf_stage
 meshes/gltf meshes/obj meshes/other meshes/read meshes/__init__
 scene sun paths camera lights sampling surface
 embree/packets embree/masks embree/native embree/fallback embree/__init__
@@ -156,7 +156,7 @@ def test_each_library_has_one_door(library: str) -> None:
 def test_imports_are_seen() -> None:
     """The tests above can fail: what they look for is there to be found."""
     assert {"window", "frame", "writer", "terms/ambient"} <= imported("render")
-    assert "errors" in imported("meshes/gltf_prepare") and "surface" in imported("embree/masks")
+    assert "errors" in imported("meshes/gltf_nodes") and "surface" in imported("embree/masks")
     assert {"embreex", "ctypes"} <= libraries("embree/native")
 
 

@@ -561,14 +561,18 @@ def test_what_cannot_be_read_is_one_clear_error(tmp_path, capfd, name, data, exp
     assert capfd.readouterr() == ("", "")
 
 
-def test_without_pillow_nothing_is_read(tmp_path, monkeypatch):
+def test_without_pillow_no_texture_is_lost_in_silence(tmp_path, monkeypatch):
     glb = Glb()
-    glb.node(glb.mesh())
+    texture = glb.texture(png(np.full((2, 2, 3), 200)))
+    glb.node(glb.mesh(glb.material("a", {"baseColorTexture": {"index": texture}}), TEXCOORD_0=glb.accessor(QUAD_UVS)))
     file = glb.save(tmp_path / "a.glb")
     monkeypatch.setitem(sys.modules, "PIL", None)
     monkeypatch.delitem(sys.modules, "PIL.Image", raising=False)
     with pytest.raises(SceneError, match="pip install Pillow"):
         read_meshes(file)
+    (tmp_path / "a.ply").write_text("ply\n")
+    with pytest.raises(SceneError, match="pip install Pillow"):
+        read_meshes(tmp_path / "a.ply")
 
 
 def test_help_never_waits_for_trimesh():

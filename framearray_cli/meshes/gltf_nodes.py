@@ -1,0 +1,145 @@
+"""Nodes of a glTF file: what can be read of them, and every place where a mesh stands."""
+
+import importlib.util
+
+import numpy as np
+
+from ..arrays import Float64
+from ..errors import SceneError
+from .container import Gltf
+from .gltf_check import Tree
+from .gltf_materials import KNOWN, SILENT
+from .gltf_motion import AT_REST, PATHS, at_rest, rotations
+from .gltf_triangles import triangle_count
+from .limit import Limit
+from .model import Notes
+
+# Memory that a triangle takes while a scene is read, at least: measured 460 to 800 bytes, with texture coordinates,
+# normals and colours; and a place of a mesh.
+TRIANGLE_BYTES, PLACE_BYTES = 450, 1000
+INSTANCE_KEYS = {"TRANSLATION": "translation", "ROTATION": "rotation", "SCALE": "scale"}
+HANDLED = KNOWN | SILENT | {"KHR_texture_transform", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}
+HANDLED |= {"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_materials_unlit"}
+
+
+def check_readable(gltf: Gltf) -> None:
+    """Refuse what would load as nothing or as garbage.
+
+    Raises:
+        SceneError: compressed geometry, no scene, or a node graph with a cycle.
+    """
+    used = set(gltf.tree.get("extensionsUsed") or [])
+    for meshopt in ("EXT_meshopt_compression", "KHR_meshopt_compression"):
+        if meshopt in used:
+            raise SceneError(f"the geometry is compressed with {meshopt}, which cannot be read; export without it")
+    if "KHR_draco_mesh_compression" in used and importlib.util.find_spec("DracoPy") is None:
+        raise SceneError(
+            "the geometry is compressed with Draco; install DracoPy (pip install DracoPy) or export without it"
+        )
+    if not gltf.items("scenes"):
+        raise SceneError("expected a scene in the file, got none; nothing says which nodes to show")
+    _check_nodes(gltf)
+
+
+def _check_nodes(gltf: Gltf) -> None:
+    """Raise where a node is its own ancestor, by taking away leaves until none is left."""
+    nodes = gltf.items("nodes")
+    waiting = [len(node.get("children") or []) for node in nodes]
+    parents: list[list[int]] = [[] for _ in nodes]
+    for index, node in enumerate(nodes):
+        for child in node.get("children") or []:
+            parents[child].append(index)
+    leaves = [index for index, count in enumerate(waiting) if count == 0]
+    gone = 0
+    while leaves:
+        gone += 1
+        for parent in parents[leaves.pop()]:
+            waiting[parent] -= 1
+            if waiting[parent] == 0:
+                leaves.append(parent)
+    if gone < len(nodes):
+        cyclic = next(index for index, count in enumerate(waiting) if count > 0)
+        raise SceneError(f"nodes[{cyclic}] is below itself: the node graph has a cycle")
+    if any(len(found) > 1 for found in parents):
+        raise SceneError("a node has several parents, which glTF forbids; export the file anew")
+
+
+def used_materials(gltf: Gltf) -> set[int]:
+    """Indices of the materials that some primitive has."""
+    primitives = [primitive for mesh in gltf.items("meshes") for primitive in mesh["primitives"]]
+    return {primitive["material"] for primitive in primitives if "material" in primitive}
+
+
+def note_unread(gltf: Gltf, notes: Notes) -> None:
+    """Note what the file has and the renderer does not show."""
+    for extension in sorted(set(gltf.tree.get("extensionsUsed") or []) - HANDLED):
+        if extension == "KHR_lights_punctual":
+            notes.add("lights in the scene file are left out; the job gives the lights")
+        elif not extension.startswith("KHR_materials_"):  # those are noted with their materials
+            notes.add(f"{extension} is left out")
+    if gltf.items("animations"):
+        notes.add("animations are left out; everything stands in its rest pose")
+    if gltf.items("skins"):
+        notes.add("skins are left out; meshes stand in their rest pose")
+    if len(gltf.items("scenes")) > 1:
+        notes.add("only the file's default scene is read")
+    if any(primitive.get("targets") for mesh in gltf.items("meshes") for primitive in mesh["primitives"]):
+        notes.add("morph targets are left out")
+
+
+def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64]]:
+    """Every mesh that the default scene shows, by its number, with its places: (n, 4, 4) `world_from_mesh`.
+
+    Args:
+        limit: counts triangles and places, before they are there.
+
+    Raises:
+        SceneError: they take more memory than there is.
+    """
+    nodes, meshes = gltf.items("nodes"), gltf.items("meshes")
+    triangles = [sum(triangle_count(gltf, primitive) for primitive in mesh["primitives"]) for mesh in meshes]
+    scene = gltf.tree["scenes"][gltf.tree.get("scene") or 0]
+    waiting = [(node, np.eye(4)) for node in reversed(scene.get("nodes") or [])]
+    placed: list[tuple[int, Float64]] = []
+    seen: set[int] = set()
+    while waiting:
+        index, world_from_parent = waiting.pop()
+        if index in seen:
+            continue
+        seen.add(index)
+        node = nodes[index]
+        world_from_node = world_from_parent @ at_rest(node)
+        waiting += [(child, world_from_node) for child in reversed(node.get("children") or [])]
+        mesh = node.get("mesh")
+        if mesh is None:
+            continue
+        places = _places(gltf, node, limit)
+        limit.take("triangles", TRIANGLE_BYTES * triangles[mesh] * len(places))
+        limit.take("places", PLACE_BYTES * len(places))
+        placed.append((mesh, world_from_node @ places))
+    return placed
+
+
+def _places(gltf: Gltf, node: Tree, limit: Limit) -> Float64:
+    """(n, 4, 4) transforms of the instances of a node in the node; of a plain node, one that changes nothing."""
+    instancing = (node.get("extensions") or {}).get("EXT_mesh_gpu_instancing")
+    if instancing is None:
+        return np.eye(4)[None]
+    found = {INSTANCE_KEYS[name]: number for name, number in instancing["attributes"].items() if name in INSTANCE_KEYS}
+    if not found:
+        raise ValueError("EXT_mesh_gpu_instancing: expected TRANSLATION, ROTATION or SCALE, got none of them")
+    count = min(gltf.tree["accessors"][number]["count"] for number in found.values())
+    limit.take("instances", PLACE_BYTES * count)
+    tables = {path: np.tile(np.array(AT_REST[path], dtype=np.float64), (count, 1)) for path in PATHS}
+    for path, number in found.items():
+        table = gltf.read_accessor(number)
+        if table.shape[1] != tables[path].shape[1]:
+            raise ValueError(f"EXT_mesh_gpu_instancing: expected {tables[path].shape[1]} numbers for each {path}")
+        tables[path] = table[:count].astype(np.float64)
+    with np.errstate(all="ignore"):
+        length = np.linalg.norm(tables["rotation"], axis=1, keepdims=True)
+        turn = np.where(length > 0, tables["rotation"] / length, AT_REST["rotation"])
+    places = np.tile(np.eye(4), (count, 1, 1))
+    places[:, :3, :3] = rotations(turn) * tables["scale"][:, None, :]
+    places[:, :3, 3] = tables["translation"]
+    return places

@@ -1,0 +1,168 @@
+"""glTF primitives -> triangles: lists, strips and fans, plain, sparse or compressed with Draco."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Float32, Float64
+from .container import Gltf, normalised
+from .defaults import clean_colours
+from .gltf_check import TRIANGLES, Tree
+from .gltf_materials import GltfMaterial
+from .model import Notes
+
+LIST, STRIP, FAN = TRIANGLES
+DRACO = "KHR_draco_mesh_compression"
+
+Attributes = dict[str, NDArray[Any]]  # name -> (v, width)
+Faces = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Triangles:
+    """f triangles of one material between v vertices, in the coordinates of their mesh.
+
+    Attributes:
+        material: number.
+        vertices: (v, 3).
+        faces: (f, 3), all of them between 0 and v.
+        normals: (v, 3), or None.
+        uvs: (v, 2) with v upwards, or None.
+        colours: (v, 3) linear, or None.
+        outside: triangles that are left out because a vertex of theirs is not there.
+    """
+
+    material: int
+    vertices: Float64
+    faces: Faces
+    normals: Float64 | None
+    uvs: Float64 | None
+    colours: Float32 | None
+    outside: int
+
+
+def triangle_count(gltf: Gltf, primitive: Tree) -> int:
+    """How many triangles a primitive says that it has."""
+    number = primitive.get("indices", primitive["attributes"].get("POSITION"))
+    mode = primitive.get("mode", LIST)
+    if number is None or mode not in TRIANGLES:
+        return 0
+    corners = int(gltf.tree["accessors"][number]["count"])
+    return corners // 3 if mode == LIST else max(corners - 2, 0)
+
+
+def read_triangles(gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], notes: Notes) -> Triangles | None:
+    """Read one primitive; None where it holds no triangles.
+
+    Args:
+        materials: what those of the file were mapped to; the numbers behind them stand for none, with and without
+            colours at the vertices.
+        notes: takes what is left out.
+    """
+    mode = primitive.get("mode", LIST)
+    if mode not in TRIANGLES:
+        notes.add("points and lines are left out")
+        return None
+    if "POSITION" not in primitive["attributes"]:
+        notes.add("primitives without positions are left out")
+        return None
+    number = primitive.get("material")
+    material = None if number is None else materials[number]
+    uv_name = f"TEXCOORD_{material.uv_set}" if material is not None and material.uv_set >= 0 else ""
+    found, indices = _arrays(gltf, primitive, ("POSITION", "NORMAL", "COLOR_0", uv_name))
+    count = len(found["POSITION"])
+    for name in [name for name, values in found.items() if len(values) != count]:
+        notes.add(f"{name} of another length than POSITION is left out")
+        del found[name]
+    faces = _faces(np.arange(count, dtype=np.int64) if indices is None else indices, mode, notes)
+    if faces is None:
+        return None
+    inside = ((faces >= 0) & (faces < count)).all(axis=1)
+    kept = faces[inside]
+    if kept.size < count:  # many primitives may share the vertices of all
+        found = {name: values[kept.reshape(-1)] for name, values in found.items()}
+        kept = np.arange(kept.size, dtype=np.int64).reshape(-1, 3)
+    if number is None:
+        number = len(materials) + ("COLOR_0" in found)
+    normals, uvs = found.get("NORMAL"), found.get(uv_name)
+    return Triangles(
+        material=number,
+        vertices=found["POSITION"].astype(np.float64),
+        faces=kept,
+        normals=None if normals is None else normals.astype(np.float64),
+        uvs=None if uvs is None or material is None else _uvs(uvs, material, notes),
+        colours=_colours(found["COLOR_0"], notes) if "COLOR_0" in found else None,
+        outside=int((~inside).sum()),
+    )
+
+
+def _arrays(gltf: Gltf, primitive: Tree, names: tuple[str, ...]) -> tuple[Attributes, Faces | None]:
+    """Those of the named attributes that there are, and the indices, if any."""
+    attributes: Mapping[str, int] = primitive["attributes"]
+    packed: Attributes = {}
+    indices: NDArray[Any] | None = None
+    draco = (primitive.get("extensions") or {}).get(DRACO)
+    if draco is not None:
+        packed, indices = _unpacked(gltf, draco, attributes)
+    elif "indices" in primitive:
+        indices = gltf.read_accessor(primitive["indices"])
+    found = {
+        name: packed[name] if name in packed else gltf.read_accessor(attributes[name])
+        for name in names
+        if name in attributes
+    }
+    return found, None if indices is None else indices.reshape(-1).astype(np.int64)
+
+
+def _unpacked(gltf: Gltf, draco: Tree, attributes: Mapping[str, int]) -> tuple[Attributes, NDArray[Any]]:
+    """Attributes and indices of a primitive that is compressed with Draco."""
+    import DracoPy
+
+    mesh: Any = DracoPy.decode(gltf.view_bytes(draco["bufferView"]))
+    names = {number: name for name, number in draco["attributes"].items()}
+    found = {names[entry["unique_id"]]: entry["data"] for entry in mesh.attributes if entry["unique_id"] in names}
+    flat = {
+        name: normalised(np.asarray(values).reshape(len(values), -1), gltf.tree["accessors"][attributes[name]])
+        for name, values in found.items()
+        if name in attributes
+    }
+    return flat, np.asarray(mesh.faces)
+
+
+def _faces(indices: Faces, mode: int, notes: Notes) -> Faces | None:
+    """(f, 3) corners of a list, strip or fan."""
+    count = len(indices)
+    if count < 3:
+        notes.add("primitives with fewer than 3 corners are left out")
+        return None
+    if mode == FAN:
+        return np.column_stack([np.full(count - 2, indices[0]), indices[1:-1], indices[2:]])
+    if mode == STRIP:
+        faces = np.column_stack([indices[:-2], indices[1:-1], indices[2:]])
+        faces[1::2] = faces[1::2, ::-1]
+        return faces
+    if count % 3:
+        notes.add("corners beyond a multiple of three are left out")
+    return indices[: count - count % 3].reshape(-1, 3)
+
+
+def _uvs(values: NDArray[Any], material: GltfMaterial, notes: Notes) -> Float64:
+    """(v, 2) texture coordinates, transformed, v upwards."""
+    uv = values.astype(np.float64)
+    if material.uv_matrix is not None:
+        with np.errstate(all="ignore"):
+            uv = np.column_stack([uv, np.ones(len(uv))]) @ material.uv_matrix.T
+    if not material.repeats and len(uv) and (uv.min() < 0 or uv.max() > 1):
+        notes.add("textures that clamp or mirror at their edges repeat", material.material.name)
+    return np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
+
+
+def _colours(values: NDArray[Any], notes: Notes) -> Float32:
+    """(v, 3) linear vertex colours."""
+    colours = values.astype(np.float64)
+    if colours.shape[1] > 3 and (colours[:, 3] < 1).any():
+        notes.add("the opacity of vertex colours is left out")
+    return clean_colours(colours[:, :3], notes)
