@@ -3,6 +3,7 @@
 Only keys that some reader reads are checked; a key with the value null counts as missing.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -85,8 +86,8 @@ def _numbers(count: int) -> Check:
         if not isinstance(value, list) or len(value) != count:
             yield f"{place}: expected {count} numbers, got {_got(value)}"
         else:
-            for item in value:
-                yield from one(item, place, tree)
+            wrong = (problem for item in value for problem in one(item, place, tree))
+            yield from itertools.islice(wrong, 1)
 
     return check
 

@@ -184,6 +184,14 @@ def test_rotations_that_are_no_rotations(tmp_path: Path) -> None:
     assert (scenes[2] == scenes[3]).all()
 
 
+@pytest.mark.parametrize("name", ["\ud800", "\0", "", "x" * 100_000])
+def test_names_do_not_matter(tmp_path: Path, name: str) -> None:
+    glb = quad()
+    glb.tree["meshes"][0] |= {"name": name, "extras": {"faces": name, name: name}}
+    glb.tree["nodes"][0]["name"] = name
+    assert load_scene(glb.save(tmp_path / "a.glb")).report.triangles == 2
+
+
 def test_attributes_of_another_length_are_left_out(tmp_path: Path) -> None:
     glb = quad()
     glb.tree["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = glb.accessor(np.ones((3, 3), np.float32))
