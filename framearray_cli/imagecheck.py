@@ -1,12 +1,11 @@
 """A quick look whether an image file is there, whole and of the right size, without decoding all of it."""
 
 import os
-import struct
 from pathlib import Path
 
 from .errors import OutputError
-from .files import reason
 from .images import last_row, read_image
+from .pngjpeg import opened_picture
 
 JPEG_END = b"\xff\xd9"
 
@@ -40,29 +39,21 @@ def check_image(path: Path, resolution: tuple[int, int]) -> None:
 
 def _size_of_png(path: Path) -> tuple[int, int]:
     """Read the size of a PNG, and check the sum of each chunk, which Pillow does not when it decodes."""
-    import PIL.Image
-
-    try:
-        with PIL.Image.open(path) as picture:
-            size = picture.size
-            picture.verify()
-    except (SyntaxError, ValueError, EOFError, struct.error) as error:  # how Pillow reports broken chunks
-        raise OutputError(f"{path}: damaged: {error}") from error
-    except OSError as error:
-        raise OutputError(f"{path}: not an image, or damaged: {reason(error)}") from error
+    with opened_picture(path) as picture:
+        size: tuple[int, int] = picture.size
+        picture.verify()
     return size
 
 
 def _size_of_jpeg(path: Path) -> tuple[int, int] | None:
     """Read the size from the head of a JPEG whose end is there; None if either is not found."""
-    import PIL.Image
-
     try:
         with path.open("rb") as file:
             file.seek(-len(JPEG_END), os.SEEK_END)
             if file.read() != JPEG_END:
                 return None
-        with PIL.Image.open(path) as picture:
-            return picture.size
-    except (OSError, SyntaxError, ValueError):
+        with opened_picture(path) as picture:
+            size: tuple[int, int] = picture.size
+            return size
+    except (OSError, OutputError):
         return None

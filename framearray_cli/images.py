@@ -1,10 +1,9 @@
-"""Read and write one image: the only door to OpenImageIO (EXR, TIFF) and Pillow (PNG, JPEG).
+"""Read and write one image; for EXR and TIFF the only door to OpenImageIO.
 
 OpenImageIO raises nothing: every return value is checked here. It also reports success for a PNG on a full disk and
 reads half a JPEG without a word, so PNG and JPEG go through Pillow, in memory.
 """
 
-import io
 import math
 import os
 from collections.abc import Mapping
@@ -20,8 +19,9 @@ from numpy.typing import NDArray
 from .arrays import Bytes, Float32, Image
 from .colour import linear_from_srgb8, srgb8_from_linear
 from .errors import MissingExtraError, OutputError
-from .files import reason, refusal, whole_file, write_bytes
+from .files import refusal, whole_file, write_bytes
 from .imageattributes import FIXED_DATE, Attribute, Attributes
+from .pngjpeg import can_encode, check_size, encode_jpeg, encode_png, read_codes
 
 Extension = Literal["exr", "png", "tif", "jpg"]
 
@@ -29,6 +29,7 @@ HALF_MAX = 65504.0  # the largest half; what lies beyond becomes infinite
 EXR_COMPRESSIONS = ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
 FLOAT_LAYERS = ("depth", "samples")  # layers that need more than the 11 bits of a half
 _OIIO_NAMES = {"exr": "openexr", "tif": "tiff"}
+_HEADS = (b"\x76\x2f\x31\x01", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")  # of EXR, TIFF and large TIFF
 _PILLOW_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
@@ -77,9 +78,7 @@ def require_writer(name: Extension) -> None:
         good, library = _oiio().ImageOutput.create(_OIIO_NAMES[name]) is not None, "OpenImageIO"
         _oiio().geterror()  # clears what a failed attempt left behind
     else:
-        import PIL.features
-
-        good, library = PIL.features.check_codec("jpg" if name == "jpg" else "zlib"), "Pillow"
+        good, library = can_encode(name), "Pillow"
     if not good:
         raise MissingExtraError(
             f"{library} is built without {name.upper()} here; pip install --force-reinstall {library} brings a build "
@@ -119,7 +118,7 @@ def write_image(
     largest = _largest(str(path), image)
     if image_format.format in ("png", "jpg"):
         exposed = image * np.float32(2.0**image_format.exposure) if image_format.exposure else image
-        write_bytes(path, _encode8(srgb8_from_linear(exposed), image_format, attributes))
+        write_codes(path, srgb8_from_linear(exposed), image_format, attributes)
         return
     if image_format.format == "exr":
         half = image_format.half == "always" or (image_format.half == "auto" and largest <= HALF_MAX)
@@ -169,12 +168,10 @@ def write_codes(
     Raises:
         OutputError: the file cannot be written.
     """
-    write_bytes(path, _encode8(codes, image_format or ImageFormat(format="png"), attributes or {}))
-
-
-def encode_jpeg(codes: Bytes, quality: int) -> memoryview:
-    """Encode (h, w, 3) 8-bit codes as JPEG without chroma subsampling; a file in memory."""
-    return _encode8(codes, ImageFormat(format="jpg", quality=quality), {})
+    if image_format is not None and image_format.format == "jpg":
+        write_bytes(path, encode_jpeg(codes, image_format.quality))
+    else:
+        write_bytes(path, encode_png(codes, attributes or {}))
 
 
 def write_layers(
@@ -222,25 +219,6 @@ def read_image(path: Path) -> Image:
     return np.ascontiguousarray(pixels[..., [names.index(name) for name in "RGB"]])
 
 
-def read_codes(path: Path) -> Bytes:
-    """Read the 8-bit sRGB codes of a PNG or JPEG: (h, w, 3) uint8.
-
-    Raises:
-        OutputError: the file is missing, damaged or cut short.
-    """
-    import PIL.Image
-
-    try:
-        with PIL.Image.open(path) as picture:
-            return np.asarray(picture.convert("RGB"))
-    except PIL.UnidentifiedImageError as error:
-        raise OutputError(f"{path}: not an image, or damaged") from error
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be read: {reason(error)}") from error
-    except (SyntaxError, ValueError, EOFError) as error:  # how Pillow reports some broken PNG chunks
-        raise OutputError(f"{path}: damaged: {error}") from error
-
-
 def read_layers(path: Path) -> dict[str, Float32]:
     """Read every channel of an EXR: name -> (h, w) float32, in the order of the file (by name).
 
@@ -254,7 +232,7 @@ def read_layers(path: Path) -> dict[str, Float32]:
 def last_row(path: Path) -> tuple[int, int] | None:
     """Read the last row of an EXR or TIFF, which one that was cut short has lost: width and height, or None."""
     oiio = _oiio()
-    source = oiio.ImageInput.open(str(path)) if os.path.isfile(path) else None
+    source = oiio.ImageInput.open(str(path)) if _begins_well(path) else None
     if source is None:
         oiio.geterror()  # clears what the failed opening left behind
         return None
@@ -282,26 +260,6 @@ def _largest(label: str, values: Float32) -> float:
     if not (math.isfinite(low) and math.isfinite(high)):
         raise ValueError(f"{label}: not finite, {np.count_nonzero(~np.isfinite(values))} values")
     return max(-low, high)
-
-
-def _encode8(codes: Bytes, image_format: ImageFormat, attributes: Attributes) -> memoryview:
-    """Encode (h, w, 3) 8-bit codes as PNG or JPEG in memory."""
-    import PIL.Image
-    import PIL.PngImagePlugin
-
-    buffer = io.BytesIO()
-    picture = PIL.Image.fromarray(codes)
-    if image_format.format == "jpg":
-        # No chroma subsampling: coloured edges of thin objects would bleed.
-        picture.save(buffer, "JPEG", quality=image_format.quality, subsampling=0)
-    else:
-        info = PIL.PngImagePlugin.PngInfo()
-        info.add(b"sRGB", b"\0")  # says that the codes are sRGB; 0: perceptual intent
-        for name, value in attributes.items():
-            if isinstance(value, str | int | float | Fraction):
-                info.add_text(name, str(value))
-        picture.save(buffer, "PNG", compress_level=1, pnginfo=info)
-    return buffer.getbuffer()
 
 
 @cache
@@ -372,16 +330,28 @@ def _read_oiio(path: Path) -> tuple[list[str], Float32]:
     oiio = _oiio()
     if not os.path.isfile(path):
         raise OutputError(f"{path}: no such file")
+    if not _begins_well(path):
+        raise OutputError(f"{path}: not an image, or damaged: it does not begin like EXR or TIFF")
     source = oiio.ImageInput.open(str(path))
     if source is None:
         raise OutputError(f"{path}: not an image, or damaged: {_first_line(oiio.geterror(), path)}")
     spec = source.spec()
+    check_size(path, spec.width, spec.height)
     pixels = source.read_image(oiio.FLOAT)
     message = source.geterror()
     source.close()
     if pixels is None or message:
         raise OutputError(f"{path}: damaged or cut short: {_first_line(message, path)}")
     return list(spec.channelnames), np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
+
+
+def _begins_well(path: Path) -> bool:
+    """Whether a file begins like EXR or TIFF; any other kind OpenImageIO would try with all its readers."""
+    try:
+        with path.open("rb") as file:
+            return file.read(4) in _HEADS
+    except OSError:
+        return False
 
 
 def _first_line(message: str, path: Path) -> str:

@@ -25,8 +25,9 @@ import numpy as np
 from ..arrays import Bytes
 from ..errors import OutputError
 from ..files import reason, whole_file, write_bytes
-from ..images import encode_jpeg, read_layers
+from ..images import read_layers
 from ..manifest import Manifest, layers_path
+from ..pngjpeg import encode_jpeg
 from .coding import Coding, encode
 from .index import index_table, sheet_layout
 from .streams import Stream, choose_coding, layer_streams, read_values, source_file, streams_of

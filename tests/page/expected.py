@@ -4,7 +4,7 @@ import numpy as np
 
 from framearray_cli.arrays import Bytes, Float64
 from framearray_cli.colour import srgb_from_linear
-from framearray_cli.images import read_codes
+from framearray_cli.pngjpeg import read_codes
 from framearray_cli.view.coding import decode
 from framearray_cli.view.tiles import Tiles
 

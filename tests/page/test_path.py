@@ -101,7 +101,7 @@ def test_assemble_takes_the_light_of_groups(browser, grouped, tmp_path):
     target = tmp_path / "frames" / "frame.####.png"
     told = CliRunner().invoke(app, ["assemble", str(manifest.directory), str(file), "-o", str(target)])
     assert told.exit_code == 0, told.output
-    from framearray_cli.images import read_codes
+    from framearray_cli.pngjpeg import read_codes
 
     last = read_codes(sorted(target.parent.glob("*.png"))[-1])
     assert np.abs(last - pixels.astype(float)).mean() < 1.0

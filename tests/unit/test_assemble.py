@@ -14,11 +14,12 @@ import pytest
 from framearray_cli.colour import srgb8_from_linear
 from framearray_cli.errors import JobError, MissingExtraError, OutputError
 from framearray_cli.filepatterns import file_patterns
-from framearray_cli.images import ImageFormat, read_codes, read_image, write_image
+from framearray_cli.images import ImageFormat, read_image, write_image
 from framearray_cli.manifest import Manifest, ManifestCamera, ManifestLight, image_path
 from framearray_cli.manifestfile import write_manifest
 from framearray_cli.movie.assemble import assemble
 from framearray_cli.movie.look import Look
+from framearray_cli.pngjpeg import read_codes
 
 av = pytest.importorskip("av")
 

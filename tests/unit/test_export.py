@@ -21,9 +21,10 @@ from boxarrays import (
 from framearray_cli.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.errors import JobError, OutputError
 from framearray_cli.export import KINDS, export
-from framearray_cli.images import ImageFormat, read_codes, read_image
+from framearray_cli.images import ImageFormat, read_image
 from framearray_cli.manifest import Manifest, image_path
 from framearray_cli.pictures import Pictures
+from framearray_cli.pngjpeg import read_codes
 
 
 @pytest.fixture

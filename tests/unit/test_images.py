@@ -1,6 +1,8 @@
 import io
 import resource
 import signal
+import struct
+import zlib
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
@@ -15,6 +17,7 @@ from framearray_cli.errors import OutputError
 from framearray_cli.files import whole_file, write_bytes
 from framearray_cli.framerate import frame_rate
 from framearray_cli.imageattributes import exr_camera_from_world, exr_ndc_from_world, frame_attributes
+from framearray_cli.imagecheck import check_image
 from framearray_cli.images import HALF_MAX, ImageFormat, read_image, read_layers, write_image, write_layers
 
 FORMATS = ("exr", "png", "tif", "jpg")
@@ -280,6 +283,38 @@ def test_missing_and_foreign_files_are_errors(tmp_path: Path, name: str) -> None
     (tmp_path / f"c.{name}").mkdir()
     with pytest.raises(OutputError, match=rf"c\.{name}: "):
         read_image(tmp_path / f"c.{name}")
+
+
+@pytest.mark.parametrize("name", ["exr", "tif", "png", "jpg"])
+def test_images_of_another_kind_are_errors(tmp_path: Path, name: str) -> None:
+    other = "png" if name in ("exr", "tif") else "exr"
+    write_image(tmp_path / f"a.{name}", noisy(4, 4), ImageFormat(format=other))
+    for read in (read_image, lambda path: check_image(path, (4, 4))):
+        with pytest.raises(OutputError, match=rf"a\.{name}: not an image, or damaged: it does not begin like"):
+            read(tmp_path / f"a.{name}")
+
+
+def test_sizes_beyond_any_job_take_no_memory(tmp_path: Path) -> None:
+    def chunk(name: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+
+    head = struct.pack(">IIBBBBB", 60_000, 60_000, 8, 2, 0, 0, 0)
+    end = chunk(b"IDAT", zlib.compress(bytes(99))) + chunk(b"IEND", b"")
+    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + end)
+    write_image(tmp_path / "a.exr", noisy(4, 4), ImageFormat())
+    data, wide = (tmp_path / "a.exr").read_bytes(), struct.pack("<iiii", 0, 0, 59_999, 59_999)
+    assert data.count(struct.pack("<iiii", 0, 0, 3, 3)) == 2  # data and display window
+    (tmp_path / "a.exr").write_bytes(data.replace(struct.pack("<iiii", 0, 0, 3, 3), wide))
+    for name in ("a.png", "a.exr"):
+        with pytest.raises(OutputError, match=rf"{name}: .*damaged"):
+            read_image(tmp_path / name)
+
+
+@pytest.mark.filterwarnings("error")
+def test_large_pngs_of_a_job_are_no_bombs(tmp_path: Path) -> None:
+    path = tmp_path / "a.png"
+    PIL.Image.new("1", (16384, 16384)).save(path)  # Pillow's own `open` raises from 179 million pixels on
+    check_image(path, (16384, 16384))
 
 
 def test_an_exr_without_rgb_is_an_error(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ rays hits eyehits plan allotment
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
 terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise standarderror compose accumulate window
-imageattributes images filepatterns manifest manifestfile pictures ranges record resume folderlock
+imageattributes pngjpeg images filepatterns manifest manifestfile pictures ranges record resume folderlock
 outfolder stored writer
 prepare memory acceptance expected auto allot target describe summary render check verify
 start/rays start/sample start/views start/room start/orbit start/model start/staged start/expose start/plan
@@ -64,7 +64,7 @@ DOORS = {
     ),  # eyehits: one function that allocates, so no kernel
     "trimesh": ("meshes/",),
     "OpenImageIO": ("images", "movie/display"),
-    "PIL": ("meshes/", "images", "imagecheck", "movie/label", "movie/animation", "sheet"),
+    "PIL": ("meshes/", "pngjpeg", "movie/label", "movie/animation", "sheet"),
     "tomllib": ("jobfile", "manifestfile"),
     "tomli_w": ("manifestfile", "report/tables"),
     "matplotlib": ("report/plots",),

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from movies import grouped, path_file, plain
 
 from framearray_cli.errors import JobError
-from framearray_cli.images import read_codes, read_image
+from framearray_cli.images import read_image
 from framearray_cli.jobfile import read_job
 from framearray_cli.manifest import BACKGROUND, Manifest
 from framearray_cli.movie.assemble import assemble
@@ -19,6 +19,7 @@ from framearray_cli.movie.curves import at, relights
 from framearray_cli.movie.pathfile import MoviePath, load_movie_path
 from framearray_cli.movie.timeline import timeline
 from framearray_cli.pictures import AS_RENDERED, Pictures, Relight
+from framearray_cli.pngjpeg import read_codes
 
 JOBS = Path(__file__).resolve().parents[2] / "jobs"
 GREY = (1.0, 1.0, 1.0)

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 
 from framearray_cli.colour import srgb8_from_linear
 from framearray_cli.errors import JobError, OutputError
-from framearray_cli.images import read_codes, read_image
+from framearray_cli.images import read_image
 from framearray_cli.manifest import Manifest, image_path
 from framearray_cli.pictures import Pictures
+from framearray_cli.pngjpeg import read_codes
 from framearray_cli.sheet import BACKGROUND, GAP, area_mean, make_sheet
 
 

@@ -15,8 +15,9 @@ import pytest
 
 from framearray_cli.colour import srgb8_from_linear
 from framearray_cli.errors import OutputError
-from framearray_cli.images import ImageFormat, read_codes, write_image
+from framearray_cli.images import ImageFormat, write_image
 from framearray_cli.manifest import image_path, layers_path
+from framearray_cli.pngjpeg import read_codes
 from framearray_cli.view.coding import MOST_WHITE, Coding, coding_for, data_coding, decode, encode
 from framearray_cli.view.index import sheet_layout
 from framearray_cli.view.prepare import prepare_all

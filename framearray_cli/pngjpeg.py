@@ -1,0 +1,96 @@
+"""Read and write PNG and JPEG, by Pillow: codes of 8 bits."""
+
+import io
+import struct
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .arrays import Bytes
+from .errors import OutputError
+from .files import reason
+from .imageattributes import Attributes
+
+MOST_PIXELS = 16384**2  # of an image; the largest that a job may have
+_PNG_HEAD, _JPEG_HEAD = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
+# How Pillow reports broken files, beside OSError.
+_PILLOW_ERRORS = (SyntaxError, ValueError, EOFError, IndexError, KeyError, TypeError, struct.error, zlib.error)
+
+
+def read_codes(path: Path) -> Bytes:
+    """Read the 8-bit sRGB codes of a PNG or JPEG: (h, w, 3) uint8.
+
+    Raises:
+        OutputError: the file is missing, damaged or cut short.
+    """
+    with opened_picture(path) as picture:
+        return np.asarray(picture.convert("RGB"))
+
+
+@contextmanager
+def opened_picture(path: Path) -> Iterator[Any]:
+    """Open a PNG or JPEG with Pillow; what goes wrong while it is used is told of the file.
+
+    Pillow's own `open` takes files of any format, and refuses sizes that a job may ask for.
+
+    Raises:
+        OutputError: the file is missing, damaged, of another format, or larger than any job's.
+    """
+    from PIL.JpegImagePlugin import JpegImageFile
+    from PIL.PngImagePlugin import PngImageFile
+
+    kind: Any = PngImageFile if path.suffix.lower() == ".png" else JpegImageFile
+    try:
+        with path.open("rb") as file:
+            head = file.read(len(_PNG_HEAD))
+        if not head.startswith(_PNG_HEAD if kind is PngImageFile else _JPEG_HEAD):
+            raise OutputError(f"{path}: not an image, or damaged: it does not begin like {path.suffix[1:].upper()}")
+        with kind(path) as picture:
+            check_size(path, *picture.size)
+            yield picture
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be read: {reason(error)}") from error
+    except _PILLOW_ERRORS as error:
+        raise OutputError(f"{path}: damaged: {error}") from error
+
+
+def can_encode(name: str) -> bool:
+    """Whether Pillow was built with a format, "png" or "jpg"."""
+    import PIL.features
+
+    return bool(PIL.features.check_codec("jpg" if name == "jpg" else "zlib"))
+
+
+def check_size(path: Path, width: int, height: int) -> None:
+    """Refuse what a few bytes may claim, before memory is taken for it."""
+    if width * height > MOST_PIXELS:
+        raise OutputError(f"{path}: damaged: it says that it has {width} x {height} pixels, more than any job")
+
+
+def encode_png(codes: Bytes, attributes: Attributes) -> memoryview:
+    """Encode (h, w, 3) 8-bit codes as PNG; a file in memory."""
+    import PIL.Image
+    import PIL.PngImagePlugin
+
+    info = PIL.PngImagePlugin.PngInfo()
+    info.add(b"sRGB", b"\0")  # says that the codes are sRGB; 0: perceptual intent
+    for name, value in attributes.items():
+        if isinstance(value, str | int | float | Fraction):
+            info.add_text(name, str(value))
+    buffer = io.BytesIO()
+    PIL.Image.fromarray(codes).save(buffer, "PNG", compress_level=1, pnginfo=info)
+    return buffer.getbuffer()
+
+
+def encode_jpeg(codes: Bytes, quality: int) -> memoryview:
+    """Encode (h, w, 3) 8-bit codes as JPEG without chroma subsampling, as coloured edges would bleed; in memory."""
+    import PIL.Image
+
+    buffer = io.BytesIO()
+    PIL.Image.fromarray(codes).save(buffer, "JPEG", quality=quality, subsampling=0)
+    return buffer.getbuffer()
