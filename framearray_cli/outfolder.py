@@ -168,9 +168,14 @@ def remove_array(old: Manifest) -> int:
 
     Raises:
         OSError: one of them cannot be removed.
+        OutputError: a link within the folder leads to one elsewhere; then none is removed.
     """
-    removed = 0
-    for file in (*array_files(old), *record_files(old.directory), old.directory / FILE_NAME):
+    removed, files = 0, (*array_files(old), *record_files(old.directory), old.directory / FILE_NAME)
+    whole = old.directory.resolve()
+    for folder in {file.parent for file in files} - {old.directory}:
+        if not folder.resolve().is_relative_to(whole):
+            raise OutputError(f"{folder}: leads out of the folder of the array; remove what lies there yourself")
+    for file in files:
         if os.path.lexists(file) and not file.is_dir():
             file.unlink()
             removed += 1

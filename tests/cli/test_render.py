@@ -132,6 +132,25 @@ def test_restart_removes_what_the_manifest_lists_and_nothing_else(tmp_path, caps
     assert (out / "mine.txt").read_text() == "keep"
 
 
+def test_restart_removes_nothing_that_a_link_leads_to(tmp_path, capsys):
+    job = write_job(tmp_path)
+    assert run(capsys, "render", "-q", job).code == 0
+    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "c0000.exr").write_text("mine")
+    (out / "link").symlink_to(elsewhere)
+    manifest = out / "manifest.toml"
+    text = manifest.read_text()
+    assert 'layers = "tiny.layers.' in text
+    manifest.write_text(text.replace('layers = "tiny.layers.', 'layers = "link/'))
+    before = names(out)
+    told = run(capsys, "render", "-q", job, "--restart")
+    assert (told.code, told.out) == (4, "")
+    assert told.err == f"{out / 'link'}: leads out of the folder of the array; remove what lies there yourself\n"
+    assert (elsewhere / "c0000.exr").read_text() == "mine"
+    assert names(out) == before
+
+
 def test_restart_of_a_job_with_a_problem_removes_nothing(tmp_path, capsys):
     assert run(capsys, "render", "-q", write_job(tmp_path)).code == 0
     broken = write_job(tmp_path, "broken.toml", seed=7, scene={"file": "nosuch.glb"})

@@ -130,6 +130,7 @@ def _files(rng: Random, record: Path) -> str:
         "a\nb.jsonl",
     )
     place = folder / rng.choice(names)
+    data = record.read_bytes()
     if place.exists() or place.is_symlink():
         place.unlink()
     match rng.randrange(5):
@@ -143,7 +144,7 @@ def _files(rng: Random, record: Path) -> str:
             place.write_bytes(rng.randbytes(1000))
             return "random bytes"
         case 3:
-            place.write_bytes(record.read_bytes())
+            place.write_bytes(data)
             return "a copy of the record"
     for file in folder.iterdir():
         file.unlink()
