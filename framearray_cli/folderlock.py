@@ -13,11 +13,10 @@ from filelock import FileLock, Timeout
 from .errors import BusyError, OutputError
 from .files import make_folder, reason
 from .ranges import parse_frames
-from .record import FOLDER, record_file
+from .record import FOLDER, MOST, record_file
 
 # Seconds that a run waits for another one to leave the guard, which it holds for milliseconds.
 PATIENCE = 60.0
-ANY = 10**6  # more cameras than any job has
 
 
 class Folder:
@@ -100,6 +99,6 @@ class Folder:
 def _cameras_of(lock: Path) -> range | tuple[int, ...]:
     """The cameras of another run; of a range that is too long for a file name, all."""
     try:
-        return parse_frames(lock.stem, ANY)
+        return parse_frames(lock.stem, MOST)
     except ValueError:
-        return range(ANY)
+        return range(MOST)

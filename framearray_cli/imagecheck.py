@@ -21,6 +21,8 @@ def check_image(path: Path, resolution: tuple[int, int]) -> None:
     Raises:
         OutputError: the file is missing, damaged, cut short or of another size.
     """
+    if os.path.exists(path) and not os.path.isfile(path):  # a pipe would be waited for
+        raise OutputError(f"{path}: expected a file, got a folder or a device")
     size: tuple[int, int] | None
     match path.suffix.lower():
         case ".png":

@@ -232,7 +232,7 @@ def read_layers(path: Path) -> dict[str, Float32]:
 def last_row(path: Path) -> tuple[int, int] | None:
     """Read the last row of an EXR or TIFF, which one that was cut short has lost: width and height, or None."""
     oiio = _oiio()
-    source = oiio.ImageInput.open(str(path)) if _begins_well(path) else None
+    source = oiio.ImageInput.open(str(path)) if os.path.isfile(path) and _begins_well(path) else None
     if source is None:
         oiio.geterror()  # clears what the failed opening left behind
         return None

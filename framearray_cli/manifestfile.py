@@ -39,6 +39,8 @@ def read_manifest(place: Path) -> Manifest:
         OutputError: it is missing, broken, made by a newer program, or leads out of its folder.
     """
     path = place / FILE_NAME if os.path.isdir(place) else place
+    if os.path.exists(path) and not os.path.isfile(path):  # a device may have no end
+        raise OutputError(f"{path}: expected a file, got a folder or a device")
     try:
         table = tomllib.loads(path.read_bytes().decode())
     except FileNotFoundError as error:

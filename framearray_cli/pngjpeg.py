@@ -1,6 +1,7 @@
 """Read and write PNG and JPEG, by Pillow: codes of 8 bits."""
 
 import io
+import os
 import struct
 import zlib
 from collections.abc import Iterator
@@ -44,6 +45,8 @@ def opened_picture(path: Path) -> Iterator[Any]:
     from PIL.JpegImagePlugin import JpegImageFile
     from PIL.PngImagePlugin import PngImageFile
 
+    if os.path.exists(path) and not os.path.isfile(path):  # a pipe would be waited for
+        raise OutputError(f"{path}: expected a file, got a folder or a device")
     kind: Any = PngImageFile if path.suffix.lower() == ".png" else JpegImageFile
     try:
         with path.open("rb") as file:

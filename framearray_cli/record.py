@@ -9,18 +9,21 @@ import hashlib
 import json
 import os
 import re
+import stat
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from .arrays import is_number
 from .errors import OutputError
 from .files import make_folder, reason
 
 FOLDER = "records"
+MOST = 10**6  # cameras, and light positions of all groups: more than any job has
 _SEAL = re.compile(rb'\{"check":"([0-9a-f]{16})",')
 
 
@@ -182,16 +185,17 @@ def read_records(folder: Path, fingerprint: str) -> Records:
             if "fingerprint" in line:
                 current = line["fingerprint"] == fingerprint
                 if current:
-                    sessions.append(Session(cameras=line.get("cameras", ""), processor=line.get("processor", "")))
+                    cameras, processor = (str(line.get(key, "")) for key in ("cameras", "processor"))
+                    sessions.append(Session(cameras=cameras, processor=processor))
             elif current and (entry := _entry(line)):
                 entries[entry.c, *entry.lights] = entry
-                rays, seconds = line.get("rays", {}), float(line.get("seconds", 0.0))
-                last = sessions[-1]
-                sessions[-1] = Session(cameras=last.cameras, processor=last.processor, rays=rays, seconds=seconds)
+                sessions[-1] = replace(sessions[-1], **_taken(line))
     return Records(entries=tuple(entries.values()), sessions=tuple(sessions))
 
 
 def _lines(file: Path) -> Iterator[dict[str, Any]]:
+    if file.exists() and not file.is_file():  # a device may have no end
+        raise OutputError(f"{file}: expected a file, got a folder or a device; remove it")
     try:
         data = file.read_bytes()
     except OSError as error:
@@ -232,7 +236,7 @@ def _check(body: bytes) -> bytes:
 def _entry(line: Mapping[str, Any]) -> Entry | None:
     """An entry, unless the line holds something else."""
     try:
-        return Entry(
+        entry = Entry(
             c=int(line["c"]),
             lights=(int(line["lights"][0]), int(line["lights"][1])),
             files={str(name): (int(size), str(known)) for name, (size, known) in line["files"].items()},
@@ -240,8 +244,23 @@ def _entry(line: Mapping[str, Any]) -> Entry | None:
             notes=tuple(str(note) for note in line.get("notes", ())),
             errors={int(l): (float(a), float(b)) for l, (a, b) in line.get("errors", {}).items()},
         )
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError):
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
         return None
+    first, end = entry.lights
+    within = 0 <= entry.c < MOST and 0 <= first <= end <= MOST
+    return entry if within and all(map(_is_plain, entry.files)) else None
+
+
+def _is_plain(name: str) -> bool:
+    """Whether a name leads to a file in the folder itself, as those of all images do."""
+    return name not in ("", ".", "..") and not any(character in name for character in "/\\\0")
+
+
+def _taken(line: Mapping[str, Any]) -> dict[str, Any]:
+    """What a session says that it took; nothing where that is not what a session writes."""
+    rays, seconds = line.get("rays"), line.get("seconds")
+    counts = isinstance(rays, dict) and all(isinstance(n, int) for n in rays.values())
+    return ({"rays": rays} if counts else {}) | ({"seconds": float(seconds)} if is_number(seconds) else {})
 
 
 def damaged(folder: Path, checksums: Mapping[str, tuple[int, str]], names: Iterable[str]) -> Iterator[tuple[str, str]]:
@@ -249,8 +268,11 @@ def damaged(folder: Path, checksums: Mapping[str, tuple[int, str]], names: Itera
     for name in names:
         path, (size, known) = folder / name, checksums[name]
         try:
-            if path.stat().st_size != size:
-                yield name, f"expected {size:,} bytes, found {path.stat().st_size:,}"
+            found = path.stat()
+            if not stat.S_ISREG(found.st_mode):  # a device or a pipe may have no end
+                yield name, "is no file"
+            elif found.st_size != size:
+                yield name, f"expected {size:,} bytes, found {found.st_size:,}"
             elif digest(path)[1] != known:
                 yield name, "its bytes have changed"
         except FileNotFoundError:

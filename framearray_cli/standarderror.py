@@ -12,6 +12,7 @@ degree of freedom a pixel, so it is averaged over a neighbourhood, weighed by hi
 a hit, not the same number of hits.
 """
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -69,8 +70,11 @@ def standard_error(difference: Float32, hits: Float32 | Int32, radius: int = RAD
 
     n = np.maximum(np.asarray(hits, np.float32), 1)[..., None]
     size = 2 * radius + 1
-    variance = uniform_filter(n * difference * difference, size=(size, size, 0), mode="nearest") / n
-    error: Float32 = np.sqrt(np.maximum(variance, 0.0, dtype=np.float32))
+    # a power of 2 keeps every bit, and the squares of what is very bright from overflowing
+    scale = np.float32(2.0 ** max(math.frexp(float(np.abs(difference).max(initial=0.0)))[1] - 1, 0))
+    scaled = difference / scale
+    variance = uniform_filter(n * scaled * scaled, size=(size, size, 0), mode="nearest") / n
+    error: Float32 = np.sqrt(np.maximum(variance, 0.0, dtype=np.float32)) * scale
     return error
 
 
