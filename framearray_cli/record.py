@@ -260,7 +260,9 @@ def _taken(line: Mapping[str, Any]) -> dict[str, Any]:
     """What a session says that it took; nothing where that is not what a session writes."""
     rays, seconds = line.get("rays"), line.get("seconds")
     counts = isinstance(rays, dict) and all(isinstance(n, int) for n in rays.values())
-    return ({"rays": rays} if counts else {}) | ({"seconds": float(seconds)} if is_number(seconds) else {})
+    return ({"rays": rays} if counts else {}) | (
+        {"seconds": float(seconds)} if isinstance(seconds, int | float) and is_number(seconds) else {}
+    )
 
 
 def damaged(folder: Path, checksums: Mapping[str, tuple[int, str]], names: Iterable[str]) -> Iterator[tuple[str, str]]:
