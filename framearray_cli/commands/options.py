@@ -1,5 +1,6 @@
 """Options and endings that several commands share."""
 
+import re
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -74,8 +75,9 @@ def place(name: str, option: str = "--output") -> Path:
 
 def problems(error: JobError, outcome: str) -> list[str]:
     """The problems of a job or path file, and what came of them."""
-    n = len(error.problems)
-    return [*str(error).splitlines(), f"{n} problem{'s' if n > 1 else ''}; {outcome}."]
+    more = re.fullmatch(r"and (\d+) more problems", error.problems[-1])
+    n = len(error.problems) - 1 + int(more[1]) if more else len(error.problems)
+    return [*str(error).splitlines(), f"{n:,} problem{'s' if n > 1 else ''}; {outcome}."]
 
 
 def fail(lines: Sequence[str], code: int) -> NoReturn:

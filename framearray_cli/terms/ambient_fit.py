@@ -148,7 +148,12 @@ class _Fit:
         near = steps.distance < curve.d_max  # False for NaN, too
         far = ~near & ~np.isnan(steps.distance)
         openness = np.zeros(n, np.float32)
-        _rho_of(curve.falloff, curve.tau, np.where(near, steps.distance / curve.d_max, 0).astype(np.float32), openness)
+        _rho_of(
+            curve.falloff,
+            curve.tau,
+            np.divide(steps.distance, curve.d_max, out=np.zeros_like(steps.distance), where=near).astype(np.float32),
+            openness,
+        )
         share = np.where(near, openness, 0.0)[:, None] * met
         light = source[:, :, None] * gathered
         average = reflectivity / max(count, 1)

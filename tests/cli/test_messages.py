@@ -178,3 +178,10 @@ def test_a_range_in_which_obscurances_mean_nothing(command, value, message, tmp_
     assert (told.code, told.out) == (2, "")
     assert told.err.splitlines() == [f"{job}: obscurance.range: {message}", "1 problem; nothing was rendered."]
     assert names(tmp_path) == {"job.toml", "tiny.glb"}
+
+
+def test_all_problems_are_counted_at_the_end(tmp_path, capsys):
+    told = run(capsys, "check", write_job(tmp_path, camera={f"k{i}": 1 for i in range(1200)}))
+    assert told.code == 2
+    assert told.err.splitlines()[-2].endswith("job.toml: and 1150 more problems")
+    assert told.err.splitlines()[-1] == "1,200 problems; nothing was rendered."

@@ -211,3 +211,11 @@ def test_images_are_halves_unless_they_are_too_bright(tmp_path, capsys, irradian
         np.testing.assert_array_equal(read_image(file), exact.astype(np.float16) if kind == "half" else exact)
         stored.add(kind)
     assert stored == kinds
+
+
+@pytest.mark.parametrize("method", ["eye", "light", "fit"])
+def test_a_range_of_next_to_nothing(method, tmp_path, capsys):
+    obscurance = {"range": 1e-45, "falloff": "cbrt", "outside": "background"}
+    job = write_job(tmp_path, obscurance=obscurance, ambient={"method": method, "paths": 64}, light={"frames": 3})
+    told = run(capsys, "render", "-q", job)
+    assert (told.code, told.err) == (0, "")

@@ -89,6 +89,7 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
     del jobs["fixed"]["ambient"]["paths"]
     for name, job in jobs.items():
         job["scene"] = {**job["scene"], "file": scene}
+        job["output"] = {**job.get("output", {}), "directory": "out"}
         job["name"] = re.sub(" ", "-", name)
     return jobs
 
@@ -100,6 +101,7 @@ def texts(scene: str) -> list[str]:
         text = file.read_text(encoding="utf-8")
         if "[scene]" in text:  # the others are paths of movies
             text = re.sub(r"^file = .*", f'file = "{scene}"', text, count=1, flags=re.MULTILINE)
+            text = re.sub(r"^directory = .*", 'directory = "out"', text, count=1, flags=re.MULTILINE)
             found.append(re.sub(r"^resolution = .*", "resolution = [16, 12]", text, count=1, flags=re.MULTILINE))
     return found
 

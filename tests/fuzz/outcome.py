@@ -16,7 +16,7 @@ from pathlib import Path
 
 SECONDS = 10.0  # a case that takes longer hangs
 MEMORY = 6 << 30  # bytes of address space beyond what the program has when it starts
-LONGEST = 4000  # characters of a message that somebody still reads
+LONGEST, WIDEST = 60, 1000  # lines of a message, and characters of a line, that somebody still reads
 CODES = (0, 2, 3, 4, 5)
 
 
@@ -53,7 +53,7 @@ def outcome_of(arguments: Sequence[str | Path], log: Path, *, before: Callable[[
         _become([str(argument) for argument in arguments], log, before)
     code = _wait(child, started + SECONDS)
     message = log.read_text(errors="replace")
-    return Outcome(_verdict(code, message), code, time.monotonic() - started, message[-LONGEST:])
+    return Outcome(_verdict(code, message), code, time.monotonic() - started, message[-LONGEST * WIDEST // 4 :])
 
 
 def _become(arguments: list[str], log: Path, before: Callable[[], None]) -> None:
@@ -111,4 +111,5 @@ def _verdict(code: int | None, message: str) -> str:
         return "accepted"
     if not message.strip():
         return "no message"
-    return "refused" if len(message) <= LONGEST else "endless message"
+    lines = message.splitlines()
+    return "refused" if len(lines) <= LONGEST and max(map(len, lines)) <= WIDEST else "endless message"

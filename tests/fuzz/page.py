@@ -1,8 +1,111 @@
 """docs/fuzzing.md, from the results of all runs."""
 
+import json
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
+
+from bench.markdown import grid
+from bench.results import ROOT, Table
+
+from .found import FOUND
+from .outcome import MEMORY, SECONDS
+
+PAGE = ROOT / "docs" / "fuzzing.md"
+HEAD = f"""
+# Broken input
+
+Every outcome is a picture or one clear message with the right exit code. `make fuzz` breaks small files by the
+thousand and hands each to a command of the program, in a process of its own: `tests/fuzz/` says how. A case is bad if
+there is a traceback, a crash, a warning of a library, an exit code that is not in [the list](cli.md#errors), no
+message, a message of more than 60 lines or with a line of more than 1000 letters, more than {SECONDS:.0f} s, or more
+than {MEMORY >> 30} GiB. A case that hangs is tried once more, as another program may have had the processor.
+"""
+KINDS = {
+    "jobs": """
+## Job files
+
+Small jobs that use every key, and those of `jobs/`, changed in four ways: their tables (any value at any place, keys
+missing, added, renamed or moved), their bytes, extreme values that are allowed, and things that stand where a file
+should. An accepted job is rendered where that takes a moment; every value of every image must then be finite, the
+manifest readable, and `verify` content. One that takes up to ten times as much is checked (`framearray check`, with
+smaller probes), a larger one prepared: its scene is read, its memory estimated.
+""",
+    "scenes": """
+## Scene files
+
+Scenes of every format, with one of everything that a format has, changed in their bytes and in their structure; real
+ones, too, where they are at hand.
+""",
+    "paths": """
+## Paths of movies, and options
+
+Path files for `assemble`, changed like job files; and odd values of the options of `assemble`, `sheet`, `export` and
+`view`. Movies have at most 300 frames here.
+""",
+    "manifests": """
+## Manifests and images
+
+Manifests, changed like job files; file patterns that lead out of the folder; images that are damaged, missing, another
+one, a link, or no file. Any command that reads an array follows, or a render that goes on. Files beside the array must
+stay as they were.
+""",
+    "records": """
+## Records
+
+The lists of what was finished: bytes and lines changed, also by somebody who knows their checksums, and other things in
+their folder. A render goes on, or `verify` looks. Where a render ends well after damage, all images must have the bytes
+of one that was never stopped.
+""",
+}
+CODES = ("exit code 2", "exit code 3", "exit code 4", "exit code 5")
 
 
 def write(results: Path) -> None:
-    """Write the page."""
-    raise NotImplementedError
+    """Write the page from every result in a folder."""
+    tables = [json.loads(file.read_text(encoding="utf-8")) for file in sorted(results.glob("*.json"))]
+    parts = [HEAD.strip(), summary(tables)]
+    for kind, text in KINDS.items():
+        own = [table for table in tables if table["kind"] == kind]
+        if own:
+            parts += [text.strip(), by_mutation(own)]
+    parts += ["## What was found", grid(("", "Now", "Test, in `tests/`"), [(a, b, f"`{c}`") for a, b, c in FOUND])]
+    PAGE.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+
+
+def counts(tables: Sequence[Table]) -> dict[str, Counter[str]]:
+    """Cases by mutation and by how they ended."""
+    found: dict[str, Counter[str]] = {}
+    for table in tables:
+        for name, ends in table["mutations"].items():
+            found.setdefault(name, Counter()).update(ends)
+    return found
+
+
+def summary(tables: Sequence[Table]) -> str:
+    """A row a kind."""
+    rows = []
+    for kind in KINDS:
+        own = [table for table in tables if table["kind"] == kind]
+        ends = sum(counts(own).values(), Counter())
+        if not ends:
+            continue
+        bad = sum(len(table["bad"]) for table in own)
+        slowest = max(seconds for table in own for seconds, _ in table["slowest"])
+        minutes = sum(table["seconds"] for table in own) / 60
+        accepted = ends.total() - bad - sum(ends[code] for code in CODES)
+        refused = [f"{ends[code]:,}" for code in CODES]
+        rows.append(
+            [kind, f"{ends.total():,}", f"{accepted:,}", *refused, str(bad), f"{slowest:.1f}", f"{minutes:.0f}"]
+        )
+    head = ("", "cases", "accepted", *(code.replace("exit ", "") for code in CODES), "bad", "slowest, s", "min")
+    return grid(head, rows)
+
+
+def by_mutation(tables: Sequence[Table]) -> str:
+    """A row a mutation, with the ways of ending that there were."""
+    found = counts(tables)
+    ends = sum(found.values(), Counter())
+    columns = sorted(set(ends) - set(CODES)) + [code for code in CODES if code in ends]
+    rows = [[name, str(own.total()), *(str(own[column] or "") for column in columns)] for name, own in found.items()]
+    return grid(("", "cases", *columns), rows)

@@ -15,7 +15,7 @@ from framearray_cli.verify import verify
 
 # A job is rendered where it takes at most so much, checked up to FAR_MORE times as much, and beyond that only prepared:
 # read, with its scene, and its memory estimated.
-MOST_IMAGES, MOST_PIXELS, MOST_RAYS, MOST_WALKS, MOST_THREADS = 300, 100_000, 3_000_000, 2_000_000, 64
+MOST_IMAGES, MOST_LIGHTS, MOST_PIXELS, MOST_RAYS, MOST_WALKS, MOST_THREADS = 300, 60, 100_000, 3_000_000, 2_000_000, 64
 FAR_MORE = 10
 DONE = "done"  # a file in the folder of a case that says which of these it was
 
@@ -74,6 +74,7 @@ def size(job: Any) -> float:
     hits = max(hits, 1) * (2 * n_r + 1 if frames == 1 else 1) + job.specular.hits * max(job.specular.depth, 1)
     return max(
         frames * lights / MOST_IMAGES,
+        lights / MOST_LIGHTS,
         pixels / MOST_PIXELS,
         pixels * frames * hits * (job.samples.obscurance + 4 * n_r + lights) / MOST_RAYS,
         (job.ambient.paths or 4096) * lights / MOST_WALKS,

@@ -1,7 +1,6 @@
 """Properties of what reads files: any content gives what the file is for, or one message of the right kind."""
 
 import json
-import string
 import tomllib
 from pathlib import Path
 from random import Random
@@ -180,7 +179,7 @@ def test_any_manifest_is_read_or_refused(tmp_path, seed):
 
 PATTERN = st.lists(
     st.sampled_from(
-        ["{camera}", "{light:03d}", "{camera:04d}", "{camera!r}", "{", "}", "{{", "..", "/", "\\", ":", "a", ".png", "\0"]
+        ["{camera}", "{light:03d}", "{camera:04d}", "{camera!r}", "{", "}", "{{", "..", "/", "\\", ":", "a.png", "\0"]
     ),
     max_size=7,
 ).map("".join)  # fmt: skip
@@ -239,9 +238,7 @@ def test_a_place_is_an_index_that_there_is(text, n):
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=5),
-    lambda inner: (
-        st.lists(inner, max_size=3) | st.dictionaries(st.text(string.printable, max_size=5), inner, max_size=3)
-    ),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=3),
     max_leaves=8,
 )
 

@@ -1,0 +1,35 @@
+"""What broken input brought to light, for the page: what happened, what happens now, and the test of it."""
+
+FOUND: tuple[tuple[str, str, str], ...] = (
+    (
+        "A name of more than 255 letters, in a job or on the command line: a traceback where it was only looked up",
+        "a message; names in a job have at most 1000 letters",
+        "cli/test_long_names.py",
+    ),
+    ("`samples.hits = inf`: a traceback", "a message", "unit/test_jobfile.py"),
+    ("Numbers of more than 308 digits in a manifest or a path: a traceback", "a message", "unit/test_manifest.py"),
+    ("4 MB of unknown keys: a minute and more", "3 s: 50 problems are told, the rest counted", "unit/test_jobfile.py"),
+    ("A key of 100,000 parts, `x.a.a.a...`: all memory of the machine", "a message", "unit/test_jobfile.py"),
+    ("A key of 5000 letters: a message of as many", "a key in a message has at most 100", "unit/test_jobfile.py"),
+    ("A rate near 0 in a manifest: a division by zero", "a message", "unit/test_manifest.py"),
+    (
+        "A file of zeros in place of an EXR: every reader of OpenImageIO tried it, for 10 s and more",
+        "a message at once: a file must begin as its name says",
+        "unit/test_images.py",
+    ),
+    ("A PNG beyond 179 million pixels, which a job may ask for: a traceback", "it is read", "unit/test_images.py"),
+    ("A PNG of 2 KB that claims 60,000 x 60,000 pixels: a traceback", "a message", "unit/test_images.py"),
+    ("A pipe or a device in place of an image, a manifest or a record: no end", "a message", "unit/test_untrusted.py"),
+    (
+        "Records whose checksums are right and whose content is not: tracebacks; 10^12 light positions: no end; files "
+        "elsewhere were read",
+        "such a line does not count",
+        "unit/test_untrusted.py",
+    ),
+    (
+        "`--restart` with a link in the folder, and a manifest that names files through it: those files were removed",
+        "a message, and nothing is removed",
+        "cli/test_render.py",
+    ),
+    ("Standard errors of images beyond 1e19: an overflow, with a warning", "right", "unit/test_untrusted.py"),
+)
