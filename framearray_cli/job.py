@@ -215,11 +215,13 @@ class Job(Table):
     @model_validator(mode="after")
     def _fill_defaults(self, info: ValidationInfo) -> "Job":
         if self.rests_on > MOST_HITS and self.samples.hits != "auto":
-            frames = round(self.rests_on / self.samples.hits)
-            fail([(("samples", "hits"), f"expected at most {MOST_HITS // frames} with this n_r")])
+            hits = self.samples.hits
+            frames = round(self.rests_on / hits)
+            fail([(("samples", "hits"), f"expected at most {MOST_HITS // frames} with this n_r, got {hits:g}")])
         n_r = DEFAULT_N_R if self.reuse.n_r == "auto" else self.reuse.n_r
         if self.samples.error is not None and (2 * n_r + 1) * self.samples.most_hits > MOST_HITS:
-            fail([(("samples", "most_hits"), f"expected at most {MOST_HITS // (2 * n_r + 1)} with this n_r")])
+            most, found = MOST_HITS // (2 * n_r + 1), self.samples.most_hits
+            fail([(("samples", "most_hits"), f"expected at most {most} with this n_r, got {found}")])
         if self.samples.halves and self.output.format != "exr":
             fail(
                 [(("samples", "halves"), 'expected output.format = "exr": no other format has room for more channels')]

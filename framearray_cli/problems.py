@@ -100,10 +100,10 @@ def _unknown_key(root: Schema, place: tuple[int | str, ...]) -> str:
     homes: dict[str, list[str]] = {}
     for section in sections(root):
         for name in section.keys:
-            homes.setdefault(name, []).append(f"[{section.place}]" if section.place else "the top of the file")
+            homes.setdefault(name, []).append(f"in [{section.place}]" if section.place else "at the top of the file")
     if meant := _nearest(key, homes):
-        places = " or ".join(dict.fromkeys(homes[meant]))
-        return f'unknown key here; "{meant}" belongs in {places}'
+        places = " or ".join(dict.fromkeys(homes[meant])).replace(" or in ", " or ")
+        return f'unknown key here; "{meant}" belongs {places}'
     return f"unknown key; known here: {', '.join(dotted(name) for name in known)}"
 
 

@@ -128,19 +128,26 @@ class Screen:
 
 
 def say(console: Console, lines: Iterable[str]) -> None:
-    """Print lines as they are: no wrapping, no markup, no colours.
+    """Print lines as they are: no wrapping, no markup, no colours; what a terminal would obey becomes text.
 
     Raises:
         OutputError: they cannot be printed, into a file on a full disk for instance.
     """
     try:
         for line in lines:
-            console.print(line, markup=False, highlight=False, soft_wrap=True, emoji=False)
+            console.print(told(line), markup=False, highlight=False, soft_wrap=True, emoji=False)
     except BrokenPipeError:  # whoever read it has gone
         raise
     except OSError as error:
         _let_go(console.file)
         raise OutputError(f"standard output: cannot be written: {reason(error)}") from error
+
+
+def told(text: str) -> str:
+    """A text of which every character can be seen: names may hold escape sequences, or turn the line around."""
+    if text.replace("\n", "").isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in "\n\xa0" else c.encode("unicode_escape").decode() for c in text)
 
 
 def _let_go(stream: IO[str]) -> None:

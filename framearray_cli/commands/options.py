@@ -77,7 +77,8 @@ def problems(error: JobError, outcome: str) -> list[str]:
     """The problems of a job or path file, and what came of them."""
     more = re.fullmatch(r"and (\d+) more problems", error.problems[-1])
     n = len(error.problems) - 1 + int(more[1]) if more else len(error.problems)
-    return [*str(error).splitlines(), f"{n:,} problem{'s' if n > 1 else ''}; {outcome}."]
+    lines = [f"{error.file}: {problem}".replace("\n", "\\n") for problem in error.problems]
+    return [*lines, f"{n:,} problem{'s' if n > 1 else ''}; {outcome}."]
 
 
 def fail(lines: Sequence[str], code: int) -> NoReturn:

@@ -185,3 +185,12 @@ def test_all_problems_are_counted_at_the_end(tmp_path, capsys):
     assert told.code == 2
     assert told.err.splitlines()[-2].endswith("job.toml: and 1150 more problems")
     assert told.err.splitlines()[-1] == "1,200 problems; nothing was rendered."
+
+
+@pytest.mark.skipif(os.name == "nt", reason="such names are none there")
+def test_names_cannot_command_the_terminal(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    told = run(capsys, "check", "a\x1b[31m\u202eb\n.toml")
+    assert told.err == "a\\x1b[31m\\u202eb\\n.toml: no such file\n1 problem; nothing was rendered.\n"
+    job = write_job(tmp_path, scene={"materials": {"x\x1b[2J": {"specular": 0.5}}})
+    assert "\x1b" not in run(capsys, "check", job).err

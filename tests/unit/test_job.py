@@ -222,7 +222,7 @@ WRONG = [
      "light.sources[0].keys[1].color: missing; keys[0] gives it, so every key of this list must"),
     ("samples.hits", 0, 'samples.hits: expected a whole number from 1 to 65000, 1/2, 1/3, ... 1/8 or "auto", got 0'),
     ("reuse.n_r", 65, 'reuse.n_r: expected a whole number from 0 to 64 or "auto", got 65'),
-    ("samples.hits", 9286, "samples.hits: expected at most 9285 with this n_r"),
+    ("samples.hits", 9286, "samples.hits: expected at most 9285 with this n_r, got 9286"),
     ("samples.hits", "two",
      'samples.hits: expected a whole number from 1 to 65000, 1/2, 1/3, ... 1/8 or "auto", got "two"'),
     ("obscurance.range", 0, "obscurance.range: expected a number above 0, got 0: nothing is within it"),
