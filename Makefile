@@ -6,7 +6,7 @@ JOB := jobs/kitchen-small.toml
 OUT := out/kitchen-small
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-all smoke format check docs bench bench-scaling bench-bias bench-ambient bench-report bench-view clean
+.PHONY: help install render test test-all smoke format check docs bench bench-scaling bench-bias bench-ambient bench-report bench-view fuzz clean
 
 help: ## Show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -73,6 +73,9 @@ bench-report: $(VENV)/installed-bench ## Measure speed against error of the thre
 
 bench-view: $(VENV)/installed-bench ## Measure the page of `framearray view` in Chromium
 	PYTHONPATH=tests $(BIN)/python -m bench view $(BENCH)
+
+fuzz: $(VENV)/installed-dev ## Hand broken files to the program, for ten minutes
+	PYTHONPATH=tests $(BIN)/python -m fuzz $(FUZZ)
 
 clean: ## Remove what was built and rendered
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache

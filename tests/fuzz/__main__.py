@@ -26,30 +26,37 @@ RESULTS = ROOT / "out" / "fuzz"  # git ignores it
 
 
 def main() -> None:
-    """Run cases of one kind and keep what came of them, or write the page."""
+    """Run cases of one kind or of all, and keep what came of them; or write the page."""
     parser = argparse.ArgumentParser(prog="fuzz", description="Broken input by the thousand; writes docs/fuzzing.md.")
-    parser.add_argument("what", choices=(*KINDS, "page"))
-    parser.add_argument("--cases", type=int, default=100, help="how many")
+    parser.add_argument("what", nargs="?", default="all", choices=(*KINDS, "all", "page"))
+    parser.add_argument("--cases", type=int, default=1_000_000, help="how many, of each kind")
     parser.add_argument("--seed", type=int, default=0, help="results of every seed are kept")
-    parser.add_argument("--minutes", type=float, default=60.0, help="no case is begun after that time")
+    parser.add_argument("--minutes", type=float, default=10.0, help="no case is begun after that time")
     parser.add_argument("--only", default="", help="only cases whose mutation has this text in its name")
     args = parser.parse_args()
     if args.what == "page":
         page.write(RESULTS)
         return
-    kept = RESULTS / f"{args.what}-{args.seed}"
-    cases = importlib.import_module(f"fuzz.{KINDS[args.what]}").cases
+    kinds = list(KINDS) if args.what == "all" else [args.what]
     with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
         os.environ["TMPDIR"] = tempfile.tempdir = name  # what stopped cases leave there is removed, too
         warm(Path(name))
-        made = cases(random.Random(f"{args.what} {args.seed}"), Path(name))
-        wanted = (case for case in made if args.only in case.mutation)
-        table = run(wanted, args.cases, 60 * args.minutes, kept, Path(name))
-    save(RESULTS, kept.name, {"kind": args.what, "seed": args.seed, **table})
+        bad = [fuzz(kind, args, 60 * args.minutes / len(kinds), Path(name) / kind) for kind in kinds]
+    sys.exit(any(bad))
+
+
+def fuzz(kind: str, args: argparse.Namespace, seconds: float, scratch: Path) -> int:
+    """Run cases of one kind; returns how many were bad."""
+    scratch.mkdir()
+    kept = RESULTS / f"{kind}-{args.seed}"
+    cases = importlib.import_module(f"fuzz.{KINDS[kind]}").cases
+    wanted = (case for case in cases(random.Random(f"{kind} {args.seed}"), scratch) if args.only in case.mutation)
+    table = run(wanted, args.cases, seconds, kept, scratch)
+    save(RESULTS, kept.name, {"kind": kind, "seed": args.seed, **table})
     for bad in table["bad"]:
         print(f"{bad['mutation']}: {bad['verdict']}; kept in {bad['folder']}")
-    print(f"{table['cases']} cases in {table['seconds']:.0f} s, {len(table['bad'])} bad")
-    sys.exit(bool(table["bad"]))
+    print(f"{kind}: {table['cases']} cases in {table['seconds']:.0f} s, {len(table['bad'])} bad", flush=True)
+    return len(table["bad"])
 
 
 if __name__ == "__main__":
