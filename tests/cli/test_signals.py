@@ -196,3 +196,41 @@ def test_a_lock_that_a_signal_broke_counts_as_the_signal(monkeypatch, capsys):
     monkeypatch.setattr(cli, "app", wrong)
     with pytest.raises(RuntimeError, match="something else"):
         cli.main([])
+
+
+def writer_of(pipe: Path, process: subprocess.Popen[str]) -> int:
+    """The end of a pipe that is written to, once the process waits at the other one."""
+    ends: list[int] = []
+
+    def opened() -> bool:
+        try:
+            ends.append(os.open(pipe, os.O_WRONLY | os.O_NONBLOCK))
+        except OSError:
+            return False
+        return True
+
+    wait_for(opened, process)
+    return ends[0]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_job_that_never_comes_is_waited_for_until_a_signal(number, tmp_path):
+    pipe = tmp_path / "job.toml"
+    os.mkfifo(pipe)
+    process = start("check", pipe)
+    end = writer_of(pipe, process)
+    stop(process, number)
+    os.close(end)
+
+
+def test_a_job_may_come_through_a_pipe(tmp_path):
+    pipe, text = tmp_path / "pipe.toml", write_job(tmp_path, camera={"fov": 500.0}).read_bytes()
+    os.mkfifo(pipe)
+    process = start("check", pipe)
+    end = writer_of(pipe, process)
+    os.set_blocking(end, True)
+    os.write(end, text)
+    os.close(end)
+    told = finish(process)
+    assert told.code == 2
+    assert told.err.startswith(f"{pipe}: camera.fov: expected a number from 0.001 to 179.9, got 500.0\n")

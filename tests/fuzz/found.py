@@ -32,4 +32,15 @@ FOUND: tuple[tuple[str, str, str], ...] = (
         "cli/test_render.py",
     ),
     ("Standard errors of images beyond 1e19: an overflow, with a warning", "right", "unit/test_untrusted.py"),
+    (
+        'An obscurance range of 1e-45 with `ambient.method = "fit"`: an overflow, with a warning',
+        "right",
+        "cli/test_render.py",
+    ),
+    (
+        "Escape sequences in the names of files and materials: the terminal obeyed them",
+        "they are shown",
+        "cli/test_messages.py",
+    ),
+    ('"51 problems" where there were 3000', "3,000 problems", "cli/test_messages.py"),
 )
