@@ -1,7 +1,10 @@
 """What the processes of all cases share: the program with its kernels, loaded before the first case."""
 
+import gc
 import importlib
+import os
 import pkgutil
+from contextlib import suppress
 from pathlib import Path
 
 import tomli_w
@@ -38,3 +41,25 @@ def warm(folder: Path) -> None:
                 main(["render", str(job), "--quiet", "--restart", "--output", str(folder / f"warm-{name}")])
             except SystemExit as end:
                 assert not end.code, f"the job {name!r} is wrong"
+    _refused(folder)
+    gc.collect()
+    gc.freeze()  # else a process that is copied looks through all that, and so copies it in memory
+
+
+def _refused(folder: Path) -> None:
+    """Meet what is loaded for messages alone; they go nowhere."""
+    job = folder / "warm.toml"
+    job.write_text("a = 1\nname = 5\n[camera]\nfov = 500\nfof = 1\nkeys = 3\n[light]\nsources = [{}, { type = 'x' }]\n")
+    stderr = os.dup(2)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+    try:
+        for command in (
+            ["check", str(job)],
+            ["verify", str(folder)],
+            ["assemble", str(folder), str(job), "-o", "a.gif"],
+        ):
+            with suppress(SystemExit):
+                main(command)
+    finally:
+        os.dup2(stderr, 2)
+        os.close(stderr)
