@@ -42,7 +42,8 @@ def main() -> None:
         os.environ["TMPDIR"] = tempfile.tempdir = name  # what stopped cases leave there is removed, too
         warm(Path(name))
         bad = [fuzz(kind, args, 60 * args.minutes / len(kinds), Path(name) / kind) for kind in kinds]
-    sys.exit(any(bad))
+    sys.stdout.flush()
+    os._exit(any(bad))  # libraries would tell what they leave behind
 
 
 def fuzz(kind: str, args: argparse.Namespace, seconds: float, scratch: Path) -> int:

@@ -24,6 +24,7 @@ class Case:
         mutation: what was done to the input, in a few words; cases are counted by it.
         folder: holds whatever the case reads and writes; removed when the case ended well, kept when it did not.
         before: called in the process of the command, first; for limits, or another working directory.
+        alone: whether it needs a process of its own; others share one with those that follow.
         accepted: called after a case that was accepted: what was done, in a word.
         wrong: called afterwards, however the command ended: what else is wrong, or None.
     """
@@ -32,11 +33,11 @@ class Case:
     mutation: str
     folder: Path
     before: Callable[[], None] = lambda: None
+    alone: bool = True
     accepted: Callable[[], str] = lambda: "accepted"
     wrong: Callable[[Outcome], str | None] = _nothing
 
 
 # Each kind of input is a module with `cases(rng, folder)`: it yields cases one by one, each with a folder of its own
-# below `folder`, for as long as it is asked. The next case may be made only once it is asked for: by then the one
-# before has run.
+# below `folder`, for as long as it is asked. A case that is to run alone has run before the next one is made.
 Cases: TypeAlias = Callable[[Random, Path], Iterator[Case]]

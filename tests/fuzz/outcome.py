@@ -14,7 +14,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-SECONDS = 10.0  # a case that takes longer hangs
+SECONDS = 10.0  # of processor time; a case that takes longer hangs
+PATIENCE = 30.0  # seconds that a case is waited for, whatever else the machine does
 MEMORY = 6 << 30  # bytes of address space beyond what the program has when it starts
 LONGEST, WIDEST = 60, 1000  # lines of a message, and characters of a line, that somebody still reads
 CODES = (0, 2, 3, 4, 5)
@@ -27,6 +28,7 @@ class Outcome:
     Attributes:
         verdict: "accepted", "refused", or what is wrong.
         code: exit code, negative for a signal; None where the process was stopped.
+        seconds: of processor time; where the process was stopped, how long it was waited for.
         message: the end of what it printed on stderr.
     """
 
@@ -47,53 +49,99 @@ def outcome_of(arguments: Sequence[str | Path], log: Path, *, before: Callable[[
         log: file for what it prints on stderr; stdout goes nowhere.
         before: called in the new process first.
     """
-    started = time.monotonic()
     child = os.fork()
     if child == 0:
-        _become([str(argument) for argument in arguments], log, before)
-    code = _wait(child, started + SECONDS)
+        _limit_itself()
+        faulthandler.dump_traceback_later(0.9 * PATIENCE, file=_redirected(log))  # what it does when it hangs
+        os._exit(_code_of(arguments, before))
+    code, seconds = _wait(child, PATIENCE)
+    return _outcome(code, seconds, log)
+
+
+def outcomes_of(
+    commands: Sequence[tuple[Sequence[str | Path], Callable[[], None]]], folder: Path
+) -> list[Outcome] | None:
+    """Run several commands in one process, one after the other; None if not all of them came to an end there.
+
+    Args:
+        commands: arguments, and what is called before.
+        folder: for what they print.
+    """
+    done = folder / "done.txt"
+    done.write_text("")
+    logs = [folder / f"stderr-{k}.txt" for k in range(len(commands))]
+    child = os.fork()
+    if child == 0:
+        _limit_itself()
+        with done.open("w") as told:
+            for (arguments, before), log in zip(commands, logs, strict=True):
+                started = time.process_time()
+                _redirected(log)
+                code = _code_of(arguments, before)
+                told.write(f"{code} {time.process_time() - started}\n")
+                told.flush()
+        os._exit(0)
+    _wait(child, PATIENCE + len(commands))
+    lines = done.read_text().splitlines()
+    if len(lines) < len(commands):
+        return None
+    ends = [line.split() for line in lines]
+    return [_outcome(int(code), float(seconds), log) for (code, seconds), log in zip(ends, logs, strict=True)]
+
+
+def _outcome(code: int | None, seconds: float, log: Path) -> Outcome:
     message = log.read_text(errors="replace")
-    return Outcome(_verdict(code, message), code, time.monotonic() - started, message[-LONGEST * WIDEST // 4 :])
+    verdict = "hang" if seconds > SECONDS else _verdict(code, message)
+    return Outcome(verdict, code, seconds, message[-LONGEST * WIDEST // 4 :])
 
 
-def _become(arguments: list[str], log: Path, before: Callable[[], None]) -> None:
-    """Run the command in the new process; never returns."""
-    code = 1
+def _limit_itself() -> None:
+    """What a new process does first."""
+    os.setpgid(0, 0)
+    os.dup2(os.open(os.devnull, os.O_RDWR), 0)
+    os.dup2(os.open(os.devnull, os.O_RDWR), 1)
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _redirected(log: Path) -> int:
+    """Send stderr to a file."""
+    file = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    os.dup2(file, 2)
+    os.close(file)
+    return 2
+
+
+def _code_of(arguments: Sequence[str | Path], before: Callable[[], None]) -> int:
+    """Run a command in this process: its exit code."""
     try:
-        os.setpgid(0, 0)
-        os.dup2(os.open(os.devnull, os.O_RDWR), 0)
-        os.dup2(os.open(os.devnull, os.O_RDWR), 1)
-        os.dup2(os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
-        used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-        resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        faulthandler.dump_traceback_later(0.9 * SECONDS)  # what it does when it hangs
         from framearray_cli.cli import main
 
         before()
-        main(arguments)
-        code = 0
+        main([str(argument) for argument in arguments])
     except SystemExit as end:
-        code = end.code if isinstance(end.code, int) else int(end.code is not None)
+        return end.code if isinstance(end.code, int) else int(end.code is not None)
     except BaseException:
         traceback.print_exc()
+        return 1
     finally:
         sys.stderr.flush()
-        os._exit(code)
+    return 0
 
 
-def _wait(child: int, end: float) -> int | None:
-    """The exit code of a process, negative for a signal; None when it had to be stopped."""
-    pause = 0.0005
+def _wait(child: int, seconds: float) -> tuple[int | None, float]:
+    """The exit code of a process, negative for a signal, None when it had to be stopped; and its processor time."""
+    pause, end = 0.0005, time.monotonic() + seconds
     while time.monotonic() < end:
-        done, status = os.waitpid(child, os.WNOHANG)
+        done, status, used = os.wait4(child, os.WNOHANG)
         if done:
-            return os.waitstatus_to_exitcode(status)
+            return os.waitstatus_to_exitcode(status), used.ru_utime + used.ru_stime
         time.sleep(pause)
         pause = min(2 * pause, 0.01)
     os.killpg(child, signal.SIGKILL)
     os.waitpid(child, 0)
-    return None
+    return None, seconds
 
 
 def _verdict(code: int | None, message: str) -> str:

@@ -116,7 +116,7 @@ def cases(rng: Random, folder: Path) -> Iterator[Case]:
             mutation=f"{kind}: {name}",
             folder=own,
             before=partial(_within, own),
-            accepted=lambda: "accepted",
+            alone=False,
         )
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from framearray_cli import check, render
 from framearray_cli.auto import require_least_memory
 from framearray_cli.images import read_image, read_layers
 from framearray_cli.manifest import array_files
@@ -17,6 +18,7 @@ from framearray_cli.verify import verify
 # read, with its scene, and its memory estimated.
 MOST_IMAGES, MOST_LIGHTS, MOST_PIXELS, MOST_RAYS, MOST_WALKS, MOST_THREADS = 300, 60, 100_000, 3_000_000, 2_000_000, 64
 FAR_MORE = 10
+whole_render, whole_check, PROBE_RAYS = render.render, check.check, check.PROBE_RAYS
 DONE = "done"  # a file in the folder of a case that says which of these it was
 
 
@@ -28,10 +30,7 @@ def render_small(folder: Path) -> Callable[[], None]:
     """
 
     def hook() -> None:
-        from framearray_cli import check, render
-
-        whole_render, whole_check = render.render, check.check
-        check.PROBE_RAYS, check.MOST_PIXELS = check.PROBE_RAYS // 100, check.FEWEST_PIXELS
+        check.PROBE_RAYS, check.MOST_PIXELS = PROBE_RAYS // 100, check.FEWEST_PIXELS
 
         def small_check(job: Any) -> Any:
             if size(job) <= FAR_MORE:

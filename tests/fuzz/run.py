@@ -4,16 +4,17 @@ import shlex
 import shutil
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from bench.results import Table
 
 from .case import Case
-from .outcome import Outcome, outcome_of
+from .outcome import Outcome, outcome_of, outcomes_of
 
 MESSAGES = 400  # that are kept to be read, the latest of them
 SLOWEST = 5
+TOGETHER = 25  # cases that share a process: what starting one costs is half of most cases
 
 
 def run(cases: Iterable[Case], n: int, seconds: float, kept: Path, scratch: Path) -> Table:
@@ -32,8 +33,7 @@ def run(cases: Iterable[Case], n: int, seconds: float, kept: Path, scratch: Path
     times: list[tuple[float, str]] = []
     bad: list[Table] = []
     messages: list[list[str]] = []
-    for case in cases:
-        outcome, verdict = judged(case, scratch / "stderr.txt")
+    for case, outcome, verdict in all_judged(cases, scratch):
         counts[case.mutation][_column(case, outcome, verdict)] += 1
         times = sorted([*times, (outcome.seconds, case.mutation)], reverse=True)[:SLOWEST]
         if outcome.verdict == "refused":
@@ -54,13 +54,27 @@ def run(cases: Iterable[Case], n: int, seconds: float, kept: Path, scratch: Path
     }
 
 
-def judged(case: Case, log: Path) -> tuple[Outcome, str]:
-    """Run a case: how it ended, and the verdict with what else is wrong."""
-    outcome = outcome_of(case.arguments, log, before=case.before)
-    if outcome.verdict == "hang":  # once more: another program may have had the processor
-        outcome = outcome_of(case.arguments, log, before=case.before)
-    wrong = None if outcome.bad else case.wrong(outcome)
-    return outcome, wrong or outcome.verdict
+def all_judged(cases: Iterable[Case], scratch: Path) -> Iterator[tuple[Case, Outcome, str]]:
+    """Run cases: how each ended, and the verdict with what else is wrong.
+
+    Those that may share a process do, until one of them ends badly; then each of them runs again, alone.
+    """
+    waiting: list[Case] = []
+    for case in cases:
+        waiting.append(case)
+        if case.alone or len(waiting) == TOGETHER:
+            yield from _judged(waiting, scratch)
+            waiting = []
+
+
+def _judged(cases: Sequence[Case], scratch: Path) -> Iterator[tuple[Case, Outcome, str]]:
+    shared = outcomes_of([(case.arguments, case.before) for case in cases], scratch) if len(cases) > 1 else None
+    for k, case in enumerate(cases):
+        outcome = shared[k] if shared else None
+        if outcome is None or outcome.bad:
+            outcome = outcome_of(case.arguments, scratch / "stderr.txt", before=case.before)
+        wrong = None if outcome.bad else case.wrong(outcome)
+        yield case, outcome, wrong or outcome.verdict
 
 
 def _column(case: Case, outcome: Outcome, verdict: str) -> str:
