@@ -168,7 +168,7 @@ def _hits(value: object) -> float | Auto:
     if isinstance(value, int | float) and not isinstance(value, bool):
         if 1 <= value <= MOST_HITS and value == int(value):
             return float(value)
-        for share in SHARES:
+        for share in SHARES if 0 < value < 1 else ():
             if abs(value - share) < 1e-3:  # 0.333 means a third
                 return share
     fail([((), f'expected a whole number from 1 to {MOST_HITS}, 1/2, 1/3, ... 1/8 or "auto", got {shown(value)}')])

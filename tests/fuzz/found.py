@@ -6,7 +6,7 @@ FOUND: tuple[tuple[str, str, str], ...] = (
         "a message; names in a job have at most 1000 letters",
         "cli/test_long_names.py",
     ),
-    ("`samples.hits = inf`: a traceback", "a message", "unit/test_jobfile.py"),
+    ("`samples.hits = inf`, or of 400 digits: a traceback", "a message", "unit/test_jobfile.py"),
     ("Numbers of more than 308 digits in a manifest or a path: a traceback", "a message", "unit/test_manifest.py"),
     ("4 MB of unknown keys: a minute and more", "3 s: 50 problems are told, the rest counted", "unit/test_jobfile.py"),
     ("A key of 100,000 parts, `x.a.a.a...`: all memory of the machine", "a message", "unit/test_jobfile.py"),
