@@ -82,7 +82,7 @@ def other_number(rng: Random, table: Table, root: Schema) -> str:
         return another_value(rng, table, root)
     place = rng.choice(numbers)
     old = at(table, place)
-    scaled = [old * factor for factor in (-1, 2, 1000, 1e6, 1e-6, 1e12)]
+    scaled = [old * factor for factor in (-1, 2, 1000, *((1e6, 1e-6, 1e12) if abs(old) < 1e200 else ()))]
     put(table, place, rng.choice(values.NUMBERS) if rng.random() < 0.5 else rng.choice(scaled))
     return "another number"
 
