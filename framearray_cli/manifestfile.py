@@ -56,9 +56,8 @@ def read_manifest(place: Path) -> Manifest:
     found = table.get("format")
     if found not in (FORMAT, FORMAT_OF_GROUPS):
         advice = "; use a newer framearray" if isinstance(found, int) and found > FORMAT_OF_GROUPS else ""
-        raise OutputError(
-            f"{path}: format: expected {FORMAT} or {FORMAT_OF_GROUPS}, got {shown(found) if found is not None else 'none'}{advice}"
-        )
+        got = "none" if found is None else shown(found)
+        raise OutputError(f"{path}: format: expected {FORMAT} or {FORMAT_OF_GROUPS}, got {got}{advice}")
     try:
         return _from_table(table, path.parent)
     except (ValueError, TypeError) as error:
