@@ -21,7 +21,7 @@ from .colour import linear_from_srgb8, srgb8_from_linear
 from .errors import MissingExtraError, OutputError
 from .files import refusal, whole_file, write_bytes
 from .imageattributes import FIXED_DATE, Attribute, Attributes
-from .pngjpeg import check_size, encode_jpeg, encode_png, has_codec, read_codes
+from .pngjpeg import can_encode, check_size, encode_jpeg, encode_png, read_codes
 
 Extension = Literal["exr", "png", "tif", "jpg"]
 
@@ -78,7 +78,7 @@ def require_writer(name: Extension) -> None:
         good, library = _oiio().ImageOutput.create(_OIIO_NAMES[name]) is not None, "OpenImageIO"
         _oiio().geterror()  # clears what a failed attempt left behind
     else:
-        good, library = has_codec(jpeg=name == "jpg"), "Pillow"
+        good, library = can_encode(name), "Pillow"
     if not good:
         raise MissingExtraError(
             f"{library} is built without {name.upper()} here; pip install --force-reinstall {library} brings a build "

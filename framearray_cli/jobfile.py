@@ -1,6 +1,5 @@
 """TOML text -> Job, or one JobError with every problem; and Job -> plain tables."""
 
-import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -11,16 +10,12 @@ from .errors import JobError
 from .eyefile import EyeFileError, read_eyes
 from .job import Job
 from .jobschema import job_schema
-from .jobvalues import absolute, shown
+from .jobvalues import absolute, long_key, shown
 from .problems import problems_of
 
 __all__ = ["job_schema", "job_table", "load_toml", "problems_of", "read_job"]
 
 LARGEST_FILE = 4 * 1024 * 1024  # bytes; a hand-written job is a thousand times smaller, so more is the wrong file
-# The reader of TOML takes time and memory by the square of this number.
-MOST_PARTS = 6  # keys with dots between them; no file has more than 4
-_KEY = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
-_LONG_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*+{_KEY}(?:[ \t]*+\.[ \t]*+{_KEY}){{{MOST_PARTS}}}", re.MULTILINE)
 
 
 def read_job(path: Path) -> Job:
@@ -103,9 +98,8 @@ def load_toml(path: Path) -> dict[str, Any]:
     """
     data = _read_bytes(path)
     text = _decode(path, data)
-    if long := _LONG_KEY.search(text):
-        line = text.count("\n", 0, long.start()) + 1
-        raise JobError(path, [f"line {line}: expected at most {MOST_PARTS} keys with dots between them, got more"])
+    if problem := long_key(text):
+        raise JobError(path, [problem])
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -54,6 +54,21 @@ def shown(value: object) -> str:
     return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 4] + "..." + text[-1]
 
 
+# The reader of TOML takes time and memory by the square of this number.
+MOST_PARTS = 6  # keys with dots between them; no file has more than 4
+_KEY = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*+{_KEY}(?:[ \t]*+\.[ \t]*+{_KEY}){{{MOST_PARTS}}}", re.MULTILINE)
+
+
+def long_key(text: str) -> str | None:
+    """What is wrong with a TOML text whose keys have too many parts, or None."""
+    found = _LONG_KEY.search(text)
+    if not found:
+        return None
+    line = text.count("\n", 0, found.start()) + 1
+    return f"line {line}: expected at most {MOST_PARTS} keys with dots between them, got more"
+
+
 def between(low: float, high: float) -> str:
     """Say a range of numbers, "from 0 to 1"; bounds that only protect the arithmetic are left out."""
     if high >= FARTHEST:

@@ -10,6 +10,7 @@ import numpy as np
 
 from .errors import OutputError
 from .files import reason, write_bytes
+from .jobvalues import long_key, shown
 from .manifest import FILE_NAME, Manifest, ManifestCamera, ManifestGroup, ManifestLight
 
 # Of the manifest itself; a program that knows format 1 may not understand 2, which has groups of sources.
@@ -42,7 +43,10 @@ def read_manifest(place: Path) -> Manifest:
     if os.path.exists(path) and not os.path.isfile(path):  # a device may have no end
         raise OutputError(f"{path}: expected a file, got a folder or a device")
     try:
-        table = tomllib.loads(path.read_bytes().decode())
+        text = path.read_bytes().decode()
+        if problem := long_key(text):
+            raise OutputError(f"{path}: {problem}")
+        table = tomllib.loads(text)
     except FileNotFoundError as error:
         raise OutputError(f"{path}: no such file; expected the output folder of `framearray render`") from error
     except OSError as error:
@@ -52,7 +56,8 @@ def read_manifest(place: Path) -> Manifest:
     found = table.get("format")
     if found not in (FORMAT, FORMAT_OF_GROUPS):
         advice = "; use a newer framearray" if isinstance(found, int) and found > FORMAT_OF_GROUPS else ""
-        raise OutputError(f"{path}: format: expected {FORMAT} or {FORMAT_OF_GROUPS}, got {found!r}{advice}")
+        got = "none" if found is None else shown(found)
+        raise OutputError(f"{path}: format: expected {FORMAT} or {FORMAT_OF_GROUPS}, got {got}{advice}")
     try:
         return _from_table(table, path.parent)
     except (ValueError, TypeError) as error:

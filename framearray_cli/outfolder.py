@@ -13,6 +13,7 @@ from typing import Any
 from . import __version__
 from .errors import OutputError
 from .files import make_folder, reason
+from .jobschema import dotted
 from .manifest import FILE_NAME, Manifest, array_files
 from .manifestfile import read_manifest
 from .record import FOLDER, record_files
@@ -120,10 +121,10 @@ def _changes(old: Mapping[str, Any], new: Mapping[str, Any], place: str = "") ->
     for key in dict.fromkeys((*old, *new)):
         a, b = old.get(key), new.get(key)
         if isinstance(a, Mapping) and isinstance(b, Mapping):
-            found += _changes(a, b, f"{place}{key}.")
+            found += _changes(a, b, f"{place}{dotted(key)}.")
         elif a != b:
             both = f": {_short(a)} there, {_short(b)} now"
-            found.append(f"{place}{key}{both if len(both) < LONGEST_SHOWN else ''}")
+            found.append(f"{place}{dotted(key)}{both if len(both) < LONGEST_SHOWN else ''}")
     return found
 
 

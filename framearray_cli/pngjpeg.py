@@ -62,17 +62,17 @@ def opened_picture(path: Path) -> Iterator[Any]:
         raise OutputError(f"{path}: damaged: {error}") from error
 
 
+def can_encode(name: str) -> bool:
+    """Whether Pillow was built with a format, "png" or "jpg"."""
+    import PIL.features
+
+    return bool(PIL.features.check_codec("jpg" if name == "jpg" else "zlib"))
+
+
 def check_size(path: Path, width: int, height: int) -> None:
     """Refuse what a few bytes may claim, before memory is taken for it."""
     if width * height > MOST_PIXELS:
         raise OutputError(f"{path}: damaged: it says that it has {width} x {height} pixels, more than any job")
-
-
-def has_codec(*, jpeg: bool) -> bool:
-    """Whether Pillow was built with what JPEG, or else PNG, needs."""
-    import PIL.features
-
-    return bool(PIL.features.check_codec("jpg" if jpeg else "zlib"))
 
 
 def encode_png(codes: Bytes, attributes: Attributes) -> memoryview:

@@ -8,6 +8,7 @@ from typing import Protocol
 from ..errors import SceneError
 from .model import Material, Notes, listed
 
+LONGEST_NAME = 100  # characters of a name in a message
 NAMES_IN_AN_ERROR = 12
 
 
@@ -57,4 +58,5 @@ def _unknown_material(name: str, names: Sequence[str]) -> str:
         return difflib.SequenceMatcher(None, name.lower(), known.lower()).ratio()
 
     nearest = sorted(names, key=likeness, reverse=True)
-    return f'scene.materials."{name}": no such material in the scene; it has {listed(nearest, NAMES_IN_AN_ERROR)}'
+    short = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
+    return f'scene.materials."{short}": no such material in the scene; it has {listed(nearest, NAMES_IN_AN_ERROR)}'

@@ -194,3 +194,10 @@ def test_names_cannot_command_the_terminal(tmp_path, capsys, monkeypatch):
     assert told.err == "a\\x1b[31m\\u202eb\\n.toml: no such file\n1 problem; nothing was rendered.\n"
     job = write_job(tmp_path, scene={"materials": {"x\x1b[2J": {"specular": 0.5}}})
     assert "\x1b" not in run(capsys, "check", job).err
+
+
+def test_a_long_name_of_a_material_is_told_shortly(tmp_path, capsys):
+    told = run(capsys, "check", write_job(tmp_path, scene={"materials": {"x" * 5000: {"specular": 0.5}}}))
+    assert told.code == 3
+    assert '"' + "x" * 100 + '...": no such material' in told.err
+    assert len(told.err) < 1000

@@ -11,6 +11,12 @@ FOUND: tuple[tuple[str, str, str], ...] = (
     ("4 MB of unknown keys: a minute and more", "3 s: 50 problems are told, the rest counted", "unit/test_jobfile.py"),
     ("A key of 100,000 parts, `x.a.a.a...`: all memory of the machine", "a message", "unit/test_jobfile.py"),
     ("A key of 5000 letters: a message of as many", "a key in a message has at most 100", "unit/test_jobfile.py"),
+    ("Likewise the name of a material", "likewise", "cli/test_messages.py"),
+    (
+        "A manifest with such a key: 13 s; one with a key of 100,000 letters: a message of as many",
+        "as in a job",
+        "unit/test_manifest.py",
+    ),
     ("A rate near 0 in a manifest: a division by zero", "a message", "unit/test_manifest.py"),
     (
         "A file of zeros in place of an EXR: every reader of OpenImageIO tried it, for 10 s and more",

@@ -19,8 +19,9 @@ Every outcome is a picture or one clear message with the right exit code. `make 
 thousand and hands each to a command of the program: `tests/fuzz/` says how. A case is bad if there is a traceback, a
 crash, a warning of a library, an exit code that is not in [the list](cli.md#errors), no message, a message of more
 than 60 lines or with a line of more than 1000 letters, more than {SECONDS:.0f} s of processor time, no end within
-{PATIENCE:.0f} s, or more than {MEMORY >> 30} GiB. Cases run in a process of their own, or 25 in one; those of which
-one ends badly run again, alone.
+{PATIENCE:.0f} s, or more than {MEMORY >> 30} GiB.
+Cases run in a process of their own, or 25 in one; those of which one ends badly run again, alone. What is counted as
+bad was found in the very runs below, and mended since.
 """
 KINDS = {
     "jobs": """

@@ -169,10 +169,18 @@ SINGLE: tuple[Mutation, ...] = (
 )  # fmt: skip
 
 
+def _unshared(value: Any) -> Any:
+    """A copy in which no table or list stands in two places, so that none can be moved into itself."""
+    if isinstance(value, dict):
+        return {key: _unshared(item) for key, item in value.items()}
+    return [_unshared(item) for item in value] if isinstance(value, list) else value
+
+
 def mutated(rng: Random, table: Table, root: Schema, often: float = 0.25) -> tuple[str, Table]:
     """A copy with one thing changed, or with several."""
     result = copy.deepcopy(table)
     n = rng.randint(2, 6) if rng.random() < often else 1
     for _ in range(n):
         name = rng.choice(SINGLE)(rng, result, root)
+        result = _unshared(result)
     return (name if n == 1 else "several changes"), result
