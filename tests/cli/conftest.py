@@ -1,4 +1,4 @@
-"""Signal handlers that the command line sets are put back after each test."""
+"""Signal handlers that the command line sets are put back after each test; tests mean the same under `nohup`."""
 
 import signal
 from collections.abc import Iterator
@@ -10,6 +10,8 @@ SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SI
 
 @pytest.fixture(autouse=True)
 def _signals() -> Iterator[None]:
+    if hasattr(signal, "SIGHUP"):  # what is ignored here would be ignored by every program that a test starts
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
     before = [(number, signal.getsignal(number)) for number in SIGNALS]
     yield
     for number, handler in before:
