@@ -4,7 +4,8 @@ import os
 from pathlib import Path
 
 from .errors import OutputError
-from .images import last_row, read_image
+from .exrtiff import last_row
+from .images import read_image
 from .pngjpeg import opened_picture
 
 JPEG_END = b"\xff\xd9"

@@ -1,17 +1,14 @@
-"""Read and write one image; for EXR and TIFF the only door to OpenImageIO.
+"""Read and write one image.
 
-OpenImageIO raises nothing: every return value is checked here. It also reports success for a PNG on a full disk and
-reads half a JPEG without a word, so PNG and JPEG go through Pillow, in memory.
+EXR and TIFF go through OpenImageIO. It reports success for a PNG on a full disk and reads half a JPEG without a word,
+so PNG and JPEG go through Pillow, in memory.
 """
 
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from fractions import Fraction
-from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,17 +16,16 @@ from numpy.typing import NDArray
 from .arrays import Bytes, Float32, Image
 from .colour import linear_from_srgb8, srgb8_from_linear
 from .errors import MissingExtraError, OutputError
-from .files import refusal, whole_file, write_bytes
-from .imageattributes import FIXED_DATE, Attribute, Attributes
-from .pngjpeg import can_encode, check_size, encode_jpeg, encode_png, read_codes
+from .exrtiff import OIIO_NAMES, oiio, read_pixels, spec_of, write_pixels
+from .files import write_bytes
+from .imageattributes import Attributes
+from .pngjpeg import can_encode, encode_jpeg, encode_png, read_codes
 
 Extension = Literal["exr", "png", "tif", "jpg"]
 
 HALF_MAX = 65504.0  # the largest half; what lies beyond becomes infinite
 EXR_COMPRESSIONS = ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
 FLOAT_LAYERS = ("depth", "samples")  # layers that need more than the 11 bits of a half
-_OIIO_NAMES = {"exr": "openexr", "tif": "tiff"}
-_HEADS = (b"\x76\x2f\x31\x01", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")  # of EXR, TIFF and large TIFF
 _PILLOW_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
@@ -74,9 +70,9 @@ def require_writer(name: Extension) -> None:
     Raises:
         MissingExtraError: it cannot.
     """
-    if name in _OIIO_NAMES:
-        good, library = _oiio().ImageOutput.create(_OIIO_NAMES[name]) is not None, "OpenImageIO"
-        _oiio().geterror()  # clears what a failed attempt left behind
+    if name in OIIO_NAMES:
+        good, library = oiio().ImageOutput.create(OIIO_NAMES[name]) is not None, "OpenImageIO"
+        oiio().geterror()  # clears what a failed attempt left behind
     else:
         good, library = can_encode(name), "Pillow"
     if not good:
@@ -126,10 +122,10 @@ def write_image(
     else:
         # Only plain text: other types of attribute can end the process in the TIFF writer.
         text = {name: value for name, value in attributes.items() if isinstance(value, str)}
-        spec = _spec(image.shape, ["R", "G", "B"], ["float"] * 3, text)
+        spec = spec_of(image.shape, ["R", "G", "B"], ["float"] * 3, text)
         spec.attribute("compression", "none")  # zip saves a fifth of a noisy float image and takes 20 times as long
         spec.attribute("tiff:write_exif", 0)  # else it fails to write an empty Exif directory, and says so
-        _write_oiio(path, "tiff", spec, image)
+        write_pixels(path, "tiff", spec, image)
 
 
 def _halves(image: Image, largest: float) -> NDArray[np.float16]:
@@ -149,9 +145,9 @@ def _write_exr(
     layers = [_halves(layer, np.inf) if kind == "half" else layer for layer in more.values()]
     names = ["R", "G", "B"] + [f"{name}.{letter}" for name in more for letter in "RGB"]
     pixels = np.concatenate([image, *layers], axis=-1) if layers else image
-    spec = _spec(pixels.shape, names, [kind] * len(names), attributes)
+    spec = spec_of(pixels.shape, names, [kind] * len(names), attributes)
     spec.attribute("compression", _compression(image_format.compression))
-    _write_oiio(path, "openexr", spec, pixels)
+    write_pixels(path, "openexr", spec, pixels)
 
 
 def write_codes(
@@ -200,9 +196,9 @@ def write_layers(
         for name, layer in layers.items()
     ]
     pixels = np.stack([np.asarray(layer, np.float32) for layer in layers.values()], axis=-1)
-    spec = _spec(pixels.shape, list(layers), kinds, attributes or {})
+    spec = spec_of(pixels.shape, list(layers), kinds, attributes or {})
     spec.attribute("compression", _compression(compression))
-    _write_oiio(path, "openexr", spec, pixels)
+    write_pixels(path, "openexr", spec, pixels)
 
 
 def read_image(path: Path) -> Image:
@@ -213,7 +209,7 @@ def read_image(path: Path) -> Image:
     """
     if path.suffix.lower() in _PILLOW_SUFFIXES:
         return linear_from_srgb8(read_codes(path))
-    names, pixels = _read_oiio(path)
+    names, pixels = read_pixels(path)
     if not {"R", "G", "B"} <= set(names):
         raise OutputError(f"{path}: expected channels R, G, B, found {', '.join(names)}")
     return np.ascontiguousarray(pixels[..., [names.index(name) for name in "RGB"]])
@@ -225,22 +221,8 @@ def read_layers(path: Path) -> dict[str, Float32]:
     Raises:
         OutputError: the file is missing, damaged or cut short.
     """
-    names, pixels = _read_oiio(path)
+    names, pixels = read_pixels(path)
     return {name: np.ascontiguousarray(pixels[..., i]) for i, name in enumerate(names)}
-
-
-def last_row(path: Path) -> tuple[int, int] | None:
-    """Read the last row of an EXR or TIFF, which one that was cut short has lost: width and height, or None."""
-    oiio = _oiio()
-    source = oiio.ImageInput.open(str(path)) if os.path.isfile(path) and _begins_well(path) else None
-    if source is None:
-        oiio.geterror()  # clears what the failed opening left behind
-        return None
-    spec = source.spec()
-    row = source.read_scanlines(spec.height - 1, spec.height, 0, 0, spec.nchannels, oiio.UNKNOWN)
-    message = source.geterror()
-    source.close()
-    return None if row is None or message else (spec.width, spec.height)
 
 
 def _compression(wish: str) -> str:
@@ -260,101 +242,3 @@ def _largest(label: str, values: Float32) -> float:
     if not (math.isfinite(low) and math.isfinite(high)):
         raise ValueError(f"{label}: not finite, {np.count_nonzero(~np.isfinite(values))} values")
     return max(-low, high)
-
-
-@cache
-def _oiio() -> Any:
-    """Import OpenImageIO, with its own threads off: callers write several files at once instead."""
-    try:
-        import OpenImageIO
-    except ImportError as error:
-        raise MissingExtraError(f"images need OpenImageIO ({error}); pip install OpenImageIO") from error
-    OpenImageIO.attribute("threads", 1)
-    OpenImageIO.attribute("exr_threads", -1)  # -1: compress in the calling thread; 1 would hand it to another
-    return OpenImageIO
-
-
-def _spec(shape: tuple[int, ...], names: list[str], kinds: list[str], attributes: Attributes) -> Any:
-    """Describe an image of `shape` (h, w, channels) with "half" or "float" for each channel."""
-    oiio = _oiio()
-    height, width, channels = shape
-    spec = oiio.ImageSpec(width, height, channels, "float" if "float" in kinds else "half")
-    spec.channelnames = names
-    if len(set(kinds)) > 1:
-        spec.channelformats = kinds
-    for name, value in {"DateTime": FIXED_DATE, **attributes}.items():
-        _set_attribute(spec, name, value)
-    return spec
-
-
-def _set_attribute(spec: Any, name: str, value: Attribute) -> None:
-    oiio = _oiio()
-    if isinstance(value, np.ndarray):
-        rows = np.asarray(value.T, np.float32)  # row vectors in the file, see imageattributes.py
-        spec.attribute(name, oiio.TypeDesc("matrix44"), tuple(rows.ravel().tolist()))
-    elif isinstance(value, Fraction):
-        spec.attribute(name, oiio.TypeDesc("rational"), (value.numerator, value.denominator))
-    elif isinstance(value, tuple):
-        spec.attribute(name, oiio.TypeDesc("vector"), tuple(float(x) for x in value))
-    else:
-        spec.attribute(name, value)
-
-
-def _write_oiio(path: Path, format_name: str, spec: Any, pixels: NDArray[Any]) -> None:
-    """Write pixels (h, w, channels) through OpenImageIO, by format name: a temporary file has no suffix of its own."""
-    oiio = _oiio()
-    pixels = np.ascontiguousarray(pixels)  # a strided array can be stored wrongly without an error
-    with whole_file(path) as part:
-        output = oiio.ImageOutput.create(format_name)
-        if output is None:
-            raise OutputError(f"{path}: OpenImageIO cannot write {format_name}: {oiio.geterror()}")
-        # All three run in turn; the file is good only if none fails and no error was left behind.
-        done = output.open(str(part), spec) and output.write_image(pixels)
-        done = output.close() and done
-        message = output.geterror()
-        if not done or message:
-            why = refusal(part, pixels.nbytes) or _first_line(message, part)
-            raise OutputError(f"{path}: cannot be written: {why}")
-        _check_end(path, part, pixels.nbytes)
-
-
-def _check_end(path: Path, part: Path, n_bytes: int) -> None:
-    """Read the last row back (0.15 ms): a disk that is full when the last buffer is flushed goes unreported."""
-    if last_row(part) is None:
-        why = refusal(part, n_bytes) or "the file is cut short; is the disk full?"
-        raise OutputError(f"{path}: cannot be written: {why}")
-
-
-def _read_oiio(path: Path) -> tuple[list[str], Float32]:
-    """Read all channels as float32: names and (h, w, channels)."""
-    oiio = _oiio()
-    if not os.path.isfile(path):
-        raise OutputError(f"{path}: no such file")
-    if not _begins_well(path):
-        raise OutputError(f"{path}: not an image, or damaged: it does not begin like EXR or TIFF")
-    source = oiio.ImageInput.open(str(path))
-    if source is None:
-        raise OutputError(f"{path}: not an image, or damaged: {_first_line(oiio.geterror(), path)}")
-    spec = source.spec()
-    check_size(path, spec.width, spec.height)
-    pixels = source.read_image(oiio.FLOAT)
-    message = source.geterror()
-    source.close()
-    if pixels is None or message:
-        raise OutputError(f"{path}: damaged or cut short: {_first_line(message, path)}")
-    return list(spec.channelnames), np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
-
-
-def _begins_well(path: Path) -> bool:
-    """Whether a file begins like EXR or TIFF; any other kind OpenImageIO would try with all its readers."""
-    try:
-        with path.open("rb") as file:
-            return file.read(4) in _HEADS
-    except OSError:
-        return False
-
-
-def _first_line(message: str, path: Path) -> str:
-    """Shorten an OpenImageIO error to one line, without the path that the message around it already names."""
-    lines = [line.strip() for line in message.replace(str(path), path.name).splitlines() if line.strip()]
-    return lines[0] if lines else "no reason given"

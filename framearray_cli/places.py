@@ -9,6 +9,7 @@ from itertools import product
 from typing import TypeAlias
 
 from .errors import JobError
+from .jobvalues import shown
 from .manifest import MAIN_AXIS, Manifest
 from .movie.places import nearest, position_of, read_place
 
@@ -38,7 +39,7 @@ def indices(option: str, text: str, n: int) -> tuple[int, ...]:
     for place in text.split(","):
         index = _index(place.strip(), n)
         if index is None:
-            raise JobError(option, [f"expected {_WANTED}, got {text!r}"])
+            raise JobError(option, [f"expected {_WANTED}, got {shown(text)}"])
         if not 0 <= index < n:
             raise JobError(option, [f"expected 0 to {n - 1}, or -{n} to -1, got {place.strip()}"])
         found[index] = None
@@ -97,7 +98,7 @@ def _told(axes: Mapping[str, int], at: Sequence[str]) -> dict[str, tuple[str, st
         axis, equals, places = text.partition("=")
         if not equals or axis not in axes or axis in told:
             known = ", ".join(f"{name} (0 to {n - 1})" for name, n in axes.items())
-            problem = "twice the same axis" if axis in told else repr(text)
+            problem = "twice the same axis" if axis in told else shown(text)
             raise JobError("--at", [f"expected AXIS=PLACES with one of the axes {known}, got {problem}"])
         told[axis] = (f"--at {axis}", places)
     return told

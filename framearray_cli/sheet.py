@@ -12,6 +12,7 @@ from .arrays import Bytes, Float32, Image
 from .colour import srgb8_from_linear
 from .errors import JobError, OutputError
 from .images import Extension, ImageFormat, require_writer, write_codes, write_image
+from .jobvalues import shown
 from .manifest import MAIN_AXIS, Manifest
 from .manifestfile import read_manifest
 from .movie.label import typeface
@@ -139,7 +140,7 @@ def _image_format(target: Path, exposure: float) -> ImageFormat:
 def _place_beside(manifest: Manifest, axis: str, at: Sequence[str]) -> tuple[int, ...]:
     """The one light place of the axes that are not shown; that of the shown one means nothing."""
     if axis not in manifest.axes:
-        raise JobError("--side", [f"expected one of the axes {', '.join(manifest.axes)}, got {axis!r}"])
+        raise JobError("--side", [f"expected one of the axes {', '.join(manifest.axes)}, got {shown(axis)}"])
     if any(text.partition("=")[0] == axis for text in at):
         raise JobError("--at", [f"expected other axes than {axis}, all of which is shown"])
     places = light_places(manifest, None, at, MIDDLE)

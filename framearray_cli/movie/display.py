@@ -13,6 +13,7 @@ import numpy as np
 from ..arrays import Float32, Image
 from ..colour import srgb_from_linear
 from ..errors import JobError
+from ..jobvalues import shown
 from .cube import Encode, tabled
 
 BUILT_IN = "ocio://default"  # the configuration that OpenColorIO carries: ACES 2.0
@@ -72,9 +73,8 @@ def find_view(name: str) -> View:
                 return _ocio_view(name, place, display, view)
     known = [f"{display}/{view}" for display in config.getDisplayNames() for view in config.getViewNames(display)]
     more = f" and {len(known) - MOST_NAMES} more" if len(known) > MOST_NAMES else ""
-    raise JobError(
-        "--view", [f'expected srgb, aces or a view of {place} ({"; ".join(known[:MOST_NAMES])}{more}), got "{name}"']
-    )
+    names = "; ".join(known[:MOST_NAMES]) + more
+    raise JobError("--view", [f"expected srgb, aces or a view of {place} ({names}), got {shown(name)}"])
 
 
 def _config(place: str) -> Any:

@@ -28,7 +28,6 @@ from .handout import LOOK_EVERY, HandedOut, count_workers, lacks_program
 # Share of the free memory that workers get; the rest is for files that the system keeps in memory.
 SHARE = 0.9
 PROBE = ".parts-"  # begins the name of a file in the folder, which workers look for
-LOST = "the Dask scheduler has gone away"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,7 @@ import PIL.ImageFont
 import pytest
 from program import PACKAGE_PARENT, names, run, write_job
 
-from framearray_cli import images
+from framearray_cli import exrtiff
 from framearray_cli.movie import label, video
 
 # Runs the command line where some libraries cannot be found.
@@ -128,7 +128,7 @@ def test_formats_that_a_library_was_built_without(array, tmp_path, monkeypatch, 
 
 
 def test_an_image_library_without_a_format(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(images._OIIO_NAMES, "exr", "none")
+    monkeypatch.setitem(exrtiff.OIIO_NAMES, "exr", "none")
     told = run(capsys, "render", "-q", write_job(tmp_path, output={"format": "png"}))
     assert told.code == 2, "layers are EXR"
     assert told.err.startswith("OpenImageIO is built without EXR here; ")

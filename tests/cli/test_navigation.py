@@ -110,3 +110,19 @@ def test_points_of_a_rendered_room_lie_on_its_surfaces(tmp_path, capsys):
     assert misses(mesh, points, size) <= 0.01  # edges whose depth bends little
     for wrong in ([-1, 1, 1], [1, -1, 1], [1, 1, -1], [1.1, 1.1, 1.1]):  # mirrored, or a tenth too far
         assert misses(mesh, (points - eyes[0]) * wrong + eyes[0], size) > 0.2
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("assemble", "--walk", "-o", "a.gif", "--view"),
+        ("export", "-f", "colmap", "-o", "a", "--at"),
+        ("export", "-f", "colmap", "-o", "a", "--cameras"),
+        ("sheet", "-o", "a.png", "--side"),
+        ("sheet", "-o", "a.png", "--at"),
+    ],
+)
+def test_a_long_value_of_an_option_is_told_shortly(options, array, capsys):
+    told = run(capsys, options[0], array, *options[1:], "1" * 5000)
+    assert told.code == 2
+    assert "111..." in told.err and len(told.err) < 1000

@@ -27,7 +27,7 @@ rays hits eyehits plan allotment
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
 terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise standarderror compose accumulate window
-imageattributes pngjpeg images filepatterns manifest manifestfile pictures ranges record resume folderlock
+imageattributes pngjpeg exrtiff images filepatterns manifest manifestfile pictures ranges record resume folderlock
 outfolder stored writer
 prepare memory acceptance expected auto allot target describe summary render check verify
 start/rays start/sample start/views start/room start/orbit start/model start/staged start/expose start/plan
@@ -63,7 +63,7 @@ DOORS = {
         "eyehits",
     ),  # eyehits: one function that allocates, so no kernel
     "trimesh": ("meshes/",),
-    "OpenImageIO": ("images", "movie/display"),
+    "OpenImageIO": ("exrtiff", "movie/display"),
     "PIL": ("meshes/", "pngjpeg", "movie/label", "movie/animation", "sheet"),
     "tomllib": ("jobfile", "manifestfile"),
     "tomli_w": ("manifestfile", "report/tables"),

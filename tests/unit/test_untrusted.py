@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from framearray_cli.errors import OutputError
+from framearray_cli.exrtiff import last_row
 from framearray_cli.imagecheck import check_image
-from framearray_cli.images import last_row, read_image
+from framearray_cli.images import read_image
 from framearray_cli.manifestfile import read_manifest
 from framearray_cli.record import Entry, RecordWriter, Session, damaged, read_records, record_file, sealed
 from framearray_cli.standarderror import standard_error

@@ -1,0 +1,131 @@
+"""Read and write EXR and TIFF, by OpenImageIO, which raises nothing: every return value is checked here."""
+
+import os
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arrays import Float32
+from .errors import MissingExtraError, OutputError
+from .files import refusal, whole_file
+from .imageattributes import FIXED_DATE, Attribute, Attributes
+from .pngjpeg import check_size
+
+OIIO_NAMES = {"exr": "openexr", "tif": "tiff"}
+_HEADS = (b"\x76\x2f\x31\x01", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")  # of EXR, TIFF and large TIFF
+
+
+def spec_of(shape: tuple[int, ...], names: list[str], kinds: list[str], attributes: Attributes) -> Any:
+    """Describe an image of `shape` (h, w, channels) with "half" or "float" for each channel."""
+    library = oiio()
+    height, width, channels = shape
+    spec = library.ImageSpec(width, height, channels, "float" if "float" in kinds else "half")
+    spec.channelnames = names
+    if len(set(kinds)) > 1:
+        spec.channelformats = kinds
+    for name, value in {"DateTime": FIXED_DATE, **attributes}.items():
+        _set_attribute(spec, name, value)
+    return spec
+
+
+def write_pixels(path: Path, format_name: str, spec: Any, pixels: NDArray[Any]) -> None:
+    """Write pixels (h, w, channels) through OpenImageIO, by format name: a temporary file has no suffix of its own."""
+    library = oiio()
+    pixels = np.ascontiguousarray(pixels)  # a strided array can be stored wrongly without an error
+    with whole_file(path) as part:
+        output = library.ImageOutput.create(format_name)
+        if output is None:
+            raise OutputError(f"{path}: OpenImageIO cannot write {format_name}: {library.geterror()}")
+        # All three run in turn; the file is good only if none fails and no error was left behind.
+        done = output.open(str(part), spec) and output.write_image(pixels)
+        done = output.close() and done
+        message = output.geterror()
+        if not done or message:
+            why = refusal(part, pixels.nbytes) or _first_line(message, part)
+            raise OutputError(f"{path}: cannot be written: {why}")
+        _check_end(path, part, pixels.nbytes)
+
+
+def read_pixels(path: Path) -> tuple[list[str], Float32]:
+    """Read all channels as float32: names and (h, w, channels)."""
+    library = oiio()
+    if not os.path.isfile(path):
+        raise OutputError(f"{path}: no such file")
+    if not _begins_well(path):
+        raise OutputError(f"{path}: not an image, or damaged: it does not begin like EXR or TIFF")
+    source = library.ImageInput.open(str(path))
+    if source is None:
+        raise OutputError(f"{path}: not an image, or damaged: {_first_line(library.geterror(), path)}")
+    spec = source.spec()
+    check_size(path, spec.width, spec.height)
+    pixels = source.read_image(library.FLOAT)
+    message = source.geterror()
+    source.close()
+    if pixels is None or message:
+        raise OutputError(f"{path}: damaged or cut short: {_first_line(message, path)}")
+    return list(spec.channelnames), np.asarray(pixels, np.float32).reshape(spec.height, spec.width, -1)
+
+
+def last_row(path: Path) -> tuple[int, int] | None:
+    """Read the last row of an EXR or TIFF, which one that was cut short has lost: width and height, or None."""
+    library = oiio()
+    source = library.ImageInput.open(str(path)) if os.path.isfile(path) and _begins_well(path) else None
+    if source is None:
+        library.geterror()  # clears what the failed opening left behind
+        return None
+    spec = source.spec()
+    row = source.read_scanlines(spec.height - 1, spec.height, 0, 0, spec.nchannels, library.UNKNOWN)
+    message = source.geterror()
+    source.close()
+    return None if row is None or message else (spec.width, spec.height)
+
+
+@cache
+def oiio() -> Any:
+    """Import OpenImageIO, with its own threads off: callers write several files at once instead."""
+    try:
+        import OpenImageIO
+    except ImportError as error:
+        raise MissingExtraError(f"images need OpenImageIO ({error}); pip install OpenImageIO") from error
+    OpenImageIO.attribute("threads", 1)
+    OpenImageIO.attribute("exr_threads", -1)  # -1: compress in the calling thread; 1 would hand it to another
+    return OpenImageIO
+
+
+def _set_attribute(spec: Any, name: str, value: Attribute) -> None:
+    library = oiio()
+    if isinstance(value, np.ndarray):
+        rows = np.asarray(value.T, np.float32)  # row vectors in the file, see imageattributes.py
+        spec.attribute(name, library.TypeDesc("matrix44"), tuple(rows.ravel().tolist()))
+    elif isinstance(value, Fraction):
+        spec.attribute(name, library.TypeDesc("rational"), (value.numerator, value.denominator))
+    elif isinstance(value, tuple):
+        spec.attribute(name, library.TypeDesc("vector"), tuple(float(x) for x in value))
+    else:
+        spec.attribute(name, value)
+
+
+def _check_end(path: Path, part: Path, n_bytes: int) -> None:
+    """Read the last row back (0.15 ms): a disk that is full when the last buffer is flushed goes unreported."""
+    if last_row(part) is None:
+        why = refusal(part, n_bytes) or "the file is cut short; is the disk full?"
+        raise OutputError(f"{path}: cannot be written: {why}")
+
+
+def _begins_well(path: Path) -> bool:
+    """Whether a file begins like EXR or TIFF; any other kind OpenImageIO would try with all its readers."""
+    try:
+        with path.open("rb") as file:
+            return file.read(4) in _HEADS
+    except OSError:
+        return False
+
+
+def _first_line(message: str, path: Path) -> str:
+    """Shorten an OpenImageIO error to one line, without the path that the message around it already names."""
+    lines = [line.strip() for line in message.replace(str(path), path.name).splitlines() if line.strip()]
+    return lines[0] if lines else "no reason given"
