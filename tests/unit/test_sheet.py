@@ -117,7 +117,7 @@ def test_groups_are_summed_and_another_axis_may_stand_at_the_side(tmp_path: Path
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"side": "lamps"}, "--side: expected one of the axes light, got 'lamps'"),
+        ({"side": "lamps"}, '--side: expected one of the axes light, got "lamps"'),
         ({"at": ["light=1"]}, "--at: expected other axes than light"),
         ({"at": ["lamps=1"]}, "--at: expected AXIS=PLACES with one of the axes light"),
         ({"width": 100}, "--width: 100 pixels are too few for 4 columns; try fewer --columns"),
