@@ -113,6 +113,8 @@ def _parsed(text: bytes) -> Tree:
     """The JSON of a glTF without keys whose value is null."""
     try:
         tree = json.loads(text.decode("utf-8-sig"), object_hook=_without_null if b"null" in text else None)
+        if b"\\ud" in text.lower():  # half of a letter beyond 16 bits is none, and cannot be written again
+            tree = json.loads(json.dumps(tree, ensure_ascii=False).encode(errors="replace"))
     except RecursionError as error:
         raise ValueError("lists or objects are nested too deeply") from error
     if not isinstance(tree, dict):

@@ -26,27 +26,27 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
     materials = read_materials(gltf, used_materials(gltf), assets, textures, notes)
     placed = placed_meshes(gltf, assets.limit)
     primitives: dict[int, list[Triangles]] = {}
+    shown = {mesh for mesh, _ in placed}
     for number, entry in enumerate(gltf.items("meshes")):
-        if any(mesh == number for mesh, _ in placed):
+        if number in shown:
             read = (read_triangles(gltf, primitive, materials, notes) for primitive in entry["primitives"])
             primitives[number] = [triangles for triangles in read if triangles is not None]
     parts: list[Part] = []
     outside = 0
     for mesh, places in placed:
-        for world_from_mesh in places:
-            for found in primitives[mesh]:
-                parts.append(
-                    place(
-                        found.vertices,
-                        found.faces,
-                        world_from_mesh,
-                        found.material,
-                        normals=found.normals,
-                        uvs=found.uvs,
-                        colours=found.colours,
-                    )
+        for found in primitives[mesh]:
+            parts.append(
+                place(
+                    found.vertices,
+                    found.faces,
+                    places,
+                    found.material,
+                    normals=found.normals,
+                    uvs=found.uvs,
+                    colours=found.colours,
                 )
-                outside += found.outside
+            )
+            outside += found.outside * len(places)
     tables = [entry.material for entry in materials] + _defaults(parts, len(materials), len(materials) + 1, notes)
     return Meshes(
         parts=tuple(parts),

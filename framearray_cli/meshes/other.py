@@ -89,7 +89,7 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
             place(
                 vertices,
                 faces[inside],
-                world_from_mesh,
+                world_from_mesh[None],
                 numbers[key],
                 normals=file_normals(mesh),
                 uvs=None if uv is None else np.array(uv, dtype=np.float64),

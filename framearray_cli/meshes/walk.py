@@ -32,7 +32,7 @@ def place(
     colours: Float32 | None,
     face_colours: Float32 | None = None,
 ) -> Part:
-    """Put a mesh where its node says, in float64, one row a triangle corner.
+    """Put a mesh into all of its places, one after the other, in float64, one row a triangle corner.
 
     A mirrored transform turns triangles inside out: their winding is turned back. Normals go with the
     cofactors of the matrix, which are its inverse transpose times its determinant and exist for flat matrices too.
@@ -40,37 +40,49 @@ def place(
     Args:
         vertices: (v, 3).
         faces: (f, 3), all of them between 0 and v.
-        world_from_mesh: (4, 4).
+        world_from_mesh: (n, 4, 4), one a place.
         material: number that the part gets.
         normals: (v, 3) that the file gives.
         uvs: (v, 2) a vertex.
         colours: (v, 3) a vertex.
         face_colours: (f, 3) a face; count where `colours` is None.
     """
-    linear = world_from_mesh[:3, :3]
+    linear = world_from_mesh[:, :3, :3]
     with np.errstate(all="ignore"):  # non-finite vertices are counted and dropped by whoever takes the part
-        world = vertices @ linear.T + world_from_mesh[:3, 3]
-        determinant = float(np.linalg.det(linear))
+        world = vertices @ linear.transpose(0, 2, 1) + world_from_mesh[:, None, :3, 3]
+        mirrored = np.linalg.det(linear) < 0
         if normals is not None:
-            normals = normals @ (cofactors(linear) * (-1.0 if determinant < 0 else 1.0)).T
-    if determinant < 0:
-        faces = faces[:, ::-1]
-    if colours is not None:
-        colours = colours[faces]
-    elif face_colours is not None:
-        colours = np.repeat(face_colours[:, None], 3, axis=1)
+            sign = np.where(mirrored, -1.0, 1.0)[:, None, None]
+            normals = normals @ (cofactors(linear) * sign).transpose(0, 2, 1)
+
+    def turned(rows: NDArray[Any]) -> NDArray[Any]:
+        """(n f, 3, k) of (n, f, 3, k), the corners of mirrored places in the other order."""
+        if mirrored.any():
+            rows = rows.copy()
+            rows[mirrored] = rows[mirrored][:, :, ::-1]
+        return rows.reshape(-1, *rows.shape[2:])
+
+    def everywhere(rows: NDArray[Any]) -> NDArray[Any]:
+        """The same (f, 3, k) in all places."""
+        return turned(np.broadcast_to(rows, (len(linear), *rows.shape)))
+
+    if colours is None and face_colours is not None:
+        at_corners: Float32 | None = np.repeat(face_colours[:, None], 3, axis=1)
+    else:
+        at_corners = None if colours is None else colours[faces]
     return Part(
         material=material,
-        corners=world[faces],
-        normals=None if normals is None else normals[faces],
-        uvs=None if uvs is None else uvs[faces],
-        colours=colours,
+        corners=turned(world[:, faces]),
+        normals=None if normals is None else turned(normals[:, faces]),
+        uvs=None if uvs is None else everywhere(uvs[faces]),
+        colours=None if at_corners is None else everywhere(at_corners),
     )
 
 
-def cofactors(matrix: Float64) -> Float64:
-    """(3, 3) cofactor matrix: rows are cross products of the other rows."""
-    return np.stack([np.cross(matrix[1], matrix[2]), np.cross(matrix[2], matrix[0]), np.cross(matrix[0], matrix[1])])
+def cofactors(matrices: Float64) -> Float64:
+    """(n, 3, 3) cofactor matrices: rows are cross products of the other rows."""
+    a, b, c = matrices[:, 0], matrices[:, 1], matrices[:, 2]
+    return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
 
 
 def file_normals(mesh: Any) -> Float64 | None:

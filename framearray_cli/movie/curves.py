@@ -8,6 +8,7 @@ from typing import Annotated, Any, TypeAlias
 
 from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
 
+from ..jobschema import dotted
 from ..jobvalues import Place, Table, Triple, fail, shown
 from ..pictures import AS_RENDERED, Relight
 from .places import percent
@@ -125,7 +126,7 @@ def relights(
     """
     if not times or not (groups or ambient):
         return [AS_RENDERED] * len(times)
-    by_group = {name: _factors(f"groups.{name}", change, times, problems) for name, change in groups.items()}
+    by_group = {name: _factors(f"groups.{dotted(name)}", change, times, problems) for name, change in groups.items()}
     of_ambient = _factors("ambient", ambient or LightChange(), times, problems)
     return [
         Relight(groups={name: factors[k] for name, factors in by_group.items()}, ambient=of_ambient[k])

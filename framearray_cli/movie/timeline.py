@@ -6,6 +6,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from ..errors import JobError
+from ..jobschema import dotted
 from ..manifest import MAIN_AXIS, Manifest
 from ..pictures import Relight
 from .curves import relights
@@ -93,11 +94,13 @@ def _spans(
     given: dict[str, Sequence[IndexPlace] | None] = {"camera": segment.camera, MAIN_AXIS: segment.light, **segment.axes}
     for k, (name, n) in enumerate({"camera": manifest.n_cameras, **axes}.items()):
         if (span := given.pop(name, None)) is not None:
-            place, noun = (name, f"{name}s") if name in ("camera", MAIN_AXIS) else (f"axes.{name}", f"places of {name}")
+            place, noun = (
+                (name, f"{name}s") if name in ("camera", MAIN_AXIS) else (f"axes.{dotted(name)}", f"places of {name}")
+            )
             found[k] = positions(f"{key}.{place}", span, n, noun, problems)
     for name, span in given.items():
         if span is not None:
-            place = MAIN_AXIS if name == MAIN_AXIS else f"axes.{name}"
+            place = MAIN_AXIS if name == MAIN_AXIS else f"axes.{dotted(name)}"
             problems.append(f"{key}.{place}: no such light axis; the array has {', '.join(axes)}")
     return found
 
@@ -105,7 +108,7 @@ def _spans(
 def _light_problems(movie: MoviePath, manifest: Manifest) -> list[str]:
     """What is asked of the light that the array cannot give."""
     if not manifest.groups:
-        keys = [f"groups.{name}" for name in movie.groups] + (["ambient"] if movie.ambient else [])
+        keys = [f"groups.{dotted(name)}" for name in movie.groups] + (["ambient"] if movie.ambient else [])
         return [
             f"{key}: this array stores its light all together, so that it cannot be changed; render again with "
             'group = "..." in [[light.sources]]'
@@ -113,7 +116,9 @@ def _light_problems(movie: MoviePath, manifest: Manifest) -> list[str]:
         ]
     known = manifest.group_names
     return [
-        f"groups.{name}: no such group; the array has {', '.join(known)}" for name in movie.groups if name not in known
+        f"groups.{dotted(name)}: no such group; the array has {', '.join(known)}"
+        for name in movie.groups
+        if name not in known
     ]
 
 

@@ -1,5 +1,6 @@
 """Triangles of glTF files: what trimesh finds too, which reads them in another way; and forms that it does not read."""
 
+import time
 from pathlib import Path
 from typing import Any
 
@@ -112,3 +113,29 @@ def test_draco(tmp_path: Path) -> None:
     glb.tree["extensionsUsed"] = ["KHR_draco_mesh_compression"]
     found = corners(read_meshes(glb.save(tmp_path / "scene.glb")))
     np.testing.assert_allclose(found, QUAD[np.array([[0, 1, 2], [0, 2, 3]])], atol=1e-3)
+
+
+def test_a_million_places_are_filled_at_once(tmp_path: Path) -> None:
+    """One after the other they would take a minute; and mirrored ones are turned, each by itself."""
+    glb, n = Glb(), 1_000_000
+    scale = np.ones((n, 3), np.float32)
+    scale[1::2, 0] = -1
+    move = np.arange(3 * n, dtype=np.float32).reshape(n, 3)
+    rows = {"TRANSLATION": glb.accessor(move), "SCALE": glb.accessor(scale)}
+    mesh = glb.mesh(positions=QUAD[:3], faces=None)
+    glb.node(mesh, extensions={"EXT_mesh_gpu_instancing": {"attributes": rows}})
+    file = glb.save(tmp_path / "scene.glb")
+    started = time.process_time()
+    found = corners(read_meshes(file))
+    assert time.process_time() - started < 10
+    assert found.shape == (n, 3, 3)
+    for k in (0, 1, 2, 99_999, n - 1):
+        expected = QUAD[:3] * scale[k] + move[k]
+        np.testing.assert_array_equal(found[k], expected[::-1] if k % 2 else expected)
+
+
+def test_half_a_letter_in_a_name_is_replaced(tmp_path: Path) -> None:
+    """JSON can hold what no file can; the name goes into the manifest."""
+    glb = Glb()
+    glb.node(glb.mesh(glb.material("a\ud800b")))
+    assert read_meshes(glb.save(tmp_path / "scene.glb")).materials[0].name == "a?b"
