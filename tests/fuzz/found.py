@@ -49,4 +49,15 @@ FOUND: tuple[tuple[str, str, str], ...] = (
         "cli/test_messages.py",
     ),
     ('"51 problems" where there were 3000', "3,000 problems", "cli/test_messages.py"),
+    ("A million instances of a mesh: a minute, one after the other", "1 s", "unit/test_gltf_triangles.py"),
+    (
+        "Half of a letter (`\\ud800`) in the name of a material: a traceback when the manifest was written",
+        "it is replaced",
+        "unit/test_gltf_triangles.py",
+    ),
+    (
+        "Values of options, and keys of movie paths, of 5000 letters: messages of as many",
+        "at most 100 of them",
+        "cli/test_navigation.py",
+    ),
 )

@@ -75,7 +75,7 @@ def size(job: Any) -> float:
         frames * lights / MOST_IMAGES,
         lights / MOST_LIGHTS,
         pixels / MOST_PIXELS,
-        pixels * frames * hits * (job.samples.obscurance + 4 * n_r + lights) / MOST_RAYS,
+        pixels * frames * hits * (job.samples.obscurance + 4 * n_r + lights * len(job.light.sources)) / MOST_RAYS,
         (job.ambient.paths or 4096) * lights / MOST_WALKS,
         (job.render.threads or 1) / MOST_THREADS,
     )
