@@ -32,6 +32,9 @@ missing, added, renamed or moved), their bytes, extreme values that are allowed,
 should. An accepted job is rendered where that takes a moment; every value of every image must then be finite, the
 manifest readable, and `verify` content. One that takes up to ten times as much is checked (`framearray check`, with
 smaller probes), a larger one prepared: its scene is read, its memory estimated.
+
+One case of the run of November 2026 counts as bad that is none: 9,285 hits a pixel under 300 lamps, 1.2 million rays a
+pixel. The render ended well after 18 s of processor time. Such jobs are no longer rendered here: lamps are counted.
 """,
     "scenes": """
 ## Scene files
