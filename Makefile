@@ -54,21 +54,21 @@ check: $(VENV)/installed-dev ## Check format, style and types
 	$(BIN)/mypy
 
 docs: $(VENV)/installed-dev ## Write the generated pages of docs/
-	$(BIN)/python -m framearray_cli.jobdocs docs/
+	$(BIN)/python -m framearray_cli.jobdocs docs/guide/
 
-bench: $(VENV)/installed-bench ## Measure what an image costs, and write docs/speed.md
+bench: $(VENV)/installed-bench ## Measure what an image costs, and write docs/measured/speed.md
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)
 
-bench-scaling: $(VENV)/installed-bench ## Measure time against the size of a job, for docs/speed.md
+bench-scaling: $(VENV)/installed-bench ## Measure time against the size of a job, for docs/measured/speed.md
 	PYTHONPATH=tests $(BIN)/python -m bench scaling $(BENCH)
 
-bench-bias: $(VENV)/installed-bench ## Measure what reuse is off by with both kinds of weights, and write docs/bias.md
+bench-bias: $(VENV)/installed-bench ## Measure what reuse is off by with both kinds of weights, and write docs/measured/bias.md
 	PYTHONPATH=tests $(BIN)/python -m bench bias $(BENCH)
 
-bench-ambient: $(VENV)/installed-bench ## Measure the ambient estimate against path tracing, and write docs/ambient.md
+bench-ambient: $(VENV)/installed-bench ## Measure the ambient estimate against path tracing, and write docs/measured/ambient.md
 	PYTHONPATH=tests $(BIN)/python -m bench ambient $(BENCH)
 
-bench-report: $(VENV)/installed-bench ## Measure speed against error of the three jobs, and write docs/report-*.md
+bench-report: $(VENV)/installed-bench ## Measure speed against error of the three jobs, and write docs/measured/report-*.md
 	PYTHONPATH=tests $(BIN)/python -m bench report $(BENCH)
 
 bench-view: $(VENV)/installed-bench ## Measure the page of `framearray view` in Chromium

@@ -1,4 +1,4 @@
-"""Reference page and JSON Schema of the job file, made from the job: `python -m framearray_cli.jobdocs docs/`."""
+"""Reference page and JSON Schema of the job file, made from the job: `python -m framearray_cli.jobdocs docs/guide/`."""
 
 import json
 import sys
@@ -37,7 +37,7 @@ range = 1.5
 INTRODUCTION = f"""\
 # The job file
 
-<!-- Made by `python -m framearray_cli.jobdocs docs/` from framearray_cli/job.py; edit there. -->
+<!-- Made by `python -m framearray_cli.jobdocs docs/guide/` from framearray_cli/job.py; edit there. -->
 
 A job file says what to render: a scene, a camera path, a light path, and how. It is written in [TOML](https://toml.io).
 This is a whole job of 96 eyes and 48 light positions:

@@ -7,7 +7,7 @@ formula. Reuse is done by brute force: every hit of every eye of the window is p
 
     image[c, l] = sum w L / sum w + what mirrors show / their native hits,    L = R (E[l] / pi + I_A[l] W + S)
 
-Letters: docs/algorithm.md.
+Letters: docs/method/algorithm.md.
 """
 
 from fractions import Fraction

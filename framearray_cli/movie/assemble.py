@@ -67,7 +67,7 @@ def assemble(
 
     Args:
         out: output folder of a render, or its manifest.
-        path: TOML file of segments, see docs/movies.md; or one movement.
+        path: TOML file of segments, see docs/guide/movies.md; or one movement.
         target: "x.mp4" or another of MOVIES; "x.####.png" (also .exr, .tif, .jpg) with as many digits as "#"; a name
             without suffix is a folder, filled with "frame.####" in the array's own format.
         look: how movies, PNG and JPEG are shown.

@@ -1,4 +1,4 @@
-"""The file that tells a movie's path through a frame array: TOML, segments, light; see docs/movies.md."""
+"""The file that tells a movie's path through a frame array: TOML, segments, light; see docs/guide/movies.md."""
 
 from fractions import Fraction
 from pathlib import Path

@@ -18,15 +18,15 @@
     rooms.py      generated scenes of any number of triangles
     scaling.py    time an image against the size of a job
     ambient.py    the ambient estimate, in ambient_scenes.py: ambient_levels.py against walks, ambient_pictures.py
-                  against path-traced pictures; ambient_page.py and ambient_plots.py write docs/ambient.md
+                  against path-traced pictures; ambient_page.py and ambient_plots.py write docs/measured/ambient.md
     pathtraced.py pictures by Mitsuba's path tracer
-    reports.py    reports of the three jobs -> docs/report-*.md
+    reports.py    reports of the three jobs -> docs/measured/report-*.md
     viewpage.py   the page of `framearray view` in Chromium
     machine.py    what all this ran on, and how busy that was
     results.py    results on the disk
     markdown.py   numbers and tables as text
-    pages.py      the parts of docs/speed.md
-    table.py      results -> docs/speed.md
-    biaspage.py   results -> docs/bias.md
+    pages.py      the parts of docs/measured/speed.md
+    table.py      results -> docs/measured/speed.md
+    biaspage.py   results -> docs/measured/bias.md
     plots.py      results -> docs/plots/
 """

@@ -32,7 +32,9 @@ OTHERS = ("scaling", "report", "bias", "told", "page", "peak", "view", *TRACES, 
 
 def main() -> None:
     """Measure what is asked for, and write the page."""
-    parser = argparse.ArgumentParser(prog="bench", description="Measure what an image costs, and write docs/speed.md.")
+    parser = argparse.ArgumentParser(
+        prog="bench", description="Measure what an image costs, and write docs/measured/speed.md."
+    )
     parser.add_argument("what", nargs="?", default="all", choices=("all", *OTHERS, *PROGRAMS, *PARTS))
     parser.add_argument("jobs", nargs="*", help="some of the jobs, of the scenes of `ambient`, or arrays for `view`")
     parser.add_argument("--quick", action="store_true", help="a small picture, once; the page goes to out/bench/quick")

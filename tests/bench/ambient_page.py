@@ -1,4 +1,4 @@
-"""Results -> docs/ambient.md, its plots and its pictures. Nothing is measured here."""
+"""Results -> docs/measured/ambient.md, its plots and its pictures. Nothing is measured here."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,14 +12,14 @@ from .ambient_plots import draw, strips
 from .ambient_scenes import SMALLER, probes
 from .cases import JOBS
 from .markdown import grid, number, percent
-from .results import ROOT, Table, folder, load
+from .results import Site, Table, folder, load, site_for
 
 HEAD = """
 # Ambient light, measured
 
 How I_A depends on the number of walks or particles, whether the error that is reported with it is honest, and how far
 pictures are from path-traced ones: by the model, and by sampling. `make bench-ambient` measures and writes this page;
-`tests/bench/` says how. What follows from it is in the [decision](decisions/ambient.md).
+`tests/bench/` says how. What follows from it is in the [decision](../decisions/ambient.md).
 """
 # Chance that any of the ratios of a page is marked though all reported errors are right: that of 3 standard errors.
 CHANCE = 2 * norm.sf(3.0)
@@ -27,13 +27,12 @@ CHANCE = 2 * norm.sf(3.0)
 
 def write(quick: bool) -> None:
     """Write the page from whatever was measured; quick results go beside themselves."""
-    results = folder(quick)
-    page = results / "ambient.md" if quick else ROOT / "docs" / "ambient.md"
-    page.write_text(render(results, page.parent), encoding="utf-8")
+    page = site_for(quick).pages / "ambient.md"
+    page.write_text(render(folder(quick), site_for(quick)), encoding="utf-8")
     print(page)
 
 
-def render(results: Path, beside: Path) -> str:
+def render(results: Path, site: Site) -> str:
     """The whole page; parts without results are left out."""
     names = [probe.name for probe in probes()]
     levels = {name: table for name in names if (table := load(results, f"ambient-levels-{name}"))}
@@ -41,7 +40,7 @@ def render(results: Path, beside: Path) -> str:
     pictures = {name: table for name, table in compared.items() if "skipped" not in table}
     along = {name: table for name in names if (table := load(results, f"ambient-along-{name}")) and "cameras" in table}
     left_out = {name: table["skipped"] for name, table in compared.items() if "skipped" in table}
-    drawn = draw(levels, pictures, beside / "plots")
+    drawn = {plot: site.link(file) for plot, file in draw(levels, pictures, site.plots).items()}
     parts = [HEAD]
     if levels:
         parts += [*walks(levels, drawn), *honesty(levels)]
@@ -50,7 +49,8 @@ def render(results: Path, beside: Path) -> str:
     if along:
         parts += paths(along)
     if pictures:
-        parts += errors(pictures, strips(pictures, results, beside / "pictures"))
+        shown = strips(pictures, results, site.pictures)
+        parts += errors(pictures, {name: site.link(file) for name, file in shown.items()})
         parts += same_light(pictures)
     if left_out:
         parts.append("Not path-traced: " + "; ".join(f"{name}: {why}" for name, why in left_out.items()) + ".")

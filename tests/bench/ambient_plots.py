@@ -1,4 +1,4 @@
-"""Plots and pictures of docs/ambient.md."""
+"""Plots and pictures of docs/measured/ambient.md."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,17 +18,17 @@ STRIPS = ("kitchen", "stairs", "cabin")  # jobs whose pictures are shown
 WIDTH, GAP, QUALITY = 240, 4, 80  # of one picture and between two, pixels; of JPEG
 
 
-def draw(levels: Mapping[str, Table], pictures: Mapping[str, Table], folder: Path) -> dict[str, str]:
-    """Draw what was measured; returns plot -> its place beside the page. Without matplotlib there are none."""
+def draw(levels: Mapping[str, Table], pictures: Mapping[str, Table], folder: Path) -> dict[str, Path]:
+    """Draw what was measured; returns plot -> its file. Without matplotlib there are none."""
     if not ready(folder):
         return {}
     found = {}
     if levels:
-        _walks(levels, folder / "ambient-walks.svg")
-        found["walks"] = f"{folder.name}/ambient-walks.svg"
+        found["walks"] = folder / "ambient-walks.svg"
+        _walks(levels, found["walks"])
     if pictures:
-        _levels(pictures, folder / "ambient-levels.svg")
-        found["levels"] = f"{folder.name}/ambient-levels.svg"
+        found["levels"] = folder / "ambient-levels.svg"
+        _levels(pictures, found["levels"])
     return found
 
 
@@ -93,16 +93,16 @@ def _levels(pictures: Mapping[str, Table], file: Path) -> None:
         pyplot.close(figure)
 
 
-def strips(pictures: Mapping[str, Table], results: Path, folder: Path) -> dict[str, str]:
-    """Pictures side by side, a job a file; returns name -> the file's place beside the page."""
+def strips(pictures: Mapping[str, Table], results: Path, folder: Path) -> dict[str, Path]:
+    """Pictures side by side, one file per job; returns name -> file."""
     found = {}
     for name in STRIPS:
         if name in pictures:
             with np.load(results / f"ambient-shown-{name}.npz") as kept:
                 made = strip(kept["eye"], kept["fit"], kept["traced"])
             folder.mkdir(parents=True, exist_ok=True)
-            made.save(folder / f"ambient-{name}.jpg", "JPEG", quality=QUALITY, optimize=True)
-            found[name] = f"{folder.name}/ambient-{name}.jpg"
+            found[name] = folder / f"ambient-{name}.jpg"
+            made.save(found[name], "JPEG", quality=QUALITY, optimize=True)
     return found
 
 

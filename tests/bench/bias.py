@@ -1,4 +1,4 @@
-"""What camera reuse is off by however many runs are averaged, with both kinds of weights: results for docs/bias.md.
+"""The bias of camera reuse, however many runs are averaged, with both kinds of weights; see docs/measured/bias.md.
 
 Frames of a camera path are rendered many times with independent seeds, of the hits of their whole window, and without
 reuse with many more hits: the parts of their reference. Ambient light, average reflectivity and light positions are

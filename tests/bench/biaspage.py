@@ -1,4 +1,4 @@
-"""Results of bias.py -> docs/bias.md and docs/plots/bias.svg. Nothing is measured here."""
+"""Results of bias.py -> docs/measured/bias.md and docs/plots/bias.svg. Nothing is measured here."""
 
 import math
 import statistics
@@ -10,7 +10,7 @@ from .campaths import CAMERAS, CLOSE, N_R, NEARER, SPEED
 from .cases import JOBS
 from .markdown import grid, number, percent
 from .plots import draw_bias
-from .results import ROOT, Table, folder, load
+from .results import Site, Table, folder, load, site_for
 
 ALLOWED = 3  # standard errors that a bound leaves to chance
 
@@ -18,7 +18,7 @@ HEAD = f"""
 # Bias of reuse
 
 Written by `make bench-bias`. What is a frame off by, however many runs of it are averaged? Weights `average` and
-`balance` ([note](decisions/weights.md)) with N_r = {N_R}, against references without reuse and with other seeds.
+`balance` ([note](../decisions/weights.md)) with N_r = {N_R}, against references without reuse and with other seeds.
 
 - *Squared bias*: mean((mean of runs - reference)^2) - variance / runs - variance of the reference, over all pixels,
   channels and pictures of a row, each picture over its own mean; in millionths. 2,500 is 5 % of the mean, root mean
@@ -58,13 +58,12 @@ that of all threads together in the steady state, under all 48 light positions, 
 
 def write(quick: bool) -> None:
     """Write the page and its plot from whatever was measured; quick results go beside themselves."""
-    results = folder(quick)
-    page = results / "bias.md" if quick else ROOT / "docs" / "bias.md"
-    page.write_text(render(results, page.parent / "plots"), encoding="utf-8")
+    page = site_for(quick).pages / "bias.md"
+    page.write_text(render(folder(quick), site_for(quick)), encoding="utf-8")
     print(page)
 
 
-def render(results: Path, plots_at: Path) -> str:
+def render(results: Path, site: Site) -> str:
     """The whole page; parts without results are left out."""
     found = {
         (job, camera): table for camera in CAMERAS for job in JOBS if (table := load(results, f"bias-{job}-{camera}"))
@@ -75,8 +74,8 @@ def render(results: Path, plots_at: Path) -> str:
     if found:
         parts += [*_summary(found), *_by_part(found), *_by_hits(found)]
         curves = {key: {w: _curve(table, w) for w in ("average", "balance")} for key, table in found.items()}
-        if drawn := draw_bias(curves, plots_at):
-            parts.append(f"![Squared bias by hits]({drawn})")
+        if drawn := draw_bias(curves, site.plots):
+            parts.append(f"![Squared bias by hits]({site.link(drawn)})")
     if own and spent:
         parts += _equal_time(own, spent)
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"

@@ -22,8 +22,8 @@ LINES = {"average": "--", "balance": "-"}
 Point: TypeAlias = tuple[int, float, float]
 
 
-def draw(scaling: Table, folder: Path) -> dict[str, str]:
-    """Draw every sweep; returns sweep -> the picture's place beside the page. Without matplotlib there are none."""
+def draw(scaling: Table, folder: Path) -> dict[str, Path]:
+    """Draw every sweep; returns sweep -> its plot. Without matplotlib there are none."""
     if not ready(folder):
         return {}
     found = {}
@@ -31,7 +31,7 @@ def draw(scaling: Table, folder: Path) -> dict[str, str]:
         rows = scaling.get(sweep, [])
         if len(rows) > 1:
             _plot(folder / name, label, [size(r) for r in rows], [r["ms"] for r in rows], sweep not in LINEAR)
-            found[sweep] = f"{folder.name}/{name}"
+            found[sweep] = folder / name
     return found
 
 
@@ -69,8 +69,8 @@ def _plot(file: Path, label: str, sizes: list[float], ms: list[float], logarithm
         pyplot.close(figure)
 
 
-def draw_bias(found: Mapping[tuple[str, str], Mapping[str, Sequence[Point]]], folder: Path) -> str | None:
-    """Draw squared bias against hits, a panel a camera; returns the picture's place beside the page.
+def draw_bias(found: Mapping[tuple[str, str], Mapping[str, Sequence[Point]]], folder: Path) -> Path | None:
+    """Draw squared bias against hits, a panel per camera; returns the plot, or None without matplotlib.
 
     Args:
         found: (job, camera) -> weights -> (hits, squared bias, standard error).
@@ -79,6 +79,7 @@ def draw_bias(found: Mapping[tuple[str, str], Mapping[str, Sequence[Point]]], fo
         return None
     from matplotlib import pyplot
 
+    file = folder / "bias.svg"
     cameras = list(dict.fromkeys(camera for _, camera in found))
     colours = dict(zip(dict.fromkeys(job for job, _ in found), COLOURS, strict=False))
     figure, panels = pyplot.subplots(
@@ -95,10 +96,10 @@ def draw_bias(found: Mapping[tuple[str, str], Mapping[str, Sequence[Point]]], fo
             axes.grid(alpha=0.3)
         panels[0][0].set_ylabel("squared bias over the squared mean")
         figure.legend(*panels[0][0].get_legend_handles_labels(), fontsize=7, ncols=3, loc="outside lower center")
-        figure.savefig(folder / "bias.svg", metadata={"Date": None, "Creator": None})
+        figure.savefig(file, metadata={"Date": None, "Creator": None})
     finally:
         pyplot.close(figure)
-    return f"{folder.name}/bias.svg"
+    return file
 
 
 def _curve(axes: Any, curve: Sequence[Point], colour: str, line: str, label: str) -> None:

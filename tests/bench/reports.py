@@ -1,4 +1,4 @@
-"""Speed against error of the three jobs: `framearray report`, and from its tables docs/report-<job>.md."""
+"""Speed against error of the three jobs: `framearray report`, and from its tables docs/measured/report-*.md."""
 
 import shutil
 import tomllib
@@ -14,7 +14,7 @@ from framearray_cli.report.crops import draw_crops
 from .cases import job_named
 from .machine import describe
 from .markdown import grid, number, percent, times
-from .results import RESULTS, ROOT, Table, load, save
+from .results import DOCS, RESULTS, Table, load, save
 from .speed import tell
 
 PLOTS = ("error-and-time", "bias-and-noise", "by-offset", "flicker")
@@ -31,11 +31,11 @@ Machine: {machine}.
 
 {summary}
 
-![Error against time](plots/report-{name}-error-and-time.svg)
+![Error against time](../plots/report-{name}-error-and-time.svg)
 
 *Every setting that was tried; both axes logarithmic.*
 
-![Crops](pictures/report-{name}.jpg)
+![Crops](../pictures/report-{name}.jpg)
 
 *{captions}.*
 
@@ -47,7 +47,7 @@ In bold: on the front, where nothing that was tried is both quicker and more exa
 
 {advice}
 
-![Bias and noise](plots/report-{name}-bias-and-noise.svg)
+![Bias and noise](../plots/report-{name}-bias-and-noise.svg)
 {more}
 """
 
@@ -77,7 +77,7 @@ def write(name: str) -> None:
     pictures([folder / f"crop-{i}.png" for i in range(len(kept["captions"]))], name)
     plots = [plot for plot in PLOTS if (folder / f"{plot}.svg").is_file()]
     for plot in plots:
-        shutil.copyfile(folder / f"{plot}.svg", ROOT / "docs" / "plots" / f"report-{name}-{plot}.svg")
+        shutil.copyfile(folder / f"{plot}.svg", DOCS.plots / f"report-{name}-{plot}.svg")
     width, height = about["resolution"]
     words = PAGE.strip().format(
         name=name,
@@ -93,9 +93,9 @@ def write(name: str) -> None:
         captions="; ".join(kept["captions"]),
         table=rows(table),
         advice=advice(table),
-        more="".join(f"\n![{plot}](plots/report-{name}-{plot}.svg)\n" for plot in plots[2:]),
+        more="".join(f"\n![{plot}](../plots/report-{name}-{plot}.svg)\n" for plot in plots[2:]),
     )
-    page = ROOT / "docs" / f"report-{name}.md"
+    page = DOCS.pages / f"report-{name}.md"
     page.write_text(words.rstrip() + "\n", encoding="utf-8")
     tell(str(page))
 
@@ -152,4 +152,4 @@ def pictures(files: list[Path], name: str) -> None:
             crops.append(np.asarray(image.convert("RGB")))
     gap = np.full((crops[0].shape[0], 6, 3), 255, np.uint8)
     strip = np.concatenate([part for crop in crops for part in (crop, gap)][:-1], axis=1)
-    Image.fromarray(strip).save(ROOT / "docs" / "pictures" / f"report-{name}.jpg", quality=QUALITY)
+    Image.fromarray(strip).save(DOCS.pictures / f"report-{name}.jpg", quality=QUALITY)

@@ -1,8 +1,10 @@
 """Results on the disk: one JSON file a part a job, so that pages can be written again without measuring again."""
 
 import json
+import os
 import statistics
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -12,9 +14,35 @@ RESULTS = ROOT / "out" / "bench"  # git ignores it
 Table: TypeAlias = dict[str, Any]
 
 
+@dataclass(frozen=True)
+class Site:
+    """The folders of measured pages, and of the plots and pictures that they show."""
+
+    pages: Path
+    plots: Path
+    pictures: Path
+
+    def link(self, file: Path) -> str:
+        """Where a page finds a plot or a picture."""
+        return Path(os.path.relpath(file, self.pages)).as_posix()
+
+
+def site_in(results: Path) -> Site:
+    """Pages, plots and pictures beside their results."""
+    return Site(pages=results, plots=results / "plots", pictures=results / "pictures")
+
+
+DOCS = Site(pages=ROOT / "docs" / "measured", plots=ROOT / "docs" / "plots", pictures=ROOT / "docs" / "pictures")
+
+
 def folder(quick: bool) -> Path:
     """Where results go; those of quick runs are kept apart."""
     return RESULTS / "quick" if quick else RESULTS
+
+
+def site_for(quick: bool) -> Site:
+    """Where pages go; those of quick runs stay beside their results."""
+    return site_in(folder(quick)) if quick else DOCS
 
 
 def save(directory: Path, name: str, table: Mapping[str, Any]) -> None:

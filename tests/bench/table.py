@@ -1,23 +1,20 @@
-"""Results -> docs/speed.md. Nothing is measured here: the page can be written again from the files in out/bench."""
+"""Results -> docs/measured/speed.md. Nothing is measured here: the files in out/bench are enough for the page."""
 
 from pathlib import Path
 
 from . import pages, plots
 from .cases import JOBS
-from .results import ROOT, folder, load
+from .results import Site, folder, load, site_for
 
 
 def write(quick: bool) -> None:
     """Write the page and its plots from whatever was measured; quick results go beside themselves."""
-    results = folder(quick)
-    page = results / "speed.md" if quick else ROOT / "docs" / "speed.md"
-    plots_at = page.parent / "plots"
-    text = render(results, plots_at)
-    page.write_text(text, encoding="utf-8")
+    page = site_for(quick).pages / "speed.md"
+    page.write_text(render(folder(quick), site_for(quick)), encoding="utf-8")
     print(page)
 
 
-def render(results: Path, plots_at: Path) -> str:
+def render(results: Path, site: Site) -> str:
     """The whole page; parts without results are left out."""
     speed = {name: table for name in JOBS if (table := load(results, f"speed-{name}"))}
     error = {name: table for name in JOBS if (table := load(results, f"error-{name}"))}
@@ -39,5 +36,6 @@ def render(results: Path, plots_at: Path) -> str:
     if startup:
         parts += pages.startup(startup)
     if scaling:
-        parts += pages.scaling(scaling, plots.draw(scaling, plots_at))
+        drawn = {sweep: site.link(file) for sweep, file in plots.draw(scaling, site.plots).items()}
+        parts += pages.scaling(scaling, drawn)
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"

@@ -1,4 +1,4 @@
-"""The standard error that images tell of themselves beside the error that they have: docs/standard-error.md."""
+"""The standard error that images report beside the error that they have: docs/measured/standard-error.md."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,7 +16,7 @@ from framearray_cli.work import BY_SAMPLE
 from .cases import Case, Variant, job_named, opened, under, varied, with_resolution
 from .frames import frame
 from .markdown import grid, number, percent
-from .results import ROOT, Table
+from .results import DOCS, Table
 from .speed import tell
 
 RESOLUTION = (160, 120)
@@ -43,7 +43,7 @@ error that the images have: the root mean square over a picture of what is told,
 {cameras} cameras under {lights} light positions of each job. Written by `python -m bench told`, from the folder
 `tests`.
 
-![Told against true](plots/standard-error.svg)
+![Told against true](../plots/standard-error.svg)
 
 {table}
 
@@ -92,7 +92,7 @@ def compare(case: Case, variant: Variant, c: int, wanted: Reference) -> list[Tab
 
 def write(rows: Sequence[Table]) -> None:
     """Write the page and its plot."""
-    draw(rows, ROOT / "docs" / "plots" / "standard-error.svg")
+    draw(rows, DOCS.plots / "standard-error.svg")
     table = []
     for variant in TRIED:
         cells = [variant.name]
@@ -108,7 +108,7 @@ def write(rows: Sequence[Table]) -> None:
         hits=2 * PASSES * HITS, width=RESOLUTION[0], height=RESOLUTION[1], cameras=len(PLACES), lights=len(LIGHTS),
         table=grid(head, table),
     )  # fmt: skip
-    page = ROOT / "docs" / "standard-error.md"
+    page = DOCS.pages / "standard-error.md"
     page.write_text(text.strip("\n") + "\n", encoding="utf-8")
     print(page)
 

@@ -1,4 +1,4 @@
-"""Help, version and schema; and that docs/cli.md tells every command, option and exit code."""
+"""Help, version and schema; and that docs/guide/cli.md tells every command, option and exit code."""
 
 import inspect
 import json
@@ -11,7 +11,7 @@ from program import run
 from framearray_cli import __version__, errors
 from framearray_cli.cli import app
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "cli.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "guide" / "cli.md"
 COMMANDS = ["assemble", "check", "export", "init", "openjd", "render", "report", "schema", "sheet", "verify", "view"]
 
 

@@ -27,7 +27,9 @@ RESULTS = ROOT / "out" / "fuzz"  # git ignores it
 
 def main() -> None:
     """Run cases of one kind or of all, and keep what came of them; or write the page."""
-    parser = argparse.ArgumentParser(prog="fuzz", description="Broken input by the thousand; writes docs/fuzzing.md.")
+    parser = argparse.ArgumentParser(
+        prog="fuzz", description="Break input by the thousand; write docs/measured/fuzzing.md."
+    )
     parser.add_argument("what", nargs="?", default="all", choices=(*KINDS, "all", "page"))
     parser.add_argument("--cases", type=int, default=1_000_000, help="how many, of each kind")
     parser.add_argument("--seed", type=int, default=0, help="results of every seed are kept")

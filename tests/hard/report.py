@@ -1,7 +1,7 @@
 # ruff: noqa: E501 - rows of tables
-"""Writes docs/hard-cases.md: rays with a known answer in rooms that are hard to trace, and how many were wrong.
+"""Writes docs/measured/hard-cases.md: rays with a known answer in rooms that are hard to trace, and how many were wrong.
 
-PYTHONPATH=tests:tests/stat python tests/hard/report.py docs/hard-cases.md
+PYTHONPATH=tests:tests/stat python tests/hard/report.py docs/measured/hard-cases.md
 """
 
 import inspect
@@ -43,7 +43,8 @@ PLACES = (
 
 HEAD = """# Hard cases
 
-Written by `PYTHONPATH=tests:tests/stat python tests/hard/report.py docs/hard-cases.md`; `tests/hard/` tests all of it.
+Written by `PYTHONPATH=tests:tests/stat python tests/hard/report.py docs/measured/hard-cases.md`; `tests/hard/` tests
+all of it.
 """
 
 ROOMS_HEAD = f"""

@@ -1,4 +1,4 @@
-"""Strips of pictures of the real scenes, as docs/real-scenes.md shows them.
+"""Strips of pictures of the real scenes, as docs/measured/real-scenes.md shows them.
 
     python tests/real/make_strips.py FOLDER STRIPS
 

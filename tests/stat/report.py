@@ -1,6 +1,6 @@
-"""Writes docs/accuracy.md: every closed form, what is right, what the program finds, and by how much they differ.
+"""Writes docs/measured/accuracy.md: every closed form, the right answer, that of the program, and their difference.
 
-python tests/stat/report.py docs/accuracy.md
+python tests/stat/report.py docs/measured/accuracy.md
 """
 
 import sys
@@ -23,8 +23,8 @@ from framearray_cli.terms.obscurance import FALLOFFS
 
 HEAD = """# Accuracy
 
-Written by `python tests/stat/report.py docs/accuracy.md`, from the same measurements as the tests in `tests/stat/`.
-Formulas and their derivations: `tests/stat/closed_forms.py`.
+Written by `python tests/stat/report.py docs/measured/accuracy.md`, from the same measurements as the tests in
+`tests/stat/`. Formulas and their derivations: `tests/stat/closed_forms.py`.
 
 Standard errors come from independent pixels or independent seeds. z is the difference in standard errors: of
 independent right values, 1 in 20 is beyond 2 and 1 in 370 beyond 3. Rows of one table share random numbers, so that

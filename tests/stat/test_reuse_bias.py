@@ -1,4 +1,4 @@
-"""Reuse leaves the mean alone with the weights `balance`, and does not with `average`; docs/bias.md has the figures.
+"""Reuse keeps the mean with the weights `balance`, and does not with `average`; figures: docs/measured/bias.md.
 
 A small scene with silhouettes, a texture, the sky and a mirror; the middle frame of a short path, rendered with and
 without reuse for independent seeds, compared pixel by pixel.

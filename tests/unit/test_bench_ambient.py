@@ -10,7 +10,7 @@ from bench.ambient_levels import METHODS, Runs, _estimate
 from bench.ambient_pictures import OWN_LEVEL, Wanted, against, around, own_level
 from bench.ambient_plots import signed, strip
 from bench.ambient_scenes import FURNACE, FURNACE_LEVEL, probe_named, probes, under_one
-from bench.results import save
+from bench.results import save, site_in
 
 from framearray_cli.prepare import open_embree
 
@@ -130,7 +130,7 @@ def test_the_page_shows_what_there_is(tmp_path: Path):
     save(tmp_path, "ambient-pictures-cabin", {"skipped": "Mitsuba is not installed"})
     image = np.full(SHAPE, 0.3, np.float32)
     np.savez(tmp_path / "ambient-shown-kitchen.npz", eye=image, fit=image, traced=image)
-    page = ambient_page.render(tmp_path, tmp_path)
+    page = ambient_page.render(tmp_path, site_in(tmp_path))
     assert "2 *" in page and "1 *" not in page  # the dishonest errors alone are marked
     assert "| kitchen | 60 % | 0.8 | 2 | 1.01 | 0.010 |  |" in page
     assert "| kitchen | 0.9 | 0.75 to 1.50 | 0.9 | 0.75 to 1.50 | 0.9 | 0.75 to 1.50 | 1 % |" in page

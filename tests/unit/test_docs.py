@@ -19,7 +19,12 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PACKAGE = ROOT / "framearray_cli"
 PAGES = (ROOT / "README.md", *sorted(DOCS.rglob("*.md")))
-LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
+ROOMS = ("guide", "method", "measured", "decisions", "develop")
+# [text](place), [text](place "title"), [name]: place, <a href="place">, <img src="place">
+LINK = re.compile(
+    r"\]\(<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\)|^\[[^\]]+\]: +(\S+)|\b(?:href|src)=\"([^\"]+)\"", re.MULTILINE
+)
+TITLE = re.compile(r"^#+ (.*)$", re.MULTILINE)
 FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 KEY = re.compile(r"\[(FA|[A-Z][a-z]+[0-9]{2})(?: [a-z]+\.? [0-9.]+)?\]")
 
@@ -34,33 +39,52 @@ def prose(page: Path) -> str:
 
 
 def links(page: Path) -> list[str]:
-    return [link for link in LINK.findall(prose(page)) if not re.match(r"[a-z]+:", link)]
+    found = ["".join(groups) for groups in LINK.findall(prose(page))]
+    return [link for link in found if not re.match(r"[a-z]+:", link)]
 
 
 def anchors(page: Path) -> set[str]:
     """The anchors of a page's headings, as GitHub makes them."""
-    headings = re.findall(r"^#+ (.*)$", prose(page), re.MULTILINE)
-    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+    names = [re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in TITLE.findall(prose(page))]
+    return {f"{name}-{n}" if (n := names[:i].count(name)) else name for i, name in enumerate(names)}
+
+
+def broken_links(page: Path) -> list[str]:
+    """Relative links of a page that lead to no file, or to no heading of it."""
+    broken = []
+    for link in links(page):
+        name, _, anchor = link.partition("#")
+        target = (page.parent / name).resolve() if name else page
+        if not target.is_file() or (anchor and anchor not in anchors(target)):
+            broken.append(link)
+    return broken
 
 
 def test_links_lead_somewhere():
-    broken = []
-    for page in PAGES:
-        for link in links(page):
-            name, _, anchor = link.partition("#")
-            target = (page.parent / name).resolve() if name else page
-            if not target.is_file() or (anchor and anchor not in anchors(target)):
-                broken.append(f"{page.relative_to(ROOT)}: {link}")
-    assert not broken
+    assert {str(page.relative_to(ROOT)): broken for page in PAGES if (broken := broken_links(page))} == {}
 
 
 def test_a_broken_link_is_found(tmp_path: Path):
     page = tmp_path / "page.md"
     page.write_text(
-        "# A `b` c\n[x](other.md) ![y](y.png)\n```\n[no](link.md)\n```\n[z](https://a.b)\n", encoding="utf-8"
+        "# A `b` c\n[x](other.md) ![y](y.png)\n```\n[no](link.md)\n```\n[z](https://a.b) [w](page.md#b)\n"
+        '## B\n[v](#b-1) <img src="v.svg">\n[u]: u.md\n## B\n[t](page.md "Title") [![s](s.png)](page.md#a-b-c)\n',
+        encoding="utf-8",
     )
-    assert links(page) == ["other.md", "y.png"]
-    assert anchors(page) == {"a-b-c"}
+    found = ["other.md", "y.png", "page.md#b", "#b-1", "v.svg", "u.md", "page.md", "s.png", "page.md#a-b-c"]
+    assert links(page) == found
+    assert anchors(page) == {"a-b-c", "b", "b-1"}
+    assert broken_links(page) == ["other.md", "y.png", "v.svg", "u.md", "s.png"]
+    page.write_text("# A\n[b](#b) [c](../nowhere/page.md#a)\n", encoding="utf-8")
+    assert broken_links(page) == ["#b", "../nowhere/page.md#a"]
+
+
+def test_the_index_lists_every_page():
+    index = DOCS / "index.md"
+    listed = {(DOCS / link.partition("#")[0]).resolve() for link in links(index)}
+    pages = {page for page in PAGES if page.parent != ROOT}
+    assert pages - listed - {index} == set()
+    assert {page.parent for page in pages - {index}} == {DOCS / room for room in ROOMS}
 
 
 def test_every_page_and_picture_is_reachable_from_the_index():
@@ -72,8 +96,9 @@ def test_every_page_and_picture_is_reachable_from_the_index():
         reached.add(page)
         if page.suffix == ".md":
             todo += [(page.parent / link.partition("#")[0]).resolve() for link in links(page) if link[0] != "#"]
-    files = {*DOCS.rglob("*.md"), *(DOCS / "pictures").iterdir()}
+    files = {file for file in DOCS.rglob("*") if file.is_file()}
     assert files - reached == set()
+    assert {file.suffix for file in files} == {".md", ".json", ".jpg", ".svg"}, "no scripts in docs/"
 
 
 def test_pictures_are_small():
@@ -87,8 +112,8 @@ def test_make_targets_exist():
     for page in PAGES:
         found = re.findall(r"(?:`|^)make ([a-z-]+)", text(page), re.MULTILINE)
         assert set(found) <= targets, page
-    named = set(re.findall(r"`make ([a-z-]+)`", text(DOCS / "contributing.md")))
-    assert named | {"help"} == targets, "docs/contributing.md names every target"
+    named = set(re.findall(r"`make ([a-z-]+)`", text(DOCS / "develop" / "contributing.md")))
+    assert named | {"help"} == targets, "docs/develop/contributing.md names every target"
 
 
 def test_commands_exist():
@@ -97,7 +122,7 @@ def test_commands_exist():
         shown = "\n".join(f"`{line}" for _, block in FENCED.findall(text(page)) for line in block.splitlines())
         found = re.findall(r"(?:`|^    )framearray ([a-z]+)", f"{prose(page)}\n{shown}", re.MULTILINE)
         assert set(found) <= commands, page
-    assert commands <= set(re.findall(r"`framearray ([a-z]+)`", text(DOCS / "changelog.md")))
+    assert commands <= set(re.findall(r"`framearray ([a-z]+)`", text(DOCS / "develop" / "changelog.md")))
 
 
 def test_named_files_exist():
@@ -111,8 +136,16 @@ def test_named_files_exist():
     assert not missing
 
 
+def test_pages_that_tests_and_tools_name_exist():
+    place = re.compile(r"\bdocs/[\w./*-]*[\w/]")
+    files = (ROOT / "Makefile", *ROOT.glob("tests/**/*.py"), *PACKAGE.rglob("*.js"), *ROOT.glob("jobs/**/*.py"))
+    named = {(file.relative_to(ROOT).as_posix(), name) for file in files for name in place.findall(text(file))}
+    assert ("Makefile", "docs/measured/report-*.md") in named
+    assert sorted(pair for pair in named if not any(ROOT.glob(pair[1]))) == []
+
+
 def test_references_are_listed():
-    listed = re.findall(r"^\| \[(\w+)\] \|", text(DOCS / "references.md"), re.MULTILINE)
+    listed = re.findall(r"^\| \[(\w+)\] \|", text(DOCS / "method" / "references.md"), re.MULTILINE)
     assert len(listed) == len(set(listed))
     for file in (*PAGES, *PACKAGE.rglob("*.py")):
         assert set(KEY.findall(text(file))) <= set(listed), file
@@ -120,7 +153,7 @@ def test_references_are_listed():
 
 def groups() -> list[list[str]]:
     """The groups of modules in contributing.md, from the first on; "meshes/" is all files in that folder."""
-    table = text(DOCS / "contributing.md").split("| Group |")[1].split("\n\n")[0]
+    table = text(DOCS / "develop" / "contributing.md").split("| Group |")[1].split("\n\n")[0]
     rows = [re.findall(r"`([\w/.]+)`", row) for row in table.splitlines()[2:]]
     return [[file for name in row for file in members(name)] for row in rows]
 
@@ -145,7 +178,9 @@ def imports(file: Path) -> set[str]:
 
 def test_the_layout_is_complete():
     listed = [name for group in groups() for name in group]
-    assert {*members("./")} - {"__init__.py"} == set(listed), "docs/contributing.md lists every file of the package"
+    assert {*members("./")} - {"__init__.py"} == set(listed), (
+        "docs/develop/contributing.md lists every file of the package"
+    )
     assert len(listed) == len(set(listed))
 
 

@@ -63,7 +63,7 @@ def falls(model: Model, image: int, points: np.ndarray) -> np.ndarray:
 
 
 def falls_by_manifest(manifest: Manifest, c: int, points: np.ndarray, flip: int | None = None) -> np.ndarray:
-    """Where points fall by docs/manifest.md alone; `flip` turns an axis of the camera round."""
+    """Where points fall by docs/guide/manifest.md alone; `flip` turns an axis of the camera round."""
     matrix = manifest.cameras[c].matrix
     if flip is not None:
         matrix[:3, flip] *= -1

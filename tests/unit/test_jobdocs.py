@@ -8,13 +8,13 @@ from framearray_cli.job import Job
 from framearray_cli.jobdocs import EXAMPLE, reference, schema_text
 from framearray_cli.jobschema import file_schema, find, sections, words
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
-REMEDY = "out of date: run `python -m framearray_cli.jobdocs docs/`"
+GUIDE = Path(__file__).resolve().parents[2] / "docs" / "guide"
+REMEDY = "out of date: run `python -m framearray_cli.jobdocs docs/guide/`"
 
 
 def test_published_files_are_up_to_date():
-    assert (DOCS / "job-file.md").read_text(encoding="utf-8") == reference(), REMEDY
-    assert (DOCS / "job.schema.json").read_text(encoding="utf-8") == schema_text(), REMEDY
+    assert (GUIDE / "job-file.md").read_text(encoding="utf-8") == reference(), REMEDY
+    assert (GUIDE / "job.schema.json").read_text(encoding="utf-8") == schema_text(), REMEDY
 
 
 def test_the_example_is_a_job():

@@ -59,7 +59,7 @@ def test_round_trip(tmp_path: Path) -> None:
 
 
 def test_the_file_says_what_the_contract_asks(tmp_path: Path) -> None:
-    """What a program reads that knows docs/manifest.md alone."""
+    """What a program reads that knows docs/guide/manifest.md alone."""
     manifest = make_manifest()
     table = tomllib.loads(write_manifest(tmp_path, manifest).read_text(encoding="utf-8"))
     assert table["format"] == 1

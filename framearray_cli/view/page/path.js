@@ -82,7 +82,7 @@ export class Path {
     return null;
   }
 
-  // The path file, see docs/movies.md.
+  // The path file, see docs/guide/movies.md.
   toToml(array, view) {
     const lines = [
       "# Drawn on the pad of `framearray view`. Make a movie of it:",

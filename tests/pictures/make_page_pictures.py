@@ -1,4 +1,4 @@
-"""Makes the pictures of docs/view.md, of the page in Chromium: `python docs/make_page_pictures.py`.
+"""Makes the pictures of docs/guide/view.md, of the page in Chromium: `python tests/pictures/make_page_pictures.py`.
 
 Three of the jobs are rendered into out/page-pictures/, unless they are there.
 """
@@ -17,7 +17,7 @@ from framearray_cli.render import render
 from framearray_cli.view.prepare import prepare_all
 from framearray_cli.view.run import open_tiles, serving
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "page"))
 from chromium import DESKTOP, PHONE, Shown, browser, shown  # noqa: E402
 

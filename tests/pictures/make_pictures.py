@@ -1,4 +1,4 @@
-"""Makes the pictures of README and docs/ with the program itself: `python docs/make_pictures.py`.
+"""Makes the pictures of README and docs/ with the program itself: `python tests/pictures/make_pictures.py`.
 
 Each picture comes from a job of this project, cut down to the eyes and light positions that are shown. An eye keeps
 the N_r eyes before and after it, so that it has the samples that it would have in the whole array.
@@ -24,7 +24,7 @@ from framearray_cli.paths import eyes, lights
 from framearray_cli.render import render
 from framearray_cli.sheet import make_sheet
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "docs" / "pictures"
 GAP = 4  # pixels between the images of a sheet
 QUALITY = 80  # of JPEG: a sheet of twelve stays below 150 kB
