@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from parts import Part
 from PIL import Image
-from shapes import Array, Mesh
+
+from .parts import Part
+from .shapes import Array, Mesh
 
 FLOAT, USHORT, UINT = 5126, 5123, 5125  # glTF component types
 

@@ -1,9 +1,10 @@
 """What a kitchen cooks with: tap, range, hood, refrigerator, pans; each stands on y = 0."""
 
 import numpy as np
-from parts import Part
-from shapes import between, box, cushion, move, turn
-from turned import curve, extrude, lathe, polyline, rod, sweep, torus
+
+from ..common.parts import Part
+from ..common.shapes import between, box, cushion, move, turn
+from ..common.turned import curve, extrude, lathe, polyline, rod, sweep, torus
 
 
 def tap() -> Part:

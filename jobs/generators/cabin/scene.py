@@ -1,21 +1,19 @@
-"""Make cabin.glb: an airliner's cabin, ten rows of three and three seats, a galley in front (-z).
+"""cabin.glb: an airliner's cabin, ten rows of three and three seats, a galley in front (-z).
 
-Run `python jobs/scenes/make_cabin.py [FILE]`. Needs numpy and Pillow. Metres, y up.
+Needs numpy and Pillow. Metres, y up.
 The floor is y = 0, the middle of the aisle x = 0.
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
-from cabin_materials import materials
-from cabin_seats import SEAT_WIDTH, row, screen
-from cabin_walls import CEILING, WALL, along_z, bin_unit, oven, pot, trolley, wall_x, window_panel
-from furniture import curtain
-from glb import Model, place, write
-from parts import Part, mirrored, moved, reflected
-from shapes import Mesh, between, mirror_x, move, turn
-from turned import extrude, polyline, rod, surface, sweep
+
+from ..common.furniture import curtain
+from ..common.glb import Model, place
+from ..common.parts import Part, mirrored, moved, reflected
+from ..common.shapes import Mesh, between, mirror_x, move, turn
+from ..common.turned import extrude, polyline, rod, surface, sweep
+from .materials import materials
+from .seats import SEAT_WIDTH, row, screen
+from .walls import CEILING, WALL, along_z, bin_unit, oven, pot, trolley, wall_x, window_panel
 
 N_ROWS, PITCH, FIRST_Z = 10, 0.84, -3.55  # z of the first row's middle
 FRONT, REAR, NOSE = -4.70, 5.05, -6.60  # bulkheads with the doorway, the wall behind the last row, the galley's end
@@ -174,7 +172,3 @@ def _seam() -> Mesh:
     return sweep(
         path, [(-0.004, -0.003), (0.004, -0.003), (0.004, 0.003), (-0.004, 0.003)], up=(0, 0, 1), crease_deg=30.0
     )
-
-
-if __name__ == "__main__":
-    write(build(), Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_name("cabin.glb"))

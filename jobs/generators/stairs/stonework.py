@@ -1,9 +1,10 @@
 """Columns, balusters, arches, mouldings and windows of the theatre staircase; each stands on y = 0."""
 
 import numpy as np
-from parts import Part
-from shapes import Mesh, between, box, move, scale, turn
-from turned import ball, extrude, lathe, polyline, surface, sweep, torus
+
+from ..common.parts import Part
+from ..common.shapes import Mesh, between, box, move, scale, turn
+from ..common.turned import ball, extrude, lathe, polyline, surface, sweep, torus
 
 BALUSTER = polyline(
     "0.05 0, 0.048 0.03, 0.03 0.05, 0.052 0.16, 0.05 0.24, 0.03 0.4, 0.022 0.5, 0.036 0.53, 0.024 0.56, "

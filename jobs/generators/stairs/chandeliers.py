@@ -1,9 +1,10 @@
 """Lamps of the theatre staircase: standards, chandeliers, wall lights."""
 
 import numpy as np
-from parts import Part
-from shapes import Mesh, move, scale, turn
-from turned import ball, curve, lathe, polyline, sweep
+
+from ..common.parts import Part
+from ..common.shapes import Mesh, move, scale, turn
+from ..common.turned import ball, curve, lathe, polyline, sweep
 
 
 def candelabrum(arms: int = 5) -> Part:

@@ -3,12 +3,14 @@
 from itertools import pairwise
 
 import numpy as np
-from chandeliers import sconce
-from furnishings import double_door, great_mirror
-from furniture import picture
-from parts import Part, moved
-from shapes import between, box, move, slab, turn
-from stairs_plan import (
+
+from ..common.furniture import picture
+from ..common.parts import Part, moved
+from ..common.shapes import between, box, move, slab, turn
+from ..common.turned import polyline, sweep
+from .chandeliers import sconce
+from .furnishings import double_door, great_mirror
+from .plan import (
     BACK,
     COLUMN_Z,
     FRONT,
@@ -22,8 +24,7 @@ from stairs_plan import (
     WINDOW_WIDTH,
     WINDOW_X,
 )
-from stonework import arch_infill, arched_window, architrave, panel_moulding, rosette
-from turned import polyline, sweep
+from .stonework import arch_infill, arched_window, architrave, panel_moulding, rosette
 
 
 def shell() -> Part:

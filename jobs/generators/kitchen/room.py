@@ -1,11 +1,12 @@
 """Walls, windows and the garden of the kitchen."""
 
 import numpy as np
-from furniture import curtain, window
-from kitchen_plan import BASIN_WINDOW, EAST, HEIGHT, NORTH, SOUTH, TABLE_WINDOWS, WALL, WEST
-from parts import Part, moved
-from shapes import Mesh, between, cushion, move, slab, turn
-from turned import lathe, polyline, rod, sweep, torus
+
+from ..common.furniture import curtain, window
+from ..common.parts import Part, moved
+from ..common.shapes import Mesh, between, cushion, move, slab, turn
+from ..common.turned import lathe, polyline, rod, sweep, torus
+from .plan import BASIN_WINDOW, EAST, HEIGHT, NORTH, SOUTH, TABLE_WINDOWS, WALL, WEST
 
 
 def room() -> Part:

@@ -1,9 +1,10 @@
 """Plants in pots and jugs; each function returns a part that stands on y = 0."""
 
 import numpy as np
-from parts import Part
-from shapes import Mesh, move, rotation, turn
-from turned import curve, lathe, polyline, surface, sweep
+
+from .parts import Part
+from .shapes import Mesh, move, rotation, turn
+from .turned import curve, lathe, polyline, surface, sweep
 
 
 def leaf(length: float, width: float, droop: float) -> Mesh:

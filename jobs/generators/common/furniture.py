@@ -1,9 +1,10 @@
 """Table, chairs, lamps, windows and what hangs on walls; each function returns a part around the origin."""
 
 import numpy as np
-from parts import Part
-from shapes import Mesh, between, box, cushion, move, turn
-from turned import curve, lathe, polyline, rod, surface, sweep
+
+from .parts import Part
+from .shapes import Mesh, between, box, cushion, move, turn
+from .turned import curve, lathe, polyline, rod, surface, sweep
 
 
 def table(length: float, width: float) -> Part:

@@ -1,9 +1,10 @@
 """Seats of the aircraft cabin; z runs along the aisle, seats look towards -z."""
 
 import numpy as np
-from parts import Part
-from shapes import Mesh, between, box, cushion, move, turn
-from turned import curve, lathe, polyline, rod, surface, sweep
+
+from ..common.parts import Part
+from ..common.shapes import Mesh, between, box, cushion, move, turn
+from ..common.turned import curve, lathe, polyline, rod, surface, sweep
 
 SEAT_WIDTH = 0.49  # from one armrest's middle to the next
 

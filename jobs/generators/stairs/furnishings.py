@@ -1,10 +1,11 @@
 """The great mirror, doors and benches of the theatre staircase."""
 
 import numpy as np
-from parts import Part
-from shapes import between, box, cushion, move
-from stonework import panel_moulding
-from turned import ball, curve, extrude, lathe, polyline, rod, surface, sweep
+
+from ..common.parts import Part
+from ..common.shapes import between, box, cushion, move
+from ..common.turned import ball, curve, extrude, lathe, polyline, rod, surface, sweep
+from .stonework import panel_moulding
 
 
 def great_mirror(width: float, height: float) -> Part:

@@ -1,15 +1,13 @@
-"""Make furnace.glb: the inside of a finely tessellated sphere with the surface area of a sphere of radius 1.
+"""furnace.glb: the inside of a finely tessellated sphere with the surface area of a sphere of radius 1.
 
-Run `python jobs/scenes/make_furnace.py [FILE]`. Needs numpy. The edges of an icosahedron are halved six times:
+Needs numpy. The edges of an icosahedron are halved six times:
 81,920 triangles, whose corners and middles lie within 6e-5 of the mean distance from the centre.
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
-from glb import Material, Model, write
-from shapes import Mesh
+
+from .common.glb import Material, Model
+from .common.shapes import Mesh
 
 SUBDIVISIONS = 6
 
@@ -57,7 +55,3 @@ def build() -> Model:
     model = Model(materials={"Wall": Material(colour=(0.5, 0.5, 0.5))}, normals=False, decimals=7)
     model.add("sphere", [("Wall", icosphere(SUBDIVISIONS))])
     return model
-
-
-if __name__ == "__main__":
-    write(build(), Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_name("furnace.glb"))

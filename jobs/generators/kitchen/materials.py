@@ -1,7 +1,7 @@
 """Materials of the kitchen: linear reflectivities, mostly 0.2 to 0.8."""
 
-import textures as tex
-from glb import Material
+from ..common import textures as tex
+from ..common.glb import Material
 
 
 def materials() -> dict[str, Material]:

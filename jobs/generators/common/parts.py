@@ -1,6 +1,6 @@
 """Parts: meshes with the names of their materials."""
 
-from shapes import Mesh, mirror_x, move, turn
+from .shapes import Mesh, mirror_x, move, turn
 
 Part = list[tuple[str, Mesh]]
 

@@ -1,24 +1,22 @@
-"""Make kitchen.glb: a farmhouse kitchen, one window over the basin (-z), two tall ones by the table (+x).
+"""kitchen.glb: a farmhouse kitchen, one window over the basin (-z), two tall ones by the table (+x).
 
-Run `python jobs/scenes/make_kitchen.py [FILE]`. Needs numpy and Pillow. Metres, y up; the floor is y = 0.
+Needs numpy and Pillow. Metres, y up; the floor is y = 0.
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
-from cooking import cooker, fridge, hanging, hood, kettle, pan, tap, toaster
-from crockery import BOWL, PLATE, basket, board, bottle, cup, fruit_bowl, jar, knife_block, loaf, plate_stack
-from cupboards import base_cupboard, basin, door, wall_cupboard, worktop
-from furniture import chair, clock, pendant, picture, rug, table
-from glb import Model, place, write
-from kitchen_materials import materials
-from kitchen_plan import BASIN_WINDOW, EAST, HEIGHT, NORTH, SOUTH, TABLE_X, TABLE_Z, WEST
-from kitchen_room import garden, room, windows
-from parts import Part, moved
-from plants import plant, tulips
-from shapes import between, box, cushion, move, turn
-from turned import lathe, rod
+
+from ..common.furniture import chair, clock, pendant, picture, rug, table
+from ..common.glb import Model, place
+from ..common.parts import Part, moved
+from ..common.plants import plant, tulips
+from ..common.shapes import between, box, cushion, move, turn
+from ..common.turned import lathe, rod
+from .cooking import cooker, fridge, hanging, hood, kettle, pan, tap, toaster
+from .crockery import BOWL, PLATE, basket, board, bottle, cup, fruit_bowl, jar, knife_block, loaf, plate_stack
+from .cupboards import base_cupboard, basin, door, wall_cupboard, worktop
+from .materials import materials
+from .plan import BASIN_WINDOW, EAST, HEIGHT, NORTH, SOUTH, TABLE_X, TABLE_Z, WEST
+from .room import garden, room, windows
 
 
 def north_side(rng: np.random.Generator) -> Part:
@@ -242,7 +240,3 @@ def build() -> Model:
             f"chair-{i}", chair(rng, "Cream" if i % 2 else "Dresser"), [place(TABLE_X + x, 0.0, TABLE_Z + z, angle)]
         )
     return model
-
-
-if __name__ == "__main__":
-    write(build(), Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_name("kitchen.glb"))

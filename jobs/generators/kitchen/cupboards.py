@@ -1,9 +1,10 @@
 """Cupboards of the kitchen, their doors and worktops; each function returns a part that stands on y = 0."""
 
 import numpy as np
-from parts import Part, moved
-from shapes import Mesh, between, join, move, turn
-from turned import extrude, lathe, polyline, surface
+
+from ..common.parts import Part, moved
+from ..common.shapes import Mesh, between, join, move, turn
+from ..common.turned import extrude, lathe, polyline, surface
 
 GAP = 0.004  # between neighbouring doors
 

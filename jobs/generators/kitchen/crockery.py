@@ -1,9 +1,10 @@
 """Plates, cups, jars, bottles, fruit and bread; each function returns a part that stands on y = 0."""
 
 import numpy as np
-from parts import Part
-from shapes import box, cushion, move, turn
-from turned import curve, extrude, lathe, polyline, rod, sweep, torus
+
+from ..common.parts import Part
+from ..common.shapes import box, cushion, move, turn
+from ..common.turned import curve, extrude, lathe, polyline, rod, sweep, torus
 
 PLATE = polyline(
     "0 0.004, 0.07 0.004, 0.085 0.007, 0.13 0.02, 0.133 0.023, 0.128 0.0235, 0.085 0.0115, 0.07 0.009, 0 0.009"

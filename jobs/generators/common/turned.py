@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from shapes import ROUND, Array, Mesh, clean, join, patch
+
+from .shapes import ROUND, Array, Mesh, clean, join, patch
 
 
 def polyline(text: str) -> Array:

@@ -1,9 +1,10 @@
 """Wall panels, overhead bins and galley things of the aircraft cabin; z runs along the aisle."""
 
 import numpy as np
-from parts import Part
-from shapes import Array, Mesh, between, box, move, turn
-from turned import curve, extrude, lathe, polyline, rod, surface, sweep
+
+from ..common.parts import Part
+from ..common.shapes import Array, Mesh, between, box, move, turn
+from ..common.turned import curve, extrude, lathe, polyline, rod, surface, sweep
 
 # right half of the cross-section, from the floor up: side wall, then the bin's front, then the ceiling's middle
 WALL = curve(polyline("1.6 -0.02, 1.7 0.2, 1.765 0.55, 1.78 0.85, 1.745 1.15, 1.65 1.42, 1.5 1.64"), 8)

@@ -3,10 +3,12 @@
 from collections.abc import Iterator
 
 import numpy as np
-from glb import place
-from parts import Part, moved
-from shapes import Array, Mesh, between, move, turn
-from stairs_plan import (
+
+from ..common.glb import place
+from ..common.parts import Part, moved
+from ..common.shapes import Array, Mesh, between, move, turn
+from ..common.turned import extrude, rod, surface
+from .plan import (
     BACK,
     COLUMN_Z,
     FOOT,
@@ -25,8 +27,7 @@ from stairs_plan import (
     SIDE_Z,
     TREAD,
 )
-from stonework import newel, rail
-from turned import extrude, rod, surface
+from .stonework import newel, rail
 
 
 def main_flight() -> Part:

@@ -1,22 +1,20 @@
-"""Make stairs.glb: the grand stair of a theatre, lit through seven tall windows in the wall behind the visitor (+z).
+"""stairs.glb: the grand stair of a theatre, lit through seven tall windows in the wall behind the visitor (+z).
 
-Run `python jobs/scenes/make_stairs.py [FILE]`. Needs numpy and Pillow. Metres, y up; the floor is y = 0.
+Needs numpy and Pillow. Metres, y up; the floor is y = 0.
 A flight of 16 steps leads to a landing with a great mirror, two more lead left and right to the galleries.
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
-from chandeliers import candelabrum, chandelier
-from furnishings import bench
-from glb import Model, place, write
-from parts import mirrored
-from plants import palm
-from stairs_flights import balusters_at, balustrades, gallery, main_flight, runner, side_flight
-from stairs_hall import ceiling, shell, walls
-from stairs_materials import materials
-from stairs_plan import (
+
+from ..common.glb import Model, place
+from ..common.parts import mirrored
+from ..common.plants import palm
+from .chandeliers import candelabrum, chandelier
+from .flights import balusters_at, balustrades, gallery, main_flight, runner, side_flight
+from .furnishings import bench
+from .hall import ceiling, shell, walls
+from .materials import materials
+from .plan import (
     COLUMN_Z,
     FOOT,
     GALLERY,
@@ -28,7 +26,7 @@ from stairs_plan import (
     LANDING_Z,
     MAIN_HALF,
 )
-from stonework import baluster, column, rosette
+from .stonework import baluster, column, rosette
 
 
 def build() -> Model:
@@ -73,7 +71,3 @@ def build() -> Model:
     )
     model.add("bench", bench(), [place(s * (HALF_WIDTH - 0.32), 0, 2.75, 90) for s in (-1, 1)])
     return model
-
-
-if __name__ == "__main__":
-    write(build(), Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_name("stairs.glb"))

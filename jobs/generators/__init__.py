@@ -1,0 +1,1 @@
+"""Generators of the project's own scenes: `python -m jobs.generators [NAME [FILE]]`, from the root of the project."""

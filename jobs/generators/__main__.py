@@ -1,0 +1,31 @@
+"""Make the scenes: `python -m jobs.generators [NAME [FILE]]`.
+
+Without arguments it makes all four; with a name one of them, in jobs/scenes/ or as FILE. Needs numpy and Pillow.
+"""
+
+import argparse
+from importlib import import_module
+from pathlib import Path
+
+from .common.glb import write
+
+NAMES = ("cabin", "furnace", "kitchen", "stairs")
+SCENES = Path(__file__).resolve().parents[1] / "scenes"
+
+
+def make(name: str, file: Path) -> None:
+    """Build a scene and write it."""
+    write(import_module(f".{name}", __package__).build(), file)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m jobs.generators", description="Make the scenes of jobs/.")
+    parser.add_argument("name", nargs="?", choices=NAMES, help="default: all")
+    parser.add_argument("file", nargs="?", type=Path, help="default: jobs/scenes/NAME.glb")
+    args = parser.parse_args()
+    for name in [args.name] if args.name else NAMES:
+        make(name, args.file or SCENES / f"{name}.glb")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,5 @@
+"""An aircraft cabin."""
+
+from .scene import build
+
+__all__ = ["build"]

@@ -1,0 +1,1 @@
+"""What several scenes share: shapes, textures, furniture, plants, and the GLB writer."""

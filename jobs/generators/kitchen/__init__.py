@@ -1,0 +1,5 @@
+"""A farmhouse kitchen."""
+
+from .scene import build
+
+__all__ = ["build"]

@@ -1,0 +1,5 @@
+"""A theatre staircase."""
+
+from .scene import build
+
+__all__ = ["build"]
