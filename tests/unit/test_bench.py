@@ -6,7 +6,7 @@ from bench import reports
 from bench.biaspage import at_most, at_time
 from bench.floor import PIECE, _pieces
 from bench.markdown import grid, number, percent
-from bench.results import load, median, save
+from bench.results import DOCS, load, median, save, site_for, site_in
 from bench.scaling import resampled
 from bench.steady import mean
 
@@ -157,3 +157,12 @@ def test_a_bound_counts_noise_against_balance():
     average = {"bias": 10.0, "error": 0.1}
     assert at_most({"bias": -1.0, "error": 0.2}, average) == pytest.approx(0.06)
     assert at_most({"bias": 0.5, "error": 0.2}, average) == pytest.approx(0.11)
+
+
+def test_pages_find_their_plots(tmp_path):
+    """A page of docs/ looks into the folder beside its own; a quick one beside itself."""
+    for site, link in ((DOCS, "../plots/bias.svg"), (site_in(tmp_path), "plots/bias.svg")):
+        assert site.link(site.plots / "bias.svg") == link
+        assert (site.pages / link).resolve() == site.plots / "bias.svg"
+    assert f"]({DOCS.link(DOCS.plots / 'bias.svg')})" in (DOCS.pages / "bias.md").read_text(encoding="utf-8")
+    assert site_for(False) == DOCS and site_for(True).pages.name == "quick"
