@@ -9,7 +9,7 @@ from .arrays import Addresses, Float32, Float64, Int32, Real, Rgb
 from .compose import INVERSE_PI, MOST, Band, Stored, finish
 from .kernel import inlined, integer_at, kernel, prefetch, real_at
 from .lanes import LANES, lane_numbers, lanes_at, lanes_from, put_lanes, reals
-from .work import BY_SAMPLE, HALF, INDIRECT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, Placed, Records, lit_bit
+from .work import BY_SAMPLE, HALF, INDIRECT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, HitRecords, Placed, lit_bit
 
 # Columns of a list of sources: addresses of arrays, 0 for one that is empty.
 START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE = range(7)
@@ -32,7 +32,7 @@ class Source(NamedTuple):
     """
 
     placed: Placed
-    known: Records
+    known: HitRecords
     weight: Float32 = _NOTHING
     scale: Float32 = _NOTHING
     odd_scale: Float32 = _NOTHING
@@ -168,7 +168,7 @@ def compose_pixels(
     smooth: Float32,
     colour: Rgb,
     ambient: Rgb,
-    steady_from: int,
+    light_independent_from: int,
     lowest: Real,
     images: Stored,
     samples: Int32,
@@ -181,7 +181,7 @@ def compose_pixels(
         hits, mirrored: from `sources`: what is averaged by weight, and what is added to that.
         channels: of irradiance, 1 or 3.
         smooth: (n_pixels, 3) R W that replaces the mean, or (0, 3).
-        colour, ambient, steady_from, lowest, images: see `finish`.
+        colour, ambient, light_independent_from, lowest, images: see `finish`.
         samples: (n_pixels,) overwritten: hits of each pixel.
         maps: (n_pixels, 9) overwritten with means of W, R W and R, or (0, 9).
 
@@ -204,7 +204,7 @@ def compose_pixels(
                     maps[first + i, 6 + channel] = band.sums[i, REFLECTIVITY + channel]
         if mirrored.shape[0] > 0:
             accumulate(band, first, m, mirrored, channels, n_lights, False)
-        found, l, pixel, large = finish(band, first, m, colour, ambient, steady_from, lowest, images)
+        found, l, pixel, large = finish(band, first, m, colour, ambient, light_independent_from, lowest, images)
         if bad == 0 and found > 0:
             bad_light, bad_pixel = l, pixel
         bad, beyond = bad + found, beyond + large
@@ -240,7 +240,7 @@ def compose_differences(
     channels: int,
     colour: Rgb,
     ambient: Rgb,
-    steady_from: int,
+    light_independent_from: int,
     images: Float32,
 ) -> None:
     """Compose sums of hits, each with its factor, as images, a band at a time; see `standarderror.py`.
@@ -249,7 +249,7 @@ def compose_differences(
         band: room for the sums of some pixels.
         parts: from `sources`, with factors.
         channels: of irradiance, 1 or 3.
-        colour, ambient, steady_from: see `finish`.
+        colour, ambient, light_independent_from: see `finish`.
         images: (n_lights, n_pixels, 3) overwritten in pixels first_pixel to first_pixel + n - 1.
     """
     for first in range(first_pixel, first_pixel + n, band.hits.shape[0]):
@@ -261,4 +261,4 @@ def compose_differences(
                 for l in range(band.direct.shape[2]):
                     band.direct[i, channel, l] = 0.0
         accumulate(band, first, m, parts, channels, images.shape[0], False)
-        finish(band, first, m, colour, ambient, steady_from, np.float32(-np.inf), images)
+        finish(band, first, m, colour, ambient, light_independent_from, np.float32(-np.inf), images)

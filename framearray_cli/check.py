@@ -10,7 +10,7 @@ import numpy as np
 
 from .auto import Choice, require_least_memory, settled
 from .compiling import compile_clock
-from .crew import Crew
+from .crew import TracePool
 from .describe import identity_of
 from .frame import find_frame
 from .job import Job
@@ -27,7 +27,7 @@ from .target import Target, aimed
 from .terms.ambient import Ambient
 from .usage import free_memory, resident_memory
 from .window import Window
-from .work import Work
+from .work import FrameSetup
 from .writer import ArrayWriter, image_format
 
 # A probe traces about this many rays, which takes a second or two.
@@ -139,25 +139,25 @@ def _warnings(job: Job, identity: Identity, *, memory_lacks: bool, disk_lacks: b
     return tuple(found)
 
 
-def _rays_of_a_hit(work: Work) -> int:
+def _rays_of_a_hit(work: FrameSetup) -> int:
     """About how many rays a hit takes that do not depend on the lights."""
     return 1 + work.obscurance.n_rays + (4 if work.balance else 2) * work.n_r
 
 
-def _repeats(work: Work, blocks: int) -> float:
+def _repeats(work: FrameSetup, blocks: int) -> float:
     """How much longer a render in blocks takes: each finds its hits again."""
     again = _rays_of_a_hit(work)
     return 1 + (blocks - 1) * again / (again + work.lights.n_lights)
 
 
-def _probe_pixels(work: Work) -> int:
+def _probe_pixels(work: FrameSetup) -> int:
     """Pixels a frame for the second probe."""
     rays = _rays_of_a_hit(work) + work.lights.n_lights
     hits = float(np.mean(work.per_pixel)) * min(2 * work.n_r + 2, work.n_frames)
     return int(min(max(PROBE_RAYS / (rays * hits), FEWEST_PIXELS), MOST_PIXELS, work.n_pixels))
 
 
-def _small(work: Work, pixels: int) -> Work:
+def _small(work: FrameSetup, pixels: int) -> FrameSetup:
     """A few frames from the middle of the path, with about that many pixels each."""
     n = min(2 * work.n_r + 2, work.n_frames)
     first = (work.n_frames - n) // 2
@@ -180,11 +180,11 @@ def _small(work: Work, pixels: int) -> Work:
     )
 
 
-def _probe(prepared: Prepared, work: Work, ambient: Ambient, pixels: int) -> _Probe:
+def _probe(prepared: Prepared, work: FrameSetup, ambient: Ambient, pixels: int) -> _Probe:
     """Render and write small frames."""
     small = _small(work, pixels)
     n, writing = small.n_frames, 0.0
-    crew = Crew(small, prepared.threads)
+    crew = TracePool(small, prepared.threads)
     try:
         with tempfile.TemporaryDirectory() as name:
             started = time.perf_counter()
@@ -213,7 +213,7 @@ def _probe(prepared: Prepared, work: Work, ambient: Ambient, pixels: int) -> _Pr
     )
 
 
-def _writer(prepared: Prepared, small: Work, folder: Path, threads: int) -> ArrayWriter:
+def _writer(prepared: Prepared, small: FrameSetup, folder: Path, threads: int) -> ArrayWriter:
     job = prepared.job
     return ArrayWriter(
         folder,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .arrays import Addresses, Float32, Images, Int32, Real, Rgb, with_room
 from .kernel import kernel
 from .lanes import LANES, compress, gather, lane_numbers, put_lanes, stored
-from .work import INDIRECT, STEADY
+from .work import INDIRECT, LIGHT_INDEPENDENT
 
 # Images as they are stored: float32, or the bits of halves; (n_lights, n_pixels, 3).
 Stored: TypeAlias = Float32 | NDArray[np.uint16]
@@ -30,11 +30,11 @@ class Band(NamedTuple):
     Attributes:
         direct: (n_pixels, 3, n_lights or more, a multiple of LANES) sum of w R / pi E[l], in units of the lights'
             colour.
-        sums: (n_pixels, LANES) weighed sums of rows of hits, see `Records`.
+        sums: (n_pixels, LANES) weighed sums of rows of hits, see `HitRecords`.
         hits: (n_pixels,) number of hits.
         places: (MOST,) where the irradiance of a hit stands: an address.
         shares: (MOST, 3) w R / pi of a hit.
-        lit: (MOST,) which of its light is not zero: see `Records`.
+        lit: (MOST,) which of its light is not zero: see `HitRecords`.
     """
 
     direct: Float32
@@ -68,14 +68,21 @@ def as_stored(images: Images) -> Stored:
 
 @kernel
 def finish(
-    band: Band, first_pixel: int, n: int, colour: Rgb, ambient: Rgb, steady_from: int, lowest: Real, images: Stored
+    band: Band,
+    first_pixel: int,
+    n: int,
+    colour: Rgb,
+    ambient: Rgb,
+    light_independent_from: int,
+    lowest: Real,
+    images: Stored,
 ) -> tuple[int, int, int, int]:
     """Write the pixels of a band into all images of the frame; the band's direct sums are used up.
 
     Args:
         colour: (3, n_lights) what the direct sums are in units of.
         ambient: (3, n_lights) I_A, radiance.
-        steady_from: the first light position whose images hold what is the same under every light.
+        light_independent_from: the first light position whose images hold what is the same under every light.
         lowest: the least value that is right: 0, or minus infinity where estimates may be negative.
         images: (n_lights, n_pixels of the image, 3), written: float32, or uint16 for the bits of halves, what lies
             beyond the largest half cut to that.
@@ -88,10 +95,14 @@ def finish(
     n_lights, sums = images.shape[0], band.direct
     for i in range(n):
         for channel in range(3):
-            indirect, steady = band.sums[i, INDIRECT + channel], band.sums[i, STEADY + channel]
+            indirect, steady = band.sums[i, INDIRECT + channel], band.sums[i, LIGHT_INDEPENDENT + channel]
             wrong = large = 0
             for part in range(2):
-                first, end, rest = (0, steady_from, np.float32(0.0)) if part == 0 else (steady_from, n_lights, steady)
+                first, end, rest = (
+                    (0, light_independent_from, np.float32(0.0))
+                    if part == 0
+                    else (light_independent_from, n_lights, steady)
+                )
                 for l in range(first, end):
                     value = colour[channel, l] * sums[i, channel, l] + ambient[channel, l] * indirect + rest
                     wrong += not (value >= lowest and abs(value) < np.inf)

@@ -12,7 +12,7 @@ from .arrays import reshaped, with_room
 from .hits import empty_hits
 from .rays import room_for_hits, room_for_tests
 from .terms.direct_steps import room_for_steps
-from .work import Work
+from .work import FrameSetup
 
 # Hits of a batch: large enough that calls and changes of threads cost nothing, small enough that a frame has several
 # for each thread and that their arrays stay in a core's cache.
@@ -21,7 +21,7 @@ BATCH, LARGEST_BATCH, BATCHES_A_THREAD = 2048, 8192, 20
 RAYS = 4096
 
 
-class Shelf:
+class ArrayPool:
     """Arrays of frames that were dropped, for the next frame to use: fresh memory costs the system a page at a time.
 
     Frames have about as many mirror hits as their neighbours; native ones are up to twice as many at the path's ends.
@@ -47,40 +47,40 @@ class Shelf:
 class Scratch:
     """One thread's arrays, kept from batch to batch."""
 
-    def __init__(self, work: Work, batch: int) -> None:
-        n_eyes = 4 * work.n_r + 1
-        rays = max(RAYS, batch, work.obscurance.n_rays)
+    def __init__(self, setup: FrameSetup, batch: int) -> None:
+        n_eyes = 4 * setup.n_r + 1
+        rays = max(RAYS, batch, setup.obscurance.n_rays)
         self.hit_rays = room_for_hits(rays)
-        self.test_rays = room_for_tests(RAYS, work.lights.n_lights)
+        self.test_rays = room_for_tests(RAYS, setup.lights.n_lights)
         self.hits = empty_hits(batch)
-        self.reflected = [empty_hits(batch) for _ in range(2 if work.depth else 0)]
+        self.reflected = [empty_hits(batch) for _ in range(2 if setup.depth else 0)]
         self.throughput = [np.empty((batch, 3), np.float32) for _ in self.reflected]
-        self.steps = room_for_steps(work.lights.n_lights) if work.shadow_step > 1 else None
-        full = (0 if work.keeps_all else batch, work.lights.channels, work.lights.n_lights)
+        self.steps = room_for_steps(setup.lights.n_lights) if setup.shadow_step > 1 else None
+        full = (0 if setup.keeps_all else batch, setup.lights.channels, setup.lights.n_lights)
         self.irradiance = np.empty(full, np.float32)  # of all lights, where only some are kept
         self.pixel = np.empty((n_eyes, batch), np.int32)
-        self.density = np.empty((n_eyes, batch if work.balance else 0), np.float64)
+        self.density = np.empty((n_eyes, batch if setup.balance else 0), np.float64)
         self.obscurance = np.empty((batch, 3), np.float32)
-        self.skylight = np.empty((batch if work.obscurance.sky else 0, 3), np.float32)
+        self.skylight = np.empty((batch if setup.obscurance.sky else 0, 3), np.float32)
         self.rays: Counter[str] = Counter()
         self.seconds: defaultdict[str, float] = defaultdict(float)
 
 
-class Crew:
+class TracePool:
     """The threads that work on a frame, and their scratch arrays.
 
     Attributes:
         batch: how many hits a task finds.
     """
 
-    def __init__(self, work: Work, threads: int) -> None:
+    def __init__(self, setup: FrameSetup, threads: int) -> None:
         self.threads = threads
-        hits = work.n_pixels * float(work.per_pixel.max())
+        hits = setup.n_pixels * float(setup.per_pixel.max())
         self.batch = min(max(int(hits / (BATCHES_A_THREAD * threads)) // BATCH, 1) * BATCH, LARGEST_BATCH)
-        self.shelf = Shelf()
+        self.arrays = ArrayPool()
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="trace")
         self._scratch: SimpleQueue[Scratch] = SimpleQueue()
-        self._all = [Scratch(work, self.batch) for _ in range(threads)]
+        self._all = [Scratch(setup, self.batch) for _ in range(threads)]
         for scratch in self._all:
             self._scratch.put(scratch)
 

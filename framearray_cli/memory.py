@@ -12,7 +12,7 @@ from .prepare import Prepared
 from .rays import room_for_hits
 from .terms.ambient import BATCH
 from .usage import free_memory, resident_memory
-from .work import Work
+from .work import FrameSetup
 from .writer import BLOCKS, image_format
 
 # Share of the free memory that frames under way may take unless the job says; the rest is for scene, files and others.
@@ -124,16 +124,16 @@ def light_blocks(
     return [range(first, min(first + size, n)) for first in range(0, n, size)]
 
 
-def mirror_share(work: Work) -> float:
+def mirror_share(setup: FrameSetup) -> float:
     """The largest share of pixels that see a mirror, over some frames of the path; from one ray a pixel."""
-    if not work.depth:
+    if not setup.depth:
         return 0.0
     rays, hits, most = room_for_hits(PILOT_BATCH), empty_hits(PILOT_BATCH), 0
-    for c in np.unique(np.linspace(0, work.n_frames - 1, PILOT_FRAMES).astype(int)):
-        flags = np.zeros(work.n_pixels, np.uint8)
-        for first in range(0, work.n_pixels, PILOT_BATCH):
-            n = min(PILOT_BATCH, work.n_pixels - first)
-            pilot_hits(work.cams, int(c), work.order, first, n, work.surfaces, work.tracer, rays.packets, hits)
-            flag_mirrors(hits, n, work.cams.width, work.cams.height, flags)
+    for c in np.unique(np.linspace(0, setup.n_frames - 1, PILOT_FRAMES).astype(int)):
+        flags = np.zeros(setup.n_pixels, np.uint8)
+        for first in range(0, setup.n_pixels, PILOT_BATCH):
+            n = min(PILOT_BATCH, setup.n_pixels - first)
+            pilot_hits(setup.cams, int(c), setup.order, first, n, setup.surfaces, setup.tracer, rays.packets, hits)
+            flag_mirrors(hits, n, setup.cams.width, setup.cams.height, flags)
         most = max(most, int(flags.sum()))
-    return most / work.n_pixels
+    return most / setup.n_pixels

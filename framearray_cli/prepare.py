@@ -25,7 +25,7 @@ from .terms.ambient_fit import Curve, ambient_by_fit
 from .terms.ambient_light import ambient_by_light
 from .terms.obscurance import FALLOFFS, ObscuranceSettings
 from .usage import resident_memory
-from .work import BY_SAMPLE, Work
+from .work import BY_SAMPLE, FrameSetup
 
 # Native hits of a pixel of a frame from which on they are sampled in two halves.
 FEWEST_SPLIT = 4
@@ -101,7 +101,7 @@ def open_embree(prepared: Prepared, engine: Engine = "auto") -> EmbreeScene:
     return EmbreeScene(prepared.scene, engine)
 
 
-def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
+def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambient]:
     """Estimate the ambient light and put together what every frame needs."""
     job, scene = prepared.job, prepared.scene
     cams = eye_cameras(prepared)
@@ -112,7 +112,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
         cams = cams._replace(**{name: getattr(cams, name)[:1] for name in ("position", "right", "up", "forward")})
     step_x, step_y = lattice_steps(job.samples.obscurance)
     mirrors = scene.has_mirrors and job.specular.depth > 0
-    work = Work(
+    work = FrameSetup(
         cams=cams,
         surfaces=prepared.surfaces,
         tracer=embree.tracer,
@@ -136,7 +136,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[Work, Ambient]:
         depth=job.specular.depth if mirrors else 0,
         balance=job.reuse.weights == "balance" and not prepared.still,
         background=background,
-        steady_from=prepared.lights.n_lit + 1 if prepared.lights.groups else 0,
+        light_independent_from=prepared.lights.n_lit + 1 if prepared.lights.groups else 0,
         shadow_step=job.samples.shadow_step,
         shadow_unbiased=job.samples.shadow_unbiased,
         layers=job.output.layers,
@@ -169,7 +169,7 @@ def _named(ambient: Ambient, lights: Lights) -> Ambient:
 
 
 def _halves(job: Job, *, still: bool) -> int:
-    """How the job's hits are told apart in two halves; see `Work.halves`.
+    """How the job's hits are told apart in two halves; see `FrameSetup.halves`.
 
     Frames see a place differently, so halves of frames differ by more than noise; that shows where there is little
     noise. Halves of one or two samples are spread worse over a pixel than these samples together are.

@@ -10,7 +10,7 @@ from threading import Lock
 import numpy as np
 
 from .auto import Choice, require_least_memory, settled
-from .crew import Crew
+from .crew import TracePool
 from .describe import describe, identity_of
 from .embree import EmbreeScene, Engine
 from .errors import OutputError
@@ -32,7 +32,7 @@ from .summary import Summary, summed, with_summary
 from .target import Target, aimed
 from .terms.ambient import Ambient
 from .window import Window
-from .work import Work
+from .work import FrameSetup
 from .writer import ArrayWriter, Finished, image_format
 
 
@@ -180,7 +180,7 @@ def begun(
         )  # fmt: skip
 
 
-def _planned(start: Begun, listener: Listener) -> tuple[Work, Ambient, Manifest, Counter[str]]:
+def _planned(start: Begun, listener: Listener) -> tuple[FrameSetup, Ambient, Manifest, Counter[str]]:
     """Ambient light, hits and manifest of the whole array, and the rays that they took."""
     prepared, output = start.prepared, start.prepared.job.output
     for name in {output.format, "exr"} if output.layers else {output.format}:
@@ -217,9 +217,9 @@ class _Run:
         self._prepared, self._record, self._listener, self._started = prepared, record, listener, started
         self._rays, self._stages = rays, Counter[str]()
         self._images, self._done, self._lock = 0, set[int](), Lock()
-        self._crew: Crew | None = None
+        self._crew: TracePool | None = None
 
-    def frames(self, work: Work, ambient: Ambient, lights: range, wanted: Sequence[int]) -> None:
+    def frames(self, work: FrameSetup, ambient: Ambient, lights: range, wanted: Sequence[int]) -> None:
         """Find every frame's hits, compose each frame as soon as its window is complete, write it, forget it.
 
         Args:
@@ -230,7 +230,7 @@ class _Run:
             return
         prepared, job = self._prepared, self._prepared.job
         stored = image_format(job)
-        self._crew = crew = Crew(work, prepared.threads)
+        self._crew = crew = TracePool(work, prepared.threads)
         ambient = composed_with(ambient, prepared.lights)
         if work.lights.n_lights < prepared.n_lights:
             ambient = ambient.for_lights(lights)

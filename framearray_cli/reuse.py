@@ -182,7 +182,9 @@ def balance_weights(
 
 
 @kernel
-def expect_hits(hits: Float32, of_pixel: Int32, first_eye: int, n: int, pixel: Int32, density: Float64) -> None:
+def scale_by_expected_hits(
+    hits: Float32, of_pixel: Int32, first_eye: int, n: int, pixel: Int32, density: Float64
+) -> None:
     """Make densities of hits of those of a hit a pixel: n_k p_k of p_k, where n_k differs from place to place.
 
     Args:
@@ -197,11 +199,11 @@ def expect_hits(hits: Float32, of_pixel: Int32, first_eye: int, n: int, pixel: I
 
 
 @kernel
-def of_one_hit(hits: Float32, of_pixel: Int32, first_frame: int, n: int, pixel: Int32, weight: Float32) -> None:
+def divide_by_own_hits(hits: Float32, of_pixel: Int32, first_frame: int, n: int, pixel: Int32, weight: Float32) -> None:
     """Make weights of one hit of those of the n_j hits that frame j's own eye finds there.
 
     Args:
-        hits, of_pixel: as for `expect_hits`.
+        hits, of_pixel: as for `scale_by_expected_hits`.
         pixel: (n_frames, >= n) that see each hit.
         weight: (n_frames, >= n) changed.
     """

@@ -12,17 +12,28 @@ from .lanes import LANES, bits, lanes_at
 from .terms.direct import direct
 from .terms.direct_steps import direct_by_steps
 from .terms.obscurance import obscurance
-from .work import HALF, INDIRECT, LIT, OBSCURANCE, REFLECTIVITY, STEADY, WEIGHT, Records, Work, lit_bit
+from .work import (
+    HALF,
+    INDIRECT,
+    LIGHT_INDEPENDENT,
+    LIT,
+    OBSCURANCE,
+    REFLECTIVITY,
+    WEIGHT,
+    FrameSetup,
+    HitRecords,
+    lit_bit,
+)
 
 _NOTHING = np.empty((0, 3), np.float32)
 
 
 def estimate_terms(
-    work: Work,
+    setup: FrameSetup,
     hits: Hits,
     n: int,
     scratch: Scratch,
-    out: Records,
+    out: HitRecords,
     obscurance_kind: str,
     shadow_kind: str,
     throughput: Rgb = _NOTHING,
@@ -34,21 +45,21 @@ def estimate_terms(
     """
     started = perf_counter()
     scratch.rays[obscurance_kind] += obscurance(
-        hits, n, work.obscurance, work.surfaces, work.tracer, scratch.hit_rays, scratch.obscurance, scratch.skylight
+        hits, n, setup.obscurance, setup.surfaces, setup.tracer, scratch.hit_rays, scratch.obscurance, scratch.skylight
     )
     middle = perf_counter()
     if scratch.steps is None:
-        rays = direct(hits, n, work.lights, work.tracer, scratch.test_rays, out.irradiance)
+        rays = direct(hits, n, setup.lights, setup.tracer, scratch.test_rays, out.irradiance)
     else:
-        irradiance = out.irradiance if work.keeps_all else scratch.irradiance
+        irradiance = out.irradiance if setup.keeps_all else scratch.irradiance
         rays = direct_by_steps(
-            hits, n, work.lights, work.shadow_step, work.shadow_unbiased, work.tracer, scratch.test_rays,
+            hits, n, setup.lights, setup.shadow_step, setup.shadow_unbiased, setup.tracer, scratch.test_rays,
             scratch.steps, irradiance,
         )  # fmt: skip
-        if not work.keeps_all:
-            out.irradiance[:n] = irradiance[:n, :, work.kept.start : work.kept.stop]
+        if not setup.keeps_all:
+            out.irradiance[:n] = irradiance[:n, :, setup.kept.start : setup.kept.stop]
     scratch.rays[shadow_kind] += rays
-    write_rows(hits, n, work.background, scratch.obscurance, scratch.skylight, throughput, out.irradiance, out.row)
+    write_rows(hits, n, setup.background, scratch.obscurance, scratch.skylight, throughput, out.irradiance, out.row)
     scratch.seconds[obscurance_kind] += middle - started
     scratch.seconds[shadow_kind] += perf_counter() - middle
 
@@ -64,7 +75,7 @@ def write_rows(
     irradiance: Float32,
     row: Float32,
 ) -> None:
-    """Write what composing needs of hits 0 to n - 1 beside their irradiance; see `Records`.
+    """Write what composing needs of hits 0 to n - 1 beside their irradiance; see `HitRecords`.
 
     Args:
         background: (3,) what escaped rays see.
@@ -82,7 +93,7 @@ def write_rows(
             if skylight.shape[0]:
                 steady += reflectivity * skylight[i, channel]
             row[i, INDIRECT + channel] = reflectivity * obscurance[i, channel]
-            row[i, STEADY + channel] = steady
+            row[i, LIGHT_INDEPENDENT + channel] = steady
             row[i, OBSCURANCE + channel] = obscurance[i, channel]
             row[i, REFLECTIVITY + channel] = reflectivity
         row[i, LIT] = _lit(irradiance, i)

@@ -13,14 +13,14 @@ from .acceptance import MOST_DENSE, spread
 from .allot import FEWEST, Witnesses, allot
 from .allotment import Allotment, Blocks, blocks_of
 from .arrays import Float32, Float64, Int32
-from .crew import Crew, Scratch
+from .crew import Scratch, TracePool
 from .eyehits import native_hits
 from .lanes import LANES
 from .prepare import Prepared
 from .reuse import outer_hits
 from .shading import estimate_terms
 from .terms.ambient import Ambient
-from .work import INDIRECT, REFLECTIVITY, STEADY, Records, Work, empty_records
+from .work import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY, FrameSetup, HitRecords, empty_records
 
 # Added to the job's seed for the pilot; no job's seed is as large.
 PILOT_SEED = 1 << 40
@@ -79,24 +79,24 @@ class Target:
         }
 
 
-def aimed(prepared: Prepared, work: Work, ambient: Ambient) -> tuple[Work, Target | None]:
-    """The same work with native hits allotted for `samples.error`; as it is where the job has no target.
+def aimed(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> tuple[FrameSetup, Target | None]:
+    """The same setup with native hits allotted for `samples.error`; as it is where the job has no target.
 
     Args:
-        work: of all light positions.
+        setup: of all light positions.
     """
     error = prepared.job.samples.error
     if error is None:
-        return work, None
+        return setup, None
     # one frame serves for the whole window of a camera that stands still
     most = float(prepared.job.samples.most_hits * (2 * prepared.job.n_r + 1 if prepared.still else 1))
-    crew = Crew(work, prepared.threads)
+    pool = TracePool(setup, prepared.threads)
     try:
-        pilot = _Pilot(work, ambient, blocks_of(work.cams.width, work.cams.height))
-        found = crew.run(pilot.look, range(work.n_frames))
-        rays = crew.rays().total()
+        pilot = _Pilot(setup, ambient, blocks_of(setup.cams.width, setup.cams.height))
+        found = pool.run(pilot.look, range(setup.n_frames))
+        rays = pool.rays().total()
     finally:
-        crew.close()
+        pool.close()
     radiance = float(np.mean([frame.radiance for frame in found]))
     wanted = (error * radiance) ** 2
     if wanted > 0:
@@ -104,7 +104,7 @@ def aimed(prepared: Prepared, work: Work, ambient: Ambient) -> tuple[Work, Targe
         witnesses = [frame.witnesses for frame in found if frame.witnesses]
         hits, reached = allot(u, pilot.blocks, wanted, most, witnesses)
     else:  # all is black
-        hits, reached = np.full((work.n_frames, pilot.blocks.n), FEWEST), np.zeros(1)
+        hits, reached = np.full((setup.n_frames, pilot.blocks.n), FEWEST), np.zeros(1)
     allotment = Allotment(blocks=pilot.blocks, hits=hits.astype(np.float32))
     means = allotment.mean()
     least = radiance if radiance > 0 else 1.0
@@ -118,7 +118,7 @@ def aimed(prepared: Prepared, work: Work, ambient: Ambient) -> tuple[Work, Targe
         capped=float((allotment.hits >= most).mean()),
         rays=rays,
     )
-    return replace(work, allotment=allotment, per_pixel=means), target
+    return replace(setup, allotment=allotment, per_pixel=means), target
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -139,16 +139,16 @@ class _Found:
 class _Pilot:
     """Two hits, independent of each other, of two pixels of each block: one pixel for each half of the pilot."""
 
-    def __init__(self, work: Work, ambient: Ambient, blocks: Blocks) -> None:
-        self.work = replace(work, seed=work.seed + PILOT_SEED)
+    def __init__(self, setup: FrameSetup, ambient: Ambient, blocks: Blocks) -> None:
+        self.setup = replace(setup, seed=setup.seed + PILOT_SEED)
         self.ambient = ambient
         self.blocks = blocks
-        self._judges = frozenset(spread(work.n_frames, JUDGED))
+        self._judges = frozenset(spread(setup.n_frames, JUDGED))
 
     def look(self, c: int, scratch: Scratch) -> _Found:
         """What the pilot finds in frame c."""
-        eyes = self.work.frames_around(c, self.work.n_r)
-        random = np.random.default_rng((self.work.seed, c)).random((2, self.blocks.n, 2))
+        eyes = self.setup.frames_around(c, self.setup.n_r)
+        random = np.random.default_rng((self.setup.seed, c)).random((2, self.blocks.n, 2))
         pixels = np.concatenate([self.blocks.some_pixel(half) for half in random])
         n, batch = len(pixels), len(scratch.hits.pixel) // 2
         mean, variance = 0.0, np.empty(n)
@@ -179,25 +179,25 @@ class _Pilot:
 
     def _radiance(self, c: int, pixels: Int32, scratch: Scratch) -> Float32:
         """What images of two hits of each of some pixels would show, (hits, n_lights, 3); the hits are in `scratch`."""
-        work, n = self.work, 2 * len(pixels)
+        setup, n = self.setup, 2 * len(pixels)
         native_hits(
-            work.cams, c, work.seed, pixels, 2, 0, 0, n, work.surfaces, work.tracer, work.depth > 0,
+            setup.cams, c, setup.seed, pixels, 2, 0, 0, n, setup.surfaces, setup.tracer, setup.depth > 0,
             scratch.hit_rays.packets, scratch.hits, True,
         )  # fmt: skip
         scratch.rays["pilot"] += n
-        records = empty_records(work, n)
-        estimate_terms(work, scratch.hits, n, scratch, records, "pilot", "pilot")
-        return _radiance(work, self.ambient, records)
+        records = empty_records(setup, n)
+        estimate_terms(setup, scratch.hits, n, scratch, records, "pilot", "pilot")
+        return _radiance(setup, self.ambient, records)
 
     def _seen(self, c: int, eyes: range, n: int, scratch: Scratch) -> tuple[Int32, Float64]:
         """The block that each eye sees each hit in, and its hits there for one of eye c, (n, n_eyes)."""
-        work, own = self.work, c - eyes.start
-        if work.n_r == 0:
+        setup, own = self.setup, c - eyes.start
+        if setup.n_r == 0:
             return self.blocks.of_pixel[scratch.hits.pixel[:n]][:, None], np.ones((n, 1))
         room = -(-n // LANES) * LANES
         pixel, density = np.empty((len(eyes), room), np.int32), np.empty((len(eyes), room))
         scratch.rays["pilot"] += outer_hits(
-            work.cams, c, eyes.start, scratch.hits, n, work.tracer, scratch.test_rays, pixel, density
+            setup.cams, c, eyes.start, scratch.hits, n, setup.tracer, scratch.test_rays, pixel, density
         )
         known = density[own, :n] > 0
         ratio = np.divide(density[:, :n], density[own, :n], out=np.zeros((len(eyes), n)), where=known)
@@ -214,10 +214,10 @@ def of_samples(n: int) -> Int32:
     return places
 
 
-def _radiance(work: Work, ambient: Ambient, records: Records) -> Float32:
+def _radiance(setup: FrameSetup, ambient: Ambient, records: HitRecords) -> Float32:
     """What an image of each hit alone would show under every light, (n, n_lights, 3)."""
-    triple = {at: records.row[:, None, at : at + 3] for at in (STEADY, INDIRECT, REFLECTIVITY)}
-    direct = np.swapaxes(records.irradiance, 1, 2) * work.lights.colour / np.float32(np.pi)
+    triple = {at: records.row[:, None, at : at + 3] for at in (LIGHT_INDEPENDENT, INDIRECT, REFLECTIVITY)}
+    direct = np.swapaxes(records.irradiance, 1, 2) * setup.lights.colour / np.float32(np.pi)
     indirect = ambient.intensity * triple[INDIRECT]
-    radiance: Float32 = triple[STEADY] + triple[REFLECTIVITY] * direct + indirect
+    radiance: Float32 = triple[LIGHT_INDEPENDENT] + triple[REFLECTIVITY] * direct + indirect
     return radiance

@@ -16,13 +16,13 @@ import numpy as np
 from .accumulate import Source, accumulate, compose_differences, compose_pixels, sources, weigh_halves
 from .arrays import Addresses, Float32, Images, Int32
 from .compose import as_stored, empty_band
-from .crew import Crew, Scratch
+from .crew import Scratch, TracePool
 from .denoise import denoised
-from .frame import Frame, fill_holes
+from .frame import FrameHits, fill_holes
 from .kernel import kernel
 from .standarderror import fill_unknown, half_factors
 from .terms.ambient import Ambient
-from .work import BY_SAMPLE, INDIRECT, REFLECTIVITY, Placed, Records, Work
+from .work import BY_SAMPLE, INDIRECT, REFLECTIVITY, FrameSetup, HitRecords, Placed
 
 # Pixels whose sums over all lights are held together: they fit a core's cache. And pixels of a task.
 BAND_PIXELS, TASK_PIXELS = 256, 2048
@@ -71,43 +71,45 @@ class Composed:
 
 
 class Window:
-    """At most 2 N_r + 1 frames, and the crew that composes from them."""
+    """At most 2 N_r + 1 frames, and the threads that compose from them."""
 
-    def __init__(self, work: Work, ambient: Ambient, crew: Crew, wanted: Sequence[int] | None = None) -> None:
+    def __init__(
+        self, setup: FrameSetup, ambient: Ambient, pool: TracePool, wanted: Sequence[int] | None = None
+    ) -> None:
         """Make ready to compose frames.
 
         Args:
-            ambient: of all lights that `work` computes.
+            ambient: of all lights that `setup` computes.
             wanted: frames that are to be composed, in rising order; None: all of the path.
         """
-        self._work = work
+        self._setup = setup
         # by channel, as the sums are
-        kept = slice(work.kept.start, work.kept.stop)
-        self._colour = np.ascontiguousarray(work.lights.colour[kept].T)
+        kept = slice(setup.kept.start, setup.kept.stop)
+        self._colour = np.ascontiguousarray(setup.lights.colour[kept].T)
         self._ambient = np.ascontiguousarray(ambient.intensity[kept].T)
-        self._crew = crew
+        self._pool = pool
         # corrections of unbiased shadows may outweigh a dark pixel; cut at 0, their mean would be wrong
-        self._lowest = np.float32(-np.inf if work.shadow_unbiased and work.shadow_step > 1 else 0.0)
-        self._frames: dict[int, Frame] = {}
-        self._wanted = deque(range(work.n_frames) if wanted is None else wanted)
-        self._bands = [empty_band(BAND_PIXELS, len(work.kept)) for _ in range(crew.threads)]
+        self._lowest = np.float32(-np.inf if setup.shadow_unbiased and setup.shadow_step > 1 else 0.0)
+        self._frames: dict[int, FrameHits] = {}
+        self._wanted = deque(range(setup.n_frames) if wanted is None else wanted)
+        self._bands = [empty_band(BAND_PIXELS, len(setup.kept)) for _ in range(pool.threads)]
 
-    def add(self, frame: Frame) -> None:
+    def add(self, frame: FrameHits) -> None:
         """Take in the hits of the next frame of the path."""
         self._frames[frame.c] = frame
 
     def complete(self) -> Iterator[int]:
         """Frames that can be composed now, one after another; what no later frame needs is dropped in between."""
-        last, shelf = max(self._frames), self._crew.shelf
-        while self._wanted and self._work.frames_around(self._wanted[0], self._work.n_r)[-1] <= last:
+        last, arrays = max(self._frames), self._pool.arrays
+        while self._wanted and self._setup.frames_around(self._wanted[0], self._setup.n_r)[-1] <= last:
             j = self._wanted[0]
             yield j
             self._wanted.popleft()
-            needed = self._wanted[0] - self._work.n_r if self._wanted else last + 1
+            needed = self._wanted[0] - self._setup.n_r if self._wanted else last + 1
             for k in [k for k in self._frames if k <= j or k < needed]:
-                self._frames[k].forget_mirrors(shelf)
+                self._frames[k].forget_mirrors(arrays)
                 if k < needed:
-                    self._frames.pop(k).put_back(shelf)
+                    self._frames.pop(k).put_back(arrays)
 
     def compose(self, j: int, images: Images, eyes: Sequence[int] | None = None) -> Composed:
         """Compose frame j, once all frames of its window were added.
@@ -116,27 +118,27 @@ class Window:
             images: (n_lights, height, width, 3), overwritten; float32, or float16 where that is how they are stored.
             eyes: only hits of these eyes are averaged, and pixels that none of them reaches stay black; None: of all.
         """
-        work = self._work
-        flat = as_stored(images.reshape(len(images), work.n_pixels, 3))
-        layered = work.n_pixels if work.layers else 0
+        setup = self._setup
+        flat = as_stored(images.reshape(len(images), setup.n_pixels, 3))
+        layered = setup.n_pixels if setup.layers else 0
         maps, own = np.empty((layered, 9), np.float32), np.empty((layered, 4), np.float32)
-        samples = np.empty(work.n_pixels, np.int32)
+        samples = np.empty(setup.n_pixels, np.int32)
         holes = self._holes(j) if eyes is None else []
         mirror_scale = self._mirror_scale(j, holes)
         hits, mirrored = self._hits(j, holes[:1], eyes), self._mirrored(j, holes[1:], mirror_scale)
         smooth = (
-            self._smooth_indirect(j, holes[:1], images.shape[1:3]) if work.denoise else np.empty((0, 3), np.float32)
+            self._smooth_indirect(j, holes[:1], images.shape[1:3]) if setup.denoise else np.empty((0, 3), np.float32)
         )
         frame = self._frames[j]
 
         def some(first: int, scratch: Scratch) -> tuple[int, int, int, int]:
             started = perf_counter()
-            n = min(TASK_PIXELS, work.n_pixels - first)
+            n = min(TASK_PIXELS, setup.n_pixels - first)
             sums = self._bands.pop()
             try:
                 found: tuple[int, int, int, int] = compose_pixels(
-                    sums, first, n, hits, mirrored, work.lights.channels, smooth, self._colour, self._ambient,
-                    work.steady_from, self._lowest, flat, samples, maps,
+                    sums, first, n, hits, mirrored, setup.lights.channels, smooth, self._colour, self._ambient,
+                    setup.light_independent_from, self._lowest, flat, samples, maps,
                 )  # fmt: skip
             finally:
                 self._bands.append(sums)
@@ -146,8 +148,8 @@ class Window:
             scratch.seconds["compose"] += perf_counter() - started
             return found
 
-        results = self._crew.run(some, range(0, work.n_pixels, TASK_PIXELS))
-        differences = self._differences(j, samples, images.shape) if work.halves else None
+        results = self._pool.run(some, range(0, setup.n_pixels, TASK_PIXELS))
+        differences = self._differences(j, samples, images.shape) if setup.halves else None
         bad = sum(result[0] for result in results)
         shape = images.shape[1:3]
         return Composed(
@@ -163,13 +165,13 @@ class Window:
 
     def _differences(self, j: int, samples: Int32, shape: tuple[int, ...]) -> Float32:
         """What the halves of the hits of frame j differ by, (n_lights, height, width, 3); see standarderror.py."""
-        work, frame = self._work, self._frames[j]
-        images, weights = np.empty((len(work.kept), work.n_pixels, 3), np.float32), np.empty((2, work.n_pixels))
-        eyes = work.frames_around(j, work.n_r)
-        own = np.array([work.half_of(k) for k in eyes], np.int32)
+        setup, frame = self._setup, self._frames[j]
+        images, weights = np.empty((len(setup.kept), setup.n_pixels, 3), np.float32), np.empty((2, setup.n_pixels))
+        eyes = setup.frames_around(j, setup.n_r)
+        own = np.array([setup.half_of(k) for k in eyes], np.int32)
         hits = self._hits(j, [])
-        tasks = [(first, min(TASK_PIXELS, work.n_pixels - first)) for first in range(0, work.n_pixels, TASK_PIXELS)]
-        self._crew.run(lambda task, _: weigh_halves(hits, own, task[0], task[1], weights), tasks)
+        tasks = [(first, min(TASK_PIXELS, setup.n_pixels - first)) for first in range(0, setup.n_pixels, TASK_PIXELS)]
+        self._pool.run(lambda task, _: weigh_halves(hits, own, task[0], task[1], weights), tasks)
         factors, parts = half_factors(weights), []
         for k, half in zip(eyes, own, strict=True):
             scales = (factors[0], factors[1]) if half == BY_SAMPLE else (factors[half],)
@@ -184,21 +186,28 @@ class Window:
         def some(task: tuple[int, int], _scratch: Scratch) -> None:
             band = self._bands.pop()
             compose_differences(
-                band, *task, listed, work.lights.channels, self._colour, self._ambient, work.steady_from, images
+                band,
+                *task,
+                listed,
+                setup.lights.channels,
+                self._colour,
+                self._ambient,
+                setup.light_independent_from,
+                images,
             )
             self._bands.append(band)
 
-        self._crew.run(some, tasks)
+        self._pool.run(some, tasks)
         differences = images.reshape(shape)
         fill_unknown(differences, (weights > 0).all(axis=0).reshape(shape[1:3]), samples.reshape(shape[1:3]))
         return differences
 
-    def _smooth_indirect(self, j: int, holes: list[tuple[Placed, Records]], shape: tuple[int, ...]) -> Float32:
+    def _smooth_indirect(self, j: int, holes: list[tuple[Placed, HitRecords]], shape: tuple[int, ...]) -> Float32:
         """R W of every pixel of frame j with W denoised, (n_pixels, 3).
 
         W is R W over R, so that a pixel that only partly shows a surface has that surface's W.
         """
-        n_pixels = self._work.n_pixels
+        n_pixels = self._setup.n_pixels
         indirect, reflectivity = np.empty((n_pixels, 3), np.float32), np.empty((n_pixels, 3), np.float32)
         own = np.empty((n_pixels, 4), np.float32)
         frame, hits = self._frames[j], self._hits(j, holes)
@@ -212,29 +221,29 @@ class Window:
             place = frame.places[j]
             average_native(place.start, place.order, frame.normal, frame.depth, first, n, own)
 
-        self._crew.run(band, range(0, n_pixels, TASK_PIXELS))
+        self._pool.run(band, range(0, n_pixels, TASK_PIXELS))
         obscurance = np.divide(indirect, reflectivity, out=np.zeros_like(indirect), where=reflectivity > 0)
         images = (array.reshape(*shape, 3) for array in (obscurance, reflectivity, own[:, :3]))
         return reflectivity * denoised(*images).reshape(n_pixels, 3)
 
-    def _holes(self, j: int) -> list[tuple[Placed, Records]]:
+    def _holes(self, j: int) -> list[tuple[Placed, HitRecords]]:
         """Hits for pixels of frame j that nobody reached; there are none where every pixel has hits of its own."""
-        work = self._work
-        if work.fewest_hits(j) >= 1:
+        setup = self._setup
+        if setup.fewest_hits(j) >= 1:
             return []
-        reached = np.zeros(work.n_pixels, np.int32)
-        for k in work.frames_around(j, work.n_r):
+        reached = np.zeros(setup.n_pixels, np.int32)
+        for k in setup.frames_around(j, setup.n_r):
             reached += np.diff(self._frames[k].places[j].start)
-        missed = np.flatnonzero(reached[work.order] == 0)
-        return fill_holes(work, j, work.order[missed], self._crew) if len(missed) else []
+        missed = np.flatnonzero(reached[setup.order] == 0)
+        return fill_holes(setup, j, setup.order[missed], self._pool) if len(missed) else []
 
-    def _hits(self, j: int, holes: list[tuple[Placed, Records]], eyes: Sequence[int] | None = None) -> Addresses:
+    def _hits(self, j: int, holes: list[tuple[Placed, HitRecords]], eyes: Sequence[int] | None = None) -> Addresses:
         """All hits of frame j, or those of some eyes, for `accumulate`."""
-        frames = [self._frames[k] for k in self._work.frames_around(j, self._work.n_r) if eyes is None or k in eyes]
+        frames = [self._frames[k] for k in self._setup.frames_around(j, self._setup.n_r) if eyes is None or k in eyes]
         found = [Source(frame.places[j], frame.records, frame.weights[j]) for frame in frames]
         return sources(found + [Source(place, records) for place, records in holes])
 
-    def _mirrored(self, j: int, holes: list[tuple[Placed, Records]], scale: Float32) -> Addresses:
+    def _mirrored(self, j: int, holes: list[tuple[Placed, HitRecords]], scale: Float32) -> Addresses:
         """What the mirrors of frame j show, for `accumulate`: a mean over its native hits alone."""
         frame = self._frames[j]
         found = [Source(place, records, scale=scale) for place, records in holes]
@@ -242,7 +251,7 @@ class Window:
             found.insert(0, Source(frame.mirror_places, frame.mirrored, scale=scale))
         return sources(found)
 
-    def _mirror_scale(self, j: int, holes: list[tuple[Placed, Records]]) -> Float32:
+    def _mirror_scale(self, j: int, holes: list[tuple[Placed, HitRecords]]) -> Float32:
         """One over the native hits of each pixel of frame j, (n_pixels,); those that fill holes count."""
         even, odd = self._frames[j].mirror_hits
         own: Int32 = even + odd

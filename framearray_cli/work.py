@@ -20,7 +20,7 @@ from .terms.obscurance import ObscuranceSettings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Work:
+class FrameSetup:
     """Everything that the terms of every frame need, as kernels take it.
 
     Attributes:
@@ -30,7 +30,8 @@ class Work:
         depth: mirror bounces that are followed; 0 in a scene without mirrors.
         balance: weights of hits by the balance heuristic, else all alike.
         background: (3,) radiance outside the scene.
-        steady_from: the first of the kept light positions whose images hold what is the same under every light.
+        light_independent_from: the first of the kept light positions whose images hold what is the same under
+            every light.
         shadow_step, shadow_unbiased: see `terms/direct_steps.py`; step 1 tests every light position.
         layers: whether normals and depths are kept for the layers.
         denoise: whether W is denoised in composing.
@@ -57,7 +58,7 @@ class Work:
     layers: bool
     denoise: bool = False
     halves: int = 0
-    steady_from: int = 0
+    light_independent_from: int = 0
     allotment: Allotment | None = None
     order: Int32 = field(init=False)
 
@@ -91,16 +92,16 @@ class Work:
         """Whether all light that is computed is stored too."""
         return len(self.kept) == self.lights.n_lights
 
-    def for_lights(self, block: range) -> "Work":
-        """The same work for some light positions; their images are the same to the last bit.
+    def for_lights(self, block: range) -> "FrameSetup":
+        """The same setup for some light positions; their images are the same to the last bit.
 
         Shadow steps walk along the whole light path wherever a block ends, so all of it is computed, and some is kept.
         """
-        steady_from = min(max(self.steady_from - block.start, 0), len(block))
-        work = replace(self, layers=self.layers and block.start == 0, steady_from=steady_from)
+        light_independent_from = min(max(self.light_independent_from - block.start, 0), len(block))
+        setup = replace(self, layers=self.layers and block.start == 0, light_independent_from=light_independent_from)
         if self.shadow_step > 1:
-            return replace(work, kept=block)
-        return replace(work, lights=some_lights(self.lights, block), kept=range(len(block)))
+            return replace(setup, kept=block)
+        return replace(setup, lights=some_lights(self.lights, block), kept=range(len(block)))
 
     def frames_for(self, wanted: Sequence[int]) -> list[int]:
         """The frames whose hits are needed to compose some frames, in rising order."""
@@ -112,7 +113,7 @@ class Work:
 
 
 # Columns of a row of a hit, and of the sums of such rows; those from INDIRECT to REFLECTIVITY are of three channels.
-WEIGHT, INDIRECT, STEADY, OBSCURANCE, REFLECTIVITY, LIT, HALF = 0, 1, 4, 7, 10, 13, 14
+WEIGHT, INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY, LIT, HALF = 0, 1, 4, 7, 10, 13, 14
 # In place of a half: each hit has its own.
 BY_SAMPLE = -1
 # The most bits that a whole number in a float32 has.
@@ -129,7 +130,7 @@ def lit_bit(n_lights: int, l: int) -> int:
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
-class Records:
+class HitRecords:
     """What composing needs of n hits.
 
     Attributes:
@@ -147,9 +148,9 @@ class Records:
         """The arrays by name."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
-    def part(self, span: slice) -> "Records":
+    def part(self, span: slice) -> "HitRecords":
         """The records of some hits; they share memory."""
-        return Records(
+        return HitRecords(
             row=self.row[span],
             irradiance=self.irradiance[span],
         )
@@ -167,13 +168,13 @@ def _fresh(_name: str, shape: tuple[int, ...], dtype: Any) -> Any:
     return with_room(shape, dtype)
 
 
-def empty_records(work: Work, n: int, take: Callable[[str, tuple[int, ...], Any], Any] = _fresh) -> Records:
+def empty_records(setup: FrameSetup, n: int, take: Callable[[str, tuple[int, ...], Any], Any] = _fresh) -> HitRecords:
     """Room for n hits; contents are arbitrary.
 
     Args:
         take: makes an array of a name, shape and dtype.
     """
-    return Records(
+    return HitRecords(
         row=take("row", (n, LANES), np.float32),
-        irradiance=take("irradiance", (n, work.lights.channels, len(work.kept)), np.float32),
+        irradiance=take("irradiance", (n, setup.lights.channels, len(setup.kept)), np.float32),
     )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scenes import Glb, png
 
-from framearray_cli.crew import Crew
+from framearray_cli.crew import TracePool
 from framearray_cli.embree import Engine
 from framearray_cli.frame import find_frame
 from framearray_cli.job import Job
@@ -21,7 +21,7 @@ from framearray_cli.scene import Scene, build_scene
 from framearray_cli.surface import surfaces
 from framearray_cli.terms.ambient import Ambient
 from framearray_cli.window import Composed, Window
-from framearray_cli.work import Work
+from framearray_cli.work import FrameSetup
 
 PLAIN, FLOOR, PAINTED, SMOOTH, MIRROR, GLOSSY = range(6)
 MATERIALS = (
@@ -235,20 +235,20 @@ def prepared(job: Job, scene: Scene | None = None) -> Prepared:
 
 
 @contextmanager
-def planned(inputs: Prepared, engine: Engine = "auto") -> Iterator[tuple[Work, Ambient]]:
+def planned(inputs: Prepared, engine: Engine = "auto") -> Iterator[tuple[FrameSetup, Ambient]]:
     """Embree open, ambient light known."""
     with open_embree(inputs, engine) as embree:
         yield plan_work(inputs, embree)
 
 
 @contextmanager
-def crew_of(work: Work, threads: int = 1) -> Iterator[Crew]:
+def pool_of(setup: FrameSetup, threads: int = 1) -> Iterator[TracePool]:
     """Threads, ended afterwards."""
-    crew = Crew(work, threads)
+    pool = TracePool(setup, threads)
     try:
-        yield crew
+        yield pool
     finally:
-        crew.close()
+        pool.close()
 
 
 @dataclass(frozen=True)
@@ -265,19 +265,19 @@ class Rendered:
         return np.stack([frame.images for frame in self.composed])
 
 
-def frames_of(work: Work, ambient: Ambient, crew: Crew) -> list[Composed]:
+def frames_of(setup: FrameSetup, ambient: Ambient, pool: TracePool) -> list[Composed]:
     """The frame loop without files."""
-    composed, window = [], Window(work, ambient, crew)
-    for c in range(work.n_frames):
-        window.add(find_frame(work, c, crew))
+    composed, window = [], Window(setup, ambient, pool)
+    for c in range(setup.n_frames):
+        window.add(find_frame(setup, c, pool))
         for j in window.complete():
-            shape = (work.lights.n_lights, work.cams.height, work.cams.width, 3)
+            shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
             composed.append(window.compose(j, np.empty(shape, np.float32)))
     return composed
 
 
 def render_frames(inputs: Prepared, threads: int = 1, engine: Engine = "auto") -> Rendered:
     """All frames of a job."""
-    with planned(inputs, engine) as (work, ambient), crew_of(work, threads) as crew:
-        composed = frames_of(work, ambient, crew)
-        return Rendered(composed, ambient, dict(crew.rays()))
+    with planned(inputs, engine) as (setup, ambient), pool_of(setup, threads) as pool:
+        composed = frames_of(setup, ambient, pool)
+        return Rendered(composed, ambient, dict(pool.rays()))

@@ -14,7 +14,7 @@ from ..job import Job
 from ..lights import some_lights
 from ..prepare import Prepared, open_embree, plan_work, prepare
 from ..terms.ambient import Ambient
-from ..work import Work
+from ..work import FrameSetup
 from .settings import Settings
 
 
@@ -23,12 +23,12 @@ class Case:
     """A job, opened and planned.
 
     Attributes:
-        settings: what its work was planned with.
+        settings: what its setup was planned with.
     """
 
     prepared: Prepared
     embree: EmbreeScene
-    work: Work
+    setup: FrameSetup
     ambient: Ambient
     settings: Settings
 
@@ -57,8 +57,8 @@ def planned(prepared: Prepared) -> Iterator[Case]:
     """Plan a job that is prepared, for measuring."""
     with open_embree(prepared) as embree:
         prepared, _ = settled(prepared, embree)
-        work, ambient = plan_work(prepared, embree)
-        yield Case(prepared=prepared, embree=embree, work=work, ambient=ambient, settings=Settings.of(prepared.job))
+        setup, ambient = plan_work(prepared, embree)
+        yield Case(prepared=prepared, embree=embree, setup=setup, ambient=ambient, settings=Settings.of(prepared.job))
 
 
 def varied(case: Case, settings: Settings) -> Case:
@@ -77,24 +77,24 @@ def varied(case: Case, settings: Settings) -> Case:
         }
     )
     prepared = replace(case.prepared, job=job)
-    work, _ = plan_work(prepared, case.embree)
-    middle = work.per_pixel[work.n_frames // 2]
-    work = replace(
-        work,
-        lights=case.work.lights,
-        kept=case.work.kept,
-        per_pixel=np.full_like(work.per_pixel, middle),
-        obscurance=work.obscurance._replace(average=case.work.obscurance.average),
+    setup, _ = plan_work(prepared, case.embree)
+    middle = setup.per_pixel[setup.n_frames // 2]
+    setup = replace(
+        setup,
+        lights=case.setup.lights,
+        kept=case.setup.kept,
+        per_pixel=np.full_like(setup.per_pixel, middle),
+        obscurance=setup.obscurance._replace(average=case.setup.obscurance.average),
     )
-    return replace(case, prepared=prepared, work=work, settings=settings)
+    return replace(case, prepared=prepared, setup=setup, settings=settings)
 
 
 def under(case: Case, l: Sequence[int]) -> Case:
     """The same job with light positions l alone."""
-    lights = some_lights(case.work.lights, l)
+    lights = some_lights(case.setup.lights, l)
     ambient = replace(
         case.ambient,
         intensity=np.ascontiguousarray(case.ambient.intensity[list(l)]),
         standard_error=case.ambient.standard_error[list(l)],
     )
-    return replace(case, work=replace(case.work, lights=lights, kept=range(len(l))), ambient=ambient)
+    return replace(case, setup=replace(case.setup, lights=lights, kept=range(len(l))), ambient=ambient)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Float32, Int32
-from ..crew import Crew
+from ..crew import TracePool
 from ..frame import find_frame
 from ..window import Window
 from .case import Case, under, varied
@@ -62,19 +62,19 @@ def run(case: Case, settings: Settings, cameras: Sequence[int], lights: Sequence
     """
     changed = varied(case, settings)
     changed = under(changed, lights) if settings.one_light else changed
-    work = replace(changed.work, seed=seed)
-    shape = (work.lights.n_lights, work.cams.height, work.cams.width, 3)
+    setup = replace(changed.setup, seed=seed)
+    shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
     block = np.empty(shape, np.float16)
     exact = np.empty(shape, np.float32)
     kept = range(len(lights)) if settings.one_light else lights
-    crew = Crew(work, changed.threads)
-    window = Window(work, changed.ambient, crew, range(cameras[0], work.n_frames))
+    pool = TracePool(setup, changed.threads)
+    window = Window(setup, changed.ambient, pool, range(cameras[0], setup.n_frames))
     images, hits, finding, composing = [], [], [], []
     try:
-        first, last = work.frames_around(cameras[0], work.n_r)[0], work.frames_around(cameras[-1], work.n_r)[-1]
+        first, last = setup.frames_around(cameras[0], setup.n_r)[0], setup.frames_around(cameras[-1], setup.n_r)[-1]
         for c in range(first, last + 1):
             started = time.perf_counter()
-            window.add(find_frame(work, c, crew))
+            window.add(find_frame(setup, c, pool))
             finding.append(time.perf_counter() - started)
             for j in window.complete():
                 if j > cameras[-1]:
@@ -85,7 +85,7 @@ def run(case: Case, settings: Settings, cameras: Sequence[int], lights: Sequence
                 hits.append(window.compose(j, exact).hits)
                 images.append(exact[list(kept)])
     finally:
-        crew.close()
+        pool.close()
     return Run(
         images=np.stack(images),
         seconds=statistics.median(finding) + statistics.median(composing),
@@ -110,7 +110,7 @@ def measure(
     all_hits = np.concatenate([h.ravel() for h in hits])
     return Measured(
         named=named,
-        ms=1e3 * statistics.median(seconds) / case.work.lights.n_lights,
+        ms=1e3 * statistics.median(seconds) / case.setup.lights.n_lights,
         quality=mean_quality(found),
         hits=(float(all_hits.mean()), float(np.percentile(all_hits, 1))),
         example=example,

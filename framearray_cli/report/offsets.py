@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..crew import Crew
+from ..crew import TracePool
 from ..frame import find_frame
 from ..window import Window
 from .case import Case, varied
@@ -37,25 +37,25 @@ class Offset:
 def by_offset(case: Case, c: int, lights: Sequence[int], reference: Reference) -> list[Offset]:
     """Make frame c of each eye of its window alone, with the job's own settings."""
     changed = varied(case, case.settings)
-    images = np.empty((2, case.work.lights.n_lights, case.work.cams.height, case.work.cams.width, 3), np.float32)
-    windows, crews = [], []
+    images = np.empty((2, case.setup.lights.n_lights, case.setup.cams.height, case.setup.cams.width, 3), np.float32)
+    windows, pools = [], []
     try:
         for seed in SEEDS:
-            work = replace(changed.work, seed=seed)
-            crew = Crew(work, changed.threads)
-            crews.append(crew)
-            window = Window(work, changed.ambient, crew, [c])
-            for k in work.frames_around(c, work.n_r):
-                window.add(find_frame(work, k, crew))
+            setup = replace(changed.setup, seed=seed)
+            pool = TracePool(setup, changed.threads)
+            pools.append(pool)
+            window = Window(setup, changed.ambient, pool, [c])
+            for k in setup.frames_around(c, setup.n_r):
+                window.add(find_frame(setup, k, pool))
             windows.append(window)
         found = []
-        for k in changed.work.frames_around(c, changed.work.n_r):
+        for k in changed.setup.frames_around(c, changed.setup.n_r):
             hits = [window.compose(c, images[i], [k]).hits for i, window in enumerate(windows)]
             found.append(_offset(case, k - c, hits, images, lights, reference))
         return found
     finally:
-        for crew in crews:
-            crew.close()
+        for pool in pools:
+            pool.close()
 
 
 def _offset(

@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays import Float32, Float64, Image, Rgb
-from ..crew import Crew
+from ..crew import TracePool
 from ..files import make_folder, whole_file
 from ..fingerprint import fingerprint
 from ..frame import find_frame
 from ..prepare import job_fingerprint
 from ..window import Layers, Window
-from ..work import Work
+from ..work import FrameSetup
 from .case import Case, under
 from .metrics import rmse
 
@@ -77,9 +77,9 @@ def reference(case: Case, c: int, l: Sequence[int], folder: Path, passes: int = 
     Raises:
         OutputError: it cannot be kept.
     """
-    average = case.work.obscurance.average.tobytes()
+    average = case.setup.obscurance.average.tobytes()
     pixels = job_fingerprint(case.prepared).encode()  # the seed, too, which does no harm
-    key = fingerprint(pixels, average, repr((c, list(l), HITS, passes, case.work.cams.width)).encode())
+    key = fingerprint(pixels, average, repr((c, list(l), HITS, passes, case.setup.cams.width)).encode())
     file = folder / f"reference-{sha256(key.encode()).hexdigest()[:16]}.npz"
     names = ("light", "indirect", "reflectivity", "normal", "depth")
     if os.path.isfile(file):
@@ -93,20 +93,20 @@ def reference(case: Case, c: int, l: Sequence[int], folder: Path, passes: int = 
 
 
 def _render(case: Case, c: int, passes: int) -> Reference:
-    work = replace(
-        case.work,
+    setup = replace(
+        case.setup,
         n_r=0,
-        per_pixel=np.full_like(case.work.per_pixel, HITS),
+        per_pixel=np.full_like(case.setup.per_pixel, HITS),
         balance=False,
         shadow_step=1,
         layers=True,
     )
-    shape = (work.cams.height, work.cams.width, 3)
-    light: Float64 = np.zeros((2, work.lights.n_lights, *shape))
+    shape = (setup.cams.height, setup.cams.width, 3)
+    light: Float64 = np.zeros((2, setup.lights.n_lights, *shape))
     indirect: Float64 = np.zeros((2, *shape))
     for half, seed in enumerate(SEEDS):
         for i in range(passes):
-            parts = _pass(replace(work, seed=seed + i), replace(case, work=work), c)
+            parts = _pass(replace(setup, seed=seed + i), replace(case, setup=setup), c)
             light[half] += parts[0] / passes
             indirect[half] += parts[1] / passes
     layers = parts[2]
@@ -120,19 +120,19 @@ def _render(case: Case, c: int, passes: int) -> Reference:
     )
 
 
-def _pass(work: Work, case: Case, c: int) -> tuple[Float32, Float32, Layers]:
+def _pass(setup: FrameSetup, case: Case, c: int) -> tuple[Float32, Float32, Layers]:
     """One image a light position without ambient light, what an ambient light of 1 adds, and the layers."""
-    images = np.empty((2, work.lights.n_lights, work.cams.height, work.cams.width, 3), np.float32)
-    crew = Crew(work, case.threads)
+    images = np.empty((2, setup.lights.n_lights, setup.cams.height, setup.cams.width, 3), np.float32)
+    pool = TracePool(setup, case.threads)
     try:
-        frame = find_frame(work, c, crew)
+        frame = find_frame(setup, c, pool)
         for ambient in (0, 1):
             fixed = replace(case.ambient, intensity=np.full_like(case.ambient.intensity, ambient))
-            window = Window(work, fixed, crew, [c])
+            window = Window(setup, fixed, pool, [c])
             window.add(frame)
             layers = window.compose(c, images[ambient]).layers
     finally:
-        crew.close()
+        pool.close()
     assert layers is not None
     return images[0], images[1, 0] - images[0, 0], layers
 

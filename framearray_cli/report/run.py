@@ -92,8 +92,8 @@ def make_report(job: Job, folder: Path, wish: Wish, listener: Listener | None = 
     with opened(job) as case:
         listener.opened(case)
         still, n_l = case.prepared.still, case.prepared.n_lights
-        looked_at = probes(case.work.n_frames, n_l, wish.cameras, wish.lights, file=job.file or job.name)
-        trying = to_try(case.settings, 1 if still else case.work.n_frames, wish.vary)
+        looked_at = probes(case.setup.n_frames, n_l, wish.cameras, wish.lights, file=job.file or job.name)
+        trying = to_try(case.settings, 1 if still else case.setup.n_frames, wish.vary)
         frames = [c for run in looked_at.cameras for c in run]
         listener.planned(len(frames), len(trying))
         passes = passes_for(wish.times, case.settings.rests_on)

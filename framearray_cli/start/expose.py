@@ -7,7 +7,7 @@ import numpy as np
 
 from ..arrays import Float64, Images
 from ..colour import srgb_from_linear
-from ..crew import Crew
+from ..crew import TracePool
 from ..embree import EmbreeScene
 from ..frame import find_frame
 from ..lights import light_arrays
@@ -109,20 +109,20 @@ def _pictures(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[Float64,
         surfaces=surfaces(scene),
         still=len(some) == 1,
     )
-    work, ambient = plan_work(prepared, embree)
-    crew = Crew(work, prepared.threads)
+    setup, ambient = plan_work(prepared, embree)
+    pool = TracePool(setup, prepared.threads)
     found: list[Images] = []
     try:
-        window = Window(work, ambient, crew)
-        for c in range(work.n_frames):
-            window.add(find_frame(work, c, crew))
+        window = Window(setup, ambient, pool)
+        for c in range(setup.n_frames):
+            window.add(find_frame(setup, c, pool))
             for j in window.complete():
-                shape = (work.lights.n_lights, work.cams.height, work.cams.width, 3)
+                shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
                 composed = window.compose(j, np.empty(shape, np.float32))
                 assert composed.layers is not None
                 found.append(composed.images[:, composed.layers.depth > 0])
     finally:
-        crew.close()
+        pool.close()
     n = few_lights.n - 1
     images = np.concatenate(found, axis=1).astype(np.float64)  # (n + 1, pixels, 3); the last has no lights
     dark = np.repeat(images[-1:], n, axis=0)

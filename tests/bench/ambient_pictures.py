@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter
 
 from framearray_cli.arrays import Float32, Float64, Image
-from framearray_cli.crew import Crew
+from framearray_cli.crew import TracePool
 from framearray_cli.frame import find_frame
 from framearray_cli.report.case import Case, planned, under
 from framearray_cli.report.metrics import EPSILON
@@ -183,16 +183,16 @@ def _sampled(probe: Probe, method: str, total: Wanted, indirect: Wanted) -> Tabl
 
 def _parts(case: Case, c: int) -> tuple[Image, Image]:
     """Frame c with its neighbours' hits: without ambient light, and what an ambient light of 1 adds."""
-    work = replace(case.work, layers=False)
-    images = np.empty((2, 1, work.cams.height, work.cams.width, 3), np.float32)
-    crew = Crew(work, case.threads)
+    setup = replace(case.setup, layers=False)
+    images = np.empty((2, 1, setup.cams.height, setup.cams.width, 3), np.float32)
+    pool = TracePool(setup, case.threads)
     try:
         for image, level in zip(images, (0, 1), strict=True):
             fixed = replace(case.ambient, intensity=np.full_like(case.ambient.intensity, level))
-            window = Window(work, fixed, crew, [c])
-            for other in work.frames_around(c, work.n_r):
-                window.add(find_frame(work, other, crew))
+            window = Window(setup, fixed, pool, [c])
+            for other in setup.frames_around(c, setup.n_r):
+                window.add(find_frame(setup, other, pool))
             window.compose(c, image)
     finally:
-        crew.close()
+        pool.close()
     return images[0, 0], images[1, 0] - images[0, 0]

@@ -119,8 +119,8 @@ def measure(name: str, camera: str, plan: Plan) -> Table:
     job = job_named(name, False)
     job = with_resolution(job, plan.resolution) if plan.resolution else job
     with opened(job) as case:
-        cameras = [round(place * case.work.n_frames) for place in plan.places]
-        lights = [int(share * case.work.lights.n_lights) for share in LIGHTS]
+        cameras = [round(place * case.setup.n_frames) for place in plan.places]
+        lights = [int(share * case.setup.lights.n_lights) for share in LIGHTS]
         for c in cameras:
             _add_frame(under(case, lights), c, camera, plan, sums)
             tell(f"{name}, {camera}: camera {c}: {time.perf_counter() - started:.0f} s")

@@ -33,7 +33,7 @@ def fast(case: Case, c: int) -> Cameras:
 def close(case: Case, c: int) -> Cameras:
     """An eye that goes to what frame c shows in the middle of its picture, and looks where frame c does."""
     cams = _some(case, np.full(len(STEPS), c))
-    alone = seen_by(replace(case, work=replace(case.work, n_r=0)), cams)
+    alone = seen_by(replace(case, setup=replace(case.setup, n_r=0)), cams)
     layers = frame(alone, MIDDLE, seed=0, layers=True).layers
     assert layers is not None
     depth = layers.depth[cams.height // 2, cams.width // 2]
@@ -47,12 +47,12 @@ CAMERAS: dict[str, Callable[[Case, int], Cameras]] = {"slow": slow, "fast": fast
 
 def seen_by(case: Case, cams: Cameras) -> Case:
     """The same job seen by other eyes; each finds as many hits as a frame in the middle of its path."""
-    middle = case.work.per_pixel[case.work.n_frames // 2]
-    return replace(case, work=replace(case.work, cams=cams, per_pixel=np.full(len(cams.position), middle)))
+    middle = case.setup.per_pixel[case.setup.n_frames // 2]
+    return replace(case, setup=replace(case.setup, cams=cams, per_pixel=np.full(len(cams.position), middle)))
 
 
 def _some(case: Case, at: NDArray[np.int64]) -> Cameras:
-    if at.min() < 0 or at.max() >= case.work.n_frames:
-        raise ValueError(f"frames {at.min()} to {at.max()} do not fit a path of {case.work.n_frames}")
-    cams, names = case.work.cams, ("position", "right", "up", "forward")
+    if at.min() < 0 or at.max() >= case.setup.n_frames:
+        raise ValueError(f"frames {at.min()} to {at.max()} do not fit a path of {case.setup.n_frames}")
+    cams, names = case.setup.cams, ("position", "right", "up", "forward")
     return cams._replace(**{name: np.ascontiguousarray(getattr(cams, name)[at]) for name in names})

@@ -116,5 +116,5 @@ def parts_of(case: Case, variant: Variant) -> list[Case]:
     changed = varied(case, variant)
     if not variant.one_light:
         return [changed]
-    n = case.work.lights.n_lights
+    n = case.setup.lights.n_lights
     return [under(changed, [min(int(share * n), n - 1)]) for share in PLACES_OF_LIGHT]

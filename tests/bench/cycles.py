@@ -30,7 +30,7 @@ def measure(name: str, quick: bool) -> Table:
         camera, lamps = _scene(bpy, case)
         shares, spent = [busy()], []
         for i, (a, b) in enumerate(((0.1, 0.1), *PLACES)):  # the first one is not timed
-            _place(case, camera, lamps, int(a * case.work.n_frames), int(b * case.work.lights.n_lights))
+            _place(case, camera, lamps, int(a * case.setup.n_frames), int(b * case.setup.lights.n_lights))
             started = time.perf_counter()
             with _silent():
                 bpy.ops.render.render()
@@ -55,7 +55,7 @@ def _silent() -> Any:
 
 def _scene(bpy: Any, case: Case) -> tuple[Any, list[Any]]:
     """One mesh with its materials, a camera and the lamps; coordinates as the program's kernels have them."""
-    s, lights, cams = case.work.surfaces, case.work.lights, case.work.cams
+    s, lights, cams = case.setup.surfaces, case.setup.lights, case.setup.cams
     n = len(s.corners)
     mesh = bpy.data.meshes.new("scene")
     mesh.vertices.add(3 * n)
@@ -80,7 +80,7 @@ def _scene(bpy: Any, case: Case) -> tuple[Any, list[Any]]:
         scene.collection.objects.link(lamp)
         lamps.append(lamp)
     scene.world = bpy.data.worlds.new("sky")
-    scene.world.color = case.work.background[:3].tolist()
+    scene.world.color = case.setup.background[:3].tolist()
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = cams.width, cams.height
     scene.render.use_persistent_data = True
@@ -108,7 +108,7 @@ def _place(case: Case, camera: Any, lamps: list[Any], c: int, l: int) -> None:
     """Put the camera and the lamps where they are at (c, l)."""
     from mathutils import Matrix, Vector
 
-    cams, lights = case.work.cams, case.work.lights
+    cams, lights = case.setup.cams, case.setup.lights
     axes = np.stack([cams.right[c], cams.up[c], -cams.forward[c], cams.position[c]], axis=1)
     camera.matrix_world = Matrix([*axes.tolist(), [0, 0, 0, 1]])
     for source, lamp in enumerate(lamps):

@@ -58,9 +58,9 @@ FORMATS = {
 def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = VARIANTS) -> Table:
     """Compare every variant of a job with references; `folder` keeps these."""
     with opened(job_named(name, quick)) as case:
-        n_lights = case.work.lights.n_lights
+        n_lights = case.setup.lights.n_lights
         l = [min(int(share * n_lights), n_lights - 1) for share in LIGHTS]
-        frames = [round(PLACE * case.work.n_frames) + step for step in (0, 1)]
+        frames = [round(PLACE * case.setup.n_frames) + step for step in (0, 1)]
         references = []
         for c in frames:
             started = time.perf_counter()

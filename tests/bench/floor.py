@@ -21,7 +21,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from framearray_cli.arrays import Bytes, Float32, Float64
-from framearray_cli.crew import Crew
+from framearray_cli.crew import TracePool
 from framearray_cli.embree.masks import _pointer
 from framearray_cli.embree.packets import (
     GEOMETRY,
@@ -94,7 +94,7 @@ def record(case: Case, c: int, expected: float) -> Recording:
     Raises:
         RuntimeError: Embree's own functions cannot be reached, or rays were missed.
     """
-    tracer = case.work.tracer
+    tracer = case.setup.tracer
     if tracer.batch:
         raise RuntimeError("the floor needs Embree's C functions")
     capacity = int(1.25 * expected / LANES) + 65536
@@ -102,13 +102,13 @@ def record(case: Case, c: int, expected: float) -> Recording:
     state = np.array([0, capacity, rays.ctypes.data, flags.ctypes.data, tracer.intersect, tracer.occluded], np.int64)
     recorders = [_recorder(state.ctypes.data, what) for what in (_INTERSECT, _OCCLUDED)]
     watched = tracer._replace(intersect=recorders[0].address, occluded=recorders[1].address)
-    crew = Crew(case.work, 1)
+    pool = TracePool(case.setup, 1)
     marks = _Marks(state)
     try:
-        crew._all[0].rays = marks
-        find_frame(replace(case.work, tracer=watched), c, crew)
+        pool._all[0].rays = marks
+        find_frame(replace(case.setup, tracer=watched), c, pool)
     finally:
-        crew.close()
+        pool.close()
     n = int(state[0])
     lanes = int((rays[:n, TFAR] >= 0).sum())
     if n > capacity or lanes != sum(marks.values()):
@@ -120,7 +120,7 @@ def record(case: Case, c: int, expected: float) -> Recording:
         kinds=kinds,
         pieces=_pieces(marks.ends, kinds, flags[:n]),
         n_rays=dict(marks),
-        n_pixels=case.work.n_pixels,
+        n_pixels=case.setup.n_pixels,
     )
 
 

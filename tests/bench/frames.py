@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from framearray_cli.crew import Crew
+from framearray_cli.crew import TracePool
 from framearray_cli.frame import find_frame
 from framearray_cli.window import Composed, Window
 
@@ -19,16 +19,16 @@ def frame(case: Case, c: int, seed: int, *, layers: bool = False, threads: int |
     Args:
         threads: None: those of the case.
     """
-    work = replace(case.work, seed=seed, layers=layers)
-    crew = Crew(work, threads or case.threads)
-    window = Window(work, case.ambient, crew, range(c, case.work.n_frames))
-    out = np.empty((len(work.kept), work.cams.height, work.cams.width, 3), np.float32)
+    setup = replace(case.setup, seed=seed, layers=layers)
+    pool = TracePool(setup, threads or case.threads)
+    window = Window(setup, case.ambient, pool, range(c, case.setup.n_frames))
+    out = np.empty((len(setup.kept), setup.cams.height, setup.cams.width, 3), np.float32)
     try:
-        for other in work.frames_around(c, work.n_r):
-            window.add(find_frame(work, other, crew))
+        for other in setup.frames_around(c, setup.n_r):
+            window.add(find_frame(setup, other, pool))
         return window.compose(c, out)
     finally:
-        crew.close()
+        pool.close()
 
 
 def frames(case: Case, c: int, seeds: Sequence[int], *, layers: bool = False) -> list[Composed]:

@@ -37,10 +37,10 @@ def measure(name: str, quick: bool) -> Table:
         return {"skipped": "this Mitsuba has no LLVM variant"}
     mi.set_variant("llvm_ad_rgb")
     with opened(job_named(name, quick)) as case:
-        if case.work.obscurance.falloff != FALLOFFS["sqrt"]:
+        if case.setup.obscurance.falloff != FALLOFFS["sqrt"]:
             return {"skipped": "the integrator knows the falloff sqrt alone"}
         image = integrator(mi, case)
-        n_c, n_l = case.work.n_frames, case.work.lights.n_lights
+        n_c, n_l = case.setup.n_frames, case.setup.lights.n_lights
         where = [(int(a * n_c), int(b * n_l)) for a, b in PLACES]
         first = image(*where[0])  # compiles
         shares, spent, written = [busy()], [], []
@@ -76,12 +76,12 @@ def integrator(mi: Any, case: Case) -> Callable[[int, int], Any]:
     """A function (c, l) -> image, (h, w, 3), on the LLVM backend."""
     import drjit as dr
 
-    work, s = case.work, case.work.surfaces
+    setup, s = case.setup, case.setup.surfaces
     scene = _scene(mi, s.corners)
-    cams, lights, settings = work.cams, work.lights, work.obscurance
+    cams, lights, settings = setup.cams, setup.lights, setup.obscurance
     n_pixels = cams.width * cams.height
     reflectivity_of = _reflectivity(mi, dr, s)
-    average, background = mi.Color3f(settings.average.tolist()), mi.Color3f(work.background.tolist())
+    average, background = mi.Color3f(settings.average.tolist()), mi.Color3f(setup.background.tolist())
     d_max = float(settings.d_max)
 
     def image(c: int, l: int) -> Any:

@@ -60,11 +60,11 @@ def _lights(case: Case, quick: bool) -> list[Table]:
 
 def _with_lights(case: Case, n: int) -> Case:
     """The same path of the light at n positions."""
-    lights, intensity = case.work.lights, case.ambient.intensity
+    lights, intensity = case.setup.lights, case.ambient.intensity
     at = np.linspace(0, lights.n_lights - 1, n) if n > 1 else np.array([(lights.n_lights - 1) / 2])
     return replace(
         case,
-        work=replace(case.work, lights=resampled(lights, at), kept=range(n)),
+        setup=replace(case.setup, lights=resampled(lights, at), kept=range(n)),
         ambient=replace(
             case.ambient,
             intensity=np.ascontiguousarray(_between(intensity, at, 0)),
@@ -118,18 +118,18 @@ def _with_threads(case: Case, n: int) -> Case:
 
 def _cameras(case: Case, quick: bool) -> list[Table]:
     """The camera path there and back again, several times over: the same steps, so the same reuse."""
-    cams, per_pixel, rows = case.work.cams, case.work.per_pixel, []
+    cams, per_pixel, rows = case.setup.cams, case.setup.per_pixel, []
     for times in PATHS:
         turn = np.concatenate([np.arange(len(per_pixel)), np.arange(len(per_pixel))[::-1]])
         at = np.tile(turn, times)[: times * len(per_pixel)]
         longer = cams._replace(
             position=cams.position[at], right=cams.right[at], up=cams.up[at], forward=cams.forward[at]
         )
-        work = replace(case.work, cams=longer, per_pixel=per_pixel[at])
+        setup = replace(case.setup, cams=longer, per_pixel=per_pixel[at])
         prepared = replace(case.prepared, eyes=_longer_eyes(case, at))
         # the same cameras every time: those of the middle of the first turn
         place = 0.5 / times
-        measured = steady(replace(case, work=work, prepared=prepared), 1 if quick else FRAMES, place=place)
+        measured = steady(replace(case, setup=setup, prepared=prepared), 1 if quick else FRAMES, place=place)
         tell(f"{len(at)} cameras: {measured.ms:.2f} ms an image")
         rows.append({"cameras": len(at), **measured.table()})
     return rows
@@ -147,9 +147,9 @@ def _triangles(quick: bool) -> list[Table]:
         started = time.perf_counter()
         with open_embree(prepared) as embree:
             built = time.perf_counter() - started
-            work, ambient = plan_work(prepared, embree)
+            setup, ambient = plan_work(prepared, embree)
             settings = Settings.of(prepared.job)
-            planned = Case(prepared=prepared, embree=embree, work=work, ambient=ambient, settings=settings)
+            planned = Case(prepared=prepared, embree=embree, setup=setup, ambient=ambient, settings=settings)
             case = varied(planned, FRAME_ARRAY)
             row = _row(case, quick, triangles=len(prepared.scene.corners))
         rows.append({**row, "scene_s": scene_seconds, "embree_s": built})

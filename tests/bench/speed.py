@@ -46,13 +46,13 @@ def measure(
                 table = measure_once(case, replace(variant, frames=2) if quick else variant, place)
                 found[variant.name].append(table)
                 tell(f"{name}: {variant.name}: {table['ms']:.2f} ms an image, others take {shares[-1]:.0%}")
-        work, job = case.work, case.prepared.job
+        setup, job = case.setup, case.prepared.job
         about = {
-            "triangles": len(work.surfaces.corners),
+            "triangles": len(setup.surfaces.corners),
             "resolution": list(job.camera.resolution),
-            "n_lights": work.lights.n_lights,
+            "n_lights": setup.lights.n_lights,
             "n_cameras": case.prepared.n_cameras,
-            "mirrors": bool(work.depth),
+            "mirrors": bool(setup.depth),
             "threads": case.threads,
         }
     return {
@@ -73,9 +73,9 @@ def measure_once(case: Case, variant: Variant, place: float) -> Table:
     if variant.floor:
         part = parts[len(parts) // 2]
         first = start_of(part, variant.frames, place)
-        c = first + 2 * part.work.n_r + 1 + variant.frames // 2
-        expected = total(table["rays"]) * part.work.n_pixels * part.work.lights.n_lights
-        table["floor"] = replay(record(part, c, expected), part.work.tracer, part.threads, table["rays"])
+        c = first + 2 * part.setup.n_r + 1 + variant.frames // 2
+        expected = total(table["rays"]) * part.setup.n_pixels * part.setup.lights.n_lights
+        table["floor"] = replay(record(part, c, expected), part.setup.tracer, part.threads, table["rays"])
         table["floor_ratio"] = {clock: table[clock] / total(table["floor"][clock]) for clock in ("ms", "cpu_ms")}
     return table
 

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.arrays import Int32
-from framearray_cli.crew import Crew
+from framearray_cli.crew import TracePool
 from framearray_cli.frame import find_frame
 from framearray_cli.images import ImageFormat
 from framearray_cli.stored import plain_names
 from framearray_cli.window import Composed, Window
-from framearray_cli.work import Work
+from framearray_cli.work import FrameSetup
 from framearray_cli.writer import BLOCKS, ArrayWriter
 
 from .cases import Case
@@ -82,11 +82,11 @@ class TimedWriter(ArrayWriter):
 
 def start_of(case: Case, frames: int, place: float) -> int:
     """The first camera of a run whose measured cameras lie about a place of the path, 0 to 1."""
-    before = 2 * case.work.n_r + 1
-    last = case.work.n_frames - frames - before
+    before = 2 * case.setup.n_r + 1
+    last = case.setup.n_frames - frames - before
     if last < 0:
-        raise ValueError(f"{frames} frames with n_r = {case.work.n_r} do not fit a path of {case.work.n_frames}")
-    return min(max(round(place * case.work.n_frames) - frames // 2 - case.work.n_r - 1, 0), last)
+        raise ValueError(f"{frames} frames with n_r = {case.setup.n_r} do not fit a path of {case.setup.n_frames}")
+    return min(max(round(place * case.setup.n_frames) - frames // 2 - case.setup.n_r - 1, 0), last)
 
 
 def steady(case: Case, frames: int, image_format: ImageFormat | None = None, place: float = 0.5) -> Measured:
@@ -96,29 +96,31 @@ def steady(case: Case, frames: int, image_format: ImageFormat | None = None, pla
         image_format: how images are written, or None: they are composed and dropped.
         place: where on the path, 0 to 1.
     """
-    work, n_r = case.work, case.work.n_r
+    setup, n_r = case.setup, case.setup.n_r
     before = 2 * n_r + 1  # frames that fill the window and compose one frame, so that all is compiled
     first = start_of(case, frames, place)
-    crew = Crew(work, case.threads)
-    window = Window(work, case.ambient, crew, range(first + n_r, work.n_frames))
+    pool = TracePool(setup, case.threads)
+    window = Window(setup, case.ambient, pool, range(first + n_r, setup.n_frames))
     try:
         with _writer(case, Path(), None) as nothing:
-            _pass(work, window, crew, nothing, range(first, first + before))
-        return _measured(case, window, crew, range(first + before, first + before + frames), image_format)
+            _pass(setup, window, pool, nothing, range(first, first + before))
+        return _measured(case, window, pool, range(first + before, first + before + frames), image_format)
     finally:
-        crew.close()
+        pool.close()
 
 
-def _measured(case: Case, window: Window, crew: Crew, cameras: range, image_format: ImageFormat | None) -> Measured:
+def _measured(
+    case: Case, window: Window, pool: TracePool, cameras: range, image_format: ImageFormat | None
+) -> Measured:
     """Put the clock to some frames."""
-    work = case.work
+    setup = case.setup
     with tempfile.TemporaryDirectory() as folder, _writer(case, Path(folder), image_format) as writer:
-        rays, seconds = crew.rays(), crew.seconds()
+        rays, seconds = pool.rays(), pool.seconds()
         started, cpu = time.perf_counter(), time.process_time()
-        hits = _pass(work, window, crew, writer, cameras)
+        hits = _pass(setup, window, pool, writer, cameras)
         wall, cpu = time.perf_counter() - started, time.process_time() - cpu
-        spent = {stage: t - seconds.get(stage, 0.0) for stage, t in crew.seconds().items()}
-        images = len(hits) * work.lights.n_lights
+        spent = {stage: t - seconds.get(stage, 0.0) for stage, t in pool.seconds().items()}
+        images = len(hits) * setup.lights.n_lights
         spent = {stage: t for stage, t in spent.items() if stage not in WITHIN_MIRROR}
         spent["rest"] = case.threads * wall - sum(spent.values())
         spent["writing"] = writer.seconds
@@ -128,16 +130,16 @@ def _measured(case: Case, window: Window, crew: Crew, cameras: range, image_form
         ms=1e3 * wall / images,
         cpu_ms=1e3 * cpu / images,
         stages={stage: 1e3 * t / images for stage, t in spent.items()},
-        rays={kind: (n - rays[kind]) / images / work.n_pixels for kind, n in crew.rays().items()},
+        rays={kind: (n - rays[kind]) / images / setup.n_pixels for kind, n in pool.rays().items()},
         hits=[float(all_hits.mean()), float(np.percentile(all_hits, 1))],
     )
 
 
-def _pass(work: Work, window: Window, crew: Crew, writer: TimedWriter, cameras: range) -> list[Int32]:
+def _pass(setup: FrameSetup, window: Window, pool: TracePool, writer: TimedWriter, cameras: range) -> list[Int32]:
     """Find the hits of some cameras and compose what they complete, as the program does; returns hits by pixel."""
     hits: list[Int32] = []
     for c in cameras:
-        window.add(find_frame(work, c, crew))
+        window.add(find_frame(setup, c, pool))
         for j in window.complete():
             composed = window.compose(j, writer.block())
             hits.append(composed.hits)
@@ -170,7 +172,7 @@ def mean(tables: Sequence[Table]) -> Table:
 
 
 def _writer(case: Case, folder: Path, image_format: ImageFormat | None) -> TimedWriter:
-    job, prepared, n_lights = case.prepared.job, case.prepared, case.work.lights.n_lights
+    job, prepared, n_lights = case.prepared.job, case.prepared, case.setup.lights.n_lights
     stored = image_format or ImageFormat()
     writer = TimedWriter(
         folder,

@@ -59,11 +59,11 @@ def measure(name: str, folder: Path) -> list[Table]:
     """For each setting, camera and light position: what is told, and what is true."""
     rows: list[Table] = []
     with opened(with_resolution(job_named(name, False), RESOLUTION)) as whole:
-        n_lights = whole.work.lights.n_lights
+        n_lights = whole.setup.lights.n_lights
         l = [min(int(share * n_lights), n_lights - 1) for share in LIGHTS]
         case = under(whole, l)
         for place in PLACES:
-            c = round(place * case.work.n_frames)
+            c = round(place * case.setup.n_frames)
             wanted = reference(whole, c, l, folder, PASSES)
             for variant in TRIED:
                 rows += [{"job": name, "variant": variant.name, **row} for row in compare(case, variant, c, wanted)]
@@ -73,9 +73,9 @@ def measure(name: str, folder: Path) -> list[Table]:
 
 def compare(case: Case, variant: Variant, c: int, wanted: Reference) -> list[Table]:
     """Each image of frame c made by a variant: what it tells, and how far it is from the reference."""
-    work = varied(case, variant).work
+    setup = varied(case, variant).setup
     halves = BY_SAMPLE if variant.hits >= FEWEST_SPLIT or variant.n_r == 0 else turns(variant.hits)
-    made = frame(replace(case, work=replace(work, halves=halves)), c, SEED)
+    made = frame(replace(case, setup=replace(setup, halves=halves)), c, SEED)
     assert made.differences is not None
     hits = made.hits.reshape(made.images.shape[1:3])
     rows = []

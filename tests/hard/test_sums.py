@@ -9,7 +9,7 @@ from framearray_cli.accumulate import Source, accumulate, sources
 from framearray_cli.arrays import with_room
 from framearray_cli.compose import empty_band
 from framearray_cli.lanes import LANES
-from framearray_cli.work import INDIRECT, LIT, REFLECTIVITY, WEIGHT, Placed, Records
+from framearray_cli.work import INDIRECT, LIT, REFLECTIVITY, WEIGHT, HitRecords, Placed
 
 
 def mean_of_many(n: int) -> tuple[Any, Any]:
@@ -22,7 +22,7 @@ def mean_of_many(n: int) -> tuple[Any, Any]:
     row[:, INDIRECT : INDIRECT + 3] = rng.random((n, 3))
     placed = Placed(start=np.array([0, n], np.int32), order=np.arange(n, dtype=np.int32))
     band = empty_band(1, 3)
-    parts = sources([Source(placed, Records(row=row, irradiance=irradiance))])
+    parts = sources([Source(placed, HitRecords(row=row, irradiance=irradiance))])
     accumulate(band, 0, 1, parts, 1, 3, True)
     light = row[:, REFLECTIVITY : REFLECTIVITY + 3, None].astype(np.float64) / np.pi * irradiance
     exact = [light.mean(axis=0).ravel(), row[:, INDIRECT : INDIRECT + 3].mean(axis=0, dtype=np.float64)]

@@ -58,14 +58,14 @@ def hits_of(job: Job) -> Lit:
     """Find the eye's hits and their direct irradiance by the program's kernels, as its frame loop does."""
     prepared = prepare(job)
     with open_embree(prepared) as embree:
-        work, _ = plan_work(prepared, embree)
-        scratch, n = Scratch(work, 1024), 1024
+        setup, _ = plan_work(prepared, embree)
+        scratch, n = Scratch(setup, 1024), 1024
         native_hits(
-            work.cams, 0, work.seed, work.order, 1, 0, 0, n, work.surfaces, work.tracer, False,
+            setup.cams, 0, setup.seed, setup.order, 1, 0, 0, n, setup.surfaces, setup.tracer, False,
             scratch.hit_rays.packets, scratch.hits,
         )  # fmt: skip
-        irradiance = np.empty((n, work.lights.channels, work.lights.n_lights), np.float32)
-        direct(scratch.hits, n, work.lights, work.tracer, scratch.test_rays, irradiance)
+        irradiance = np.empty((n, setup.lights.channels, setup.lights.n_lights), np.float32)
+        direct(scratch.hits, n, setup.lights, setup.tracer, scratch.test_rays, irradiance)
     hits = scratch.hits
     met = hits.kind[:n] == SURFACE
     return Lit(

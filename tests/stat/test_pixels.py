@@ -20,11 +20,11 @@ AMBIENT = {"intensity": [0.4, 0.3, 0.2]}
 
 def runs(inputs: Any, seeds: range) -> Any:
     """(n_seeds, n_c, n_l, h, w, 3): pictures of a job for independent seeds."""
-    with tiny.planned(inputs) as (work, ambient):
+    with tiny.planned(inputs) as (setup, ambient):
         found = []
         for seed in seeds:
-            with tiny.crew_of(replace(work, seed=seed)) as crew:
-                composed = tiny.frames_of(replace(work, seed=seed), ambient, crew)
+            with tiny.pool_of(replace(setup, seed=seed)) as pool:
+                composed = tiny.frames_of(replace(setup, seed=seed), ambient, pool)
                 assert all(frame.bad == 0 for frame in composed)
                 found.append(np.stack([frame.images for frame in composed]).astype(np.float64))
     return np.array(found)

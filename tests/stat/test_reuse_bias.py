@@ -15,7 +15,7 @@ from stages import box, make_job, point, quad, sun, write_scene
 from ztests import differing
 
 from framearray_cli.allotment import Allotment, blocks_of
-from framearray_cli.crew import Crew
+from framearray_cli.crew import TracePool
 from framearray_cli.frame import find_frame
 from framearray_cli.job import Job
 from framearray_cli.prepare import open_embree, plan_work, prepare
@@ -70,15 +70,15 @@ def middle_frames(job: Job, seeds: range, allotment: Allotment | None = None) ->
     with open_embree(prepared) as embree:
         planned, ambient = plan_work(prepared, embree)
         for seed in seeds:
-            work = replace(planned, seed=seed, allotment=allotment)
-            crew = Crew(work, 1)
-            window = Window(work, ambient, crew)
-            for c in work.frames_around(MIDDLE, work.n_r):
-                window.add(find_frame(work, c, crew))
+            setup = replace(planned, seed=seed, allotment=allotment)
+            pool = TracePool(setup, 1)
+            window = Window(setup, ambient, pool)
+            for c in setup.frames_around(MIDDLE, setup.n_r):
+                window.add(find_frame(setup, c, pool))
             composed = window.compose(MIDDLE, block)
             assert composed.bad == 0
             images.append(block.ravel().astype(float))
-            crew.close()
+            pool.close()
     return np.array(images)
 
 

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 from stages import box, make_job, quad, write_scene
 
-from framearray_cli.crew import Crew
+from framearray_cli.crew import TracePool
 from framearray_cli.frame import find_frame
 from framearray_cli.job import Job
 from framearray_cli.prepare import open_embree, plan_work, prepare
@@ -80,13 +80,13 @@ def over_seeds(job: Job, seeds: int = SEEDS) -> tuple[Array, Array, Array]:
     with open_embree(prepared) as embree:
         planned, ambient = plan_work(prepared, embree)
         for seed in range(seeds):
-            work = replace(planned, seed=seed)
-            crew = Crew(work, 1)
-            window = Window(work, ambient, crew, range(MIDDLE, work.n_frames))
-            for c in work.frames_around(MIDDLE, work.n_r):
-                window.add(find_frame(work, c, crew))
+            setup = replace(planned, seed=seed)
+            pool = TracePool(setup, 1)
+            window = Window(setup, ambient, pool, range(MIDDLE, setup.n_frames))
+            for c in setup.frames_around(MIDDLE, setup.n_r):
+                window.add(find_frame(setup, c, pool))
             composed = window.compose(MIDDLE, block)
-            crew.close()
+            pool.close()
             assert composed.differences is not None
             images.append(block.astype(float).reshape(2, -1))
             differences.append(composed.differences.astype(float).reshape(2, -1))
@@ -162,14 +162,14 @@ def test_a_wanted_error_is_reached(error: float, weights: str, scene: Path, tmp_
     with open_embree(prepared) as embree:
         planned, ambient = plan_work(prepared, embree)
         for seed in range(8):
-            work, target = aimed(prepared, replace(planned, seed=seed), ambient)
+            setup, target = aimed(prepared, replace(planned, seed=seed), ambient)
             assert target is not None and target.capped < 0.02 and abs(target.expected / error - 1) < 0.05
-            crew = Crew(work, 1)
-            window = Window(work, ambient, crew, range(MIDDLE, work.n_frames))
-            for c in work.frames_around(MIDDLE, work.n_r):
-                window.add(find_frame(work, c, crew))
+            pool = TracePool(setup, 1)
+            window = Window(setup, ambient, pool, range(MIDDLE, setup.n_frames))
+            for c in setup.frames_around(MIDDLE, setup.n_r):
+                window.add(find_frame(setup, c, pool))
             window.compose(MIDDLE, block)
-            crew.close()
+            pool.close()
             images.append(block.astype(float).reshape(2, -1))
             radiance.append(target.radiance)
     spread = np.sqrt(np.array(images).var(axis=0, ddof=1).mean())

@@ -42,8 +42,8 @@ def test_blocks_give_the_same_bytes(tmp_path: Path, samples: dict[str, Any]) -> 
     inputs = tiny.prepared(whole)
     limit = window_memory(inputs, 3, 0.4)
     cut = job(tmp_path, limit, **samples)
-    with tiny.planned(tiny.prepared(cut)) as (work, _):
-        assert len(light_blocks(tiny.prepared(cut), mirror_share(work))) > 1
+    with tiny.planned(tiny.prepared(cut)) as (setup, _):
+        assert len(light_blocks(tiny.prepared(cut), mirror_share(setup))) > 1
     summaries = [render(whole), render(cut)]
     files = sorted(file.name for file in whole.output.directory.glob("*.exr"))
     assert len(files) == 6 * 7 + 6 == len(list(cut.output.directory.glob("*.exr")))
@@ -68,10 +68,10 @@ def test_a_limit_below_one_light_is_refused(tmp_path: Path) -> None:
 
 
 def test_mirrors_are_seen_before_the_first_frame(tmp_path: Path) -> None:
-    with tiny.planned(tiny.prepared(tiny.job())) as (work, _):
-        assert 0.1 < mirror_share(work) < 1
-    with tiny.planned(tiny.prepared(tiny.job(), tiny.room(mirrors=False))) as (work, _):
-        assert mirror_share(work) == 0.0
+    with tiny.planned(tiny.prepared(tiny.job())) as (setup, _):
+        assert 0.1 < mirror_share(setup) < 1
+    with tiny.planned(tiny.prepared(tiny.job(), tiny.room(mirrors=False))) as (setup, _):
+        assert mirror_share(setup) == 0.0
 
 
 def test_the_limit_is_that_of_the_whole_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

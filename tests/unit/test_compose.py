@@ -14,14 +14,14 @@ from framearray_cli.work import (
     BY_SAMPLE,
     HALF,
     INDIRECT,
+    LIGHT_INDEPENDENT,
     LIT,
     LIT_BITS,
     OBSCURANCE,
     REFLECTIVITY,
-    STEADY,
     WEIGHT,
+    HitRecords,
     Placed,
-    Records,
 )
 
 N_PIXELS, N_LIGHTS, NOTHING = 40, 7, np.empty(0, np.float32)
@@ -66,7 +66,7 @@ class Case:
         row = with_room((len(self.pixel), LANES), np.float32, fill=0)
         row[:, WEIGHT] = 1
         row[:, INDIRECT : INDIRECT + 3] = self.reflectivity * self.obscurance
-        row[:, STEADY : STEADY + 3] = self.constant if len(self.constant) else 0
+        row[:, LIGHT_INDEPENDENT : LIGHT_INDEPENDENT + 3] = self.constant if len(self.constant) else 0
         row[:, OBSCURANCE : OBSCURANCE + 3] = self.obscurance
         row[:, REFLECTIVITY : REFLECTIVITY + 3] = self.reflectivity
         row[:, LIT] = lit_packets(self.irradiance)
@@ -74,11 +74,11 @@ class Case:
         return row
 
     def add(self, band: Band, first: int, n: int, scale: Any = NOTHING, mean: bool = True) -> None:
-        records = Records(row=self.row(), irradiance=self.irradiance)
+        records = HitRecords(row=self.row(), irradiance=self.irradiance)
         parts = sources([self.source(records, np.float32(scale))])
         accumulate(band, first, n, parts, *self.irradiance.shape[1:], mean)
 
-    def source(self, records: Records, scale: Any = NOTHING, odd_scale: Any = NOTHING) -> Source:
+    def source(self, records: HitRecords, scale: Any = NOTHING, odd_scale: Any = NOTHING) -> Source:
         return Source(Placed(start=self.start, order=self.order), records, self.weight, scale, odd_scale)
 
     def sums(self, values: Any, scale: Any = NOTHING) -> Any:
@@ -133,7 +133,7 @@ def test_differences_are_sums_with_a_factor_for_each_half(channels: int, weighed
     case = Case(channels, weighed=weighed)
     rng = np.random.default_rng(6)
     even, odd = rng.normal(size=(2, N_PIXELS)).astype(np.float32)
-    records = Records(row=case.row(), irradiance=case.irradiance)
+    records = HitRecords(row=case.row(), irradiance=case.irradiance)
     images = np.full((N_LIGHTS, N_PIXELS, 3), np.nan, np.float32)
     colour, ambient = lights()
     listed = sources([case.source(records, even, odd)])
@@ -152,7 +152,7 @@ def test_differences_are_sums_with_a_factor_for_each_half(channels: int, weighed
 @pytest.mark.parametrize("weighed", [False, True])
 def test_halves_are_weighed_by_part_and_by_sample(weighed: bool) -> None:
     cases = [Case(1, weighed=weighed, seed=seed) for seed in (1, 2, 3)]
-    records = [Records(row=case.row(), irradiance=case.irradiance) for case in cases]
+    records = [HitRecords(row=case.row(), irradiance=case.irradiance) for case in cases]
     weights = np.full((2, N_PIXELS), np.nan)
     listed = sources([case.source(known) for case, known in zip(cases, records, strict=True)])
     weigh_halves(listed, np.array([1, BY_SAMPLE, 0], np.int32), 0, N_PIXELS, weights)
@@ -181,7 +181,7 @@ def test_means_of_a_band() -> None:
     total = case.sums(np.ones(len(case.pixel)))[pixels]
     expected = {
         INDIRECT: case.sums(case.reflectivity.astype(np.float64) * case.obscurance),
-        STEADY: case.sums(case.constant),
+        LIGHT_INDEPENDENT: case.sums(case.constant),
         OBSCURANCE: case.sums(case.obscurance),
         REFLECTIVITY: case.sums(case.reflectivity),
     }

@@ -8,38 +8,38 @@ import pytest
 import tiny
 
 from framearray_cli.arrays import LINE
-from framearray_cli.crew import Crew, Shelf
+from framearray_cli.crew import ArrayPool, TracePool
 
 
 @pytest.fixture
-def crew() -> Iterator[Crew]:
-    with tiny.planned(tiny.prepared(tiny.job())) as (work, _), tiny.crew_of(work, 3) as found:
+def pool() -> Iterator[TracePool]:
+    with tiny.planned(tiny.prepared(tiny.job())) as (setup, _), tiny.pool_of(setup, 3) as found:
         yield found
 
 
-def test_every_item_is_done_once_and_results_keep_their_order(crew: Crew) -> None:
+def test_every_item_is_done_once_and_results_keep_their_order(pool: TracePool) -> None:
     done: list[int] = []
 
     def task(item: int, _scratch: object) -> int:
         done.append(item)
         return item * item
 
-    assert crew.run(task, range(1000)) == [item * item for item in range(1000)]
+    assert pool.run(task, range(1000)) == [item * item for item in range(1000)]
     assert sorted(done) == list(range(1000))
-    assert crew.run(task, []) == []
+    assert pool.run(task, []) == []
 
 
-def test_all_threads_work_each_with_arrays_of_its_own(crew: Crew) -> None:
+def test_all_threads_work_each_with_arrays_of_its_own(pool: TracePool) -> None:
     together = Barrier(3, timeout=60)  # breaks where three tasks do not run at a time
 
     def task(_item: int, scratch: object) -> int:
         together.wait()
         return id(scratch)
 
-    assert len(set(crew.run(task, range(3)))) == 3
+    assert len(set(pool.run(task, range(3)))) == 3
 
 
-def test_an_error_reaches_the_caller_and_ends_the_work(crew: Crew) -> None:
+def test_an_error_reaches_the_caller_and_ends_the_work(pool: TracePool) -> None:
     done: list[int] = []
 
     def task(item: int, _scratch: object) -> None:
@@ -48,31 +48,31 @@ def test_an_error_reaches_the_caller_and_ends_the_work(crew: Crew) -> None:
         done.append(item)
 
     with pytest.raises(ValueError, match="item 5"):
-        crew.run(task, range(100_000))
-    crew.close()
+        pool.run(task, range(100_000))
+    pool.close()
     assert len(done) < 99_999
 
 
-def test_the_crew_works_on_after_an_error(crew: Crew) -> None:
+def test_the_crew_works_on_after_an_error(pool: TracePool) -> None:
     def task(item: int, _scratch: object) -> int:
         return 1 // item
 
     with pytest.raises(ZeroDivisionError):
-        crew.run(task, [0])
-    assert crew.run(task, [1, 1, 1, 1]) == [1, 1, 1, 1]
+        pool.run(task, [0])
+    assert pool.run(task, [1, 1, 1, 1]) == [1, 1, 1, 1]
 
 
 def test_memory_on_the_shelf_serves_what_is_about_as_large() -> None:
-    shelf = Shelf()
-    array = shelf.take("row", (50, 16), np.float32)
+    arrays = ArrayPool()
+    array = arrays.take("row", (50, 16), np.float32)
     block = array.base
-    shelf.give("row", array)
-    smaller = shelf.take("row", (7, 100), np.float32)
+    arrays.give("row", array)
+    smaller = arrays.take("row", (7, 100), np.float32)
     assert smaller.base is block and smaller.shape == (7, 100) and smaller.ctypes.data % LINE == 0
-    shelf.give("row", smaller)
-    again = shelf.take("row", (50, 16), np.float32)
+    arrays.give("row", smaller)
+    again = arrays.take("row", (50, 16), np.float32)
     assert again.base is block and again.ctypes.data == array.ctypes.data
-    shelf.give("row", again)
-    assert shelf.take("row", (51, 16), np.float32).base is not block
-    shelf.give("row", again)
-    assert shelf.take("row", (25, 16), np.float32).base is not block, "frames at a path's ends are twice as large"
+    arrays.give("row", again)
+    assert arrays.take("row", (51, 16), np.float32).base is not block
+    arrays.give("row", again)
+    assert arrays.take("row", (25, 16), np.float32).base is not block, "frames at a path's ends are twice as large"

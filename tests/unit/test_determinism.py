@@ -82,10 +82,10 @@ def test_the_hits_of_a_frame_do_not_depend_on_the_length_of_the_path() -> None:
         table = tiny.table(camera=camera, scene=SKY, reuse={"n_r": 0})
         table["ambient"] = ambient
         inputs = tiny.prepared(Job.model_validate(table))
-        with tiny.planned(inputs) as (work, estimate):
+        with tiny.planned(inputs) as (setup, estimate):
             average = np.float32([0.5, 0.5, 0.5])  # the walks that measure it start at the path's own eyes, too
-            work = replace(work, obscurance=work.obscurance._replace(average=average))
-            with tiny.crew_of(work) as crew:
-                results.append([frame.images for frame in tiny.frames_of(work, estimate, crew)])
+            setup = replace(setup, obscurance=setup.obscurance._replace(average=average))
+            with tiny.pool_of(setup) as pool:
+                results.append([frame.images for frame in tiny.frames_of(setup, estimate, pool)])
     for long, short in zip(results[0][:2], results[1], strict=True):
         np.testing.assert_array_equal(long, short)

@@ -10,16 +10,28 @@ from oracle import Oracle
 from framearray_cli.eyehits import extra_hits, native_hits, pilot_hits, pixel_order
 from framearray_cli.hits import ESCAPED, SURFACE, Hits, empty_hits, record_hits
 from framearray_cli.rays import room_for_hits
-from framearray_cli.work import Work
+from framearray_cli.work import FrameSetup
 
 
-def native(work: Work, c: int, per_pixel: int, batch: int = 2048) -> Hits:
+def native(setup: FrameSetup, c: int, per_pixel: int, batch: int = 2048) -> Hits:
     """All native hits of a frame, found in batches."""
-    n, packets, parts = work.n_pixels * per_pixel, room_for_hits(batch).packets, []
+    n, packets, parts = setup.n_pixels * per_pixel, room_for_hits(batch).packets, []
     for first in range(0, n, batch):
         hits, m = empty_hits(batch), min(batch, n - first)
         native_hits(
-            work.cams, c, work.seed, work.order, per_pixel, 0, first, m, work.surfaces, work.tracer, True, packets, hits
+            setup.cams,
+            c,
+            setup.seed,
+            setup.order,
+            per_pixel,
+            0,
+            first,
+            m,
+            setup.surfaces,
+            setup.tracer,
+            True,
+            packets,
+            hits,
         )
         parts.append([array[:m] for array in hits])
     return Hits(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
@@ -41,21 +53,21 @@ def test_packets_are_blocks_of_pixels() -> None:
 @pytest.mark.parametrize(("resolution", "per_pixel"), [([24, 18], 1), ([24, 18], 3), ([5, 7], 2), ([1, 1], 4)])
 def test_every_pixel_has_its_hits_inside_its_box(resolution: Any, per_pixel: int) -> None:
     inputs = tiny.prepared(tiny.job(camera={"resolution": resolution}))
-    with tiny.planned(inputs) as (work, _):
-        hits = native(work, 0, per_pixel, batch=48)
-    assert (np.bincount(hits.pixel, minlength=work.n_pixels) == per_pixel).all()
+    with tiny.planned(inputs) as (setup, _):
+        hits = native(setup, 0, per_pixel, batch=48)
+    assert (np.bincount(hits.pixel, minlength=setup.n_pixels) == per_pixel).all()
     assert len(np.unique(hits.key)) == len(hits.key)
-    frame = np.stack([work.cams.right[0], work.cams.up[0], work.cams.forward[0]])
+    frame = np.stack([setup.cams.right[0], setup.cams.up[0], setup.cams.forward[0]])
     a, b, forward = (hits.incoming @ frame.T).astype(np.float64).T
     np.testing.assert_allclose(forward, 1, rtol=1e-6)
-    x = a * work.cams.focal + resolution[0] / 2 - hits.pixel % resolution[0]
-    y = resolution[1] / 2 - b * work.cams.focal - hits.pixel // resolution[0]
+    x = a * setup.cams.focal + resolution[0] / 2 - hits.pixel % resolution[0]
+    y = resolution[1] / 2 - b * setup.cams.focal - hits.pixel // resolution[0]
     assert min(x.min(), y.min()) > -1e-4 and max(x.max(), y.max()) < 1 + 1e-4
 
 
 def test_batches_of_any_size_find_the_same_hits() -> None:
-    with tiny.planned(tiny.prepared(tiny.job(scene={"background": 1.0}))) as (work, _):
-        one, other = native(work, 0, 3), native(work, 0, 3, batch=37)
+    with tiny.planned(tiny.prepared(tiny.job(scene={"background": 1.0}))) as (setup, _):
+        one, other = native(setup, 0, 3), native(setup, 0, 3, batch=37)
     surface = one.kind == SURFACE
     assert surface.any() and not surface.all()
     for name in ("kind", "key", "pixel", "position", "incoming", "reflectivity", "specular"):
@@ -66,8 +78,8 @@ def test_batches_of_any_size_find_the_same_hits() -> None:
 
 def test_hits_are_those_of_the_twin() -> None:
     inputs = tiny.prepared(tiny.job())
-    with tiny.planned(inputs) as (work, ambient):
-        hits = native(work, 0, 2)
+    with tiny.planned(inputs) as (setup, ambient):
+        hits = native(setup, 0, 2)
     twin = Oracle(inputs, ambient).native(0)
     here = {key: i for i, key in enumerate(hits.key.tolist())}
     order = [here[key] for key in twin.key]
@@ -82,8 +94,8 @@ def test_hits_are_those_of_the_twin() -> None:
 
 
 def test_normals_are_on_the_side_that_is_seen() -> None:
-    with tiny.planned(tiny.prepared(tiny.job())) as (work, _):
-        hits = native(work, 0, 2)
+    with tiny.planned(tiny.prepared(tiny.job())) as (setup, _):
+        hits = native(setup, 0, 2)
     surface = hits.kind == SURFACE
     way, geometric, shading = hits.incoming[surface], hits.geometric[surface], hits.shading[surface]
     assert ((way * geometric).sum(axis=1) <= 0).all()
@@ -92,8 +104,8 @@ def test_normals_are_on_the_side_that_is_seen() -> None:
 
 
 def test_an_escaped_ray_is_a_unit_direction_and_reflects_nothing() -> None:
-    with tiny.planned(tiny.prepared(tiny.job())) as (work, _):
-        hits = native(work, 0, 2)
+    with tiny.planned(tiny.prepared(tiny.job())) as (setup, _):
+        hits = native(setup, 0, 2)
     gone = hits.kind == ESCAPED
     np.testing.assert_allclose(np.linalg.norm(hits.position[gone], axis=1), 1, rtol=3e-7)
     assert not hits.reflectivity[gone].any() and not hits.specular[gone].any()
@@ -101,13 +113,13 @@ def test_an_escaped_ray_is_a_unit_direction_and_reflects_nothing() -> None:
 
 def test_extra_hits_go_on_where_the_pixels_own_hits_end() -> None:
     """Hits beyond the first two of some pixels are hits 2, 3 and 4 of a frame that has five of each."""
-    with tiny.planned(tiny.prepared(tiny.job())) as (work, _):
-        all_hits = native(work, 0, 5)
+    with tiny.planned(tiny.prepared(tiny.job())) as (setup, _):
+        all_hits = native(setup, 0, 5)
         pixels = np.array([3, 100, 431], np.int32)
         more, packets = empty_hits(9), room_for_hits(16).packets
-        extra_hits(work.cams, 0, work.seed, pixels, 2, 3, 0, 9, work.surfaces, work.tracer, packets, more)
+        extra_hits(setup.cams, 0, setup.seed, pixels, 2, 3, 0, 9, setup.surfaces, setup.tracer, packets, more)
         fewer = empty_hits(2)
-        extra_hits(work.cams, 0, work.seed, pixels, 2, 3, 4, 2, work.surfaces, work.tracer, packets, fewer)
+        extra_hits(setup.cams, 0, setup.seed, pixels, 2, 3, 4, 2, setup.surfaces, setup.tracer, packets, fewer)
     assert more.pixel.tolist() == [3] * 3 + [100] * 3 + [431] * 3
     here = {key: i for i, key in enumerate(all_hits.key.tolist())}
     order = [here[key] for key in more.key.tolist()]
@@ -124,14 +136,14 @@ def native_keys(hits: Hits, pixel: int, n: int) -> list[int]:
 
 
 def test_pilot_rays_pass_through_pixel_centres() -> None:
-    with tiny.planned(tiny.prepared(tiny.job())) as (work, _):
+    with tiny.planned(tiny.prepared(tiny.job())) as (setup, _):
         hits, packets = empty_hits(432), room_for_hits(432).packets
-        pilot_hits(work.cams, 0, work.order, 0, 432, work.surfaces, work.tracer, packets, hits)
+        pilot_hits(setup.cams, 0, setup.order, 0, 432, setup.surfaces, setup.tracer, packets, hits)
         seen = empty_hits(432)
-        record_hits(work.surfaces, work.tracer, packets, 432, True, seen)
+        record_hits(setup.surfaces, setup.tracer, packets, 432, True, seen)
     np.testing.assert_allclose(hits.specular, seen.specular, rtol=1e-6)
     assert 0 < (hits.specular.max(axis=1) > 0).sum() < 432
-    frame = np.stack([work.cams.right[0], work.cams.up[0], work.cams.forward[0]])
+    frame = np.stack([setup.cams.right[0], setup.cams.up[0], setup.cams.forward[0]])
     a, b, _ = (seen.incoming @ frame.T).astype(np.float64).T
-    np.testing.assert_allclose(a * work.cams.focal + 12, hits.pixel % 24 + 0.5, atol=1e-4)
-    np.testing.assert_allclose(9 - b * work.cams.focal, hits.pixel // 24 + 0.5, atol=1e-4)
+    np.testing.assert_allclose(a * setup.cams.focal + 12, hits.pixel % 24 + 0.5, atol=1e-4)
+    np.testing.assert_allclose(9 - b * setup.cams.focal, hits.pixel // 24 + 0.5, atol=1e-4)

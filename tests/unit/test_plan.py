@@ -61,18 +61,18 @@ def test_a_mirror_is_flagged_with_its_neighbours(pixel: int, near: list[int]) ->
 def test_a_still_camera_has_the_hits_of_its_whole_window_and_no_reuse() -> None:
     inputs = tiny.prepared(tiny.job(camera={"frames": 9}, reuse={"n_r": 3}))
     assert inputs.still
-    with tiny.planned(inputs) as (work, _):
-        assert work.per_pixel.tolist() == [14]
-        assert (work.n_r, work.n_frames, work.balance) == (0, 1, False)
+    with tiny.planned(inputs) as (setup, _):
+        assert setup.per_pixel.tolist() == [14]
+        assert (setup.n_r, setup.n_frames, setup.balance) == (0, 1, False)
 
 
 def test_features_that_a_scene_lacks_are_off() -> None:
-    with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}), tiny.room(mirrors=False))) as (work, _):
-        assert work.depth == 0 and work.mirror_hits == 0 and not work.background.any()
-    with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}, specular={"depth": 0}))) as (work, _):
-        assert work.depth == 0 and work.mirror_hits == 0
-    with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}))) as (work, _):
-        assert work.depth == 4 and work.mirror_hits == 10
+    with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}), tiny.room(mirrors=False))) as (setup, _):
+        assert setup.depth == 0 and setup.mirror_hits == 0 and not setup.background.any()
+    with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}, specular={"depth": 0}))) as (setup, _):
+        assert setup.depth == 0 and setup.mirror_hits == 0
+    with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}))) as (setup, _):
+        assert setup.depth == 4 and setup.mirror_hits == 10
 
 
 @pytest.mark.parametrize(("hits", "m"), [(1 / 2, 2), (1 / 3, 3), (1 / 4, 4), (1 / 7, 7), (1 / 8, 8)])

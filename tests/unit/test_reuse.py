@@ -19,13 +19,13 @@ from framearray_cli.reuse import balance_weights, outer_hits, sort_by_pixel
 SKY = {"background": [0.3, 0.4, 0.5]}
 
 
-def outer(work: Any, c: int, hits: Any, eyes: range, room: int = 4096) -> tuple[Any, Any, int]:
+def outer(setup: Any, c: int, hits: Any, eyes: range, room: int = 4096) -> tuple[Any, Any, int]:
     """Pixel and density of hits of eye c in each of some eyes, (n_eyes, n), and the number of rays."""
     n = len(hits.kind)
     room_for_hits = -(-n // 16) * 16
     pixel, density = np.empty((len(eyes), room_for_hits), np.int32), np.empty((len(eyes), room_for_hits), np.float64)
     rays = outer_hits(
-        work.cams, c, eyes.start, hits, n, work.tracer, room_for_tests(room, work.lights.n_lights), pixel, density
+        setup.cams, c, eyes.start, hits, n, setup.tracer, room_for_tests(room, setup.lights.n_lights), pixel, density
     )
     return pixel[:, :n], density[:, :n], rays
 
@@ -36,9 +36,9 @@ def walk() -> Any:
 
 
 def test_outer_hits_are_those_of_brute_force(walk: Any) -> None:
-    with tiny.planned(walk) as (work, ambient):
-        hits = native(work, 2, 2)
-        pixel, density, rays = outer(work, 2, hits, range(0, 6))
+    with tiny.planned(walk) as (setup, ambient):
+        hits = native(setup, 2, 2)
+        pixel, density, rays = outer(setup, 2, hits, range(0, 6))
     twin = Oracle(walk, ambient)
     theirs = twin.native(2)
     here = {key: i for i, key in enumerate(hits.key.tolist())}
@@ -55,18 +55,18 @@ def test_outer_hits_are_those_of_brute_force(walk: Any) -> None:
 
 
 def test_the_eye_that_found_a_hit_sees_it_in_its_own_pixel(walk: Any) -> None:
-    with tiny.planned(walk) as (work, _):
-        hits = native(work, 3, 2)
-        pixel, density, rays = outer(work, 3, hits, range(3, 4))
+    with tiny.planned(walk) as (setup, _):
+        hits = native(setup, 3, 2)
+        pixel, density, rays = outer(setup, 3, hits, range(3, 4))
     np.testing.assert_array_equal(pixel[0], hits.pixel)
     assert (density > 0).all() and rays == 0
 
 
 @pytest.mark.parametrize("room", [16, 160])
 def test_any_room_for_rays_gives_the_same(walk: Any, room: int) -> None:
-    with tiny.planned(walk) as (work, _):
-        hits = native(work, 2, 2)
-        expected, result = outer(work, 2, hits, range(0, 6)), outer(work, 2, hits, range(0, 6), room)
+    with tiny.planned(walk) as (setup, _):
+        hits = native(setup, 2, 2)
+        expected, result = outer(setup, 2, hits, range(0, 6)), outer(setup, 2, hits, range(0, 6), room)
     for one, other in zip(expected, result, strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -79,9 +79,9 @@ def test_a_hit_behind_a_box_is_not_seen() -> None:
         {"frame": 1, "eye": [4, 0, 0], "target": [3, 0.2, 0]},
     ]
     inputs = tiny.prepared(tiny.job(camera={"frames": 2, "keys": keys, "fov": 60.0}, reuse={"n_r": 1}), scene)
-    with tiny.planned(inputs) as (work, _):
-        hits = native(work, 0, 2)
-        pixel, density, _ = outer(work, 0, hits, range(0, 2))
+    with tiny.planned(inputs) as (setup, _):
+        hits = native(setup, 0, 2)
+        pixel, density, _ = outer(setup, 0, hits, range(0, 2))
     on_box = hits.kind == SURFACE
     assert on_box.any() and (~on_box).any()
     assert (pixel[1] == OUTSIDE).all() and not density[1].any()  # the other eye looks the other way: no sky in common
@@ -95,9 +95,9 @@ def test_escaped_rays_are_reused_as_directions() -> None:
         {"frame": 1, "eye": [0.5, 0, 6], "target": [0.5, 0, 0]},
     ]
     inputs = tiny.prepared(tiny.job(camera={"frames": 2, "keys": keys, "fov": 60.0}, reuse={"n_r": 1}), scene)
-    with tiny.planned(inputs) as (work, _):
-        hits = native(work, 0, 4)
-        pixel, density, _ = outer(work, 0, hits, range(0, 2))
+    with tiny.planned(inputs) as (setup, _):
+        hits = native(setup, 0, 4)
+        pixel, density, _ = outer(setup, 0, hits, range(0, 2))
     gone = hits.kind != SURFACE
     # both eyes look the same way, so that a direction falls into the same pixel of both
     seen = gone & (pixel[1] != OUTSIDE)
@@ -136,13 +136,13 @@ def test_weights_of_a_frame_sum_to_one_a_pixel_in_the_mean(walk: Any, c: int) ->
 
     A wrong density, a forgotten escaped ray or hits at the path's ends counted wrongly would all shift it.
     """
-    with tiny.planned(walk) as (work, _), tiny.crew_of(work) as crew:
-        total = np.zeros(work.n_pixels)
-        for k in work.frames_around(c, work.n_r):
-            frame = find_frame(work, k, crew)
+    with tiny.planned(walk) as (setup, _), tiny.pool_of(setup) as pool:
+        total = np.zeros(setup.n_pixels)
+        for k in setup.frames_around(c, setup.n_r):
+            frame = find_frame(setup, k, pool)
             place, weight = frame.places[c], frame.weights[c]
             used = place.order[: place.start[-1]]
-            np.add.at(total, np.repeat(np.arange(work.n_pixels), np.diff(place.start)), weight[used])
+            np.add.at(total, np.repeat(np.arange(setup.n_pixels), np.diff(place.start)), weight[used])
     z = (total.mean() - 1) / (total.std() / np.sqrt(len(total)))
     assert abs(z) < 4
     assert total.std() < 1

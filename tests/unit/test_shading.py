@@ -11,7 +11,7 @@ from framearray_cli.arrays import with_room
 from framearray_cli.hits import ESCAPED, SURFACE
 from framearray_cli.lanes import LANES
 from framearray_cli.shading import write_rows
-from framearray_cli.work import HALF, INDIRECT, LIT, LIT_BITS, OBSCURANCE, REFLECTIVITY, STEADY, WEIGHT
+from framearray_cli.work import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, LIT_BITS, OBSCURANCE, REFLECTIVITY, WEIGHT
 
 N = 37
 NOTHING = np.empty((0, 3), np.float32)
@@ -53,7 +53,7 @@ def test_rows_are_those_of_numpy(skylight: bool, throughput: bool) -> None:
         steady = steady + reflectivity * given["skylight"]
     expected = {
         INDIRECT: reflectivity * given["obscurance"],
-        STEADY: steady,
+        LIGHT_INDEPENDENT: steady,
         OBSCURANCE: given["obscurance"],
         REFLECTIVITY: reflectivity,
     }

@@ -12,7 +12,7 @@ from framearray_cli.meshes import Material, Meshes, Part
 from framearray_cli.rays import room_for_hits
 from framearray_cli.scene import Scene, build_scene
 from framearray_cli.terms.specular import count_mirrors, reflect
-from framearray_cli.work import Work
+from framearray_cli.work import FrameSetup
 
 TINT = np.float32([0.9, 0.8, 0.7])
 
@@ -39,26 +39,26 @@ def work_of(scene: Scene, **changes: Any) -> Any:
     return tiny.planned(tiny.prepared(tiny.job(camera={"keys": keys, "fov": 60.0}, **changes), scene))
 
 
-def reflected(work: Work, hits: Hits, throughput: Any = None) -> tuple[Hits, Any, int]:
+def reflected(setup: FrameSetup, hits: Hits, throughput: Any = None) -> tuple[Hits, Any, int]:
     n = len(hits.kind)
     out, through = empty_hits(n), np.empty((n, 3), np.float32)
     throughput = np.ones((n, 3), np.float32) if throughput is None else throughput
     packets = room_for_hits(n).packets
-    m = reflect(hits, n, throughput, work.surfaces, work.tracer, packets, out, through)
+    m = reflect(hits, n, throughput, setup.surfaces, setup.tracer, packets, out, through)
     return Hits(*(array[:m] for array in out)), through[:m], m
 
 
 def test_a_mirror_shows_the_mirrored_scene() -> None:
     """A ray to a point of the mirror goes on as a ray of the mirrored eye through the same point would."""
-    with work_of(behind_mirror()) as (work, _):
-        hits = native(work, 0, 2)
+    with work_of(behind_mirror()) as (setup, _):
+        hits = native(setup, 0, 2)
         mirrors = (hits.specular > 0).any(axis=1)
         assert 50 < mirrors.sum() == count_mirrors(hits, len(hits.kind))
-        seen, through, m = reflected(work, hits)
+        seen, through, m = reflected(setup, hits)
         assert m == mirrors.sum()
         plane = hits.position[mirrors][:, 2].mean()
         flip = np.float32([1, 1, -1])
-        eye = work.cams.position[0] * flip + np.float32([0, 0, 2 * plane])
+        eye = setup.cams.position[0] * flip + np.float32([0, 0, 2 * plane])
         way = hits.position[mirrors] - eye
         np.testing.assert_allclose(seen.incoming, hits.incoming[mirrors] * flip, atol=1e-6)
         surface = seen.kind == SURFACE
@@ -75,18 +75,18 @@ def test_a_mirror_shows_the_mirrored_scene() -> None:
 
 
 def test_throughput_multiplies() -> None:
-    with work_of(behind_mirror()) as (work, _):
-        hits = native(work, 0, 1)
+    with work_of(behind_mirror()) as (setup, _):
+        hits = native(setup, 0, 1)
         before = np.random.default_rng(1).random((len(hits.kind), 3)).astype(np.float32)
-        _, through, _ = reflected(work, hits, before)
+        _, through, _ = reflected(setup, hits, before)
     np.testing.assert_allclose(through, before[(hits.specular > 0).any(axis=1)] * TINT, rtol=1e-7)
 
 
 def test_random_streams_move_on() -> None:
     """Else a reflected hit would use the very directions of the hit before it."""
-    with work_of(behind_mirror()) as (work, _):
-        hits = native(work, 0, 3)
-        seen, _, m = reflected(work, hits)
+    with work_of(behind_mirror()) as (setup, _):
+        hits = native(setup, 0, 3)
+        seen, _, m = reflected(setup, hits)
     assert len(np.unique(np.concatenate([hits.key, seen.key]))) == len(hits.key) + m
 
 

@@ -66,11 +66,11 @@ def test_an_array_is_summed_up() -> None:
 
 def windowed(job: Job, j: int, eyes: Any = None) -> Any:
     """Frame j of a job, of all hits of its window or those of some eyes."""
-    with tiny.planned(tiny.prepared(job)) as (work, ambient), tiny.crew_of(work) as crew:
-        window = Window(work, ambient, crew, range(j, work.n_frames))
-        for k in work.frames_around(j, work.n_r):
-            window.add(find_frame(work, k, crew))
-        shape = (work.lights.n_lights, work.cams.height, work.cams.width, 3)
+    with tiny.planned(tiny.prepared(job)) as (setup, ambient), tiny.pool_of(setup) as pool:
+        window = Window(setup, ambient, pool, range(j, setup.n_frames))
+        for k in setup.frames_around(j, setup.n_r):
+            window.add(find_frame(setup, k, pool))
+        shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
         return window.compose(j, np.empty(shape, np.float32), eyes)
 
 

@@ -19,7 +19,7 @@ from framearray_cli.hits import empty_hits
 from framearray_cli.job import Job
 from framearray_cli.memory import require_memory
 from framearray_cli.rays import room_for_hits
-from framearray_cli.reuse import balance_weights, expect_hits, of_one_hit
+from framearray_cli.reuse import balance_weights, divide_by_own_hits, scale_by_expected_hits
 from framearray_cli.target import aimed, of_samples
 from framearray_cli.window import Window
 
@@ -33,8 +33,8 @@ def job(**changes: Any) -> Job:
 
 def aimed_work(inputs: Any) -> Any:
     with tiny.open_embree(inputs) as embree:
-        work, ambient = tiny.plan_work(inputs, embree)
-        return aimed(inputs, work, ambient)
+        setup, ambient = tiny.plan_work(inputs, embree)
+        return aimed(inputs, setup, ambient)
 
 
 def test_weights_of_places_with_different_hits_are_those_of_the_formula() -> None:
@@ -43,9 +43,9 @@ def test_weights_of_places_with_different_hits_are_those_of_the_formula() -> Non
     density = rng.random((n_c, n)) * (pixel != OUTSIDE)
     hits = rng.uniform(0.25, 6, (n_c, blocks.n)).astype(np.float32)
     weight, known = np.empty((n_c, n), np.float32), density.copy()
-    expect_hits(hits, blocks.of_pixel, 0, n, pixel, known)
+    scale_by_expected_hits(hits, blocks.of_pixel, 0, n, pixel, known)
     balance_weights(np.ones(n_c), n_r, 0, 0, n, pixel, known, weight)
-    of_one_hit(hits, blocks.of_pixel, 0, n, pixel, weight)
+    divide_by_own_hits(hits, blocks.of_pixel, 0, n, pixel, weight)
     for j in range(n_c):
         for i in range(n):
             if pixel[j, i] == OUTSIDE:
@@ -61,14 +61,14 @@ def test_frames_rest_on_the_hits_that_were_allotted(weights: str) -> None:
     inputs = tiny.prepared(job(samples={"error": 0.05}, reuse={"n_r": 2, "weights": weights}))
     with tiny.open_embree(inputs) as embree:
         planned, ambient = tiny.plan_work(inputs, embree)
-        work, target = aimed(inputs, planned, ambient)
-        assert target is not None and work.allotment is not None
+        setup, target = aimed(inputs, planned, ambient)
+        assert target is not None and setup.allotment is not None
         assert target.frames[0] <= target.hits <= target.frames[1]
-        with tiny.crew_of(work) as crew:
-            window = Window(work, ambient, crew)
-            for c in range(work.n_frames):
-                frame = find_frame(work, c, crew)
-                own, counts = np.diff(frame.places[c].start), work.allotment.counts(c)
+        with tiny.pool_of(setup) as pool:
+            window = Window(setup, ambient, pool)
+            for c in range(setup.n_frames):
+                frame = find_frame(setup, c, pool)
+                own, counts = np.diff(frame.places[c].start), setup.allotment.counts(c)
                 np.testing.assert_array_equal(own, counts)
                 window.add(frame)
 
@@ -77,10 +77,10 @@ def test_frames_rest_on_the_hits_that_were_allotted(weights: str) -> None:
 def test_pairs_are_two_hits_of_one_pixel(n: int) -> None:
     inputs = tiny.prepared(job(samples={"error": 0.1}))
     with tiny.open_embree(inputs) as embree:
-        work, _ = tiny.plan_work(inputs, embree)
-        pixels, hits = work.order[:n], empty_hits(2 * n)
+        setup, _ = tiny.plan_work(inputs, embree)
+        pixels, hits = setup.order[:n], empty_hits(2 * n)
         native_hits(
-            work.cams, 0, 3, pixels, 2, 0, 0, 2 * n, work.surfaces, work.tracer, True,
+            setup.cams, 0, 3, pixels, 2, 0, 0, 2 * n, setup.surfaces, setup.tracer, True,
             room_for_hits(2 * n).packets, hits, True,
         )  # fmt: skip
     pair = of_samples(n)
@@ -90,11 +90,11 @@ def test_pairs_are_two_hits_of_one_pixel(n: int) -> None:
 
 
 def test_noisier_places_get_more_hits() -> None:
-    work, target = aimed_work(tiny.prepared(job(samples={"error": 0.2})))
-    assert work.allotment.hits.std() > 0.1 * target.hits
+    setup, target = aimed_work(tiny.prepared(job(samples={"error": 0.2})))
+    assert setup.allotment.hits.std() > 0.1 * target.hits
     tighter, other = aimed_work(tiny.prepared(job(samples={"error": 0.1})))
     assert 2 < other.hits / target.hits < 5  # half the error takes 2^(2 / 1.3) = 2.9 times the hits
-    assert (tighter.per_pixel > work.per_pixel).all()
+    assert (tighter.per_pixel > setup.per_pixel).all()
 
 
 def test_the_cap_binds_and_is_told() -> None:
@@ -106,8 +106,8 @@ def test_the_cap_binds_and_is_told() -> None:
 
 def test_a_dark_array_takes_the_fewest_hits_and_renders() -> None:
     dark = {"sources": [{"type": "point", "keys": [{"frame": 0, "position": [0, 2, 0], "intensity": 0}]}]}
-    work, target = aimed_work(tiny.prepared(job(light=dark, scene={"background": 0}, samples={"error": 0.05})))
-    assert target.expected == 0 and target.radiance == 0 and work.allotment.hits.max() < 1
+    setup, target = aimed_work(tiny.prepared(job(light=dark, scene={"background": 0}, samples={"error": 0.05})))
+    assert target.expected == 0 and target.radiance == 0 and setup.allotment.hits.max() < 1
 
 
 def test_threads_and_blocks_of_lights_change_nothing() -> None:
@@ -117,23 +117,23 @@ def test_threads_and_blocks_of_lights_change_nothing() -> None:
         render = inputs.job.render.model_copy(update={"threads": threads})
         with tiny.open_embree(inputs) as embree:
             planned, ambient = tiny.plan_work(inputs, embree)
-            work, _ = aimed(replace(inputs, job=inputs.job.model_copy(update={"render": render})), planned, ambient)
-            with tiny.crew_of(work, threads) as crew:
-                images.append(composed(work, ambient, crew))
+            setup, _ = aimed(replace(inputs, job=inputs.job.model_copy(update={"render": render})), planned, ambient)
+            with tiny.pool_of(setup, threads) as pool:
+                images.append(composed(setup, ambient, pool))
             block = range(1, 3)
-            with tiny.crew_of(work.for_lights(block), threads) as crew:
-                some = composed(work.for_lights(block), ambient.for_lights(block), crew)
+            with tiny.pool_of(setup.for_lights(block), threads) as pool:
+                some = composed(setup.for_lights(block), ambient.for_lights(block), pool)
                 np.testing.assert_array_equal(some, images[-1][:, 1:3])
     np.testing.assert_array_equal(*images)
 
 
-def composed(work: Any, ambient: Any, crew: Any) -> Any:
+def composed(setup: Any, ambient: Any, pool: Any) -> Any:
     """All images, (n_frames, n_lights, height, width, 3)."""
-    window, found = Window(work, ambient, crew), []
-    for c in range(work.n_frames):
-        window.add(find_frame(work, c, crew))
+    window, found = Window(setup, ambient, pool), []
+    for c in range(setup.n_frames):
+        window.add(find_frame(setup, c, pool))
         for j in window.complete():
-            images = np.empty((len(work.kept), work.cams.height, work.cams.width, 3), np.float32)
+            images = np.empty((len(setup.kept), setup.cams.height, setup.cams.width, 3), np.float32)
             found.append(window.compose(j, images).images)
     return np.stack(found)
 
@@ -142,14 +142,14 @@ def test_no_pixel_stays_without_a_hit() -> None:
     inputs = tiny.prepared(job(camera=WALK | {"resolution": [5, 3]}, samples={"error": 5.0}))
     with tiny.open_embree(inputs) as embree:
         planned, ambient = tiny.plan_work(inputs, embree)
-        work, target = aimed(inputs, planned, ambient)
+        setup, target = aimed(inputs, planned, ambient)
         assert target is not None and target.hits < 1
-        with tiny.crew_of(work) as crew:
-            window = Window(work, ambient, crew)
-            for c in range(work.n_frames):
-                window.add(find_frame(work, c, crew))
+        with tiny.pool_of(setup) as pool:
+            window = Window(setup, ambient, pool)
+            for c in range(setup.n_frames):
+                window.add(find_frame(setup, c, pool))
                 for j in window.complete():
-                    images = np.empty((len(work.kept), 3, 5, 3), np.float32)
+                    images = np.empty((len(setup.kept), 3, 5, 3), np.float32)
                     assert window.compose(j, images).hits.min() >= 1
 
 
@@ -178,7 +178,7 @@ def test_hits_that_do_not_fit_into_memory_are_refused() -> None:
 
 def test_a_camera_at_rest_gets_the_hits_of_its_whole_window(tmp_path: Path) -> None:
     walking = {"frames": 5, "keys": [{"frame": 0, "eye": [0, 1.2, 1.6], "target": [0, 1, 0]}]}
-    work, target = aimed_work(tiny.prepared(job(camera=walking, samples={"error": 1e-3, "most_hits": 2})))
-    assert work.n_frames == 1 and work.n_r == 0
-    assert isinstance(work.allotment, Allotment) and work.allotment.hits.max() == 10
+    setup, target = aimed_work(tiny.prepared(job(camera=walking, samples={"error": 1e-3, "most_hits": 2})))
+    assert setup.n_frames == 1 and setup.n_r == 0
+    assert isinstance(setup.allotment, Allotment) and setup.allotment.hits.max() == 10
     assert target.capped > 0

@@ -25,16 +25,16 @@ def test_no_more_than_the_window_is_held_and_every_frame_comes_once(n_c: int, n_
         camera={**camera, "resolution": [4, 3]}, reuse={"n_r": n_r}, ambient={"paths": 8}, light={"frames": 3}
     )
     composed, most = [], 0
-    with tiny.planned(tiny.prepared(job)) as (work, ambient), tiny.crew_of(work) as crew:
-        window = Window(work, ambient, crew)
+    with tiny.planned(tiny.prepared(job)) as (setup, ambient), tiny.pool_of(setup) as pool:
+        window = Window(setup, ambient, pool)
         images = np.empty((3, 3, 4, 3), np.float32)
-        for c in range(work.n_frames):
-            window.add(find_frame(work, c, crew))
+        for c in range(setup.n_frames):
+            window.add(find_frame(setup, c, pool))
             most = max(most, len(window._frames))
             for j in window.complete():
                 assert j == len(composed), "in order"
-                assert j + work.n_r <= c or c == work.n_frames - 1, "not before its last neighbour was found"
-                assert j + work.n_r >= c or c == work.n_frames - 1, "as soon as its last neighbour was found"
+                assert j + setup.n_r <= c or c == setup.n_frames - 1, "not before its last neighbour was found"
+                assert j + setup.n_r >= c or c == setup.n_frames - 1, "as soon as its last neighbour was found"
                 composed.append(window.compose(j, images).c)
     assert composed == list(range(n_c))
     assert most <= min(2 * n_r + 1, n_c)
@@ -45,12 +45,12 @@ def test_memory_of_dropped_frames_is_not_seen_again() -> None:
     """A frame is composed alike whether its arrays are fresh or were those of an earlier frame."""
     inputs = tiny.prepared(tiny.job(camera=path(8), reuse={"n_r": 1}, scene=SKY))
     rendered = tiny.render_frames(inputs).images
-    with tiny.planned(inputs) as (work, ambient):
+    with tiny.planned(inputs) as (setup, ambient):
         for j in (3, 7):
-            with tiny.crew_of(work) as crew:
-                window = Window(work, ambient, crew, [j])
-                for k in work.frames_around(j, 1):
-                    window.add(find_frame(work, k, crew))
+            with tiny.pool_of(setup) as pool:
+                window = Window(setup, ambient, pool, [j])
+                for k in setup.frames_around(j, 1):
+                    window.add(find_frame(setup, k, pool))
                 image = window.compose(j, np.empty(rendered[0].shape, np.float32)).images
             np.testing.assert_array_equal(image, rendered[j])
 
