@@ -12,8 +12,8 @@ from .auto import Choice, require_least_memory, settled
 from .compiling import compile_clock
 from .crew import TracePool
 from .describe import identity_of
-from .frame import find_frame
 from .job import Job
+from .loop import ready_frames
 from .memory import (
     ambient_memory,
     light_blocks,
@@ -184,27 +184,21 @@ def _probe(prepared: Prepared, work: FrameSetup, ambient: Ambient, pixels: int) 
     """Render and write small frames."""
     small = _small(work, pixels)
     n, writing = small.n_frames, 0.0
-    crew = TracePool(small, prepared.threads)
-    try:
-        with tempfile.TemporaryDirectory() as name:
+    with TracePool(small, prepared.threads) as pool, tempfile.TemporaryDirectory() as name:
+        started = time.perf_counter()
+        with _writer(prepared, small, Path(name), pool.threads) as writer:
+            window = Window(small, composed_with(ambient, prepared.lights), pool)
+            for j in ready_frames(window, small, range(n), pool):
+                composed = window.compose(j, writer.block())
+                writer.write(composed, range(j, j + 1))
+            writer.finish()
+        seconds = time.perf_counter() - started
+        file_bytes = sum(file.stat().st_size for file in Path(name).iterdir())
+        if prepared.still:
             started = time.perf_counter()
-            with _writer(prepared, small, Path(name), crew.threads) as writer:
-                window = Window(small, composed_with(ambient, prepared.lights), crew)
-                for c in range(n):
-                    window.add(find_frame(small, c, crew))
-                    for j in window.complete():
-                        composed = window.compose(j, writer.block())
-                        writer.write(composed, range(j, j + 1))
-                writer.finish()
-            seconds = time.perf_counter() - started
-            file_bytes = sum(file.stat().st_size for file in Path(name).iterdir())
-            if prepared.still:
-                started = time.perf_counter()
-                with _writer(prepared, small, Path(name), crew.threads) as writer:
-                    writer.write(composed, range(1))
-                writing = time.perf_counter() - started
-    finally:
-        crew.close()
+            with _writer(prepared, small, Path(name), pool.threads) as writer:
+                writer.write(composed, range(1))
+            writing = time.perf_counter() - started
     return _Probe(
         pixels=small.n_pixels,
         seconds=seconds / (float(np.sum(small.per_pixel)) * small.n_pixels),

@@ -4,7 +4,7 @@ from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -67,7 +67,7 @@ class Scratch:
 
 
 class TracePool:
-    """The threads that work on a frame, and their scratch arrays.
+    """The threads that work on a frame, and their scratch arrays; they end with the `with` block.
 
     Attributes:
         batch: how many hits a task finds.
@@ -132,6 +132,9 @@ class TracePool:
         stages = dict.fromkeys(stage for scratch in self._all for stage in scratch.seconds)
         return {stage: sum(scratch.seconds[stage] for scratch in self._all) for stage in stages}
 
-    def close(self) -> None:
-        """Wait for running tasks and end the threads."""
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_raised: object) -> None:
+        """Wait for running tasks and end the threads; rays and seconds can still be read."""
         self._pool.shutdown(wait=True, cancel_futures=True)

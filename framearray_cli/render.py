@@ -15,10 +15,10 @@ from .describe import describe, identity_of
 from .embree import EmbreeScene, Engine
 from .errors import OutputError
 from .folderlock import Folder
-from .frame import find_frame
 from .images import require_writer
 from .job import Job
 from .kernel import processor
+from .loop import ready_frames
 from .manifest import Manifest
 from .manifestfile import read_manifest, write_manifest
 from .memory import light_blocks, mirror_share, require_memory
@@ -235,25 +235,22 @@ class _Run:
         if work.lights.n_lights < prepared.n_lights:
             ambient = ambient.for_lights(lights)
         frames = [0] if prepared.still else wanted
-        window = Window(work, ambient, crew, frames)
+        window = Window(work, ambient, crew)
         writer = ArrayWriter(
             job.output.directory, array_names(job, prepared.n_cameras, prepared.lights), prepared.eyes,
             job.camera.resolution, job.output.fps, stored, lights, prepared.threads, self._listener.written,
             self._finished,
         )  # fmt: skip
         try:
-            with writer:
-                for c in work.frames_for(frames):
-                    window.add(find_frame(work, c, crew))
-                    for j in window.complete():
-                        block = writer.block()
-                        composed = window.compose(j, block)
-                        if composed.beyond and stored.half == "auto":  # too bright for halves: some will be floats
-                            composed = window.compose(j, np.empty(block.shape, np.float32))
-                        writer.write(composed, wanted if prepared.still else [j], block)
+            with crew, writer:
+                for j in ready_frames(window, work, frames, crew):
+                    block = writer.block()
+                    composed = window.compose(j, block)
+                    if composed.beyond and stored.half == "auto":  # too bright for halves: some will be floats
+                        composed = window.compose(j, np.empty(block.shape, np.float32))
+                    writer.write(composed, wanted if prepared.still else [j], block)
                 writer.finish()
         finally:
-            crew.close()
             self._rays += crew.rays()
             self._stages.update(crew.seconds())
             self._crew = None

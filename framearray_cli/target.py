@@ -90,13 +90,10 @@ def aimed(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> tuple[Fram
         return setup, None
     # one frame serves for the whole window of a camera that stands still
     most = float(prepared.job.samples.most_hits * (2 * prepared.job.n_r + 1 if prepared.still else 1))
-    pool = TracePool(setup, prepared.threads)
-    try:
+    with TracePool(setup, prepared.threads) as pool:
         pilot = _Pilot(setup, ambient, blocks_of(setup.cams.width, setup.cams.height))
         found = pool.run(pilot.look, range(setup.n_frames))
         rays = pool.rays().total()
-    finally:
-        pool.close()
     radiance = float(np.mean([frame.radiance for frame in found]))
     wanted = (error * radiance) ** 2
     if wanted > 0:

@@ -6,16 +6,17 @@ contributes (docs/decisions/window.md). A frame is composed as soon as the last 
 what no frame can need any more is dropped: never more than 2 N_r + 1 frames are held.
 """
 
-from collections import deque
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
 
 from .accumulate import Source, accumulate, compose_differences, compose_pixels, sources, weigh_halves
-from .arrays import Addresses, Float32, Images, Int32
-from .compose import as_stored, empty_band
+from .arrays import Addresses, Float32, Images, Int32, Rgb
+from .compose import Band, as_stored, empty_band
 from .crew import Scratch, TracePool
 from .denoise import denoised
 from .frame import FrameHits, fill_holes
@@ -71,48 +72,63 @@ class Composed:
 
 
 class Window:
-    """At most 2 N_r + 1 frames, and the threads that compose from them."""
+    """At most 2 N_r + 1 frames, and the threads that compose from them; `ready_frames` in loop.py fills it."""
 
-    def __init__(
-        self, setup: FrameSetup, ambient: Ambient, pool: TracePool, wanted: Sequence[int] | None = None
-    ) -> None:
-        """Make ready to compose frames.
+    def __init__(self, setup: FrameSetup, ambient: Ambient, pool: TracePool) -> None:
+        """Open an empty window.
 
         Args:
             ambient: of all lights that `setup` computes.
-            wanted: frames that are to be composed, in rising order; None: all of the path.
         """
         self._setup = setup
-        # by channel, as the sums are
-        kept = slice(setup.kept.start, setup.kept.stop)
-        self._colour = np.ascontiguousarray(setup.lights.colour[kept].T)
-        self._ambient = np.ascontiguousarray(ambient.intensity[kept].T)
+        self._colour = self._by_channel(setup.lights.colour)
+        self._ambient = self._by_channel(ambient.intensity)
         self._pool = pool
         # corrections of unbiased shadows may outweigh a dark pixel; cut at 0, their mean would be wrong
         self._lowest = np.float32(-np.inf if setup.shadow_unbiased and setup.shadow_step > 1 else 0.0)
         self._frames: dict[int, FrameHits] = {}
-        self._wanted = deque(range(setup.n_frames) if wanted is None else wanted)
+        self._holes: dict[int, list[tuple[Placed, HitRecords]]] = {}
         self._bands = [empty_band(BAND_PIXELS, len(setup.kept)) for _ in range(pool.threads)]
 
     def add(self, frame: FrameHits) -> None:
         """Take in the hits of the next frame of the path."""
         self._frames[frame.c] = frame
 
-    def complete(self) -> Iterator[int]:
-        """Frames that can be composed now, one after another; what no later frame needs is dropped in between."""
-        last, arrays = max(self._frames), self._pool.arrays
-        while self._wanted and self._setup.frames_around(self._wanted[0], self._setup.n_r)[-1] <= last:
-            j = self._wanted[0]
-            yield j
-            self._wanted.popleft()
-            needed = self._wanted[0] - self._setup.n_r if self._wanted else last + 1
-            for k in [k for k in self._frames if k <= j or k < needed]:
-                self._frames[k].forget_mirrors(arrays)
-                if k < needed:
-                    self._frames.pop(k).put_back(arrays)
+    def fill_holes(self, j: int) -> None:
+        """Trace hits for the pixels of frame j that none of its hits reaches; all frames of its window are there."""
+        self._holes[j] = self._trace_holes(j)
+
+    def drop(self, j: int, needed: int) -> None:
+        """Forget what only frame j and earlier ones show, and the frames before frame `needed`."""
+        arrays = self._pool.arrays
+        self._holes.pop(j, None)
+        for k in [k for k in self._frames if k <= j or k < needed]:
+            self._frames[k].forget_mirrors(arrays)
+            if k < needed:
+                self._frames.pop(k).put_back(arrays)
+
+    def with_ambient(self, ambient: Ambient) -> "Window":
+        """The same frames under another ambient light."""
+        window = copy(self)
+        window._ambient = self._by_channel(ambient.intensity)
+        return window
+
+    def _by_channel(self, values: Rgb) -> Rgb:
+        """Values of all lights, (n, 3), as those of the kept ones, (3, n_kept): the order of the sums."""
+        kept = self._setup.kept
+        return np.ascontiguousarray(values[kept.start : kept.stop].T)
+
+    @contextmanager
+    def _band(self) -> Iterator[Band]:
+        """Sums for one task; the next task takes them over, whatever happens to this one."""
+        band = self._bands.pop()
+        try:
+            yield band
+        finally:
+            self._bands.append(band)
 
     def compose(self, j: int, images: Images, eyes: Sequence[int] | None = None) -> Composed:
-        """Compose frame j, once all frames of its window were added.
+        """Compose frame j, once all frames of its window were added and its holes are filled.
 
         Args:
             images: (n_lights, height, width, 3), overwritten; float32, or float16 where that is how they are stored.
@@ -123,7 +139,7 @@ class Window:
         layered = setup.n_pixels if setup.layers else 0
         maps, own = np.empty((layered, 9), np.float32), np.empty((layered, 4), np.float32)
         samples = np.empty(setup.n_pixels, np.int32)
-        holes = self._holes(j) if eyes is None else []
+        holes = self._holes[j] if eyes is None else []
         mirror_scale = self._mirror_scale(j, holes)
         hits, mirrored = self._hits(j, holes[:1], eyes), self._mirrored(j, holes[1:], mirror_scale)
         smooth = (
@@ -134,14 +150,11 @@ class Window:
         def some(first: int, scratch: Scratch) -> tuple[int, int, int, int]:
             started = perf_counter()
             n = min(TASK_PIXELS, setup.n_pixels - first)
-            sums = self._bands.pop()
-            try:
+            with self._band() as sums:
                 found: tuple[int, int, int, int] = compose_pixels(
                     sums, first, n, hits, mirrored, setup.lights.channels, smooth, self._colour, self._ambient,
                     setup.light_independent_from, self._lowest, flat, samples, maps,
                 )  # fmt: skip
-            finally:
-                self._bands.append(sums)
             if layered:
                 place = frame.places[j]
                 average_native(place.start, place.order, frame.normal, frame.depth, first, n, own)
@@ -184,18 +197,17 @@ class Window:
         listed = sources(parts)
 
         def some(task: tuple[int, int], _scratch: Scratch) -> None:
-            band = self._bands.pop()
-            compose_differences(
-                band,
-                *task,
-                listed,
-                setup.lights.channels,
-                self._colour,
-                self._ambient,
-                setup.light_independent_from,
-                images,
-            )
-            self._bands.append(band)
+            with self._band() as band:
+                compose_differences(
+                    band,
+                    *task,
+                    listed,
+                    setup.lights.channels,
+                    self._colour,
+                    self._ambient,
+                    setup.light_independent_from,
+                    images,
+                )
 
         self._pool.run(some, tasks)
         differences = images.reshape(shape)
@@ -226,7 +238,7 @@ class Window:
         images = (array.reshape(*shape, 3) for array in (obscurance, reflectivity, own[:, :3]))
         return reflectivity * denoised(*images).reshape(n_pixels, 3)
 
-    def _holes(self, j: int) -> list[tuple[Placed, HitRecords]]:
+    def _trace_holes(self, j: int) -> list[tuple[Placed, HitRecords]]:
         """Hits for pixels of frame j that nobody reached; there are none where every pixel has hits of its own."""
         setup = self._setup
         if setup.fewest_hits(j) >= 1:

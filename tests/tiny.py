@@ -11,9 +11,9 @@ from scenes import Glb, png
 
 from framearray_cli.crew import TracePool
 from framearray_cli.embree import Engine
-from framearray_cli.frame import find_frame
 from framearray_cli.job import Job
 from framearray_cli.lights import light_arrays
+from framearray_cli.loop import ready_frames
 from framearray_cli.meshes import Material, Meshes, Part
 from framearray_cli.paths import eyes, lights
 from framearray_cli.prepare import Prepared, open_embree, plan_work
@@ -241,16 +241,6 @@ def planned(inputs: Prepared, engine: Engine = "auto") -> Iterator[tuple[FrameSe
         yield plan_work(inputs, embree)
 
 
-@contextmanager
-def pool_of(setup: FrameSetup, threads: int = 1) -> Iterator[TracePool]:
-    """Threads, ended afterwards."""
-    pool = TracePool(setup, threads)
-    try:
-        yield pool
-    finally:
-        pool.close()
-
-
 @dataclass(frozen=True)
 class Rendered:
     """All frames that were found and composed, one for a camera that stands still."""
@@ -266,18 +256,15 @@ class Rendered:
 
 
 def frames_of(setup: FrameSetup, ambient: Ambient, pool: TracePool) -> list[Composed]:
-    """The frame loop without files."""
-    composed, window = [], Window(setup, ambient, pool)
-    for c in range(setup.n_frames):
-        window.add(find_frame(setup, c, pool))
-        for j in window.complete():
-            shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
-            composed.append(window.compose(j, np.empty(shape, np.float32)))
-    return composed
+    """All frames, composed, without files."""
+    window = Window(setup, ambient, pool)
+    shape = (len(setup.kept), setup.cams.height, setup.cams.width, 3)
+    wanted = range(setup.n_frames)
+    return [window.compose(j, np.empty(shape, np.float32)) for j in ready_frames(window, setup, wanted, pool)]
 
 
 def render_frames(inputs: Prepared, threads: int = 1, engine: Engine = "auto") -> Rendered:
     """All frames of a job."""
-    with planned(inputs, engine) as (setup, ambient), pool_of(setup, threads) as pool:
+    with planned(inputs, engine) as (setup, ambient), TracePool(setup, threads) as pool:
         composed = frames_of(setup, ambient, pool)
         return Rendered(composed, ambient, dict(pool.rays()))

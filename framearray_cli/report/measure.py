@@ -9,8 +9,11 @@ import numpy as np
 
 from ..arrays import Float32, Int32
 from ..crew import TracePool
-from ..frame import find_frame
+from ..frame import FrameHits
+from ..loop import ready_frames
+from ..terms.ambient import Ambient
 from ..window import Window
+from ..work import FrameSetup
 from .case import Case, under, varied
 from .quality import Quality, mean_quality, quality
 from .reference import Reference
@@ -53,6 +56,31 @@ class Measured:
     example: Float32
 
 
+class TimedWindow(Window):
+    """A window that takes the time until each frame is found.
+
+    Attributes:
+        started: when the search for the next frame began; whoever composes between two frames sets it anew.
+        finding: seconds of each frame.
+    """
+
+    def __init__(self, setup: FrameSetup, ambient: Ambient, pool: TracePool) -> None:
+        super().__init__(setup, ambient, pool)
+        self.started, self.finding = time.perf_counter(), list[float]()
+
+    def add(self, frame: FrameHits) -> None:
+        """Take in the hits of the next frame, and note what it took to find them."""
+        self.finding.append(time.perf_counter() - self.started)
+        super().add(frame)
+        self.started = time.perf_counter()
+
+    def fill_holes(self, j: int) -> None:
+        """Fill the holes of frame j, as a part of finding the hits that complete it."""
+        super().fill_holes(j)
+        self.finding[-1] += time.perf_counter() - self.started
+        self.started = time.perf_counter()
+
+
 def run(case: Case, settings: Settings, cameras: Sequence[int], lights: Sequence[int], seed: int) -> Run:
     """Make frames in a row with some settings, as a render does, window and all.
 
@@ -67,28 +95,19 @@ def run(case: Case, settings: Settings, cameras: Sequence[int], lights: Sequence
     block = np.empty(shape, np.float16)
     exact = np.empty(shape, np.float32)
     kept = range(len(lights)) if settings.one_light else lights
-    pool = TracePool(setup, changed.threads)
-    window = Window(setup, changed.ambient, pool, range(cameras[0], setup.n_frames))
-    images, hits, finding, composing = [], [], [], []
-    try:
-        first, last = setup.frames_around(cameras[0], setup.n_r)[0], setup.frames_around(cameras[-1], setup.n_r)[-1]
-        for c in range(first, last + 1):
+    images, hits, composing = [], [], []
+    with TracePool(setup, changed.threads) as pool:
+        window = TimedWindow(setup, changed.ambient, pool)
+        for j in ready_frames(window, setup, range(cameras[0], cameras[-1] + 1), pool):
             started = time.perf_counter()
-            window.add(find_frame(setup, c, pool))
-            finding.append(time.perf_counter() - started)
-            for j in window.complete():
-                if j > cameras[-1]:
-                    break
-                started = time.perf_counter()
-                window.compose(j, block)  # as a render composes it; what is compared is not rounded to halves
-                composing.append(time.perf_counter() - started)
-                hits.append(window.compose(j, exact).hits)
-                images.append(exact[list(kept)])
-    finally:
-        pool.close()
+            window.compose(j, block)  # as a render composes it; what is compared is not rounded to halves
+            composing.append(time.perf_counter() - started)
+            hits.append(window.compose(j, exact).hits)
+            images.append(exact[list(kept)])
+            window.started = time.perf_counter()
     return Run(
         images=np.stack(images),
-        seconds=statistics.median(finding) + statistics.median(composing),
+        seconds=statistics.median(window.finding) + statistics.median(composing),
         hits=np.stack(hits),
     )
 

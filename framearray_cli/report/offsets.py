@@ -1,13 +1,13 @@
 """Where in the window errors come from: the same frame made of the hits of one eye of its window at a time."""
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..crew import TracePool
-from ..frame import find_frame
-from ..window import Window
+from ..loop import window_of
 from .case import Case, varied
 from .measure import SEEDS
 from .metrics import squared_bias
@@ -38,24 +38,16 @@ def by_offset(case: Case, c: int, lights: Sequence[int], reference: Reference) -
     """Make frame c of each eye of its window alone, with the job's own settings."""
     changed = varied(case, case.settings)
     images = np.empty((2, case.setup.lights.n_lights, case.setup.cams.height, case.setup.cams.width, 3), np.float32)
-    windows, pools = [], []
-    try:
+    windows, found = [], []
+    with ExitStack() as pools:
         for seed in SEEDS:
             setup = replace(changed.setup, seed=seed)
-            pool = TracePool(setup, changed.threads)
-            pools.append(pool)
-            window = Window(setup, changed.ambient, pool, [c])
-            for k in setup.frames_around(c, setup.n_r):
-                window.add(find_frame(setup, k, pool))
-            windows.append(window)
-        found = []
+            pool = pools.enter_context(TracePool(setup, changed.threads))
+            windows.append(window_of(c, setup, changed.ambient, pool))
         for k in changed.setup.frames_around(c, changed.setup.n_r):
             hits = [window.compose(c, images[i], [k]).hits for i, window in enumerate(windows)]
             found.append(_offset(case, k - c, hits, images, lights, reference))
-        return found
-    finally:
-        for pool in pools:
-            pool.close()
+    return found
 
 
 def _offset(

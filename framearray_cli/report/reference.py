@@ -17,9 +17,9 @@ from ..arrays import Float32, Float64, Image, Rgb
 from ..crew import TracePool
 from ..files import make_folder, whole_file
 from ..fingerprint import fingerprint
-from ..frame import find_frame
+from ..loop import window_of
 from ..prepare import job_fingerprint
-from ..window import Layers, Window
+from ..window import Layers
 from ..work import FrameSetup
 from .case import Case, under
 from .metrics import rmse
@@ -123,16 +123,11 @@ def _render(case: Case, c: int, passes: int) -> Reference:
 def _pass(setup: FrameSetup, case: Case, c: int) -> tuple[Float32, Float32, Layers]:
     """One image a light position without ambient light, what an ambient light of 1 adds, and the layers."""
     images = np.empty((2, setup.lights.n_lights, setup.cams.height, setup.cams.width, 3), np.float32)
-    pool = TracePool(setup, case.threads)
-    try:
-        frame = find_frame(setup, c, pool)
+    with TracePool(setup, case.threads) as pool:
+        window = window_of(c, setup, case.ambient, pool)
         for ambient in (0, 1):
             fixed = replace(case.ambient, intensity=np.full_like(case.ambient.intensity, ambient))
-            window = Window(setup, fixed, pool, [c])
-            window.add(frame)
-            layers = window.compose(c, images[ambient]).layers
-    finally:
-        pool.close()
+            layers = window.with_ambient(fixed).compose(c, images[ambient]).layers
     assert layers is not None
     return images[0], images[1, 0] - images[0, 0], layers
 

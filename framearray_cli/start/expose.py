@@ -9,8 +9,8 @@ from ..arrays import Float64, Images
 from ..colour import srgb_from_linear
 from ..crew import TracePool
 from ..embree import EmbreeScene
-from ..frame import find_frame
 from ..lights import light_arrays
+from ..loop import ready_frames
 from ..paths import LightPath, Lights, eyes, lights
 from ..prepare import Prepared, plan_work
 from ..scene import Scene
@@ -110,19 +110,14 @@ def _pictures(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[Float64,
         still=len(some) == 1,
     )
     setup, ambient = plan_work(prepared, embree)
-    pool = TracePool(setup, prepared.threads)
+    shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
     found: list[Images] = []
-    try:
+    with TracePool(setup, prepared.threads) as pool:
         window = Window(setup, ambient, pool)
-        for c in range(setup.n_frames):
-            window.add(find_frame(setup, c, pool))
-            for j in window.complete():
-                shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
-                composed = window.compose(j, np.empty(shape, np.float32))
-                assert composed.layers is not None
-                found.append(composed.images[:, composed.layers.depth > 0])
-    finally:
-        pool.close()
+        for j in ready_frames(window, setup, range(setup.n_frames), pool):
+            composed = window.compose(j, np.empty(shape, np.float32))
+            assert composed.layers is not None
+            found.append(composed.images[:, composed.layers.depth > 0])
     n = few_lights.n - 1
     images = np.concatenate(found, axis=1).astype(np.float64)  # (n + 1, pixels, 3); the last has no lights
     dark = np.repeat(images[-1:], n, axis=0)

@@ -12,11 +12,10 @@ from scipy.ndimage import uniform_filter
 
 from framearray_cli.arrays import Float32, Float64, Image
 from framearray_cli.crew import TracePool
-from framearray_cli.frame import find_frame
+from framearray_cli.loop import window_of
 from framearray_cli.report.case import Case, planned, under
 from framearray_cli.report.metrics import EPSILON
 from framearray_cli.report.reference import noise, reference
-from framearray_cli.window import Window
 
 from .ambient_levels import METHODS
 from .ambient_scenes import Probe, resized, under_one, with_ambient
@@ -185,14 +184,9 @@ def _parts(case: Case, c: int) -> tuple[Image, Image]:
     """Frame c with its neighbours' hits: without ambient light, and what an ambient light of 1 adds."""
     setup = replace(case.setup, layers=False)
     images = np.empty((2, 1, setup.cams.height, setup.cams.width, 3), np.float32)
-    pool = TracePool(setup, case.threads)
-    try:
+    with TracePool(setup, case.threads) as pool:
+        window = window_of(c, setup, case.ambient, pool)
         for image, level in zip(images, (0, 1), strict=True):
             fixed = replace(case.ambient, intensity=np.full_like(case.ambient.intensity, level))
-            window = Window(setup, fixed, pool, [c])
-            for other in setup.frames_around(c, setup.n_r):
-                window.add(find_frame(setup, other, pool))
-            window.compose(c, image)
-    finally:
-        pool.close()
+            window.with_ambient(fixed).compose(c, image)
     return images[0, 0], images[1, 0] - images[0, 0]

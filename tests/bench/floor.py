@@ -102,13 +102,10 @@ def record(case: Case, c: int, expected: float) -> Recording:
     state = np.array([0, capacity, rays.ctypes.data, flags.ctypes.data, tracer.intersect, tracer.occluded], np.int64)
     recorders = [_recorder(state.ctypes.data, what) for what in (_INTERSECT, _OCCLUDED)]
     watched = tracer._replace(intersect=recorders[0].address, occluded=recorders[1].address)
-    pool = TracePool(case.setup, 1)
     marks = _Marks(state)
-    try:
+    with TracePool(case.setup, 1) as pool:
         pool._all[0].rays = marks
         find_frame(replace(case.setup, tracer=watched), c, pool)
-    finally:
-        pool.close()
     n = int(state[0])
     lanes = int((rays[:n, TFAR] >= 0).sum())
     if n > capacity or lanes != sum(marks.values()):

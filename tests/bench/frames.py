@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from framearray_cli.crew import TracePool
-from framearray_cli.frame import find_frame
-from framearray_cli.window import Composed, Window
+from framearray_cli.loop import window_of
+from framearray_cli.window import Composed
 
 from .cases import Case
 
@@ -20,15 +20,9 @@ def frame(case: Case, c: int, seed: int, *, layers: bool = False, threads: int |
         threads: None: those of the case.
     """
     setup = replace(case.setup, seed=seed, layers=layers)
-    pool = TracePool(setup, threads or case.threads)
-    window = Window(setup, case.ambient, pool, range(c, case.setup.n_frames))
     out = np.empty((len(setup.kept), setup.cams.height, setup.cams.width, 3), np.float32)
-    try:
-        for other in setup.frames_around(c, setup.n_r):
-            window.add(find_frame(setup, other, pool))
-        return window.compose(c, out)
-    finally:
-        pool.close()
+    with TracePool(setup, threads or case.threads) as pool:
+        return window_of(c, setup, case.ambient, pool).compose(c, out)
 
 
 def frames(case: Case, c: int, seeds: Sequence[int], *, layers: bool = False) -> list[Composed]:

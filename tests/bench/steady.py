@@ -7,8 +7,9 @@ while it runs, so that what is measured is the cost of an interior frame.
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from itertools import islice
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -17,11 +18,10 @@ import numpy as np
 
 from framearray_cli.arrays import Int32
 from framearray_cli.crew import TracePool
-from framearray_cli.frame import find_frame
 from framearray_cli.images import ImageFormat
+from framearray_cli.loop import ready_frames
 from framearray_cli.stored import plain_names
 from framearray_cli.window import Composed, Window
-from framearray_cli.work import FrameSetup
 from framearray_cli.writer import BLOCKS, ArrayWriter
 
 from .cases import Case
@@ -97,27 +97,24 @@ def steady(case: Case, frames: int, image_format: ImageFormat | None = None, pla
         place: where on the path, 0 to 1.
     """
     setup, n_r = case.setup, case.setup.n_r
-    before = 2 * n_r + 1  # frames that fill the window and compose one frame, so that all is compiled
-    first = start_of(case, frames, place)
-    pool = TracePool(setup, case.threads)
-    window = Window(setup, case.ambient, pool, range(first + n_r, setup.n_frames))
-    try:
+    first = start_of(case, frames, place) + n_r
+    with TracePool(setup, case.threads) as pool:
+        window = Window(setup, case.ambient, pool)
+        ready = ready_frames(window, setup, range(first, first + 1 + frames), pool)
         with _writer(case, Path(), None) as nothing:
-            _pass(setup, window, pool, nothing, range(first, first + before))
-        return _measured(case, window, pool, range(first + before, first + before + frames), image_format)
-    finally:
-        pool.close()
+            _compose(window, islice(ready, 1), nothing)  # fills the window, and compiles what is not
+        return _measured(case, window, ready, pool, image_format)
 
 
 def _measured(
-    case: Case, window: Window, pool: TracePool, cameras: range, image_format: ImageFormat | None
+    case: Case, window: Window, ready: Iterator[int], pool: TracePool, image_format: ImageFormat | None
 ) -> Measured:
-    """Put the clock to some frames."""
+    """Put the clock to the frames that are left."""
     setup = case.setup
     with tempfile.TemporaryDirectory() as folder, _writer(case, Path(folder), image_format) as writer:
         rays, seconds = pool.rays(), pool.seconds()
         started, cpu = time.perf_counter(), time.process_time()
-        hits = _pass(setup, window, pool, writer, cameras)
+        hits = _compose(window, ready, writer)
         wall, cpu = time.perf_counter() - started, time.process_time() - cpu
         spent = {stage: t - seconds.get(stage, 0.0) for stage, t in pool.seconds().items()}
         images = len(hits) * setup.lights.n_lights
@@ -135,15 +132,13 @@ def _measured(
     )
 
 
-def _pass(setup: FrameSetup, window: Window, pool: TracePool, writer: TimedWriter, cameras: range) -> list[Int32]:
-    """Find the hits of some cameras and compose what they complete, as the program does; returns hits by pixel."""
+def _compose(window: Window, ready: Iterator[int], writer: TimedWriter) -> list[Int32]:
+    """Find and compose frames, as the program does; returns hits by pixel."""
     hits: list[Int32] = []
-    for c in cameras:
-        window.add(find_frame(setup, c, pool))
-        for j in window.complete():
-            composed = window.compose(j, writer.block())
-            hits.append(composed.hits)
-            writer.take(composed, j)
+    for j in ready:
+        composed = window.compose(j, writer.block())
+        hits.append(composed.hits)
+        writer.take(composed, j)
     writer.finish()
     return hits
 

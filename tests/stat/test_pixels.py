@@ -14,6 +14,8 @@ import tiny
 from stages import FURNACE, make_job, point, repeats, result_of
 from ztests import differing, off
 
+from framearray_cli.crew import TracePool
+
 BRIGHTER = 1.02
 AMBIENT = {"intensity": [0.4, 0.3, 0.2]}
 
@@ -23,7 +25,7 @@ def runs(inputs: Any, seeds: range) -> Any:
     with tiny.planned(inputs) as (setup, ambient):
         found = []
         for seed in seeds:
-            with tiny.pool_of(replace(setup, seed=seed)) as pool:
+            with TracePool(replace(setup, seed=seed), 1) as pool:
                 composed = tiny.frames_of(replace(setup, seed=seed), ambient, pool)
                 assert all(frame.bad == 0 for frame in composed)
                 found.append(np.stack([frame.images for frame in composed]).astype(np.float64))

@@ -16,10 +16,9 @@ from ztests import differing
 
 from framearray_cli.allotment import Allotment, blocks_of
 from framearray_cli.crew import TracePool
-from framearray_cli.frame import find_frame
 from framearray_cli.job import Job
+from framearray_cli.loop import window_of
 from framearray_cli.prepare import open_embree, plan_work, prepare
-from framearray_cli.window import Window
 
 Array = NDArray[np.float64]
 
@@ -71,14 +70,10 @@ def middle_frames(job: Job, seeds: range, allotment: Allotment | None = None) ->
         planned, ambient = plan_work(prepared, embree)
         for seed in seeds:
             setup = replace(planned, seed=seed, allotment=allotment)
-            pool = TracePool(setup, 1)
-            window = Window(setup, ambient, pool)
-            for c in setup.frames_around(MIDDLE, setup.n_r):
-                window.add(find_frame(setup, c, pool))
-            composed = window.compose(MIDDLE, block)
+            with TracePool(setup, 1) as pool:
+                composed = window_of(MIDDLE, setup, ambient, pool).compose(MIDDLE, block)
             assert composed.bad == 0
             images.append(block.ravel().astype(float))
-            pool.close()
     return np.array(images)
 
 

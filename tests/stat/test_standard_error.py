@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from stages import box, make_job, quad, write_scene
 
 from framearray_cli.crew import TracePool
-from framearray_cli.frame import find_frame
 from framearray_cli.job import Job
+from framearray_cli.loop import window_of
 from framearray_cli.prepare import open_embree, plan_work, prepare
 from framearray_cli.standarderror import standard_error
 from framearray_cli.target import aimed
-from framearray_cli.window import Window
 
 Array = NDArray[np.float64]
 
@@ -81,12 +80,8 @@ def over_seeds(job: Job, seeds: int = SEEDS) -> tuple[Array, Array, Array]:
         planned, ambient = plan_work(prepared, embree)
         for seed in range(seeds):
             setup = replace(planned, seed=seed)
-            pool = TracePool(setup, 1)
-            window = Window(setup, ambient, pool, range(MIDDLE, setup.n_frames))
-            for c in setup.frames_around(MIDDLE, setup.n_r):
-                window.add(find_frame(setup, c, pool))
-            composed = window.compose(MIDDLE, block)
-            pool.close()
+            with TracePool(setup, 1) as pool:
+                composed = window_of(MIDDLE, setup, ambient, pool).compose(MIDDLE, block)
             assert composed.differences is not None
             images.append(block.astype(float).reshape(2, -1))
             differences.append(composed.differences.astype(float).reshape(2, -1))
@@ -164,12 +159,8 @@ def test_a_wanted_error_is_reached(error: float, weights: str, scene: Path, tmp_
         for seed in range(8):
             setup, target = aimed(prepared, replace(planned, seed=seed), ambient)
             assert target is not None and target.capped < 0.02 and abs(target.expected / error - 1) < 0.05
-            pool = TracePool(setup, 1)
-            window = Window(setup, ambient, pool, range(MIDDLE, setup.n_frames))
-            for c in setup.frames_around(MIDDLE, setup.n_r):
-                window.add(find_frame(setup, c, pool))
-            window.compose(MIDDLE, block)
-            pool.close()
+            with TracePool(setup, 1) as pool:
+                window_of(MIDDLE, setup, ambient, pool).compose(MIDDLE, block)
             images.append(block.astype(float).reshape(2, -1))
             radiance.append(target.radiance)
     spread = np.sqrt(np.array(images).var(axis=0, ddof=1).mean())

@@ -13,7 +13,7 @@ from framearray_cli.crew import ArrayPool, TracePool
 
 @pytest.fixture
 def pool() -> Iterator[TracePool]:
-    with tiny.planned(tiny.prepared(tiny.job())) as (setup, _), tiny.pool_of(setup, 3) as found:
+    with tiny.planned(tiny.prepared(tiny.job())) as (setup, _), TracePool(setup, 3) as found:
         yield found
 
 
@@ -47,13 +47,12 @@ def test_an_error_reaches_the_caller_and_ends_the_work(pool: TracePool) -> None:
             raise ValueError("item 5")
         done.append(item)
 
-    with pytest.raises(ValueError, match="item 5"):
+    with pytest.raises(ValueError, match="item 5"), pool:
         pool.run(task, range(100_000))
-    pool.close()
     assert len(done) < 99_999
 
 
-def test_the_crew_works_on_after_an_error(pool: TracePool) -> None:
+def test_the_pool_works_on_after_an_error(pool: TracePool) -> None:
     def task(item: int, _scratch: object) -> int:
         return 1 // item
 
@@ -62,7 +61,7 @@ def test_the_crew_works_on_after_an_error(pool: TracePool) -> None:
     assert pool.run(task, [1, 1, 1, 1]) == [1, 1, 1, 1]
 
 
-def test_memory_on_the_shelf_serves_what_is_about_as_large() -> None:
+def test_kept_memory_serves_what_is_about_as_large() -> None:
     arrays = ArrayPool()
     array = arrays.take("row", (50, 16), np.float32)
     block = array.base

@@ -10,6 +10,7 @@ import pytest
 import tiny
 from tiny import WALK
 
+from framearray_cli.crew import TracePool
 from framearray_cli.job import Job
 from framearray_cli.render import render
 
@@ -85,7 +86,7 @@ def test_the_hits_of_a_frame_do_not_depend_on_the_length_of_the_path() -> None:
         with tiny.planned(inputs) as (setup, estimate):
             average = np.float32([0.5, 0.5, 0.5])  # the walks that measure it start at the path's own eyes, too
             setup = replace(setup, obscurance=setup.obscurance._replace(average=average))
-            with tiny.pool_of(setup) as pool:
+            with TracePool(setup, 1) as pool:
                 results.append([frame.images for frame in tiny.frames_of(setup, estimate, pool)])
     for long, short in zip(results[0][:2], results[1], strict=True):
         np.testing.assert_array_equal(long, short)

@@ -26,7 +26,7 @@ embree/packets embree/masks embree/native embree/fallback embree/__init__
 rays hits eyehits plan allotment
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
 terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
-reuse work crew shading mirrors frame denoise standarderror compose accumulate window
+reuse work crew shading mirrors frame denoise standarderror compose accumulate window loop
 imageattributes pngjpeg exrtiff images filepatterns manifest manifestfile pictures ranges record resume folderlock
 outfolder stored writer
 prepare memory acceptance expected auto allot target describe summary render check verify

@@ -11,6 +11,7 @@ from test_hits import native
 from tiny import WALK
 
 from framearray_cli.camera import OUTSIDE
+from framearray_cli.crew import TracePool
 from framearray_cli.frame import find_frame
 from framearray_cli.hits import SURFACE
 from framearray_cli.rays import room_for_tests
@@ -136,7 +137,7 @@ def test_weights_of_a_frame_sum_to_one_a_pixel_in_the_mean(walk: Any, c: int) ->
 
     A wrong density, a forgotten escaped ray or hits at the path's ends counted wrongly would all shift it.
     """
-    with tiny.planned(walk) as (setup, _), tiny.pool_of(setup) as pool:
+    with tiny.planned(walk) as (setup, _), TracePool(setup, 1) as pool:
         total = np.zeros(setup.n_pixels)
         for k in setup.frames_around(c, setup.n_r):
             frame = find_frame(setup, k, pool)

@@ -8,13 +8,13 @@ import pytest
 import tiny
 from tiny import WALK
 
-from framearray_cli.frame import find_frame
+from framearray_cli.crew import TracePool
 from framearray_cli.images import read_image, read_layers
 from framearray_cli.job import Job
+from framearray_cli.loop import window_of
 from framearray_cli.manifestfile import read_manifest
 from framearray_cli.render import render
 from framearray_cli.standarderror import fill_unknown, half_factors, standard_error, summed_up
-from framearray_cli.window import Window
 
 
 def test_factors_make_a_difference_of_means_with_the_variance_of_the_mean() -> None:
@@ -66,12 +66,9 @@ def test_an_array_is_summed_up() -> None:
 
 def windowed(job: Job, j: int, eyes: Any = None) -> Any:
     """Frame j of a job, of all hits of its window or those of some eyes."""
-    with tiny.planned(tiny.prepared(job)) as (setup, ambient), tiny.pool_of(setup) as pool:
-        window = Window(setup, ambient, pool, range(j, setup.n_frames))
-        for k in setup.frames_around(j, setup.n_r):
-            window.add(find_frame(setup, k, pool))
+    with tiny.planned(tiny.prepared(job)) as (setup, ambient), TracePool(setup, 1) as pool:
         shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
-        return window.compose(j, np.empty(shape, np.float32), eyes)
+        return window_of(j, setup, ambient, pool).compose(j, np.empty(shape, np.float32), eyes)
 
 
 def test_the_difference_is_that_of_the_two_halves_of_the_window() -> None:

@@ -12,6 +12,7 @@ from tiny import WALK
 
 from framearray_cli.allotment import Allotment, blocks_of
 from framearray_cli.camera import OUTSIDE
+from framearray_cli.crew import TracePool
 from framearray_cli.errors import JobError
 from framearray_cli.eyehits import native_hits
 from framearray_cli.frame import find_frame
@@ -21,7 +22,6 @@ from framearray_cli.memory import require_memory
 from framearray_cli.rays import room_for_hits
 from framearray_cli.reuse import balance_weights, divide_by_own_hits, scale_by_expected_hits
 from framearray_cli.target import aimed, of_samples
-from framearray_cli.window import Window
 
 
 def job(**changes: Any) -> Job:
@@ -64,13 +64,11 @@ def test_frames_rest_on_the_hits_that_were_allotted(weights: str) -> None:
         setup, target = aimed(inputs, planned, ambient)
         assert target is not None and setup.allotment is not None
         assert target.frames[0] <= target.hits <= target.frames[1]
-        with tiny.pool_of(setup) as pool:
-            window = Window(setup, ambient, pool)
+        with TracePool(setup, 1) as pool:
             for c in range(setup.n_frames):
                 frame = find_frame(setup, c, pool)
                 own, counts = np.diff(frame.places[c].start), setup.allotment.counts(c)
                 np.testing.assert_array_equal(own, counts)
-                window.add(frame)
 
 
 @pytest.mark.parametrize("n", [1, 15, 16, 17, 100])
@@ -118,10 +116,10 @@ def test_threads_and_blocks_of_lights_change_nothing() -> None:
         with tiny.open_embree(inputs) as embree:
             planned, ambient = tiny.plan_work(inputs, embree)
             setup, _ = aimed(replace(inputs, job=inputs.job.model_copy(update={"render": render})), planned, ambient)
-            with tiny.pool_of(setup, threads) as pool:
+            with TracePool(setup, threads) as pool:
                 images.append(composed(setup, ambient, pool))
             block = range(1, 3)
-            with tiny.pool_of(setup.for_lights(block), threads) as pool:
+            with TracePool(setup.for_lights(block), threads) as pool:
                 some = composed(setup.for_lights(block), ambient.for_lights(block), pool)
                 np.testing.assert_array_equal(some, images[-1][:, 1:3])
     np.testing.assert_array_equal(*images)
@@ -129,13 +127,7 @@ def test_threads_and_blocks_of_lights_change_nothing() -> None:
 
 def composed(setup: Any, ambient: Any, pool: Any) -> Any:
     """All images, (n_frames, n_lights, height, width, 3)."""
-    window, found = Window(setup, ambient, pool), []
-    for c in range(setup.n_frames):
-        window.add(find_frame(setup, c, pool))
-        for j in window.complete():
-            images = np.empty((len(setup.kept), setup.cams.height, setup.cams.width, 3), np.float32)
-            found.append(window.compose(j, images).images)
-    return np.stack(found)
+    return np.stack([frame.images for frame in tiny.frames_of(setup, ambient, pool)])
 
 
 def test_no_pixel_stays_without_a_hit() -> None:
@@ -144,13 +136,10 @@ def test_no_pixel_stays_without_a_hit() -> None:
         planned, ambient = tiny.plan_work(inputs, embree)
         setup, target = aimed(inputs, planned, ambient)
         assert target is not None and target.hits < 1
-        with tiny.pool_of(setup) as pool:
-            window = Window(setup, ambient, pool)
-            for c in range(setup.n_frames):
-                window.add(find_frame(setup, c, pool))
-                for j in window.complete():
-                    images = np.empty((len(setup.kept), 3, 5, 3), np.float32)
-                    assert window.compose(j, images).hits.min() >= 1
+        with TracePool(setup, 1) as pool:
+            composed = tiny.frames_of(setup, ambient, pool)
+        assert len(composed) == setup.n_frames
+        assert all(frame.hits.min() >= 1 for frame in composed)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,9 @@ import pytest
 import tiny
 from tiny import WALK
 
-from framearray_cli.frame import find_frame
+from framearray_cli.crew import TracePool
+from framearray_cli.frame import FrameHits
+from framearray_cli.loop import ready_frames, window_of
 from framearray_cli.window import Window
 
 SKY = {"background": [0.3, 0.4, 0.5]}
@@ -18,27 +20,39 @@ def path(frames: int) -> dict[str, Any]:
     return {"frames": frames, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": frames - 1}]}
 
 
+class Watched(Window):
+    """A window that notes which frames were found, and how many it held at most."""
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
+        self.found: list[int] = []
+        self.most = 0
+
+    def add(self, frame: FrameHits) -> None:
+        super().add(frame)
+        self.found.append(frame.c)
+        self.most = max(self.most, len(self._frames))
+
+
 @pytest.mark.parametrize(("n_c", "n_r"), [(1, 3), (2, 0), (7, 0), (7, 1), (7, 2), (4, 3), (3, 9), (12, 2)])
 def test_no_more_than_the_window_is_held_and_every_frame_comes_once(n_c: int, n_r: int) -> None:
     camera = path(n_c) if n_c > 1 else {}
     job = tiny.job(
         camera={**camera, "resolution": [4, 3]}, reuse={"n_r": n_r}, ambient={"paths": 8}, light={"frames": 3}
     )
-    composed, most = [], 0
-    with tiny.planned(tiny.prepared(job)) as (setup, ambient), tiny.pool_of(setup) as pool:
-        window = Window(setup, ambient, pool)
+    composed: list[int] = []
+    with tiny.planned(tiny.prepared(job)) as (setup, ambient), TracePool(setup, 1) as pool:
+        window = Watched(setup, ambient, pool)
         images = np.empty((3, 3, 4, 3), np.float32)
-        for c in range(setup.n_frames):
-            window.add(find_frame(setup, c, pool))
-            most = max(most, len(window._frames))
-            for j in window.complete():
-                assert j == len(composed), "in order"
-                assert j + setup.n_r <= c or c == setup.n_frames - 1, "not before its last neighbour was found"
-                assert j + setup.n_r >= c or c == setup.n_frames - 1, "as soon as its last neighbour was found"
-                composed.append(window.compose(j, images).c)
-    assert composed == list(range(n_c))
-    assert most <= min(2 * n_r + 1, n_c)
-    assert len(window._frames) <= 2 * n_r
+        for j in ready_frames(window, setup, range(n_c), pool):
+            c = window.found[-1]
+            assert j == len(composed), "in order"
+            assert j + setup.n_r <= c or c == setup.n_frames - 1, "not before its last neighbour was found"
+            assert j + setup.n_r >= c or c == setup.n_frames - 1, "as soon as its last neighbour was found"
+            composed.append(window.compose(j, images).c)
+    assert composed == window.found == list(range(n_c))
+    assert window.most <= min(2 * n_r + 1, n_c)
+    assert not window._frames and not window._holes
 
 
 def test_memory_of_dropped_frames_is_not_seen_again() -> None:
@@ -47,11 +61,8 @@ def test_memory_of_dropped_frames_is_not_seen_again() -> None:
     rendered = tiny.render_frames(inputs).images
     with tiny.planned(inputs) as (setup, ambient):
         for j in (3, 7):
-            with tiny.pool_of(setup) as pool:
-                window = Window(setup, ambient, pool, [j])
-                for k in setup.frames_around(j, 1):
-                    window.add(find_frame(setup, k, pool))
-                image = window.compose(j, np.empty(rendered[0].shape, np.float32)).images
+            with TracePool(setup, 1) as pool:
+                image = window_of(j, setup, ambient, pool).compose(j, np.empty(rendered[0].shape, np.float32)).images
             np.testing.assert_array_equal(image, rendered[j])
 
 
