@@ -7,13 +7,14 @@ from .arrays import Float32, Int32, Real
 from .camera import Cameras, corner_of, eye_ray
 from .embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, intersect
 from .hits import Hits, met, record_hits
-from .kernel import CACHED, inlined, kernel
+from .kernel import inlined, keep_on_disk, kernel
 from .lanes import LANES, choose, doubles, floor, gather, integers, lane_numbers, put_lanes, put_triples
 from .sampling import OTHER_HALF, PIXEL, PIXEL_SAMPLE, r2, stream, word
 from .surface import Surfaces, specular_at
 
 
-@nb.njit(cache=CACHED)
+@keep_on_disk
+@nb.njit()
 def pixel_order(width: int, height: int) -> Int32:
     """All pixels, in 4 x 4 blocks within 32 x 32 tiles.
 

@@ -1,4 +1,4 @@
-"""How hot loops are compiled.
+"""How hot loops are compiled, and kept on disk.
 
 `kernel` leaves out two things that numba does by default and that cost more than the loops themselves here: counting
 references to every array that is passed on (an atomic instruction each, for arrays that the caller holds anyway), and
@@ -6,39 +6,114 @@ a check for division by zero at every division. So a kernel must not allocate: i
 releases the GIL and is compiled once for all runs.
 
 `inlined` is for the small functions that kernels are written with.
+
+To decorate a function only declares it. The first call looks for its machine code on disk, and compiles it if there
+is none; only then is there a folder for it (`kernelcache.py`), and numba's settings stay as they are.
 """
 
 import platform
 from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba as nb
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
+from numba.core import caching, cgutils
 from numba.extending import intrinsic
 
-from .kernelcache import use_own_cache
-
-CACHED = use_own_cache()  # before the first kernel is declared
+from .kernelcache import forgive, kernel_folder
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 _LINE = 64  # bytes
-_njit: Any = nb.njit  # its stubs do not know `_nrt`
-_OPTIONS = {"nogil": True, "cache": CACHED, "error_model": "numpy", "_nrt": False}
+# What of numba has no types.
+_njit: Any = nb.njit
+_Locator: Any = caching._CacheLocator
+_OfSourceFile: Any = caching._SourceFileBackedLocatorMixin
+_Files: Any = caching.CompileResultCacheImpl
+_FunctionCache: Any = caching.FunctionCache
+_OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False}
+
+
+class _OwnLocator(_OfSourceFile, _Locator):  # type: ignore[misc]
+    """Names the folder of the kernels of a source file, in that of this state of the package."""
+
+    def __init__(self, function: Any, file: str, folder: Path) -> None:
+        self._py_file, self._lineno = file, function.__code__.co_firstlineno
+        self._folder = str(folder / self.get_suitable_cache_subpath(file))
+
+    def get_cache_path(self) -> str:
+        return self._folder
+
+    @classmethod
+    def from_function(cls, function: Any, file: str) -> "_OwnLocator | None":
+        folder = kernel_folder()
+        return cls(function, file, folder) if folder and Path(file).exists() else None
+
+
+class _OwnFiles(_Files):  # type: ignore[misc]
+    _locator_classes = (_OwnLocator,)
+
+
+class _OwnCache(_FunctionCache):  # type: ignore[misc]
+    """numba's cache of a function, in our folder, and without it where that fails."""
+
+    _impl_class = _OwnFiles
+
+    def _guard_against_spurious_io_errors(self) -> AbstractContextManager[None]:
+        return forgive(self)
+
+
+class _LazyCache:
+    """What numba asks for the machine code of a function; opens the cache when it is asked first."""
+
+    def __init__(self, function: Any) -> None:
+        self._function = function
+        self._opened: Any = None
+
+    @property
+    def cache(self) -> Any:
+        if self._opened is None:
+            try:
+                self._opened = _OwnCache(self._function)
+            except RuntimeError:  # no folder, or a function that was typed in
+                self._opened = caching.NullCache()
+        return self._opened
+
+    @property
+    def cache_path(self) -> Any:
+        return self.cache.cache_path
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        return self.cache.load_overload(signature, context)
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        self.cache.save_overload(signature, compiled)
+
+    def flush(self) -> None:
+        self.cache.flush()
+
+
+def keep_on_disk(function: F) -> F:
+    """Keep the machine code of a function that numba has declared (`nb.njit`, `CFunc`) for later runs."""
+    compiled: Any = function
+    if hasattr(compiled, "enable_caching"):  # not where NUMBA_DISABLE_JIT leaves Python's functions as they are
+        compiled._cache = _LazyCache(getattr(compiled, "py_func", None) or compiled.__wrapped__)
+    return function
 
 
 def kernel(function: F) -> F:
     """Compile a hot loop; it must not allocate."""
-    compiled: F = _njit(**_OPTIONS)(function)
-    return compiled
+    declared: F = _njit(**_OPTIONS)(function)
+    return keep_on_disk(declared)
 
 
 def inlined(function: F) -> F:
     """Compile a function into every kernel that calls it."""
-    compiled: F = _njit(inline="always", **_OPTIONS)(function)
-    return compiled
+    declared: F = _njit(inline="always", **_OPTIONS)(function)
+    return keep_on_disk(declared)
 
 
 def _prefetch_of(typingctx: Any, address: Any, n_bytes: Any) -> Any:

@@ -2,15 +2,18 @@
 
 numba keeps a compiled function for as long as its own source file does not change. Kernels here are written with small
 functions of other files, so that is not enough: after an edit, or an update by git, old machine code would run on. So
-kernels are kept in a folder whose name is a digest of all source files.
+kernels are kept in a folder whose name is a digest of all source files, and of what else machine code depends on.
+Nothing here is done before the first kernel is needed.
 """
 
 import hashlib
+import importlib
 import os
 import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,52 +21,84 @@ from .files import reason
 
 # Folders of earlier states of the source that are kept: enough to change between a few branches.
 KEPT = 3
+# Processors that Linux guards against Downfall take ten times as long for their gather instruction.
+_GUARD = Path("/sys/devices/system/cpu/vulnerabilities/gather_data_sampling")
 
 _problems: list[str] = []
 
 
+@cache
+def slow_gathers() -> bool:
+    """Whether this machine's gather instruction is slower than single loads; kernels are then compiled without it."""
+    with suppress(OSError):
+        return "Mitigation" in _GUARD.read_text()
+    return False
+
+
+def package_folder() -> Path:
+    """The folder of the whole package, wherever in it this module stands."""
+    package: Any = importlib.import_module(__name__.partition(".")[0])
+    return Path(package.__path__[0])
+
+
 def source_digest(package: Path) -> str:
-    """A short digest of every source file of the package."""
-    total = hashlib.sha256()
+    """A short digest of every source file of the package, and of the flags of this machine that kernels depend on.
+
+    numba itself keeps kernels apart by its version, Python's, and the name and the instructions of the processor.
+    """
+    total = hashlib.sha256(b"slow gathers\0" if slow_gathers() else b"")
     for file in sorted(package.rglob("*.py")):
         total.update(str(file.relative_to(package)).encode() + b"\0" + file.read_bytes())
     return total.hexdigest()[:16]
 
 
-def use_own_cache() -> bool:
-    """Point numba at a folder for kernels: the user's choice (NUMBA_CACHE_DIR), else one of this state of the source.
+@cache
+def kernel_folder() -> Path | None:
+    """Find, or make, the folder for kernels of this state of the source, and drop those of old states.
+
+    It stands in the user's choice (NUMBA_CACHE_DIR), else in the user's cache folder, else beside the source.
 
     Returns:
-        Whether there is one; without, kernels are compiled in each run, and `problem` tells why.
+        None where no folder can be written: kernels are then compiled in each run, and `problem` says why.
     """
-    from numba import config
-    from numba.core import caching
     from numba.misc import appdirs
 
-    settings: Any = config
-    cache_class: Any = caching.FunctionCache
-    cache_class._guard_against_spurious_io_errors = _forgiving
-    chosen = os.environ.get("NUMBA_CACHE_DIR")
-    if chosen and _usable(Path(chosen)):
-        return True
     place: Any = appdirs.AppDirs  # untyped
-    package = Path(__file__).parent
+    package = package_folder()
     digest = source_digest(package)
-    bases = (Path(place("framearray", appauthor=False).user_cache_dir), package / "__pycache__" / "framearray")
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    bases = [Path(chosen, "framearray")] if chosen else []
+    bases += [Path(place("framearray", appauthor=False).user_cache_dir), package / "__pycache__" / "framearray"]
     for base in bases:
         if _usable(base / digest):
             _drop_old(base, digest)
-            settings.CACHE_DIR = str(base / digest)
             if not chosen:
-                _problems.clear()
-            return True
-    settings.CACHE_DIR = ""
-    return False
+                _problems.clear()  # the user need not know that it is the second best
+            return base / digest
+    return None
 
 
 def problem() -> str:
     """Why kernels could not be read or kept; nothing where they could."""
     return _problems[0] if _problems else ""
+
+
+@contextmanager
+def forgive(kept: Any) -> Iterator[None]:
+    """Around reading and writing a kernel: where that fails it is compiled, as if there were no cache.
+
+    A disk may be full, and a file damaged: then reading it may raise anything.
+
+    Args:
+        kept: numba's cache of the kernel.
+    """
+    try:
+        yield
+    except Exception as error:
+        why = reason(error) if isinstance(error, OSError) else f"damaged: {error}"
+        _problems.append(f"{kept.cache_path}: {why}")
+        with suppress(OSError):
+            kept.flush()  # what is damaged would stay for ever
 
 
 def _usable(folder: Path) -> bool:
@@ -84,18 +119,3 @@ def _drop_old(base: Path, digest: str) -> None:
         others = sorted((f for f in base.iterdir() if f.name != digest), key=lambda f: f.stat().st_mtime)
         for old in others[: -KEPT or None]:
             shutil.rmtree(old, ignore_errors=True)
-
-
-@contextmanager
-def _forgiving(cache: Any) -> Iterator[None]:
-    """Around reading and writing a kernel: where that fails it is compiled, as if there were no cache.
-
-    A disk may be full, and a file damaged: then reading it may raise anything.
-    """
-    try:
-        yield
-    except Exception as error:
-        why = reason(error) if isinstance(error, OSError) else f"damaged: {error}"
-        _problems.append(f"{cache.cache_path}: {why}")
-        with suppress(OSError):
-            cache.flush()  # what is damaged would stay for ever

@@ -9,9 +9,10 @@ from typing import Any
 import numba as nb
 import numpy as np
 from numba import types
+from numba.core.ccallback import CFunc
 from numba.extending import intrinsic
 
-from ..kernel import CACHED
+from ..kernel import keep_on_disk
 from ..scene import Scene
 from ..surface import Surfaces, is_cut_out, surfaces
 
@@ -30,11 +31,12 @@ def _pointer_to(typingctx: Any, address: Any) -> Any:
 
 
 _pointer: Any = intrinsic(_pointer_to)
-_numba: Any = nb  # its stubs know neither of these two
-_carray, _cfunc = _numba.carray, _numba.cfunc
+_numba: Any = nb  # its stubs do not know this one
+_carray = _numba.carray
 
 
-@nb.njit(cache=CACHED)
+@keep_on_disk
+@nb.njit()
 def _surfaces_at(table: Any) -> Surfaces:
     """Rebuild `Surfaces` from the addresses and lengths that `MaskTable` wrote down."""
     n, m, n_texels, n_textures = table[0], table[1], table[2], table[3]
@@ -73,7 +75,10 @@ def _filter() -> Any:
                 if is_cut_out(s, triangle, hits[_HIT_U, lane], hits[_HIT_V, lane]):
                     valid[lane] = 0
 
-    return _cfunc(types.void(types.intp), nopython=True, cache=CACHED)(filter_masked)
+    declared = CFunc(filter_masked, ((types.intp,), types.void), locals={}, options={"nopython": True})
+    callback: Any = keep_on_disk(declared)
+    callback.compile()  # or load
+    return callback
 
 
 class MaskTable:

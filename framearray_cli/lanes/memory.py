@@ -1,19 +1,16 @@
 """Sixteen numbers from arrays and back: in a row, as rows of three, and from anywhere."""
 
-from pathlib import Path
 from typing import Any
 
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
+from ..kernelcache import slow_gathers
 from .kinds import ELEMENTS, FLAGS, INTEGERS, LANES, SUFFIX, WORD, Lanes, declared, takes, vector_of
 
 _LARGEST_HALF = 0x477FE000  # 65504 as the bits of a float32
 _Tuple: Any = types.UniTuple  # of numba has no types
-# Processors that Linux guards against Downfall take ten times as long for their gather instruction.
-_GUARD = Path("/sys/devices/system/cpu/vulnerabilities/gather_data_sampling")
-_SLOW_GATHERS = _GUARD.exists() and "Mitigation" in _GUARD.read_text()
 
 
 def _is_array(array: Any, lanes: Any = None) -> bool:
@@ -115,7 +112,7 @@ def _gather_of(typingctx: Any, array: Any, offsets: Any) -> Any:
 
         return array.dtype(array, offsets), one
     lanes = Lanes(array.dtype)
-    at_once = array.dtype in (types.float32, types.int32) and not _SLOW_GATHERS
+    at_once = array.dtype in (types.float32, types.int32) and not slow_gathers()
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         data = context.make_array(sig.args[0])(context, builder, args[0]).data

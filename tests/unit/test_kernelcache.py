@@ -1,24 +1,32 @@
-"""Old machine code never runs on after the source has changed."""
+"""Old machine code never runs on after the source has changed, and importing the package leaves no trace."""
 
 import errno
 import os
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
-import numba
 import pytest
 
+import framearray_cli
 from framearray_cli import kernelcache
+from framearray_cli.kernel import keep_on_disk, kernel
+
+PACKAGE = Path(framearray_cli.__file__).parent
+elsewhere = pytest.mark.skipif(os.name == "nt", reason="the place of caches is set by XDG_CACHE_HOME elsewhere only")
 
 
 @pytest.fixture
-def cache_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty place for caches; numba's own setting is put back afterwards."""
+def cache_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """An empty place for caches; the folder that other tests use is found again afterwards."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "before")
     monkeypatch.setattr(kernelcache, "_problems", [])
-    return tmp_path / "framearray"
+    kernelcache.kernel_folder.cache_clear()
+    yield tmp_path / "framearray"
+    kernelcache.kernel_folder.cache_clear()
 
 
 def test_any_change_of_any_file_changes_the_digest(tmp_path: Path) -> None:
@@ -33,56 +41,134 @@ def test_any_change_of_any_file_changes_the_digest(tmp_path: Path) -> None:
     assert len({first, second, kernelcache.source_digest(tmp_path)}) == 3
 
 
-@pytest.mark.skipif(os.name == "nt", reason="the place of caches is set by XDG_CACHE_HOME elsewhere only")
+def test_the_digest_is_of_every_module_in_every_folder_of_the_package(tmp_path: Path) -> None:
+    """Wherever the module that computes it stands."""
+    assert kernelcache.package_folder() == PACKAGE
+    copy = tmp_path / "package"
+    shutil.copytree(PACKAGE, copy, ignore=lambda folder, names: {"__pycache__"} & set(names))
+    files = sorted(copy.rglob("*.py"))
+    digests = {kernelcache.source_digest(copy)}
+    for file in files:
+        with file.open("a") as opened:
+            opened.write("# changed")
+        digests.add(kernelcache.source_digest(copy))
+    assert len({file.parent for file in files}) > 5 and len(digests) == len(files) + 1
+
+
+def test_the_digest_changes_with_what_gathers_are_compiled_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    digests = set()
+    for slow in (False, True):
+        monkeypatch.setattr(kernelcache, "slow_gathers", lambda slow=slow: slow)
+        digests.add(kernelcache.source_digest(PACKAGE))
+    assert len(digests) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "slow"), [("Mitigation: Microcode", True), ("Not affected", False), ("Vulnerable", False), (None, False)]
+)
+def test_gathers_are_slow_where_the_processor_is_guarded(
+    text: str | None, slow: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if text is not None:
+        (tmp_path / "guard").write_text(text)
+    monkeypatch.setattr(kernelcache, "_GUARD", tmp_path / "guard")
+    assert kernelcache.slow_gathers.__wrapped__() is slow
+
+
+IMPORTS = """
+import importlib, pathlib, sys
+from numba.core import caching
+from numba import config
+classes = [c for c in vars(caching).values() if isinstance(c, type)]
+def state():
+    return [dict(vars(c)) for c in classes], {name: str(value) for name, value in vars(config).items()}
+before, imported = state(), []
+package = pathlib.Path(sys.argv[1])
+for file in sorted(package.rglob("*.py")):
+    if "kernel import" in (text := file.read_text()) and "@kernel" in text or "@inlined" in text:
+        name = ".".join(file.relative_to(package.parent).with_suffix("").parts)
+        imported.append(importlib.import_module(name))
+assert len(imported) > 10, imported
+home = pathlib.Path(sys.argv[2])
+print(state() == before, any(home.iterdir()))
+from framearray_cli.eyehits import pixel_order
+pixel_order(4, 4)
+print(state() == before, len(list(home.rglob("*.nbi"))))
+"""
+
+
+@elsewhere
+def test_importing_kernels_leaves_no_folder_and_numba_as_it_is(tmp_path: Path) -> None:
+    """The first kernel that is called makes the folder; numba's settings and classes stay for other libraries."""
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment["XDG_CACHE_HOME"] = str(tmp_path)
+    command = [sys.executable, "-c", IMPORTS, str(PACKAGE), str(tmp_path)]
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert run.stdout.splitlines() == ["True False", "True 1"]
+
+
+@elsewhere
 def test_kernels_go_into_a_folder_of_this_source_and_old_ones_are_dropped(cache_home: Path) -> None:
     for age in range(5):
         (cache_home / f"old{age}").mkdir(parents=True)
         os.utime(cache_home / f"old{age}", (1000 - age, 1000 - age))
-    kernelcache.use_own_cache()
-    own = kernelcache.source_digest(Path(kernelcache.__file__).parent)
-    assert str(cache_home / own) == numba.config.CACHE_DIR
+    own = kernelcache.source_digest(PACKAGE)
+    assert kernelcache.kernel_folder() == cache_home / own
     assert {folder.name for folder in cache_home.iterdir()} == {own, "old0", "old1", "old2"}
 
 
-def test_the_users_choice_stands(cache_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(cache_home))
-    assert kernelcache.use_own_cache()
-    assert numba.config.CACHE_DIR == "before" and not list(cache_home.iterdir())
+def test_the_users_choice_stands(cache_home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What else the user keeps there stays."""
+    chosen = tmp_path / "chosen"
+    for k in range(5):
+        (chosen / f"other{k}").mkdir(parents=True)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(chosen))
+    function = kernel(doubled)
+    assert function(21) == 42
+    (file,) = chosen.rglob("*.nbi")
+    assert kernelcache.source_digest(PACKAGE) in file.parts
+    assert len(list(chosen.glob("other*"))) == 5 and not cache_home.exists()
     assert not kernelcache.problem()
 
 
-@pytest.mark.skipif(os.name == "nt", reason="the place of caches is set by XDG_CACHE_HOME elsewhere only")
+@elsewhere
 def test_where_the_users_folder_cannot_be_used_it_is_one_beside_the_source(
     cache_home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Never numba's own places: those do not change when another file of the source does."""
     package = tmp_path / "package"
     package.mkdir()
-    monkeypatch.setattr(kernelcache, "__file__", str(package / "kernelcache.py"))
+    monkeypatch.setattr(kernelcache, "package_folder", lambda: package)
     cache_home.write_text("in the way")
-    assert kernelcache.use_own_cache()
-    assert str(package / "__pycache__" / "framearray" / kernelcache.source_digest(package)) == numba.config.CACHE_DIR
+    beside = package / "__pycache__" / "framearray"
+    assert kernelcache.kernel_folder() == beside / kernelcache.source_digest(package)
     assert not kernelcache.problem(), "nothing that a user need know"
-    (package / "__pycache__" / "framearray").rename(tmp_path / "moved")
-    (package / "__pycache__" / "framearray").write_text("in the way, too")
-    assert not kernelcache.use_own_cache()
-    assert numba.config.CACHE_DIR == ""
+    beside.rename(tmp_path / "moved")
+    beside.write_text("in the way, too")
+    kernelcache.kernel_folder.cache_clear()
+    assert kernelcache.kernel_folder() is None
     assert kernelcache.problem().startswith(f"{cache_home}{os.sep}")
+    assert kernel(doubled)(21) == 42, "it is compiled all the same"
 
 
-def test_a_choice_that_cannot_be_used_is_told(cache_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_choice_that_cannot_be_used_is_reported(cache_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (cache_home.parent / "file").write_text("")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(cache_home.parent / "file"))
-    assert kernelcache.use_own_cache()
+    folder = kernelcache.kernel_folder()
     assert kernelcache.problem().startswith(str(cache_home.parent / "file"))
-    assert numba.config.CACHE_DIR != "before"
+    assert folder is not None and cache_home.parent / "file" not in folder.parents
 
 
-def compiled(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A function that numba keeps in a folder."""
-    kernelcache.use_own_cache()
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(folder))
-    return numba.njit(cache=True)(doubled)
+def test_a_function_without_a_source_file_is_compiled_in_each_run(cache_home: Path) -> None:
+    names: dict[str, Any] = {}
+    exec("def typed_in(x): return 3 * x", names)
+    assert kernel(names["typed_in"])(14) == 42
+    assert not list(cache_home.rglob("*.nbi"))
+
+
+def test_without_compiling_kernels_are_plain_functions() -> None:
+    """As numba's own decorator leaves them with NUMBA_DISABLE_JIT."""
+    assert keep_on_disk(doubled) is doubled
 
 
 def doubled(x: int) -> int:
@@ -90,24 +176,23 @@ def doubled(x: int) -> int:
 
 
 def test_a_kernel_that_cannot_be_kept_runs_all_the_same(cache_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    function = compiled(cache_home.parent / "cache", monkeypatch)
+    function: Any = kernel(doubled)
 
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(function._cache._cache_file, "save", full)
+    monkeypatch.setattr(function._cache.cache._cache_file, "save", full)
     assert function(21) == 42
     assert kernelcache.problem().endswith(": No space left on device")
 
 
 @pytest.mark.parametrize("suffix", ["nbi", "nbc"])
-def test_a_damaged_kernel_is_compiled_again(suffix: str, cache_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_damaged_kernel_is_compiled_again(suffix: str, cache_home: Path) -> None:
     """As a power cut may leave it: of the right length, and empty."""
-    folder = cache_home.parent / "cache"
-    assert compiled(folder, monkeypatch)(21) == 42
-    (file,) = folder.rglob(f"*.{suffix}")
+    assert kernel(doubled)(21) == 42
+    (file,) = (kernelcache.kernel_folder() or cache_home).rglob(f"*.{suffix}")
     file.write_bytes(bytes(file.stat().st_size))
-    damaged = compiled(folder, monkeypatch)
+    damaged: Any = kernel(doubled)
     assert damaged(21) == 42 and damaged.stats.cache_hits == {}
-    again = compiled(folder, monkeypatch)
+    again: Any = kernel(doubled)
     assert again(21) == 42 and sum(again.stats.cache_hits.values()) == 1, "it was written anew"
