@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .assets import AssetError, Assets, shortened
-from .gltf_check import COMPONENTS, WIDTHS, Tree, check_gltf
+from .gltf_check import COMPONENTS, WIDTHS, check_gltf
+from .gltf_values import Tree
 
 MAGIC = b"glTF"
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942

@@ -2,10 +2,10 @@
 
 from .assets import Assets
 from .container import open_gltf
-from .defaults import default_material
 from .gltf_materials import read_materials
 from .gltf_nodes import check_readable, note_unread, placed_meshes, used_materials
 from .gltf_triangles import Triangles, read_triangles
+from .materials import default_material
 from .model import Material, Meshes, Notes, Part
 from .textures import TextureTable
 from .walk import place

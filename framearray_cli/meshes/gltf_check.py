@@ -3,26 +3,18 @@
 Only keys that some reader reads are checked; a key with the value null counts as missing.
 """
 
-import itertools
-import math
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 
 from ..errors import SceneError
-from ..jobvalues import shown
+from .gltf_values import LIGHTS, Tree, extensions, list_of, map_of, number, number_of, numbers, one_of, table, text
 from .limit import Limit
-
-Tree = dict[str, Any]
-Check = Callable[[Any, str, Tree], Iterator[str]]  # value, its place, the whole tree -> problems
 
 COMPONENTS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 MOST_SHOWN = 3  # problems of a file; the next ones are most often the same
-LARGEST_FLOAT = 1.7e308
 LARGEST = 2**53  # whole numbers beyond are not whole in JSON
-LIGHTS = "lights"  # of the extension, beside the top-level lists
 TRIANGLES = (4, 5, 6)  # modes: list, strip, fan
 KINDS = {"POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TEXCOORD": ("VEC2",), "COLOR": ("VEC3", "VEC4")}
 
@@ -31,7 +23,7 @@ def check_gltf(tree: Tree, limit: Limit) -> None:
     """Refuse a tree that cannot be read as it is.
 
     Raises:
-        SceneError: tells the first problems, with their places.
+        SceneError: names the first problems and their places.
     """
     problems: list[str] = []
     for problem in _problems(tree):
@@ -61,199 +53,90 @@ def _problems(tree: Tree) -> Iterator[str]:
                 yield f"animations[{index}]: a channel has no sampler"
 
 
-def _got(value: Any) -> str:
-    return "an object" if isinstance(value, dict) else shown(value)
-
-
-def _number(low: float = -math.inf, high: float = math.inf, *, whole: bool = False) -> Check:
-    kind = "a whole number" if whole else "a number"
-    bounds = f" from {low:g} to {high:g}" if math.isfinite(low + high) else f" of at least {low:g}"
-    expected = kind + bounds if math.isfinite(low) else kind
-
-    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        good = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
-        good = good and abs(value) <= LARGEST_FLOAT  # neither infinite nor NaN, which are no JSON
-        if not good or value < low or value > high:
-            yield f"{place}: expected {expected}, got {_got(value)}"
-
-    return check
-
-
-def _numbers(count: int) -> Check:
-    one = _number()
-
-    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        if not isinstance(value, list) or len(value) != count:
-            yield f"{place}: expected {count} numbers, got {_got(value)}"
-        else:
-            wrong = (problem for item in value for problem in one(item, place, tree))
-            yield from itertools.islice(wrong, 1)
-
-    return check
-
-
-def _text(value: Any, place: str, tree: Tree) -> Iterator[str]:
-    if not isinstance(value, str):
-        yield f"{place}: expected text, got {_got(value)}"
-
-
-def _one_of(*values: Any) -> Check:
-    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        if not isinstance(value, int | str) or isinstance(value, bool) or value not in values:
-            yield f"{place}: expected {', '.join(map(str, values[:-1]))} or {values[-1]}, got {_got(value)}"
-
-    return check
-
-
-def _number_of(key: str) -> Check:
-    """The number of an entry of a top-level list, from 0."""
-
-    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        entries = _lights(tree) if key == LIGHTS else tree.get(key)
-        count = len(entries) if isinstance(entries, list) else 0
-        if key == "scenes" and not count:
-            return  # told in a better way later
-        if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < count:
-            yield f"{place}: expected the number of one of {count} {key}, from 0, got {_got(value)}"
-
-    return check
-
-
-def _lights(tree: Tree) -> Any:
-    """The lights of a tree, whatever it is like."""
-    for key in ("extensions", "KHR_lights_punctual", LIGHTS):
-        tree = tree.get(key) or {} if isinstance(tree, dict) else {}
-    return tree
-
-
-def _list(one: Check) -> Check:
-    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        if not isinstance(value, list):
-            yield f"{place}: expected a list, got {_got(value)}"
-        else:
-            for index, item in enumerate(value):
-                yield from one(item, f"{place}[{index}]", tree)
-
-    return check
-
-
-def _table(keys: Mapping[str, Check], needed: tuple[str, ...] = ()) -> Check:
-    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        if not isinstance(value, dict):
-            yield f"{place or 'the file'}: expected an object, got {_got(value)}"
-            return
-        before = f"{place}." if place else ""
-        for key in needed:
-            if value.get(key) is None:
-                yield f"{before}{key}: is missing"
-        for key, one in keys.items():
-            if value.get(key) is not None:
-                yield from one(value[key], before + key, tree)
-
-    return check
-
-
-def _map(one: Check) -> Check:
-    """An object with whatever keys."""
-
-    def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
-        if not isinstance(value, dict):
-            yield f"{place}: expected an object, got {_got(value)}"
-        else:
-            for key, item in value.items():
-                yield from one(item, f"{place}.{key}", tree)
-
-    return check
-
-
-def _extensions(**keys: Check) -> dict[str, Check]:
-    return {"extensions": _table(keys)}
-
-
-SIZE = _number(0, LARGEST, whole=True)
-VIEW, ACCESSOR = _number_of("bufferViews"), _number_of("accessors")
-COMPONENT = _one_of(*COMPONENTS)
-MOVED = _table({"offset": _numbers(2), "scale": _numbers(2), "rotation": _number(), "texCoord": SIZE})
-IMAGE_USE = _table(
-    {"index": _number_of("textures"), "texCoord": SIZE, **_extensions(KHR_texture_transform=MOVED)}, ("index",)
+SIZE = number(0, LARGEST, whole=True)
+VIEW, ACCESSOR = number_of("bufferViews"), number_of("accessors")
+COMPONENT = one_of(*COMPONENTS)
+MOVED = table({"offset": numbers(2), "scale": numbers(2), "rotation": number(), "texCoord": SIZE})
+IMAGE_USE = table(
+    {"index": number_of("textures"), "texCoord": SIZE, **extensions(KHR_texture_transform=MOVED)}, ("index",)
 )
-METAL = {"metallicFactor": _number(), "roughnessFactor": _number(), "baseColorFactor": _numbers(4)}
+METAL = {"metallicFactor": number(), "roughnessFactor": number(), "baseColorFactor": numbers(4)}
 METAL |= {"baseColorTexture": IMAGE_USE, "metallicRoughnessTexture": IMAGE_USE}
-GLOSSY = {"diffuseFactor": _numbers(4), "specularFactor": _numbers(3), "glossinessFactor": _number()}
+GLOSSY = {"diffuseFactor": numbers(4), "specularFactor": numbers(3), "glossinessFactor": number()}
 GLOSSY |= {"diffuseTexture": IMAGE_USE, "specularGlossinessTexture": IMAGE_USE}
 MATERIAL = {
-    "pbrMetallicRoughness": _table(METAL),
-    "alphaMode": _text,
-    "alphaCutoff": _number(),
-    "emissiveFactor": _numbers(3),
-    **_extensions(
-        KHR_materials_pbrSpecularGlossiness=_table(GLOSSY),
-        KHR_materials_transmission=_table({"transmissionFactor": _number()}),
+    "pbrMetallicRoughness": table(METAL),
+    "alphaMode": text,
+    "alphaCutoff": number(),
+    "emissiveFactor": numbers(3),
+    **extensions(
+        KHR_materials_pbrSpecularGlossiness=table(GLOSSY),
+        KHR_materials_transmission=table({"transmissionFactor": number()}),
     ),
 }
 PRIMITIVE = {
-    "attributes": _map(ACCESSOR),
+    "attributes": map_of(ACCESSOR),
     "indices": ACCESSOR,
-    "material": _number_of("materials"),
-    "mode": _number(0, 6, whole=True),
-    **_extensions(KHR_draco_mesh_compression=_table({"bufferView": VIEW, "attributes": _map(SIZE)})),
+    "material": number_of("materials"),
+    "mode": number(0, 6, whole=True),
+    **extensions(KHR_draco_mesh_compression=table({"bufferView": VIEW, "attributes": map_of(SIZE)})),
 }
 NODE = {
-    "children": _list(_number_of("nodes")),
-    "mesh": _number_of("meshes"),
-    "camera": _number_of("cameras"),
-    "matrix": _numbers(16),
-    "translation": _numbers(3),
-    "rotation": _numbers(4),
-    "scale": _numbers(3),
-    **_extensions(
-        KHR_lights_punctual=_table({"light": _number_of(LIGHTS)}, ("light",)),
-        EXT_mesh_gpu_instancing=_table({"attributes": _map(ACCESSOR)}, ("attributes",)),
+    "children": list_of(number_of("nodes")),
+    "mesh": number_of("meshes"),
+    "camera": number_of("cameras"),
+    "matrix": numbers(16),
+    "translation": numbers(3),
+    "rotation": numbers(4),
+    "scale": numbers(3),
+    **extensions(
+        KHR_lights_punctual=table({"light": number_of(LIGHTS)}, ("light",)),
+        EXT_mesh_gpu_instancing=table({"attributes": map_of(ACCESSOR)}, ("attributes",)),
     ),
 }
-SPARSE_PLACES = {"bufferView": VIEW, "byteOffset": SIZE, "componentType": _one_of(5121, 5123, 5125)}
+SPARSE_PLACES = {"bufferView": VIEW, "byteOffset": SIZE, "componentType": one_of(5121, 5123, 5125)}
 SPARSE = {
     "count": SIZE,
-    "indices": _table(SPARSE_PLACES, ("bufferView", "componentType")),
-    "values": _table({"bufferView": VIEW, "byteOffset": SIZE}, ("bufferView",)),
+    "indices": table(SPARSE_PLACES, ("bufferView", "componentType")),
+    "values": table({"bufferView": VIEW, "byteOffset": SIZE}, ("bufferView",)),
 }
 ACCESSOR_KEYS = {
     "bufferView": VIEW,
     "byteOffset": SIZE,
     "componentType": COMPONENT,
     "count": SIZE,
-    "type": _one_of(*WIDTHS),
-    "sparse": _table(SPARSE, tuple(SPARSE)),
+    "type": one_of(*WIDTHS),
+    "sparse": table(SPARSE, tuple(SPARSE)),
 }
-VIEW_KEYS = {"buffer": _number_of("buffers"), "byteOffset": SIZE, "byteLength": SIZE}
-VIEW_KEYS["byteStride"] = _number(1, 65536, whole=True)
-CAMERA = {"type": _text, "perspective": _table({"yfov": _number(), "aspectRatio": _number()})}
-LIGHT = {"type": _text, "intensity": _number(), "color": _numbers(3)}
-CHANNEL = {"sampler": SIZE, "target": _table({"node": _number_of("nodes"), "path": _text}, ("path",))}
-SAMPLER = {"input": ACCESSOR, "output": ACCESSOR, "interpolation": _text}
+VIEW_KEYS = {"buffer": number_of("buffers"), "byteOffset": SIZE, "byteLength": SIZE}
+VIEW_KEYS["byteStride"] = number(1, 65536, whole=True)
+CAMERA = {"type": text, "perspective": table({"yfov": number(), "aspectRatio": number()})}
+LIGHT = {"type": text, "intensity": number(), "color": numbers(3)}
+CHANNEL = {"sampler": SIZE, "target": table({"node": number_of("nodes"), "path": text}, ("path",))}
+SAMPLER = {"input": ACCESSOR, "output": ACCESSOR, "interpolation": text}
 ANIMATION = {
-    "channels": _list(_table(CHANNEL, tuple(CHANNEL))),
-    "samplers": _list(_table(SAMPLER, ("input", "output"))),
+    "channels": list_of(table(CHANNEL, tuple(CHANNEL))),
+    "samplers": list_of(table(SAMPLER, ("input", "output"))),
 }
-WEBP = _extensions(EXT_texture_webp=_table({"source": _number_of("images")}))
-FILE = _table(
+WEBP = extensions(EXT_texture_webp=table({"source": number_of("images")}))
+FILE = table(
     {
-        "asset": _table({}),
-        "extensionsUsed": _list(_text),
-        "scene": _number_of("scenes"),
-        "scenes": _list(_table({"nodes": _list(_number_of("nodes"))})),
-        "nodes": _list(_table(NODE)),
-        "meshes": _list(_table({"primitives": _list(_table(PRIMITIVE, ("attributes",)))}, ("primitives",))),
-        "accessors": _list(_table(ACCESSOR_KEYS, ("componentType", "count", "type"))),
-        "bufferViews": _list(_table(VIEW_KEYS, ("buffer", "byteLength"))),
-        "buffers": _list(_table({"byteLength": SIZE, "uri": _text}, ("byteLength",))),
-        "materials": _list(_table(MATERIAL)),
-        "textures": _list(_table({"source": _number_of("images"), "sampler": _number_of("samplers"), **WEBP})),
-        "images": _list(_table({"uri": _text, "bufferView": VIEW, "mimeType": _text})),
-        "samplers": _list(_table({"wrapS": SIZE, "wrapT": SIZE})),
-        "cameras": _list(_table(CAMERA, ("type",))),
-        "animations": _list(_table(ANIMATION)),
-        **_extensions(KHR_lights_punctual=_table({LIGHTS: _list(_table(LIGHT, ("type",)))})),
+        "asset": table({}),
+        "extensionsUsed": list_of(text),
+        "scene": number_of("scenes"),
+        "scenes": list_of(table({"nodes": list_of(number_of("nodes"))})),
+        "nodes": list_of(table(NODE)),
+        "meshes": list_of(table({"primitives": list_of(table(PRIMITIVE, ("attributes",)))}, ("primitives",))),
+        "accessors": list_of(table(ACCESSOR_KEYS, ("componentType", "count", "type"))),
+        "bufferViews": list_of(table(VIEW_KEYS, ("buffer", "byteLength"))),
+        "buffers": list_of(table({"byteLength": SIZE, "uri": text}, ("byteLength",))),
+        "materials": list_of(table(MATERIAL)),
+        "textures": list_of(table({"source": number_of("images"), "sampler": number_of("samplers"), **WEBP})),
+        "images": list_of(table({"uri": text, "bufferView": VIEW, "mimeType": text})),
+        "samplers": list_of(table({"wrapS": SIZE, "wrapT": SIZE})),
+        "cameras": list_of(table(CAMERA, ("type",))),
+        "animations": list_of(table(ANIMATION)),
+        **extensions(KHR_lights_punctual=table({LIGHTS: list_of(table(LIGHT, ("type",)))})),
     },
 )
 
@@ -294,8 +177,8 @@ def _primitives(tree: Tree) -> Iterator[str]:
         for p, primitive in enumerate(mesh["primitives"]):
             if primitive.get("mode", TRIANGLES[0]) not in TRIANGLES:
                 continue
-            for name, number in primitive["attributes"].items():
-                kinds, found = KINDS.get(name.split("_")[0]), accessors[number]["type"]
+            for name, accessor_number in primitive["attributes"].items():
+                kinds, found = KINDS.get(name.split("_")[0]), accessors[accessor_number]["type"]
                 if kinds and found not in kinds:
                     place = f"meshes[{m}].primitives[{p}].attributes.{name}"
                     yield f"{place}: expected an accessor of {' or '.join(kinds)}, got {found}"

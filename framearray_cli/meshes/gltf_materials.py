@@ -10,10 +10,9 @@ import numpy as np
 from ..arrays import Float64
 from .assets import AssetError, Assets
 from .container import Gltf, uri_bytes
-from .gltf_check import Tree
+from .gltf_values import Tree
+from .materials import CUTOFF, Opacity, Rgb3, blended, make_material, masked
 from .model import Material, Notes
-from .mtl import Rgb3, limited
-from .opacity import CUTOFF, Opacity, blended, masked
 from .textures import TextureTable
 
 MIRROR_ROUGHNESS = 0.1  # up to it a metal is a mirror
@@ -69,18 +68,8 @@ def _material(
         diffuse, specular = _glossy(name, base, gloss, notes)
     opacity = _opacity(name, entry, float(base[3]), texture, source, notes)
     _note_ignored(name, entry, notes)
-    reflectivity, specular = limited(name, diffuse, specular, notes)
-    material = Material(
-        name=name,
-        reflectivity=reflectivity,
-        specular=specular,
-        texture=texture,
-        specular_texture=texture if max(specular) > 0 and gloss is None else -1,
-        alpha=opacity.alpha,
-        alpha_texture=opacity.alpha_texture,
-        alpha_cutoff=opacity.alpha_cutoff,
-        left_out=opacity.left_out,
-    )
+    mirror_texture = texture if gloss is None else -1
+    material = make_material(name, diffuse, specular, opacity, notes, texture=texture, mirror_texture=mirror_texture)
     if texture < 0 or info is None:
         return GltfMaterial(material=material)
     transform: Tree = (info.get("extensions") or {}).get("KHR_texture_transform") or {}

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays import Float64
 from .container import Gltf
-from .gltf_check import Tree
+from .gltf_values import Tree
 
 PATHS = ("translation", "rotation", "scale")
 AT_REST: dict[str, Sequence[float]] = {

@@ -7,10 +7,10 @@ import numpy as np
 from ..arrays import Float64
 from ..errors import SceneError
 from .container import Gltf
-from .gltf_check import Tree
 from .gltf_materials import KNOWN, SILENT
 from .gltf_motion import AT_REST, PATHS, at_rest, rotations
 from .gltf_triangles import triangle_count
+from .gltf_values import Tree
 from .limit import Limit
 from .model import Notes
 

@@ -6,8 +6,8 @@ from typing import Literal
 
 from ..arrays import Float64
 from .container import Gltf
-from .gltf_check import Tree
 from .gltf_motion import Motion, read_motion
+from .gltf_values import Tree
 
 PUNCTUAL = "KHR_lights_punctual"
 

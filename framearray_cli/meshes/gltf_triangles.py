@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from ..arrays import Float32, Float64
 from .container import Gltf, normalised
-from .defaults import clean_colours
-from .gltf_check import TRIANGLES, Tree
+from .gltf_check import TRIANGLES
 from .gltf_materials import GltfMaterial
+from .gltf_values import Tree
+from .materials import clean_colours
 from .model import Notes
 
 LIST, STRIP, FAN = TRIANGLES

@@ -5,21 +5,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from .assets import Assets
+from .materials import Opacity, Rgb3, blended, make_material
 from .model import GREY, Material, Notes
-from .opacity import Opacity, blended
 from .textures import TextureTable
 
 MIRROR_MODELS = (3, 5)  # illum: ray traced reflection, without and with Fresnel
 GLASS_MODELS = (4, 6, 7, 9)
 # The lowest Ns of a mirror. Exporters write Ns = 1000 (1 - roughness)^2, and a mirror's roughness is at most 0.1.
 MIRROR_NS = 810.0
-BRIGHTEST = 1e30  # what infinite reflectivities are taken for, before they are scaled to 1
 MAP_OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-texres": 1, "-clamp": 1, "-bm": 1, "-imfchan": 1}
 MAP_OPTIONS |= {"-type": 1, "-cc": 1, "-o": 3, "-s": 3, "-t": 3}
 IGNORED_MAPS = [f"map_{what}" for what in ("ks", "ns", "ke", "ka", "bump", "refl", "pr", "pm", "ps", "tr")]
 IGNORED_MAPS += ["bump", "norm", "disp", "refl"]
-
-Rgb3 = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,30 +78,8 @@ def to_material(
             notes.add("rough metals are taken as diffuse", name)
     opacity = _opacity(name, values, texture, assets, textures, notes)
     _note_ignored(name, values, use, notes)
-    reflectivity, specular = limited(name, kd, specular, notes)
-    material = Material(
-        name=name,
-        reflectivity=reflectivity,
-        specular=specular,
-        texture=texture,
-        alpha=opacity.alpha,
-        alpha_texture=opacity.alpha_texture,
-        alpha_cutoff=opacity.alpha_cutoff,
-        left_out=opacity.left_out,
-    )
+    material = make_material(name, kd, specular, opacity, notes, texture=texture)
     return material, use if texture >= 0 else None
-
-
-def limited(name: str, reflectivity: Rgb3, specular: Rgb3, notes: Notes) -> tuple[Rgb3, Rgb3]:
-    """Bring both parts into [0, 1], and their sum to at most 1: no surface reflects more than it receives."""
-    diffuse = [0.0 if value != value else min(max(value, 0.0), BRIGHTEST) for value in reflectivity]
-    mirror = [0.0 if value != value else min(max(value, 0.0), BRIGHTEST) for value in specular]
-    scale = [1.0 / max(d + s, 1.0) for d, s in zip(diffuse, mirror, strict=True)]
-    if diffuse != list(reflectivity) or mirror != list(specular) or min(scale) < 1 - 1e-6:
-        notes.add("reflectivities outside 0 to 1 are brought into it", name)
-    d = [value * factor for value, factor in zip(diffuse, scale, strict=True)]
-    s = [value * factor for value, factor in zip(mirror, scale, strict=True)]
-    return (d[0], d[1], d[2]), (s[0], s[1], s[2])
 
 
 def _base_colour(name: str, values: Mapping[str, str], textured: bool, notes: Notes) -> Rgb3:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Float32, Float64
 from .assets import AssetError, Assets
-from .defaults import clean_colours, default_material
+from .materials import clean_colours, default_material
 from .model import Material, Meshes, Notes, Part
 from .mtl import MapUse, MtlEntry, parse_mtl, to_material
 from .polygons import Ears, triangulate

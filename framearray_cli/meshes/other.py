@@ -8,11 +8,9 @@ import numpy as np
 from ..arrays import Float32
 from ..errors import SceneError
 from .assets import AssetError, Assets
-from .defaults import clean_colours, default_material
 from .headers import check_headers, one_solid
+from .materials import blended, clean_colours, default_material, make_material
 from .model import Material, Meshes, Notes, Part
-from .mtl import limited
-from .opacity import blended
 from .textures import TextureTable
 from .walk import file_normals, instances, place
 
@@ -142,14 +140,4 @@ def _material(source: Any, number: int, textures: TextureTable, notes: Notes) ->
         colour = np.array([1.0, 1.0, 1.0, colour[3]])  # trimesh's default grey must not darken an image
     opacity = blended(name, float(colour[3]), texture, textures, notes)
     base = (float(colour[0]), float(colour[1]), float(colour[2]))
-    reflectivity, specular = limited(name, base, (0.0, 0.0, 0.0), notes)
-    return Material(
-        name=name,
-        reflectivity=reflectivity,
-        specular=specular,
-        texture=texture,
-        alpha=opacity.alpha,
-        alpha_texture=opacity.alpha_texture,
-        alpha_cutoff=opacity.alpha_cutoff,
-        left_out=opacity.left_out,
-    )
+    return make_material(name, base, (0.0, 0.0, 0.0), opacity, notes, texture=texture)

@@ -16,9 +16,9 @@ FLOW = """
 __init__ errors arrays files limits kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
 compiling framerate fingerprint colour sphere usage
 jobvalues jobtimes jobkeys jobmethod job jobschema jobdocs problems eyefile jobfile
-meshes/limit meshes/model meshes/assets meshes/gltf_check meshes/container meshes/headers
-meshes/defaults meshes/cleaning
-meshes/polygons meshes/merge meshes/overrides meshes/textures meshes/opacity meshes/mtl meshes/walk
+meshes/limit meshes/model meshes/assets meshes/gltf_values meshes/gltf_check meshes/container meshes/headers
+meshes/cleaning
+meshes/polygons meshes/merge meshes/overrides meshes/textures meshes/materials meshes/mtl meshes/walk
 meshes/gltf_materials meshes/gltf_motion meshes/gltf_triangles meshes/gltf_nodes meshes/gltf_stage
 meshes/gltf meshes/obj meshes/other meshes/read meshes/__init__
 scene sun paths camera lights sampling surface

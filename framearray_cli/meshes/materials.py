@@ -1,0 +1,121 @@
+"""What a file says of a surface -> a `Material`: the same rules for the readers of all formats.
+
+Readers map their format to a diffuse part, a mirror part and an opacity. Here these become a material: no surface
+reflects more than it receives, glass is left out, blended textures are cut out, and where a file gives no material, or
+colours that are not colours, something stands in.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Float32, Float64
+from .model import GREY, Material, Notes
+from .textures import TextureTable
+
+TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light than this is taken as glass and left out for now
+CUTOFF = 0.5  # where a blended texture turns from hole to surface; also glTF's default for masks
+BRIGHTEST = 1e30  # what infinite reflectivities are taken for, before they are scaled to 1
+DEFAULT_NAME = "default"
+COLOURED_NAME = "vertex colours"
+
+Rgb3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Opacity:
+    """The transparency fields of a `Material`."""
+
+    alpha: float = 1.0
+    alpha_texture: int = -1
+    alpha_cutoff: float = 0.0
+    left_out: str = ""
+
+
+def make_material(
+    name: str,
+    diffuse: Rgb3,
+    specular: Rgb3,
+    opacity: Opacity,
+    notes: Notes,
+    *,
+    texture: int = -1,
+    mirror_texture: int = -1,
+) -> Material:
+    """Make a material of what a reader found.
+
+    Args:
+        diffuse: reflectivity of the diffuse part, whatever numbers the file has.
+        specular: that of the mirror part.
+        notes: takes a note where the two have to be brought into range.
+        texture: multiplies the diffuse part.
+        mirror_texture: multiplies the mirror part, if there is one.
+    """
+    reflectivity, specular = limited(name, diffuse, specular, notes)
+    return Material(
+        name=name,
+        reflectivity=reflectivity,
+        specular=specular,
+        texture=texture,
+        specular_texture=mirror_texture if max(specular) > 0 else -1,
+        alpha=opacity.alpha,
+        alpha_texture=opacity.alpha_texture,
+        alpha_cutoff=opacity.alpha_cutoff,
+        left_out=opacity.left_out,
+    )
+
+
+def limited(name: str, reflectivity: Rgb3, specular: Rgb3, notes: Notes) -> tuple[Rgb3, Rgb3]:
+    """Bring both parts into [0, 1], and their sum to at most 1: no surface reflects more than it receives."""
+    diffuse = [0.0 if value != value else min(max(value, 0.0), BRIGHTEST) for value in reflectivity]
+    mirror = [0.0 if value != value else min(max(value, 0.0), BRIGHTEST) for value in specular]
+    scale = [1.0 / max(d + s, 1.0) for d, s in zip(diffuse, mirror, strict=True)]
+    if diffuse != list(reflectivity) or mirror != list(specular) or min(scale) < 1 - 1e-6:
+        notes.add("reflectivities outside 0 to 1 are brought into it", name)
+    d = [value * factor for value, factor in zip(diffuse, scale, strict=True)]
+    s = [value * factor for value, factor in zip(mirror, scale, strict=True)]
+    return (d[0], d[1], d[2]), (s[0], s[1], s[2])
+
+
+def masked(alpha: float, texture: int, cutoff: float, textures: TextureTable) -> Opacity:
+    """Opacity of a material whose points are absent where alpha is below the cutoff."""
+    lowest, highest = textures.alpha_range(texture)
+    if alpha * lowest >= cutoff:
+        return Opacity()
+    if alpha * highest < cutoff:
+        return Opacity(left_out="cut out")
+    return Opacity(alpha=alpha, alpha_texture=texture, alpha_cutoff=cutoff)
+
+
+def blended(name: str, alpha: float, texture: int, textures: TextureTable, notes: Notes) -> Opacity:
+    """Opacity of a material that lets light through by alpha: glass, a cut-out texture, or nearly opaque."""
+    lowest, highest = textures.alpha_range(texture)
+    if alpha * highest < TRANSMISSIVE_ALPHA:
+        notes.add("transmissive materials are left out", name)
+        return Opacity(left_out="transmissive")
+    if lowest < CUTOFF <= highest:
+        notes.add("textures with partial transparency are cut out at half opacity", name)
+        return Opacity(alpha_texture=texture, alpha_cutoff=CUTOFF)
+    if alpha * lowest < 1:
+        notes.add("partly transparent materials are taken as opaque", name)
+    return Opacity()
+
+
+def default_material(coloured: bool, notes: Notes, name: str = "") -> Material:
+    """What stands in for a missing material: white under vertex colours, grey otherwise."""
+    if coloured:
+        return Material(name=name or COLOURED_NAME, reflectivity=(1.0, 1.0, 1.0))
+    notes.add(f"surfaces without material have a grey of reflectivity {GREY}")
+    return Material(name=name or DEFAULT_NAME)
+
+
+def clean_colours(colours: Float64, notes: Notes) -> Float32:
+    """Bring colours into [0, 1]: 0 to 255 is scaled, NaN becomes white."""
+    bad = np.asarray(~np.isfinite(colours).all(axis=-1))
+    if bad.any():
+        notes.add("vertex colours that are not numbers are taken as white")
+        colours = np.where(bad[..., None], 1.0, colours)
+    if colours.size and colours.max() > 1.5:
+        notes.add("vertex colours from 0 to 255 are scaled to 0 to 1")
+        colours = colours / 255.0
+    return np.clip(colours, 0.0, 1.0).astype(np.float32)
