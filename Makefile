@@ -6,7 +6,7 @@ JOB := jobs/kitchen-small.toml
 OUT := out/kitchen-small
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-all smoke format check docs bench bench-scaling bench-bias bench-ambient bench-report bench-view fuzz clean
+.PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-scaling bench-bias bench-ambient bench-report bench-view fuzz clean
 
 help: ## Show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -36,6 +36,10 @@ render: $(VENV)/installed ## Render a small kitchen and cut a movie out of it
 
 test: $(VENV)/installed-dev ## Run the tests
 	$(BIN)/python -m pytest
+
+# Embree by its own setting, numba by a processor that has no more
+test-avx2: $(VENV)/installed-dev ## Run the tests with no instructions beyond AVX2
+	FRAMEARRAY_EMBREE=isa=avx2 NUMBA_CPU_NAME=x86-64-v3 NUMBA_CPU_FEATURES=+avx2 $(BIN)/python -m pytest
 
 test-all: $(VENV)/installed-dev ## Run all tests, the slow ones too
 	$(BIN)/python -m pytest -m 'not bench'

@@ -1,6 +1,7 @@
 """Embree through its C functions, found in the library that the embreex wheel carries."""
 
 import ctypes
+import os
 from functools import cache
 from typing import Any
 
@@ -69,7 +70,7 @@ class NativeScene:
 
     def __init__(self, scene: Scene, library: ctypes.CDLL) -> None:
         self._library = library
-        self._device = library.rtcNewDevice(None)
+        self._device = library.rtcNewDevice(_configuration())
         self._scene = library.rtcNewScene(self._device)
         self._kept: list[Any] = [scene]  # what Embree points into
         library.rtcSetSceneFlags(self._scene, _ROBUST)
@@ -126,6 +127,11 @@ class NativeScene:
             self._library.rtcReleaseScene(self._scene)
             self._library.rtcReleaseDevice(self._device)
             self._device = None
+
+
+def _configuration() -> bytes | None:
+    """Embree's settings for a device: none, but in tests that force an instruction set."""
+    return os.environ.get("FRAMEARRAY_EMBREE", "").encode() or None
 
 
 def _address(function: Any) -> int:

@@ -1,11 +1,18 @@
 """The door to Embree: packets and embreex's own API find the same hits."""
 
+import os
+import re
+import subprocess
+import sys
 from typing import Any
 
+import instructionset
+import numba
 import numpy as np
 import pytest
 import scenes
 import tiny
+from embreex import rtcore_scene
 
 from framearray_cli import embree
 from framearray_cli.embree import EmbreeScene
@@ -32,6 +39,9 @@ from framearray_cli.meshes import Material
 from framearray_cli.scene import Scene, load_scene
 
 CHUNK = 1 << 16
+# Embree divides by a reciprocal that it refines by one Newton step, an instruction set its own way; step and product
+# round to float32 and leave up to 4 units in the last place. A division would leave none: distances here are exact.
+RECIPROCAL = 2.0**-21
 
 
 def fill(packets: Any, origins: Any, dirs: Any, far: Any) -> None:
@@ -133,7 +143,7 @@ def test_hits_are_the_same_where_packets_are_told_to_be_coherent(large: Scene) -
         np.testing.assert_array_equal(dark_a, dark_b)
         # of triangles that lie on one another either may be found first; they are equally far, but for a digit
         assert (a[other, 0] >= 0).all() and (b[other, 0] >= 0).all()
-        np.testing.assert_allclose(a[other, 1], b[other, 1], rtol=2.0**-21)
+        np.testing.assert_allclose(a[other, 1], b[other, 1], rtol=RECIPROCAL)
         assert other.mean() < 1e-3
 
 
@@ -245,7 +255,7 @@ def test_the_last_packet_may_be_partly_empty(engine: Any, n: int) -> None:
     origins = np.tile(np.float32([0.2, 0.3, 2]), (n, 1))
     dirs = np.tile(np.float32([0, 0, -1]), (n, 1))
     with EmbreeScene(scene, engine) as opened:
-        assert (first_hits(opened, origins, dirs)[:, 1] == 2).all()
+        np.testing.assert_allclose(first_hits(opened, origins, dirs)[:, 1], 2, rtol=RECIPROCAL, atol=0)
         assert blocked(opened, origins, dirs, 3.0).all()
         assert not blocked(opened, origins, dirs, 1.5).any()
         assert (first_hits(opened, origins, dirs, 1.5)[:, 0] == MISS).all()
@@ -277,3 +287,38 @@ def test_without_the_symbols_embreex_takes_over(monkeypatch: pytest.MonkeyPatch)
 def test_packets_start_at_cache_lines() -> None:
     assert all(aligned(n).ctypes.data % 64 == 0 for n in range(1, 200))
     assert all(empty_packets(n, HIT_ROWS)[-1].ctypes.data % 64 == 0 for n in range(1, 20))
+
+
+AVX2 = "isa=avx2"
+NATIVE = """
+import instructionset, tiny
+from framearray_cli.embree.native import NativeScene
+scene = NativeScene(tiny.scene_of(tiny.box((0, 0, 0), (1, 1, 1))), instructionset.library())
+print(instructionset.has_packets_of_16(scene._device))
+"""
+
+
+def test_avx2_can_be_forced_in_a_process_of_its_own() -> None:
+    """As `make test-avx2` does; programs that tests start inherit it."""
+    environment = os.environ | {"FRAMEARRAY_EMBREE": AVX2, "PYTHONPATH": os.pathsep.join(sys.path)}
+    answer = subprocess.run([sys.executable, "-c", NATIVE], env=environment, capture_output=True, text=True, check=True)
+    assert answer.stdout == "False\n"
+
+
+@pytest.mark.skipif(instructionset.FORCED != AVX2, reason="run by `make test-avx2`")
+def test_forced_to_avx2_nothing_runs_with_avx512() -> None:
+    with EmbreeScene(tiny.scene_of(tiny.box((0, 0, 0), (1, 1, 1))), "packets") as opened:
+        assert not instructionset.has_packets_of_16(opened._built._device)
+    assert not instructionset.has_packets_of_16(instructionset.device_pointer(instructionset.forced_device()).value)
+    assert rtcore_scene.EmbreeScene is instructionset.forced_scene
+    limited = numba.njit(lower)
+    limited(np.ones(64, np.float32), np.zeros(64, np.float32))
+    (assembly,) = limited.inspect_asm().values()
+    assert "ymm" in assembly and not re.search(r"zmm|%k[0-7]", assembly)
+
+
+def lower(a: Any, b: Any) -> None:
+    """A loop that AVX-512 would write with masks."""
+    for i in range(len(a)):
+        if a[i] > b[i]:
+            a[i] = 3 * b[i]
