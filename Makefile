@@ -4,6 +4,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOB := jobs/kitchen-small.toml
 OUT := out/kitchen-small
+# Side by side, a process for each core; neighbours in one process, as they share what they set up
+PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 
 .DEFAULT_GOAL := help
 .PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-scaling bench-bias bench-ambient bench-report bench-view fuzz clean
@@ -35,14 +37,14 @@ render: $(VENV)/installed ## Render a small kitchen and cut a movie out of it
 	@echo "pictures: $(OUT)   movie: $(OUT)/first-movie.mp4"
 
 test: $(VENV)/installed-dev ## Run the tests
-	$(BIN)/python -m pytest
+	$(PYTEST)
 
 # Embree by its own setting, numba by a processor that has no more
 test-avx2: $(VENV)/installed-dev ## Run the tests with no instructions beyond AVX2
-	FRAMEARRAY_EMBREE=isa=avx2 NUMBA_CPU_NAME=x86-64-v3 NUMBA_CPU_FEATURES=+avx2 $(BIN)/python -m pytest
+	FRAMEARRAY_EMBREE=isa=avx2 NUMBA_CPU_NAME=x86-64-v3 NUMBA_CPU_FEATURES=+avx2 $(PYTEST)
 
 test-all: $(VENV)/installed-dev ## Run all tests, the slow ones too
-	$(BIN)/python -m pytest -m 'not bench'
+	$(PYTEST) -m 'not bench'
 
 smoke: $(VENV)/installed ## Render the smallest job
 	$(BIN)/framearray render jobs/smoke.toml
