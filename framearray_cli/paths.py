@@ -41,6 +41,11 @@ class Eyes:
         """Number of eyes, N_c."""
         return len(self.position)
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether the camera never moves."""
+        return bool((self.world_from_camera == self.world_from_camera[:1]).all())
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LightPath:

@@ -35,11 +35,7 @@ LEAST_SCENE_MEMORY = 64 * 2**20
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Prepared:
-    """A job whose inputs were read and checked; no ray was cast yet.
-
-    Attributes:
-        still: the camera never moves; its hits are found once and serve all frames [FA section 3.2].
-    """
+    """A job whose inputs were read and checked; no ray was cast yet. See `prepared_from`."""
 
     job: Job
     scene: Scene
@@ -47,7 +43,11 @@ class Prepared:
     lights: Lights
     light_arrays: LightArrays
     surfaces: Surfaces
-    still: bool
+
+    @property
+    def still(self) -> bool:
+        """Whether the camera never moves; its hits are found once then and serve all frames [FA section 3.2]."""
+        return self.eyes.at_rest
 
     @property
     def n_cameras(self) -> int:
@@ -78,15 +78,18 @@ def prepare(job: Job) -> Prepared:
         require_denoiser()
     job_eyes, job_lights = eyes(job), lights(job)
     scene = load_scene(job.scene.file, job.scene.materials, job.scene.folders, _scene_memory(job))
-    moved = job_eyes.world_from_camera != job_eyes.world_from_camera[:1]
+    return prepared_from(job, scene, job_eyes, job_lights)
+
+
+def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepared:
+    """Put together a job, its scene, and the eyes and lights to render: those of the job, or a few of them."""
     return Prepared(
         job=job,
         scene=scene,
-        eyes=job_eyes,
-        lights=job_lights,
-        light_arrays=light_arrays(job_lights, scene.centre),
+        eyes=eyes,
+        lights=lights,
+        light_arrays=light_arrays(lights, scene.centre),
         surfaces=surfaces(scene),
-        still=not moved.any(),
     )
 
 

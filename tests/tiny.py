@@ -12,13 +12,11 @@ from scenes import Glb, png
 from framearray_cli.crew import TracePool
 from framearray_cli.embree import Engine
 from framearray_cli.job import Job
-from framearray_cli.lights import light_arrays
 from framearray_cli.loop import ready_frames
 from framearray_cli.meshes import Material, Meshes, Part
 from framearray_cli.paths import eyes, lights
-from framearray_cli.prepare import Prepared, open_embree, plan_work
+from framearray_cli.prepare import Prepared, open_embree, plan_work, prepared_from
 from framearray_cli.scene import Scene, build_scene
-from framearray_cli.surface import surfaces
 from framearray_cli.terms.ambient import Ambient
 from framearray_cli.window import Composed, Window
 from framearray_cli.work import FrameSetup
@@ -220,18 +218,7 @@ def job(**changes: Any) -> Job:
 
 def prepared(job: Job, scene: Scene | None = None) -> Prepared:
     """What `prepare` gives, with a scene that is in no file."""
-    scene = scene or room()
-    job_eyes, job_lights = eyes(job), lights(job)
-    matrices = job_eyes.world_from_camera
-    return Prepared(
-        job=job,
-        scene=scene,
-        eyes=job_eyes,
-        lights=job_lights,
-        light_arrays=light_arrays(job_lights, scene.centre),
-        surfaces=surfaces(scene),
-        still=bool((matrices == matrices[:1]).all()),
-    )
+    return prepared_from(job, scene or room(), eyes(job), lights(job))
 
 
 @contextmanager

@@ -39,10 +39,11 @@ def openjd(
         )
     with Screen(out, quiet=quiet) as screen:
         screen.wait("reading the job")
-        from ..parts.chunks import default_size, in_chunks, reach, stands_still
+        from ..parts.chunks import default_size, in_chunks, reach
         from ..parts.openjd import template, write_template
+        from ..paths import eyes
 
-        n_r, still = reach(job), stands_still(job)
+        n_r, still = reach(job), eyes(job).at_rest
         size = chunk or (frames if still else default_size(frames, n_r))
         chunks = in_chunks(range(frames), size, frames, n_r, still=still)
         write_template(file, template(job, job_file, file.parent, size, job.render.threads), force=force)

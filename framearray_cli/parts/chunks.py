@@ -11,7 +11,6 @@ import numpy as np
 
 from ..errors import SceneError
 from ..job import Job
-from ..paths import eyes
 from ..plan import frame_hits
 from ..prepare import open_embree, prepare
 
@@ -104,13 +103,3 @@ def reach(job: Job) -> int:
     prepared = prepare(job)
     with open_embree(prepared) as embree:
         return settled(prepared, embree)[0].job.n_r
-
-
-def stands_still(job: Job) -> bool:
-    """Whether the camera of a job never moves.
-
-    Raises:
-        JobError: its path cannot be followed.
-    """
-    matrices = eyes(job).world_from_camera
-    return bool((matrices == matrices[:1]).all())

@@ -9,12 +9,10 @@ from ..arrays import Float64, Images
 from ..colour import srgb_from_linear
 from ..crew import TracePool
 from ..embree import EmbreeScene
-from ..lights import light_arrays
 from ..loop import ready_frames
 from ..paths import LightPath, Lights, eyes, lights
-from ..prepare import Prepared, plan_work
+from ..prepare import plan_work, prepared_from
 from ..scene import Scene
-from ..surface import surfaces
 from ..window import Window
 from .model import Start, checked, table_of
 
@@ -100,15 +98,7 @@ def _pictures(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[Float64,
     some = _spread(job_eyes.n)
     few_eyes = replace(job_eyes, position=job_eyes.position[some], world_from_camera=job_eyes.world_from_camera[some])
     few_lights = Lights(sources=tuple(_and_none(source, _spread(job_lights.n)) for source in job_lights.sources))
-    prepared = Prepared(
-        job=job,
-        scene=scene,
-        eyes=few_eyes,
-        lights=few_lights,
-        light_arrays=light_arrays(few_lights, scene.centre),
-        surfaces=surfaces(scene),
-        still=len(some) == 1,
-    )
+    prepared = prepared_from(job, scene, few_eyes, few_lights)
     setup, ambient = plan_work(prepared, embree)
     shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
     found: list[Images] = []

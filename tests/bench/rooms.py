@@ -8,13 +8,11 @@ import numpy as np
 
 from framearray_cli.arrays import Float64
 from framearray_cli.job import Job
-from framearray_cli.lights import light_arrays
 from framearray_cli.meshes import Material, Meshes
 from framearray_cli.meshes.model import Part
 from framearray_cli.paths import eyes, lights
-from framearray_cli.prepare import Prepared
+from framearray_cli.prepare import Prepared, prepared_from
 from framearray_cli.scene import Scene, build_scene
-from framearray_cli.surface import surfaces
 
 SIZE = (8.0, 3.0, 8.0)  # of the room
 COUNT = (5, 2, 5)  # spheres along each axis
@@ -50,17 +48,7 @@ def scene_of(parts: Sequence[Part], materials: Sequence[Material]) -> Scene:
 
 def prepared_of(job: Job, scene: Scene) -> Prepared:
     """A job ready to render in a scene that is in no file."""
-    job_eyes, job_lights = eyes(job), lights(job)
-    matrices = job_eyes.world_from_camera
-    return Prepared(
-        job=job,
-        scene=scene,
-        eyes=job_eyes,
-        lights=job_lights,
-        light_arrays=light_arrays(job_lights, scene.centre),
-        surfaces=surfaces(scene),
-        still=bool((matrices == matrices[:1]).all()),
-    )
+    return prepared_from(job, scene, eyes(job), lights(job))
 
 
 def _sphere(rings: int, segments: int) -> Float64:

@@ -197,6 +197,16 @@ def test_equal_keys_give_the_same_eye_bit_for_bit():
     assert (placed.world_from_camera == placed.world_from_camera[0]).all()
 
 
+def test_a_camera_is_at_rest_only_where_no_frame_differs():
+    first = {"frame": 0, "eye": [0.1, 1.7, 3.3], "target": [0.7, 0.2, -1.1]}
+    assert eyes(job_of([first], frames=50)).at_rest
+    assert eyes(job_of([first, {**first, "frame": 40}], frames=50)).at_rest
+    one_step = [first, {**first, "frame": 48}, {**first, "frame": 49, "target": [0.7, 0.2, -1.0]}]
+    assert not eyes(job_of(one_step, frames=50)).at_rest
+    there_and_back = [first, {**first, "frame": 20, "eye": [0.2, 1.7, 3.3]}, {**first, "frame": 49}]
+    assert not eyes(job_of(there_and_back, frames=50)).at_rest
+
+
 def test_far_from_the_origin_the_eye_keeps_its_digits():
     near = fixed([0.5, 1.5, 2.5], [0.25, 1.0, -1.0])
     far = fixed([5e6 + 0.5, 1.5, 2.5 - 5e6], [5e6 + 0.25, 1.0, -1.0 - 5e6])
