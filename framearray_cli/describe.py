@@ -13,8 +13,9 @@ from .manifest import BACKGROUND, Manifest, ManifestCamera, ManifestGroup, Manif
 from .manifestfile import plain
 from .outfolder import Identity
 from .paths import LightPath
+from .planes import Plane
 from .prepare import Prepared, job_fingerprint, scene_fingerprint
-from .stored import AMBIENT, Files, array_names
+from .stored import AMBIENT, ArrayNames, array_names
 from .target import Target
 from .terms.ambient import Ambient
 
@@ -72,13 +73,13 @@ def describe(
     )
 
 
-def _images(prepared: Prepared, ambient: Ambient, files: Files) -> dict[str, Any]:
+def _images(prepared: Prepared, ambient: Ambient, files: ArrayNames) -> dict[str, Any]:
     """What the images are, and the light of each."""
     lights = prepared.lights
     i_a = ambient.intensity.astype(np.float64)
     if not lights.groups:
         return {"images": files.pattern(""), "lights": _lights(range(lights.n), lights.sources, i_a, ambient)}
-    dark = i_a[lights.n_lit]  # where nothing shines: what the background adds
+    dark = i_a[lights.planes.index(Plane.INDIRECT)]  # no source shines there: what the background adds
     groups = tuple(
         ManifestGroup(
             name=group.name,

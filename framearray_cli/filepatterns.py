@@ -25,6 +25,11 @@ def camera_pattern(name: str, what: str, n_cameras: int, extension: str) -> str:
     return f"{_safe(name)}.{what}.{_camera(n_cameras)}.{extension}"
 
 
+def file_name(pattern: str, c: int, l: int = 0) -> str:
+    """The file that a pattern names for camera c and light position l; a pattern without {light} has no use for l."""
+    return pattern.format(camera=c, light=l)
+
+
 def _safe(name: str) -> str:
     return name.replace("{", "{{").replace("}", "}}")
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from .arrays import Float64, is_number
 from .errors import OutputError
-from .filepatterns import check_pattern
+from .filepatterns import check_pattern, file_name
 from .jobvalues import shown
 
 FILE_NAME = "manifest.toml"
@@ -224,7 +224,7 @@ def image_path(manifest: Manifest, c: int, l: int, group: ManifestGroup | None =
     _check_index(manifest, "camera", c, manifest.n_cameras)
     _check_index(manifest, "light", l, len(group.lights) if group else manifest.n_lights)
     pattern = group.images if group else manifest.images
-    return manifest.directory / pattern.format(camera=c, light=l)
+    return manifest.directory / file_name(pattern, c, l)
 
 
 def array_files(manifest: Manifest) -> Iterator[Path]:
@@ -232,7 +232,7 @@ def array_files(manifest: Manifest) -> Iterator[Path]:
     for c in range(manifest.n_cameras):
         for pattern in (manifest.layers, manifest.ambient_images, manifest.background_images):
             if pattern:
-                yield manifest.directory / pattern.format(camera=c)
+                yield manifest.directory / file_name(pattern, c)
         for group in manifest.groups or (None,):
             for l in range(len(group.lights) if group else manifest.n_lights):
                 yield image_path(manifest, c, l, group)
@@ -247,7 +247,7 @@ def layers_path(manifest: Manifest, c: int) -> Path:
     _check_index(manifest, "camera", c, manifest.n_cameras)
     if not manifest.layers:
         raise OutputError(f"{manifest.directory}: this frame array was written without layers")
-    return manifest.directory / manifest.layers.format(camera=c)
+    return manifest.directory / file_name(manifest.layers, c)
 
 
 def _check_index(manifest: Manifest, axis: str, index: int, count: int) -> None:

@@ -15,6 +15,7 @@ from .arrays import Float64, WorldPoints
 from .errors import JobError
 from .job import Job
 from .jobkeys import CameraKey, DirectionalKey, PointKey, SunSource
+from .planes import Plane, pictures, planes_of_groups
 from .sphere import directions_between, unit
 from .sun import NEVER, daylight, sun_between, to_sun
 
@@ -49,7 +50,7 @@ class Eyes:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LightPath:
-    """One source at every light index l.
+    """One source at every light position l; in `Lights`, at every image plane.
 
     Attributes:
         kind: "point" or "directional".
@@ -70,7 +71,7 @@ class LightGroup:
 
     Attributes:
         axis: light axis that they move along.
-        positions: light indices at which they alone shine.
+        positions: image planes at which they alone shine.
         sources: their places in `Lights.sources`.
     """
 
@@ -82,24 +83,32 @@ class LightGroup:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Lights:
-    """All sources; those of one light index l shine together.
+    """All sources; those of one image plane shine together. See `shining_together` for those without groups.
 
-    With groups, every group has light indices of its own, one behind the other, and two more follow at which nothing
-    shines: what is stored there is R W, which the ambient light multiplies, and what comes from the background.
+    Attributes:
+        sources: n positions each; where a plane is not lit, they are dark.
+        groups: each has planes of its own, one behind the other.
+        planes: what each image of a frame holds.
     """
 
     sources: tuple[LightPath, ...]
     groups: tuple[LightGroup, ...] = ()
+    planes: tuple[Plane, ...]
 
     @property
     def n(self) -> int:
-        """Number of light positions, N_l; with groups, of indices that are computed."""
-        return len(self.sources[0].vector)
+        """Number of image planes; without groups, of light positions N_l."""
+        return len(self.planes)
 
     @property
-    def n_lit(self) -> int:
-        """Number of indices at which something may shine."""
-        return self.groups[-1].positions.stop if self.groups else self.n
+    def unlit(self) -> tuple[Plane, ...]:
+        """The planes at which no source shines; none without groups."""
+        return tuple(plane for plane in self.planes if not plane.lit)
+
+
+def shining_together(sources: Sequence[LightPath]) -> Lights:
+    """Sources without groups: a picture for each light position."""
+    return Lights(sources=tuple(sources), planes=pictures(len(sources[0].vector)))
 
 
 def eyes(job: Job) -> Eyes:
@@ -128,7 +137,7 @@ def eyes(job: Job) -> Eyes:
 
 
 def lights(job: Job) -> Lights:
-    """Place and set every source at every light index of a job.
+    """Place and set every source at every image plane of a job.
 
     Raises:
         JobError: a sun that never shines, or whose north points up.
@@ -136,20 +145,20 @@ def lights(job: Job) -> Lights:
     """
     table = job.light
     if not table.groups:
-        return Lights(sources=tuple(_placed(job, i, table.frames) for i in range(len(table.sources))))
-    n, groups, found = sum(group.n for group in table.groups), [], {}
-    n_all, first = n + (2 if any(job.scene.background) else 1), 0
+        return shining_together([_placed(job, i, table.frames) for i in range(len(table.sources))])
+    planes = planes_of_groups(sum(group.n for group in table.groups), background=any(job.scene.background))
+    groups, found, first = [], {}, 0
     for group in table.groups:
         positions = range(first, first + group.n)
         groups.append(LightGroup(name=group.name, axis=group.axis, positions=positions, sources=group.sources))
         for i in group.sources:
-            found[i] = _within(_placed(job, i, group.n), positions, n_all)
+            found[i] = _within(_placed(job, i, group.n), positions, len(planes))
         first = positions.stop
-    return Lights(sources=tuple(found[i] for i in sorted(found)), groups=tuple(groups))
+    return Lights(sources=tuple(found[i] for i in sorted(found)), groups=tuple(groups), planes=planes)
 
 
 def _within(path: LightPath, positions: range, n: int) -> LightPath:
-    """The same source at some of n light indices; at the others it does not shine."""
+    """The same source at some of n image planes; at the others it does not shine."""
     own = np.clip(np.arange(n) - positions.start, 0, len(positions) - 1)
     intensity = np.zeros((n, 3))
     intensity[positions.start : positions.stop] = path.intensity

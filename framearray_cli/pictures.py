@@ -18,6 +18,7 @@ import numpy as np
 
 from .arrays import Image
 from .errors import OutputError
+from .filepatterns import file_name
 from .images import read_image
 from .manifest import BACKGROUND, Manifest, ManifestGroup, ManifestLight, Vector, image_path
 
@@ -98,7 +99,7 @@ class Pictures:
                 yield image_path(manifest, c, l, group)
         for pattern in (manifest.ambient_images, manifest.background_images):
             if pattern:
-                yield manifest.directory / pattern.format(camera=c)
+                yield manifest.directory / file_name(pattern, c)
 
     def whole_file(self, c: int, positions: Positions, relight: Relight = AS_RENDERED) -> Path | None:
         """The one file that holds this very picture, if there is one."""
@@ -129,7 +130,7 @@ class Pictures:
         return image * np.float32(near) + self._checked(image_path(self.manifest, c, next_l, group)) * np.float32(far)
 
     def _steady(self, pattern: str, c: int) -> Image:
-        return self._checked(self.manifest.directory / pattern.format(camera=c))
+        return self._checked(self.manifest.directory / file_name(pattern, c))
 
     def _checked(self, path: Path) -> Image:
         image = self._read(path)

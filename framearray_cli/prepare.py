@@ -16,6 +16,7 @@ from .jobfile import job_table
 from .lights import LightArrays, light_arrays
 from .paths import Eyes, Lights, eyes, lights
 from .plan import frame_hits, turns
+from .planes import Plane
 from .sampling import lattice_steps
 from .scene import Scene, load_scene
 from .surface import Surfaces, nearest, surfaces
@@ -139,7 +140,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambi
         depth=job.specular.depth if mirrors else 0,
         balance=job.reuse.weights == "balance" and not prepared.still,
         background=background,
-        light_independent_from=prepared.lights.n_lit + 1 if prepared.lights.groups else 0,
+        planes=prepared.lights.planes,
         shadow_step=job.samples.shadow_step,
         shadow_unbiased=job.samples.shadow_unbiased,
         layers=job.output.layers,
@@ -150,14 +151,14 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambi
 
 
 def composed_with(ambient: Ambient, lights: Lights) -> Ambient:
-    """What images are composed with: I_A; with groups, none, and 1 where R W is stored.
+    """What images are composed with: I_A; with groups, none, and 1 at the plane of R W.
 
     An array with groups has the I_A of each group in its manifest, and adds it when a picture is made.
     """
     if not lights.groups:
         return ambient
     intensity = np.zeros_like(ambient.intensity)
-    intensity[lights.n_lit] = 1.0
+    intensity[lights.planes.index(Plane.INDIRECT)] = 1.0
     return replace(ambient, intensity=intensity)
 
 

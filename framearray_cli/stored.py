@@ -1,19 +1,20 @@
-"""Which file each light index goes to: images of an array, or with groups of sources, what pictures are made of."""
+"""Which file each image plane goes to: images of an array, or with groups of sources, what pictures are made of."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from .filepatterns import camera_pattern, file_patterns
+from .filepatterns import camera_pattern, file_name, file_patterns
 from .job import Job
 from .manifest import BACKGROUND
 from .paths import Lights
+from .planes import Plane
 
-AMBIENT = "ambient"  # R W, stored at the light index behind those of all groups; the background follows
+AMBIENT = "ambient"  # stands beside the groups: R W
+_UNLIT = {Plane.INDIRECT: AMBIENT, Plane.BACKGROUND: BACKGROUND}
 
 
 class StoredImage(NamedTuple):
-    """Where the images of one light index go.
+    """Where the images of one plane go.
 
     Attributes:
         pattern: for `str.format` with {camera} and {light}.
@@ -27,44 +28,46 @@ class StoredImage(NamedTuple):
 
     def file(self, c: int) -> str:
         """Name of the image of camera c."""
-        return self.pattern.format(camera=c, light=self.light or 0)
+        return file_name(self.pattern, c, self.light or 0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Files:
-    """The files of an array.
+class ArrayNames:
+    """How the files of an array are named.
 
     Attributes:
-        images: (n_lights,) of each light index.
+        images: of each image plane.
         layers: pattern.
     """
 
     images: tuple[StoredImage, ...]
     layers: str
 
+    def layers_file(self, c: int) -> str:
+        """Name of the layers of camera c."""
+        return file_name(self.layers, c)
+
     def pattern(self, group: str) -> str:
         """Pattern of a group, of AMBIENT or BACKGROUND, or of all images: ""; empty if there is no such thing."""
         return next((image.pattern for image in self.images if image.group == group), "")
 
 
-def plain_names(name: str, n_cameras: int, n_lights: int, extension: str) -> Files:
+def names_without_groups(name: str, n_cameras: int, n_lights: int, extension: str) -> ArrayNames:
     """Name the files of an array without groups."""
     images, layers = file_patterns(name, n_cameras, n_lights, extension)
-    return Files(images=tuple(StoredImage(images, l, "") for l in range(n_lights)), layers=layers)
+    return ArrayNames(images=tuple(StoredImage(images, l, "") for l in range(n_lights)), layers=layers)
 
 
-def array_names(job: Job, n_cameras: int, lights: Lights) -> Files:
+def array_names(job: Job, n_cameras: int, lights: Lights) -> ArrayNames:
     """Name the files of a job."""
     name, extension = job.name, job.output.format
     if not lights.groups:
-        return plain_names(name, n_cameras, lights.n, extension)
-
-    def of_groups() -> Iterator[StoredImage]:
-        for group in lights.groups:
-            n = len(group.positions)
-            pattern, _ = file_patterns(f"{name}.{group.name}", n_cameras, n, extension)
-            yield from (StoredImage(pattern, l, group.name) for l in range(n))
-        for what in (AMBIENT, BACKGROUND)[: lights.n - lights.n_lit]:
-            yield StoredImage(camera_pattern(name, what, n_cameras, extension), None, what)
-
-    return Files(images=tuple(of_groups()), layers=camera_pattern(name, "layers", n_cameras, "exr"))
+        return names_without_groups(name, n_cameras, lights.n, extension)
+    images = []
+    for group in lights.groups:
+        n = len(group.positions)
+        pattern, _ = file_patterns(f"{name}.{group.name}", n_cameras, n, extension)
+        images += [StoredImage(pattern, l, group.name) for l in range(n)]
+    for what in map(_UNLIT.__getitem__, lights.unlit):
+        images.append(StoredImage(camera_pattern(name, what, n_cameras, extension), None, what))
+    return ArrayNames(images=tuple(images), layers=camera_pattern(name, "layers", n_cameras, "exr"))

@@ -104,7 +104,8 @@ def _mixed(records: Records) -> list[str]:
 
 def _standard_error(lights: Lights, errors: dict[tuple[int, int], tuple[float, float]]) -> dict[str, Any]:
     """What the manifest says of the errors; with groups, of those of their own light."""
-    found: dict[str, Any] = summed_up({(c, l): error for (c, l), error in errors.items() if l < lights.n_lit})
+    lit = {p for p, plane in enumerate(lights.planes) if plane.lit}
+    found: dict[str, Any] = summed_up({(c, p): error for (c, p), error in errors.items() if p in lit})
     for group in lights.groups:
         if found["light"] in group.positions:
             return found | {"light": found["light"] - group.positions.start, "group": group.name}

@@ -43,7 +43,7 @@ def _light_count(prepared: "Prepared") -> str:
     if not lights.groups:
         return f"{lights.n:,} lights"
     groups = [f"{len(group.positions):,} of {group.name}" for group in lights.groups]
-    return f"({' + '.join(groups)} + {lights.n - lights.n_lit} of ambient light and background)"
+    return f"({' + '.join(groups)} + {len(lights.unlit)} of ambient light and background)"
 
 
 def _blocks(n: int) -> str:

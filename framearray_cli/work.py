@@ -15,6 +15,7 @@ from .kernel import inlined
 from .lanes import LANES
 from .lights import LightArrays, some_lights
 from .plan import Pass, passes, passes_of_counts
+from .planes import Plane, first_with_background
 from .surface import Surfaces
 from .terms.obscurance import ObscuranceSettings
 
@@ -25,13 +26,12 @@ class FrameSetup:
 
     Attributes:
         lights: those whose light is computed; `kept`: which of them are stored and composed.
+        planes: what the image of each of these holds.
         per_pixel: (n_c,) native hits a pixel of every frame.
         mirror_hits: native hits of a pixel that sees a mirror, if more; 0 in a scene without mirrors.
         depth: mirror bounces that are followed; 0 in a scene without mirrors.
         balance: weights of hits by the balance heuristic, else all alike.
         background: (3,) radiance outside the scene.
-        light_independent_from: the first of the kept light positions whose images hold what is the same under
-            every light.
         shadow_step, shadow_unbiased: see `terms/direct_steps.py`; step 1 tests every light position.
         layers: whether normals and depths are kept for the layers.
         denoise: whether W is denoised in composing.
@@ -45,6 +45,7 @@ class FrameSetup:
     tracer: Tracer
     lights: LightArrays
     kept: range
+    planes: tuple[Plane, ...]
     obscurance: ObscuranceSettings
     seed: int
     n_r: int
@@ -58,7 +59,6 @@ class FrameSetup:
     layers: bool
     denoise: bool = False
     halves: int = 0
-    light_independent_from: int = 0
     allotment: Allotment | None = None
     order: Int32 = field(init=False)
 
@@ -88,6 +88,11 @@ class FrameSetup:
         return c // self.halves % 2 if self.halves > 0 else BY_SAMPLE
 
     @property
+    def light_independent_from(self) -> int:
+        """The first plane that holds what is the same under every light, as do all that follow it."""
+        return first_with_background(self.planes)
+
+    @property
     def keeps_all(self) -> bool:
         """Whether all light that is computed is stored too."""
         return len(self.kept) == self.lights.n_lights
@@ -97,8 +102,8 @@ class FrameSetup:
 
         Shadow steps walk along the whole light path wherever a block ends, so all of it is computed, and some is kept.
         """
-        light_independent_from = min(max(self.light_independent_from - block.start, 0), len(block))
-        setup = replace(self, layers=self.layers and block.start == 0, light_independent_from=light_independent_from)
+        planes = self.planes[block.start : block.stop]
+        setup = replace(self, layers=self.layers and block.start == 0, planes=planes)
         if self.shadow_step > 1:
             return replace(setup, kept=block)
         return replace(setup, lights=some_lights(self.lights, block), kept=range(len(block)))

@@ -21,7 +21,7 @@ from .job import Job
 from .paths import Eyes
 from .record import digest
 from .standarderror import square_mean, standard_error
-from .stored import Files
+from .stored import ArrayNames
 from .window import Composed, Layers
 
 # Blocks of images in memory: one is filled while the other is written.
@@ -76,7 +76,7 @@ class ArrayWriter:
     def __init__(
         self,
         directory: Path,
-        files: Files,
+        files: ArrayNames,
         eyes: Eyes,
         resolution: tuple[int, int],
         fps: float,

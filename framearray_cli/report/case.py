@@ -12,6 +12,7 @@ from ..embree import EmbreeScene
 from ..errors import JobError
 from ..job import Job
 from ..lights import some_lights
+from ..planes import pictures
 from ..prepare import Prepared, open_embree, plan_work, prepare
 from ..terms.ambient import Ambient
 from ..work import FrameSetup
@@ -97,4 +98,6 @@ def under(case: Case, l: Sequence[int]) -> Case:
         intensity=np.ascontiguousarray(case.ambient.intensity[list(l)]),
         standard_error=case.ambient.standard_error[list(l)],
     )
-    return replace(case, setup=replace(case.setup, lights=lights, kept=range(len(l))), ambient=ambient)
+    return replace(
+        case, setup=replace(case.setup, lights=lights, kept=range(len(l)), planes=pictures(len(l))), ambient=ambient
+    )

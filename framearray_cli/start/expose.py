@@ -10,7 +10,7 @@ from ..colour import srgb_from_linear
 from ..crew import TracePool
 from ..embree import EmbreeScene
 from ..loop import ready_frames
-from ..paths import LightPath, Lights, eyes, lights
+from ..paths import LightPath, eyes, lights, shining_together
 from ..prepare import plan_work, prepared_from
 from ..scene import Scene
 from ..window import Window
@@ -97,7 +97,7 @@ def _pictures(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[Float64,
     job_eyes, job_lights = eyes(job), lights(job)
     some = _spread(job_eyes.n)
     few_eyes = replace(job_eyes, position=job_eyes.position[some], world_from_camera=job_eyes.world_from_camera[some])
-    few_lights = Lights(sources=tuple(_and_none(source, _spread(job_lights.n)) for source in job_lights.sources))
+    few_lights = shining_together([_and_none(source, _spread(job_lights.n)) for source in job_lights.sources])
     prepared = prepared_from(job, scene, few_eyes, few_lights)
     setup, ambient = plan_work(prepared, embree)
     shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)

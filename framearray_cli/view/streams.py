@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays import Float32, Image
 from ..errors import OutputError
+from ..filepatterns import file_name
 from ..images import read_image
 from ..manifest import Manifest, ManifestGroup, image_path, layers_path
 from .coding import PLAIN, Coding, coding_for, data_coding
@@ -86,7 +87,7 @@ def source_file(manifest: Manifest, stream: Stream, c: int, l: int) -> Path:
     if stream.role == "layer":
         return layers_path(manifest, c)
     pattern = manifest.ambient_images if stream.role == "ambient" else manifest.background_images
-    return manifest.directory / pattern.format(camera=c)
+    return manifest.directory / file_name(pattern, c)
 
 
 def read_values(manifest: Manifest, stream: Stream, c: int, l: int, read_layers: ReadLayers) -> Float32:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from framearray_cli.arrays import Float32, Float64
 from framearray_cli.lights import DIRECTIONAL, LightArrays, padded
 from framearray_cli.paths import Eyes
+from framearray_cli.planes import pictures
 from framearray_cli.prepare import open_embree, plan_work
 from framearray_cli.report.settings import Settings
 
@@ -64,7 +65,7 @@ def _with_lights(case: Case, n: int) -> Case:
     at = np.linspace(0, lights.n_lights - 1, n) if n > 1 else np.array([(lights.n_lights - 1) / 2])
     return replace(
         case,
-        setup=replace(case.setup, lights=resampled(lights, at), kept=range(n)),
+        setup=replace(case.setup, lights=resampled(lights, at), kept=range(n), planes=pictures(n)),
         ambient=replace(
             case.ambient,
             intensity=np.ascontiguousarray(_between(intensity, at, 0)),

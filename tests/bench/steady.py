@@ -20,7 +20,7 @@ from framearray_cli.arrays import Int32
 from framearray_cli.crew import TracePool
 from framearray_cli.images import ImageFormat
 from framearray_cli.loop import ready_frames
-from framearray_cli.stored import plain_names
+from framearray_cli.stored import names_without_groups
 from framearray_cli.window import Composed, Window
 from framearray_cli.writer import BLOCKS, ArrayWriter
 
@@ -171,7 +171,7 @@ def _writer(case: Case, folder: Path, image_format: ImageFormat | None) -> Timed
     stored = image_format or ImageFormat()
     writer = TimedWriter(
         folder,
-        plain_names(job.name, prepared.n_cameras, n_lights, stored.format),
+        names_without_groups(job.name, prepared.n_cameras, n_lights, stored.format),
         prepared.eyes,
         job.camera.resolution,
         job.output.fps,

@@ -21,7 +21,7 @@ from framearray_cli.eyehits import native_hits, pixel_order
 from framearray_cli.hits import SURFACE, empty_hits
 from framearray_cli.lanes import LANES
 from framearray_cli.lights import light_arrays
-from framearray_cli.paths import LightPath, Lights
+from framearray_cli.paths import LightPath, shining_together
 from framearray_cli.rays import room_for_hits, room_for_tests
 from framearray_cli.reuse import outer_hits
 from framearray_cli.sampling import lattice_steps
@@ -79,7 +79,7 @@ def lamps_reach(stage: Stage, places: Any) -> Any:
 def _lit(stage: Stage, lamps: Any) -> Any:
     power = np.full((len(lamps), 3), float(stage.size) ** 2)
     source = LightPath(kind="point", vector=lamps, intensity=power)
-    lights = light_arrays(Lights(sources=(source,)), stage.scene.centre)
+    lights = light_arrays(shining_together([source]), stage.scene.centre)
     out = np.empty((stage.n, 1, len(lamps)), np.float32)
     direct(stage.hits, stage.n, lights, stage.embree.tracer, room_for_tests(4096, len(lamps)), out)
     return out[:, 0] > 0

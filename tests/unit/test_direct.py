@@ -11,7 +11,7 @@ from test_obscurance import points
 from framearray_cli.embree import EmbreeScene
 from framearray_cli.hits import ESCAPED, Hits
 from framearray_cli.lights import LightArrays, light_arrays
-from framearray_cli.paths import LightPath, Lights
+from framearray_cli.paths import LightPath, shining_together
 from framearray_cli.rays import room_for_tests
 from framearray_cli.scene import Scene
 from framearray_cli.terms.direct import direct
@@ -37,7 +37,7 @@ def suns(directions: Any, irradiance: Any = (1.0, 1.0, 1.0)) -> LightPath:
 
 
 def arrays(*sources: LightPath) -> LightArrays:
-    return light_arrays(Lights(sources=sources), np.zeros(3))
+    return light_arrays(shining_together(sources), np.zeros(3))
 
 
 def lit(scene: Scene, hits: Hits, lights: LightArrays, room: int = 4096) -> tuple[Any, int]:

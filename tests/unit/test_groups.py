@@ -12,6 +12,7 @@ from framearray_cli.images import read_layers
 from framearray_cli.manifest import array_files
 from framearray_cli.manifestfile import read_manifest
 from framearray_cli.pictures import Pictures, Relight
+from framearray_cli.planes import Plane
 from framearray_cli.render import render
 
 SKY = [0.3, 0.4, 0.5]
@@ -195,7 +196,7 @@ def test_notes_and_lines_tell_groups(scene: Path) -> None:
 
     job = tiny.Job.model_validate({**tiny.table(), "light": {"sources": SOURCES}})
     found = lights(job)
-    assert (found.n_lit, found.n) == (7, 8)
+    assert found.planes == (Plane.LIGHT,) * 7 + (Plane.INDIRECT,)
     error = np.zeros(8)
     error[4] = 0.5
     ambient = Ambient(

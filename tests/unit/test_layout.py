@@ -21,15 +21,15 @@ meshes/cleaning
 meshes/polygons meshes/merge meshes/overrides meshes/textures meshes/materials meshes/mtl meshes/walk
 meshes/gltf_materials meshes/gltf_motion meshes/gltf_triangles meshes/gltf_nodes meshes/gltf_stage
 meshes/gltf meshes/obj meshes/other meshes/read meshes/__init__
-scene sun paths camera lights sampling surface
+scene sun planes paths camera lights sampling surface
 embree/packets embree/masks embree/native embree/fallback embree/__init__
 rays hits eyehits plan allotment
 terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
 terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise standarderror compose accumulate window loop
 imageattributes pngjpeg exrtiff images filepatterns manifest manifestfile pictures ranges record resume folderlock
-outfolder stored writer
-prepare memory acceptance expected auto allot target describe summary render check verify
+outfolder stored
+prepare writer memory acceptance expected auto allot target describe summary render check verify
 start/rays start/sample start/views start/room start/orbit start/model start/staged start/expose start/plan
 start/text start/__init__
 imagecheck

@@ -1,0 +1,54 @@
+"""Image planes: what each of the images of one frame holds.
+
+The images of a frame lie one behind the other. Without groups there is a picture for each light position. With groups
+every group has a plane for each of its light positions, and one or two planes follow at which no source shines.
+"""
+
+from collections.abc import Sequence
+from enum import Enum
+
+
+class Plane(Enum):
+    """What one image of a frame holds.
+
+    Attributes:
+        PICTURE: all light at one light position.
+        LIGHT: direct light of one group at one of its light positions.
+        INDIRECT: R W, which I_A multiplies when a picture is made.
+        BACKGROUND: what comes from outside the scene, the same at every light position.
+    """
+
+    PICTURE = "picture"
+    LIGHT = "light"
+    INDIRECT = "indirect"
+    BACKGROUND = "background"
+
+    @property
+    def lit(self) -> bool:
+        """Whether sources shine at this plane: it belongs to a light position."""
+        return self in (Plane.PICTURE, Plane.LIGHT)
+
+    @property
+    def holds_background(self) -> bool:
+        """Whether it holds what is the same at every light position."""
+        return self in (Plane.PICTURE, Plane.BACKGROUND)
+
+
+def pictures(n_lights: int) -> tuple[Plane, ...]:
+    """The planes of an array without groups."""
+    return (Plane.PICTURE,) * n_lights
+
+
+def planes_of_groups(n_lights: int, *, background: bool) -> tuple[Plane, ...]:
+    """The planes of an array with groups.
+
+    Args:
+        n_lights: light positions of all groups together.
+        background: whether anything comes from outside the scene.
+    """
+    return (Plane.LIGHT,) * n_lights + (Plane.INDIRECT,) + (Plane.BACKGROUND,) * background
+
+
+def first_with_background(planes: Sequence[Plane]) -> int:
+    """The first plane that holds the background, as do all that follow it; the number of planes if none does."""
+    return next((p for p, plane in enumerate(planes) if plane.holds_background), len(planes))
