@@ -22,13 +22,12 @@ from .memory import (
 )
 from .outfolder import Identity, differences, free_space, in_the_way, read_array
 from .prepare import Prepared, composed_with, open_embree, plan_work, prepare
-from .stored import array_names
 from .target import Target, aimed
 from .terms.ambient import Ambient
 from .usage import free_memory, resident_memory
 from .window import Window
 from .work import FrameSetup
-from .writer import ArrayWriter, image_format
+from .writer import ArrayWriter, array_target
 
 # A probe traces about this many rays, which takes a second or two.
 PROBE_RAYS = 12_000_000
@@ -208,18 +207,8 @@ def _probe(prepared: Prepared, work: FrameSetup, ambient: Ambient, pixels: int) 
 
 
 def _writer(prepared: Prepared, small: FrameSetup, folder: Path, threads: int) -> ArrayWriter:
-    job = prepared.job
-    return ArrayWriter(
-        folder,
-        array_names(job, prepared.n_cameras, prepared.lights),
-        prepared.eyes,
-        (small.cams.width, small.cams.height),
-        job.output.fps,
-        image_format(job),
-        range(prepared.n_lights),
-        threads,
-        lambda images: None,
-    )
+    target = replace(array_target(prepared), directory=folder, resolution=(small.cams.width, small.cams.height))
+    return ArrayWriter(target, range(prepared.n_lights), threads)
 
 
 def _frame_bytes(first: _Probe, second: _Probe, pixels: int) -> float:

@@ -27,13 +27,12 @@ from .prepare import Prepared, composed_with, open_embree, plan_work, prepare
 from .ranges import frames_text
 from .record import Entry, RecordWriter, Session, read_records, record_file
 from .resume import Found, look
-from .stored import array_names
 from .summary import Summary, summed, with_summary
 from .target import Target, aimed
 from .terms.ambient import Ambient
 from .window import Window
 from .work import FrameSetup
-from .writer import ArrayWriter, Finished, image_format
+from .writer import ArrayWriter, FinishedFiles, array_target
 
 
 class Listener:
@@ -228,25 +227,20 @@ class _Run:
         """
         if not wanted:
             return
-        prepared, job = self._prepared, self._prepared.job
-        stored = image_format(job)
+        prepared, target = self._prepared, array_target(self._prepared)
         self._crew = crew = TracePool(work, prepared.threads)
-        ambient = composed_with(ambient, prepared.lights)
+        ambient, half = composed_with(ambient, prepared.lights), target.format.half
         if work.lights.n_lights < prepared.n_lights:
             ambient = ambient.for_lights(lights)
         frames = [0] if prepared.still else wanted
         window = Window(work, ambient, crew)
-        writer = ArrayWriter(
-            job.output.directory, array_names(job, prepared.n_cameras, prepared.lights), prepared.eyes,
-            job.camera.resolution, job.output.fps, stored, lights, prepared.threads, self._listener.written,
-            self._finished,
-        )  # fmt: skip
+        writer = ArrayWriter(target, lights, prepared.threads, self._listener.written, self._finished)
         try:
             with crew, writer:
                 for j in ready_frames(window, work, frames, crew):
                     block = writer.block()
                     composed = window.compose(j, block)
-                    if composed.beyond and stored.half == "auto":  # too bright for halves: some will be floats
+                    if composed.beyond and half == "auto":  # too bright for halves: some will be floats
                         composed = window.compose(j, np.empty(block.shape, np.float32))
                     writer.write(composed, wanted if prepared.still else [j], block)
                 writer.finish()
@@ -255,7 +249,7 @@ class _Run:
             self._stages.update(crew.seconds())
             self._crew = None
 
-    def _finished(self, done: Finished) -> None:
+    def _finished(self, done: FinishedFiles) -> None:
         """Note that all files of a camera are on disk; from any thread."""
         frame, crew = done.composed, self._crew
         notes = []
@@ -263,7 +257,7 @@ class _Run:
             notes = [_bad_values(frame.bad, frame.c, frame.first_bad, self._prepared.job.camera.resolution[0])]
         entry = Entry(
             c=done.c,
-            lights=(done.lights.start, done.lights.stop),
+            lights=(done.planes.start, done.planes.stop),
             files=done.files,
             hits=float(frame.hits.mean()),
             notes=tuple(notes),
@@ -273,7 +267,7 @@ class _Run:
         self._record.add(entry, rays, time.perf_counter() - self._started)
         with self._lock:
             self._done.add(done.c)
-            self._images += len(done.lights)
+            self._images += len(done.planes)
 
     def summary(self, found: Found, ambient: Ambient) -> Summary:
         """What this and all other runs did; what was found damaged counts again once it was rendered anew."""

@@ -19,9 +19,10 @@ from .imageattributes import Attributes, frame_attributes
 from .images import ImageFormat, write_image, write_layers
 from .job import Job
 from .paths import Eyes
+from .prepare import Prepared
 from .record import digest
 from .standarderror import square_mean, standard_error
-from .stored import ArrayNames
+from .stored import ArrayNames, array_names
 from .window import Composed, Layers
 
 # Blocks of images in memory: one is filled while the other is written.
@@ -37,18 +38,61 @@ def image_format(job: Job) -> ImageFormat:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Finished:
-    """A camera whose images under some light positions are on disk.
+class ArrayTarget:
+    """Where the images of an array go, and what their files say beside pixels.
+
+    Attributes:
+        directory: that they are written into.
+        names: of images and layers.
+        resolution: width, height, pixels.
+    """
+
+    directory: Path
+    names: ArrayNames
+    format: ImageFormat
+    eyes: Eyes
+    resolution: tuple[int, int]
+    fps: float
+
+    def attributes(self, c: int, l: int | None = None, group: str = "") -> Attributes:
+        """What the file of camera c says, at light position l of a group if it belongs to one."""
+        return frame_attributes(
+            world_from_camera=self.eyes.world_from_camera[c],
+            fov_deg=self.eyes.fov_deg,
+            resolution=self.resolution,
+            fps=self.fps,
+            c=c,
+            l=l,
+            group=group,
+        )
+
+
+def array_target(prepared: Prepared) -> ArrayTarget:
+    """Where the images of a job go."""
+    job = prepared.job
+    return ArrayTarget(
+        directory=job.output.directory,
+        names=array_names(job, prepared.n_cameras, prepared.lights),
+        format=image_format(job),
+        eyes=prepared.eyes,
+        resolution=job.camera.resolution,
+        fps=job.output.fps,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FinishedFiles:
+    """The files of a camera at some image planes, which are all on disk.
 
     Attributes:
         composed: the frame; its images may be overwritten by now.
         files: name -> size and checksum of every file, layers included.
-        errors: light -> mean square of the standard error, and mean radiance, of images that tell theirs.
+        errors: plane -> mean square of the standard error, and mean radiance, of images that tell theirs.
     """
 
     composed: Composed
     c: int
-    lights: range
+    planes: range
     files: Mapping[str, tuple[int, str]]
     errors: Mapping[int, tuple[float, float]]
 
@@ -75,38 +119,31 @@ class ArrayWriter:
 
     def __init__(
         self,
-        directory: Path,
-        files: ArrayNames,
-        eyes: Eyes,
-        resolution: tuple[int, int],
-        fps: float,
-        image_format: ImageFormat,
-        lights: range,
+        target: ArrayTarget,
+        planes: range,
         threads: int,
-        written: Callable[[int], None],
-        finished: "Callable[[Finished], None]" = lambda done: None,
+        written: Callable[[int], None] = lambda images: None,
+        finished: Callable[[FinishedFiles], None] = lambda done: None,
     ) -> None:
         """Start the threads.
 
         Args:
-            files: names of images and layers.
-            lights: the light positions that frames are composed for.
+            planes: the image planes that frames are composed for.
             written: called with 1 after each image, from any thread.
             finished: called when all files of a camera are on disk, from any thread.
         """
-        self._directory, self._files, self._eyes = directory, files, eyes
-        self._resolution, self._fps, self._format = resolution, fps, image_format
-        self._written, self._finished, self._lights = written, finished, lights
+        self._target, self._planes = target, planes
+        self._written, self._finished = written, finished
         self._pool = ThreadPoolExecutor(threads, thread_name_prefix="write")
         self._free: SimpleQueue[Images | BaseException] = SimpleQueue()
-        width, height = resolution
-        shape = (len(lights), height, width, 3)
+        width, height = target.resolution
+        shape = (len(planes), height, width, 3)
         for _ in range(BLOCKS):
-            halves = image_format.composes_halves
+            halves = target.format.composes_halves
             self._free.put(np.empty(shape, np.float16) if halves else np.empty(shape, np.float32))
 
     def block(self) -> Images:
-        """A block to compose a frame into, (n_lights, height, width, 3); waits until one is free.
+        """A block to compose a frame into, (n_planes, height, width, 3); waits until one is free.
 
         Raises:
             OutputError: an earlier frame could not be written.
@@ -115,10 +152,6 @@ class ArrayWriter:
         if isinstance(block, BaseException):
             raise block
         return block
-
-    def give_back(self, block: Images) -> None:
-        """Take a block back that is not to be written."""
-        self._free.put(block)
 
     def write(self, composed: Composed, cameras: Sequence[int], block: Images | None = None) -> None:
         """Write a composed frame as that of each of the given cameras.
@@ -132,15 +165,15 @@ class ArrayWriter:
             self._write_camera(composed, c, unfinished)
 
     def _write_camera(self, composed: Composed, c: int, unfinished: "_Countdown") -> None:
-        """Write all files of a camera, then tell that they are there."""
+        """Write all files of a camera, then report that they are there."""
         errors: dict[int, tuple[float, float]] = {}
-        tasks: list[Callable[[], Path]] = [partial(self._write_image, composed, c, l, errors) for l in self._lights]
+        tasks: list[Callable[[], Path]] = [partial(self._write_image, composed, c, p, errors) for p in self._planes]
         if composed.layers is not None:
             tasks.append(partial(self._write_layers, composed.layers, c))
         files: dict[str, tuple[int, str]] = {}
 
         def whole() -> None:
-            self._finished(Finished(composed=composed, c=c, lights=self._lights, files=files, errors=errors))
+            self._finished(FinishedFiles(composed=composed, c=c, planes=self._planes, files=files, errors=errors))
             unfinished.one_less()
 
         left = _Countdown(len(tasks), whole)
@@ -161,21 +194,11 @@ class ArrayWriter:
         if error is not None:
             self._free.put(error)
 
-    def _attributes(self, c: int, l: int | None, group: str = "") -> Attributes:
-        return frame_attributes(
-            world_from_camera=self._eyes.world_from_camera[c],
-            fov_deg=self._eyes.fov_deg,
-            resolution=self._resolution,
-            fps=self._fps,
-            c=c,
-            l=l,
-            group=group,
-        )
-
-    def _write_image(self, composed: Composed, c: int, l: int, errors: dict[int, tuple[float, float]]) -> Path:
-        stored = self._files.images[l]
-        path = self._directory / stored.file(c)
-        at = l - self._lights.start
+    def _write_image(self, composed: Composed, c: int, p: int, errors: dict[int, tuple[float, float]]) -> Path:
+        target = self._target
+        stored = target.names.images[p]
+        path = target.directory / stored.file(c)
+        at = p - self._planes.start
         image, more = composed.images[at], {}
         if composed.differences is not None:
             hits = composed.hits.reshape(image.shape[:2])
@@ -183,13 +206,13 @@ class ArrayWriter:
                 "error": standard_error(composed.differences[at], hits),
                 "difference": composed.differences[at],
             }
-            errors[l] = square_mean(more["error"]), float(image.mean(dtype=np.float64))
-        write_image(path, image, self._format, self._attributes(c, stored.light, stored.group), more)
+            errors[p] = square_mean(more["error"]), float(image.mean(dtype=np.float64))
+        write_image(path, image, target.format, target.attributes(c, stored.light, stored.group), more)
         self._written(1)
         return path
 
     def _write_layers(self, layers: Layers, c: int) -> Path:
-        path = self._directory / self._files.layers.format(camera=c)
+        path = self._target.directory / self._target.names.layers_file(c)
         channels: dict[str, Float32] = {"depth.Z": layers.depth, "samples": layers.samples}
         for name, letters, values in (
             ("obscurance", "RGB", layers.obscurance),
@@ -198,7 +221,7 @@ class ArrayWriter:
             ("normal", "XYZ", layers.normal),
         ):
             channels |= {f"{name}.{letter}": values[..., i] for i, letter in enumerate(letters)}
-        write_layers(path, channels, self._attributes(c, None))
+        write_layers(path, channels, self._target.attributes(c))
         return path
 
     def finish(self) -> None:

@@ -8,7 +8,7 @@ import tempfile
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import islice
 from pathlib import Path
 from threading import Lock
@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.arrays import Int32
+from framearray_cli.arrays import Images, Int32
 from framearray_cli.crew import TracePool
 from framearray_cli.images import ImageFormat
 from framearray_cli.loop import ready_frames
 from framearray_cli.stored import names_without_groups
 from framearray_cli.window import Composed, Window
-from framearray_cli.writer import BLOCKS, ArrayWriter
+from framearray_cli.writer import BLOCKS, ArrayWriter, array_target
 
 from .cases import Case
 from .results import Table
@@ -72,9 +72,13 @@ class TimedWriter(ArrayWriter):
         else:
             self.give_back(composed.images)
 
-    def _write_image(self, composed: Composed, c: int, l: int, errors: dict[int, tuple[float, float]]) -> Path:
+    def give_back(self, block: Images) -> None:
+        """Take a block back that is not to be written."""
+        self._free.put(block)
+
+    def _write_image(self, composed: Composed, c: int, p: int, errors: dict[int, tuple[float, float]]) -> Path:
         started = time.thread_time()
-        path = super()._write_image(composed, c, l, errors)
+        path = super()._write_image(composed, c, p, errors)
         with self._lock:
             self.seconds += time.thread_time() - started
         return path
@@ -167,18 +171,13 @@ def mean(tables: Sequence[Table]) -> Table:
 
 
 def _writer(case: Case, folder: Path, image_format: ImageFormat | None) -> TimedWriter:
-    job, prepared, n_lights = case.prepared.job, case.prepared, case.setup.lights.n_lights
+    prepared, n_lights = case.prepared, case.setup.lights.n_lights
     stored = image_format or ImageFormat()
+    names = names_without_groups(prepared.job.name, prepared.n_cameras, n_lights, stored.format)
     writer = TimedWriter(
-        folder,
-        names_without_groups(job.name, prepared.n_cameras, n_lights, stored.format),
-        prepared.eyes,
-        job.camera.resolution,
-        job.output.fps,
-        stored,
+        replace(array_target(prepared), directory=folder, names=names, format=stored),
         range(n_lights),
         case.threads,
-        lambda images: None,
         writes=image_format is not None,
     )
     for block in [writer.block() for _ in range(BLOCKS)]:  # memory that was never written costs a page at a time
