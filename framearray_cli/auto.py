@@ -32,10 +32,11 @@ TOLD = (1, 2, 4, 8, 16)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
-    """What was chosen, and why.
+class AutoSettings:
+    """What was chosen where the job says "auto", and why.
 
     Attributes:
+        reuse: the settings; those that the job says itself are among them.
         keys: of the job file that say "auto".
         enough: whether it is as exact as wanted; else nothing that was tried is.
         error: expected, over that which is wanted.
@@ -52,22 +53,6 @@ class Choice:
     hits: tuple[float, float]
     seen: dict[int, float]
 
-    def lines(self) -> list[str]:
-        """What a person is told."""
-        said = {"reuse.n_r": f"n_r = {self.reuse.n_r}", "samples.hits": f"hits = {self.reuse.hits:g}"}
-        default = f"n_r = {DEFAULT.n_r}, hits = {DEFAULT.hits:g}"
-        lines = [
-            f"automatic: {', '.join(said[key] for key in self.keys)}; expected: {self.hits[0]:.1f} hits a pixel "
-            f"(1st percentile {self.hits[1]:.1f}), {self.error:.2f} times the error that is wanted, "
-            f"{self.time:.2f} times the time of {default}"
-        ]
-        if not self.enough:
-            lines.append("  note: no window reaches the error that is wanted; this one makes the most of its time")
-        if self.seen:
-            shares = ", ".join(f"{share:.0%} ({k})" for k, share in self.seen.items())
-            lines.append(f"  hits that are seen so many frames away: {shares}")
-        return lines
-
     def table(self) -> dict[str, object]:
         """For the manifest."""
         return {
@@ -83,7 +68,7 @@ class Choice:
         }
 
 
-def settled(prepared: Prepared, embree: EmbreeScene) -> tuple[Prepared, Choice | None]:
+def resolve_auto(prepared: Prepared, embree: EmbreeScene) -> tuple[Prepared, AutoSettings | None]:
     """The same job with a number for each "auto", and why; no choice where the job says all numbers.
 
     Raises:
@@ -106,7 +91,7 @@ def settled(prepared: Prepared, embree: EmbreeScene) -> tuple[Prepared, Choice |
     chosen = choose(model, enough, trying, lambda reuse: _blocks(prepared, reuse))
     result = applied(prepared, chosen)
     require_memory(result)
-    return result, Choice(
+    return result, AutoSettings(
         reuse=chosen,
         keys=keys,
         enough=enough(chosen),

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .auto import Choice, require_least_memory, settled
+from .auto import AutoSettings, require_least_memory, resolve_auto
 from .compiling import compile_clock
 from .crew import TracePool
-from .describe import identity_of
+from .identity import identity_of
 from .job import Job
 from .loop import ready_frames
 from .memory import (
@@ -22,7 +22,7 @@ from .memory import (
 )
 from .outfolder import Identity, differences, free_space, in_the_way, read_array
 from .prepare import Prepared, composed_with, open_embree, plan_work, prepare
-from .target import Target, aimed
+from .target import Target, allot_hits
 from .terms.ambient import Ambient
 from .usage import free_memory, resident_memory
 from .window import Window
@@ -45,14 +45,14 @@ class Estimate:
         memory: bytes at most, of the whole program; `available`: bytes the machine can give it.
         disk: bytes of all images and layers; `free`: bytes free where they go.
         seconds: from start to end, writing included, with kernels that were compiled before.
-        choice: of what the job leaves open; None where it says all.
+        settings: that were chosen where the job leaves them open; None where it says all.
         target: what the error takes that the job wants; None where it wants none.
         blocks: of light positions, rendered one after the other because of the memory limit.
         warnings: what would go wrong.
     """
 
     prepared: Prepared
-    choice: Choice | None
+    settings: AutoSettings | None
     target: Target | None
     ambient: Ambient
     memory: int
@@ -93,10 +93,10 @@ def check(job: Job) -> Estimate:
         prepared = prepare(job)
         require_least_memory(prepared)
         with open_embree(prepared) as embree:
-            prepared, choice = settled(prepared, embree)
+            prepared, settings = resolve_auto(prepared, embree)
             identity = identity_of(prepared)
             work, ambient = plan_work(prepared, embree)
-            work, target = aimed(prepared, work, ambient)
+            work, target = allot_hits(prepared, work, ambient)
             before_frames = time.perf_counter() - started - clock.seconds
             pixels = _probe_pixels(work)
             first, second = (_probe(prepared, work, ambient, int(p)) for p in (FIRST_SHARE * pixels, pixels))
@@ -112,7 +112,7 @@ def check(job: Job) -> Estimate:
     copies = prepared.n_cameras - work.n_frames  # frames of a camera that stands still, which are written only
     return Estimate(
         prepared=prepared,
-        choice=choice,
+        settings=settings,
         target=target,
         ambient=ambient,
         memory=resident + more,

@@ -7,14 +7,12 @@ import numpy as np
 
 from . import __version__
 from .arrays import Float64
-from .auto import Choice
-from .jobfile import job_table
+from .auto import AutoSettings
 from .manifest import BACKGROUND, Manifest, ManifestCamera, ManifestGroup, ManifestLight, matrix_rows
-from .manifestfile import plain
 from .outfolder import Identity
 from .paths import LightPath
 from .planes import Plane
-from .prepare import Prepared, job_fingerprint, scene_fingerprint
+from .prepare import Prepared
 from .stored import AMBIENT, ArrayNames, array_names
 from .target import Target
 from .terms.ambient import Ambient
@@ -22,19 +20,8 @@ from .terms.ambient import Ambient
 _KEYS = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
 
 
-def identity_of(prepared: Prepared) -> Identity:
-    """What decides every byte of the files of a job."""
-    job, scene = prepared.job, scene_fingerprint(prepared)
-    return Identity(
-        name=job.name,
-        fingerprint=job_fingerprint(prepared, scene),
-        scene=scene,
-        job=plain(job_table(job)),
-    )
-
-
 def describe(
-    prepared: Prepared, ambient: Ambient, identity: Identity, choice: Choice | None, target: Target | None
+    prepared: Prepared, ambient: Ambient, identity: Identity, settings: AutoSettings | None, target: Target | None
 ) -> Manifest:
     """The manifest of a render that has not begun.
 
@@ -45,7 +32,7 @@ def describe(
     files = array_names(job, prepared.n_cameras, prepared.lights)
     summary: dict[str, Any] = {"finished": False, "images": 0, "ambient_paths": ambient.paths}
     summary |= {"notes": list(ambient.notes)}
-    summary |= {"automatic": choice.table()} if choice else {}
+    summary |= {"automatic": settings.table()} if settings else {}
     summary |= {"target": target.table()} if target else {}
     return Manifest(
         version=__version__,

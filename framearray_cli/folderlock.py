@@ -19,7 +19,7 @@ from .record import FOLDER, MOST, record_file
 PATIENCE = 60.0
 
 
-class Folder:
+class ArrayFolder:
     """An output folder in which some cameras are this run's."""
 
     def __init__(self, folder: Path) -> None:

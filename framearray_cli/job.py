@@ -190,7 +190,7 @@ class Job(Table):
 
     @property
     def n_r(self) -> int:
-        """N_r: `reuse.n_r`, after a choice where that is "auto" (`auto.settled`)."""
+        """N_r: `reuse.n_r`, after a choice where that is "auto" (`auto.resolve_auto`)."""
         assert self.reuse.n_r != "auto"
         return self.reuse.n_r
 

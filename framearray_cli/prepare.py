@@ -1,6 +1,5 @@
 """From a job to everything that is known before the first frame: scene, eyes, lights, ambient light, plan."""
 
-import json
 import os
 from dataclasses import dataclass, replace
 
@@ -10,9 +9,7 @@ from .arrays import Float32
 from .camera import Cameras, cameras
 from .denoise import require_denoiser
 from .embree import EmbreeScene, Engine
-from .fingerprint import fingerprint
 from .job import Job
-from .jobfile import job_table
 from .lights import LightArrays, light_arrays
 from .paths import Eyes, Lights, eyes, lights
 from .plan import frame_hits, turns
@@ -216,22 +213,3 @@ def _curve(job: Job) -> Curve:
     wanted = job.obscurance
     sky = wanted.outside == "background"
     return Curve(d_max=wanted.range, falloff=FALLOFFS[wanted.falloff], tau=wanted.tau, sky=sky)
-
-
-def scene_fingerprint(prepared: Prepared) -> str:
-    """Hash the scene as it was read: its triangles, materials and textures; where the file lies plays no part."""
-    arrays = (np.ascontiguousarray(array).reshape(-1).view(np.uint8).data for array in prepared.surfaces)
-    return fingerprint(prepared.scene.centre.tobytes(), *arrays)
-
-
-def job_fingerprint(prepared: Prepared, scene: str | None = None) -> str:
-    """Hash whatever the pixels depend on: the job without its output and machine, and the scene as it was read.
-
-    Args:
-        scene: its fingerprint, where it is known.
-    """
-    table = {key: value for key, value in job_table(prepared.job).items() if key not in ("output", "render")}
-    for where in ("file", "folders"):
-        table["scene"].pop(where, None)
-    scene = scene or scene_fingerprint(prepared)
-    return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), scene.encode())

@@ -49,7 +49,7 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Session:
+class RecordedRun:
     """One run of the program: what it was to do, and what it took until its last entry.
 
     Attributes:
@@ -66,11 +66,11 @@ class Session:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Records:
+class ArrayRecords:
     """What all records of a folder say of one array; of a frame that was finished twice, the last entry counts."""
 
     entries: tuple[Entry, ...] = ()
-    sessions: tuple[Session, ...] = ()
+    runs: tuple[RecordedRun, ...] = ()
 
     def checksums(self) -> dict[str, tuple[int, str]]:
         """Size and checksum of every file that was finished."""
@@ -97,7 +97,7 @@ def digest(path: Path) -> tuple[int, str]:
 class RecordWriter:
     """Appends to a record; lines appear whole, from any thread."""
 
-    def __init__(self, file: Path, fingerprint: str, session: Session) -> None:
+    def __init__(self, file: Path, fingerprint: str, run: RecordedRun) -> None:
         """Open the record, or begin it.
 
         Raises:
@@ -111,13 +111,13 @@ class RecordWriter:
             raise OutputError(f"{file}: cannot be written: {reason(error)}") from error
         self._torn = True  # a line of an earlier run may have been cut short
         try:
-            self._put({"fingerprint": fingerprint, "cameras": session.cameras, "processor": session.processor})
+            self._put({"fingerprint": fingerprint, "cameras": run.cameras, "processor": run.processor})
         except BaseException:
             self._file.close()
             raise
 
     def add(self, entry: Entry, rays: Mapping[str, int], seconds: float) -> None:
-        """Note that a frame is finished, and what the session took so far.
+        """Note that a frame is finished, and what the run took so far.
 
         Raises:
             OutputError: it cannot be written.
@@ -171,14 +171,14 @@ def record_files(folder: Path) -> list[Path]:
     return sorted((folder / FOLDER).glob("*.jsonl"))
 
 
-def read_records(folder: Path, fingerprint: str) -> Records:
+def read_records(folder: Path, fingerprint: str) -> ArrayRecords:
     """What was finished of the array with this fingerprint; lines of other arrays, and torn ones, do not count.
 
     Raises:
         OutputError: a record cannot be read.
     """
     entries: dict[tuple[int, int, int], Entry] = {}
-    sessions: list[Session] = []
+    runs: list[RecordedRun] = []
     for file in record_files(folder):
         current = False
         for line in _lines(file):
@@ -186,11 +186,11 @@ def read_records(folder: Path, fingerprint: str) -> Records:
                 current = line["fingerprint"] == fingerprint
                 if current:
                     cameras, processor = (str(line.get(key, "")) for key in ("cameras", "processor"))
-                    sessions.append(Session(cameras=cameras, processor=processor))
+                    runs.append(RecordedRun(cameras=cameras, processor=processor))
             elif current and (entry := _entry(line)):
                 entries[entry.c, *entry.lights] = entry
-                sessions[-1] = replace(sessions[-1], **_taken(line))
-    return Records(entries=tuple(entries.values()), sessions=tuple(sessions))
+                runs[-1] = replace(runs[-1], **_taken(line))
+    return ArrayRecords(entries=tuple(entries.values()), runs=tuple(runs))
 
 
 def _lines(file: Path) -> Iterator[dict[str, Any]]:
@@ -257,7 +257,7 @@ def _is_plain(name: str) -> bool:
 
 
 def _taken(line: Mapping[str, Any]) -> dict[str, Any]:
-    """What a session says that it took; nothing where that is not what a session writes."""
+    """What a run says that it took; nothing where that is not what a run writes."""
     rays, seconds = line.get("rays"), line.get("seconds")
     counts = isinstance(rays, dict) and all(isinstance(n, int) for n in rays.values())
     return ({"rays": rays} if counts else {}) | (

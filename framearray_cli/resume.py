@@ -5,11 +5,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from .record import Entry, Records, damaged, read_records
+from .record import ArrayRecords, Entry, damaged, read_records
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class OnDisk:
     """What lies in an output folder.
 
     Attributes:
@@ -17,7 +17,7 @@ class Found:
         damaged: names of files that were finished and are missing or changed, with what is wrong.
     """
 
-    records: Records
+    records: ArrayRecords
     damaged: tuple[tuple[str, str], ...] = ()
 
     @property
@@ -31,25 +31,25 @@ class Found:
         return [c for c in cameras if not set(lights) <= done.get(c, set())]
 
 
-def _lights_by_camera(records: Records) -> dict[int, set[int]]:
+def _lights_by_camera(records: ArrayRecords) -> dict[int, set[int]]:
     done: dict[int, set[int]] = {}
     for entry in records.entries:
         done.setdefault(entry.c, set()).update(range(*entry.lights))
     return done
 
 
-def look(
+def scan_output(
     folder: Path,
     fingerprint: str,
     threads: int = 1,
     cameras: Container[int] | None = None,
-    looking: Callable[[int], None] = lambda files: None,
-) -> Found:
+    scanning: Callable[[int], None] = lambda files: None,
+) -> OnDisk:
     """Read all records of an array, and the files that they name: those that are not what they were do not count.
 
     Args:
         cameras: whose files are read; what records say of others is believed. None: of all.
-        looking: told how many files are read, before that.
+        scanning: called with the number of files before they are read.
 
     Raises:
         OutputError: a record cannot be read.
@@ -59,7 +59,7 @@ def look(
 
     read = [entry for entry in records.entries if cameras is None or entry.c in cameras]
     if files := sum(len(entry.files) for entry in read):
-        looking(files)
+        scanning(files)
 
     def wrong(entry: Entry) -> list[tuple[str, str]]:
         return list(damaged(folder, checksums, entry.files))
@@ -68,6 +68,6 @@ def look(
         found = list(pool.map(wrong, read))
     bad = {id(entry) for entry, problems in zip(read, found, strict=True) if problems}
     whole = tuple(entry for entry in records.entries if id(entry) not in bad)
-    return Found(
+    return OnDisk(
         records=replace(records, entries=whole), damaged=tuple(problem for problems in found for problem in problems)
     )

@@ -9,7 +9,7 @@ from .kernel import processor
 from .manifest import Manifest
 from .paths import Lights
 from .prepare import Prepared
-from .record import Records
+from .record import ArrayRecords
 from .standarderror import summed_up
 from .usage import peak_memory
 
@@ -50,9 +50,9 @@ class Summary:
         return {kind: n / (self.pixels * max(self.images, 1)) for kind, n in self.rays.items()}
 
 
-def summed(
+def summarize(
     prepared: Prepared,
-    records: Records,
+    records: ArrayRecords,
     *,
     images: int,
     seconds: float,
@@ -76,7 +76,7 @@ def summed(
         there |= {(entry.c, l) for l in range(*entry.lights)}
     width, height = prepared.job.camera.resolution
     found = dict.fromkeys(note for entry in sorted(records.entries, key=lambda e: e.c) for note in entry.notes)
-    all_rays = sum((Counter(session.rays) for session in records.sessions), Counter[str]())
+    all_rays = sum((Counter(run.rays) for run in records.runs), Counter[str]())
     return Summary(
         images=images,
         there=len(there),
@@ -90,13 +90,13 @@ def summed(
         notes=tuple(dict.fromkeys((*notes, *found, *_mixed(records)))),
         standard_error=_standard_error(prepared.lights, errors) if errors else {},
         all_rays=dict(all_rays) or dict(rays),
-        all_seconds=sum(session.seconds for session in records.sessions) or seconds,
+        all_seconds=sum(run.seconds for run in records.runs) or seconds,
     )
 
 
-def _mixed(records: Records) -> list[str]:
+def _mixed(records: ArrayRecords) -> list[str]:
     """Say it where processors of several kinds worked on an array: their kernels round differently."""
-    kinds = sorted({session.processor for session in records.sessions} | {processor()})
+    kinds = sorted({run.processor for run in records.runs} | {processor()})
     if len(kinds) < 2:
         return []
     return [f"rendered on several kinds of processor, whose images may differ in the last bits: {', '.join(kinds)}"]

@@ -51,20 +51,6 @@ class Target:
     capped: float
     rays: int
 
-    def lines(self) -> list[str]:
-        """What a person is told."""
-        least, most = self.frames
-        lines = [
-            f"error: {self.error:.3g} of the mean radiance is wanted; {self.hits:.1f} native hits a pixel "
-            f"({least:.1f} to {most:.1f} by frame) are expected to give {self.expected:.3g}"
-        ]
-        if self.expected > 1.05 * self.error:
-            lines.append(
-                f"  note: {self.capped:.1%} of all places have as many hits as samples.most_hits allows, "
-                "too few for this error"
-            )
-        return lines
-
     def table(self) -> dict[str, object]:
         """For the manifest."""
         return {
@@ -79,7 +65,7 @@ class Target:
         }
 
 
-def aimed(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> tuple[FrameSetup, Target | None]:
+def allot_hits(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> tuple[FrameSetup, Target | None]:
     """The same setup with native hits allotted for `samples.error`; as it is where the job has no target.
 
     Args:

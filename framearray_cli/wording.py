@@ -3,16 +3,20 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from .progress import ambient_figures
 from .screen import duration, size
 
 if TYPE_CHECKING:
+    from .auto import AutoSettings
     from .check import Estimate
     from .job import Job
+    from .parts.chunks import Chunks
     from .prepare import Prepared
+    from .progress import AmbientFigures
     from .report import Report
-    from .resume import Found
+    from .resume import OnDisk
     from .summary import Summary
-    from .terms.ambient import Ambient
+    from .target import Target
     from .verify import Verified
 
 
@@ -26,9 +30,9 @@ def estimate_lines(estimate: "Estimate") -> list[str]:
     width, height = job.camera.resolution
     return [
         *scene_lines(prepared),
-        *(estimate.choice.lines() if estimate.choice else []),
-        *ambient_lines(estimate.ambient),
-        *(estimate.target.lines() if estimate.target else []),
+        *(settings_lines(estimate.settings) if estimate.settings else []),
+        *ambient_lines(ambient_figures(estimate.ambient)),
+        *(target_lines(estimate.target) if estimate.target else []),
         f"array: {n_c:,} cameras x {_light_count(prepared)} = {n_c * n_l:,} images of {width} x {height}",
         f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_blocks(estimate.blocks)}",
         f"disk: about {size(estimate.disk)} in {job.output.directory}, {size(estimate.free)} free",
@@ -57,15 +61,48 @@ def scene_lines(prepared: "Prepared") -> list[str]:
     return report_lines(prepared.scene.report, prepared.job.scene.file)
 
 
-def ambient_lines(ambient: "Ambient") -> list[str]:
+def ambient_lines(figures: "AmbientFigures") -> list[str]:
     """The ambient light, and how well it is known."""
-    mean = ambient.intensity.mean(axis=1)
-    error = ambient.standard_error.max()
-    known = f"standard error at most {error:.1%}, {ambient.paths:,} paths" if error > 0 else "fixed, or nothing arrives"
+    error = figures.error
+    known = f"standard error at most {error:.1%}, {figures.paths:,} paths" if error > 0 else "fixed, or nothing arrives"
     return [
-        f"ambient light: I_A {mean.min():.4g} to {mean.max():.4g} ({known})",
-        *(f"  note: {note}" for note in ambient.notes),
+        f"ambient light: I_A {figures.lowest:.4g} to {figures.highest:.4g} ({known})",
+        *(f"  note: {note}" for note in figures.notes),
     ]
+
+
+def settings_lines(settings: "AutoSettings") -> list[str]:
+    """The settings that were chosen, and what is expected of them."""
+    from .auto import DEFAULT
+
+    said = {"reuse.n_r": f"n_r = {settings.reuse.n_r}", "samples.hits": f"hits = {settings.reuse.hits:g}"}
+    default = f"n_r = {DEFAULT.n_r}, hits = {DEFAULT.hits:g}"
+    lines = [
+        f"automatic: {', '.join(said[key] for key in settings.keys)}; expected: {settings.hits[0]:.1f} hits a pixel "
+        f"(1st percentile {settings.hits[1]:.1f}), {settings.error:.2f} times the error that is wanted, "
+        f"{settings.time:.2f} times the time of {default}"
+    ]
+    if not settings.enough:
+        lines.append("  note: no window reaches the error that is wanted; this one makes the most of its time")
+    if settings.seen:
+        shares = ", ".join(f"{share:.0%} ({k})" for k, share in settings.seen.items())
+        lines.append(f"  hits that are seen so many frames away: {shares}")
+    return lines
+
+
+def target_lines(target: "Target") -> list[str]:
+    """The error that the job wants, and the hits that it takes."""
+    least, most = target.frames
+    lines = [
+        f"error: {target.error:.3g} of the mean radiance is wanted; {target.hits:.1f} native hits a pixel "
+        f"({least:.1f} to {most:.1f} by frame) are expected to give {target.expected:.3g}"
+    ]
+    if target.expected > 1.05 * target.error:
+        lines.append(
+            f"  note: {target.capped:.1%} of all places have as many hits as samples.most_hits allows, "
+            "too few for this error"
+        )
+    return lines
 
 
 def summary_lines(summary: "Summary", told: Sequence[str], job: "Job") -> list[str]:
@@ -100,15 +137,29 @@ def _cost_lines(summary: "Summary") -> list[str]:
     ]
 
 
-def found_lines(found: "Found", wanted: int) -> list[str]:
+def on_disk_lines(on_disk: "OnDisk", wanted: int) -> list[str]:
     """What of an array is there already."""
-    lines = [f"damaged: {name}: {problem}" for name, problem in found.damaged[:MOST_DAMAGED]]
-    if len(found.damaged) > MOST_DAMAGED:
-        lines.append(f"damaged: {len(found.damaged) - MOST_DAMAGED:,} files more")
-    if found.images:
+    lines = [f"damaged: {name}: {problem}" for name, problem in on_disk.damaged[:MOST_DAMAGED]]
+    if len(on_disk.damaged) > MOST_DAMAGED:
+        lines.append(f"damaged: {len(on_disk.damaged) - MOST_DAMAGED:,} files more")
+    if on_disk.images:
         left = f"{wanted:,} are left" if wanted else "nothing is left to do"
-        lines.append(f"{found.images:,} images are there and whole; {left}")
+        lines.append(f"{on_disk.images:,} images are there and whole; {left}")
     return lines
+
+
+def chunks_line(chunks: "Chunks") -> str:
+    """How the camera path was cut: "4 chunks of 24 frames; halos add 19 % to the hits"."""
+    n, sizes = len(chunks.each), sorted({len(chunk) for chunk in chunks.each})
+    frames = f"{' to '.join(map(str, sizes))} frame{'s' if sizes[-1] > 1 else ''}"
+    if n == 1:
+        return f"1 chunk of {frames}"
+    return f"{n:,} chunks of {frames}; halos add {chunks.more:.0%} to the hits"
+
+
+def workers_text(n: int) -> str:
+    """A number of workers."""
+    return f"{n:,} worker{'s' if n > 1 else ''}"
 
 
 def _error_lines(summary: "Summary") -> list[str]:

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from ..screen import Screen, out, say
+from ..wording import chunks_line
 from .options import MOST_THREADS, JobFile, Quiet, place, read
 
 
@@ -48,4 +49,4 @@ def openjd(
         chunks = in_chunks(range(frames), size, frames, n_r, still=still)
         write_template(file, template(job, job_file, file.parent, size, job.render.threads), force=force)
     if not quiet:
-        say(out, [chunks.line(), f"{file}; next: openjd run {shlex.quote(str(file))}"])
+        say(out, [chunks_line(chunks), f"{file}; next: openjd run {shlex.quote(str(file))}"])

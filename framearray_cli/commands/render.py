@@ -10,15 +10,26 @@ import typer
 from ..compiling import compile_clock
 from ..errors import OutputError
 from ..screen import Screen, out, say, size
-from ..wording import ambient_lines, found_lines, scene_lines, summary_lines
+from ..wording import (
+    ambient_lines,
+    chunks_line,
+    on_disk_lines,
+    scene_lines,
+    settings_lines,
+    summary_lines,
+    target_lines,
+    workers_text,
+)
 from .options import MOST_THREADS, JobFile, Output, Quiet, Threads, frames_of, read
 
 if TYPE_CHECKING:
-    from ..auto import Choice
+    from ..auto import AutoSettings
     from ..job import Job
-    from ..parts.run import Hands
+    from ..parts.chunks import Chunks
+    from ..parts.run import WorkerOptions
     from ..prepare import Prepared
-    from ..resume import Found
+    from ..progress import AmbientFigures
+    from ..resume import OnDisk
     from ..target import Target
     from ..terms.ambient import Ambient
 
@@ -54,11 +65,11 @@ def render(
     """Render every (camera, light) image of a job into a folder, with a manifest, or what is missing of them there."""
     job = read(job_file, threads, output)
     chosen = None if cameras is None else frames_of(cameras, job.camera.frames)
-    render_shown(job, quiet=quiet, restart=restart, cameras=chosen, hands=_hands(workers, dask, chunk))
+    render_shown(job, quiet=quiet, restart=restart, cameras=chosen, options=_worker_options(workers, dask, chunk))
 
 
-def _hands(workers: int | None, dask: str | None, chunk: int | None) -> "Hands | None":
-    """Who renders; None: this process."""
+def _worker_options(workers: int | None, dask: str | None, chunk: int | None) -> "WorkerOptions | None":
+    """Which workers render; None: this process does."""
     if workers and dask is not None:
         raise typer.BadParameter("expected either --workers or --dask", param_hint="--workers")
     if not workers and dask is None:
@@ -67,9 +78,9 @@ def _hands(workers: int | None, dask: str | None, chunk: int | None) -> "Hands |
         return None
     if dask is not None and not dask.strip():  # most often a shell variable that is not set
         raise typer.BadParameter("expected an address, got none", param_hint="--dask")
-    from ..parts.run import Hands
+    from ..parts.run import WorkerOptions
 
-    return Hands(workers=workers or 1, address=dask, chunk=chunk)
+    return WorkerOptions(workers=workers or 1, address=dask, chunk=chunk)
 
 
 def render_shown(
@@ -78,15 +89,16 @@ def render_shown(
     quiet: bool,
     restart: bool = False,
     cameras: Sequence[int] | None = None,
-    hands: "Hands | None" = None,
+    options: "WorkerOptions | None" = None,
 ) -> None:
     """Render, and show on the screen what goes on."""
     with Screen(out, quiet=quiet) as screen:
         screen.wait("reading the scene")
-        from ..render import Listener
+        from ..parts.progress import PartEvents
+        from ..progress import ambient_figures
         from ..render import render as run
 
-        class Shown(Listener):
+        class Shown(PartEvents):
             """Prints the scene, then the ambient light, then a progress bar."""
 
             told: tuple[str, ...] = ()
@@ -99,37 +111,43 @@ def render_shown(
                 if files:
                     screen.say([f"removed {files:,} files of the frame array in {job.output.directory}"])
 
-            def settled(self, choice: "Choice") -> None:
-                screen.say(choice.lines())
+            def resolved(self, settings: "AutoSettings") -> None:
+                screen.say(settings_lines(settings))
 
-            def looking(self, files: int) -> None:
+            def scanning(self, files: int) -> None:
                 screen.wait(f"looking whether {files:,} files are whole")
 
-            def found(self, found: "Found", wanted: int) -> None:
+            def scanned(self, on_disk: "OnDisk", wanted: int) -> None:
                 self.total = wanted
-                screen.say(found_lines(found, wanted))
+                screen.say(on_disk_lines(on_disk, wanted))
                 screen.wait("estimating the ambient light")
 
             def planned(self, ambient: "Ambient") -> None:
-                screen.say(ambient_lines(ambient))
+                screen.say(ambient_lines(ambient_figures(ambient)))
                 self.told = ambient.notes
                 screen.count("rendering", self.total, "image")
 
-            def aimed(self, target: "Target") -> None:
-                screen.say(target.lines())
+            def allotted(self, target: "Target") -> None:
+                screen.say(target_lines(target))
 
             def written(self, images: int) -> None:
                 screen.advance(images)
 
-            def waits(self, what: str) -> None:
-                screen.wait(what)
+            def starting_workers(self) -> None:
+                screen.wait("starting workers")
 
-            def handed_out(self, line: str) -> None:
-                screen.say([line])
+            def awaiting_workers(self, address: str | None) -> None:
+                screen.say([f"waiting for workers of {address or 'this machine'}"])
+
+            def cut(self, workers: int, chunks: "Chunks") -> None:
+                screen.say([f"{workers_text(workers)}, {chunks_line(chunks)}"])
                 screen.count("rendering", self.total, "image")
 
-            def heard(self, lines: Sequence[str]) -> None:
-                screen.say(lines)
+            def ambient_known(self, figures: "AmbientFigures") -> None:
+                screen.say(ambient_lines(figures))
+
+            def target_known(self, target: "Target") -> None:
+                screen.say(target_lines(target))
 
             def compiling(self) -> None:
                 screen.compiling()
@@ -137,12 +155,12 @@ def render_shown(
         shown = Shown()
         try:
             with compile_clock(screen.compiling):
-                if hands is None:
+                if options is None:
                     summary = run(job, shown, restart=restart, cameras=cameras)
                 else:
                     from ..parts.run import render_in_parts
 
-                    summary = render_in_parts(job, shown, hands, restart=restart, cameras=cameras)
+                    summary = render_in_parts(job, shown, options, restart=restart, cameras=cameras)
         except BaseException as error:
             if isinstance(error, OutputError):
                 _add_space(error, job.output.directory)

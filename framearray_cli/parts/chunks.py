@@ -32,14 +32,6 @@ class Chunks:
     each: tuple[tuple[int, ...], ...]
     more: float
 
-    def line(self) -> str:
-        """What a person is told: "4 chunks of 24 frames; halos add 19 % to the hits"."""
-        n, sizes = len(self.each), sorted({len(chunk) for chunk in self.each})
-        frames = f"{' to '.join(map(str, sizes))} frame{'s' if sizes[-1] > 1 else ''}"
-        if n == 1:
-            return f"1 chunk of {frames}"
-        return f"{n:,} chunks of {frames}; halos add {self.more:.0%} to the hits"
-
 
 def cut(cameras: Sequence[int], size: int) -> list[tuple[int, ...]]:
     """Cut cameras into as few chunks of at most `size` as there can be, of almost the same length.
@@ -98,8 +90,8 @@ def reach(job: Job) -> int:
         raise SceneError(f"{job.scene.file}: no such file")
     if job.reuse.n_r != "auto":
         return job.n_r
-    from ..auto import settled
+    from ..auto import resolve_auto
 
     prepared = prepare(job)
     with open_embree(prepared) as embree:
-        return settled(prepared, embree)[0].job.n_r
+        return resolve_auto(prepared, embree)[0].job.n_r

@@ -72,7 +72,7 @@ def connected(address: str) -> Iterator[Any]:
 def local(workers: int) -> Iterator[Any]:
     """A client of a scheduler of its own, with so many worker processes; a worker that dies is replaced."""
     distributed = require_dask()
-    from .worker import DeafToSignals
+    from .worker import IgnoreSignals
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -87,7 +87,7 @@ def local(workers: int) -> Iterator[Any]:
         )
         try:
             client = distributed.Client(cluster, set_as_default=False)
-            client.register_plugin(DeafToSignals())
+            client.register_plugin(IgnoreSignals())
             yield client
         finally:
             with suppress(NameError):

@@ -8,9 +8,12 @@ from typing import Any
 
 from .. import errors
 from ..errors import JobError, OutputError, WorkerError
+from ..progress import AmbientFigures
 from ..ranges import frames_text
-from ..render import Begun, Listener
+from ..session import RenderSession
+from ..target import Target
 from .chunks import Chunks
+from .progress import PartEvents
 
 # Seconds between two looks at what goes on, and for which workers get to stop by themselves.
 LOOK_EVERY, STOPPING = 0.5, 5.0
@@ -42,23 +45,25 @@ def lacks_program(error: BaseException | None) -> bool:
     return False
 
 
-class HandedOut:
+class ChunkQueue:
     """The chunks of a render: those that wait, and those that workers are at."""
 
-    def __init__(self, client: Any, common: dict[str, Any], chunks: Chunks, start: Begun, listener: Listener) -> None:
-        self._client, self._common, self._listener = client, common, listener
-        self._place, self._n_lights = start.place, start.prepared.n_lights
+    def __init__(
+        self, client: Any, common: dict[str, Any], chunks: Chunks, session: RenderSession, events: PartEvents
+    ) -> None:
+        self._client, self._common, self._events = client, common, events
+        self._folder, self._n_lights = session.folder, session.prepared.n_lights
         self._waiting = list(reversed(chunks.each))
         self._at_work: dict[Any, tuple[int, ...]] = {}
         self._left = {chunk[0]: len(chunk) * self._n_lights for chunk in chunks.each}
         self._something, self._lock = threading.Event(), threading.Lock()  # a chunk came back; of what is counted
         self._deaths: dict[int, tuple[int, int]] = {}  # by chunk: how many, and images left at the last
-        self._said: set[str] = set()
+        self._heard: set[str] = set()
         self.notes: tuple[str, ...] = ()
         self.peak_memory = self.images = 0
         client.subscribe_topic(common["topic"], self._hear)
 
-    def all_done(self) -> None:
+    def render_all(self) -> None:
         """Hand out chunks until all are rendered.
 
         Raises:
@@ -139,13 +144,21 @@ class HandedOut:
         message = event[1]
         if "left" in message:
             self._hear_left(message["chunk"], message["left"])
-        for kind in ("ambient", "target"):
-            if kind in message and kind not in self._said:
-                self._said.add(kind)
-                self._listener.heard(message[kind])
-        if "compiling" in message and "compiling" not in self._said:
-            self._said.add("compiling")
-            self._listener.compiling()
+        if self._first("ambient", message):
+            figures = message["ambient"]
+            self._events.ambient_known(AmbientFigures(**figures | {"notes": tuple(figures["notes"])}))
+        if self._first("target", message):
+            least, most = message["target"]["frames"]
+            self._events.target_known(Target(**message["target"] | {"frames": (least, most)}))
+        if self._first("compiling", message):
+            self._events.compiling()
+
+    def _first(self, kind: str, message: dict[str, Any]) -> bool:
+        """Whether this is the first message of a kind, which all workers send and one is reported of."""
+        if kind not in message or kind in self._heard:
+            return False
+        self._heard.add(kind)
+        return True
 
     def _hear_left(self, chunk: int, left: int, *, last: bool = False) -> None:
         """Count what a chunk has written; messages that come after its end do not count."""
@@ -157,16 +170,16 @@ class HandedOut:
                 del self._left[chunk]
             self.images += written
         if written:
-            self._listener.written(written)
+            self._events.written(written)
 
     def stop(self) -> None:
         """Take all chunks back, and wait a moment until workers have let go of the folder."""
-        with suppress(Exception):  # the scheduler may be gone; what stopped the render is told
+        with suppress(Exception):  # the scheduler may be gone; what stopped the render is reported
             self._client.cancel(list(self._at_work), force=True)
         end = time.monotonic() + STOPPING
         with suppress(OutputError):
             while time.monotonic() < end:
-                with self._place.alone():
-                    if not self._place.others():
+                with self._folder.alone():
+                    if not self._folder.others():
                         return
                 time.sleep(0.1)

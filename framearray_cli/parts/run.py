@@ -18,12 +18,14 @@ from ..jobfile import job_table
 from ..manifestfile import read_manifest, write_manifest
 from ..prepare import Prepared
 from ..record import FOLDER, digest, read_records
-from ..render import Begun, Listener, begun, nothing_to_do
-from ..summary import Summary, summed, with_summary
+from ..session import RenderSession, nothing_to_do, open_session
+from ..summary import Summary, summarize, with_summary
 from ..usage import free_memory
+from ..wording import workers_text
 from .chunks import Chunks, default_size, in_chunks
 from .cluster import connected, local, require_dask
-from .handout import LOOK_EVERY, HandedOut, count_workers, lacks_program
+from .handout import LOOK_EVERY, ChunkQueue, count_workers, lacks_program
+from .progress import PartEvents
 
 # Share of the free memory that workers get; the rest is for files that the system keeps in memory.
 SHARE = 0.9
@@ -31,8 +33,8 @@ PROBE = ".parts-"  # begins the name of a file in the folder, which workers look
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hands:
-    """Who renders.
+class WorkerOptions:
+    """Which workers render.
 
     Attributes:
         workers: processes of this machine, if no scheduler is named.
@@ -47,8 +49,8 @@ class Hands:
 
 def render_in_parts(
     job: Job,
-    listener: Listener,
-    hands: Hands,
+    events: PartEvents,
+    options: WorkerOptions,
     *,
     restart: bool = False,
     cameras: Sequence[int] | None = None,
@@ -65,46 +67,41 @@ def render_in_parts(
     started = time.perf_counter()
     require_dask()
     with ExitStack() as stack:
-        client = stack.enter_context(connected(hands.address)) if hands.address else None
-        with begun(job, listener, restart=restart, cameras=cameras) as start:
-            if not start.wanted:
-                with start.place.alone():
-                    return nothing_to_do(start.prepared, start.found, time.perf_counter() - started)
-            memory = None if hands.address else _memory(start.prepared, hands.workers)
+        client = stack.enter_context(connected(options.address)) if options.address else None
+        with open_session(job, events, restart=restart, cameras=cameras) as session:
+            if not session.wanted:
+                return nothing_to_do(session, time.perf_counter() - started)
+            memory = None if options.address else _memory(session.prepared, options.workers)
         if client is None:
-            listener.waits("starting workers")
-            client = stack.enter_context(local(hands.workers))
-        n_workers = _some_workers(client, hands, listener)
-        common = stack.enter_context(_common(job, start, hands, memory))
+            events.starting_workers()
+            client = stack.enter_context(local(options.workers))
+        n_workers = _some_workers(client, options, events)
+        common = stack.enter_context(_common(job, session, options, memory))
         _require_fit(client, common)
-        chunks = _cut(start, hands, n_workers)
-        listener.handed_out(f"{_told(n_workers)}, {chunks.line()}")
-        work = HandedOut(client, common, chunks, start, listener)
+        chunks = _cut(session, options, n_workers)
+        events.cut(n_workers, chunks)
+        queue = ChunkQueue(client, common, chunks, session, events)
         try:
-            work.all_done()
+            queue.render_all()
         except BaseException:
             forget()  # a signal that was heard must not break off what follows
-            work.stop()
-            with suppress(OutputError):  # what stopped the render is told, not what that meets
-                summary = _summed(start, work, time.perf_counter() - started)
-                if missed := summary.there - start.found.images - work.images:  # of which no message came
-                    listener.written(missed)
-                _write_manifest(start, summary)
+            queue.stop()
+            with suppress(OutputError):  # report the first error, not one from here
+                summary = _summarize(session, queue, time.perf_counter() - started)
+                if missed := summary.there - session.on_disk.images - queue.images:  # of which no message came
+                    events.written(missed)
+                _write_manifest(session, summary)
             raise
-    summary = _summed(start, work, time.perf_counter() - started)
-    _write_manifest(start, summary)
+    summary = _summarize(session, queue, time.perf_counter() - started)
+    _write_manifest(session, summary)
     return summary
 
 
-def _told(n: int) -> str:
-    return f"{n:,} worker{'s' if n > 1 else ''}"
-
-
-def _cut(start: Begun, hands: Hands, n_workers: int) -> Chunks:
-    prepared, n = start.prepared, len(start.wanted)
+def _cut(session: RenderSession, options: WorkerOptions, n_workers: int) -> Chunks:
+    prepared, n = session.prepared, len(session.wanted)
     n_r = 0 if prepared.still else prepared.job.n_r
-    size = hands.chunk or (n if prepared.still else default_size(n, n_r, n_workers))
-    return in_chunks(start.wanted, size, prepared.n_cameras, n_r, still=prepared.still)
+    size = options.chunk or (n if prepared.still else default_size(n, n_r, n_workers))
+    return in_chunks(session.wanted, size, prepared.n_cameras, n_r, still=prepared.still)
 
 
 def _memory(prepared: Prepared, workers: int) -> int:
@@ -119,29 +116,29 @@ def _memory(prepared: Prepared, workers: int) -> int:
     try:
         require_least_memory(replace(prepared, job=prepared.job.model_copy(update={"render": table})))
     except JobError as error:
-        more = f"; {_told(workers)} share {(limit or each * workers) / 2**30:.1f} GiB, fewer have more each"
+        more = f"; {workers_text(workers)} share {(limit or each * workers) / 2**30:.1f} GiB, fewer have more each"
         raise JobError(error.file, [f"{problem}{more}" for problem in error.problems]) from error
     return each
 
 
-def _some_workers(client: Any, hands: Hands, listener: Listener) -> int:
+def _some_workers(client: Any, options: WorkerOptions, events: PartEvents) -> int:
     """How many workers there are, once there is one."""
     if not count_workers(client):
-        listener.heard([f"waiting for workers of {hands.address or 'this machine'}"])
+        events.awaiting_workers(options.address)
     while not (n := count_workers(client)):
         time.sleep(LOOK_EVERY)
-    return max(n, 1 if hands.address else hands.workers)
+    return max(n, 1 if options.address else options.workers)
 
 
 @contextmanager
-def _common(job: Job, start: Begun, hands: Hands, memory: int | None) -> Iterator[dict[str, Any]]:
+def _common(job: Job, session: RenderSession, options: WorkerOptions, memory: int | None) -> Iterator[dict[str, Any]]:
     """What all chunks share; a file in the output folder, there meanwhile, shows workers that it is this one."""
     from .worker import Common
 
     folder, scene = job.output.directory, job.scene.file
     token = secrets.token_hex(4)
     probe = folder / FOLDER / f"{PROBE}{token}"
-    threads = None if hands.address else job.render.threads or max(start.prepared.threads // hands.workers, 1)
+    threads = None if options.address else job.render.threads or max(session.prepared.threads // options.workers, 1)
     try:
         known = digest(scene)
     except OSError as error:
@@ -158,8 +155,8 @@ def _common(job: Job, start: Begun, hands: Hands, memory: int | None) -> Iterato
         topic=f"framearray-{token}",
     )
     try:
-        with start.place.alone():
-            if not start.place.others():  # nobody works here, so what a killed program left may go
+        with session.folder.alone():
+            if not session.folder.others():  # nobody works here, so what a killed program left may go
                 for old in probe.parent.glob(f"{PROBE}*"):
                     old.unlink()
         probe.touch()
@@ -189,20 +186,22 @@ def _require_fit(client: Any, common: dict[str, Any]) -> None:
             raise WorkerError(found)
 
 
-def _summed(start: Begun, work: HandedOut, seconds: float) -> Summary:
+def _summarize(session: RenderSession, queue: ChunkQueue, seconds: float) -> Summary:
     """Put together what all chunks left in the folder."""
-    prepared, before = start.prepared, start.found.records
-    records = read_records(prepared.job.output.directory, start.identity.fingerprint)
-    rays = sum((Counter(session.rays) for session in records.sessions), Counter[str]())
-    rays -= sum((Counter(session.rays) for session in before.sessions), Counter[str]())
+    prepared, before = session.prepared, session.on_disk.records
+    records = read_records(prepared.job.output.directory, session.identity.fingerprint)
+    rays = sum((Counter(run.rays) for run in records.runs), Counter[str]())
+    rays -= sum((Counter(run.rays) for run in before.runs), Counter[str]())
     rays["ambient"] += 0
-    summary = summed(prepared, records, images=work.images, seconds=seconds, rays=rays, stages={}, notes=work.notes)
-    return replace(summary, peak_memory=work.peak_memory)
+    summary = summarize(
+        prepared, records, images=queue.images, seconds=seconds, rays=rays, stages={}, notes=queue.notes
+    )
+    return replace(summary, peak_memory=queue.peak_memory)
 
 
-def _write_manifest(start: Begun, summary: Summary) -> None:
+def _write_manifest(session: RenderSession, summary: Summary) -> None:
     """Write the manifest of the whole over those of the chunks."""
-    folder = start.prepared.job.output.directory
-    with start.place.alone():
-        manifest = replace(read_manifest(folder), job=start.identity.job)
+    folder = session.prepared.job.output.directory
+    with session.folder.alone():
+        manifest = replace(read_manifest(folder), job=session.identity.job)
         write_manifest(folder, with_summary(manifest, summary))

@@ -1,4 +1,4 @@
-"""What a Dask worker does: renders one chunk, tells how far it is, and stops when nobody wants the chunk any more."""
+"""What a Dask worker does: renders one chunk, reports how far it is, and stops when nobody wants the chunk any more."""
 
 import signal
 import socket
@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +18,16 @@ from ..errors import BusyError, FrameArrayError, JobError
 from ..job import Job
 from ..jobfile import job_of_table
 from ..prepare import Prepared
+from ..progress import RenderEvents, ambient_figures
 from ..record import digest
-from ..render import Listener, render
-from ..resume import Found
+from ..render import render
+from ..resume import OnDisk
 from ..summary import Summary
 from ..target import Target
 from ..terms.ambient import Ambient
-from ..wording import ambient_lines
 
 # Seconds between two looks whether the chunk is still wanted, and between two messages on how far it is.
-LOOK_EVERY, TELL_EVERY = 0.2, 0.5
+LOOK_EVERY, SEND_EVERY = 0.2, 0.5
 # Seconds that a chunk waits for one that still runs in this process before it is given to another worker.
 TURN = 1.0
 # Seconds that a chunk waits for cameras which a run that is about to end still holds.
@@ -103,11 +103,11 @@ def render_chunk(common: dict[str, Any], cameras: tuple[int, ...]) -> dict[str, 
     try:
         if problem := unfit(common):
             return {"error": "WorkerError", "problems": [problem], "notes": []}
-        telling = _Telling(worker, Common(**common), cameras)
-        with telling.watching(), compile_clock(lambda: telling.tell(compiling=True)):
-            job = telling.common.job(worker.state.nthreads)
-            summary = _patiently(lambda: render(job, telling, cameras=cameras))
-        return {"notes": list(telling.notes), "peak_memory": summary.peak_memory}
+        reporter = _Reporter(worker, Common(**common), cameras)
+        with reporter.watching(), compile_clock(lambda: reporter.send(compiling=True)):
+            job = reporter.common.job(worker.state.nthreads)
+            summary = _patiently(lambda: render(job, reporter, cameras=cameras))
+        return {"notes": list(reporter.notes), "peak_memory": summary.peak_memory}
     except FrameArrayError as error:
         problems = list(error.problems) if isinstance(error, JobError) else [str(error)]
         notes = list(getattr(error, "__notes__", ()))
@@ -136,8 +136,8 @@ class _Unwanted(BaseException):
     """The chunk was taken back."""
 
 
-class _Telling(Listener):
-    """Tells how many images are left, and ends the render when the chunk was taken back."""
+class _Reporter(RenderEvents):
+    """Reports how many images are left, and ends the render when the chunk was taken back."""
 
     def __init__(self, worker: Worker, common: Common, cameras: tuple[int, ...]) -> None:
         self._worker, self.common, self._first = worker, common, cameras[0]
@@ -146,7 +146,7 @@ class _Telling(Listener):
         self._unwanted = False
         self.notes: tuple[str, ...] = ()
 
-    def tell(self, **message: Any) -> None:
+    def send(self, **message: Any) -> None:
         """Send something to the one who hands out the chunks."""
         self._worker.log_event(self.common.topic, {"chunk": self._first, **message})
 
@@ -177,32 +177,32 @@ class _Telling(Listener):
     def prepared(self, prepared: Prepared) -> None:
         self._go_on()
 
-    def found(self, found: Found, wanted: int) -> None:
+    def scanned(self, on_disk: OnDisk, wanted: int) -> None:
         self._left = wanted
-        self.tell(left=wanted)
+        self.send(left=wanted)
 
     def planned(self, ambient: Ambient) -> None:
         self._go_on()
         self.notes = ambient.notes
-        self.tell(ambient=ambient_lines(ambient))
+        self.send(ambient=asdict(ambient_figures(ambient)))
 
-    def aimed(self, target: Target) -> None:
+    def allotted(self, target: Target) -> None:
         self._go_on()
-        self.tell(target=target.lines())
+        self.send(target=asdict(target))
 
     def written(self, images: int) -> None:
         self._go_on()
         with self._lock:
             self._left -= images
             now = time.monotonic()
-            if self._left and now - self._last < TELL_EVERY:
+            if self._left and now - self._last < SEND_EVERY:
                 return
             self._last = now
             left = self._left
-        self.tell(left=left)
+        self.send(left=left)
 
 
-class DeafToSignals(WorkerPlugin):
+class IgnoreSignals(WorkerPlugin):
     """Workers of this machine get Ctrl-C from the terminal too; the program that started them ends them."""
 
     name = "framearray-signals"

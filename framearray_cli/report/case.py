@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..auto import settled
+from ..auto import resolve_auto
 from ..embree import EmbreeScene
 from ..errors import JobError
 from ..job import Job
@@ -57,7 +57,7 @@ def opened(job: Job) -> Iterator[Case]:
 def planned(prepared: Prepared) -> Iterator[Case]:
     """Plan a job that is prepared, for measuring."""
     with open_embree(prepared) as embree:
-        prepared, _ = settled(prepared, embree)
+        prepared, _ = resolve_auto(prepared, embree)
         setup, ambient = plan_work(prepared, embree)
         yield Case(prepared=prepared, embree=embree, setup=setup, ambient=ambient, settings=Settings.of(prepared.job))
 

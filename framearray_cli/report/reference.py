@@ -17,8 +17,8 @@ from ..arrays import Float32, Float64, Image, Rgb
 from ..crew import TracePool
 from ..files import make_folder, whole_file
 from ..fingerprint import fingerprint
+from ..identity import job_fingerprint
 from ..loop import window_of
-from ..prepare import job_fingerprint
 from ..window import Layers
 from ..work import FrameSetup
 from .case import Case, under

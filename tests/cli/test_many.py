@@ -7,14 +7,15 @@ import psutil
 import pytest
 import tiny
 
-from framearray_cli.render import Listener, render
+from framearray_cli.progress import RenderEvents
+from framearray_cli.render import render
 
 CAMERAS, LIGHTS = 5000, 4
 BLOCK = 2500  # images
 MEMORY_GROWTH, TIME_GROWTH = 1.02, 1.05
 
 
-class Marks(Listener):
+class Marks(RenderEvents):
     """Memory, and processor time since the mark before, after each block of images."""
 
     def __init__(self) -> None:

@@ -12,7 +12,8 @@ from framearray_cli.images import read_image
 from framearray_cli.job import Job
 from framearray_cli.manifest import image_path
 from framearray_cli.manifestfile import read_manifest
-from framearray_cli.render import Listener, render
+from framearray_cli.progress import RenderEvents
+from framearray_cli.render import render
 from framearray_cli.terms.ambient import Ambient
 
 Array = NDArray[np.float64]
@@ -165,7 +166,7 @@ class Result:
     ambient: Ambient
 
 
-class _Keep(Listener):
+class _Keep(RenderEvents):
     ambient: Ambient
 
     def planned(self, ambient: Ambient) -> None:

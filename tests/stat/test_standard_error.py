@@ -19,7 +19,7 @@ from framearray_cli.job import Job
 from framearray_cli.loop import window_of
 from framearray_cli.prepare import open_embree, plan_work, prepare
 from framearray_cli.standarderror import standard_error
-from framearray_cli.target import aimed
+from framearray_cli.target import allot_hits
 
 Array = NDArray[np.float64]
 
@@ -157,7 +157,7 @@ def test_a_wanted_error_is_reached(error: float, weights: str, scene: Path, tmp_
     with open_embree(prepared) as embree:
         planned, ambient = plan_work(prepared, embree)
         for seed in range(8):
-            setup, target = aimed(prepared, replace(planned, seed=seed), ambient)
+            setup, target = allot_hits(prepared, replace(planned, seed=seed), ambient)
             assert target is not None and target.capped < 0.02 and abs(target.expected / error - 1) < 0.05
             with TracePool(setup, 1) as pool:
                 window_of(MIDDLE, setup, ambient, pool).compose(MIDDLE, block)

@@ -14,13 +14,14 @@ from framearray_cli.auto import (
     auto_keys,
     choose,
     exact_enough,
-    settled,
+    resolve_auto,
     to_try,
     wanted_variance,
 )
 from framearray_cli.expected import Model, Reuse
+from framearray_cli.identity import job_fingerprint
 from framearray_cli.jobfile import job_table
-from framearray_cli.prepare import job_fingerprint, open_embree
+from framearray_cli.prepare import open_embree
 
 AUTO = {"reuse": {"n_r": "auto"}, "samples": {"hits": "auto"}}
 REACH = 16
@@ -183,8 +184,8 @@ def test_expected_hits_are_those_of_a_render() -> None:
 def test_what_is_chosen_is_a_job_of_numbers() -> None:
     inputs = tiny.prepared(tiny.job(camera=tiny.WALK, **AUTO))
     with open_embree(inputs) as embree:
-        first, why = settled(inputs, embree)
-        again, _ = settled(inputs, embree)
+        first, why = resolve_auto(inputs, embree)
+        again, _ = resolve_auto(inputs, embree)
     assert why is not None and why.keys == ("reuse.n_r", "samples.hits") == auto_keys(inputs.job)
     assert (first.job.n_r, first.job.hits) == (why.reuse.n_r, why.reuse.hits)
     assert first.job.specular.hits == 14
@@ -204,7 +205,7 @@ def test_what_is_chosen_is_a_job_of_numbers() -> None:
 def test_a_job_of_numbers_stays_as_it_is() -> None:
     inputs = tiny.prepared(tiny.job())
     with open_embree(inputs) as embree:
-        assert settled(inputs, embree) == (inputs, None)
+        assert resolve_auto(inputs, embree) == (inputs, None)
 
 
 @pytest.mark.parametrize("empty", ["nothing reflects", "nothing is hit"])
@@ -215,5 +216,5 @@ def test_a_scene_without_noise_gets_settings_all_the_same(empty: str) -> None:
     camera = tiny.WALK | ({"keys": away} if empty == "nothing is hit" else {})
     inputs = tiny.prepared(tiny.job(camera=camera, **AUTO), scene)
     with open_embree(inputs) as embree:
-        result, why = settled(inputs, embree)
+        result, why = resolve_auto(inputs, embree)
     assert result.job.hits >= 1 and why is not None and 0.5 < why.error <= 1

@@ -29,7 +29,8 @@ terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
 reuse work crew shading mirrors frame denoise standarderror compose accumulate window loop
 imageattributes pngjpeg exrtiff images filepatterns manifest manifestfile pictures ranges record resume folderlock
 outfolder stored
-prepare writer memory acceptance expected auto allot target describe summary render check verify
+prepare writer memory acceptance expected auto allot target identity describe summary progress session render
+check verify
 start/rays start/sample start/views start/room start/orbit start/model start/staged start/expose start/plan
 start/text start/__init__
 imagecheck
@@ -41,8 +42,8 @@ view/coding view/streams view/index view/tiles view/prepare view/pagefiles view/
 view/__init__
 report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
 report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
-screen interrupts wording
-parts/chunks parts/openjd parts/worker parts/cluster parts/handout parts/run parts/__init__
+screen interrupts
+parts/chunks wording parts/openjd parts/progress parts/worker parts/cluster parts/handout parts/run parts/__init__
 commands/__init__ commands/options commands/init commands/render commands/check commands/verify
 commands/assemble commands/sheet commands/export commands/openjd commands/report commands/schema
 commands/view

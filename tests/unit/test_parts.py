@@ -7,6 +7,7 @@ import pytest
 
 from framearray_cli.parts.chunks import cut, default_size, in_chunks
 from framearray_cli.plan import frame_hits
+from framearray_cli.wording import chunks_line
 
 
 @pytest.mark.parametrize(("n", "size"), [(1, 1), (5, 9), (24, 24), (25, 24), (96, 24), (100, 24), (101, 7), (8, 1)])
@@ -52,13 +53,13 @@ def test_the_cost_is_that_of_the_frames_that_are_found(n_r, size):
 def test_halos_of_long_chunks_cost_about_2_n_r_over_their_length():
     chunks = in_chunks(range(2400), 24, 2400, 3)
     assert chunks.more == pytest.approx(6 / 24, rel=0.02)
-    assert chunks.line() == "100 chunks of 24 frames; halos add 25% to the hits"
+    assert chunks_line(chunks) == "100 chunks of 24 frames; halos add 25% to the hits"
 
 
 def test_what_is_told():
-    assert in_chunks(range(5), 9, 5, 2).line() == "1 chunk of 5 frames"
-    assert in_chunks(range(1), 9, 1, 0).line() == "1 chunk of 1 frame"
-    assert in_chunks(range(5), 2, 5, 0).line() == "3 chunks of 1 to 2 frames; halos add 0% to the hits"
+    assert chunks_line(in_chunks(range(5), 9, 5, 2)) == "1 chunk of 5 frames"
+    assert chunks_line(in_chunks(range(1), 9, 1, 0)) == "1 chunk of 1 frame"
+    assert chunks_line(in_chunks(range(5), 2, 5, 0)) == "3 chunks of 1 to 2 frames; halos add 0% to the hits"
 
 
 def test_a_camera_that_stands_still_has_one_frame_to_find():

@@ -5,14 +5,14 @@ import sys
 import pytest
 
 from framearray_cli.errors import OutputError
-from framearray_cli.record import Entry, RecordWriter, Session, read_records, record_file
+from framearray_cli.record import Entry, RecordedRun, RecordWriter, read_records, record_file
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="an open file cannot be removed there")
 def test_a_record_that_is_removed_while_it_is_written(tmp_path):
     """Else hours of frames would be finished, and nobody knew."""
     file = record_file(tmp_path, "0-3")
-    with RecordWriter(file, "print", Session(cameras="0-3", processor="this one")) as record:
+    with RecordWriter(file, "print", RecordedRun(cameras="0-3", processor="this one")) as record:
         record.add(Entry(c=0, lights=(0, 1), files={}), {}, 0.0)
         file.unlink()
         with pytest.raises(OutputError, match=r"0-3\.jsonl: was removed while it was written"):
@@ -21,7 +21,7 @@ def test_a_record_that_is_removed_while_it_is_written(tmp_path):
 
 def test_a_line_that_is_torn_does_not_spoil_the_next(tmp_path, monkeypatch):
     file = record_file(tmp_path, "0-3")
-    with RecordWriter(file, "print", Session(cameras="0-3", processor="this one")) as record:
+    with RecordWriter(file, "print", RecordedRun(cameras="0-3", processor="this one")) as record:
         disk = record._file
 
         class BecomesFull:

@@ -14,10 +14,11 @@ from framearray_cli.errors import OutputError
 from framearray_cli.job import Job
 from framearray_cli.manifest import Manifest
 from framearray_cli.manifestfile import read_manifest
+from framearray_cli.progress import RenderEvents
 from framearray_cli.ranges import frames_text, parse_frames
 from framearray_cli.record import damaged, digest, read_records, record_files, sealed, unsealed
-from framearray_cli.render import Listener, render
-from framearray_cli.resume import look
+from framearray_cli.render import render
+from framearray_cli.resume import scan_output
 from framearray_cli.terms import ambient
 
 N = 7
@@ -46,7 +47,7 @@ def whole(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-class Counting(Listener):
+class Counting(RenderEvents):
     """Counts what is written, and stops after some images."""
 
     def __init__(self, most: float = np.inf) -> None:
@@ -119,7 +120,7 @@ def test_torn_and_foreign_lines_do_not_count(scene: Path, tmp_path: Path, whole:
     ):
         torn = [*lines[: entries[1]], cut + b"\n", *lines[entries[1] : entries[2]], lines[entries[2]][:-20]]
         file.write_bytes(b"".join(torn))
-        assert look(tmp_path, read_manifest(tmp_path).fingerprint).images == 3 * 2
+        assert scan_output(tmp_path, read_manifest(tmp_path).fingerprint).images == 3 * 2
         assert read_records(tmp_path, "sha256:other").entries == ()
     render(job(scene, tmp_path), cameras=(0, 1, 2))
     render(job(scene, tmp_path))
@@ -172,16 +173,16 @@ def test_damage_is_found_and_mended(scene: Path, tmp_path: Path, whole: Path) ->
     heard: list[int] = []
 
     class Hears(Counting):
-        def looking(self, files: int) -> None:
+        def scanning(self, files: int) -> None:
             heard.append(files)
 
-        def found(self, found: Any, wanted: int) -> None:
-            heard.append(len(found.damaged))
+        def scanned(self, on_disk: Any, wanted: int) -> None:
+            heard.append(len(on_disk.damaged))
 
     render(job(scene, tmp_path), Hears())
     assert heard == [len(images(whole)), 6]
     assert images(tmp_path) == images(whole)
-    assert look(tmp_path, read_manifest(tmp_path).fingerprint).damaged == ()
+    assert scan_output(tmp_path, read_manifest(tmp_path).fingerprint).damaged == ()
 
 
 def test_another_processor_is_told(scene: Path, tmp_path: Path) -> None:
@@ -259,14 +260,14 @@ def test_what_is_no_range(text: str) -> None:
         parse_frames(text, 10)
 
 
-class Blocked(Listener):
+class Blocked(RenderEvents):
     """Starts other runs from within one."""
 
     def __init__(self, *others: Any) -> None:
         self.found_others: list[str] = []
         self._others = list(others)
 
-    def aimed(self, target: Any) -> None:
+    def allotted(self, target: Any) -> None:
         raise AssertionError("no target")
 
     def planned(self, ambient: Any) -> None:

@@ -21,7 +21,8 @@ from framearray_cli.job import Job
 from framearray_cli.memory import require_memory
 from framearray_cli.rays import room_for_hits
 from framearray_cli.reuse import balance_weights, divide_by_own_hits, scale_by_expected_hits
-from framearray_cli.target import aimed, of_samples
+from framearray_cli.target import allot_hits, of_samples
+from framearray_cli.wording import target_lines
 
 
 def job(**changes: Any) -> Job:
@@ -34,7 +35,7 @@ def job(**changes: Any) -> Job:
 def aimed_work(inputs: Any) -> Any:
     with tiny.open_embree(inputs) as embree:
         setup, ambient = tiny.plan_work(inputs, embree)
-        return aimed(inputs, setup, ambient)
+        return allot_hits(inputs, setup, ambient)
 
 
 def test_weights_of_places_with_different_hits_are_those_of_the_formula() -> None:
@@ -61,7 +62,7 @@ def test_frames_rest_on_the_hits_that_were_allotted(weights: str) -> None:
     inputs = tiny.prepared(job(samples={"error": 0.05}, reuse={"n_r": 2, "weights": weights}))
     with tiny.open_embree(inputs) as embree:
         planned, ambient = tiny.plan_work(inputs, embree)
-        setup, target = aimed(inputs, planned, ambient)
+        setup, target = allot_hits(inputs, planned, ambient)
         assert target is not None and setup.allotment is not None
         assert target.frames[0] <= target.hits <= target.frames[1]
         with TracePool(setup, 1) as pool:
@@ -98,7 +99,7 @@ def test_noisier_places_get_more_hits() -> None:
 def test_the_cap_binds_and_is_told() -> None:
     _, target = aimed_work(tiny.prepared(job(samples={"error": 1e-4, "most_hits": 3})))
     assert target.capped > 0.9 and target.expected > target.error
-    assert "samples.most_hits" in target.lines()[1]
+    assert "samples.most_hits" in target_lines(target)[1]
     assert target.frames[1] <= 3
 
 
@@ -115,7 +116,9 @@ def test_threads_and_blocks_of_lights_change_nothing() -> None:
         render = inputs.job.render.model_copy(update={"threads": threads})
         with tiny.open_embree(inputs) as embree:
             planned, ambient = tiny.plan_work(inputs, embree)
-            setup, _ = aimed(replace(inputs, job=inputs.job.model_copy(update={"render": render})), planned, ambient)
+            setup, _ = allot_hits(
+                replace(inputs, job=inputs.job.model_copy(update={"render": render})), planned, ambient
+            )
             with TracePool(setup, threads) as pool:
                 images.append(composed(setup, ambient, pool))
             block = range(1, 3)
@@ -134,7 +137,7 @@ def test_no_pixel_stays_without_a_hit() -> None:
     inputs = tiny.prepared(job(camera=WALK | {"resolution": [5, 3]}, samples={"error": 5.0}))
     with tiny.open_embree(inputs) as embree:
         planned, ambient = tiny.plan_work(inputs, embree)
-        setup, target = aimed(inputs, planned, ambient)
+        setup, target = allot_hits(inputs, planned, ambient)
         assert target is not None and target.hits < 1
         with TracePool(setup, 1) as pool:
             composed = tiny.frames_of(setup, ambient, pool)

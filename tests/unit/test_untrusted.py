@@ -12,7 +12,7 @@ from framearray_cli.exrtiff import last_row
 from framearray_cli.imagecheck import check_image
 from framearray_cli.images import read_image
 from framearray_cli.manifestfile import read_manifest
-from framearray_cli.record import Entry, RecordWriter, Session, damaged, read_records, record_file, sealed
+from framearray_cli.record import Entry, RecordedRun, RecordWriter, damaged, read_records, record_file, sealed
 from framearray_cli.standarderror import standard_error
 
 PRINT = "sha256:0"
@@ -31,7 +31,7 @@ def test_a_good_line_counts(tmp_path: Path) -> None:
     write(tmp_path, GOOD)
     records = read_records(tmp_path, PRINT)
     assert records.entries == (Entry(c=0, lights=(0, 2), files={"a.exr": (4, "0")}, hits=1.0),)
-    assert records.sessions == (Session(cameras="0-1", processor="p", rays={"native": 5}, seconds=2.0),)
+    assert records.runs == (RecordedRun(cameras="0-1", processor="p", rays={"native": 5}, seconds=2.0),)
 
 
 @pytest.mark.parametrize(
@@ -64,19 +64,19 @@ def test_what_a_session_took_counts_where_it_is_told(tmp_path: Path, wrong: dict
     write(tmp_path, GOOD | wrong)
     records = read_records(tmp_path, PRINT)
     assert len(records.entries) == 1
-    assert records.sessions[0].rays == ({} if "rays" in wrong else {"native": 5})
-    assert records.sessions[0].seconds == (0.0 if "seconds" in wrong else 2.0)
+    assert records.runs[0].rays == ({} if "rays" in wrong else {"native": 5})
+    assert records.runs[0].seconds == (0.0 if "seconds" in wrong else 2.0)
 
 
 def test_what_the_program_writes_is_what_it_reads(tmp_path: Path) -> None:
     entry = Entry(
         c=3, lights=(1, 4), files={"Ω é.exr": (1 << 40, "ab")}, hits=0.5, notes=("x",), errors={1: (1e-30, 2.0)}
     )
-    with RecordWriter(record_file(tmp_path, "0-3"), PRINT, Session(cameras="0-3", processor="p")) as record:
+    with RecordWriter(record_file(tmp_path, "0-3"), PRINT, RecordedRun(cameras="0-3", processor="p")) as record:
         record.add(entry, {"native": 7}, 1.5)
     records = read_records(tmp_path, PRINT)
     assert records.entries == (entry,)
-    assert records.sessions == (Session(cameras="0-3", processor="p", rays={"native": 7}, seconds=1.5),)
+    assert records.runs == (RecordedRun(cameras="0-3", processor="p", rays={"native": 7}, seconds=1.5),)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="pipes and devices are no files there")

@@ -1,0 +1,31 @@
+"""What a render in parts reports beside the events of any render."""
+
+from typing import TYPE_CHECKING
+
+from ..progress import AmbientFigures, RenderEvents
+
+if TYPE_CHECKING:
+    from ..target import Target
+    from .chunks import Chunks
+
+
+class PartEvents(RenderEvents):
+    """The events of a render in parts; override those that you want. Calls may come from any thread."""
+
+    def starting_workers(self) -> None:
+        """Worker processes of this machine are started."""
+
+    def awaiting_workers(self, address: str | None) -> None:
+        """No worker has come yet to the scheduler at an address, or on this machine."""
+
+    def cut(self, workers: int, chunks: "Chunks") -> None:
+        """The camera path was cut, and that many workers begin."""
+
+    def ambient_known(self, figures: AmbientFigures) -> None:
+        """The first worker knows the ambient light of the whole array."""
+
+    def target_known(self, target: "Target") -> None:
+        """The first worker allotted native hits for the error that the job wants."""
+
+    def compiling(self) -> None:
+        """A worker compiles kernels."""

@@ -1,0 +1,94 @@
+"""A session of a render: inputs read, the output folder claimed, and known what is there and what is left to do."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+
+from .auto import AutoSettings, require_least_memory, resolve_auto
+from .embree import EmbreeScene, Engine
+from .folderlock import ArrayFolder
+from .identity import identity_of
+from .job import Job
+from .kernel import processor
+from .manifestfile import read_manifest, write_manifest
+from .outfolder import Identity, check_folder, claim_folder
+from .prepare import Prepared, open_embree, prepare
+from .progress import RenderEvents
+from .ranges import frames_text
+from .record import RecordedRun
+from .resume import OnDisk, scan_output
+from .summary import Summary, summarize, with_summary
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RenderSession:
+    """A render that knows what it has to do.
+
+    Attributes:
+        settings: that were chosen where the job leaves them open; `prepared` has numbers for them.
+        run: what the record will say of this run.
+        folder: the output folder; `on_disk`: what is there.
+        chosen: cameras that were asked for; `wanted`: those of them of which something is missing.
+    """
+
+    prepared: Prepared
+    embree: EmbreeScene
+    settings: AutoSettings | None
+    identity: Identity
+    run: RecordedRun
+    folder: ArrayFolder
+    on_disk: OnDisk
+    chosen: Sequence[int]
+    wanted: list[int]
+
+
+@contextmanager
+def open_session(
+    job: Job, events: RenderEvents, engine: Engine = "auto", *, restart: bool, cameras: Sequence[int] | None
+) -> Iterator[RenderSession]:
+    """Read what a job names, claim its folder, keep other runs off its cameras, and scan what is there; see `render`.
+
+    Raises:
+        JobError, SceneError, OutputError: as `render`.
+    """
+    prepared = prepare(job)
+    events.prepared(prepared)
+    require_least_memory(prepared)
+    directory = job.output.directory
+    chosen = range(prepared.n_cameras) if cameras is None else cameras
+    with open_embree(prepared, engine) as embree, ExitStack() as held:
+        prepared, settings = resolve_auto(prepared, embree)
+        identity = identity_of(prepared)
+        run = RecordedRun(cameras=frames_text(chosen), processor=processor())
+        check_folder(directory, identity, restart=restart)
+        folder = ArrayFolder(directory)
+        with folder.alone():
+            if restart:
+                folder.require_no_other()
+            events.removed(claim_folder(directory, identity, restart=restart))
+            held.enter_context(folder.reserved(chosen, run.cameras))
+        if settings:
+            events.resolved(settings)
+        on_disk = scan_output(directory, identity.fingerprint, prepared.threads, frozenset(chosen), events.scanning)
+        wanted = on_disk.missing(chosen, range(prepared.n_lights))
+        events.scanned(on_disk, len(wanted) * prepared.n_lights)
+        yield RenderSession(
+            prepared=prepared, embree=embree, settings=settings, identity=identity, run=run, folder=folder,
+            on_disk=on_disk, chosen=chosen, wanted=wanted,
+        )  # fmt: skip
+
+
+def nothing_to_do(session: RenderSession, seconds: float) -> Summary:
+    """All that is wanted is on disk; complete the manifest where it does not say so yet."""
+    prepared, directory = session.prepared, session.prepared.job.output.directory
+    with session.folder.alone():
+        manifest = read_manifest(directory)
+        known = manifest.summary.get("notes")
+        notes = tuple(note for note in known if isinstance(note, str)) if isinstance(known, list) else ()
+        summary = summarize(
+            prepared, session.on_disk.records, images=0, seconds=seconds, rays=Counter(), stages={}, notes=notes
+        )
+        if manifest.summary.get("images") != summary.there or not manifest.summary.get("finished"):
+            write_manifest(directory, with_summary(manifest, summary))
+    return summary

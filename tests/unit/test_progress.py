@@ -1,0 +1,109 @@
+"""What a render reports while it runs, and what a render in parts passes on of its workers."""
+
+import ast
+import inspect
+import json
+from dataclasses import asdict
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import framearray_cli.commands.render as command
+import framearray_cli.parts.worker as worker
+from framearray_cli.parts.chunks import Chunks
+from framearray_cli.parts.handout import ChunkQueue
+from framearray_cli.parts.progress import PartEvents
+from framearray_cli.progress import AmbientFigures, RenderEvents, ambient_figures
+from framearray_cli.target import Target
+from framearray_cli.terms.ambient import Ambient
+from framearray_cli.wording import ambient_lines, target_lines
+
+FIGURES = AmbientFigures(lowest=0.25, highest=0.5, error=0.0123, paths=4096, notes=("a note", "another"))
+TARGET = Target(
+    error=0.1, expected=0.2, worst=0.25, radiance=0.5, hits=3.0, frames=(1.5, 4.5), capped=0.25, rays=12
+)  # fmt: skip
+
+
+class Kept(PartEvents):
+    """Keeps what is reported."""
+
+    def __init__(self) -> None:
+        self.seen: list[Any] = []
+
+    def ambient_known(self, figures: AmbientFigures) -> None:
+        self.seen.append(figures)
+
+    def target_known(self, target: Target) -> None:
+        self.seen.append(target)
+
+    def compiling(self) -> None:
+        self.seen.append("compiling")
+
+    def written(self, images: int) -> None:
+        self.seen.append(images)
+
+
+def sent(**message: Any) -> tuple[float, dict[str, Any]]:
+    """A message as it arrives: tuples become lists on the way."""
+    return 0.0, json.loads(json.dumps({"chunk": 0, **message}))
+
+
+def test_of_messages_that_all_workers_send_the_first_is_reported() -> None:
+    hear: list[Any] = []
+    client = SimpleNamespace(subscribe_topic=lambda topic, handler: hear.append(handler))
+    session: Any = SimpleNamespace(folder=None, prepared=SimpleNamespace(n_lights=4))
+    events = Kept()
+    ChunkQueue(client, {"topic": "t"}, Chunks(each=((0, 1), (2, 3)), more=0.0), session, events)
+    for _ in range(2):
+        hear[0](sent(compiling=True))
+        hear[0](sent(ambient=asdict(FIGURES)))
+        hear[0](sent(target=asdict(TARGET)))
+    hear[0](sent(left=5))
+    hear[0](sent(left=3))
+    assert events.seen == ["compiling", FIGURES, TARGET, 3, 2]
+    assert hash(events.seen[1]) and hash(events.seen[2])  # tuples again
+
+
+def test_lines_of_the_ambient_light() -> None:
+    estimate = Ambient(
+        intensity=np.array([[0.1, 0.2, 0.3], [1, 2, 3]], np.float32),
+        standard_error=np.array([0.01, 0.02]),
+        reflectivity=np.ones(3, np.float32),
+        paths=8192,
+        rays=1,
+        notes=("a note",),
+    )
+    assert ambient_lines(ambient_figures(estimate)) == [
+        "ambient light: I_A 0.2 to 2 (standard error at most 2.0%, 8,192 paths)",
+        "  note: a note",
+    ]
+
+
+def test_lines_of_a_target_that_is_not_reached() -> None:
+    first, note = target_lines(TARGET)
+    assert first == (
+        "error: 0.1 of the mean radiance is wanted; 3.0 native hits a pixel (1.5 to 4.5 by frame) "
+        "are expected to give 0.2"
+    )
+    assert "25.0% of all places" in note
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "base"), [(command, "Shown", PartEvents), (worker, "_Reporter", RenderEvents)]
+)
+def test_who_listens_listens_to_events_that_there_are(module: Any, name: str, base: type) -> None:
+    """A method of another name would never be called, without an error."""
+    [found] = [
+        node
+        for node in ast.walk(ast.parse(inspect.getsource(module)))
+        if isinstance(node, ast.ClassDef) and node.name == name
+    ]
+    methods = {node.name for node in found.body if isinstance(node, ast.FunctionDef)}
+    events = {event for event in dir(base) if not event.startswith("_")}
+    own = {"send", "watching"}  # of the reporter
+    assert {method for method in methods if not method.startswith("_")} - own <= events
+    assert "written" in methods
+    if base is PartEvents:
+        assert events <= methods, "an event that nobody sees"
