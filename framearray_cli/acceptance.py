@@ -65,15 +65,15 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
     """
     job, n_c = prepared.job, 1 if prepared.still else prepared.n_cameras
     cams = eye_cameras(prepared)
-    lights = some_lights(prepared.light_arrays, spread(prepared.n_lights, PROBE_LIGHTS))
+    lights = some_lights(prepared.light_arrays, spread_in_shares(prepared.n_lights, PROBE_LIGHTS))
     order = pixel_order(cams.width, cams.height)
-    pixels = order[spread(len(order), PROBE_HITS)]
+    pixels = order[spread_in_shares(len(order), PROBE_HITS)]
     n = len(pixels)
     hits, hit_rays = empty_hits(PROBE_HITS), room_for_hits(PROBE_HITS)
     test_rays = room_for_tests(PROBE_HITS, lights.n_lights)
     irradiance = with_room((PROBE_HITS, lights.channels, lights.n_lights), np.float32)
     frames, densities, diffuse, shadow = [], [], [], 0
-    for c in spread(n_c, PROBE_FRAMES):
+    for c in spread_in_shares(n_c, PROBE_FRAMES):
         native_hits(
             cams, c, job.seed, pixels, 1, 0, 0, n, prepared.surfaces, embree.tracer, False,
             hit_rays.packets, hits,
@@ -96,7 +96,7 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
     )
 
 
-def spread(n: int, most: int) -> list[int]:
+def spread_in_shares(n: int, most: int) -> list[int]:
     """At most so many of the numbers 0 to n - 1, evenly spread, each in the middle of its share."""
     count = min(n, most)
     return [(2 * i + 1) * n // (2 * count) for i in range(count)]

@@ -1,13 +1,13 @@
 """How many native hits each block of a frame is to have, so that no frame has more error than wanted.
 
 A pilot finds (target.py) u(b), the variance of a pixel of block b, mean over light positions and channels, were each
-frame of the window to give it one hit. With n(b) hits from each frame it is u(b) / worth(n(b)), so the squared error
-of a frame's images is
+frame of the window to give it one hit. With n(b) hits from each frame, which count as m(b) independent ones, it is
+u(b) / m(b), so the squared error of a frame's images is
 
-    e^2 = mean over b of u(b) / worth(n(b)).
+    e^2 = mean over b of u(b) / m(b), m(b) = independent_hits(n(b)).
 
-Of all n with the same e, that with the fewest hits has n(b)^(1 + p) in proportion to u(b), with p the power of `worth`
-[Neyman34].
+Of all n with the same e, that with the fewest hits has n(b)^(1 + p) in proportion to u(b), with p the power of
+`independent_hits` [Neyman34].
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ import numpy as np
 
 from .allotment import Blocks
 from .arrays import Float64, Int32
-from .expected import EVENNESS, worth
+from .expected import EVENNESS, independent_hits
 
 # The fewest hits a pixel of a frame: below, most pixels would rest on hits of frames far away.
 FEWEST = 0.25
@@ -54,7 +54,7 @@ def fewest_hits(u: Float64, wanted: float, most: float) -> Float64:
 
 def variances(u: Float64, hits: Float64) -> Float64:
     """Mean variance of every frame, (n_frames,), with some native hits a pixel of each block."""
-    means: Float64 = (u / worth(hits)).mean(axis=1)
+    means: Float64 = (u / independent_hits(hits)).mean(axis=1)
     return means
 
 
@@ -90,7 +90,7 @@ class Witnesses:
             hits = whole[self.first_eye + eyes, self.block[half]]
             own = self.c - self.first_eye
             hits[..., own] = ways[1 - half][self.c, self.block[half][..., own]]
-            arriving = (self.density[half] * worth(hits)).sum(axis=-1)
+            arriving = (self.density[half] * independent_hits(hits)).sum(axis=-1)
             found.append((self.variance[half] * (1.0 / arriving).mean(axis=0)).mean())
         return float(np.mean(found))
 

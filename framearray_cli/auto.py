@@ -11,7 +11,7 @@ import numpy as np
 
 from .acceptance import probe
 from .embree import EmbreeScene
-from .expected import Model, Reuse, worth
+from .expected import Model, Reuse, independent_hits
 from .job import Job
 from .jobmethod import DEFAULT_HITS, DEFAULT_N_R
 from .jobvalues import MOST_HITS, SHARES
@@ -134,7 +134,7 @@ def applied(prepared: Prepared, reuse: Reuse) -> Prepared:
 def wanted_variance(job: Job) -> float:
     """Variance of a pixel of the default window on an ordinary walk, in units of that of one hit."""
     hits = DEFAULT.hits if job.samples.hits == "auto" else job.samples.hits
-    return 1.0 / (ORDINARY * (2 * DEFAULT.n_r + 1) * float(worth(np.array(hits))))
+    return 1.0 / (ORDINARY * (2 * DEFAULT.n_r + 1) * float(independent_hits(np.array(hits))))
 
 
 def exact_enough(model: Model, job: Job) -> Callable[[Reuse], bool]:

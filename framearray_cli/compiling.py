@@ -28,7 +28,7 @@ def compile_clock(begins: Callable[[], None] = lambda: None) -> Iterator[Compile
     clock = CompileClock()
     own: list[float] = []  # of this clock: there may be several
 
-    class Listener(event.Listener):
+    class CompileEvents(event.Listener):
         def on_start(self, event: object) -> None:
             if not own and clock.seconds == 0.0:
                 begins()
@@ -41,7 +41,7 @@ def compile_clock(begins: Callable[[], None] = lambda: None) -> Iterator[Compile
             if not own:
                 clock.seconds += time.perf_counter() - started
 
-    with event.install_listener("numba:compile", Listener()):
+    with event.install_listener("numba:compile", CompileEvents()):
         yield clock
 
 

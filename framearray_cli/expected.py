@@ -54,9 +54,10 @@ class Model:
     def variance(self, reuse: Reuse) -> float:
         """Expected variance of a pixel, mean over pixels, in units of that of one hit.
 
-        It is 1 over the number of hits, those of one eye counted as `worth` says; a pixel that no hit reaches gets one.
+        It is 1 over the number of hits, those of one eye counted by `independent_hits`; a pixel that no hit reaches
+        gets one.
         """
-        sums = self._arriving(worth(self._native(reuse)), reuse.n_r)
+        sums = self._arriving(independent_hits(self._native(reuse)), reuse.n_r)
         return float((1.0 / np.maximum(sums, 1.0)).mean())
 
     def time(self, reuse: Reuse, blocks: int = 1) -> float:
@@ -89,7 +90,7 @@ class Model:
         return sums
 
 
-def worth(hits: Float64) -> Float64:
+def independent_hits(hits: Float64) -> Float64:
     """How many independent hits the hits of one eye in a pixel are worth; see `EVENNESS`."""
     value: Float64 = np.where(hits >= 1.0, hits**EVENNESS, hits)
     return value

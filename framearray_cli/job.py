@@ -27,10 +27,10 @@ from .jobvalues import (
     Bytes,
     Emission,
     FileName,
+    Float3,
     Place,
     Reflectivity,
     Table,
-    Triple,
     absolute,
     computed,
     fail,
@@ -60,7 +60,7 @@ class MaterialTable(Table):
 
     @field_validator("specular")
     @classmethod
-    def _conserves_energy(cls, specular: Triple | None, info: ValidationInfo) -> Triple | None:
+    def _conserves_energy(cls, specular: Float3 | None, info: ValidationInfo) -> Float3 | None:
         diffuse = info.data.get("reflectivity")
         for channel, a, b in zip(("red", "green", "blue"), diffuse or (), specular or (), strict=False):
             if a + b > 1 + 1e-9:  # 0.1 + 0.9 may round to just above 1

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from .jobtimes import Clock, Date, Zone
-from .jobvalues import Direction, Emission, FileName, Place, Point, Size, Table, Triple, computed, fail, fill, shown
+from .jobvalues import Direction, Emission, FileName, Float3, Place, Point, Size, Table, computed, fail, fill, shown
 
 MAIN_AXIS = "light"  # of sources that name no axis
 REST_GROUP = "main"  # sources that name no group, where others do
@@ -48,7 +48,7 @@ class CameraKey(Table):
 
     @field_validator("target")
     @classmethod
-    def _differs_from_eye(cls, target: Triple, info: ValidationInfo) -> Triple:
+    def _differs_from_eye(cls, target: Float3, info: ValidationInfo) -> Float3:
         if target == info.data.get("eye"):
             fail([((), f"expected a point other than the eye, got {shown(target)}, the eye itself")])
         return target
@@ -103,7 +103,7 @@ def _key_problems(keys: Sequence[Key], directions: str, optional: str) -> list[t
     return problems
 
 
-def _opposite(a: Triple, b: Triple) -> bool:
+def _opposite(a: Float3, b: Float3) -> bool:
     """Whether two directions are so close to opposite that no shortest way leads from one to the other."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] <= -hypot(*a) * hypot(*b) * (1 - 1e-8)  # 1e-8: within 0.01 degrees
 
@@ -242,7 +242,7 @@ class SunSource(_Source):
         return ()
 
 
-Source: TypeAlias = Annotated[PointSource | DirectionalSource | SunSource, Field(discriminator="type")]
+LightSource: TypeAlias = Annotated[PointSource | DirectionalSource | SunSource, Field(discriminator="type")]
 
 
 class SourceGroup(NamedTuple):
@@ -260,7 +260,7 @@ class SourceGroup(NamedTuple):
     sources: tuple[int, ...]
 
 
-def _group_problems(sources: Sequence[Source]) -> list[tuple[Place, str]]:
+def _group_problems(sources: Sequence[LightSource]) -> list[tuple[Place, str]]:
     """Check that the sources of a group move along one axis, and that whatever has an axis has a group."""
     problems: list[tuple[Place, str]] = []
     axes: dict[str, tuple[int, str | None]] = {}
@@ -289,13 +289,13 @@ class LightTable(Table):
         description="Number of light positions along further axes, by name: { lamps = 12 }.",
         json_schema_extra={**computed("the last key's frame + 1 of each"), "x-words": "names with whole numbers"},
     )
-    sources: tuple[Source, ...] = Field(
+    sources: tuple[LightSource, ...] = Field(
         strict=False, min_length=1, description="One or more sources; all of them shine together at each light index."
     )
 
     @field_validator("sources")
     @classmethod
-    def _within_frames(cls, sources: tuple[Source, ...], info: ValidationInfo) -> tuple[Source, ...]:
+    def _within_frames(cls, sources: tuple[LightSource, ...], info: ValidationInfo) -> tuple[LightSource, ...]:
         frames, axes = info.data.get("frames", 0), info.data.get("axes", {})
         late = [
             ((i, "keys", *place), text)

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationError, Val
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 Place: TypeAlias = tuple[int | str, ...]  # keys and list positions from the value at hand down to the problem
-Triple: TypeAlias = tuple[float, float, float]
+Float3: TypeAlias = tuple[float, float, float]
 Auto: TypeAlias = Literal["auto"]  # chosen from the camera path, see auto.py
 
 FARTHEST = 1e12  # scene units; squares and cubes of it still fit in float32 (3e38)
@@ -208,13 +208,13 @@ def _vector_schema(count: int, *, grey: bool = False, whole: bool = False, **bou
     return WithJsonSchema({"anyOf": [item, vector]} if grey else vector)
 
 
-Point: TypeAlias = Annotated[Triple, PlainValidator(_vector(3, -FARTHEST, FARTHEST)), _vector_schema(3)]
-Direction: TypeAlias = Annotated[Triple, PlainValidator(_direction), _vector_schema(3)]
+Point: TypeAlias = Annotated[Float3, PlainValidator(_vector(3, -FARTHEST, FARTHEST)), _vector_schema(3)]
+Direction: TypeAlias = Annotated[Float3, PlainValidator(_direction), _vector_schema(3)]
 Emission: TypeAlias = Annotated[
-    Triple, PlainValidator(_vector(3, 0.0, BRIGHTEST, grey=True)), _vector_schema(3, grey=True, minimum=0)
+    Float3, PlainValidator(_vector(3, 0.0, BRIGHTEST, grey=True)), _vector_schema(3, grey=True, minimum=0)
 ]
 Reflectivity: TypeAlias = Annotated[
-    Triple, PlainValidator(_vector(3, 0.0, 1.0, grey=True)), _vector_schema(3, grey=True, minimum=0, maximum=1)
+    Float3, PlainValidator(_vector(3, 0.0, 1.0, grey=True)), _vector_schema(3, grey=True, minimum=0, maximum=1)
 ]
 Size: TypeAlias = Annotated[
     tuple[int, int],

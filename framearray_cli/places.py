@@ -68,7 +68,7 @@ def light_places(manifest: Manifest, light: str | None, at: Sequence[str], defau
     return list(product(*chosen))
 
 
-def spread(n: int, most: int) -> tuple[int, ...]:
+def spread_with_ends(n: int, most: int) -> tuple[int, ...]:
     """At most so many of n indices, evenly, the first and the last among them; the middle one if there is one."""
     if n <= most:
         return tuple(range(n))

@@ -19,7 +19,7 @@ from .scene import Scene, load_scene
 from .surface import Surfaces, nearest, surfaces
 from .terms.ambient import Ambient
 from .terms.ambient_eye import EyeWalks, ambient_by_eye, fixed_ambient
-from .terms.ambient_fit import Curve, ambient_by_fit
+from .terms.ambient_fit import ObscuranceCurve, ambient_by_fit
 from .terms.ambient_light import ambient_by_light
 from .terms.obscurance import FALLOFFS, ObscuranceSettings
 from .usage import resident_memory
@@ -209,7 +209,7 @@ def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Am
     return ambient_by_eye(walks, prepared.threads)
 
 
-def _curve(job: Job) -> Curve:
+def _curve(job: Job) -> ObscuranceCurve:
     wanted = job.obscurance
     sky = wanted.outside == "background"
-    return Curve(d_max=wanted.range, falloff=FALLOFFS[wanted.falloff], tau=wanted.tau, sky=sky)
+    return ObscuranceCurve(d_max=wanted.range, falloff=FALLOFFS[wanted.falloff], tau=wanted.tau, sky=sky)

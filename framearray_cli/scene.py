@@ -243,7 +243,7 @@ def _dropped_text(dropped: Mapping[str, int]) -> str:
     return ", ".join(f"{count} {reason}" for reason, count in dropped.items())
 
 
-def report_lines(report: SceneReport, file: Path | str) -> list[str]:
+def scene_report_lines(report: SceneReport, file: Path | str) -> list[str]:
     """What the user sees of a scene: one line of numbers, then a line a note."""
     left_out = f"; left out: {_dropped_text(report.dropped)}" if report.dropped else ""
     numbers = f"{report.triangles:,} triangles, {report.materials} materials, {report.textures} textures"

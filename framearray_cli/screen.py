@@ -135,7 +135,7 @@ def say(console: Console, lines: Iterable[str]) -> None:
     """
     try:
         for line in lines:
-            console.print(told(line), markup=False, highlight=False, soft_wrap=True, emoji=False)
+            console.print(printable(line), markup=False, highlight=False, soft_wrap=True, emoji=False)
     except BrokenPipeError:  # whoever read it has gone
         raise
     except OSError as error:
@@ -143,7 +143,7 @@ def say(console: Console, lines: Iterable[str]) -> None:
         raise OutputError(f"standard output: cannot be written: {reason(error)}") from error
 
 
-def told(text: str) -> str:
+def printable(text: str) -> str:
     """A text of which every character can be seen: names may hold escape sequences, or turn the line around."""
     if text.replace("\n", "").isprintable():
         return text

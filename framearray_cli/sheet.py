@@ -17,7 +17,7 @@ from .manifest import MAIN_AXIS, Manifest
 from .manifestfile import read_manifest
 from .movie.label import typeface
 from .pictures import Pictures
-from .places import MIDDLE, light_places, spread
+from .places import MIDDLE, light_places, spread_with_ends
 
 Progress: TypeAlias = Callable[[int, int], None]  # images done, images in all
 
@@ -88,8 +88,8 @@ def make_sheet(
     manifest = read_manifest(out)
     axis = side if side is not None else next(iter(manifest.axes))
     place = _place_beside(manifest, axis, at)
-    cameras = spread(manifest.n_cameras, columns)
-    places = spread(manifest.axes[axis], rows)
+    cameras = spread_with_ends(manifest.n_cameras, columns)
+    places = spread_with_ends(manifest.axes[axis], rows)
     labels = [f"{axis} {l}" for l in places] if image_format.format in ("png", "jpg") else []
     tile = _tile(manifest, len(cameras), width, labels)
     tiles = _tiles(manifest, cameras, places, (list(manifest.axes).index(axis), place), tile, progress)

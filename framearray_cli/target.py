@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .acceptance import MOST_DENSE, spread
+from .acceptance import MOST_DENSE, spread_in_shares
 from .allot import FEWEST, Witnesses, allot
 from .allotment import Allotment, Blocks, blocks_of
 from .arrays import Float32, Float64, Int32
@@ -126,7 +126,7 @@ class _Pilot:
         self.setup = replace(setup, seed=setup.seed + PILOT_SEED)
         self.ambient = ambient
         self.blocks = blocks
-        self._judges = frozenset(spread(setup.n_frames, JUDGED))
+        self._judges = frozenset(spread_in_shares(setup.n_frames, JUDGED))
 
     def look(self, c: int, scratch: Scratch) -> _Found:
         """What the pilot finds in frame c."""

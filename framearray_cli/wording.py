@@ -56,9 +56,9 @@ def _blocks(n: int) -> str:
 
 def scene_lines(prepared: "Prepared") -> list[str]:
     """What a scene holds, and what was left out of it."""
-    from .scene import report_lines
+    from .scene import scene_report_lines
 
-    return report_lines(prepared.scene.report, prepared.job.scene.file)
+    return scene_report_lines(prepared.scene.report, prepared.job.scene.file)
 
 
 def ambient_lines(figures: "AmbientFigures") -> list[str]:

@@ -50,7 +50,7 @@ def report(
         screen.wait("reading the scene")
         from .. import report as reporting
 
-        class Shown(reporting.Listener):
+        class Shown(reporting.ReportEvents):
             """Prints the scene, then a progress bar."""
 
             def opened(self, case: "Case") -> None:
@@ -62,7 +62,7 @@ def report(
             def done(self) -> None:
                 screen.advance()
 
-        wish = reporting.Wish(
+        options = reporting.ReportOptions(
             cameras=camera or (),
             lights=light or (),
             vary=dict(reporting.read_vary(option, job) for option in vary or ()),
@@ -71,7 +71,7 @@ def report(
         )
         place = folder.absolute() if folder else job.output.directory.with_name(f"{job.output.directory.name}-report")
         with compile_clock(screen.compiling):
-            made = reporting.make_report(job, place, wish, Shown())
+            made = reporting.make_report(job, place, options, Shown())
         reporting.write_report(made)
     if not quiet:
         say(out, report_lines(made))

@@ -12,7 +12,7 @@ from typing import Any
 
 from ..files import write_bytes
 from ..places import plain_names
-from .selection import Frame, Selection, rigid_pose, sources_at
+from .selection import ExportedFrame, Selection, rigid_pose, sources_at
 
 FILE = MARK = "data.csv"
 SUFFIX = ".cdb"
@@ -37,7 +37,7 @@ def write_table(folder: Path, selection: Selection, files: Mapping[str, str]) ->
     write_bytes(folder / FILE, buffer.getvalue().encode())
 
 
-def _row(selection: Selection, frame: Frame) -> dict[str, Any]:
+def _row(selection: Selection, frame: ExportedFrame) -> dict[str, Any]:
     """Parameters of one picture; whole numbers are indices, all others floats."""
     manifest = selection.manifest
     pose = rigid_pose(manifest, frame.c)

@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Float64
 from ..files import write_bytes
 from .points import Cloud, Sight
-from .selection import Frame, Selection, focal_length, numbers, rigid_pose
+from .selection import ExportedFrame, Selection, focal_length, numbers, rigid_pose
 
 FOLDER = "sparse/0"  # where COLMAP and what builds on it look for a model
 MARK = f"{FOLDER}/images.txt"
@@ -79,7 +79,7 @@ def _observations(sight: Sight) -> str:
     return " ".join(f"{x:.4f} {y:.4f} {point + 1}" for (x, y), point in pairs)
 
 
-def _point_lines(frames: Sequence[Frame], cloud: Cloud) -> list[str]:
+def _point_lines(frames: Sequence[ExportedFrame], cloud: Cloud) -> list[str]:
     """One line a point; its error is 0, for a point is listed where it falls in an image, not where it was found."""
     tracks: list[list[str]] = [[] for _ in cloud.position]
     for k, frame in enumerate(frames, start=1):

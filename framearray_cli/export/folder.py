@@ -12,7 +12,7 @@ from ..files import make_folder, reason
 from ..imageattributes import frame_attributes
 from ..images import ImageFormat, write_image
 from ..pictures import Pictures
-from .selection import Frame
+from .selection import ExportedFrame
 
 _SAME = {"jpeg": "jpg", "tiff": "tif"}
 
@@ -65,7 +65,9 @@ def _in_the_way(target: Path, mark: str, force: bool) -> bool:
     return True
 
 
-def place_picture(pictures: Pictures, frame: Frame, target: Path, image_format: ImageFormat, *, copy: bool) -> None:
+def place_picture(
+    pictures: Pictures, frame: ExportedFrame, target: Path, image_format: ImageFormat, *, copy: bool
+) -> None:
     """Put one picture into a folder: a link to the array's own file where that is the very picture, else written.
 
     Args:

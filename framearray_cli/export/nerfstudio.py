@@ -13,7 +13,7 @@ from ..files import write_bytes
 from ..manifest import Manifest
 from ..places import plain_names
 from .points import Cloud, read_depth
-from .selection import Frame, Selection, focal_length, numbers, rigid_pose, sources_at
+from .selection import ExportedFrame, Selection, focal_length, numbers, rigid_pose, sources_at
 
 FILE = MARK = "transforms.json"
 POINTS = "points.ply"
@@ -70,7 +70,7 @@ def _lens(manifest: Manifest, focal: float) -> dict[str, float]:
     return {"fl_x": focal, "fl_y": focal, "camera_angle_x": 2 * math.atan(0.5 * manifest.resolution[0] / focal)}
 
 
-def _frame(manifest: Manifest, frame: Frame) -> dict[str, Any]:
+def _frame(manifest: Manifest, frame: ExportedFrame) -> dict[str, Any]:
     """Pose and light. `pl_pos`, `pl_intensity` are there where exactly one source shines, and that is a point."""
     table: dict[str, Any] = {
         "transform_matrix": [numbers(row) for row in rigid_pose(manifest, frame.c)],

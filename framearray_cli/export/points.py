@@ -13,7 +13,7 @@ from ..arrays import Bytes, Float32, Float64
 from ..errors import OutputError
 from ..images import read_layers
 from ..manifest import Manifest, layers_path
-from ..places import spread
+from ..places import spread_with_ends
 from .selection import focal_length, rigid_pose
 
 SOURCES = 16  # cameras that points are taken from, evenly along the path; more add the same surfaces again
@@ -102,7 +102,7 @@ def find_points(manifest: Manifest, cameras: Sequence[int], shown: Mapping[int, 
 
 def source_cameras(cameras: Sequence[int]) -> list[int]:
     """The cameras that points are taken from."""
-    return [cameras[k] for k in spread(len(cameras), SOURCES)]
+    return [cameras[k] for k in spread_with_ends(len(cameras), SOURCES)]
 
 
 def unproject(manifest: Manifest, c: int, position: Float64, depth: Float32) -> Float64:

@@ -17,7 +17,7 @@ RIGID = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Frame:
+class ExportedFrame:
     """One picture that is handed over.
 
     Attributes:
@@ -40,10 +40,10 @@ class Selection:
     places: tuple[LightPlace, ...]
 
     @property
-    def frames(self) -> list[Frame]:
+    def frames(self) -> list[ExportedFrame]:
         """All frames, place by place for each camera."""
         name = self._name
-        return [Frame(c=c, place=place, name=name(c, place)) for c in self.cameras for place in self.places]
+        return [ExportedFrame(c=c, place=place, name=name(c, place)) for c in self.cameras for place in self.places]
 
     def camera_name(self, c: int) -> str:
         """Name of a camera's files."""

@@ -57,7 +57,7 @@ def _material(
     pbr: Tree = entry.get("pbrMetallicRoughness") or {}
     if not used:  # no triangle has it: the name is kept for overrides, its images are not read
         return GltfMaterial(material=Material(name=name))
-    source = Source(name, gltf, assets, textures)
+    source = ImageFinder(name, gltf, assets, textures)
     info: Tree | None = pbr.get("baseColorTexture") if gloss is None else gloss.get("diffuseTexture")
     factor = pbr.get("baseColorFactor") if gloss is None else gloss.get("diffuseFactor")
     base = np.array([1.0, 1.0, 1.0, 1.0] if factor is None else factor, dtype=np.float64)
@@ -83,7 +83,7 @@ def _material(
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class ImageFinder:
     """Finds the images that a material's texture infos point to."""
 
     name: str
@@ -135,7 +135,7 @@ class Source:
         return read
 
 
-def _metal(name: str, base: Float64, pbr: Tree, source: Source, notes: Notes) -> tuple[Rgb3, Rgb3]:
+def _metal(name: str, base: Float64, pbr: Tree, source: ImageFinder, notes: Notes) -> tuple[Rgb3, Rgb3]:
     """Diffuse and mirror part: the smooth metal share of the base colour mirrors, all else is diffuse."""
     metallic, roughness = float(pbr.get("metallicFactor", 1.0)), float(pbr.get("roughnessFactor", 1.0))
     if pbr.get("metallicRoughnessTexture") is not None and metallic > 0:
@@ -164,7 +164,7 @@ def _glossy(name: str, base: Float64, gloss: Tree, notes: Notes) -> tuple[Rgb3, 
     return _rgb(base[:3] + specular), (0.0, 0.0, 0.0)
 
 
-def _opacity(name: str, entry: Tree, alpha: float, texture: int, source: Source, notes: Notes) -> Opacity:
+def _opacity(name: str, entry: Tree, alpha: float, texture: int, source: ImageFinder, notes: Notes) -> Opacity:
     transmission: Tree = (entry.get("extensions") or {}).get("KHR_materials_transmission") or {}
     passed = float(transmission.get("transmissionFactor", 0.0))
     if transmission.get("transmissionTexture") is not None and passed > 0:

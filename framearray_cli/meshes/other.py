@@ -18,7 +18,7 @@ BYTE = 255.0
 HINT = "; install it (for COLLADA: pip install pycollada), or convert the file to GLB"
 
 
-class Folder:
+class FolderResolver:
     """Gives trimesh's loaders the files beside the scene, and no others."""
 
     def __init__(self, assets: Assets, notes: Notes) -> None:
@@ -50,7 +50,7 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
     import trimesh
 
     notes = Notes()
-    folder: Any = Folder(assets, notes)  # it has what loaders use of trimesh's own resolvers
+    folder: Any = FolderResolver(assets, notes)  # it has what loaders use of trimesh's own resolvers
     check_headers(data, extension, assets.limit)
     if extension == "ply":
         data = _without_blank_lines(data)

@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypeAlias
 from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
 
 from ..jobschema import dotted
-from ..jobvalues import Place, Table, Triple, fail, shown
+from ..jobvalues import Float3, Place, Table, fail, shown
 from ..pictures import AS_RENDERED, Relight
 from .places import percent
 
@@ -18,32 +18,32 @@ LONGEST_S = 1e6  # seconds; later key frames are typing errors
 
 
 @dataclass(frozen=True, slots=True)
-class Curve:
+class LightCurve:
     """Key frames: (time, RGB) each, where a time is in seconds or "50%" of the movie; one alone is a constant."""
 
-    keys: tuple[tuple[float | str, Triple], ...]
+    keys: tuple[tuple[float | str, Float3], ...]
 
 
-def _curve(grey_alone: bool) -> Callable[[object], Curve]:
+def _curve(grey_alone: bool) -> Callable[[object], LightCurve]:
     """Make a check for one value or a list of key frames.
 
     Args:
         grey_alone: a value is one number; else it may be three.
     """
 
-    def check(value: object) -> Curve:
+    def check(value: object) -> LightCurve:
         if not (isinstance(value, list) and any(isinstance(item, dict) for item in value)):
-            return Curve(((0.0, _value(value, grey_alone, ())),))
+            return LightCurve(((0.0, _value(value, grey_alone, ())),))
         problems: list[tuple[Place, str]] = []
         keys = [_key(item, grey_alone, k, problems) for k, item in enumerate(value)]
         if problems:
             fail(problems)
-        return Curve(tuple(keys))
+        return LightCurve(tuple(keys))
 
     return check
 
 
-def _key(item: object, grey_alone: bool, k: int, problems: list[tuple[Place, str]]) -> tuple[float | str, Triple]:
+def _key(item: object, grey_alone: bool, k: int, problems: list[tuple[Place, str]]) -> tuple[float | str, Float3]:
     """Check one key frame."""
     if not isinstance(item, dict):
         problems.append(((k,), f"expected a table with time and value, got {shown(item)}"))
@@ -79,7 +79,7 @@ def _wanted(grey_alone: bool) -> str:
     return f"a number {'' if grey_alone else 'or 3 numbers '}from 0 to {STRONGEST:.0f}"
 
 
-def _value(value: object, grey_alone: bool, place: Place) -> Triple:
+def _value(value: object, grey_alone: bool, place: Place) -> Float3:
     """Check one number, or three."""
     numbers = [value] * 3 if not isinstance(value, list) else [] if grey_alone else value
     good = [isinstance(x, int | float) and not isinstance(x, bool) and 0 <= x <= STRONGEST for x in numbers]
@@ -98,10 +98,10 @@ def _schema(grey_alone: bool) -> WithJsonSchema:
     return WithJsonSchema({"anyOf": [value, {"type": "array", "items": key, "minItems": 1}]})
 
 
-Intensity: TypeAlias = Annotated[Curve, PlainValidator(_curve(True)), _schema(True)]
-Colour: TypeAlias = Annotated[Curve, PlainValidator(_curve(False)), _schema(False)]
+Intensity: TypeAlias = Annotated[LightCurve, PlainValidator(_curve(True)), _schema(True)]
+Colour: TypeAlias = Annotated[LightCurve, PlainValidator(_curve(False)), _schema(False)]
 
-_ONE = Curve(((0.0, (1.0, 1.0, 1.0)),))
+_ONE = LightCurve(((0.0, (1.0, 1.0, 1.0)),))
 
 
 class LightChange(Table):
@@ -134,7 +134,7 @@ def relights(
     ]
 
 
-def _factors(key: str, change: LightChange, times: Sequence[float], problems: list[str]) -> list[Triple]:
+def _factors(key: str, change: LightChange, times: Sequence[float], problems: list[str]) -> list[Float3]:
     """Multiply intensity and colour at each time."""
     intensity = _timed(f"{key}.intensity", change.intensity, times[-1], problems)
     color = _timed(f"{key}.color", change.color, times[-1], problems)
@@ -145,10 +145,10 @@ def _factors(key: str, change: LightChange, times: Sequence[float], problems: li
     return found
 
 
-Timed: TypeAlias = tuple[list[float], list[Triple]]  # times in seconds, in order, and values
+Timed: TypeAlias = tuple[list[float], list[Float3]]  # times in seconds, in order, and values
 
 
-def _timed(key: str, curve: Curve, end: float, problems: list[str]) -> Timed:
+def _timed(key: str, curve: LightCurve, end: float, problems: list[str]) -> Timed:
     """Turn times into seconds; a key frame before the one above it is a problem."""
     seconds = [end * (percent(time) or 0.0) / 100 if isinstance(time, str) else time for time, _ in curve.keys]
     for k, (before, time) in enumerate(pairwise(seconds), start=1):
@@ -157,7 +157,7 @@ def _timed(key: str, curve: Curve, end: float, problems: list[str]) -> Timed:
     return seconds, [value for _, value in curve.keys]
 
 
-def at(curve: Timed, time: float) -> Triple:
+def at(curve: Timed, time: float) -> Float3:
     """Find the value at a time: linear between key frames, held outside; of two at one time the later one."""
     times, values = curve
     k = bisect_right(times, time)

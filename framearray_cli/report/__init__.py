@@ -1,7 +1,7 @@
 """Speed against error: what each setting of a job buys and costs, as tables, plots and a page."""
 
 from .page import advice_lines, write_report
-from .run import Listener, Report, Wish, make_report
+from .run import Report, ReportEvents, ReportOptions, make_report
 from .settings import read_vary
 
-__all__ = ["Listener", "Report", "Wish", "advice_lines", "make_report", "read_vary", "write_report"]
+__all__ = ["Report", "ReportEvents", "ReportOptions", "advice_lines", "make_report", "read_vary", "write_report"]

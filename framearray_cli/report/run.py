@@ -22,7 +22,7 @@ TIMES = 100.0  # samples of a reference over those of a picture
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wish:
+class ReportOptions:
     """What the user asks of a report.
 
     Attributes:
@@ -39,7 +39,7 @@ class Wish:
     times: float = TIMES
 
 
-class Listener:
+class ReportEvents:
     """Is told how a report goes on; each method may be left as it is."""
 
     def opened(self, case: Case) -> None:
@@ -79,7 +79,7 @@ class Report:
     signed: Float32
 
 
-def make_report(job: Job, folder: Path, wish: Wish, listener: Listener | None = None) -> Report:
+def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEvents | None = None) -> Report:
     """Measure a job and its variations; references are kept in the folder and used again.
 
     Raises:
@@ -88,26 +88,26 @@ def make_report(job: Job, folder: Path, wish: Wish, listener: Listener | None = 
         OutputError: the folder cannot be written.
     """
     require_extra()
-    listener = listener or Listener()
+    events = events or ReportEvents()
     with opened(job) as case:
-        listener.opened(case)
+        events.opened(case)
         still, n_l = case.prepared.still, case.prepared.n_lights
-        looked_at = probes(case.setup.n_frames, n_l, wish.cameras, wish.lights, file=job.file or job.name)
-        trying = to_try(case.settings, 1 if still else case.setup.n_frames, wish.vary)
+        looked_at = probes(case.setup.n_frames, n_l, options.cameras, options.lights, file=job.file or job.name)
+        trying = to_try(case.settings, 1 if still else case.setup.n_frames, options.vary)
         frames = [c for run in looked_at.cameras for c in run]
-        listener.planned(len(frames), len(trying))
-        passes = passes_for(wish.times, case.settings.rests_on)
+        events.planned(len(frames), len(trying))
+        passes = passes_for(options.times, case.settings.rests_on)
         references: dict[int, Reference] = {}
         for c in frames:
             references[c] = reference(case, c, looked_at.lights, folder / "references", passes)
-            listener.done()
+            events.done()
         measured: list[Measured] = []
         for named in trying:
             measured.append(_measured(case, named, looked_at, references, measured))
-            listener.done()
+            events.done()
         first, own = references[frames[0]], measured[0]
         right = first.image(0, case.ambient.intensity[looked_at.lights[0]])
-        wanted = wish.errors or [share * own.quality.rmse for share in (2.0, 1.0, 0.5)]
+        wanted = options.errors or [share * own.quality.rmse for share in (2.0, 1.0, 0.5)]
         return Report(
             job=job,
             folder=folder,

@@ -43,7 +43,7 @@ class Camera:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Source:
+class LightKeys:
     """A light's path: its frames, its places or directions, and its power at each."""
 
     kind: Literal["point", "directional"]
@@ -78,7 +78,7 @@ class Start:
     background: Vector
     camera: Camera
     light_frames: int
-    sources: tuple[Source, ...]
+    sources: tuple[LightKeys, ...]
     range: float
     inside: bool
     about: tuple[str, ...]
@@ -144,7 +144,7 @@ def checked(table: dict[str, Any], file: Path) -> Job:
         raise SceneError(f"{file}: its cameras or lights do not make a job: {told}") from error
 
 
-def source_keys(source: Source) -> list[dict[str, Any]]:
+def source_keys(source: LightKeys) -> list[dict[str, Any]]:
     """The key frames of a source."""
     place, power = POWERS[source.kind]
     return [

@@ -7,7 +7,7 @@ import numpy as np
 from ..arrays import Float64
 from .rays import Probe
 from .sample import level_directions
-from .views import ASPECT, worth
+from .views import ASPECT, view_worth
 
 FOV_DEG = 40.0  # longer than a room's: a thing seen from some way off is not distorted
 ABOVE_DEG = 20.0  # of the eye over the middle of the thing
@@ -44,7 +44,7 @@ def orbit(probe: Probe, up: int, shares: Float64) -> tuple[Float64, Float64]:
     ways = np.stack([_to_eye(way, up_dir, ABOVE_DEG) for way in middle])
     far = _distance(outline, ways, up_dir)
     size = float(np.linalg.norm(outline, axis=1).max())
-    shown, _ = worth(probe, target + ways * far, -ways, up_dir, size)
+    shown, _ = view_worth(probe, target + ways * far, -ways, up_dir, size)
     best = middle[int((shown + FRONT_BONUS * (middle @ middle[0])).argmax())]
     arc = np.radians(ARC_DEG * (shares - 0.5))
     ways = np.stack([_to_eye(turned(best, up_dir, angle), up_dir, ABOVE_DEG) for angle in arc])

@@ -14,7 +14,7 @@ from ..job import NAME, Z_UP_FORMATS
 from ..meshes import Stage, read_stage
 from ..scene import Scene, load_scene
 from .expose import factors_for
-from .model import Camera, EyeKey, MaterialNote, Source, Start, Vector, rounded, tidy
+from .model import Camera, EyeKey, LightKeys, MaterialNote, Start, Vector, rounded, tidy
 from .orbit import FOV_DEG as ORBIT_FOV
 from .orbit import KEYS, SUN_KEYS, key_frames, orbit, sun_over
 from .rays import Probe
@@ -160,7 +160,7 @@ def _with_lights(place: _Place, start: Start, stage: Stage, wishes: Wishes, ends
     raise SceneError(f"{start.file}: no light reaches what the camera sees; its surfaces may be black")
 
 
-def _own_lights(place: _Place, start: Start, ends: Float64, n: int) -> list[Source]:
+def _own_lights(place: _Place, start: Start, ends: Float64, n: int) -> list[LightKeys]:
     """Lights to try in turn: a lamp where there is a room, then a sun from behind the eye, then a lamp at the eye."""
     found = []
     eyes, targets = ends[:, 0], ends[:, 1]
@@ -181,9 +181,9 @@ def _own_lights(place: _Place, start: Start, ends: Float64, n: int) -> list[Sour
 
 def _moving(
     kind: Literal["point", "directional"], frames: list[int], vectors: list[Vector], power: Vector, about: str
-) -> Source:
+) -> LightKeys:
     n = len(frames)
-    return Source(kind=kind, frames=tuple(frames), vectors=tuple(vectors[:n]), powers=(power,) * n, about=(about,))
+    return LightKeys(kind=kind, frames=tuple(frames), vectors=tuple(vectors[:n]), powers=(power,) * n, about=(about,))
 
 
 def _exposed(start: Start, factor: float, sky: float) -> Start:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..arrays import Float64
 from .rays import Probe
 from .sample import directions_around, level_directions, points_in
-from .views import view_directions, worth
+from .views import view_directions, view_worth
 
 POINTS, AROUND = 3000, 64
 ENCLOSED, FRONTS = 0.7, 0.75  # shares of the rays around a point that is inside
@@ -121,7 +121,7 @@ def walk_through(probe: Probe, room: Room) -> Walk | None:
     looks = level - DOWN * room.up_dir
     looks /= np.linalg.norm(looks, axis=1, keepdims=True)
     eye, look = np.repeat(eyes, TURNS, axis=0), np.tile(looks, (len(eyes), 1))
-    value, depth = worth(probe, eye, look, room.up_dir, room.height)
+    value, depth = view_worth(probe, eye, look, room.up_dir, room.height)
     best = int(value.argmax())
     target = eye[best] + look[best] * max(depth[best], 0.5 * room.height)
     return _through_open_side(probe, room, float(value[best])) or _go_on(probe, room, eye[best], target)
@@ -135,7 +135,7 @@ def _through_open_side(probe: Probe, room: Room, least: float) -> Walk | None:
     ways = np.repeat(level_directions(4, room.up), len(OPEN_SIDE), axis=0)
     away = np.abs(ways @ half) + np.tile(OPEN_SIDE, 4) * room.height
     eyes = middle + ways * away[:, None]
-    value, _ = worth(probe, eyes, -ways, room.up_dir, room.height)
+    value, _ = view_worth(probe, eyes, -ways, room.up_dir, room.height)
     best = int(value.argmax())
     if value[best] <= least + OPEN_BONUS:
         return None
@@ -156,7 +156,7 @@ def _go_on(probe: Probe, room: Room, eye: Float64, target: Float64) -> Walk:
     if not ends:
         return Walk(eyes=np.array([eye, eye]), target=target)
     look = target - np.array(ends)
-    value, _ = worth(
+    value, _ = view_worth(
         probe, np.array(ends), look / np.linalg.norm(look, axis=1, keepdims=True), room.up_dir, room.height
     )
     best = int((value + np.array(lengths)).argmax())

@@ -5,7 +5,7 @@ import numpy as np
 from ..arrays import Float64
 from ..errors import JobError, SceneError
 from ..meshes import Stage, StageCamera, StageLight
-from .model import Camera, EyeKey, Source, rounded
+from .model import Camera, EyeKey, LightKeys, rounded
 
 FPS = 24.0  # of the job; times of animations are seconds
 HEIGHT = 240  # pixels of a first picture
@@ -71,7 +71,7 @@ def staged_camera(stage: Stage, camera: StageCamera, wanted: int | None, depth: 
     )
 
 
-def staged_lights(stage: Stage, wanted: int | None) -> tuple[tuple[Source, ...], int]:
+def staged_lights(stage: Stage, wanted: int | None) -> tuple[tuple[LightKeys, ...], int]:
     """The paths of the lights of the file that shine, with the file's own strengths; and the number of positions."""
     shining = [light for light in stage.lights if max(light.intensity) > 0]
     span = stage.span([light.node for light in shining])
@@ -79,7 +79,7 @@ def staged_lights(stage: Stage, wanted: int | None) -> tuple[tuple[Source, ...],
     return tuple(_source(stage, light, times) for light in shining), len(times)
 
 
-def _source(stage: Stage, light: StageLight, times: list[float]) -> Source:
+def _source(stage: Stage, light: StageLight, times: list[float]) -> LightKeys:
     matrices = stage.world_from(light.node, times)
     if light.kind == "directional":
         vectors = _units(-matrices[:, :3, 2], light.name)
@@ -93,7 +93,7 @@ def _source(stage: Stage, light: StageLight, times: list[float]) -> Source:
     about = [f'the {light.kind} light "{light.name}" of the file, there {max(light.intensity):.4g} {unit}']
     if light.kind == "spot":
         about.append("a spot: here it shines to all sides, as there are no spots")
-    return Source(
+    return LightKeys(
         kind="directional" if light.kind == "directional" else "point",
         frames=tuple(range(n)),
         vectors=tuple(rounded(vector) for vector in vectors[:n]),

@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from .model import Camera, MaterialNote, Source, Start, source_keys
+from .model import Camera, LightKeys, MaterialNote, Start, source_keys
 
 MOST_STEPS_UP = 2  # folders that a relative name of the scene may climb; beyond, it is absolute
 COLUMN = 42  # where comments behind a key start
@@ -100,7 +100,7 @@ def _lights(start: Start) -> list[str]:
     return lines
 
 
-def _source(source: Source) -> list[str]:
+def _source(source: LightKeys) -> list[str]:
     unit = "W/sr" if source.kind == "point" else "W/m2 of a surface that faces the light"
     power = "intensity" if source.kind == "point" else "irradiance"
     lines = [

@@ -31,7 +31,7 @@ def view_directions(look_dir: Float64, up_dir: Float64, fov_deg: float = FOV_DEG
     return np.asarray(look_dir[:, None] + a * right[:, None] + b * above[:, None])
 
 
-def worth(probe: Probe, eye: Float64, look_dir: Float64, up_dir: Float64, size: float) -> tuple[Float64, Float64]:
+def view_worth(probe: Probe, eye: Float64, look_dir: Float64, up_dir: Float64, size: float) -> tuple[Float64, Float64]:
     """Judge n views: (n,) how much each shows, and (n,) median distance of what it sees.
 
     A view is worth the variety of what is in it (the entropy of its materials and of the ways surfaces face), and the

@@ -25,7 +25,7 @@ from .obscurance import rho
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Curve:
+class ObscuranceCurve:
     """The falloff of the job's obscurances; see `ObscuranceSettings`."""
 
     d_max: float
@@ -102,7 +102,7 @@ class _Fit:
     """Walks that are compared with obscurances."""
 
     walks: EyeWalks
-    curve: Curve
+    curve: ObscuranceCurve
 
     def batch(self, work: Workspace, first: int, n: int) -> _Fitted:
         """Walk walks first to first + n - 1 to their ends."""
@@ -173,7 +173,7 @@ class _Fit:
         )
 
 
-def ambient_by_fit(walks: EyeWalks, curve: Curve, threads: int = 1) -> Ambient:
+def ambient_by_fit(walks: EyeWalks, curve: ObscuranceCurve, threads: int = 1) -> Ambient:
     """Estimate I_A[l] so that indirect light is right on average over the pictures."""
 
     def enough(found: _Fitted) -> bool:

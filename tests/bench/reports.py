@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from framearray_cli.report import Wish, make_report, write_report
+from framearray_cli.report import ReportOptions, make_report, write_report
 from framearray_cli.report.crops import draw_crops
 
 from .cases import job_named
@@ -56,7 +56,7 @@ def measure(name: str) -> None:
     """Make the report of a job in out/bench, or what is missing of its references, and write its page."""
     folder = RESULTS / f"report-{name}"
     job = job_named(name, False)
-    report = make_report(job, folder, Wish())
+    report = make_report(job, folder, ReportOptions())
     write_report(report)
     save(
         folder,

@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from framearray_cli.allot import FEWEST, Witnesses, allot, fewest_hits, variances
 from framearray_cli.allotment import Allotment, blocks_of
-from framearray_cli.expected import EVENNESS, worth
+from framearray_cli.expected import EVENNESS, independent_hits
 from framearray_cli.plan import passes_of_counts
 
 MANY = 1e9
@@ -80,7 +80,7 @@ def test_a_pilot_does_not_flatter_itself(n_r: int) -> None:
         ]
         hits, expected = allot(variance / shared, blocks, wanted, MANY, witnesses)
         told.append(expected.mean())
-        arriving = np.stack([worth(hits[window.start : window.stop]).sum(axis=0) for window in eyes])
+        arriving = np.stack([independent_hits(hits[window.start : window.stop]).sum(axis=0) for window in eyes])
         true.append((true_u / arriving).mean())
         alone = fewest_hits((variance / shared).mean(axis=0), wanted, MANY)
         naive.append(variances(true_u / shared, alone).mean())
@@ -140,4 +140,4 @@ def test_passes_give_every_pixel_its_number() -> None:
     np.testing.assert_array_equal(found, counts)
     ends = [part.first_hit + part.n for part in passes]
     assert [part.first_hit for part in passes] == [0, *ends[:-1]] and ends[-1] == counts.sum()
-    assert worth(np.array([2.0])) > 2  # more than one hit of an eye is worth more than so many of many eyes
+    assert independent_hits(np.array([2.0])) > 2  # more than one hit of an eye is worth more than so many of many eyes

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import tiny
 
-from framearray_cli.acceptance import Acceptance, probe, spread
+from framearray_cli.acceptance import Acceptance, probe, spread_in_shares
 from framearray_cli.auto import (
     DEFAULT,
     HITS,
@@ -163,7 +163,11 @@ def test_path_ends_count_as_they_are_rendered() -> None:
 
 
 def test_spread_numbers_lie_in_the_middle() -> None:
-    assert spread(5, 16) == [0, 1, 2, 3, 4] and spread(12, 3) == [2, 6, 10] and spread(1, 8) == [0]
+    assert (
+        spread_in_shares(5, 16) == [0, 1, 2, 3, 4]
+        and spread_in_shares(12, 3) == [2, 6, 10]
+        and spread_in_shares(1, 8) == [0]
+    )
 
 
 def test_expected_hits_are_those_of_a_render() -> None:

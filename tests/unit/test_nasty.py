@@ -9,7 +9,7 @@ from scenes import scenes_folder, shared_scene
 from test_scene import check_shapes
 
 from framearray_cli.errors import SceneError
-from framearray_cli.scene import Scene, load_scene, report_lines
+from framearray_cli.scene import Scene, load_scene, scene_report_lines
 
 INDEX = scenes_folder() / "nasty" / "INDEX.json"
 FILES = [entry["file"] for entry in json.loads(INDEX.read_text())] if INDEX.is_file() else []
@@ -79,7 +79,7 @@ def test_a_scene_or_one_clear_error(name, capfd):
     else:
         scene = load_scene(file)
         check_shapes(scene)
-        assert report_lines(scene.report, name)
+        assert scene_report_lines(scene.report, name)
     assert capfd.readouterr() == ("", "")
 
 

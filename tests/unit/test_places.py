@@ -6,7 +6,7 @@ import pytest
 from boxarrays import grouped_manifest, plain_manifest
 
 from framearray_cli.errors import JobError
-from framearray_cli.places import indices, light_places, plain_names, spread
+from framearray_cli.places import indices, light_places, plain_names, spread_with_ends
 
 
 def test_places_are_read() -> None:
@@ -30,11 +30,11 @@ def test_places_outside_are_refused(text: str) -> None:
 
 
 def test_spread_is_even_with_both_ends() -> None:
-    assert spread(3, 8) == (0, 1, 2)
-    assert spread(192, 3) == (0, 96, 191)
-    assert spread(7, 1) == (3,)
+    assert spread_with_ends(3, 8) == (0, 1, 2)
+    assert spread_with_ends(192, 3) == (0, 96, 191)
+    assert spread_with_ends(7, 1) == (3,)
     for n, most in ((24, 12), (192, 12), (48, 8), (9, 8)):
-        chosen = spread(n, most)
+        chosen = spread_with_ends(n, most)
         steps = {b - a for a, b in pairwise(chosen)}
         assert (len(chosen), chosen[0], chosen[-1]) == (most, 0, n - 1)
         assert max(steps) - min(steps) <= 1

@@ -10,7 +10,7 @@ from scenes import QUAD, QUAD_FACES, QUAD_UVS, Glb, png, shared_scene
 
 from framearray_cli.errors import SceneError
 from framearray_cli.meshes import Material, Meshes, Part, has_area, repeated
-from framearray_cli.scene import Scene, build_scene, load_scene, report_lines
+from framearray_cli.scene import Scene, build_scene, load_scene, scene_report_lines
 
 
 @dataclass(frozen=True)
@@ -238,7 +238,7 @@ def test_masked_triangles_come_last_and_glass_is_left_out(tmp_path):
 
 def test_report_lines(tmp_path):
     file = leaf_and_wall(tmp_path)
-    lines = report_lines(load_scene(file).report, file.name)
+    lines = scene_report_lines(load_scene(file).report, file.name)
     assert lines[0] == "leaf.glb: 4 triangles, 2 materials, 1 textures; left out: 2 transmissive"
     assert any("Glass" in line for line in lines[1:])
 
