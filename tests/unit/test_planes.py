@@ -1,16 +1,21 @@
 """Image planes: what each image of a frame holds, as composing, names and the manifest see it."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import tiny
 
+from framearray_cli.describe import describe
+from framearray_cli.identity import identity_of
+from framearray_cli.manifest import array_files
 from framearray_cli.paths import lights
 from framearray_cli.planes import Plane, first_with_background, pictures, planes_of_groups
 from framearray_cli.prepare import composed_with
 from framearray_cli.stored import array_names
 from framearray_cli.terms.ambient import Ambient
+from framearray_cli.writer import array_target
 
 LAMP = {**tiny.TABLE["light"]["sources"][0], "group": "lamps", "axis": "lamps"}
 SKY, NIGHT = [0.3, 0.4, 0.5], [0.0, 0.0, 0.0]
@@ -98,3 +103,29 @@ def test_a_block_of_light_positions_has_the_planes_of_its_own(samples: Any) -> N
             assert part.planes == setup.planes[block.start : block.stop]
             assert len(part.planes) == len(part.kept)
             assert part.light_independent_from == first
+
+
+@pytest.mark.parametrize("sources", [(LAMP, tiny.RED), (tiny.RED, tiny.SUN)])
+@pytest.mark.parametrize("background", [SKY, NIGHT])
+def test_files_that_are_written_are_those_that_a_manifest_lists(sources: Any, background: Any, tmp_path: Path) -> None:
+    at = job(background, sources)
+    at = at.model_copy(
+        update={
+            "camera": at.camera.model_copy(update={"frames": 3}),
+            "output": at.output.model_copy(update={"directory": tmp_path, "layers": True}),
+        }
+    )
+    prepared = tiny.prepared(at)
+    n = prepared.lights.n
+    estimate = Ambient(
+        intensity=np.ones((n, 3), np.float32),
+        standard_error=np.zeros(n),
+        reflectivity=np.ones(3, np.float32),
+        paths=1,
+        rays=1,
+    )
+    target = array_target(prepared)
+    written = {target.directory / image.file(c) for image in target.names.images for c in range(3)}
+    written |= {target.directory / target.names.layers_file(c) for c in range(3)}
+    assert len(written) == 3 * (n + 1)
+    assert written == set(array_files(describe(prepared, estimate, identity_of(prepared), None, None)))
