@@ -9,6 +9,8 @@ import typer
 
 from ..compiling import compile_clock
 from ..errors import OutputError
+from ..parts.progress import PartEvents
+from ..progress import ambient_figures
 from ..screen import Screen, out, say, size
 from ..wording import (
     ambient_lines,
@@ -94,65 +96,9 @@ def render_shown(
     """Render, and show on the screen what goes on."""
     with Screen(out, quiet=quiet) as screen:
         screen.wait("reading the scene")
-        from ..parts.progress import PartEvents
-        from ..progress import ambient_figures
         from ..render import render as run
 
-        class Shown(PartEvents):
-            """Prints the scene, then the ambient light, then a progress bar."""
-
-            told: tuple[str, ...] = ()
-
-            def prepared(self, prepared: "Prepared") -> None:
-                screen.say(scene_lines(prepared))
-                screen.wait("looking at the output folder")
-
-            def removed(self, files: int) -> None:
-                if files:
-                    screen.say([f"removed {files:,} files of the frame array in {job.output.directory}"])
-
-            def resolved(self, settings: "AutoSettings") -> None:
-                screen.say(settings_lines(settings))
-
-            def scanning(self, files: int) -> None:
-                screen.wait(f"looking whether {files:,} files are whole")
-
-            def scanned(self, on_disk: "OnDisk", wanted: int) -> None:
-                self.total = wanted
-                screen.say(on_disk_lines(on_disk, wanted))
-                screen.wait("estimating the ambient light")
-
-            def planned(self, ambient: "Ambient") -> None:
-                screen.say(ambient_lines(ambient_figures(ambient)))
-                self.told = ambient.notes
-                screen.count("rendering", self.total, "image")
-
-            def allotted(self, target: "Target") -> None:
-                screen.say(target_lines(target))
-
-            def written(self, images: int) -> None:
-                screen.advance(images)
-
-            def starting_workers(self) -> None:
-                screen.wait("starting workers")
-
-            def awaiting_workers(self, address: str | None) -> None:
-                screen.say([f"waiting for workers of {address or 'this machine'}"])
-
-            def cut(self, workers: int, chunks: "Chunks") -> None:
-                screen.say([f"{workers_text(workers)}, {chunks_line(chunks)}"])
-                screen.count("rendering", self.total, "image")
-
-            def ambient_known(self, figures: "AmbientFigures") -> None:
-                screen.say(ambient_lines(figures))
-
-            def target_known(self, target: "Target") -> None:
-                screen.say(target_lines(target))
-
-            def compiling(self) -> None:
-                screen.compiling()
-
-        shown = Shown()
+        shown = Shown(screen, job)
         try:
             with compile_clock(screen.compiling):
                 if options is None:
@@ -170,6 +116,68 @@ def render_shown(
             raise
     if not quiet:
         say(out, summary_lines(summary, shown.told, job))
+
+
+class Shown(PartEvents):
+    """Prints the scene, then the ambient light, then a progress bar.
+
+    Attributes:
+        told: notes that were printed.
+    """
+
+    def __init__(self, screen: Screen, job: "Job") -> None:
+        self._screen, self._job = screen, job
+        self._total = 0
+        self.told: tuple[str, ...] = ()
+
+    def prepared(self, prepared: "Prepared") -> None:
+        self._screen.say(scene_lines(prepared))
+        self._screen.wait("looking at the output folder")
+
+    def removed(self, files: int) -> None:
+        if files:
+            self._screen.say([f"removed {files:,} files of the frame array in {self._job.output.directory}"])
+
+    def resolved(self, settings: "AutoSettings") -> None:
+        self._screen.say(settings_lines(settings))
+
+    def scanning(self, files: int) -> None:
+        self._screen.wait(f"looking whether {files:,} files are whole")
+
+    def scanned(self, on_disk: "OnDisk", wanted: int) -> None:
+        self._total = wanted
+        self._screen.say(on_disk_lines(on_disk, wanted))
+        self._screen.wait("estimating the ambient light")
+
+    def planned(self, ambient: "Ambient") -> None:
+        self._screen.say(ambient_lines(ambient_figures(ambient)))
+        self.told = ambient.notes
+        self._screen.count("rendering", self._total, "image")
+
+    def allotted(self, target: "Target") -> None:
+        self._screen.say(target_lines(target))
+
+    def written(self, images: int) -> None:
+        self._screen.advance(images)
+
+    def starting_workers(self) -> None:
+        self._screen.wait("starting workers")
+
+    def awaiting_workers(self, address: str | None) -> None:
+        self._screen.say([f"waiting for workers of {address or 'this machine'}"])
+
+    def cut(self, workers: int, chunks: "Chunks") -> None:
+        self._screen.say([f"{workers_text(workers)}, {chunks_line(chunks)}"])
+        self._screen.count("rendering", self._total, "image")
+
+    def ambient_known(self, figures: "AmbientFigures") -> None:
+        self._screen.say(ambient_lines(figures))
+
+    def target_known(self, target: "Target") -> None:
+        self._screen.say(target_lines(target))
+
+    def compiling(self) -> None:
+        self._screen.compiling()
 
 
 def _add_space(error: OutputError, folder: Path) -> None:

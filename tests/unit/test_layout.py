@@ -156,7 +156,7 @@ def test_each_library_has_one_door(library: str) -> None:
 
 def test_imports_are_seen() -> None:
     """The tests above can fail: what they look for is there to be found."""
-    assert {"window", "frame", "writer", "terms/ambient"} <= imported("render")
+    assert {"window", "loop", "writer", "terms/ambient"} <= imported("render")
     assert "errors" in imported("meshes/gltf_nodes") and "surface" in imported("embree/masks")
     assert {"embreex", "ctypes"} <= libraries("embree/native")
 
