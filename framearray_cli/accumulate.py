@@ -1,9 +1,10 @@
 """Adding the hits of many frames to pixels, one pass over them, until images are finished."""
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from .arrays import Addresses, Float32, Float64, Int32, Real, Rgb
 from .compose import INVERSE_PI, MOST, Band, Stored, finish
@@ -11,8 +12,9 @@ from .kernel import inlined, integer_at, kernel, prefetch, real_at
 from .lanes import LANES, lane_numbers, lanes_at, lanes_from, put_lanes, reals
 from .work import BY_SAMPLE, HALF, INDIRECT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, HitRecords, Placed, lit_bit
 
-# Columns of a list of sources: addresses of arrays, 0 for one that is empty.
+# Columns of a list of sources: addresses of arrays, 0 for one that is empty; and what these hold.
 START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE = range(7)
+_TYPES = (np.int32, np.int32, np.float32, np.float32, np.float32, np.float32, np.float32)
 _NOTHING = np.empty(0, np.float32)
 # How many hits ahead the light of a hit is fetched, and twice as many its row: memory answers in about the time that
 # this many hits take to sum.
@@ -20,7 +22,7 @@ AHEAD = 8
 ROW_BYTES = 4 * LANES
 
 
-class Source(NamedTuple):
+class HitSource(NamedTuple):
     """Hits that are summed.
 
     Attributes:
@@ -38,14 +40,33 @@ class Source(NamedTuple):
     odd_scale: Float32 = _NOTHING
 
 
-def sources(parts: Iterable[Source]) -> Addresses:
-    """List hits for `accumulate`, (n, 7) addresses; whoever asks keeps the arrays while the list is in use."""
-    rows = []
-    for placed, known, weight, scale, odd_scale in parts:
-        arrays = (placed.start, placed.order, weight, scale, odd_scale, known.row, known.irradiance)
-        assert all(array.flags.c_contiguous for array in arrays)
-        rows.append([array.ctypes.data if array.size else 0 for array in arrays])
-    return np.array(rows, np.int64).reshape(-1, 7)
+class SourceList:
+    """Hits of several sources, as `accumulate` takes them; keeps the arrays that it points into.
+
+    Attributes:
+        addresses: (n, 7) of the arrays of each source; they count as long as the list lives.
+    """
+
+    def __init__(self, parts: Iterable[HitSource]) -> None:
+        """List sources.
+
+        Raises:
+            ValueError: an array is not contiguous, or holds something else than kernels read.
+        """
+        self._kept = [
+            (p.placed.start, p.placed.order, p.weight, p.scale, p.odd_scale, p.known.row, p.known.irradiance)
+            for p in parts
+        ]
+        rows = [[_address(*of_column) for of_column in zip(arrays, _TYPES, strict=True)] for arrays in self._kept]
+        self.addresses: Addresses = np.array(rows, np.int64).reshape(-1, len(_TYPES))
+
+
+def _address(array: NDArray[Any], dtype: DTypeLike) -> int:
+    if array.dtype != dtype:
+        raise ValueError(f"expected an array of {np.dtype(dtype)}, got one of {array.dtype}")
+    if not array.flags.c_contiguous:
+        raise ValueError(f"expected a contiguous array, got one of shape {array.shape} with strides {array.strides}")
+    return array.ctypes.data if array.size else 0
 
 
 @inlined
@@ -99,7 +120,7 @@ def accumulate(
     """Sum the hits of pixels first_pixel to first_pixel + n - 1, pixel by pixel, source by source.
 
     Args:
-        parts: from `sources`.
+        parts: of a `SourceList`.
         channels: of irradiance, 1 or 3.
         n_lights: of irradiance; 0: direct light is left out.
         mean: the sums become means over the weights, zero in a pixel without hits; else they are added to what the
@@ -178,7 +199,7 @@ def compose_pixels(
 
     Args:
         band: room for the sums of some pixels.
-        hits, mirrored: from `sources`: what is averaged by weight, and what is added to that.
+        hits, mirrored: of a `SourceList`: what is averaged by weight, and what is added to that.
         channels: of irradiance, 1 or 3.
         smooth: (n_pixels, 3) R W that replaces the mean, or (0, 3).
         colour, ambient, light_independent_from, lowest, images: see `finish`.
@@ -216,7 +237,7 @@ def weigh_halves(parts: Addresses, half: Int32, first_pixel: int, n: int, weight
     """Sum the weights of the hits of both halves in pixels first_pixel to first_pixel + n - 1.
 
     Args:
-        parts: from `sources`.
+        parts: of a `SourceList`.
         half: (n_parts,) the half that all hits of a part belong to, or BY_SAMPLE.
         weights: (2, n_pixels) overwritten there.
     """
@@ -247,7 +268,7 @@ def compose_differences(
 
     Args:
         band: room for the sums of some pixels.
-        parts: from `sources`, with factors.
+        parts: of a `SourceList`, with factors.
         channels: of irradiance, 1 or 3.
         colour, ambient, light_independent_from: see `finish`.
         images: (n_lights, n_pixels, 3) overwritten in pixels first_pixel to first_pixel + n - 1.

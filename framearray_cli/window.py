@@ -14,8 +14,8 @@ from time import perf_counter
 
 import numpy as np
 
-from .accumulate import Source, accumulate, compose_differences, compose_pixels, sources, weigh_halves
-from .arrays import Addresses, Float32, Images, Int32, Rgb
+from .accumulate import HitSource, SourceList, accumulate, compose_differences, compose_pixels, weigh_halves
+from .arrays import Float32, Images, Int32, Rgb
 from .compose import Band, as_stored, empty_band
 from .crew import Scratch, TracePool
 from .denoise import denoised
@@ -152,8 +152,8 @@ class Window:
             n = min(TASK_PIXELS, setup.n_pixels - first)
             with self._band() as sums:
                 found: tuple[int, int, int, int] = compose_pixels(
-                    sums, first, n, hits, mirrored, setup.lights.channels, smooth, self._colour, self._ambient,
-                    setup.light_independent_from, self._lowest, flat, samples, maps,
+                    sums, first, n, hits.addresses, mirrored.addresses, setup.lights.channels, smooth, self._colour,
+                    self._ambient, setup.light_independent_from, self._lowest, flat, samples, maps,
                 )  # fmt: skip
             if layered:
                 place = frame.places[j]
@@ -184,24 +184,24 @@ class Window:
         own = np.array([setup.half_of(k) for k in eyes], np.int32)
         hits = self._hits(j, [])
         tasks = [(first, min(TASK_PIXELS, setup.n_pixels - first)) for first in range(0, setup.n_pixels, TASK_PIXELS)]
-        self._pool.run(lambda task, _: weigh_halves(hits, own, task[0], task[1], weights), tasks)
+        self._pool.run(lambda task, _: weigh_halves(hits.addresses, own, task[0], task[1], weights), tasks)
         factors, parts = half_factors(weights), []
         for k, half in zip(eyes, own, strict=True):
             scales = (factors[0], factors[1]) if half == BY_SAMPLE else (factors[half],)
             parts.append(
-                Source(self._frames[k].places[j], self._frames[k].records, self._frames[k].weights[j], *scales)
+                HitSource(self._frames[k].places[j], self._frames[k].records, self._frames[k].weights[j], *scales)
             )
         if frame.mirrored is not None and frame.mirror_places is not None:
             even, odd = half_factors(frame.mirror_hits)
-            parts.append(Source(frame.mirror_places, frame.mirrored, scale=even, odd_scale=odd))
-        listed = sources(parts)
+            parts.append(HitSource(frame.mirror_places, frame.mirrored, scale=even, odd_scale=odd))
+        listed = SourceList(parts)
 
         def some(task: tuple[int, int], _scratch: Scratch) -> None:
             with self._band() as band:
                 compose_differences(
                     band,
                     *task,
-                    listed,
+                    listed.addresses,
                     setup.lights.channels,
                     self._colour,
                     self._ambient,
@@ -227,7 +227,7 @@ class Window:
         def band(first: int, _scratch: Scratch) -> None:
             n = min(TASK_PIXELS, n_pixels - first)
             sums = empty_band(n, 0)
-            accumulate(sums, first, n, hits, 1, 0, True)
+            accumulate(sums, first, n, hits.addresses, 1, 0, True)
             indirect[first : first + n] = sums.sums[:n, INDIRECT : INDIRECT + 3]
             reflectivity[first : first + n] = sums.sums[:n, REFLECTIVITY : REFLECTIVITY + 3]
             place = frame.places[j]
@@ -249,19 +249,19 @@ class Window:
         missed = np.flatnonzero(reached[setup.order] == 0)
         return fill_holes(setup, j, setup.order[missed], self._pool) if len(missed) else []
 
-    def _hits(self, j: int, holes: list[tuple[Placed, HitRecords]], eyes: Sequence[int] | None = None) -> Addresses:
+    def _hits(self, j: int, holes: list[tuple[Placed, HitRecords]], eyes: Sequence[int] | None = None) -> SourceList:
         """All hits of frame j, or those of some eyes, for `accumulate`."""
         frames = [self._frames[k] for k in self._setup.frames_around(j, self._setup.n_r) if eyes is None or k in eyes]
-        found = [Source(frame.places[j], frame.records, frame.weights[j]) for frame in frames]
-        return sources(found + [Source(place, records) for place, records in holes])
+        found = [HitSource(frame.places[j], frame.records, frame.weights[j]) for frame in frames]
+        return SourceList(found + [HitSource(place, records) for place, records in holes])
 
-    def _mirrored(self, j: int, holes: list[tuple[Placed, HitRecords]], scale: Float32) -> Addresses:
+    def _mirrored(self, j: int, holes: list[tuple[Placed, HitRecords]], scale: Float32) -> SourceList:
         """What the mirrors of frame j show, for `accumulate`: a mean over its native hits alone."""
         frame = self._frames[j]
-        found = [Source(place, records, scale=scale) for place, records in holes]
+        found = [HitSource(place, records, scale=scale) for place, records in holes]
         if frame.mirrored is not None and frame.mirror_places is not None:
-            found.insert(0, Source(frame.mirror_places, frame.mirrored, scale=scale))
-        return sources(found)
+            found.insert(0, HitSource(frame.mirror_places, frame.mirrored, scale=scale))
+        return SourceList(found)
 
     def _mirror_scale(self, j: int, holes: list[tuple[Placed, HitRecords]]) -> Float32:
         """One over the native hits of each pixel of frame j, (n_pixels,); those that fill holes count."""

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from framearray_cli.accumulate import Source, accumulate, sources
+from framearray_cli.accumulate import HitSource, SourceList, accumulate
 from framearray_cli.arrays import with_room
 from framearray_cli.compose import empty_band
 from framearray_cli.lanes import LANES
@@ -22,8 +22,8 @@ def mean_of_many(n: int) -> tuple[Any, Any]:
     row[:, INDIRECT : INDIRECT + 3] = rng.random((n, 3))
     placed = Placed(start=np.array([0, n], np.int32), order=np.arange(n, dtype=np.int32))
     band = empty_band(1, 3)
-    parts = sources([Source(placed, HitRecords(row=row, irradiance=irradiance))])
-    accumulate(band, 0, 1, parts, 1, 3, True)
+    parts = SourceList([HitSource(placed, HitRecords(row=row, irradiance=irradiance))])
+    accumulate(band, 0, 1, parts.addresses, 1, 3, True)
     light = row[:, REFLECTIVITY : REFLECTIVITY + 3, None].astype(np.float64) / np.pi * irradiance
     exact = [light.mean(axis=0).ravel(), row[:, INDIRECT : INDIRECT + 3].mean(axis=0, dtype=np.float64)]
     found = [band.direct[0, :, :3].ravel(), band.sums[0, INDIRECT : INDIRECT + 3]]

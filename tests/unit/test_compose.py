@@ -1,11 +1,13 @@
 """Sums of hits become images."""
 
+import gc
 from typing import Any
+from weakref import ref
 
 import numpy as np
 import pytest
 
-from framearray_cli.accumulate import Source, accumulate, compose_differences, sources, weigh_halves
+from framearray_cli.accumulate import HitSource, SourceList, accumulate, compose_differences, weigh_halves
 from framearray_cli.arrays import with_room
 from framearray_cli.compose import MOST, Band, as_stored, empty_band, finish
 from framearray_cli.lanes import LANES
@@ -75,11 +77,11 @@ class Case:
 
     def add(self, band: Band, first: int, n: int, scale: Any = NOTHING, mean: bool = True) -> None:
         records = HitRecords(row=self.row(), irradiance=self.irradiance)
-        parts = sources([self.source(records, np.float32(scale))])
-        accumulate(band, first, n, parts, *self.irradiance.shape[1:], mean)
+        parts = SourceList([self.source(records, np.float32(scale))])
+        accumulate(band, first, n, parts.addresses, *self.irradiance.shape[1:], mean)
 
-    def source(self, records: HitRecords, scale: Any = NOTHING, odd_scale: Any = NOTHING) -> Source:
-        return Source(Placed(start=self.start, order=self.order), records, self.weight, scale, odd_scale)
+    def source(self, records: HitRecords, scale: Any = NOTHING, odd_scale: Any = NOTHING) -> HitSource:
+        return HitSource(Placed(start=self.start, order=self.order), records, self.weight, scale, odd_scale)
 
     def sums(self, values: Any, scale: Any = NOTHING) -> Any:
         """Weighed sums of values (n, ...) by pixel."""
@@ -109,6 +111,46 @@ class Case:
         return (value / total[:, None, None]).transpose(2, 0, 1)
 
 
+def test_a_list_of_sources_keeps_its_arrays() -> None:
+    """Nobody else holds them; without the list their memory would be free, and soon be somebody's."""
+    case = Case(1)
+    dropped = []
+
+    def listed() -> SourceList:
+        records = HitRecords(row=case.row(), irradiance=case.irradiance.copy())
+        dropped.extend([ref(records.row), ref(records.irradiance)])
+        return SourceList([case.source(records, np.ones(N_PIXELS, np.float32))])
+
+    kept = listed()
+    gc.collect()
+    assert all(array() is not None for array in dropped)
+    del kept
+    gc.collect()
+    assert all(array() is None for array in dropped)
+
+
+@pytest.mark.parametrize("column", ["start", "order", "weight", "scale", "odd_scale", "row", "irradiance"])
+def test_a_list_of_sources_refuses_what_kernels_would_misread(column: str) -> None:
+    case = Case(1)
+    ones = np.ones(N_PIXELS, np.float32)
+    arrays = {"start": case.start, "order": case.order, "weight": case.weight, "scale": ones, "odd_scale": ones}
+    arrays |= {"row": case.row(), "irradiance": case.irradiance}
+
+    def listed(**changed: Any) -> SourceList:
+        a = arrays | changed
+        placed, records = (
+            Placed(start=a["start"], order=a["order"]),
+            HitRecords(row=a["row"], irradiance=a["irradiance"]),
+        )
+        return SourceList([HitSource(placed, records, a["weight"], a["scale"], a["odd_scale"])])
+
+    assert listed().addresses.shape == (1, 7)
+    with pytest.raises(ValueError, match="contiguous"):
+        listed(**{column: np.repeat(arrays[column], 2, axis=0)[::2]})
+    with pytest.raises(ValueError, match="expected an array of"):
+        listed(**{column: arrays[column].astype(np.float64)})
+
+
 def lights() -> tuple[Any, Any]:
     """Colour and ambient radiance, (3, n_lights)."""
     rng = np.random.default_rng(9)
@@ -136,8 +178,8 @@ def test_differences_are_sums_with_a_factor_for_each_half(channels: int, weighed
     records = HitRecords(row=case.row(), irradiance=case.irradiance)
     images = np.full((N_LIGHTS, N_PIXELS, 3), np.nan, np.float32)
     colour, ambient = lights()
-    listed = sources([case.source(records, even, odd)])
-    compose_differences(empty_band(16, N_LIGHTS), 0, N_PIXELS, listed, channels, colour, ambient, 0, images)
+    listed = SourceList([case.source(records, even, odd)])
+    compose_differences(empty_band(16, N_LIGHTS), 0, N_PIXELS, listed.addresses, channels, colour, ambient, 0, images)
     factor = np.where(case.half == 1, odd[case.pixel], even[case.pixel]).astype(np.float64)
     value = (
         colour * case.sums(case.direct() * factor[:, None, None])
@@ -154,8 +196,8 @@ def test_halves_are_weighed_by_part_and_by_sample(weighed: bool) -> None:
     cases = [Case(1, weighed=weighed, seed=seed) for seed in (1, 2, 3)]
     records = [HitRecords(row=case.row(), irradiance=case.irradiance) for case in cases]
     weights = np.full((2, N_PIXELS), np.nan)
-    listed = sources([case.source(known) for case, known in zip(cases, records, strict=True)])
-    weigh_halves(listed, np.array([1, BY_SAMPLE, 0], np.int32), 0, N_PIXELS, weights)
+    listed = SourceList([case.source(known) for case, known in zip(cases, records, strict=True)])
+    weigh_halves(listed.addresses, np.array([1, BY_SAMPLE, 0], np.int32), 0, N_PIXELS, weights)
     second = cases[1]
     for half, whole in ((0, cases[2]), (1, cases[0])):
         expected = whole.sums(np.ones(len(whole.pixel))) + second.sums((second.half == half).astype(float))

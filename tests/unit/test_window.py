@@ -66,6 +66,25 @@ def test_memory_of_dropped_frames_is_not_seen_again() -> None:
             np.testing.assert_array_equal(image, rendered[j])
 
 
+@pytest.mark.parametrize("kernel", ["compose_pixels", "compose_differences"])
+def test_a_task_that_fails_gives_its_sums_to_the_next(kernel: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each thread has one set of sums: one that is lost would end all later frames."""
+    inputs = tiny.prepared(tiny.job(camera=path(3), reuse={"n_r": 1}, samples={"halves": True}))
+
+    def fail(*_arguments: object) -> None:
+        raise MemoryError
+
+    with tiny.planned(inputs) as (setup, ambient), TracePool(setup, 2) as pool:
+        window = window_of(1, setup, ambient, pool)
+        shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
+        before = window.compose(1, np.empty(shape, np.float32)).images
+        for _ in range(3):
+            with monkeypatch.context() as broken, pytest.raises(MemoryError):
+                broken.setattr(f"framearray_cli.window.{kernel}", fail)
+                window.compose(1, np.empty(shape, np.float32))
+        np.testing.assert_array_equal(window.compose(1, np.empty(shape, np.float32)).images, before)
+
+
 @pytest.mark.parametrize("weights", ["average", "balance"])
 def test_twice_the_light_is_twice_the_picture(weights: str) -> None:
     """Direct and indirect together, to the last bit: a factor of two changes no digit."""
