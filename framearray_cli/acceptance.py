@@ -7,8 +7,8 @@ import numpy as np
 from .arrays import Float64, Int32, with_room
 from .camera import Cameras
 from .embree import EmbreeScene
-from .eyehits import native_hits, pixel_order
-from .hits import SURFACE, Hits, empty_hits
+from .eyehits import Samples, native_hits, pixel_order
+from .hits import SURFACE, Hits, World, empty_hits
 from .lanes import LANES
 from .lights import some_lights
 from .prepare import Prepared, eye_cameras
@@ -68,16 +68,14 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
     lights = some_lights(prepared.light_arrays, spread_in_shares(prepared.n_lights, PROBE_LIGHTS))
     order = pixel_order(cams.width, cams.height)
     pixels = order[spread_in_shares(len(order), PROBE_HITS)]
-    n = len(pixels)
+    n, samples = len(pixels), Samples(job.seed, pixels, per_pixel=1, first=0)
+    world = World(prepared.surfaces, embree.tracer)
     hits, hit_rays = empty_hits(PROBE_HITS), room_for_hits(PROBE_HITS)
     test_rays = room_for_tests(PROBE_HITS, lights.n_lights)
     irradiance = with_room((PROBE_HITS, lights.channels, lights.n_lights), np.float32)
     frames, densities, diffuse, shadow = [], [], [], 0
     for c in spread_in_shares(n_c, PROBE_FRAMES):
-        native_hits(
-            cams, c, job.seed, pixels, 1, 0, 0, n, prepared.surfaces, embree.tracer, False,
-            hit_rays.packets, hits,
-        )  # fmt: skip
+        native_hits(cams, c, samples, 0, n, world, False, hit_rays.packets, hits)
         shadow += direct(hits, n, lights, embree.tracer, test_rays, irradiance)
         eyes = range(max(c - reach, 0), min(c + reach, n_c - 1) + 1)
         density, first = np.zeros((n, 2 * reach + 1)), eyes.start - c + reach

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from .arrays import Addresses, Float32, Float64, Int32, Real, Rgb
-from .compose import INVERSE_PI, MOST, Band, Stored, finish
+from .arrays import Addresses, Float32, Float64, Int32, Real
+from .compose import INVERSE_PI, MOST, Band, Finish, Stored, finish
 from .kernel import inlined, integer_at, kernel, prefetch, real_at
 from .lanes import LANES, lane_numbers, lanes_at, lanes_from, put_lanes, reals
 from .work import BY_SAMPLE, HALF, INDIRECT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, HitRecords, Placed, lit_bit
@@ -178,37 +178,50 @@ def _scale(band: Band, i: int, n: int, n_lights: int, fresh: bool, factor: Real)
                 band.direct[i, channel, l] *= factor
 
 
+class Summands(NamedTuple):
+    """The hits that a frame shows.
+
+    Attributes:
+        hits, mirrored: of a `SourceList` each: what is averaged by weight, and what is added to that.
+        channels: of irradiance, 1 or 3.
+        smooth: (n_pixels, 3) R W that replaces the mean, or (0, 3).
+    """
+
+    hits: Addresses
+    mirrored: Addresses
+    channels: int
+    smooth: Float32
+
+
+class Pixels(NamedTuple):
+    """What composing writes of a frame.
+
+    Attributes:
+        images: (n_lights, n_pixels, 3), see `finish`.
+        samples: (n_pixels,) hits of each pixel.
+        maps: (n_pixels, 9) means of W, R W and R, or (0, 9).
+    """
+
+    images: Stored
+    samples: Int32
+    maps: Float32
+
+
 @kernel
 def compose_pixels(
-    band: Band,
-    first_pixel: int,
-    n: int,
-    hits: Addresses,
-    mirrored: Addresses,
-    channels: int,
-    smooth: Float32,
-    colour: Rgb,
-    ambient: Rgb,
-    light_independent_from: int,
-    lowest: Real,
-    images: Stored,
-    samples: Int32,
-    maps: Float32,
+    band: Band, first_pixel: int, n: int, summands: Summands, how: Finish, out: Pixels
 ) -> tuple[int, int, int, int]:
     """Compose pixels first_pixel to first_pixel + n - 1 of all images of a frame, a band at a time.
 
     Args:
         band: room for the sums of some pixels.
-        hits, mirrored: of a `SourceList`: what is averaged by weight, and what is added to that.
-        channels: of irradiance, 1 or 3.
-        smooth: (n_pixels, 3) R W that replaces the mean, or (0, 3).
-        colour, ambient, light_independent_from, lowest, images: see `finish`.
-        samples: (n_pixels,) overwritten: hits of each pixel.
-        maps: (n_pixels, 9) overwritten with means of W, R W and R, or (0, 9).
+        out: overwritten there.
 
     Returns:
         as `finish`, for all bands together.
     """
+    hits, mirrored, channels, smooth = summands
+    images, samples, maps = out
     n_lights = images.shape[0]
     bad, bad_light, bad_pixel, beyond = 0, -1, -1, 0
     for first in range(first_pixel, first_pixel + n, band.hits.shape[0]):
@@ -225,7 +238,7 @@ def compose_pixels(
                     maps[first + i, 6 + channel] = band.sums[i, REFLECTIVITY + channel]
         if mirrored.shape[0] > 0:
             accumulate(band, first, m, mirrored, channels, n_lights, False)
-        found, l, pixel, large = finish(band, first, m, colour, ambient, light_independent_from, lowest, images)
+        found, l, pixel, large = finish(band, first, m, how, images)
         if bad == 0 and found > 0:
             bad_light, bad_pixel = l, pixel
         bad, beyond = bad + found, beyond + large
@@ -254,15 +267,7 @@ def weigh_halves(parts: Addresses, half: Int32, first_pixel: int, n: int, weight
 
 @kernel
 def compose_differences(
-    band: Band,
-    first_pixel: int,
-    n: int,
-    parts: Addresses,
-    channels: int,
-    colour: Rgb,
-    ambient: Rgb,
-    light_independent_from: int,
-    images: Float32,
+    band: Band, first_pixel: int, n: int, parts: Addresses, channels: int, how: Finish, images: Float32
 ) -> None:
     """Compose sums of hits, each with its factor, as images, a band at a time; see `standarderror.py`.
 
@@ -270,7 +275,7 @@ def compose_differences(
         band: room for the sums of some pixels.
         parts: of a `SourceList`, with factors.
         channels: of irradiance, 1 or 3.
-        colour, ambient, light_independent_from: see `finish`.
+        how: `lowest` is minus infinity, as differences have both signs.
         images: (n_lights, n_pixels, 3) overwritten in pixels first_pixel to first_pixel + n - 1.
     """
     for first in range(first_pixel, first_pixel + n, band.hits.shape[0]):
@@ -282,4 +287,4 @@ def compose_differences(
                 for l in range(band.direct.shape[2]):
                     band.direct[i, channel, l] = 0.0
         accumulate(band, first, m, parts, channels, images.shape[0], False)
-        finish(band, first, m, colour, ambient, light_independent_from, np.float32(-np.inf), images)
+        finish(band, first, m, how, images)

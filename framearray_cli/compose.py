@@ -45,6 +45,22 @@ class Band(NamedTuple):
     lit: Addresses
 
 
+class Finish(NamedTuple):
+    """How sums become radiance.
+
+    Attributes:
+        colour: (3, n_lights) what direct sums are in units of.
+        ambient: (3, n_lights) I_A, radiance.
+        light_independent_from: the first light position whose images hold what is the same under every light.
+        lowest: the least value that is right: 0, or minus infinity where estimates may be negative.
+    """
+
+    colour: Rgb
+    ambient: Rgb
+    light_independent_from: int
+    lowest: Real
+
+
 # Hits of a pixel that are summed at once.
 MOST = 64
 
@@ -67,30 +83,18 @@ def as_stored(images: Images) -> Stored:
 
 
 @kernel
-def finish(
-    band: Band,
-    first_pixel: int,
-    n: int,
-    colour: Rgb,
-    ambient: Rgb,
-    light_independent_from: int,
-    lowest: Real,
-    images: Stored,
-) -> tuple[int, int, int, int]:
+def finish(band: Band, first_pixel: int, n: int, how: Finish, images: Stored) -> tuple[int, int, int, int]:
     """Write the pixels of a band into all images of the frame; the band's direct sums are used up.
 
     Args:
-        colour: (3, n_lights) what the direct sums are in units of.
-        ambient: (3, n_lights) I_A, radiance.
-        light_independent_from: the first light position whose images hold what is the same under every light.
-        lowest: the least value that is right: 0, or minus infinity where estimates may be negative.
         images: (n_lights, n_pixels of the image, 3), written: float32, or uint16 for the bits of halves, what lies
             beyond the largest half cut to that.
 
     Returns:
-        number of values that were not finite or below `lowest`, written as 0; light index and pixel of the first;
+        number of values that were not finite or below `how.lowest`, written as 0; light index and pixel of the first;
         number of values beyond the largest half.
     """
+    colour, ambient, light_independent_from, lowest = how
     bad, bad_light, bad_pixel, beyond = 0, -1, -1, 0
     n_lights, sums = images.shape[0], band.direct
     for i in range(n):

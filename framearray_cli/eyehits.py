@@ -1,16 +1,35 @@
 """Eye rays and the hits that they find: native ones, those that only mirror pixels have, and a look for mirrors."""
 
+from typing import NamedTuple
+
 import numba as nb
 import numpy as np
 
 from .arrays import Float32, Int32, Real
 from .camera import Cameras, corner_of, eye_ray
-from .embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, intersect
-from .hits import Hits, met, record_hits
+from .embree.packets import DIRECTION, ORIGIN, TFAR, intersect
+from .hits import Hits, World, met, record_hits
 from .kernel import inlined, keep_on_disk, kernel
 from .lanes import LANES, choose, doubles, floor, gather, integers, lane_numbers, put_lanes, put_triples
 from .sampling import OTHER_HALF, PIXEL, PIXEL_SAMPLE, r2, stream, word
-from .surface import Surfaces, specular_at
+from .surface import specular_at
+
+
+class Samples(NamedTuple):
+    """Which samples of which pixels are taken.
+
+    Attributes:
+        seed: of the job.
+        pixels: (n,) of the image.
+        per_pixel: samples of each of them, numbered from `first` on.
+        halves: whether even and odd samples of a pixel are independent of each other.
+    """
+
+    seed: int
+    pixels: Int32
+    per_pixel: int
+    first: int
+    halves: bool = False
 
 
 @keep_on_disk
@@ -59,98 +78,73 @@ def _shoot(cams: Cameras, c: int, pixel: int, jx: Real, jy: Real, i: int, packet
 
 @inlined
 def _shoot_samples(
-    cams: Cameras, c: int, seed: int, pixel: int, sample: int, i: int, packets: Float32, hits: Hits, halves: bool
+    cams: Cameras, c: int, samples: Samples, pixel: int, sample: int, i: int, packets: Float32, hits: Hits
 ) -> None:
     """Write the eye rays of 16 samples; the samples of a pixel are spread by the golden ratio sequence.
 
     Where they are taken in two halves, even and odd ones are spread each by a sequence of its own.
     """
-    key, number = stream(seed, c, pixel, PIXEL_SAMPLE), sample
+    key, number = stream(samples.seed, c, pixel, PIXEL_SAMPLE), sample
     random = word(key, PIXEL)
     odd = (sample & np.int32(1)) == np.int32(1)
     put_lanes(hits.half, i, choose(odd, np.uint8(1), np.uint8(0)))
-    if halves:
+    if samples.halves:
         random, number = choose(odd, word(key, OTHER_HALF), random), integers(sample >> np.int32(1))
     jx, jy = r2(random, number)
     _shoot(cams, c, pixel, jx, jy, i, packets, hits)
-    put_lanes(hits.key, i, stream(seed, c, pixel, sample))
+    put_lanes(hits.key, i, stream(samples.seed, c, pixel, sample))
 
 
 @kernel
 def native_hits(
     cams: Cameras,
     c: int,
-    seed: int,
-    pixels: Int32,
-    per_pixel: int,
-    first_sample: int,
+    samples: Samples,
     first: int,
     n: int,
-    surfaces: Surfaces,
-    tracer: Tracer,
+    world: World,
     mirrors: bool,
     packets: Float32,
     hits: Hits,
-    halves: bool = False,
 ) -> None:
-    """Find native hits first to first + n - 1 of eye c, `per_pixel` in each of `pixels`.
+    """Find native hits first to first + n - 1 of eye c.
 
     They are numbered by groups of 16 pixels, within a group by sample, then by pixel.
 
     Args:
-        halves: the two halves of a pixel's samples are independent of each other.
+        mirrors: whether the scene has any; else the hits' `specular` is left alone.
     """
     # a frame may have more hits than an int32 counts; the quotients of such numbers are exact in float64
-    n_pixels, of_group = np.float64(pixels.shape[0]), np.float64(16 * per_pixel)
+    n_pixels, of_group = np.float64(samples.pixels.shape[0]), np.float64(16 * samples.per_pixel)
     for i in range(0, n, LANES):
         number = doubles(_numbers(i, n)) + np.float64(first)
         group = floor(number / of_group)
         rest, left = number - group * of_group, n_pixels - group * 16.0
         members = choose(left < 16.0, left, 16.0)
         sample = floor(rest / members)
-        pixel = gather(pixels, integers(group * 16.0 + rest - sample * members))
-        _shoot_samples(cams, c, seed, pixel, integers(sample) + np.int32(first_sample), i, packets, hits, halves)
-    intersect(tracer, packets, n, True, cams.near)
-    record_hits(surfaces, tracer, packets, n, mirrors, hits)
+        pixel = gather(samples.pixels, integers(group * 16.0 + rest - sample * members))
+        _shoot_samples(cams, c, samples, pixel, integers(sample) + np.int32(samples.first), i, packets, hits)
+    intersect(world.tracer, packets, n, True, cams.near)
+    record_hits(world, packets, n, mirrors, hits)
 
 
 @kernel
 def extra_hits(
-    cams: Cameras,
-    c: int,
-    seed: int,
-    pixels: Int32,
-    first_sample: int,
-    per_pixel: int,
-    first: int,
-    n: int,
-    surfaces: Surfaces,
-    tracer: Tracer,
-    packets: Float32,
-    hits: Hits,
-    halves: bool = False,
+    cams: Cameras, c: int, samples: Samples, first: int, n: int, world: World, packets: Float32, hits: Hits
 ) -> None:
-    """Find hits first to first + n - 1 of those that mirror pixels have beyond the others, `per_pixel` each."""
+    """Find additional native hits of some pixels of eye c: numbers first to first + n - 1, counted pixel by pixel."""
     for i in range(0, n, LANES):
         number = doubles(_numbers(i, n)) + np.float64(first)
-        at = floor(number / np.float64(per_pixel))
-        sample = integers(number - at * np.float64(per_pixel)) + np.int32(first_sample)
-        _shoot_samples(cams, c, seed, gather(pixels, integers(at)), sample, i, packets, hits, halves)
-    intersect(tracer, packets, n, True, cams.near)
-    record_hits(surfaces, tracer, packets, n, True, hits)
+        at = floor(number / np.float64(samples.per_pixel))
+        sample = integers(number - at * np.float64(samples.per_pixel)) + np.int32(samples.first)
+        _shoot_samples(cams, c, samples, gather(samples.pixels, integers(at)), sample, i, packets, hits)
+    intersect(world.tracer, packets, n, True, cams.near)
+    record_hits(world, packets, n, True, hits)
 
 
 @kernel
 def pilot_hits(
-    cams: Cameras,
-    c: int,
-    order: Int32,
-    first: int,
-    n: int,
-    surfaces: Surfaces,
-    tracer: Tracer,
-    packets: Float32,
-    hits: Hits,
+    cams: Cameras, c: int, order: Int32, first: int, n: int, world: World, packets: Float32, hits: Hits
 ) -> None:
     """Look through the centres of pixels order[first : first + n] for mirrors; of the hits only `specular` is known.
 
@@ -158,6 +152,7 @@ def pilot_hits(
     """
     for i in range(0, n, LANES):
         _shoot(cams, c, gather(order, _numbers(i, n) + np.int32(first)), 0.5, 0.5, i, packets, hits)
+    surfaces, tracer = world
     intersect(tracer, packets, n, True, cams.near)
     for i in range(0, n, LANES):
         missed, triangle, u, v = met(tracer, packets, i)

@@ -14,7 +14,7 @@ import numpy as np
 from .arrays import Float32, Int32
 from .camera import Cameras
 from .crew import ArrayPool, Scratch, TracePool
-from .eyehits import extra_hits, native_hits
+from .eyehits import Samples, extra_hits, native_hits
 from .hits import ESCAPED, SURFACE, Hits
 from .mirrors import extra_mirror_hits, mirror_paths
 from .plan import Pass
@@ -111,15 +111,12 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
 
 def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> list[tuple[Placed, HitRecords]]:
     """One native hit for each of some pixels of eye c that nothing else reaches; then what mirrors show there."""
-    n = len(pixels)
+    n, samples = len(pixels), Samples(setup.seed, pixels, per_pixel=1, first=HOLE_SAMPLE)
     records = empty_records(setup, n)
 
     def batch(first: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
         m = min(pool.batch, n - first)
-        extra_hits(
-            setup.cams, c, setup.seed, pixels, HOLE_SAMPLE, 1, first, m, setup.surfaces, setup.tracer,
-            scratch.hit_rays.packets, scratch.hits,
-        )  # fmt: skip
+        extra_hits(setup.cams, c, samples, first, m, setup.world, scratch.hit_rays.packets, scratch.hits)
         scratch.rays["native"] += m
         estimate_terms(setup, scratch.hits, m, scratch, records.part(slice(first, first + m)), "obscurance", "shadow")
         return mirror_paths(setup, scratch.hits, m, scratch) if setup.depth else []
@@ -174,10 +171,9 @@ def _sorted(pixel: Int32, n_pixels: int, order: Int32, pool: TracePool) -> list[
 
 def _native(setup: FrameSetup, c: int, part: Pass, first: int, n: int, scratch: Scratch) -> None:
     started = perf_counter()
-    native_hits(
-        setup.cams, c, setup.seed, part.pixels, part.per_pixel, part.first_sample, first, n, setup.surfaces,
-        setup.tracer, setup.depth > 0, scratch.hit_rays.packets, scratch.hits, setup.halves == BY_SAMPLE,
-    )  # fmt: skip
+    samples = Samples(setup.seed, part.pixels, part.per_pixel, part.first_sample, setup.halves == BY_SAMPLE)
+    packets = scratch.hit_rays.packets
+    native_hits(setup.cams, c, samples, first, n, setup.world, setup.depth > 0, packets, scratch.hits)
     scratch.rays["native"] += n
     scratch.seconds["native"] += perf_counter() - started
 

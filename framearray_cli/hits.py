@@ -70,6 +70,13 @@ class Hits(NamedTuple):
     half: Bytes
 
 
+class World(NamedTuple):
+    """What rays meet: the surfaces of a scene, and how to trace rays through it."""
+
+    surfaces: Surfaces
+    tracer: Tracer
+
+
 def empty_hits(n: int) -> Hits:
     """Room for n hits; contents are arbitrary.
 
@@ -145,8 +152,9 @@ def met(tracer: Tracer, packets: Float32, i: int) -> tuple[bool, int, Real, Real
 
 
 @kernel
-def record_hits(surfaces: Surfaces, tracer: Tracer, packets: Float32, n: int, mirrors: bool, hits: Hits) -> None:
+def record_hits(world: World, packets: Float32, n: int, mirrors: bool, hits: Hits) -> None:
     """Turn traced rays 0 to n - 1 into hits; key and pixel are left alone."""
+    surfaces, tracer = world
     packet = packets.shape[1] * LANES
     for i in range(0, n, LANES):
         at = (i >> 4) * packet

@@ -133,7 +133,7 @@ def mirror_share(setup: FrameSetup) -> float:
         flags = np.zeros(setup.n_pixels, np.uint8)
         for first in range(0, setup.n_pixels, PILOT_BATCH):
             n = min(PILOT_BATCH, setup.n_pixels - first)
-            pilot_hits(setup.cams, int(c), setup.order, first, n, setup.surfaces, setup.tracer, rays.packets, hits)
+            pilot_hits(setup.cams, int(c), setup.order, first, n, setup.world, rays.packets, hits)
             flag_mirrors(hits, n, setup.cams.width, setup.cams.height, flags)
         most = max(most, int(flags.sum()))
     return most / setup.n_pixels

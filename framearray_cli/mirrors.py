@@ -6,7 +6,7 @@ import numpy as np
 
 from .arrays import Int32
 from .crew import Scratch, TracePool
-from .eyehits import extra_hits, pilot_hits
+from .eyehits import Samples, extra_hits, pilot_hits
 from .hits import Hits
 from .plan import Pass, flag_mirrors, halves_of
 from .shading import estimate_terms
@@ -26,7 +26,7 @@ def mirror_paths(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch) -> lis
         if m == 0:
             break
         reflected, next_throughput = scratch.reflected[bounce % 2], scratch.throughput[bounce % 2]
-        reflect(hits, n, throughput, setup.surfaces, setup.tracer, scratch.hit_rays.packets, reflected, next_throughput)
+        reflect(hits, n, throughput, setup.world, scratch.hit_rays.packets, reflected, next_throughput)
         scratch.rays["mirror"] += m
         hits, n, throughput = reflected, m, next_throughput
         records = empty_records(setup, m)
@@ -60,21 +60,19 @@ def extra_mirror_hits(
     def look(first: int, scratch: Scratch) -> None:
         n = min(pool.batch, setup.n_pixels - first)
         hits = scratch.hits
-        pilot_hits(setup.cams, c, setup.order, first, n, setup.surfaces, setup.tracer, scratch.hit_rays.packets, hits)
+        pilot_hits(setup.cams, c, setup.order, first, n, setup.world, scratch.hit_rays.packets, hits)
         scratch.rays["pilot"] += n
         flag_mirrors(hits, n, setup.cams.width, setup.cams.height, flags)
 
     def follow(first: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
         n = min(pool.batch, len(pixels) * extra - first)
-        extra_hits(
-            setup.cams, c, setup.seed, pixels, most, extra, first, n, setup.surfaces, setup.tracer,
-            scratch.hit_rays.packets, scratch.hits, setup.halves != 0,
-        )  # fmt: skip
+        extra_hits(setup.cams, c, samples, first, n, setup.world, scratch.hit_rays.packets, scratch.hits)
         scratch.rays["mirror"] += n
         return mirror_paths(setup, scratch.hits, n, scratch)
 
     pool.run(look, range(0, setup.n_pixels, pool.batch))
     pixels = setup.order[flags[setup.order] > 0]
+    samples = Samples(setup.seed, pixels, extra, most, setup.halves != 0)
     found = pool.run(follow, range(0, len(pixels) * extra, pool.batch))
     own += halves_of(most, extra)[:, None] * flags
     return [path for batch in found for path in batch]

@@ -9,6 +9,7 @@ from .arrays import Float32
 from .camera import Cameras, cameras
 from .denoise import require_denoiser
 from .embree import EmbreeScene, Engine
+from .hits import World
 from .job import Job
 from .lights import LightArrays, light_arrays
 from .paths import Eyes, Lights, eyes, lights
@@ -20,7 +21,7 @@ from .surface import Surfaces, nearest, surfaces
 from .terms.ambient import Ambient
 from .terms.ambient_eye import EyeWalks, ambient_by_eye, fixed_ambient
 from .terms.ambient_fit import ObscuranceCurve, ambient_by_fit
-from .terms.ambient_light import ambient_by_light
+from .terms.ambient_light import LightWalks, ambient_by_light
 from .terms.obscurance import FALLOFFS, ObscuranceSettings
 from .usage import resident_memory
 from .work import BY_SAMPLE, FrameSetup
@@ -188,17 +189,17 @@ def eye_cameras(prepared: Prepared) -> Cameras:
 
 
 def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Ambient:
-    job, seed = prepared.job, prepared.job.seed
+    job, seed, world = prepared.job, prepared.job.seed, World(prepared.surfaces, embree.tracer)
     if job.ambient.method == "light" and job.ambient.intensity is None:
-        return ambient_by_light(
-            seed, job.ambient.paths, prepared.surfaces, embree.tracer, prepared.light_arrays, background
+        particles = LightWalks(
+            seed=seed, paths=job.ambient.paths, world=world, lights=prepared.light_arrays, background=background
         )
+        return ambient_by_light(particles, prepared.threads)
     walks = EyeWalks(
         cams=eye_cameras(prepared),
         seed=seed,
         paths=job.ambient.paths,
-        surfaces=prepared.surfaces,
-        tracer=embree.tracer,
+        world=world,
         lights=prepared.light_arrays,
         background=background,
     )

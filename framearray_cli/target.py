@@ -14,7 +14,7 @@ from .allot import FEWEST, Witnesses, allot
 from .allotment import Allotment, Blocks, blocks_of
 from .arrays import Float32, Float64, Int32
 from .crew import Scratch, TracePool
-from .eyehits import native_hits
+from .eyehits import Samples, native_hits
 from .lanes import LANES
 from .prepare import Prepared
 from .reuse import outer_hits
@@ -163,10 +163,8 @@ class _Pilot:
     def _radiance(self, c: int, pixels: Int32, scratch: Scratch) -> Float32:
         """What images of two hits of each of some pixels would show, (hits, n_lights, 3); the hits are in `scratch`."""
         setup, n = self.setup, 2 * len(pixels)
-        native_hits(
-            setup.cams, c, setup.seed, pixels, 2, 0, 0, n, setup.surfaces, setup.tracer, setup.depth > 0,
-            scratch.hit_rays.packets, scratch.hits, True,
-        )  # fmt: skip
+        samples, packets = Samples(setup.seed, pixels, per_pixel=2, first=0, halves=True), scratch.hit_rays.packets
+        native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, scratch.hits)
         scratch.rays["pilot"] += n
         records = empty_records(setup, n)
         estimate_terms(setup, scratch.hits, n, scratch, records, "pilot", "pilot")

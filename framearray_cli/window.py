@@ -14,9 +14,18 @@ from time import perf_counter
 
 import numpy as np
 
-from .accumulate import HitSource, SourceList, accumulate, compose_differences, compose_pixels, weigh_halves
+from .accumulate import (
+    HitSource,
+    Pixels,
+    SourceList,
+    Summands,
+    accumulate,
+    compose_differences,
+    compose_pixels,
+    weigh_halves,
+)
 from .arrays import Float32, Images, Int32, Rgb
-from .compose import Band, as_stored, empty_band
+from .compose import Band, Finish, as_stored, empty_band
 from .crew import Scratch, TracePool
 from .denoise import denoised
 from .frame import FrameHits, fill_holes
@@ -81,11 +90,15 @@ class Window:
             ambient: of all lights that `setup` computes.
         """
         self._setup = setup
-        self._colour = self._by_channel(setup.lights.colour)
-        self._ambient = self._by_channel(ambient.intensity)
         self._pool = pool
         # corrections of unbiased shadows may outweigh a dark pixel; cut at 0, their mean would be wrong
-        self._lowest = np.float32(-np.inf if setup.shadow_unbiased and setup.shadow_step > 1 else 0.0)
+        lowest = -np.inf if setup.shadow_unbiased and setup.shadow_step > 1 else 0.0
+        self._finish = Finish(
+            colour=self._by_channel(setup.lights.colour),
+            ambient=self._by_channel(ambient.intensity),
+            light_independent_from=setup.light_independent_from,
+            lowest=np.float32(lowest),
+        )
         self._frames: dict[int, FrameHits] = {}
         self._holes: dict[int, list[tuple[Placed, HitRecords]]] = {}
         self._bands = [empty_band(BAND_PIXELS, len(setup.kept)) for _ in range(pool.threads)]
@@ -110,7 +123,7 @@ class Window:
     def with_ambient(self, ambient: Ambient) -> "Window":
         """The same frames under another ambient light."""
         window = copy(self)
-        window._ambient = self._by_channel(ambient.intensity)
+        window._finish = self._finish._replace(ambient=self._by_channel(ambient.intensity))
         return window
 
     def _by_channel(self, values: Rgb) -> Rgb:
@@ -145,16 +158,14 @@ class Window:
         smooth = (
             self._smooth_indirect(j, holes[:1], images.shape[1:3]) if setup.denoise else np.empty((0, 3), np.float32)
         )
-        frame = self._frames[j]
+        frame, out = self._frames[j], Pixels(flat, samples, maps)
 
         def some(first: int, scratch: Scratch) -> tuple[int, int, int, int]:
             started = perf_counter()
             n = min(TASK_PIXELS, setup.n_pixels - first)
+            summands = Summands(hits.addresses, mirrored.addresses, setup.lights.channels, smooth)
             with self._band() as sums:
-                found: tuple[int, int, int, int] = compose_pixels(
-                    sums, first, n, hits.addresses, mirrored.addresses, setup.lights.channels, smooth, self._colour,
-                    self._ambient, setup.light_independent_from, self._lowest, flat, samples, maps,
-                )  # fmt: skip
+                found: tuple[int, int, int, int] = compose_pixels(sums, first, n, summands, self._finish, out)
             if layered:
                 place = frame.places[j]
                 average_native(place.start, place.order, frame.normal, frame.depth, first, n, own)
@@ -194,20 +205,11 @@ class Window:
         if frame.mirrored is not None and frame.mirror_places is not None:
             even, odd = half_factors(frame.mirror_hits)
             parts.append(HitSource(frame.mirror_places, frame.mirrored, scale=even, odd_scale=odd))
-        listed = SourceList(parts)
+        listed, how = SourceList(parts), self._finish._replace(lowest=np.float32(-np.inf))
 
         def some(task: tuple[int, int], _scratch: Scratch) -> None:
             with self._band() as band:
-                compose_differences(
-                    band,
-                    *task,
-                    listed.addresses,
-                    setup.lights.channels,
-                    self._colour,
-                    self._ambient,
-                    setup.light_independent_from,
-                    images,
-                )
+                compose_differences(band, *task, listed.addresses, setup.lights.channels, how, images)
 
         self._pool.run(some, tasks)
         differences = images.reshape(shape)

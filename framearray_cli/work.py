@@ -11,6 +11,7 @@ from .arrays import Float32, Float64, Int32, Rgb, with_room
 from .camera import Cameras
 from .embree.packets import Tracer
 from .eyehits import pixel_order
+from .hits import World
 from .kernel import inlined
 from .lanes import LANES
 from .lights import LightArrays, some_lights
@@ -72,6 +73,11 @@ class FrameSetup:
     @property
     def n_pixels(self) -> int:
         return self.cams.width * self.cams.height
+
+    @property
+    def world(self) -> World:
+        """What rays meet."""
+        return World(self.surfaces, self.tracer)
 
     def passes(self, c: int) -> tuple[Pass, ...]:
         """The native hits of frame c."""

@@ -15,11 +15,10 @@ import numpy as np
 
 from ..arrays import Float32, Float64, Rgb
 from ..embree.packets import Tracer
-from ..hits import ESCAPED, Hits, empty_hits
+from ..hits import ESCAPED, Hits, World, empty_hits
 from ..kernel import kernel
 from ..lights import LightArrays
 from ..rays import room_for_hits, room_for_tests
-from ..surface import Surfaces
 from .direct import direct
 from .walks import DIFFUSE, Walkers, advance, choose_step, deposit, empty_walkers
 
@@ -71,9 +70,9 @@ class Workspace:
         self.sums = np.empty((BATCH, 3, lights.n_lights), np.float32)
         self.rays = 0
 
-    def advance(self, n: int, surfaces: Surfaces, tracer: Tracer) -> int:
+    def advance(self, n: int, world: World) -> int:
         """Move all walks on; `hits[0]` and `walkers[0]` are the current ones before and after."""
-        n = advance(self.hits[0], self.walkers[0], n, surfaces, tracer, self.hit_packets, self.hits[1], self.walkers[1])
+        n = advance(self.hits[0], self.walkers[0], n, world, self.hit_packets, self.hits[1], self.walkers[1])
         self.hits.reverse()
         self.walkers.reverse()
         self.rays += n
@@ -125,6 +124,7 @@ def walk_until(
     paths: int | None,
     lights: LightArrays,
     threads: int,
+    most: int = MOST,
 ) -> S:
     """Walk batch after batch, as many at once as there are threads; what lies behind the last one is forgotten.
 
@@ -132,10 +132,10 @@ def walk_until(
 
     Args:
         batch: walks a number of walks from a first one on.
-        enough: whether what was found by so many batches will do.
-        paths: how many walks there are; None: `MOST`.
+        enough: whether what the batches so far have found will do.
+        paths: the number of walks; None: `most`.
     """
-    limit, found = paths or MOST, None
+    limit, found = paths or most, None
     workspaces = [Workspace(lights) for _ in range(threads)]
     with ThreadPoolExecutor(threads, thread_name_prefix="ambient") as pool:
         for group in range(0, limit, threads * BATCH):

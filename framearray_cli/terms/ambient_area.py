@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Bytes, Float32, Float64, Int32
 from ..embree.packets import Tracer, is_blocked, occlude, set_ray
-from ..hits import ESCAPED, SURFACE, Hits, ray_origin
+from ..hits import ESCAPED, SURFACE, Hits, World, ray_origin
 from ..kernel import kernel
 from ..lanes import LANES
 from ..lights import LightArrays
@@ -159,26 +159,24 @@ def _still_dark(hits: Hits, walkers: Walkers, n: int, lit: Bytes) -> int:
     return left
 
 
-def _reach(
-    work: Workspace, n: int, surfaces: Surfaces, tracer: Tracer, lights: LightArrays, pool: Pool, sky: bool
-) -> Bytes:
+def _reach(work: Workspace, n: int, world: World, lights: LightArrays, pool: Pool, sky: bool) -> Bytes:
     """Which of the walks that stand at hits 0 to n - 1 meet light of each position, (n, n_lights), 0 or 1."""
     lit = np.zeros((n, lights.n_lights), np.uint8)
     for _ in range(AREA_BOUNCES):
         hits, walkers = work.hits[0], work.walkers[0]
-        lit[walkers.walk[:n]] |= (work.diffuse_direct(n, lights, tracer) > 0).any(axis=1)
-        work.rays += _connect(hits, walkers, n, pool, tracer, work.test_rays, lit)
+        lit[walkers.walk[:n]] |= (work.diffuse_direct(n, lights, world.tracer) > 0).any(axis=1)
+        work.rays += _connect(hits, walkers, n, pool, world.tracer, work.test_rays, lit)
         if sky:
             lit[walkers.walk[:n][hits.kind[:n] == ESCAPED]] = 1
         if not _still_dark(hits, walkers, n, lit):
             break
-        n = work.advance(n, surfaces, tracer)
+        n = work.advance(n, world)
         choose_all(work.hits[0], work.walkers[0], n, True)
     return lit
 
 
 def reached_area(
-    work: Workspace, seed: int, surfaces: Surfaces, tracer: Tracer, lights: LightArrays, pool: Pool, sky: bool
+    work: Workspace, seed: int, world: World, lights: LightArrays, pool: Pool, sky: bool
 ) -> tuple[Float64, Float64, Float64]:
     """Measure the surface sides that light reaches.
 
@@ -189,7 +187,7 @@ def reached_area(
         area of each light position, (n_lights,); its relative variance, (n_lights,); and the average reflectivity of
         those sides, all light positions together, (3,).
     """
-    edges = surfaces.corners[:, 1:].astype(np.float64) - surfaces.corners[:, :1]
+    edges = world.surfaces.corners[:, 1:].astype(np.float64) - world.surfaces.corners[:, :1]
     cumulated = np.cumsum(0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1))
     half = BATCH // 2
     places, reflectivity, points = np.empty(half), np.zeros(3), []
@@ -197,9 +195,9 @@ def reached_area(
         _spread(seed, first, half, places)
         triangle = np.searchsorted(cumulated, places * cumulated[-1], side="right")
         triangle = np.minimum(triangle, len(cumulated) - 1).astype(np.int32)
-        _stand_on(surfaces, triangle, seed, first, half, work.hits[0], work.walkers[0])
+        _stand_on(world.surfaces, triangle, seed, first, half, work.hits[0], work.walkers[0])
         own = (work.hits[0].reflectivity + work.hits[0].specular).astype(np.float64)
-        lit = _reach(work, BATCH, surfaces, tracer, lights, pool, sky)
+        lit = _reach(work, BATCH, world, lights, pool, sky)
         reflectivity += lit.sum(axis=1) @ own
         points.append(lit.reshape(half, 2, -1).sum(axis=1))
     lit_sides = np.concatenate(points).astype(np.float64)  # (AREA_POINTS, n_lights), 0 to 2

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from ..arrays import Float32, Float64, Points, Rgb
 from ..camera import Cameras, eye_ray
-from ..embree.packets import Tracer, intersect, set_ray
-from ..hits import SURFACE, Hits, record_hits
+from ..embree.packets import intersect, set_ray
+from ..hits import SURFACE, Hits, World, record_hits
 from ..kernel import kernel
 from ..lights import LightArrays
 from ..sampling import CHOICE, PIXEL, PIXEL_SAMPLE, r2, stream, word
-from ..surface import Surfaces
 from .ambient import (
     AMBIENT_STREAM,
     FEWEST,
@@ -39,8 +38,7 @@ def start_at_eyes(
     seed: int,
     first: int,
     n: int,
-    surfaces: Surfaces,
-    tracer: Tracer,
+    world: World,
     packets: Float32,
     hits: Hits,
     walkers: Walkers,
@@ -62,8 +60,8 @@ def start_at_eyes(
         walkers.walk[i] = i
         for channel in range(3):
             walkers.throughput[i, channel] = 1.0
-    intersect(tracer, packets, n, False, cams.near)
-    record_hits(surfaces, tracer, packets, n, True, hits)
+    intersect(world.tracer, packets, n, False, cams.near)
+    record_hits(world, packets, n, True, hits)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -94,7 +92,7 @@ class Steps:
         self.distance[walk] = np.where(surface, away, np.inf)
 
 
-def to_first_vertices(work: Workspace, n: int, surfaces: Surfaces, tracer: Tracer, steps: Steps | None = None) -> int:
+def to_first_vertices(work: Workspace, n: int, world: World, steps: Steps | None = None) -> int:
     """From eye hits, through mirrors, to the diffuse hit that the eye sees, and on to the vertex after it.
 
     Walks that wait there while others still pass mirrors are set aside.
@@ -108,7 +106,7 @@ def to_first_vertices(work: Workspace, n: int, surfaces: Surfaces, tracer: Trace
         choose_all(hits, walkers, n, True)
         if steps:
             steps.begin(hits, walkers, n)
-        n = work.advance(n, surfaces, tracer)
+        n = work.advance(n, world)
         hits, walkers = work.hits[0], work.walkers[0]
         if steps:
             steps.end(hits, walkers, n)
@@ -167,20 +165,18 @@ class EyeWalks:
     cams: Cameras
     seed: int
     paths: int | None
-    surfaces: Surfaces
-    tracer: Tracer
+    world: World
     lights: LightArrays
     background: Rgb
 
     def batch(self, work: Workspace, first: int, n: int) -> _Walked:
         """Walk walks first to first + n - 1 to their ends."""
-        surfaces, tracer = self.surfaces, self.tracer
         rays = work.rays
         hits, walkers = work.hits[0], work.walkers[0]
-        start_at_eyes(self.cams, self.seed, first, n, surfaces, tracer, work.hit_packets, hits, walkers)
+        start_at_eyes(self.cams, self.seed, first, n, self.world, work.hit_packets, hits, walkers)
         work.rays += n
         seen, seen_reflectivity = int((hits.kind[:n] == SURFACE).sum()), total_reflectivity(hits, n)
-        left = to_first_vertices(work, n, surfaces, tracer)
+        left = to_first_vertices(work, n, self.world)
         work.sums[:] = 0.0
         hits, walkers = work.hits[0], work.walkers[0]
         reflectivity = total_reflectivity(hits, left)
@@ -203,8 +199,8 @@ class EyeWalks:
     def follow(self, work: Workspace, n: int) -> None:
         """Walk the current walks to their ends, and gather the light of every vertex in `work.sums`."""
         for _ in range(MAX_BOUNCES):
-            work.gather(n, self.lights, self.tracer)
-            n = work.advance(n, self.surfaces, self.tracer)
+            work.gather(n, self.lights, self.world.tracer)
+            n = work.advance(n, self.world)
             if self.background.any():
                 see_background(work.hits[0], work.walkers[0], n, self.background, work.sums)
             choose_all(work.hits[0], work.walkers[0], n, False)

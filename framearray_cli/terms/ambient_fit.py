@@ -112,12 +112,10 @@ class _Fit:
             position=np.zeros((n, 3), np.float32),
             distance=np.full(n, np.nan, np.float32),
         )
-        start_at_eyes(
-            walks.cams, walks.seed, first, n, walks.surfaces, walks.tracer, work.hit_packets, work.hits[0],
-            work.walkers[0],
-        )  # fmt: skip
+        hits, walkers = work.hits[0], work.walkers[0]
+        start_at_eyes(walks.cams, walks.seed, first, n, walks.world, work.hit_packets, hits, walkers)
         work.rays += n
-        left = to_first_vertices(work, n, walks.surfaces, walks.tracer, steps)
+        left = to_first_vertices(work, n, walks.world, steps)
         hits, walkers = work.hits[0], work.walkers[0]
         met = np.zeros((n, 3))  # R(Q) of each walk
         walk = walkers.walk[:left].copy()

@@ -6,16 +6,18 @@ In a house the sunlit roof and facade count too, which makes E[l] too large indo
 that fault.
 """
 
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
 import numpy as np
 
 from ..arrays import Float32, Float64, Real, Rgb, Triple
-from ..embree.packets import Tracer, intersect, set_ray
-from ..hits import SURFACE, Hits, record_hits
+from ..embree.packets import intersect, set_ray
+from ..hits import SURFACE, Hits, World, record_hits
 from ..kernel import inlined, kernel
 from ..lights import DIRECTIONAL, LightArrays
 from ..sampling import PIXEL, cosine_direction, r2, stream, word
-from ..surface import Surfaces
-from .ambient import AMBIENT_STREAM, BATCH, TARGET_ERROR, Ambient, Workspace, choose_all, summarise
+from .ambient import AMBIENT_STREAM, BATCH, TARGET_ERROR, Ambient, Workspace, choose_all, summarise, walk_until
 from .ambient_area import KEPT_BOUNCES, Pool, empty_pool, keep, reached_area
 from .walks import MAX_BOUNCES, Walkers
 
@@ -46,26 +48,28 @@ def _across(x: Real, y: Real, z: Real, a: Real, b: Real) -> Triple:
     return p * ux + q * wx, p * uy + q * wy, p * uz + q * wz
 
 
+class Emitter(NamedTuple):
+    """What sends particles: source s at light position l, in a scene of some radius.
+
+    The source after the last is the background.
+    """
+
+    lights: LightArrays
+    s: int
+    l: int
+    radius: float
+
+
 @kernel
 def _emit(
-    lights: LightArrays,
-    s: int,
-    l: int,
-    seed: int,
-    first: int,
-    n: int,
-    radius: float,
-    surfaces: Surfaces,
-    tracer: Tracer,
-    packets: Float32,
-    hits: Hits,
-    walkers: Walkers,
+    emitter: Emitter, seed: int, first: int, n: int, world: World, packets: Float32, hits: Hits, walkers: Walkers
 ) -> None:
-    """Send particles first to first + n - 1 from source s; the random numbers are the same for every light position.
+    """Send particles first to first + n - 1; their random numbers are the same for every light position.
 
-    A directional source sends them through a disc as wide as the scene, placed before it. The source after the last
-    is the background, which sends them through a sphere around the scene.
+    A directional source sends them through a disc as wide as the scene, placed before it, and the background through a
+    sphere around the scene.
     """
+    lights, s, l, radius = emitter
     for i in range(n):
         group, place = (first + i) % GROUPS, (first + i) // GROUPS
         a, b = r2(word(stream(seed, AMBIENT_STREAM, group, _STARTS), PIXEL), place)
@@ -87,8 +91,8 @@ def _emit(
         walkers.walk[i] = i
         for channel in range(3):
             walkers.throughput[i, channel] = 1.0
-    intersect(tracer, packets, n, False)
-    record_hits(surfaces, tracer, packets, n, True, hits)
+    intersect(world.tracer, packets, n, False)
+    record_hits(world, packets, n, True, hits)
 
 
 @kernel
@@ -102,52 +106,131 @@ def _land(hits: Hits, walkers: Walkers, n: int, power: Float32, first: int, last
                     sums[walkers.walk[i], channel, l] += arriving
 
 
-def ambient_by_light(
-    seed: int,
-    paths: int | None,
-    surfaces: Surfaces,
-    tracer: Tracer,
-    lights: LightArrays,
-    background: Rgb | None = None,
-) -> Ambient:
-    """Estimate I_A[l] and the average reflectivity by particles from the lights [FA].
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Landed:
+    """What a batch of particles left.
 
-    Args:
-        paths: particles a source and light position; None: as many as a standard error of 1 % takes, at most `MOST`.
-        background: (3,) radiance outside the scene; it lights the surfaces too.
+    Attributes:
+        spent, rays: particles per light position, and rays.
+        total: (3, n_lights) sum of the power that surfaces took up.
+        groups: (GROUPS, n_lights) sums over groups of particles, of the mean of the channels.
+        reached: of the first batch: the area that light reaches, its relative variance and its reflectivity, see
+            `reached_area`.
     """
-    work = Workspace(lights)
-    n_sources, n_lights = len(lights.kind), lights.n_lights
-    sky = background is not None and bool(background.any())
-    pool = empty_pool(n_lights, n_sources + sky)
-    radius = float(np.sqrt((surfaces.corners.reshape(-1, 3).astype(np.float64) ** 2).sum(axis=1).max()))
-    total, groups = np.zeros((3, n_lights)), np.zeros((GROUPS, n_lights))
-    error = area_variance = np.zeros(n_lights)
-    spent, limit = 0, paths or MOST
-    while spent < limit:
-        n = min(BATCH, limit - spent)
+
+    spent: int
+    rays: int
+    total: Float64
+    groups: Float64
+    reached: tuple[Float64, Float64, Float64] | None
+
+    def and_then(self, other: "_Landed") -> "_Landed":
+        """Both together."""
+        return _Landed(
+            spent=self.spent + other.spent,
+            rays=self.rays + other.rays,
+            total=self.total + other.total,
+            groups=self.groups + other.groups,
+            reached=self.reached or other.reached,
+        )
+
+    @property
+    def area(self) -> tuple[Float64, Float64, Float64]:
+        """What the first batch reached."""
+        assert self.reached is not None
+        return self.reached
+
+    @property
+    def error(self) -> Float64:
+        """(n_lights,) relative standard error."""
+        error: Float64 = np.sqrt(_group_variance(self.groups, self.spent) + self.area[1])
+        return error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LightWalks:
+    """Where particles start and what they meet; arguments of `ambient_by_light`.
+
+    Attributes:
+        paths: particles per light position; None: as many as a standard error of 1 % takes, at most `MOST`.
+        background: (3,) radiance outside the scene, which lights the surfaces too; None: black.
+        radius: of the scene.
+    """
+
+    seed: int
+    paths: int | None
+    world: World
+    lights: LightArrays
+    background: Rgb | None = None
+    radius: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        corners = self.world.surfaces.corners.reshape(-1, 3).astype(np.float64)
+        object.__setattr__(self, "radius", float(np.sqrt((corners**2).sum(axis=1).max())))
+
+    def batch(self, work: Workspace, first: int, n: int) -> _Landed:
+        """Follow particles first to first + n - 1 of every source and light position to their ends."""
+        lights, rays = self.lights, work.rays
+        n_sources, n_lights = len(lights.kind), lights.n_lights
+        sky = self.background is not None and bool(self.background.any())
+        pool = empty_pool(n_lights, n_sources + sky) if first == 0 else None
+        radius = self.radius
         work.sums[:] = 0.0
         for s in range(n_sources):
             flow = np.pi * radius**2 if lights.kind[s] == DIRECTIONAL else 4 * np.pi
             for l in range(n_lights):
                 if lights.lit[s, l]:
                     power = flow * lights.strength[s, :, l] * lights.colour[l]
-                    _follow(work, (s, range(l, l + 1)), power, (seed, spent, n, radius), surfaces, tracer, lights, pool)
-        if sky and background is not None:
-            power = 4 * np.pi**2 * radius**2 * background
-            _follow(work, (n_sources, range(n_lights)), power, (seed, spent, n, radius), surfaces, tracer, lights, pool)
-        if spent == 0:
-            area, area_variance, reflectivity = reached_area(work, seed, surfaces, tracer, lights, pool, sky)
+                    self._follow(work, Emitter(lights, s, l, radius), range(l, l + 1), power, (first, n), pool)
+        if sky and self.background is not None:
+            power = 4 * np.pi**2 * radius**2 * self.background
+            self._follow(work, Emitter(lights, n_sources, 0, radius), range(n_lights), power, (first, n), pool)
+        reached = reached_area(work, self.seed, self.world, lights, pool, sky) if pool else None
         deposited = work.sums[:n].astype(np.float64)
-        total += deposited.sum(axis=0)
+        groups = np.zeros((GROUPS, n_lights))
         for group in range(min(GROUPS, n)):  # a batch is a multiple of GROUPS
-            groups[group] += deposited[group::GROUPS].mean(axis=1).sum(axis=0)
-        spent += n
-        error = np.sqrt(_group_variance(groups, spent) + area_variance)
-        if paths is None and error.max() <= TARGET_ERROR:
-            break
+            groups[group] = deposited[group::GROUPS].mean(axis=1).sum(axis=0)
+        total = deposited.sum(axis=0)
+        return _Landed(spent=n, rays=work.rays - rays, total=total, groups=groups, reached=reached)
+
+    def _follow(
+        self, work: Workspace, emitter: Emitter, positions: range, power: Float32, batch: tuple[int, int],
+        pool: Pool | None,
+    ) -> None:  # fmt: skip
+        """Follow particles to their ends, and leave what they deposit in `work.sums`.
+
+        Args:
+            positions: light positions that the particles count for.
+            power: (3,) of the source, at that position.
+            batch: number of the first particle, number of particles.
+            pool: takes in vertices, or None.
+        """
+        first, n = batch
+        carried = power.astype(np.float32)
+        _emit(emitter, self.seed, first, n, self.world, work.hit_packets, work.hits[0], work.walkers[0])
+        work.rays += n
+        for bounce in range(MAX_BOUNCES):
+            hits, walkers = work.hits[0], work.walkers[0]
+            _land(hits, walkers, n, carried, positions.start, positions.stop, work.sums)
+            choose_all(hits, walkers, n, False)
+            if pool and bounce < KEPT_BOUNCES:
+                keep(pool, hits, walkers, n, positions)
+            n = work.advance(n, self.world)
+            if n == 0:
+                break
+
+
+def ambient_by_light(walks: LightWalks, threads: int = 1) -> Ambient:
+    """Estimate I_A[l] and the average reflectivity by particles from the lights [FA]; threads change nothing."""
+
+    def enough(found: _Landed) -> bool:
+        return walks.paths is None and bool(found.error.max() <= TARGET_ERROR)
+
+    found = walk_until(walks.batch, enough, walks.paths, walks.lights, threads, MOST)
+    area, _, reflectivity = found.area
     per_area = np.divide(1.0, area, out=np.zeros_like(area), where=area > 0)
-    return summarise(total / spent * per_area, error, reflectivity, spent, work.rays, paths is None)
+    mean = found.total / found.spent * per_area
+    return summarise(mean, found.error, reflectivity, found.spent, found.rays, walks.paths is None)
 
 
 def _group_variance(groups: Float64, n: int) -> Float64:
@@ -158,38 +241,3 @@ def _group_variance(groups: Float64, n: int) -> Float64:
     squares = ((groups - size / n * whole) ** 2).sum(axis=0) * used / max(used - 1, 1)
     variance: Float64 = np.divide(squares, whole**2, out=np.zeros_like(whole), where=whole > 0)
     return variance
-
-
-def _follow(
-    work: Workspace,
-    source: tuple[int, range],
-    power: Float32,
-    batch: tuple[int, int, int, float],
-    surfaces: Surfaces,
-    tracer: Tracer,
-    lights: LightArrays,
-    pool: Pool,
-) -> None:
-    """Follow particles to their ends, and leave what they deposit in `work.sums`.
-
-    Args:
-        source: number of the source, and the light positions that its particles count for.
-        power: (3,) of the source, at that position.
-        batch: seed, number of the first particle, number of particles, radius of the scene.
-        pool: takes in vertices of the first batch.
-    """
-    s, positions = source
-    seed, first, n, radius = batch
-    carried = power.astype(np.float32)
-    hits, walkers = work.hits[0], work.walkers[0]
-    _emit(lights, s, positions.start, seed, first, n, radius, surfaces, tracer, work.hit_packets, hits, walkers)
-    work.rays += n
-    for bounce in range(MAX_BOUNCES):
-        hits, walkers = work.hits[0], work.walkers[0]
-        _land(hits, walkers, n, carried, positions.start, positions.stop, work.sums)
-        choose_all(hits, walkers, n, False)
-        if first == 0 and bounce < KEPT_BOUNCES:
-            keep(pool, hits, walkers, n, positions)
-        n = work.advance(n, surfaces, tracer)
-        if n == 0:
-            break

@@ -1,5 +1,7 @@
 """Direct light: the irradiance of every light position at a hit, one shadow ray a hit a source a light position."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..arrays import Float32, Real, Triple
@@ -64,16 +66,34 @@ def look(hits: Hits, i: int, lights: LightArrays, s: int, row: Float32, value: F
         put_lanes(value, l, factor)
 
 
+class _Start(NamedTuple):
+    """Where shadow rays of a hit start.
+
+    Attributes:
+        origin: the point.
+        up: vector from the hit to it.
+        place: of the hit's first value in the flat array of irradiances.
+    """
+
+    origin: Triple
+    up: Triple
+    place: int
+
+
 @inlined
 def _queue(
-    lights: LightArrays, s: int, l: int, x: Real, y: Real, z: Real, factor: Real, origin: Triple, up: Triple,
-    place: int, rays: Rays, waiting: int, channels: int,
-) -> None:  # fmt: skip
+    lights: LightArrays, s: int, l: int, to: Triple, factor: Real, start: _Start, rays: Rays, waiting: int
+) -> None:
     """Append rays to light positions l to l + 15; what comes next replaces those that do not count.
 
-    They start by the vector `up` above the hit; those to a point aim at it from there, else they would end as far
-    beyond it, and a wall that it is on would hide it.
+    They start a little above the hit; those to a point aim at it from there, else they would end as far beyond it, and
+    a wall that it is on would hide it.
+
+    Args:
+        to: vectors from the hit to the source; `factor`: geometry factors; see `_look`.
     """
+    (x, y, z), origin, up = to, start.origin, start.up
+    channels = lights.strength.shape[1]
     if lights.kind[s] != DIRECTIONAL:
         x, y, z = x - up[0], y - up[1], z - up[2]
     n_lights, room, row = lights.lit.shape[1], rays.row.shape[1], rays.row
@@ -84,7 +104,7 @@ def _queue(
     put_lanes(row, (TO + 1) * room + waiting, y)
     put_lanes(row, (TO + 2) * room + waiting, z)
     put_lanes(row, REACH * room + waiting, np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END)
-    put_lanes(rays.place, waiting, lane_numbers() + np.int32(place + l))
+    put_lanes(rays.place, waiting, lane_numbers() + np.int32(start.place + l))
     for channel in range(channels):
         strength = lanes_at(lights.strength, (s * channels + channel) * n_lights + l)
         put_lanes(rays.value, channel * rays.value.shape[1] + waiting, factor * strength)
@@ -154,7 +174,7 @@ def _of_many(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays
     for i in range(n):
         if not reflects(hits, i):
             continue
-        origin, up, place = ray_origin(hits, i), lift(hits, i), i * channels * n_lights
+        start = _Start(ray_origin(hits, i), lift(hits, i), i * channels * n_lights)
         for s in range(lights.kind.shape[0]):
             for l in range(0, n_lights, LANES):
                 x, y, z, factor = _look(hits, i, lights, s, l)
@@ -164,16 +184,16 @@ def _of_many(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays
                         _settle(tracer, rays, waiting, irradiance)
                         total, waiting = total + waiting, 0
                     if lit == ALL:
-                        _queue(lights, s, l, x, y, z, factor, origin, up, place, rays, waiting, channels)
+                        _queue(lights, s, l, (x, y, z), factor, start, rays, waiting)
                         waiting, lit = waiting + LANES, 0
                         continue
-                    start = lowest(lit)  # one run of positions after another
-                    m = lowest(~(lit >> start))
-                    if start > 0:
-                        x, y, z, factor = _look(hits, i, lights, s, l + start)
-                    _queue(lights, s, l + start, x, y, z, factor, origin, up, place, rays, waiting, channels)
+                    skipped = lowest(lit)  # one run of positions after another
+                    m = lowest(~(lit >> skipped))
+                    if skipped > 0:
+                        x, y, z, factor = _look(hits, i, lights, s, l + skipped)
+                    _queue(lights, s, l + skipped, (x, y, z), factor, start, rays, waiting)
                     waiting += m
-                    lit &= ~(((1 << m) - 1) << start)
+                    lit &= ~(((1 << m) - 1) << skipped)
     _settle(tracer, rays, waiting, irradiance)
     return total + waiting
 

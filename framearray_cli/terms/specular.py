@@ -7,11 +7,10 @@ obscurance. So what a mirror pixel needs is a list of reflected hits, each with 
 import numpy as np
 
 from ..arrays import Float32, Rgb
-from ..embree.packets import Tracer, intersect, set_ray
-from ..hits import SURFACE, Hits, record_hits
+from ..embree.packets import intersect, set_ray
+from ..hits import SURFACE, Hits, World, record_hits
 from ..kernel import inlined, kernel
 from ..sampling import mix
-from ..surface import Surfaces
 
 
 @inlined
@@ -31,14 +30,7 @@ def count_mirrors(hits: Hits, n: int) -> int:
 
 @kernel
 def reflect(
-    hits: Hits,
-    n: int,
-    throughput: Rgb,
-    surfaces: Surfaces,
-    tracer: Tracer,
-    packets: Float32,
-    reflected: Hits,
-    reflected_throughput: Rgb,
+    hits: Hits, n: int, throughput: Rgb, world: World, packets: Float32, reflected: Hits, reflected_throughput: Rgb
 ) -> int:
     """Follow hits 0 to n - 1 one mirror bounce; those that are no mirror end here.
 
@@ -69,6 +61,6 @@ def reflect(
         reflected.pixel[m] = hits.pixel[i]
         reflected.half[m] = hits.half[i]
         m += 1
-    intersect(tracer, packets, m, True)
-    record_hits(surfaces, tracer, packets, m, True, reflected)
+    intersect(world.tracer, packets, m, True)
+    record_hits(world, packets, m, True, reflected)
     return m

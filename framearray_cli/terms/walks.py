@@ -9,11 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Float32, Int32, Rgb, Triple
-from ..embree.packets import Tracer, intersect, set_ray
-from ..hits import SURFACE, Hits, record_hits
+from ..embree.packets import intersect, set_ray
+from ..hits import SURFACE, Hits, World, record_hits
 from ..kernel import inlined, kernel
 from ..sampling import CHOICE, HEMISPHERE, above, cosine_direction, mix, r2, word
-from ..surface import Surfaces
 
 DIFFUSE, MIRROR, END = 0, 1, 2
 # Walks end here whatever they carry: 0.97^256 is four ten-thousandths. Nearly all end long before by themselves.
@@ -88,8 +87,7 @@ def advance(
     hits: Hits,
     walkers: Walkers,
     n: int,
-    surfaces: Surfaces,
-    tracer: Tracer,
+    world: World,
     packets: Float32,
     next_hits: Hits,
     next_walkers: Walkers,
@@ -108,8 +106,8 @@ def advance(
         for channel in range(3):
             next_walkers.throughput[m, channel] = walkers.throughput[i, channel]
         m += 1
-    intersect(tracer, packets, m, False)
-    record_hits(surfaces, tracer, packets, m, True, next_hits)
+    intersect(world.tracer, packets, m, False)
+    record_hits(world, packets, m, True, next_hits)
     return m
 
 

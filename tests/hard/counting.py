@@ -17,8 +17,8 @@ from framearray_cli.camera import OUTSIDE as HIDDEN
 from framearray_cli.camera import Cameras
 from framearray_cli.embree import EmbreeScene
 from framearray_cli.embree.packets import DIRECTION, ORIGIN, TFAR, intersect
-from framearray_cli.eyehits import native_hits, pixel_order
-from framearray_cli.hits import SURFACE, empty_hits
+from framearray_cli.eyehits import Samples, native_hits, pixel_order
+from framearray_cli.hits import SURFACE, World, empty_hits
 from framearray_cli.lanes import LANES
 from framearray_cli.lights import light_arrays
 from framearray_cli.paths import LightPath, shining_together
@@ -175,8 +175,9 @@ def eyes_on_walls(
     )  # fmt: skip
     order, n = pixel_order(size, size), size * size
     packets, hits, cosine, wrong = room_for_hits(n).packets, empty_hits(n), [], []
+    samples, world = Samples(1, order, per_pixel=1, first=0), World(stage.surfaces, stage.embree.tracer)
     for c in range(n_eyes):
-        native_hits(cams, c, 1, order, 1, 0, 0, n, stage.surfaces, stage.embree.tracer, False, packets, hits)
+        native_hits(cams, c, samples, 0, n, world, False, packets, hits)
         way = hits.incoming / np.linalg.norm(hits.incoming, axis=1, keepdims=True)
         if inwards:
             distance = packets[:, TFAR].ravel() * np.linalg.norm(hits.incoming, axis=1)

@@ -11,7 +11,7 @@ from rooms import ROOMS, TURN, WIDTH, plain, planes
 
 from framearray_cli.embree import EmbreeScene
 from framearray_cli.embree.packets import intersect, set_ray
-from framearray_cli.hits import SURFACE, Hits, empty_hits, record_hits
+from framearray_cli.hits import SURFACE, Hits, World, empty_hits, record_hits
 from framearray_cli.kernel import kernel
 from framearray_cli.rays import room_for_hits
 from framearray_cli.scene import Scene
@@ -109,7 +109,7 @@ def _seen(arrays: Surfaces, embree: EmbreeScene, eye: Any, n: int) -> Hits:
     packets, hits = room_for_hits(n).packets, empty_hits(n)
     _shoot(eye, way, packets)
     intersect(embree.tracer, packets, n)
-    record_hits(arrays, embree.tracer, packets, n, False, hits)
+    record_hits(World(arrays, embree.tracer), packets, n, False, hits)
     assert (hits.kind == SURFACE).all(), "a ray left a closed room"
     return hits
 

@@ -11,10 +11,11 @@ from pathtracer import PathTracer
 from stages import FURNACE, Part, box, make_job, point, quad, sun, write_scene
 from ztests import Estimate, chi2_bounds, difference, estimate
 
+from framearray_cli.hits import World
 from framearray_cli.job import Job
 from framearray_cli.prepare import open_embree, plan_work, prepare
 from framearray_cli.terms.ambient import Ambient
-from framearray_cli.terms.ambient_light import ambient_by_light
+from framearray_cli.terms.ambient_light import LightWalks, ambient_by_light
 
 # A house of 5 x 3 x 4 m outside, walls 0.2 m thick, with one window in the wall x = 5 that the sun shines through.
 OUTER, WALL = np.array([5.0, 3.0, 4.0]), 0.2
@@ -166,8 +167,9 @@ def test_white_surfaces_under_a_sky(method: str, tmp_path: Path) -> None:
             ambient = plan_work(prepared, embree)[1]
         else:
             background = np.array(job.scene.background, np.float32)
-            args = (0, None, prepared.surfaces, embree.tracer, prepared.light_arrays)
-            ambient = ambient_by_light(*args, background)
+            world, lights = World(prepared.surfaces, embree.tracer), prepared.light_arrays
+            particles = LightWalks(seed=0, paths=None, world=world, lights=lights, background=background)
+            ambient = ambient_by_light(particles)
     for value, sky in zip(ambient.intensity[0], (1.0, 2.0, 4.0), strict=True):
         error = max(float(ambient.standard_error[0]), 1e-5)  # walks from the eye all bring the same; float32
         assert abs(float(value) / sky - 1) < 3 * error

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from stages import Part, look, make_job, point, quad, result_of, sun, write_scene
 
 from framearray_cli.crew import Scratch
-from framearray_cli.eyehits import native_hits
+from framearray_cli.eyehits import Samples, native_hits
 from framearray_cli.hits import SURFACE
 from framearray_cli.job import Job
 from framearray_cli.prepare import open_embree, plan_work, prepare
@@ -60,10 +60,8 @@ def hits_of(job: Job) -> Lit:
     with open_embree(prepared) as embree:
         setup, _ = plan_work(prepared, embree)
         scratch, n = Scratch(setup, 1024), 1024
-        native_hits(
-            setup.cams, 0, setup.seed, setup.order, 1, 0, 0, n, setup.surfaces, setup.tracer, False,
-            scratch.hit_rays.packets, scratch.hits,
-        )  # fmt: skip
+        samples = Samples(setup.seed, setup.order, per_pixel=1, first=0)
+        native_hits(setup.cams, 0, samples, 0, n, setup.world, False, scratch.hit_rays.packets, scratch.hits)
         irradiance = np.empty((n, setup.lights.channels, setup.lights.n_lights), np.float32)
         direct(scratch.hits, n, setup.lights, setup.tracer, scratch.test_rays, irradiance)
     hits = scratch.hits

@@ -9,7 +9,7 @@ import pytest
 
 from framearray_cli.accumulate import HitSource, SourceList, accumulate, compose_differences, weigh_halves
 from framearray_cli.arrays import with_room
-from framearray_cli.compose import MOST, Band, as_stored, empty_band, finish
+from framearray_cli.compose import MOST, Band, Finish, as_stored, empty_band, finish
 from framearray_cli.lanes import LANES
 from framearray_cli.reuse import sort_by_pixel
 from framearray_cli.work import (
@@ -165,7 +165,7 @@ def composed(
     band = empty_band(N_PIXELS, N_LIGHTS)
     for first, n in bands:
         case.add(band, first, n)
-        bad.append(finish(band, first, n, colour, ambient, 0, np.float32(0), as_stored(images)))
+        bad.append(finish(band, first, n, Finish(colour, ambient, 0, np.float32(0)), as_stored(images)))
     return images, bad
 
 
@@ -179,7 +179,8 @@ def test_differences_are_sums_with_a_factor_for_each_half(channels: int, weighed
     images = np.full((N_LIGHTS, N_PIXELS, 3), np.nan, np.float32)
     colour, ambient = lights()
     listed = SourceList([case.source(records, even, odd)])
-    compose_differences(empty_band(16, N_LIGHTS), 0, N_PIXELS, listed.addresses, channels, colour, ambient, 0, images)
+    how = Finish(colour, ambient, 0, np.float32(-np.inf))
+    compose_differences(empty_band(16, N_LIGHTS), 0, N_PIXELS, listed.addresses, channels, how, images)
     factor = np.where(case.half == 1, odd[case.pixel], even[case.pixel]).astype(np.float64)
     value = (
         colour * case.sums(case.direct() * factor[:, None, None])
@@ -283,7 +284,7 @@ def test_a_scale_a_pixel_multiplies_all_its_hits() -> None:
     band, images = empty_band(N_PIXELS, N_LIGHTS), np.empty((N_LIGHTS, N_PIXELS, 3), np.float32)
     case.add(band, 0, N_PIXELS)
     other.add(band, 0, N_PIXELS, scale, mean=False)
-    finish(band, 0, N_PIXELS, colour, ambient, 0, np.float32(0), images)
+    finish(band, 0, N_PIXELS, Finish(colour, ambient, 0, np.float32(0)), images)
     more = colour * other.sums(other.direct(), scale)
     more = more + ambient * other.sums(other.reflectivity.astype(np.float64) * other.obscurance, scale)[:, :, None]
     more = more + other.sums(other.constant, scale)[:, :, None]

@@ -7,7 +7,7 @@ import pytest
 import tiny
 from oracle import Oracle
 
-from framearray_cli.eyehits import extra_hits, native_hits, pilot_hits, pixel_order
+from framearray_cli.eyehits import Samples, extra_hits, native_hits, pilot_hits, pixel_order
 from framearray_cli.hits import ESCAPED, SURFACE, Hits, empty_hits, record_hits
 from framearray_cli.rays import room_for_hits
 from framearray_cli.work import FrameSetup
@@ -18,21 +18,8 @@ def native(setup: FrameSetup, c: int, per_pixel: int, batch: int = 2048) -> Hits
     n, packets, parts = setup.n_pixels * per_pixel, room_for_hits(batch).packets, []
     for first in range(0, n, batch):
         hits, m = empty_hits(batch), min(batch, n - first)
-        native_hits(
-            setup.cams,
-            c,
-            setup.seed,
-            setup.order,
-            per_pixel,
-            0,
-            first,
-            m,
-            setup.surfaces,
-            setup.tracer,
-            True,
-            packets,
-            hits,
-        )
+        samples = Samples(setup.seed, setup.order, per_pixel, 0)
+        native_hits(setup.cams, c, samples, first, m, setup.world, True, packets, hits)
         parts.append([array[:m] for array in hits])
     return Hits(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
@@ -117,9 +104,10 @@ def test_extra_hits_go_on_where_the_pixels_own_hits_end() -> None:
         all_hits = native(setup, 0, 5)
         pixels = np.array([3, 100, 431], np.int32)
         more, packets = empty_hits(9), room_for_hits(16).packets
-        extra_hits(setup.cams, 0, setup.seed, pixels, 2, 3, 0, 9, setup.surfaces, setup.tracer, packets, more)
+        samples = Samples(setup.seed, pixels, per_pixel=3, first=2)
+        extra_hits(setup.cams, 0, samples, 0, 9, setup.world, packets, more)
         fewer = empty_hits(2)
-        extra_hits(setup.cams, 0, setup.seed, pixels, 2, 3, 4, 2, setup.surfaces, setup.tracer, packets, fewer)
+        extra_hits(setup.cams, 0, samples, 4, 2, setup.world, packets, fewer)
     assert more.pixel.tolist() == [3] * 3 + [100] * 3 + [431] * 3
     here = {key: i for i, key in enumerate(all_hits.key.tolist())}
     order = [here[key] for key in more.key.tolist()]
@@ -138,9 +126,9 @@ def native_keys(hits: Hits, pixel: int, n: int) -> list[int]:
 def test_pilot_rays_pass_through_pixel_centres() -> None:
     with tiny.planned(tiny.prepared(tiny.job())) as (setup, _):
         hits, packets = empty_hits(432), room_for_hits(432).packets
-        pilot_hits(setup.cams, 0, setup.order, 0, 432, setup.surfaces, setup.tracer, packets, hits)
+        pilot_hits(setup.cams, 0, setup.order, 0, 432, setup.world, packets, hits)
         seen = empty_hits(432)
-        record_hits(setup.surfaces, setup.tracer, packets, 432, True, seen)
+        record_hits(setup.world, packets, 432, True, seen)
     np.testing.assert_allclose(hits.specular, seen.specular, rtol=1e-6)
     assert 0 < (hits.specular.max(axis=1) > 0).sum() < 432
     frame = np.stack([setup.cams.right[0], setup.cams.up[0], setup.cams.forward[0]])

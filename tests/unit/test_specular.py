@@ -44,7 +44,7 @@ def reflected(setup: FrameSetup, hits: Hits, throughput: Any = None) -> tuple[Hi
     out, through = empty_hits(n), np.empty((n, 3), np.float32)
     throughput = np.ones((n, 3), np.float32) if throughput is None else throughput
     packets = room_for_hits(n).packets
-    m = reflect(hits, n, throughput, setup.surfaces, setup.tracer, packets, out, through)
+    m = reflect(hits, n, throughput, setup.world, packets, out, through)
     return Hits(*(array[:m] for array in out)), through[:m], m
 
 

@@ -14,7 +14,7 @@ from framearray_cli.allotment import Allotment, blocks_of
 from framearray_cli.camera import OUTSIDE
 from framearray_cli.crew import TracePool
 from framearray_cli.errors import JobError
-from framearray_cli.eyehits import native_hits
+from framearray_cli.eyehits import Samples, native_hits
 from framearray_cli.frame import find_frame
 from framearray_cli.hits import empty_hits
 from framearray_cli.job import Job
@@ -78,10 +78,8 @@ def test_pairs_are_two_hits_of_one_pixel(n: int) -> None:
     with tiny.open_embree(inputs) as embree:
         setup, _ = tiny.plan_work(inputs, embree)
         pixels, hits = setup.order[:n], empty_hits(2 * n)
-        native_hits(
-            setup.cams, 0, 3, pixels, 2, 0, 0, 2 * n, setup.surfaces, setup.tracer, True,
-            room_for_hits(2 * n).packets, hits, True,
-        )  # fmt: skip
+        samples = Samples(3, pixels, per_pixel=2, first=0, halves=True)
+        native_hits(setup.cams, 0, samples, 0, 2 * n, setup.world, True, room_for_hits(2 * n).packets, hits)
     pair = of_samples(n)
     assert sorted(pair.ravel()) == list(range(2 * n))
     np.testing.assert_array_equal(hits.pixel[pair], [pixels, pixels])
