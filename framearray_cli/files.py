@@ -1,8 +1,9 @@
-"""Files that appear whole or not at all: written beside the target, then renamed onto it."""
+"""Files and folders that appear whole or not at all: written beside the target, then renamed."""
 
 import errno
 import os
 import secrets
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -34,6 +35,57 @@ def whole_file(target: Path) -> Iterator[Path]:
             part.unlink(missing_ok=True)
         if isinstance(error, OSError):
             raise OutputError(f"{target}: cannot be written: {reason(error)}") from error
+        raise
+
+
+@contextmanager
+def whole_folder(target: Path, *, replace: bool) -> Iterator[Path]:
+    """Yield a folder to write into; on success it takes the place of `target`, on any failure it is removed.
+
+    The folder that is there already stays until then, and comes back if the last step fails or is interrupted.
+
+    Args:
+        replace: put the new folder in place of one that holds files; else only an empty one gives way.
+
+    Raises:
+        OutputError: the system refused to write; the message names `target` and the reason.
+    """
+    make_folder(target.parent)
+    try:
+        with temporary_folder(target.parent, f"{target.name}.") as part:
+            yield part
+            _swap(part, target, replace=replace)
+    except OSError as error:
+        raise OutputError(f"{target}: cannot be written: {reason(error)}") from error
+
+
+@contextmanager
+def temporary_folder(parent: Path, stem: str) -> Iterator[Path]:
+    """Make a hidden folder, and remove it with all that is in it, whatever happens."""
+    part = parent / f".{stem}{secrets.token_hex(4)}.part"
+    try:
+        part.mkdir()
+        yield part
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def _swap(part: Path, target: Path, *, replace: bool) -> None:
+    """Rename a finished folder to its target, and remove the one that was there; or leave that one where it was."""
+    aside = part.with_suffix(".old")
+    try:
+        if os.path.isdir(target):
+            target.rename(aside)
+            if not replace and any(aside.iterdir()):
+                raise OSError(errno.ENOTEMPTY, os.strerror(errno.ENOTEMPTY))
+        part.rename(target)
+        shutil.rmtree(aside, ignore_errors=True)
+    except BaseException:
+        if os.path.isdir(part):  # it did not take its place
+            with suppress(OSError):
+                aside.rename(target)
+        else:
+            shutil.rmtree(aside, ignore_errors=True)
         raise
 
 

@@ -1,14 +1,11 @@
-"""A folder that appears whole or not at all, and the pictures in it."""
+"""The folder of an export, and the pictures in it."""
 
 import os
-import secrets
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 
 from ..errors import OutputError
-from ..files import make_folder, reason
 from ..imageattributes import frame_attributes
 from ..images import ImageFormat, write_image
 from ..pictures import Pictures
@@ -17,43 +14,16 @@ from .selection import ExportedFrame
 _SAME = {"jpeg": "jpg", "tiff": "tif"}
 
 
-@contextmanager
-def whole_folder(target: Path, mark: str, *, force: bool) -> Iterator[Path]:
-    """Yield a folder to write into; on success it becomes `target`, on any failure it is removed.
+def earlier_export(target: Path, mark: str, *, force: bool) -> bool:
+    """Return whether an earlier export is there, to be replaced.
 
     Args:
         target: must not exist, or be empty; with `force` it may hold an earlier export.
         mark: a file that every such export has, so that `force` removes nothing else.
-        force: put the new folder in place of the old one.
 
     Raises:
-        OutputError: something else is there, or the system refused to write.
+        OutputError: something else is there.
     """
-    old = _in_the_way(target, mark, force)
-    part = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
-    aside = part.with_suffix(".old")
-    try:
-        make_folder(target.parent)
-        part.mkdir()
-        yield part
-        if old:
-            target.rename(aside)
-        elif os.path.isdir(target):
-            target.rmdir()
-        part.rename(target)
-    except BaseException as error:
-        shutil.rmtree(part, ignore_errors=True)
-        if os.path.isdir(aside) and not os.path.exists(target):
-            with suppress(OSError):
-                aside.rename(target)
-        if isinstance(error, OSError):
-            raise OutputError(f"{target}: cannot be written: {reason(error)}") from error
-        raise
-    shutil.rmtree(aside, ignore_errors=True)
-
-
-def _in_the_way(target: Path, mark: str, force: bool) -> bool:
-    """Whether an earlier export is to be replaced."""
     if os.path.lexists(target) and (os.path.islink(target) or not os.path.isdir(target)):
         raise OutputError(f"{target}: a file of that name is there; choose another name")
     if not os.path.isdir(target) or not any(target.iterdir()):

@@ -9,12 +9,13 @@ import numpy as np
 
 from ..colour import srgb8_from_linear
 from ..errors import JobError, OutputError
+from ..files import whole_folder
 from ..images import ImageFormat, require_writer
 from ..manifestfile import read_manifest
 from ..pictures import Pictures
 from ..places import ALL, MIDDLE, indices, light_places
 from . import cinema, colmap, nerfstudio
-from .folder import place_picture, whole_folder
+from .folder import earlier_export, place_picture
 from .points import Cloud, find_points, source_cameras
 from .selection import Selection
 
@@ -92,7 +93,8 @@ def export(
         target = target.with_name(f"{target.name}{cinema.SUFFIX}")
     require_writer(wanted.format)
     pictures, frames = Pictures(manifest), selection.frames
-    with whole_folder(target, _MARKS[kind], force=force) as folder:
+    replace = earlier_export(target, _MARKS[kind], force=force)
+    with whole_folder(target, replace=replace) as folder:
         (folder / "images").mkdir()
         files = {frame.name: f"{frame.name}.{wanted.format}" for frame in frames}
         for done, frame in enumerate(frames, start=1):

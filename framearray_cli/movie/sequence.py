@@ -2,10 +2,9 @@
 
 import os
 import re
-import secrets
 import shutil
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import get_args
@@ -13,7 +12,7 @@ from typing import get_args
 import numpy as np
 
 from ..errors import OutputError
-from ..files import folder_for, reason
+from ..files import folder_for, reason, temporary_folder
 from ..imageattributes import Attribute, frame_attributes
 from ..images import Extension, ImageFormat, read_image, write_codes, write_image
 from ..manifest import Manifest
@@ -75,10 +74,8 @@ def write_sequence(
     before, digits, after = re.split("(#+)", pattern.name)
     names = [f"{before}{k:0{len(digits)}d}{after}" for k in range(len(line.shots))]
     _check_leftovers(pattern.parent, before, after, set(names))
-    part = pattern.parent / f".{before}{secrets.token_hex(4)}.part"
     try:
-        with folder_for(pattern.parent), _removed_after(part):
-            part.mkdir()
+        with folder_for(pattern.parent), temporary_folder(pattern.parent, before) as part:
             last: tuple[Shot, Relight, Path] | None = None
             for k, (name, shot, relight) in enumerate(zip(names, line.shots, line.relights, strict=True)):
                 if last is not None and last[:2] == (shot, relight):  # a held picture is made once
@@ -90,15 +87,6 @@ def write_sequence(
             _move(names, part, pattern.parent)
     except OSError as error:
         raise OutputError(f"{pattern}: cannot be written: {reason(error)}") from error
-
-
-@contextmanager
-def _removed_after(folder: Path) -> Iterator[None]:
-    """Remove a folder and what is in it, whatever happens."""
-    try:
-        yield
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _check_leftovers(folder: Path, before: str, after: str, names: set[str]) -> None:

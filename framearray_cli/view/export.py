@@ -1,12 +1,11 @@
 """The page and its tiles as a folder of plain files, for any web server."""
 
 import os
-import secrets
 import shutil
 from pathlib import Path
 
 from ..errors import OutputError
-from ..files import make_folder, reason
+from ..files import reason, whole_folder
 from .pagefiles import page_files
 from .tiles import INDEX, TILES, Tiles
 
@@ -41,23 +40,11 @@ def export(tiles: Tiles, target: Path) -> int:
         OutputError: the target holds other files, or cannot be written.
     """
     check_target(target)
-    make_folder(target.parent)
-    token = secrets.token_hex(4)
-    part, old = (target.with_name(f".{target.name}.{token}.{end}") for end in ("part", "old"))
-    try:
-        part.mkdir()
+    with whole_folder(target, replace=True) as part:
         for name, data in page_files().items():
             (part / name).write_bytes(data)
         shutil.copyfile(tiles.folder / INDEX, part / INDEX)
         _copy_tiles(tiles.folder / TILES, part / TILES)
-        if target.exists():
-            os.replace(target, old)
-        os.replace(part, target)
-    except OSError as error:
-        raise OutputError(f"{target}: cannot be written: {reason(error)}") from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
-        shutil.rmtree(old, ignore_errors=True)
     return sum(file.stat().st_size for file in target.rglob("*") if file.is_file())
 
 
