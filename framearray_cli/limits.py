@@ -1,4 +1,6 @@
-"""What the system lets this process have: memory of its control group, which is a container's, and address space."""
+"""What the system lets this process have: memory and cores of its control group, which is a container's, and address
+space.
+"""
 
 import os
 from collections.abc import Iterator
@@ -28,8 +30,37 @@ class _Files:
     cached: str
 
 
-_V1 = _Files(limit="memory.limit_in_bytes", used="memory.usage_in_bytes", cached="total_inactive_file")
-_V2 = _Files(limit="memory.max", used="memory.current", cached="inactive_file")
+_FILES = {
+    1: _Files(limit="memory.limit_in_bytes", used="memory.usage_in_bytes", cached="total_inactive_file"),
+    2: _Files(limit="memory.max", used="memory.current", cached="inactive_file"),
+}
+
+
+def available_cores(root: Path = ROOT, own: Path = OWN) -> int:
+    """Cores that this process may use: those that it may run on, or fewer where a control group has a quota of time.
+
+    A quota of two and a half cores counts as three.
+
+    Args:
+        root: where the groups are mounted.
+        own: the file that names those of this process.
+    """
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    quotas = (_quota(folder, version) for folder, version in _groups("cpu", root, own))
+    return min([cores, *(quota for quota in quotas if quota is not None)])
+
+
+def _quota(folder: Path, version: int) -> int | None:
+    """Cores that a group may keep busy, rounded up; None without a limit."""
+    try:
+        if version == 2:
+            time, period = (folder / "cpu.max").read_text().split()
+        else:
+            time, period = ((folder / f"cpu.cfs_{name}_us").read_text() for name in ("quota", "period"))
+        cores = -(-int(time) // int(period))
+    except (OSError, ValueError, ZeroDivisionError):  # no such group; "max"
+        return None
+    return cores if cores > 0 else None  # -1 is version 1's way to say that there is no limit
 
 
 def group_memory(root: Path = ROOT, own: Path = OWN) -> int | None:
@@ -41,12 +72,14 @@ def group_memory(root: Path = ROOT, own: Path = OWN) -> int | None:
         root: where the groups are mounted.
         own: the file that names those of this process.
     """
-    left = [room for folder, files in _groups(root, own) if (room := _room(folder, files)) is not None]
+    left = [
+        room for folder, version in _groups("memory", root, own) if (room := _room(folder, _FILES[version])) is not None
+    ]
     return min(left, default=None)
 
 
-def _groups(root: Path, own: Path) -> Iterator[tuple[Path, _Files]]:
-    """The groups that count memory, from the innermost outwards."""
+def _groups(controller: str, root: Path, own: Path) -> Iterator[tuple[Path, int]]:
+    """The groups that limit memory or cpu, from the innermost outwards, each with the version of its files."""
     try:
         lines = own.read_text().splitlines()
     except OSError:
@@ -54,15 +87,15 @@ def _groups(root: Path, own: Path) -> Iterator[tuple[Path, _Files]]:
     for line in lines:
         _, controllers, place = line.split(":", 2)
         if not controllers:
-            base, files = (root if (root / "cgroup.controllers").exists() else root / "unified"), _V2
-        elif "memory" in controllers.split(","):
-            base, files = root / "memory", _V1
+            base, version = (root if (root / "cgroup.controllers").exists() else root / "unified"), 2
+        elif controller in controllers.split(","):
+            base, version = root / controller, 1
         else:
             continue
         inner = base / place.lstrip("/")  # in a container its names may be those outside: what is not there is left out
         for folder in (inner, *inner.parents):
             if folder == base or base in folder.parents:
-                yield folder, files
+                yield folder, version
 
 
 def _room(folder: Path, files: _Files) -> int | None:
@@ -93,7 +126,7 @@ def require_address_space(needs: dict[str, int]) -> None:
     Raises:
         LimitError: a limit is below that.
     """
-    cores = min(os.cpu_count() or 1, MOST_CORES)
+    cores = min(os.cpu_count() or 1, MOST_CORES)  # all: the libraries look at no quota
     for name, limit in _limits().items():
         needed = needs[name] + max(cores - MEASURED_CORES, 0) * CORE
         if limit < needed:

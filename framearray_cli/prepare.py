@@ -1,6 +1,5 @@
 """From a job to everything that is known before the first frame: scene, eyes, lights, ambient light, plan."""
 
-import os
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +11,7 @@ from .embree import EmbreeScene, Engine
 from .hits import World
 from .job import Job
 from .lights import LightArrays, light_arrays
+from .limits import available_cores
 from .paths import Eyes, Lights, eyes, lights
 from .plan import frame_hits, turns
 from .planes import Plane
@@ -61,9 +61,7 @@ class Prepared:
     @property
     def threads(self) -> int:
         """Threads of the render: the job's, else one for each core that this process may use."""
-        if self.job.render.threads:
-            return self.job.render.threads
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return self.job.render.threads or available_cores()
 
 
 def prepare(job: Job) -> Prepared:

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ..errors import CheckError
+from ..limits import RENDERS, available_cores, require_address_space
 from ..screen import Screen, out, say
 from ..wording import verified_lines
 from .options import Quiet, Threads, with_threads
@@ -20,8 +21,6 @@ def verify(
     quiet: Quiet = False,
 ) -> None:
     """Look whether every image of a frame array is there, whole and unchanged."""
-    import os
-
     from ..verify import verify as run
 
     with Screen(out, quiet=quiet) as screen:
@@ -31,7 +30,7 @@ def verify(
                 screen.count("verifying", total, "file")
             screen.advance()
 
-        found = run(array, threads or os.cpu_count() or 1, progress)
+        found = run(array, threads or available_cores(), progress)
     lines = verified_lines(found)
     if not found.wrong or not repair:
         if found.wrong:
@@ -40,7 +39,6 @@ def verify(
             say(out, lines)
         return
     from ..jobfile import job_of_table
-    from ..limits import RENDERS, require_address_space
     from ..manifest import FILE_NAME
     from .render import render_shown
 

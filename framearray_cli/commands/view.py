@@ -1,12 +1,12 @@
 """`framearray view`."""
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..interrupts import Stopped, forget
+from ..limits import available_cores
 from ..screen import Screen, out, say, size
 from .options import MOST_THREADS, Quiet, place
 
@@ -37,7 +37,7 @@ def view(
     """Walk through a frame array in the browser."""
     from ..view.run import open_tiles, show, write_page
 
-    workers = threads or os.cpu_count() or 1
+    workers = threads or available_cores()
     tiles = open_tiles(array, place(cache, "--cache") if cache is not None else None, workers)
     with Screen(out, quiet=quiet) as screen:
         if target is not None:

@@ -8,7 +8,7 @@ import pytest
 
 from framearray_cli import limits, usage
 from framearray_cli.errors import LimitError
-from framearray_cli.limits import group_memory, require_address_space
+from framearray_cli.limits import available_cores, group_memory, require_address_space
 
 resource = pytest.importorskip("resource")
 
@@ -56,6 +56,89 @@ def test_groups_of_version_1(tmp_path):
     assert group_memory(tmp_path, own(tmp_path, *lines)) == 500
     group(tmp_path / "memory", 2000, 1900, 0, version=1)
     assert group_memory(tmp_path, own(tmp_path, "5:memory:/elsewhere/abc")) == 100
+
+
+def quota(folder: Path, *values: object) -> None:
+    """Write what a group may use: one value as in version 2, two as in version 1."""
+    folder.mkdir(parents=True, exist_ok=True)
+    names = ("cpu.max",) if len(values) == 1 else ("cpu.cfs_quota_us", "cpu.cfs_period_us")
+    for name, value in zip(names, values, strict=True):
+        (folder / name).write_text(f"{value}\n")
+
+
+@pytest.fixture
+def many_cores(monkeypatch):
+    monkeypatch.setattr(limits.os, "sched_getaffinity", lambda process: set(range(16)), raising=False)
+
+
+@pytest.mark.parametrize(
+    ("text", "cores"),
+    [
+        ("max 100000", 16),
+        ("200000 100000", 2),
+        ("200001 100000", 3),
+        ("250000 100000", 3),
+        ("1000 100000", 1),
+        ("9900000 100000", 16),
+        ("100000 0", 16),
+        ("", 16),
+    ],
+)
+def test_a_quota_of_cores_is_rounded_up(tmp_path, many_cores, text, cores):
+    (tmp_path / "cgroup.controllers").write_text("memory cpu")
+    quota(tmp_path / "job", text)
+    assert available_cores(tmp_path, own(tmp_path, "0::/job")) == cores
+
+
+def test_the_tightest_quota_of_nested_groups_counts(tmp_path, many_cores):
+    (tmp_path / "cgroup.controllers").write_text("memory cpu")
+    quota(tmp_path / "pods/job", "700000 100000")
+    quota(tmp_path / "pods", "150000 50000")
+    assert available_cores(tmp_path, own(tmp_path, "0::/pods/job")) == 3
+    quota(tmp_path / "pods", "max 100000")
+    assert available_cores(tmp_path, own(tmp_path, "0::/pods/job")) == 7
+    quota(tmp_path, "400000 100000")
+    assert available_cores(tmp_path, own(tmp_path, "0::/pods/job")) == 4
+
+
+def test_quotas_of_version_1(tmp_path, many_cores):
+    quota(tmp_path / "cpu", -1, 100000)
+    quota(tmp_path / "cpu/docker/abc", 350000, 100000)
+    lines = ("9:name=systemd:/x", "5:cpu,cpuacct:/docker/abc", "3:cpuset:/", "0::/")
+    assert available_cores(tmp_path, own(tmp_path, *lines)) == 4
+    quota(tmp_path / "cpu/docker/abc", -1, 100000)
+    assert available_cores(tmp_path, own(tmp_path, *lines)) == 16
+    quota(tmp_path / "cpu", 100000, 100000)
+    assert available_cores(tmp_path, own(tmp_path, "5:cpu:/elsewhere/abc")) == 1
+
+
+def test_cores_without_a_quota(tmp_path, monkeypatch, many_cores):
+    assert available_cores(tmp_path, tmp_path / "missing") == 16
+    monkeypatch.delattr(limits.os, "sched_getaffinity")
+    for count, cores in ((8, 8), (None, 1)):
+        monkeypatch.setattr(limits.os, "cpu_count", lambda count=count: count)
+        assert available_cores(tmp_path, tmp_path / "missing") == cores
+
+
+def test_render_view_and_verify_use_the_cores_that_there_are(tmp_path, monkeypatch):
+    from framearray_cli import verify as verifying
+    from framearray_cli.commands import verify, view
+    from framearray_cli.view import run as viewing
+
+    seen = []
+
+    def stop(*arguments):
+        seen.append(arguments)
+        raise LimitError("seen")
+
+    monkeypatch.setattr(verify, "available_cores", lambda: 5)
+    monkeypatch.setattr(view, "available_cores", lambda: 6)
+    monkeypatch.setattr(verifying, "verify", stop)
+    monkeypatch.setattr(viewing, "open_tiles", stop)
+    for command in (verify.verify, view.view):
+        with pytest.raises(LimitError, match="seen"):
+            command(tmp_path)
+    assert seen[0][1] == 5 and seen[1][2] == 6
 
 
 def test_without_limits(tmp_path):
