@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 
 from pydantic import ValidationError
 
+from .files import read_at_most
 from .jobkeys import MOST_EYES, CameraKey
 from .problems import cut, problems_of
 
@@ -71,13 +72,12 @@ def _row_problems(rows: list[PlacedRow]) -> list[str]:
 def _read_text(path: Path) -> str:
     """Read a whole UTF-8 file whose size is checked first."""
     try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST_FILE + 1)
+        data = read_at_most(path, LARGEST_FILE)
     except FileNotFoundError:
         raise EyeFileError("no such file") from None
     except OSError as error:
         raise EyeFileError(f"cannot be read: {error.strerror}") from error
-    if len(data) > LARGEST_FILE:
+    if data is None:
         raise EyeFileError(f"expected at most {LARGEST_FILE >> 20} MB, got a bigger file")
     try:
         return data.decode("utf-8-sig")

@@ -127,6 +127,28 @@ def write_bytes(target: Path, data: bytes | memoryview) -> None:
         part.write_bytes(data)
 
 
+def require_file(path: Path, remedy: str = "") -> None:
+    """Refuse what is there and is no file: a pipe would be waited for, and a device may have no end.
+
+    Raises:
+        OutputError: it is a folder, a pipe or a device; the message ends in the remedy.
+    """
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise OutputError(f"{path}: expected a file, got a folder or a device{remedy}")
+
+
+def read_at_most(path: Path, most: int) -> bytes | None:
+    """Read a whole file; None where it holds more bytes than that.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: its name holds a NUL.
+    """
+    with path.open("rb") as file:
+        data = file.read(most + 1)
+    return data if len(data) <= most else None
+
+
 def refusal(part: Path, n_bytes: int) -> str:
     """Why the system does not let a library write, found by writing as much over what it left; "" if that succeeds.
 

@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from .arrays import Float64
-from .framerate import frame_rate
+from .units import frame_rate
 
 # A (4, 4) array is a matrix that acts on columns; three floats are a point or a colour; a Fraction is a rational.
 Attribute: TypeAlias = str | int | float | Fraction | tuple[float, float, float] | Float64

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from .errors import OutputError
 from .exrtiff import last_row
-from .images import read_image
+from .files import require_file
+from .images import format_name, read_image
 from .pngjpeg import opened_picture
 
 JPEG_END = b"\xff\xd9"
@@ -22,13 +23,12 @@ def check_image(path: Path, resolution: tuple[int, int]) -> None:
     Raises:
         OutputError: the file is missing, damaged, cut short or of another size.
     """
-    if os.path.exists(path) and not os.path.isfile(path):  # a pipe would be waited for
-        raise OutputError(f"{path}: expected a file, got a folder or a device")
+    require_file(path)
     size: tuple[int, int] | None
-    match path.suffix.lower():
-        case ".png":
+    match format_name(path):
+        case "png":
             size = _size_of_png(path)
-        case ".jpg" | ".jpeg":
+        case "jpg":
             size = _size_of_jpeg(path)
         case _:
             size = last_row(path)

@@ -26,7 +26,8 @@ Extension = Literal["exr", "png", "tif", "jpg"]
 HALF_MAX = 65504.0  # the largest half; what lies beyond becomes infinite
 EXR_COMPRESSIONS = ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
 FLOAT_LAYERS = ("depth", "samples")  # layers that need more than the 11 bits of a half
-_PILLOW_SUFFIXES = (".png", ".jpg", ".jpeg")
+FOR_SCREENS = ("png", "jpg")  # formats of 8-bit sRGB; the others keep the radiance
+_SAME = {"jpeg": "jpg", "tiff": "tif"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,6 +63,12 @@ class ImageFormat:
             raise ValueError(f"expected exr, png, tif or jpg, got {self.format!r}")
         if not 1 <= self.quality <= 100:
             raise ValueError(f"expected a quality from 1 to 100, got {self.quality}")
+
+
+def format_name(path: Path | str) -> str:
+    """The format that a file's suffix stands for, in its usual spelling: "png", "jpg"; "" without a suffix."""
+    suffix = Path(path).suffix.lower()[1:]
+    return _SAME.get(suffix, suffix)
 
 
 def require_writer(name: Extension) -> None:
@@ -112,7 +119,7 @@ def write_image(
         return
     image = np.asarray(image, np.float32)
     largest = _largest(str(path), image)
-    if image_format.format in ("png", "jpg"):
+    if image_format.format in FOR_SCREENS:
         exposed = image * np.float32(2.0**image_format.exposure) if image_format.exposure else image
         write_codes(path, srgb8_from_linear(exposed), image_format, attributes)
         return
@@ -207,7 +214,7 @@ def read_image(path: Path) -> Image:
     Raises:
         OutputError: the file is missing, damaged or cut short, or has no channels R, G, B.
     """
-    if path.suffix.lower() in _PILLOW_SUFFIXES:
+    if format_name(path) in FOR_SCREENS:
         return linear_from_srgb8(read_codes(path))
     names, pixels = read_pixels(path)
     if not {"R", "G", "B"} <= set(names):

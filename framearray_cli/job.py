@@ -37,6 +37,7 @@ from .jobvalues import (
     fill,
     shown,
 )
+from .units import LEAST_FPS, MOST_FPS, MOST_STOPS, MOST_THREADS
 
 Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; every other format is taken as y up
 NAME = "[A-Za-z0-9_][A-Za-z0-9._-]{0,99}"  # what can start a file name on every system
@@ -113,7 +114,7 @@ class OutputTable(Table):
         description="Image format. EXR and TIFF hold linear radiance; PNG and JPEG are sRGB, clipped to 0..1.",
     )
     fps: float = Field(
-        default=24.0, ge=0.01, le=1000, description="Frames a second, kept in the images and used for movies."
+        default=24.0, ge=LEAST_FPS, le=MOST_FPS, description="Frames a second, kept in the images and used for movies."
     )
     compression: Literal["none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"] = Field(
         default="none",
@@ -128,8 +129,8 @@ class OutputTable(Table):
     quality: int = Field(default=95, ge=1, le=100, description="Quality of JPEG.")
     exposure: float = Field(
         default=0.0,
-        ge=-64,
-        le=64,
+        ge=-MOST_STOPS,
+        le=MOST_STOPS,
         description="Brightens PNG and JPEG by 2 to this power (stops). EXR and TIFF stay as they are.",
     )
     layers: bool = Field(
@@ -149,7 +150,11 @@ class RenderTable(Table):
         json_schema_extra=computed("two thirds of what is free"),
     )
     threads: int | None = Field(
-        default=None, ge=1, le=1024, description="Threads that render.", json_schema_extra=computed("one for each core")
+        default=None,
+        ge=1,
+        le=MOST_THREADS,
+        description="Threads that render.",
+        json_schema_extra=computed("one for each core"),
     )
 
 

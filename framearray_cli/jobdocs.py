@@ -7,6 +7,7 @@ from pathlib import Path
 
 from .job import Job
 from .jobschema import Schema, Section, file_schema, job_schema, sections, words
+from .tomltext import inline
 
 EXAMPLE = """\
 #:schema job.schema.json
@@ -113,14 +114,9 @@ def _rows(root: Schema, section: Section) -> Iterator[str]:
         values = words(root, node)
         if values == "a table":
             continue
-        default = "required" if key in required else node.get("x-default", _toml(node.get("default")))
+        default = "required" if key in required else node.get("x-default") or f"`{inline(node['default'])}`"
         cells = (f"`{key}`", values, default, node.get("description", ""))
         yield f"| {' | '.join(cell.replace('|', '&#124;') for cell in cells)} |"
-
-
-def _toml(value: object) -> str:
-    """Write a default as it would stand in a file."""
-    return f"`{json.dumps(value)}`"
 
 
 def main(folder: Path) -> None:

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from .errors import JobError
 from .eyefile import EyeFileError, read_eyes
+from .files import read_at_most
 from .job import Job
 from .jobschema import job_schema
 from .jobvalues import absolute, long_key, shown
@@ -115,14 +116,13 @@ def _read_bytes(path: Path) -> bytes:
     try:
         if path.is_dir():
             raise JobError(path, ["expected a TOML file, got a folder"])
-        with path.open("rb") as file:
-            data = file.read(LARGEST_FILE + 1)
+        data = read_at_most(path, LARGEST_FILE)
     except FileNotFoundError as error:
         raise JobError(path, ["no such file"]) from error
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise JobError(path, [f"cannot be read: {reason}"]) from error
-    if len(data) > LARGEST_FILE:
+    if data is None:
         raise JobError(path, [f"expected a TOML file of at most {LARGEST_FILE >> 20} MB, got a bigger one"])
     return data
 

@@ -14,13 +14,13 @@ from .arrays import Float64, is_number
 from .errors import OutputError
 from .filepatterns import check_pattern, file_name
 from .jobvalues import shown
+from .units import LEAST_FPS, MOST_FPS
 
 FILE_NAME = "manifest.toml"
 BACKGROUND = "background"  # stands beside the groups: what comes from outside the scene
 MAIN_AXIS = "light"  # the axis of all sources, or of those that name none; as in the job
 
 LARGEST = 65535  # pixels of a side; a job has at most 16384
-FPS = (0.01, 1000.0)  # as in a job
 
 Vector: TypeAlias = tuple[float, float, float]
 Row: TypeAlias = tuple[float, float, float, float]
@@ -155,9 +155,8 @@ class Manifest:
             and all(isinstance(size, int) and 0 < size <= LARGEST for size in sizes)
         )
         _check(whole, f"resolution: expected 2 whole numbers from 1 to {LARGEST}, got {shown(sizes)}")
-        slow, fast = FPS
-        good = is_number(self.fps) and slow <= self.fps <= fast
-        _check(good, f"fps: expected a number from {slow:g} to {fast:g}, got {shown(self.fps)}")
+        good = is_number(self.fps) and LEAST_FPS <= self.fps <= MOST_FPS
+        _check(good, f"fps: expected a number from {LEAST_FPS:g} to {MOST_FPS:g}, got {shown(self.fps)}")
         _check(bool(self.cameras), "cameras: expected at least one")
         ambient = self.background_ambient
         _check(_is_vector(ambient, 3), f"background_ambient: expected 3 finite numbers, got {shown(ambient)}")

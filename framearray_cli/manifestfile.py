@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from .errors import OutputError
-from .files import reason, write_bytes
+from .files import reason, require_file, write_bytes
 from .jobvalues import long_key, shown
 from .manifest import FILE_NAME, Manifest, ManifestCamera, ManifestGroup, ManifestLight
+from .tomltext import inline, numbers
 
 # Of the manifest itself; a program that knows format 1 may not understand 2, which has groups of sources.
 FORMAT, FORMAT_OF_GROUPS = 1, 2
@@ -40,8 +41,7 @@ def read_manifest(place: Path) -> Manifest:
         OutputError: it is missing, broken, made by a newer program, or leads out of its folder.
     """
     path = place / FILE_NAME if os.path.isdir(place) else place
-    if os.path.exists(path) and not os.path.isfile(path):  # a device may have no end
-        raise OutputError(f"{path}: expected a file, got a folder or a device")
+    require_file(path)
     try:
         text = path.read_bytes().decode()
         if problem := long_key(text):
@@ -78,7 +78,7 @@ def to_toml(manifest: Manifest) -> str:
     text = ["# A frame array; docs/guide/manifest.md explains the keys.\n", tomli_w.dumps(plain(head | tables))]
     # Written by hand, because a matrix on one line is easier to read than on the 22 lines of tomli_w.
     for c, camera in enumerate(manifest.cameras):
-        rows = ", ".join(_numbers(row) for row in camera.world_from_camera)
+        rows = ", ".join(numbers(row) for row in camera.world_from_camera)
         text.append(f"\n[[cameras]]  # {c}\nworld_from_camera = [{rows}]\nfov = {float(camera.fov)!r}\n")
     text.extend(_light_lines("lights", manifest.lights))
     for group in manifest.groups:
@@ -92,9 +92,9 @@ def _light_lines(key: str, lights: Sequence[ManifestLight]) -> list[str]:
     """Write a block a light index."""
     text = []
     for l, light in enumerate(lights):
-        text.append(f"\n[[{key}]]  # {l}\nambient = {_numbers(light.ambient)}\n")
-        text.append(f"ambient_error = {_numbers(light.ambient_error)}\nsources = [\n")
-        text.extend(f"    {_inline(plain(source))},\n" for source in light.sources)
+        text.append(f"\n[[{key}]]  # {l}\nambient = {numbers(light.ambient)}\n")
+        text.append(f"ambient_error = {numbers(light.ambient_error)}\nsources = [\n")
+        text.extend(f"    {inline(plain(source))},\n" for source in light.sources)
         text.append("]\n")
     return text
 
@@ -161,22 +161,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [plain(item) for item in value if item is not None]
     return str(value) if isinstance(value, Path) else value
-
-
-def _numbers(values: Sequence[float]) -> str:
-    """Write numbers on one line; `repr` gives the shortest text that reads back as the same float."""
-    return f"[{', '.join(repr(float(value)) for value in values)}]"
-
-
-def _inline(value: Any) -> str:
-    """Write a plain value on one line."""
-    import tomli_w
-
-    if isinstance(value, dict):
-        return f"{{ {', '.join(f'{key} = {_inline(item)}' for key, item in value.items())} }}"
-    if isinstance(value, list):
-        return f"[{', '.join(_inline(item) for item in value)}]"
-    return tomli_w.dumps({"x": value}).removeprefix("x = ").rstrip("\n")
 
 
 def _check(good: bool, problem: str) -> None:

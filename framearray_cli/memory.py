@@ -11,6 +11,7 @@ from .plan import flag_mirrors, frame_hits
 from .prepare import Prepared
 from .rays import room_for_hits
 from .terms.ambient import BATCH
+from .units import gibibytes
 from .usage import free_memory, resident_memory
 from .work import FrameSetup
 from .writer import BLOCKS, image_format
@@ -55,13 +56,8 @@ def require_memory(prepared: Prepared, per_pixel: Float64 | None = None) -> None
         less = "a smaller camera.resolution, reuse.n_r or samples.hits takes less"
         if prepared.job.samples.error is not None:
             less = "a larger samples.error, or a smaller camera.resolution, reuse.n_r or samples.most_hits takes less"
-        problem = f"rendering needs at least {_gib(needed)} GiB of memory, {_gib(limit)} GiB may be used; {less}"
+        problem = f"rendering needs at least {gibibytes(needed)} of memory, {gibibytes(limit)} may be used; {less}"
         raise JobError(prepared.job.file or prepared.job.name, [problem])
-
-
-def _gib(n_bytes: int) -> str:
-    """Gibibytes, small amounts with a digit more."""
-    return f"{n_bytes / 2**30:.{1 if n_bytes >= 2**30 else 2}f}"
 
 
 def ambient_memory(prepared: Prepared) -> int:

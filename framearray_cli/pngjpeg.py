@@ -1,7 +1,6 @@
 """Read and write PNG and JPEG, by Pillow: codes of 8 bits."""
 
 import io
-import os
 import struct
 import zlib
 from collections.abc import Iterator
@@ -14,7 +13,7 @@ import numpy as np
 
 from .arrays import Bytes
 from .errors import OutputError
-from .files import reason
+from .files import reason, require_file
 from .imageattributes import Attributes
 
 MOST_PIXELS = 16384**2  # of an image; the largest that a job may have
@@ -45,8 +44,7 @@ def opened_picture(path: Path) -> Iterator[Any]:
     from PIL.JpegImagePlugin import JpegImageFile
     from PIL.PngImagePlugin import PngImageFile
 
-    if os.path.exists(path) and not os.path.isfile(path):  # a pipe would be waited for
-        raise OutputError(f"{path}: expected a file, got a folder or a device")
+    require_file(path)
     kind: Any = PngImageFile if path.suffix.lower() == ".png" else JpegImageFile
     try:
         with path.open("rb") as file:

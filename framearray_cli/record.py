@@ -20,7 +20,7 @@ from typing import Any, Self
 
 from .arrays import is_number
 from .errors import OutputError
-from .files import make_folder, reason
+from .files import make_folder, reason, require_file
 
 FOLDER = "records"
 MOST = 10**6  # cameras, and light positions of all groups: more than any job has
@@ -194,8 +194,7 @@ def read_records(folder: Path, fingerprint: str) -> ArrayRecords:
 
 
 def _lines(file: Path) -> Iterator[dict[str, Any]]:
-    if file.exists() and not file.is_file():  # a device may have no end
-        raise OutputError(f"{file}: expected a file, got a folder or a device; remove it")
+    require_file(file, "; remove it")
     try:
         data = file.read_bytes()
     except OSError as error:

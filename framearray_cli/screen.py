@@ -16,6 +16,7 @@ from rich.text import Text
 from .errors import OutputError
 from .files import reason
 from .kernelcache import problem
+from .units import duration
 
 out, err = Console(), Console(stderr=True)
 
@@ -154,22 +155,3 @@ def _let_go(stream: IO[str]) -> None:
     """Send the rest of a stream to nowhere: what it still holds would fail again when the process ends."""
     with suppress(OSError, ValueError):  # a stream without a file has nothing to fail
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-
-
-def duration(seconds: float) -> str:
-    """A time in the two units that matter: "3 h 05 min", "2 min 07 s", "12.3 s"."""
-    if seconds < 60:
-        return f"{seconds:.1f} s"
-    minutes, rest = divmod(round(seconds), 60)
-    if minutes < 60:
-        return f"{minutes} min {rest:02d} s"
-    return f"{minutes // 60} h {minutes % 60:02d} min"
-
-
-def size(n_bytes: float) -> str:
-    """A number of bytes in the unit that suits: "1.3 GiB"."""
-    for unit in ("bytes", "KiB", "MiB"):
-        if n_bytes < 1024:
-            return f"{n_bytes:.0f} {unit}" if unit == "bytes" else f"{n_bytes:.1f} {unit}"
-        n_bytes /= 1024
-    return f"{n_bytes:.1f} GiB" if n_bytes < 1024 else f"{n_bytes / 1024:.1f} TiB"

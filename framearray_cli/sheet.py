@@ -11,7 +11,7 @@ import numpy as np
 from .arrays import Bytes, Float32, Image
 from .colour import srgb8_from_linear
 from .errors import JobError, OutputError
-from .images import Extension, ImageFormat, require_writer, write_codes, write_image
+from .images import FOR_SCREENS, Extension, ImageFormat, format_name, require_writer, write_codes, write_image
 from .jobvalues import shown
 from .manifest import MAIN_AXIS, Manifest
 from .manifestfile import read_manifest
@@ -23,15 +23,12 @@ Progress: TypeAlias = Callable[[int, int], None]  # images done, images in all
 
 COLUMNS, ROWS = 12, 8  # of an array of 192 x 48: 200 pixels a tile on a sheet that fits a screen
 WIDTH = 2400  # pixels
-MOST_WIDTH = 20_000  # pixels; more is a typing error
 LEAST_TILE = 8  # pixels; smaller ones show nothing
 
 # sRGB codes, all neutral: a dark grey that neither dazzles nor tints what lies on it.
 BACKGROUND, HEADING, LABEL = 38, 225, 160
 GAP, MARGIN = 4, 24  # pixels
 HEAD_TEXT, LABEL_TEXT = 22, 15  # height of the letters' boxes, pixels
-
-_SAME = {"jpeg": "jpg", "tiff": "tif"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,7 +87,7 @@ def make_sheet(
     place = _place_beside(manifest, axis, at)
     cameras = spread_with_ends(manifest.n_cameras, columns)
     places = spread_with_ends(manifest.axes[axis], rows)
-    labels = [f"{axis} {l}" for l in places] if image_format.format in ("png", "jpg") else []
+    labels = [f"{axis} {l}" for l in places] if image_format.format in FOR_SCREENS else []
     tile = _tile(manifest, len(cameras), width, labels)
     tiles = _tiles(manifest, cameras, places, (list(manifest.axes).index(axis), place), tile, progress)
     if labels:
@@ -128,11 +125,10 @@ def _shares(n: int, m: int) -> Float32:
 
 
 def _image_format(target: Path, exposure: float) -> ImageFormat:
-    suffix = target.suffix.lower()[1:]
-    name = _SAME.get(suffix, suffix)
+    name = format_name(target)
     if name not in get_args(Extension):
         raise OutputError(f"{target}: expected a .png, .jpg, .exr or .tif")
-    if exposure and name not in ("png", "jpg"):
+    if exposure and name not in FOR_SCREENS:
         raise OutputError(f"{target}: exposure changes PNG and JPEG alone; {target.suffix} keeps the radiance")
     return ImageFormat(format=name)  # type: ignore[arg-type]  # just checked
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .arrays import Bytes, Corners, CornerUvs, Float32, Int32, Real, Rgb, Triple
+from .colour import linear_from_srgb8
 from .kernel import inlined
 from .lanes import choose, count, doubles, floor, gather, integers, reals, root
 from .scene import Scene
@@ -53,15 +54,13 @@ class Surfaces(NamedTuple):
 def surfaces(scene: Scene) -> Surfaces:
     """Gather what kernels read of a scene; shares memory with it."""
     largest = np.abs(scene.corners).max(axis=(1, 2), initial=0.0)
-    code = np.arange(256) / 255.0
-    linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
     arrays = {name: np.ascontiguousarray(getattr(scene, name)) for name in Surfaces._fields if hasattr(scene, name)}
     textured = (scene.reflectivity_texture >= 0) | (scene.specular_texture >= 0)
     plain = ~textured & (len(scene.colours) == 0)
     return Surfaces(
         **arrays,
         offset=(OFFSET_ULPS * ULP * largest).astype(np.float32),
-        linear=linear.astype(np.float32),
+        linear=linear_from_srgb8(np.arange(256, dtype=np.uint8)),
         plain=plain.astype(np.uint8),
         total=np.where(plain[:, None], scene.reflectivity + scene.specular, np.float32(1.0)),
     )

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from .progress import ambient_figures
-from .screen import duration, size
+from .units import duration, size
 
 if TYPE_CHECKING:
     from .auto import AutoSettings

@@ -8,9 +8,8 @@ import typer
 
 from ..errors import JobError
 from ..screen import Screen, out, say
+from ..units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS
 from .options import Quiet, fail, place, problems
-
-MOST_SECONDS = 40_000.0  # as in a path file
 
 
 def assemble(
@@ -52,12 +51,14 @@ def assemble(
         ),
     ] = None,
     fps: Annotated[
-        float | None, typer.Option("--fps", min=0.01, max=1000, help="Frames a second.", metavar="RATE")
+        float | None, typer.Option("--fps", min=LEAST_FPS, max=MOST_FPS, help="Frames a second.", metavar="RATE")
     ] = None,
     blend: Annotated[bool, typer.Option("--blend", help="Blend between light positions.")] = False,
     exposure: Annotated[
         float,
-        typer.Option("--exposure", min=-64, max=64, help="Stops added to movies, PNG and JPEG.", metavar="STOPS"),
+        typer.Option(
+            "--exposure", min=-MOST_STOPS, max=MOST_STOPS, help="Stops added to movies, PNG and JPEG.", metavar="STOPS"
+        ),
     ] = 0.0,
     view: Annotated[
         str, typer.Option("--view", help="srgb, aces, or a view of the configuration in $OCIO.", metavar="VIEW")

@@ -43,9 +43,9 @@ def export(
 ) -> None:  # fmt: skip
     """Hand a frame array to other tools: images with cameras, lights, depth and points."""
     from ..export import export as run
-    from ..images import ImageFormat
+    from ..images import FOR_SCREENS, ImageFormat
 
-    if exposure and image_format not in ("png", "jpg"):
+    if exposure and image_format not in FOR_SCREENS:
         raise typer.BadParameter("changes PNG and JPEG alone", param_hint="--exposure")
     with Screen(out, quiet=quiet) as screen:
 

@@ -7,8 +7,9 @@ from typing import Annotated
 import typer
 
 from ..screen import Screen, out, say
+from ..units import MOST_THREADS
 from ..wording import chunks_line
-from .options import MOST_THREADS, JobFile, Quiet, place, read
+from .options import JobFile, Quiet, place, read
 
 
 def openjd(

@@ -11,11 +11,10 @@ import typer
 
 from ..errors import JobError, OutputError
 from ..screen import err, say
+from ..units import MOST_STOPS, MOST_THREADS
 
 if TYPE_CHECKING:
     from ..job import Job
-
-MOST_THREADS = 1024  # as in the job file
 
 JobFile = Annotated[Path, typer.Argument(metavar="JOB", help="Job file, TOML.", show_default=False)]
 Threads = Annotated[
@@ -30,7 +29,8 @@ Output = Annotated[
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 Exposure = Annotated[
-    float, typer.Option("--exposure", min=-64, max=64, help="Stops added to PNG and JPEG.", metavar="STOPS")
+    float,
+    typer.Option("--exposure", min=-MOST_STOPS, max=MOST_STOPS, help="Stops added to PNG and JPEG.", metavar="STOPS"),
 ]
 At = Annotated[
     list[str] | None,

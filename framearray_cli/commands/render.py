@@ -11,7 +11,8 @@ from ..compiling import compile_clock
 from ..errors import OutputError
 from ..parts.progress import PartEvents
 from ..progress import ambient_figures
-from ..screen import Screen, out, say, size
+from ..screen import Screen, out, say
+from ..units import MOST_THREADS, size
 from ..wording import (
     ambient_lines,
     chunks_line,
@@ -22,7 +23,7 @@ from ..wording import (
     target_lines,
     workers_text,
 )
-from .options import MOST_THREADS, JobFile, Output, Quiet, Threads, frames_of, read
+from .options import JobFile, Output, Quiet, Threads, frames_of, read
 
 if TYPE_CHECKING:
     from ..auto import AutoSettings

@@ -9,6 +9,8 @@ from ..errors import JobError
 from ..screen import Screen, out, say
 from .options import At, Exposure, Quiet, fail, place, problems
 
+MOST_WIDTH = 20_000  # pixels; more is a typing error
+
 
 def sheet(
     array: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `render` wrote.", show_default=False)],
@@ -22,7 +24,7 @@ def sheet(
     columns: Annotated[int, typer.Option("--columns", min=1, help="Cameras, at most.", metavar="N")] = 12,
     rows: Annotated[int, typer.Option("--rows", min=1, help="Light positions, at most.", metavar="N")] = 8,
     width: Annotated[
-        int, typer.Option("--width", min=1, max=20_000, help="Of the sheet, at most, pixels.", metavar="PIXELS")
+        int, typer.Option("--width", min=1, max=MOST_WIDTH, help="Of the sheet, at most, pixels.", metavar="PIXELS")
     ] = 2400,
     exposure: Exposure = 0.0,
     side: Annotated[

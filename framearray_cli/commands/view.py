@@ -7,8 +7,9 @@ import typer
 
 from ..interrupts import Stopped, forget
 from ..limits import available_cores
-from ..screen import Screen, out, say, size
-from .options import MOST_THREADS, Quiet, place
+from ..screen import Screen, out, say
+from ..units import MOST_THREADS, size
+from .options import Quiet, place
 
 if TYPE_CHECKING:
     from ..errors import OutputError

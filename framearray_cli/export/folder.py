@@ -7,11 +7,9 @@ from pathlib import Path
 
 from ..errors import OutputError
 from ..imageattributes import frame_attributes
-from ..images import ImageFormat, write_image
+from ..images import ImageFormat, format_name, write_image
 from ..pictures import Pictures
 from .selection import ExportedFrame
-
-_SAME = {"jpeg": "jpg", "tiff": "tif"}
 
 
 def earlier_export(target: Path, mark: str, *, force: bool) -> bool:
@@ -52,7 +50,7 @@ def place_picture(
     manifest = pictures.manifest
     image = pictures.picture(frame.c, frame.place)  # also where it is linked: a damaged one must not slip in
     source = pictures.whole_file(frame.c, frame.place)
-    if source is not None and not image_format.exposure and _format(source) == image_format.format:
+    if source is not None and not image_format.exposure and format_name(source) == image_format.format:
         with suppress(OSError):
             if not copy:
                 os.link(source, target)
@@ -70,8 +68,3 @@ def place_picture(
         software=f"framearray {manifest.version}",
     )
     write_image(target, image, image_format, attributes)
-
-
-def _format(path: Path) -> str:
-    suffix = path.suffix.lower()[1:]
-    return _SAME.get(suffix, suffix)

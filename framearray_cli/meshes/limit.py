@@ -5,9 +5,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from ..errors import SceneError
+from ..units import amount
 from ..usage import free_memory
-
-MIB, GIB = 2**20, 2**30
 
 
 @dataclass(slots=True, kw_only=True)
@@ -44,10 +43,3 @@ class Limit:
             yield
         finally:
             self.taken[kind] -= size
-
-
-def amount(size: int) -> str:
-    """A number of bytes for people."""
-    if size >= 0.1 * GIB:
-        return f"{size / GIB:,.1f} GiB"
-    return f"{max(size, 0) / MIB:.1f} MiB"

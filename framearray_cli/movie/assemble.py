@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import OutputError
 from ..files import folder_for
 from ..imagecheck import check_image
-from ..images import require_writer
+from ..images import format_name, require_writer
 from ..manifest import Manifest
 from ..manifestfile import read_manifest
 from ..pictures import Pictures, Relight
@@ -21,7 +21,7 @@ from .animation import ANIMATIONS, open_animation, require_animation
 from .label import SMALLEST, typeface
 from .look import Look, place_text, shown
 from .pathfile import Mode, MoviePath, load_movie_path
-from .sequence import check_look, kind, sequence_pattern, write_sequence
+from .sequence import check_look, sequence_pattern, write_sequence
 from .sweep import Sweep, swept
 from .timeline import Shot, Timeline, timeline
 from .video import VIDEOS, open_video, require_encoder
@@ -98,7 +98,7 @@ def assemble(
     else:
         pattern = sequence_pattern(target, _own_suffix(manifest), MOVIES)
         check_look(pattern, look)
-        require_writer(kind(pattern)[1:])  # type: ignore[arg-type]  # checked by sequence_pattern
+        require_writer(format_name(pattern))  # type: ignore[arg-type]  # checked by sequence_pattern
         _check_images(pictures, line)
         write_sequence(pictures, line, pattern, look, report)
         target = pattern.parent

@@ -7,17 +7,16 @@ from typing import Literal, TypeAlias
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from ..errors import JobError
-from ..framerate import frame_rate
 from ..jobfile import load_toml
 from ..jobvalues import Table, fail
 from ..manifest import MAIN_AXIS, Manifest
 from ..problems import problems_of
+from ..units import LEAST_FPS, MOST_FPS, MOST_SECONDS, frame_rate
 from .curves import LightChange
 from .easing import Ease
 from .places import Span
 
 MOST_FRAMES = 1_000_000  # eleven hours at 24 frames a second; more is a typing error
-MOST_SECONDS = 40_000.0
 MOST_LOOPS = 10_000
 
 Mode: TypeAlias = Literal["nearest", "blend"]
@@ -72,7 +71,7 @@ class MoviePath(Table):
     """What a path file holds."""
 
     fps: float | None = Field(
-        default=None, ge=0.01, le=1000, description="Frames per second; left out: those of the frame array."
+        default=None, ge=LEAST_FPS, le=MOST_FPS, description="Frames per second; left out: those of the frame array."
     )
     positions: Mode = Field(default="nearest", description="What is shown between two light positions.")
     segments: tuple[Segment, ...] = Field(strict=False, description="Played one after another; at least one.")

@@ -14,14 +14,11 @@ import numpy as np
 from ..errors import OutputError
 from ..files import folder_for, reason, temporary_folder
 from ..imageattributes import Attribute, frame_attributes
-from ..images import Extension, ImageFormat, read_image, write_codes, write_image
+from ..images import FOR_SCREENS, Extension, ImageFormat, format_name, read_image, write_codes, write_image
 from ..manifest import Manifest
 from ..pictures import Pictures, Relight
 from .look import Look, place_text, shown
 from .timeline import Shot, Timeline
-
-_SAME = {".jpeg": ".jpg", ".tiff": ".tif"}
-_FOR_SCREENS = (".png", ".jpg")
 
 
 def sequence_pattern(target: Path, own_suffix: str, movies: Sequence[str]) -> Path:
@@ -38,7 +35,7 @@ def sequence_pattern(target: Path, own_suffix: str, movies: Sequence[str]) -> Pa
     if not target.suffix or os.path.isdir(target):
         return target / f"frame.####{own_suffix}"
     images = ", ".join(f".{name}" for name in get_args(Extension))
-    if kind(target)[1:] not in get_args(Extension):
+    if format_name(target) not in get_args(Extension):
         raise OutputError(f"{target}: expected {', '.join(movies)} (a movie), {images} (numbered images) or a folder")
     if len(re.findall("#+", target.name)) != 1:
         raise OutputError(f'{target}: expected a name with "####" where the frame number goes, as in frame.####.png')
@@ -51,16 +48,10 @@ def check_look(pattern: Path, look: Look) -> None:
     Raises:
         OutputError: a look was asked for, and the format keeps radiance.
     """
-    if look.changes and kind(pattern) not in _FOR_SCREENS:
+    if look.changes and format_name(pattern) not in FOR_SCREENS:
         raise OutputError(
             f"{pattern}: {look.changes[0]} changes movies, PNG and JPEG alone; {pattern.suffix} keeps the radiance"
         )
-
-
-def kind(path: Path) -> str:
-    """Return the suffix in its usual spelling."""
-    suffix = path.suffix.lower()
-    return _SAME.get(suffix, suffix)
 
 
 def write_sequence(
@@ -126,14 +117,14 @@ def link(source: Path, target: Path) -> None:
 def _write_frame(pictures: Pictures, shot: Shot, relight: Relight, target: Path, fps: Fraction, look: Look) -> None:
     """Link one image, or compose and convert it where the format, the light or the look differs."""
     source = pictures.whole_file(shot.c, shot.positions, relight)
-    if source is not None and kind(source) == kind(target) and not look.changes:
+    if source is not None and format_name(source) == format_name(target) and not look.changes:
         read_image(source)  # a damaged image must not slip into the sequence
         link(source.resolve(), target)
         return
     image = pictures.picture(shot.c, shot.positions, relight)
-    extension: Extension = kind(target)[1:]  # type: ignore[assignment]  # checked by sequence_pattern
+    extension: Extension = format_name(target)  # type: ignore[assignment]  # checked by sequence_pattern
     attributes = _attributes(pictures.manifest, shot, fps)
-    if kind(target) in _FOR_SCREENS:
+    if format_name(target) in FOR_SCREENS:
         codes = shown(image, look, place_text(pictures.manifest, shot))
         write_codes(target, codes, ImageFormat(format=extension), attributes)
     else:

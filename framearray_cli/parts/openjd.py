@@ -12,6 +12,7 @@ from ..errors import OutputError
 from ..files import write_bytes
 from ..job import Job
 from ..ranges import frames_text
+from ..units import MOST_THREADS
 
 SUFFIXES = (".json", ".yaml", ".yml")  # what readers of templates go by
 
@@ -123,7 +124,7 @@ def _parameters(job: Job, job_file: Path, folder: Path, chunk: int, threads: int
             objectType="DIRECTORY", dataFlow="OUT",
         ),
         number("ChunkSize", chunk, job.camera.frames, "Frames a chunk", "Frames of a chunk of the camera path."),
-        *([number("Threads", threads, 1024, "Threads", "Threads of each chunk.")] if threads else []),
+        *([number("Threads", threads, MOST_THREADS, "Threads", "Threads of each chunk.")] if threads else []),
     ]  # fmt: skip
 
 

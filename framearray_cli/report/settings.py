@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from ..errors import JobError
 from ..job import Job
+from ..tomltext import brief
 
 # Settings by the job file's key.
 KEYS = {
@@ -79,14 +80,8 @@ class Settings:
         for key, field in KEYS.items():
             if getattr(self, field) != getattr(base, field):
                 table, name = key.split(".")
-                tables.setdefault(table, []).append(f"{name} = {_toml(getattr(self, field))}")
+                tables.setdefault(table, []).append(f"{name} = {brief(getattr(self, field))}")
         return [line for table, lines in tables.items() for line in (f"[{table}]", *lines)]
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f'"{value}"' if isinstance(value, str) else f"{value:g}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

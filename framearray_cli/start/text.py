@@ -3,11 +3,12 @@
 Written by hand, because comments are half of it; a test reads it back and compares.
 """
 
-import json
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
+from ..tomltext import inline, numbers, quoted
 from .model import Camera, LightKeys, MaterialNote, Start, source_keys
 
 MOST_STEPS_UP = 2  # folders that a relative name of the scene may climb; beyond, it is absolute
@@ -26,13 +27,13 @@ def to_text(start: Start, job_file: Path) -> str:
             f"# A first job for {_one_line(start.file.name)}, made by `framearray init`. Change it, then:",
             f"#   framearray render {_one_line(job_file.name)}",
             *_comments(low),
-            _line("name", _text(start.name), "starts every file name"),
+            _line("name", quoted(start.name), "starts every file name"),
             _line("seed", "0", "of all random numbers"),
             "",
             "[scene]",
-            _line("file", _text(scene_name(start.file, job_file)), "relative to this file"),
-            _line("up", _text(start.up), "the axis that points up"),
-            _line("background", _numbers(start.background), "radiance of what lies outside: the sky"),
+            _line("file", quoted(scene_name(start.file, job_file)), "relative to this file"),
+            _line("up", quoted(start.up), "the axis that points up"),
+            _line("background", numbers(start.background), "radiance of what lies outside: the sky"),
             *_materials(start.materials),
             "",
             *_camera(start.camera),
@@ -48,10 +49,10 @@ def to_text(start: Start, job_file: Path) -> str:
             "",
             "[obscurance]",
             _line("range", f"{start.range:g}", "how far surfaces darken and colour each other, scene units"),
-            _line("outside", _text(start.outside), _outside(start)),
+            _line("outside", quoted(start.outside), _outside(start)),
             "",
             "[output]",
-            _line("directory", _text(f"out/{start.name}"), "relative to this file"),
+            _line("directory", quoted(f"out/{start.name}"), "relative to this file"),
             _line("format", '"png"', '"exr" keeps the linear light, for work after the render'),
             _line("fps", "24", "frames a second of movies"),
             "",
@@ -104,7 +105,7 @@ def _source(source: LightKeys) -> list[str]:
     unit = "W/sr" if source.kind == "point" else "W/m2 of a surface that faces the light"
     power = "intensity" if source.kind == "point" else "irradiance"
     lines = [
-        _line("type", _text(source.kind), '"point": a lamp; "directional": the sun; "sun": by place and time'),
+        _line("type", quoted(source.kind), '"point": a lamp; "directional": the sun; "sun": by place and time'),
         f"keys = [                                  # {power}: red, green, blue, {unit}",
         *(f"  {_inline(key)}," for key in source_keys(source)),
         "]",
@@ -126,11 +127,11 @@ def _materials(materials: Sequence[MaterialNote]) -> list[str]:
         "# reflectivity: diffuse, 0 is black and 1 white; specular: above 0 it is a mirror; their sum is at most 1."
     )
     for material in materials:
-        lines.append(f"# [scene.materials.{_text(material.name)}]")
+        lines.append(f"# [scene.materials.{quoted(material.name)}]")
         more = f"  # {material.more}, which these numbers replace" if material.more else ""
-        lines.append(f"# reflectivity = {_numbers(material.reflectivity)}{more}")
+        lines.append(f"# reflectivity = {numbers(material.reflectivity)}{more}")
         if max(material.specular) > 0:
-            lines.append(f"# specular = {_numbers(material.specular)}")
+            lines.append(f"# specular = {numbers(material.specular)}")
     return lines
 
 
@@ -147,16 +148,5 @@ def _line(key: str, value: str, comment: str) -> str:
     return f"{f'{key} = {value}':<{COLUMN - 1}} # {comment}"
 
 
-def _text(value: str) -> str:
-    """A TOML string; control characters are escaped, and halves of characters, which TOML cannot hold, replaced."""
-    whole = value.encode("utf-8", "replace").decode("utf-8")
-    return json.dumps(whole, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _numbers(values: Iterable[float]) -> str:
-    return f"[{', '.join(f'{float(value)!r}' for value in values)}]"
-
-
-def _inline(table: dict[str, object]) -> str:
-    cells = (f"{k} = {v if isinstance(v, int) else _numbers(v)}" for k, v in table.items())  # type: ignore[arg-type]
-    return f"{{ {', '.join(cells)} }}"
+def _inline(table: dict[str, Any]) -> str:
+    return inline({key: value if isinstance(value, int) else list(map(float, value)) for key, value in table.items()})

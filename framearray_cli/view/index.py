@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Float32, is_number
+from ..images import FOR_SCREENS, format_name
 from ..manifest import Manifest
 from .streams import LAYERS, Stream
 
@@ -83,7 +84,7 @@ def index_table(manifest: Manifest, streams: Sequence[Stream], layout: SheetLayo
 def _exposure(manifest: Manifest) -> float:
     """Stops that the job brightens PNG and JPEG by; those images have it in them, others show it on the page."""
     output = manifest.job.get("output", {})
-    linear = manifest.groups or not manifest.images.lower().endswith((".png", ".jpg", ".jpeg"))
+    linear = manifest.groups or format_name(manifest.images) not in FOR_SCREENS
     value = output.get("exposure", 0.0) if isinstance(output, dict) and linear else 0.0
     return float(value) if is_number(value) else 0.0
 

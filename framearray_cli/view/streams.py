@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Float32, Image
 from ..errors import OutputError
 from ..filepatterns import file_name
-from ..images import read_image
+from ..images import FOR_SCREENS, format_name, read_image
 from ..manifest import Manifest, ManifestGroup, image_path, layers_path
 from .coding import PLAIN, Coding, coding_for, data_coding
 
@@ -141,7 +141,7 @@ def _some(manifest: Manifest, stream: Stream, read_layers: ReadLayers) -> Iterat
 
 def _is_clipped(manifest: Manifest, stream: Stream) -> bool:
     """Whether the array itself keeps nothing beyond 1."""
-    return stream.role != "layer" and source_file(manifest, stream, 0, 0).suffix.lower() in (".png", ".jpg", ".jpeg")
+    return stream.role != "layer" and format_name(source_file(manifest, stream, 0, 0)) in FOR_SCREENS
 
 
 def _channels(name: str, letters: str) -> list[str]:

@@ -8,7 +8,8 @@ from rich.console import Console
 
 from framearray_cli import screen
 from framearray_cli.errors import OutputError
-from framearray_cli.screen import Screen, duration, say, size
+from framearray_cli.screen import Screen, say
+from framearray_cli.units import duration, size
 
 
 class Clock:

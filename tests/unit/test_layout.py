@@ -13,8 +13,9 @@ PACKAGE = Path(framearray_cli.__file__).parent
 
 # Every file, in the order in which data flows; a file imports only from those before it.
 FLOW = """
-__init__ errors arrays files limits kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
-compiling framerate fingerprint colour sphere usage
+__init__ errors units tomltext arrays files limits
+kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
+compiling fingerprint colour sphere usage
 jobvalues jobtimes jobkeys jobmethod job jobschema jobdocs problems eyefile jobfile
 meshes/limit meshes/model meshes/assets meshes/gltf_values meshes/gltf_check meshes/container meshes/headers
 meshes/cleaning
@@ -67,7 +68,7 @@ DOORS = {
     "OpenImageIO": ("exrtiff", "movie/display"),
     "PIL": ("meshes/", "pngjpeg", "movie/label", "movie/animation", "sheet"),
     "tomllib": ("jobfile", "manifestfile"),
-    "tomli_w": ("manifestfile", "report/tables"),
+    "tomli_w": ("manifestfile", "tomltext", "report/tables"),
     "matplotlib": ("report/plots",),
     "jinja2": ("report/page",),
     "flip_evaluator": ("report/flip",),

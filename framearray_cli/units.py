@@ -1,0 +1,60 @@
+"""Frame rates, times and numbers of bytes: how they are computed, and how messages show them."""
+
+from fractions import Fraction
+
+MIB, GIB = 2**20, 2**30
+# Bounds of jobs, path files and options alike; what is beyond them is a typing error.
+LEAST_FPS, MOST_FPS = 0.01, 1000  # frames per second
+MOST_SECONDS = 40_000.0  # of a movie, or a part of it
+MOST_STOPS = 64  # of exposure, either way
+MOST_THREADS = 1024
+
+# A rate that people write as 23.976, 29.97 or 59.94 means 24, 30 or 60 times 1000 / 1001.
+_NTSC = tuple(Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 120))
+
+
+def frame_rate(fps: float | Fraction) -> Fraction:
+    """Turn frames per second into an exact fraction: 24 -> 24/1, 23.976 -> 24000/1001, 12.5 -> 25/2.
+
+    Raises:
+        ValueError: fps is not a positive, finite number.
+    """
+    if not 0 < fps < float("inf"):
+        raise ValueError(f"expected a positive frame rate, got {fps}")
+    if isinstance(fps, Fraction):
+        return fps
+    for rate in _NTSC:
+        if abs(fps - float(rate)) < 0.005:  # 23.98 is 0.004 off; the next rate in use, 24, is 0.024 off
+            return rate
+    return Fraction(fps).limit_denominator(1001)
+
+
+def duration(seconds: float) -> str:
+    """A time in the two units that matter: "3 h 05 min", "2 min 07 s", "12.3 s"."""
+    if seconds < 60:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {rest:02d} s"
+    return f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def size(n_bytes: float) -> str:
+    """A number of bytes in the unit that suits: "1.3 GiB"."""
+    for unit in ("bytes", "KiB", "MiB"):
+        if n_bytes < 1024:
+            return f"{n_bytes:.0f} {unit}" if unit == "bytes" else f"{n_bytes:.1f} {unit}"
+        n_bytes /= 1024
+    return f"{n_bytes:.1f} GiB" if n_bytes < 1024 else f"{n_bytes / 1024:.1f} TiB"
+
+
+def gibibytes(n_bytes: int) -> str:
+    """A number of bytes in GiB, small ones with one more digit: "1.3 GiB", "0.42 GiB"."""
+    return f"{n_bytes / GIB:.{1 if n_bytes >= GIB else 2}f} GiB"
+
+
+def amount(n_bytes: int) -> str:
+    """A number of bytes in GiB, or in MiB where it is below 0.1 GiB: "1.3 GiB", "12.0 MiB"."""
+    if n_bytes >= 0.1 * GIB:
+        return f"{n_bytes / GIB:,.1f} GiB"
+    return f"{max(n_bytes, 0) / MIB:.1f} MiB"

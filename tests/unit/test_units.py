@@ -1,0 +1,63 @@
+"""How messages show amounts, and how values stand in a TOML file."""
+
+import math
+import tomllib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as some
+
+from framearray_cli import tomltext
+from framearray_cli.units import GIB, MIB, amount, gibibytes, size
+
+
+@pytest.mark.parametrize(
+    ("n_bytes", "texts"),
+    [
+        (1023, ("1023 bytes", "0.00 GiB", "0.0 MiB")),
+        (100 * MIB, ("100.0 MiB", "0.10 GiB", "100.0 MiB")),
+        (GIB // 2, ("512.0 MiB", "0.50 GiB", "0.5 GiB")),
+        (GIB, ("1.0 GiB", "1.0 GiB", "1.0 GiB")),
+        (2000 * GIB, ("2.0 TiB", "2000.0 GiB", "2,000.0 GiB")),
+    ],
+)
+def test_bytes(n_bytes: int, texts: tuple[str, ...]) -> None:
+    assert (size(n_bytes), gibibytes(n_bytes), amount(n_bytes)) == texts
+
+
+def test_less_than_nothing_is_nothing() -> None:
+    assert amount(-5) == "0.0 MiB"
+
+
+plain = some.recursive(
+    some.booleans() | some.integers(-(2**63), 2**63 - 1) | some.floats(allow_nan=False) | some.text(),
+    lambda inner: some.lists(inner, max_size=3) | some.dictionaries(some.from_regex(r"\A[a-z_]+\Z"), inner, max_size=3),
+    max_leaves=6,
+)
+
+
+@given(plain)
+def test_values_come_back(value: object) -> None:
+    assert tomllib.loads(f"x = {tomltext.inline(value)}")["x"] == value
+
+
+@given(some.text(some.characters(exclude_categories=())))
+def test_any_text_can_be_quoted(text: str) -> None:
+    """Also halves of characters, as names of files may hold; they become question marks."""
+    found = tomllib.loads(f"x = {tomltext.quoted(text)}")["x"]
+    assert found == text.encode("utf-8", "replace").decode()
+
+
+@given(some.lists(some.floats(allow_nan=False)))
+def test_numbers_come_back_as_floats(values: list[float]) -> None:
+    found = tomllib.loads(f"x = {tomltext.numbers(values)}")["x"]
+    assert found == values and all(isinstance(value, float) for value in found)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(True, "true"), ("auto", '"auto"'), (4.0, "4"), (1 / 3, "0.333333"), (12, "12")]
+)
+def test_settings_are_brief(value: bool | str | float, text: str) -> None:
+    assert tomltext.brief(value) == text
+    found = tomllib.loads(f"x = {text}")["x"]
+    assert found == value or math.isclose(found, float(value), rel_tol=1e-5)
