@@ -1,9 +1,11 @@
 """The command line: its commands, and how errors become messages and exit codes; they end the process here alone."""
 
 import io
+import re
 import sys
 from collections.abc import Sequence
-from typing import Annotated
+from contextlib import suppress
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -13,21 +15,21 @@ from .commands.check import check
 from .commands.export import export
 from .commands.init import init
 from .commands.openjd import openjd
-from .commands.options import fail, notes, problems
 from .commands.render import render
 from .commands.report import report
 from .commands.schema import schema
 from .commands.sheet import sheet
 from .commands.verify import verify
 from .commands.view import view
-from .errors import FrameArrayError, JobError
+from .errors import FrameArrayError, JobError, OutputError
 from .interrupts import Stopped, forget, listen, stopped_by
 from .limits import READS, RENDERS, require_address_space
-from .screen import out, say
+from .screen import err, out, say
 
 OUT_OF_MEMORY = 2  # the job asks for more than the machine has
 NO_THREADS = "can't start new thread"  # what Python says
 RENDERING = ("render", "check", "init", "report")  # commands that may trace rays
+WRITING = ("assemble", "init", "export", "sheet")  # commands that do not render the images of a job
 
 app = typer.Typer(
     name="framearray",
@@ -54,6 +56,7 @@ def _options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
+    context.ensure_object(list).append(context.invoked_subcommand)
     if context.invoked_subcommand != "schema":
         require_address_space(RENDERS if context.invoked_subcommand in RENDERING else READS)
 
@@ -65,29 +68,50 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if isinstance(stream, io.TextIOWrapper):  # a file name that the terminal cannot show is no reason to fail
             stream.reconfigure(errors="backslashreplace")
     arguments = sys.argv[1:] if arguments is None else arguments
+    begun: list[str] = []  # the command that runs, once it is known
     try:
-        app(list(arguments) or ["--help"], prog_name="framearray")
-    except JobError as error:
-        fail(problems(error, "nothing was rendered"), error.exit_code)
-    except FrameArrayError as error:
-        fail([*str(error).splitlines(), *notes(error)], error.exit_code)
-    except MemoryError as error:
+        app(list(arguments) or ["--help"], prog_name="framearray", obj=begun)
+    except (FrameArrayError, MemoryError, Stopped, RuntimeError) as error:
+        lines, exit_code = ending(error, begun[0] if begun else "")
+        _fail(lines, exit_code)
+
+
+def ending(error: BaseException, command: str) -> tuple[list[str], int]:
+    """Find what to print about an error that ends a command, and the exit code; any other is raised again.
+
+    Args:
+        command: name of the command.
+    """
+    notes = list(getattr(error, "__notes__", ()))  # what was added to the error on its way
+    if isinstance(error, JobError):
+        return _problem_lines(error, "nothing was written" if command in WRITING else "nothing was rendered")
+    if isinstance(error, FrameArrayError):
+        return [*str(error).splitlines(), *notes], error.exit_code
+    if isinstance(error, MemoryError):
         less = (
             "a render takes less with a smaller resolution or n_r, or fewer lights; `framearray check` tells how much"
         )
-        fail([f"not enough memory; {less}", *notes(error)], OUT_OF_MEMORY)
-    except (Stopped, RuntimeError) as error:
-        stopped = stopped_by(error)
-        if stopped is None and NO_THREADS in str(error):
-            limits = "`ulimit -u`, `ulimit -v` or a container's limit"
-            fail(
-                [
-                    f"no more threads can be started; --threads 1 takes the fewest; the limit may be {limits}",
-                    *notes(error),
-                ],
-                OUT_OF_MEMORY,
-            )
-        if stopped is None:
-            raise
+        return [f"not enough memory; {less}", *notes], OUT_OF_MEMORY
+    if stopped := stopped_by(error):
         forget()
-        fail([stopped.word, *notes(error)], stopped.exit_code)
+        return [stopped.word, *notes], stopped.exit_code
+    if NO_THREADS in str(error):
+        limits = "`ulimit -u`, `ulimit -v` or a container's limit"
+        line = f"no more threads can be started; --threads 1 takes the fewest; the limit may be {limits}"
+        return [line, *notes], OUT_OF_MEMORY
+    raise error
+
+
+def _problem_lines(error: JobError, outcome: str) -> tuple[list[str], int]:
+    """List the problems of a job file, a path file or options, and what came of them."""
+    more = re.fullmatch(r"and (\d+) more problems", error.problems[-1])
+    n = len(error.problems) - 1 + int(more[1]) if more else len(error.problems)
+    lines = [f"{error.file}: {problem}".replace("\n", "\\n") for problem in error.problems]
+    return [*lines, f"{n:,} problem{'s' if n > 1 else ''}; {outcome}."], error.exit_code
+
+
+def _fail(lines: Sequence[str], code: int) -> NoReturn:
+    """Print what is wrong and end the process; where nobody can read that, the exit code still says it."""
+    with suppress(OutputError, OSError):  # a terminal that was closed
+        say(err, lines)
+    sys.exit(code)

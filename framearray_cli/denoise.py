@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import Float32
-from .errors import MissingExtraError
+from .extras import extra
 
 
 def require_denoiser() -> Any:
@@ -19,13 +19,8 @@ def require_denoiser() -> Any:
     Raises:
         MissingExtraError: pyoidn is not installed.
     """
-    try:
+    with extra("denoise.obscurance needs Open Image Denoise", '"framearray[denoise]"'):
         import pyoidn
-    except ImportError as error:
-        raise MissingExtraError(
-            "denoise.obscurance needs Open Image Denoise, which is not installed; "
-            'install it with: pip install "framearray[denoise]"'
-        ) from error
     return pyoidn
 
 

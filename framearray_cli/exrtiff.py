@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Float32
-from .errors import MissingExtraError, OutputError
+from .errors import OutputError
+from .extras import extra
 from .files import refusal, whole_file
 from .imageattributes import FIXED_DATE, Attribute, Attributes
 from .pngjpeg import check_size
@@ -87,10 +88,8 @@ def last_row(path: Path) -> tuple[int, int] | None:
 @cache
 def oiio() -> Any:
     """Import OpenImageIO, with its own threads off: callers write several files at once instead."""
-    try:
+    with extra("images need OpenImageIO", "OpenImageIO", reason=True):
         import OpenImageIO
-    except ImportError as error:
-        raise MissingExtraError(f"images need OpenImageIO ({error}); pip install OpenImageIO") from error
     OpenImageIO.attribute("threads", 1)
     OpenImageIO.attribute("exr_threads", -1)  # -1: compress in the calling thread; 1 would hand it to another
     return OpenImageIO

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import Float64
-from .errors import MissingExtraError
+from .extras import extra
 from .jobtimes import moment, zone_of
 
 PRESSURE_HPA, TEMPERATURE_C = 1013.25, 12.0  # of the air that bends the light, standard at sea level; pvlib's defaults
@@ -47,12 +47,8 @@ def require_pvlib() -> Any:
     Raises:
         MissingExtraError: pvlib is not installed.
     """
-    try:
+    with extra('a source of type "sun" needs pvlib', '"framearray[sun]"'):
         from pvlib import spa
-    except ImportError as error:
-        raise MissingExtraError(
-            'a source of type "sun" needs pvlib, which is not installed; install it with: pip install "framearray[sun]"'
-        ) from error
     return spa
 
 

@@ -6,10 +6,9 @@ from typing import Annotated
 
 import typer
 
-from ..errors import JobError
 from ..screen import Screen, out, say
 from ..units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS
-from .options import Quiet, fail, place, problems
+from .options import Quiet, place
 
 
 def assemble(
@@ -82,18 +81,15 @@ def assemble(
                 screen.count("assembling", total, "frame")
             screen.advance()
 
-        try:
-            result = run(
-                array,
-                path_file or Sweep(kind=kinds[0], at=tuple(at or ()), seconds=seconds),
-                place(target),
-                look=Look(exposure=exposure, view=find_view(view), label=label),
-                fps=fps,
-                positions="blend" if blend else None,
-                progress=progress,
-            )
-        except JobError as error:
-            fail(problems(error, "nothing was written"), error.exit_code)
+        result = run(
+            array,
+            path_file or Sweep(kind=kinds[0], at=tuple(at or ()), seconds=seconds),
+            place(target),
+            look=Look(exposure=exposure, view=find_view(view), label=label),
+            fps=fps,
+            positions="blend" if blend else None,
+            progress=progress,
+        )
     if not quiet:
         rate = f"{float(result.fps):g} frames a second"
         say(out, [f"{result.target}: {result.n_frames} frames from {result.n_images} images, {rate}"])

@@ -5,9 +5,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from ..errors import JobError
 from ..screen import Screen, out, say
-from .options import Exposure, Quiet, fail, place, problems
+from .options import Exposure, Quiet, place
 
 
 def export(
@@ -54,14 +53,11 @@ def export(
                 screen.count("exporting", total, "image")
             screen.advance()
 
-        try:
-            made = run(
-                array, place(target), kind, cameras=cameras, light=light, at=at or (),
-                image_format=ImageFormat(format=image_format, exposure=exposure), points=points, copy=copy,
-                force=force, progress=progress,
-            )  # fmt: skip
-        except JobError as error:
-            fail(problems(error, "nothing was written"), error.exit_code)
+        made = run(
+            array, place(target), kind, cameras=cameras, light=light, at=at or (),
+            image_format=ImageFormat(format=image_format, exposure=exposure), points=points, copy=copy,
+            force=force, progress=progress,
+        )  # fmt: skip
     if not quiet:
         lights = f"{made.n_places} light position{'s' if made.n_places > 1 else ''}"
         points_too = f", {made.n_points:,} points" if kind != "cinema" else ""

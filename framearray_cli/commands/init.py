@@ -7,9 +7,8 @@ from typing import Annotated
 import typer
 
 from ..compiling import compile_clock
-from ..errors import JobError
 from ..screen import Screen, out, say
-from .options import Quiet, fail, place, problems
+from .options import Quiet, place
 
 MOST = 1000  # frames or lights of a first job
 
@@ -45,12 +44,9 @@ def init(
         from ..start import Wishes
         from ..start import init as run
 
-        try:
-            with compile_clock(screen.compiling):
-                wishes = Wishes(camera=camera, frames=frames, lights=lights, inside=inside)
-                start = run(scene, job_file, wishes, force=force)
-        except JobError as error:
-            fail(problems(error, "nothing was written"), error.exit_code)
+        with compile_clock(screen.compiling):
+            wishes = Wishes(camera=camera, frames=frames, lights=lights, inside=inside)
+            start = run(scene, job_file, wishes, force=force)
     if not quiet:
         images = start.camera.frames * start.light_frames
         size = f"{start.camera.frames} eyes x {start.light_frames} lights = {images} images"

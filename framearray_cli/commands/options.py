@@ -1,16 +1,10 @@
-"""Options and endings that several commands share."""
+"""Options that several commands share."""
 
-import re
-import sys
-from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..errors import JobError, OutputError
-from ..screen import err, say
 from ..units import MOST_STOPS, MOST_THREADS
 
 if TYPE_CHECKING:
@@ -71,23 +65,3 @@ def place(name: str, option: str = "--output") -> Path:
     if not name.strip():  # most often a shell variable that is not set; Path would make "." of it
         raise typer.BadParameter("expected a name, got none", param_hint=option)
     return Path(name)
-
-
-def problems(error: JobError, outcome: str) -> list[str]:
-    """The problems of a job or path file, and what came of them."""
-    more = re.fullmatch(r"and (\d+) more problems", error.problems[-1])
-    n = len(error.problems) - 1 + int(more[1]) if more else len(error.problems)
-    lines = [f"{error.file}: {problem}".replace("\n", "\\n") for problem in error.problems]
-    return [*lines, f"{n:,} problem{'s' if n > 1 else ''}; {outcome}."]
-
-
-def fail(lines: Sequence[str], code: int) -> NoReturn:
-    """Print what is wrong and end the process; the exit code tells it where nobody can read it."""
-    with suppress(OutputError, OSError):  # a terminal that was closed
-        say(err, lines)
-    sys.exit(code)
-
-
-def notes(error: BaseException) -> list[str]:
-    """What was added to an error on its way."""
-    return list(getattr(error, "__notes__", ()))

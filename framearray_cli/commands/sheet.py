@@ -5,9 +5,8 @@ from typing import Annotated
 
 import typer
 
-from ..errors import JobError
 from ..screen import Screen, out, say
-from .options import At, Exposure, Quiet, fail, place, problems
+from .options import At, Exposure, Quiet, place
 
 MOST_WIDTH = 20_000  # pixels; more is a typing error
 
@@ -43,13 +42,10 @@ def sheet(
                 screen.count("drawing", total, "image")
             screen.advance()
 
-        try:
-            made = make_sheet(
-                array, place(target), columns=columns, rows=rows, width=width, exposure=exposure, side=side,
-                at=at or (), progress=progress,
-            )  # fmt: skip
-        except JobError as error:
-            fail(problems(error, "nothing was written"), error.exit_code)
+        made = make_sheet(
+            array, place(target), columns=columns, rows=rows, width=width, exposure=exposure, side=side,
+            at=at or (), progress=progress,
+        )  # fmt: skip
     if not quiet:
         shown = f"{len(made.cameras)} cameras, {len(made.places)} light positions"
         say(out, [f"{made.target}: {shown}, {made.size[0]} x {made.size[1]} pixels"])

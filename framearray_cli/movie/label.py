@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Float32
-from ..errors import MissingExtraError
+from ..extras import extra
 
 LINES_A_PICTURE = 18  # heights of the text in that of the picture
 SMALLEST = 10  # pixels; smaller letters cannot be read
@@ -45,12 +45,8 @@ def typeface(size: int) -> Any:
     """
     from PIL import ImageFont
 
-    try:
+    with extra("labels need Pillow with FreeType", "--force-reinstall Pillow brings it", reason=True):
         return ImageFont.load_default(size)
-    except ImportError as error:
-        raise MissingExtraError(
-            f"labels need Pillow with FreeType ({error}); pip install --force-reinstall Pillow brings it"
-        ) from error
 
 
 @lru_cache(64)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MissingExtraError, OutputError
+from ..extras import extra
 from ..files import whole_file
 from .yuv import planes_422_10
 
@@ -66,10 +67,8 @@ def require_av() -> ModuleType:
     Raises:
         MissingExtraError: it is not installed.
     """
-    try:
+    with extra("movies need PyAV", '"framearray[movie]"', reason=True):
         import av
-    except ImportError as error:
-        raise MissingExtraError(f'movies need PyAV ({error}); pip install "framearray[movie]"') from error
     module: ModuleType = av
     return module
 

@@ -8,7 +8,8 @@ from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from ..errors import JobError, MissingExtraError
+from ..errors import JobError
+from ..extras import extra
 
 PATIENCE = 5.0  # seconds in which a scheduler must answer
 SILENT = logging.CRITICAL + 1
@@ -20,13 +21,8 @@ def require_dask() -> Any:
     Raises:
         MissingExtraError: Dask distributed is not installed.
     """
-    try:
+    with extra("--workers and --dask need Dask distributed", '"framearray[dask]"'):
         import distributed
-    except ImportError as error:
-        raise MissingExtraError(
-            "--workers and --dask need Dask distributed, which is not installed; "
-            'install it with: pip install "framearray[dask]"'
-        ) from error
     for name in list(logging.root.manager.loggerDict):  # what matters is told by this program, in its own words
         if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
             logging.getLogger(name).setLevel(SILENT)

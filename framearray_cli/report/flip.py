@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Float32, Image
-from ..errors import MissingExtraError
+from ..extras import not_installed
 
 # What the extra `report` brings.
 EXTRA = ("matplotlib", "flip_evaluator", "jinja2")
@@ -21,10 +21,7 @@ def require_extra() -> None:
 
     missing = [name for name in EXTRA if find_spec(name) is None]
     if missing:
-        raise MissingExtraError(
-            f"a report needs {', '.join(missing)}, which is not installed; "
-            'install it with: pip install "framearray[report]"'
-        )
+        raise not_installed(f"a report needs {', '.join(missing)}", '"framearray[report]"')
 
 
 def flip_map(image: Image, reference: Image) -> Float32:

@@ -13,7 +13,7 @@ PACKAGE = Path(framearray_cli.__file__).parent
 
 # Every file, in the order in which data flows; a file imports only from those before it.
 FLOW = """
-__init__ errors units tomltext arrays files limits
+__init__ errors extras units tomltext arrays files limits
 kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
 compiling fingerprint colour sphere usage
 jobvalues jobtimes jobkeys jobmethod job jobschema jobdocs problems eyefile jobfile

@@ -1,0 +1,94 @@
+"""How errors end a command: what is printed, and the exit code; the same for all commands."""
+
+import importlib
+
+import pytest
+
+from framearray_cli import cli
+from framearray_cli.cli import ending
+from framearray_cli.errors import (
+    BusyError,
+    CheckError,
+    JobError,
+    LimitError,
+    MissingExtraError,
+    OutputError,
+    SceneError,
+    WorkerError,
+)
+from framearray_cli.interrupts import Stopped
+
+COMMANDS = [command.callback.__name__ for command in cli.app.registered_commands]
+ENDINGS = [
+    (SceneError("a.glb: broken"), ["a.glb: broken"], 3),
+    (OutputError("out: full\nand more"), ["out: full", "and more"], 4),
+    (BusyError("out: busy"), ["out: busy"], 4),
+    (WorkerError("lost"), ["lost"], 4),
+    (CheckError("1 damaged"), ["1 damaged"], 5),
+    (LimitError("`ulimit -v`"), ["`ulimit -v`"], 2),
+    (MissingExtraError("needs PyAV"), ["needs PyAV"], 2),
+    (Stopped(2), ["interrupted"], 130),
+    (Stopped(15), ["terminated"], 143),
+]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(("error", "lines", "code"), ENDINGS, ids=lambda value: type(value).__name__)
+def test_errors_end_all_commands_alike(command: str, error: BaseException, lines: list[str], code: int) -> None:
+    assert ending(error, command) == (lines, code)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_job_error_lists_its_problems_and_what_came_of_them(command: str) -> None:
+    outcome = "written" if command in ("assemble", "init", "export", "sheet") else "rendered"
+    one = ending(JobError("a.toml", ["x: expected\ny"]), command)
+    assert one == (["a.toml: x: expected\\ny", f"1 problem; nothing was {outcome}."], 2)
+    many = ending(JobError("a.toml", ["x", "and 1234 more problems"]), command)
+    assert many == (["a.toml: x", "a.toml: and 1234 more problems", f"1,235 problems; nothing was {outcome}."], 2)
+
+
+def test_notes_follow() -> None:
+    for error, first in ((OutputError("out: full"), "out: full"), (MemoryError(), "not enough memory; a render")):
+        error.add_note("5 of 9 images were written")
+        lines, _ = ending(error, "render")
+        assert lines[0].startswith(first) and lines[1:] == ["5 of 9 images were written"]
+
+
+def test_too_few_threads_are_no_fault_of_the_program() -> None:
+    lines, code = ending(RuntimeError("can't start new thread"), "render")
+    assert code == 2 and lines[0].startswith("no more threads can be started; --threads 1 takes the fewest")
+    with pytest.raises(RuntimeError, match="another"):
+        ending(RuntimeError("another"), "render")
+
+
+def test_an_error_that_a_signal_led_to_counts_as_the_signal() -> None:
+    error = RuntimeError("cannot release un-acquired lock")
+    error.__context__ = Stopped(2)
+    assert ending(error, "render") == (["interrupted"], 130)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "function"),
+    [
+        ("assemble out --walk -o m.mp4", "movie.assemble.assemble"),
+        ("export out -f colmap -o x", "export.export"),
+        ("init scene.glb", "start.init"),
+        ("sheet out -o s.png", "sheet.make_sheet"),
+        ("verify out", "verify.verify"),
+        ("view out", "view.run.open_tiles"),
+        ("render job.toml", "jobfile.read_job"),
+        ("openjd job.toml", "jobfile.read_job"),
+    ],
+)
+def test_commands_as_typed(capsys, monkeypatch, arguments: str, function: str) -> None:
+    def refuse(*args: object, **options: object) -> None:
+        raise JobError("a.toml", ["x: expected y"])
+
+    module, _, name = function.rpartition(".")
+    monkeypatch.setattr(importlib.import_module(f"framearray_cli.{module}"), name, refuse)
+    monkeypatch.setattr(cli, "listen", lambda: None)
+    with pytest.raises(SystemExit) as end:
+        cli.main(arguments.split())
+    outcome = "written" if name in ("assemble", "export", "init", "make_sheet") else "rendered"
+    assert end.value.code == 2
+    assert tuple(capsys.readouterr()) == ("", f"a.toml: x: expected y\n1 problem; nothing was {outcome}.\n")
