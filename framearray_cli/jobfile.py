@@ -10,11 +10,8 @@ from .errors import JobError
 from .eyefile import EyeFileError, read_eyes
 from .files import read_at_most
 from .job import Job
-from .jobschema import job_schema
 from .jobvalues import absolute, long_key, shown
 from .problems import problems_of
-
-__all__ = ["job_schema", "job_table", "load_toml", "problems_of", "read_job"]
 
 LARGEST_FILE = 4 * 1024 * 1024  # bytes; a hand-written job is a thousand times smaller, so more is the wrong file
 

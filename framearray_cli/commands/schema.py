@@ -7,6 +7,6 @@ def schema() -> None:
     """Print the JSON Schema of job files, for editors that complete and check them."""
     import json
 
-    from ..jobfile import job_schema
+    from ..jobschema import job_schema
 
     say(out, json.dumps(job_schema(), indent=2).splitlines())

@@ -9,7 +9,9 @@ import pytest
 from pydantic import ValidationError
 
 from framearray_cli.job import Job
-from framearray_cli.jobfile import job_schema, job_table, problems_of
+from framearray_cli.jobfile import job_table
+from framearray_cli.jobschema import job_schema
+from framearray_cli.problems import problems_of
 
 EXAMPLE = """
 name = "cabin"                    # starts every file name

@@ -303,7 +303,7 @@ def test_no_content_gives_anything_but_a_job_or_a_job_error(data):
     """Put rubbish anywhere into a good job: every way it fails has words, and none of them are pydantic's."""
     from pydantic import ValidationError
 
-    from framearray_cli.jobfile import problems_of
+    from framearray_cli.problems import problems_of
 
     key = {"frame": 0, "eye": [0, 0, 5], "target": [0, 0, 0]}
     lamp = {"type": "point", "keys": [{"frame": 0, "position": [1, 2, 0], "intensity": 10}]}
