@@ -14,7 +14,7 @@ from .embree import EmbreeScene
 from .expected import Model, Reuse, independent_hits
 from .job import Job
 from .jobmethod import DEFAULT_HITS, DEFAULT_N_R
-from .jobvalues import MOST_HITS, SHARES
+from .jobvalues import MOST_HITS, SHARES, changed
 from .memory import light_blocks, require_memory
 from .prepare import Prepared
 
@@ -124,11 +124,8 @@ def auto_keys(job: Job) -> tuple[str, ...]:
 def applied(prepared: Prepared, reuse: Reuse) -> Prepared:
     """The same job with these settings."""
     job = prepared.job
-    updates = {
-        "reuse": job.reuse.model_copy(update={"n_r": reuse.n_r}),
-        "samples": job.samples.model_copy(update={"hits": reuse.hits}),
-    }
-    return replace(prepared, job=job.model_copy(update=updates))
+    new = changed(job, reuse=changed(job.reuse, n_r=reuse.n_r), samples=changed(job.samples, hits=reuse.hits))
+    return replace(prepared, job=new)
 
 
 def wanted_variance(job: Job) -> float:

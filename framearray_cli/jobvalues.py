@@ -8,10 +8,11 @@ import math
 import os
 import re
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal, NoReturn, TypeAlias
+from typing import Annotated, Any, Literal, NoReturn, TypeAlias, TypeVar
 
-from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationError, ValidationInfo, WithJsonSchema
+from pydantic import BaseModel, ConfigDict, PlainValidator, TypeAdapter, ValidationError, ValidationInfo, WithJsonSchema
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 Place: TypeAlias = tuple[int | str, ...]  # keys and list positions from the value at hand down to the problem
@@ -256,9 +257,34 @@ class Table(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
+_Table = TypeVar("_Table", bound=Table)
+
+
 def fill(table: Table, key: str, value: object) -> None:
     """Set what the file left out; only while a table is being made."""
     object.__setattr__(table, key, value)
+
+
+def changed(table: _Table, **values: object) -> _Table:
+    """Copy a table with other values, each checked as one of a file is; `model_copy` takes any name and any value.
+
+    Only single values are checked: a report measures settings that do not go together in a file.
+
+    Raises:
+        ValidationError: a key has no such value.
+        KeyError: there is no such key.
+    """
+    for key, value in values.items():
+        _value_check(type(table), key).validate_python(value, strict=True)
+    return table.model_copy(update=values)
+
+
+@cache
+def _value_check(kind: type[Table], key: str) -> TypeAdapter[Any]:
+    field = kind.model_fields[key]
+    bounds = tuple(field.metadata)
+    checked: Any = Annotated[(field.annotation, *bounds)] if bounds else field.annotation
+    return TypeAdapter(checked)
 
 
 def computed(text: str) -> dict[str, Any]:

@@ -35,19 +35,22 @@ At = Annotated[
 def read(job_file: Path, threads: int | None, output: str | None) -> "Job":
     """Read a job file; options replace what it says."""
     from ..jobfile import read_job
+    from ..jobvalues import changed
 
     job = with_threads(read_job(job_file), threads)
     if output is None:
         return job
-    table = job.output.model_copy(update={"directory": place(output).absolute()})
-    return job.model_copy(update={"output": table})
+    table = job.output.model_copy(update={"directory": place(output).absolute()})  # as it is: links are not followed
+    return changed(job, output=table)
 
 
 def with_threads(job: "Job", threads: int | None) -> "Job":
     """The same job with so many threads, if that is wished."""
     if threads is None:
         return job
-    return job.model_copy(update={"render": job.render.model_copy(update={"threads": threads})})
+    from ..jobvalues import changed
+
+    return changed(job, render=changed(job.render, threads=threads))
 
 
 def frames_of(text: str, n: int) -> tuple[int, ...]:

@@ -14,6 +14,7 @@ from ..errors import OutputError
 from ..files import folder_for
 from ..imagecheck import check_image
 from ..images import format_name, require_writer
+from ..jobvalues import changed
 from ..manifest import Manifest
 from ..manifestfile import read_manifest
 from ..pictures import Pictures, Relight
@@ -109,7 +110,7 @@ def assemble(
 def _with(movie: MoviePath, fps: float | None, positions: Mode | None) -> MoviePath:
     """Replace what the command line says in another way."""
     updates = {"fps": fps, "positions": positions}
-    return movie.model_copy(update={key: value for key, value in updates.items() if value is not None})
+    return changed(movie, **{key: value for key, value in updates.items() if value is not None})
 
 
 def _own_suffix(manifest: Manifest) -> str:

@@ -15,6 +15,7 @@ from ..files import reason
 from ..interrupts import forget
 from ..job import Job
 from ..jobfile import job_table
+from ..jobvalues import changed
 from ..manifestfile import read_manifest, write_manifest
 from ..prepare import Prepared
 from ..record import FOLDER, digest, read_records
@@ -112,9 +113,9 @@ def _memory(prepared: Prepared, workers: int) -> int:
     """
     limit = prepared.job.render.memory
     each = (limit or int(SHARE * free_memory())) // workers
-    table = prepared.job.render.model_copy(update={"memory": each})
+    table = changed(prepared.job.render, memory=max(each, 1))
     try:
-        require_least_memory(replace(prepared, job=prepared.job.model_copy(update={"render": table})))
+        require_least_memory(replace(prepared, job=changed(prepared.job, render=table)))
     except JobError as error:
         more = f"; {workers_text(workers)} share {(limit or each * workers) / 2**30:.1f} GiB, fewer have more each"
         raise JobError(error.file, [f"{problem}{more}" for problem in error.problems]) from error

@@ -17,6 +17,7 @@ from ..compiling import compile_clock
 from ..errors import BusyError, FrameArrayError, JobError
 from ..job import Job
 from ..jobfile import job_of_table
+from ..jobvalues import changed
 from ..prepare import Prepared
 from ..progress import RenderEvents, ambient_figures
 from ..record import digest
@@ -25,6 +26,7 @@ from ..resume import OnDisk
 from ..summary import Summary
 from ..target import Target
 from ..terms.ambient import Ambient
+from ..units import MOST_THREADS
 
 # Seconds between two looks whether the chunk is still wanted, and between two messages on how far it is.
 LOOK_EVERY, SEND_EVERY = 0.2, 0.5
@@ -63,9 +65,9 @@ class Common:
     def job(self, threads: int) -> Job:
         """The job of a chunk, on a worker with so many threads."""
         found = job_of_table(self.table, Path(self.file), Path(self.folder))
-        machine = {"threads": self.threads or found.render.threads or threads}
+        machine = {"threads": self.threads or found.render.threads or min(threads, MOST_THREADS)}
         machine |= {"memory": self.memory} if self.memory else {}
-        return found.model_copy(update={"render": found.render.model_copy(update=machine)})
+        return changed(found, render=changed(found.render, **machine))
 
 
 def unfit(common: dict[str, Any]) -> str:

@@ -11,6 +11,7 @@ from ..auto import resolve_auto
 from ..embree import EmbreeScene
 from ..errors import JobError
 from ..job import Job
+from ..jobvalues import MOST_HITS, changed
 from ..lights import some_lights
 from ..planes import pictures
 from ..prepare import Prepared, open_embree, plan_work, prepare
@@ -70,12 +71,11 @@ def varied(case: Case, settings: Settings) -> Case:
     """
     job = settings.applied(case.prepared.job)
     share = settings.rests_on / case.settings.rests_on
-    job = job.model_copy(
-        update={
-            "specular": job.specular.model_copy(update={"hits": math.ceil(share * job.specular.hits)}),
-            "ambient": job.ambient.model_copy(update={"method": "eye", "intensity": (1.0, 1.0, 1.0), "paths": 1}),
-            "output": job.output.model_copy(update={"layers": False}),
-        }
+    job = changed(
+        job,
+        specular=changed(job.specular, hits=min(math.ceil(share * job.specular.hits), MOST_HITS)),
+        ambient=changed(job.ambient, method="eye", intensity=(1.0, 1.0, 1.0), paths=1),
+        output=changed(job.output, layers=False),
     )
     prepared = replace(case.prepared, job=job)
     setup, _ = plan_work(prepared, case.embree)

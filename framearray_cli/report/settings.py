@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from ..errors import JobError
 from ..job import Job
+from ..jobvalues import changed
 from ..tomltext import brief
 
 # Settings by the job file's key.
@@ -72,7 +73,7 @@ class Settings:
             # what the job file says of it, and these; defaults that depend on others are worked out again
             said = {name: getattr(old, name) for name in old.model_fields_set if (table, name) not in TARGET}
             updates[table] = type(old).model_validate({**said, **values})
-        return job.model_copy(update=updates)
+        return changed(job, **updates)
 
     def lines(self, base: "Settings") -> list[str]:
         """What to write into a job file with settings `base` to get these."""

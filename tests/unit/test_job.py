@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from framearray_cli.job import Job
 from framearray_cli.jobfile import job_table
 from framearray_cli.jobschema import job_schema
+from framearray_cli.jobvalues import changed
 from framearray_cli.problems import problems_of
 
 EXAMPLE = """
@@ -334,3 +335,35 @@ def test_what_is_chosen_later_is_not_read_before(table):
             getattr(job, name)
     numbers = read({**table, "reuse": {}, "samples": {"hits": 0.333}})
     assert (numbers.n_r, numbers.hits) == (3, 1 / 3)
+
+
+def test_a_changed_table_keeps_the_rest():
+    job = Job.model_validate(tomllib.loads(EXAMPLE))
+    fewer = changed(job, render=changed(job.render, threads=3), samples=changed(job.samples, hits=2.0))
+    assert (fewer.render.threads, fewer.samples.hits) == (3, 2.0)
+    assert fewer.specular == job.specular and fewer.output == job.output and fewer.file == job.file
+    assert fewer.samples.model_fields_set == job.samples.model_fields_set | {"hits"}
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "error"),
+    [
+        ("render", {"threads": 0}, ValidationError),
+        ("render", {"threads": 1025}, ValidationError),
+        ("render", {"threads": "3"}, ValidationError),
+        ("render", {"memory": 0}, ValidationError),
+        ("reuse", {"n_r": -1}, ValidationError),
+        ("samples", {"hits": 0.4}, ValidationError),
+        ("ambient", {"intensity": (1.0, -1.0, 1.0)}, ValidationError),
+        ("render", {"thread": 3}, KeyError),
+    ],
+)
+def test_values_that_no_file_may_have_are_refused(name, values, error):
+    with pytest.raises(error):
+        changed(getattr(Job.model_validate(tomllib.loads(EXAMPLE)), name), **values)
+
+
+def test_a_table_of_another_kind_is_refused():
+    job = Job.model_validate(tomllib.loads(EXAMPLE))
+    with pytest.raises(ValidationError):
+        changed(job, render=job.samples)
