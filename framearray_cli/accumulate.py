@@ -9,7 +9,7 @@ from numpy.typing import DTypeLike, NDArray
 from .arrays import Addresses, Float32, Float64, Int32, Real
 from .compose import INVERSE_PI, MOST, Band, Finish, Stored, finish
 from .kernel import inlined, integer_at, kernel, prefetch, real_at
-from .lanes import LANES, lane_numbers, lanes_at, lanes_from, put_lanes, reals
+from .lanes import LANES, lane_numbers, lanes_from, load, reals, store
 from .work import BY_SAMPLE, HALF, INDIRECT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, HitRecords, Placed, lit_bit
 
 # Columns of a list of sources: addresses of arrays, 0 for one that is empty; and what these hold.
@@ -92,11 +92,11 @@ def _add_light(band: Band, i: int, n: int, channels: int, n_lights: int, fresh: 
                 green = green + lanes_from(place + 4 * n_lights) * band.shares[k, 1]
                 blue = blue + lanes_from(place + 8 * n_lights) * band.shares[k, 2]
         if not fresh:  # only now: what a single hit adds to the sum of a million would be lost in its last digits
-            red, green = red + lanes_at(band.direct, at), green + lanes_at(band.direct, at + stride)
-            blue = blue + lanes_at(band.direct, at + 2 * stride)
-        put_lanes(band.direct, at, red)
-        put_lanes(band.direct, at + stride, green)
-        put_lanes(band.direct, at + 2 * stride, blue)
+            red, green = red + load(band.direct, at), green + load(band.direct, at + stride)
+            blue = blue + load(band.direct, at + 2 * stride)
+        store(band.direct, at, red)
+        store(band.direct, at + stride, green)
+        store(band.direct, at + 2 * stride, blue)
 
 
 @inlined
@@ -155,14 +155,14 @@ def accumulate(
                     band.shares[waiting, channel] = w * INVERSE_PI * real_at(row, REFLECTIVITY + channel)
                 waiting += 1
         if mean:
-            put_lanes(band.sums, LANES * i, total)
+            store(band.sums, LANES * i, total)
             weight = band.sums[i, WEIGHT]
             inverse = np.float32(1.0) / weight if weight > 0.0 else np.float32(0.0)
-            put_lanes(band.sums, LANES * i, total * inverse)
+            store(band.sums, LANES * i, total * inverse)
             band.hits[i] = n_hits
             _scale(band, i, waiting, n_lights, fresh, inverse)
         else:
-            put_lanes(band.sums, LANES * i, lanes_at(band.sums, LANES * i) + total)
+            store(band.sums, LANES * i, load(band.sums, LANES * i) + total)
         _add_light(band, i, waiting, channels, n_lights, fresh)
 
 

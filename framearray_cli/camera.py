@@ -9,7 +9,7 @@ import numpy as np
 
 from .arrays import Directions, Float64, Points, Real, Triple
 from .kernel import inlined
-from .lanes import choose, doubles, floor, integers, reals
+from .lanes import doubles, floor, integers, reals, select
 from .paths import Eyes
 
 OUTSIDE = -1  # the "pixel" of a point that an eye does not see
@@ -81,10 +81,10 @@ def project(cams: Cameras, k: int, x: Real, y: Real, z: Real) -> tuple[int, Real
     r, u, f = cams.right, cams.up, cams.forward
     depth = x * f[k, 0] + y * f[k, 1] + z * f[k, 2]
     ahead = depth > np.float32(0.0)
-    scale = cams.focal / doubles(choose(ahead, depth, np.float32(1.0)))
+    scale = cams.focal / doubles(select(ahead, depth, np.float32(1.0)))
     column = 0.5 * cams.width + scale * doubles(x * r[k, 0] + y * r[k, 1] + z * r[k, 2])
     row = 0.5 * cams.height - scale * doubles(x * u[k, 0] + y * u[k, 1] + z * u[k, 2])
     inside = ahead & (column >= 0.0) & (column < cams.width) & (row >= 0.0) & (row < cams.height)
-    column, row = choose(inside, column, 0.0), choose(inside, row, 0.0)
+    column, row = select(inside, column, 0.0), select(inside, row, 0.0)
     pixel = integers(row) * np.int32(cams.width) + integers(column)
-    return choose(inside, pixel, np.int32(OUTSIDE)), depth
+    return select(inside, pixel, np.int32(OUTSIDE)), depth

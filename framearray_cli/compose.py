@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .arrays import Addresses, Float32, Images, Int32, Real, Rgb, with_room
 from .kernel import kernel
-from .lanes import LANES, compress, gather, lane_numbers, put_lanes, stored
+from .lanes import LANES, compress, gather, lane_numbers, store, stored
 from .work import INDIRECT, LIGHT_INDEPENDENT
 
 # Images as they are stored: float32, or the bits of halves; (n_lights, n_pixels, 3).
@@ -137,6 +137,6 @@ def transpose(sums: Float32, n: int, images: Stored, first: int) -> None:
         for l in range(n_lights):
             values = stored(images, gather(sums, step + np.int32(block * stride + l)))
             if block + LANES <= n:
-                put_lanes(images, l * row + first + block, values)
+                store(images, l * row + first + block, values)
             else:
                 compress(lane_numbers() < np.int32(n - block), values, images, l * row + first + block)

@@ -8,9 +8,9 @@ import numpy as np
 from .arrays import Float32, Int32, Real
 from .camera import Cameras, corner_of, eye_ray
 from .embree.packets import DIRECTION, ORIGIN, TFAR, intersect
-from .hits import Hits, World, met, record_hits
+from .hits import Hits, World, decode_hits, record_hits
 from .kernel import inlined, keep_on_disk, kernel
-from .lanes import LANES, choose, doubles, floor, gather, integers, lane_numbers, put_lanes, put_triples
+from .lanes import LANES, doubles, floor, gather, integers, lane_numbers, put_triples, select, store
 from .sampling import OTHER_HALF, PIXEL, PIXEL_SAMPLE, r2, stream, word
 from .surface import specular_at
 
@@ -56,7 +56,7 @@ def pixel_order(width: int, height: int) -> Int32:
 def _numbers(i: int, n: int) -> int:
     """The numbers i to i + 15, but none above n - 1."""
     number = lane_numbers() + np.int32(i)
-    kept: int = choose(number < np.int32(n), number, np.int32(n - 1))
+    kept: int = select(number < np.int32(n), number, np.int32(n - 1))
     return kept
 
 
@@ -66,14 +66,14 @@ def _shoot(cams: Cameras, c: int, pixel: int, jx: Real, jy: Real, i: int, packet
     x, y = corner_of(cams, pixel)
     dx, dy, dz = eye_ray(cams, c, x + doubles(jx), y + doubles(jy))
     o, at = cams.position, (i >> 4) * packets.shape[1] * LANES
-    put_lanes(packets, at + ORIGIN * LANES, o[c, 0])
-    put_lanes(packets, at + (ORIGIN + 1) * LANES, o[c, 1])
-    put_lanes(packets, at + (ORIGIN + 2) * LANES, o[c, 2])
-    put_lanes(packets, at + DIRECTION * LANES, dx)
-    put_lanes(packets, at + (DIRECTION + 1) * LANES, dy)
-    put_lanes(packets, at + (DIRECTION + 2) * LANES, dz)
-    put_lanes(packets, at + TFAR * LANES, np.float32(np.inf))
-    put_lanes(hits.pixel, i, pixel)
+    store(packets, at + ORIGIN * LANES, o[c, 0])
+    store(packets, at + (ORIGIN + 1) * LANES, o[c, 1])
+    store(packets, at + (ORIGIN + 2) * LANES, o[c, 2])
+    store(packets, at + DIRECTION * LANES, dx)
+    store(packets, at + (DIRECTION + 1) * LANES, dy)
+    store(packets, at + (DIRECTION + 2) * LANES, dz)
+    store(packets, at + TFAR * LANES, np.float32(np.inf))
+    store(hits.pixel, i, pixel)
 
 
 @inlined
@@ -87,12 +87,12 @@ def _shoot_samples(
     key, number = stream(samples.seed, c, pixel, PIXEL_SAMPLE), sample
     random = word(key, PIXEL)
     odd = (sample & np.int32(1)) == np.int32(1)
-    put_lanes(hits.half, i, choose(odd, np.uint8(1), np.uint8(0)))
+    store(hits.half, i, select(odd, np.uint8(1), np.uint8(0)))
     if samples.halves:
-        random, number = choose(odd, word(key, OTHER_HALF), random), integers(sample >> np.int32(1))
+        random, number = select(odd, word(key, OTHER_HALF), random), integers(sample >> np.int32(1))
     jx, jy = r2(random, number)
     _shoot(cams, c, pixel, jx, jy, i, packets, hits)
-    put_lanes(hits.key, i, stream(samples.seed, c, pixel, sample))
+    store(hits.key, i, stream(samples.seed, c, pixel, sample))
 
 
 @kernel
@@ -120,7 +120,7 @@ def native_hits(
         number = doubles(_numbers(i, n)) + np.float64(first)
         group = floor(number / of_group)
         rest, left = number - group * of_group, n_pixels - group * 16.0
-        members = choose(left < 16.0, left, 16.0)
+        members = select(left < 16.0, left, 16.0)
         sample = floor(rest / members)
         pixel = gather(samples.pixels, integers(group * 16.0 + rest - sample * members))
         _shoot_samples(cams, c, samples, pixel, integers(sample) + np.int32(samples.first), i, packets, hits)
@@ -155,6 +155,6 @@ def pilot_hits(
     surfaces, tracer = world
     intersect(tracer, packets, n, True, cams.near)
     for i in range(0, n, LANES):
-        missed, triangle, u, v = met(tracer, packets, i)
+        missed, triangle, u, v = decode_hits(tracer, packets, i)
         red, green, blue = specular_at(surfaces, triangle, u, v)
-        put_triples(hits.specular, i, choose(missed, 0.0, red), choose(missed, 0.0, green), choose(missed, 0.0, blue))
+        put_triples(hits.specular, i, select(missed, 0.0, red), select(missed, 0.0, green), select(missed, 0.0, blue))

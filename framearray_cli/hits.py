@@ -20,13 +20,13 @@ from .embree.packets import (
 from .kernel import inlined, kernel
 from .lanes import (
     LANES,
-    choose,
     gather,
     lane_numbers,
-    lanes_at,
-    put_lanes,
+    load,
     put_triples,
-    root,
+    select,
+    sqrt,
+    store,
     triples_at,
 )
 from .surface import (
@@ -114,7 +114,7 @@ def reflecting(hits: Hits, i: int, n: int) -> bool:
     """`reflects` of hits i to i + 15, of which those from n on do not count."""
     red, green, blue = triples_at(hits.reflectivity, i)
     of_any = (red > np.float32(0.0)) | (green > np.float32(0.0)) | (blue > np.float32(0.0))
-    surface = lanes_at(hits.kind, i) == np.uint8(SURFACE)
+    surface = load(hits.kind, i) == np.uint8(SURFACE)
     wanted: bool = surface & of_any & (lane_numbers() < np.int32(n - i))
     return wanted
 
@@ -141,14 +141,14 @@ def triple(array: Float32, i: int) -> Triple:
 
 
 @inlined
-def met(tracer: Tracer, packets: Float32, i: int) -> tuple[bool, int, Real, Real]:
+def decode_hits(tracer: Tracer, packets: Float32, i: int) -> tuple[bool, int, Real, Real]:
     """Whether rays i to i + 15 met nothing, and the triangles and places (u, v) that they met, else 0."""
     bits, at = packets.view(np.int32), (i >> 4) * packets.shape[1] * LANES
-    triangle = lanes_at(bits, at + TRIANGLE * LANES)
+    triangle = load(bits, at + TRIANGLE * LANES)
     missed = triangle < np.int32(0)
-    triangle = choose(missed, 0, scene_triangle(tracer, triangle, lanes_at(bits, at + GEOMETRY * LANES)))
-    u, v = lanes_at(packets, at + U * LANES), lanes_at(packets, at + V * LANES)
-    return missed, triangle, choose(missed, 0.0, u), choose(missed, 0.0, v)
+    triangle = select(missed, 0, scene_triangle(tracer, triangle, load(bits, at + GEOMETRY * LANES)))
+    u, v = load(packets, at + U * LANES), load(packets, at + V * LANES)
+    return missed, triangle, select(missed, 0.0, u), select(missed, 0.0, v)
 
 
 @kernel
@@ -158,12 +158,12 @@ def record_hits(world: World, packets: Float32, n: int, mirrors: bool, hits: Hit
     packet = packets.shape[1] * LANES
     for i in range(0, n, LANES):
         at = (i >> 4) * packet
-        dx, dy = lanes_at(packets, at + DIRECTION * LANES), lanes_at(packets, at + (DIRECTION + 1) * LANES)
-        dz = lanes_at(packets, at + (DIRECTION + 2) * LANES)
-        missed, triangle, u, v = met(tracer, packets, i)
+        dx, dy = load(packets, at + DIRECTION * LANES), load(packets, at + (DIRECTION + 1) * LANES)
+        dz = load(packets, at + (DIRECTION + 2) * LANES)
+        missed, triangle, u, v = decode_hits(tracer, packets, i)
         # all is read before anything is written: the compiler then reads what is needed twice only once
         x, y, z = position_at(surfaces, triangle, u, v)
-        length = root(dx * dx + dy * dy + dz * dz)
+        length = sqrt(dx * dx + dy * dy + dz * dz)
         gx, gy, gz = geometric_normal(surfaces, triangle, dx, dy, dz)
         nx, ny, nz = shading_normal(surfaces, triangle, u, v, gx, gy, gz)
         red, green, blue = reflectivity_at(surfaces, triangle, u, v)
@@ -171,15 +171,15 @@ def record_hits(world: World, packets: Float32, n: int, mirrors: bool, hits: Hit
         if mirrors:
             s_red, s_green, s_blue = specular_at(surfaces, triangle, u, v)
             put_triples(
-                hits.specular, i, choose(missed, 0.0, s_red), choose(missed, 0.0, s_green), choose(missed, 0.0, s_blue)
+                hits.specular, i, select(missed, 0.0, s_red), select(missed, 0.0, s_green), select(missed, 0.0, s_blue)
             )
         put_triples(hits.incoming, i, dx, dy, dz)
-        x, y, z = choose(missed, dx / length, x), choose(missed, dy / length, y), choose(missed, dz / length, z)
+        x, y, z = select(missed, dx / length, x), select(missed, dy / length, y), select(missed, dz / length, z)
         put_triples(hits.position, i, x, y, z)
         put_triples(hits.geometric, i, gx, gy, gz)
         put_triples(hits.shading, i, nx, ny, nz)
-        put_lanes(hits.offset, i, offset)
+        store(hits.offset, i, offset)
         put_triples(
-            hits.reflectivity, i, choose(missed, 0.0, red), choose(missed, 0.0, green), choose(missed, 0.0, blue)
+            hits.reflectivity, i, select(missed, 0.0, red), select(missed, 0.0, green), select(missed, 0.0, blue)
         )
-        put_lanes(hits.kind, i, choose(missed, np.uint8(ESCAPED), np.uint8(SURFACE)))
+        store(hits.kind, i, select(missed, np.uint8(ESCAPED), np.uint8(SURFACE)))

@@ -19,7 +19,7 @@ from .camera import OUTSIDE, Cameras, project
 from .embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, is_blocked, occlude
 from .hits import SURFACE, Hits, triple
 from .kernel import inlined, kernel
-from .lanes import LANES, choose, compress, count, doubles, gather, lane_numbers, lanes_at, put_lanes, triples_at
+from .lanes import LANES, compress, doubles, gather, lane_numbers, load, popcount, select, store, triples_at
 from .rays import Rays
 
 # Visibility rays end this many times as far before an eye as it sees from: their directions are rounded, and an eye
@@ -36,14 +36,14 @@ def _seen(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[int, Real, Real]:
     o = cams.position
     x, y, z = triples_at(hits.position, i)
     gx, gy, gz = triples_at(hits.geometric, i)
-    surface = lanes_at(hits.kind, i) == np.uint8(SURFACE)
+    surface = load(hits.kind, i) == np.uint8(SURFACE)
     # what is infinitely far lies in one direction from all eyes
-    from_eye = choose(surface, np.float32(1.0), np.float32(0.0))
+    from_eye = select(surface, np.float32(1.0), np.float32(0.0))
     dx, dy, dz = x - from_eye * o[k, 0], y - from_eye * o[k, 1], z - from_eye * o[k, 2]
     facing = -(doubles(dx) * doubles(gx) + doubles(dy) * doubles(gy) + doubles(dz) * doubles(gz))
-    facing = choose(surface, facing, 1.0)
+    facing = select(surface, facing, 1.0)
     pixel, depth = project(cams, k, dx, dy, dz)
-    return choose(facing > 0.0, pixel, np.int32(OUTSIDE)), facing, doubles(depth)
+    return select(facing > 0.0, pixel, np.int32(OUTSIDE)), facing, doubles(depth)
 
 
 @kernel
@@ -58,8 +58,8 @@ def _aim(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays, n: 
     for ray in range(n, (n + LANES - 1) // LANES * LANES):
         rays.place[ray], rays.number[0, ray] = rays.place[n - 1], rays.number[0, n - 1]
     for first in range(0, n, LANES):
-        place = lanes_at(rays.place, first)
-        row = lanes_at(rays.number, first)
+        place = load(rays.place, first)
+        row = load(rays.number, first)
         i = place - row * np.int32(stride)
         surface = gather(hits.kind, i) == np.uint8(SURFACE)
         ox, oy, oz = triple(cams.position, row + np.int32(first_eye))
@@ -67,21 +67,21 @@ def _aim(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays, n: 
         gx, gy, gz = triple(hits.geometric, i)
         e, at = gather(hits.offset, i), (first >> 4) * packet
         x, y, z = px + e * gx, py + e * gy, pz + e * gz
-        put_lanes(rays.packets, at + ORIGIN * LANES, choose(surface, x, ox))
-        put_lanes(rays.packets, at + (ORIGIN + 1) * LANES, choose(surface, y, oy))
-        put_lanes(rays.packets, at + (ORIGIN + 2) * LANES, choose(surface, z, oz))
-        dx, dy, dz = choose(surface, ox - x, px), choose(surface, oy - y, py), choose(surface, oz - z, pz)
-        put_lanes(rays.packets, at + DIRECTION * LANES, dx)
-        put_lanes(rays.packets, at + (DIRECTION + 1) * LANES, dy)
-        put_lanes(rays.packets, at + (DIRECTION + 2) * LANES, dz)
+        store(rays.packets, at + ORIGIN * LANES, select(surface, x, ox))
+        store(rays.packets, at + (ORIGIN + 1) * LANES, select(surface, y, oy))
+        store(rays.packets, at + (ORIGIN + 2) * LANES, select(surface, z, oz))
+        dx, dy, dz = select(surface, ox - x, px), select(surface, oy - y, py), select(surface, oz - z, pz)
+        store(rays.packets, at + DIRECTION * LANES, dx)
+        store(rays.packets, at + (DIRECTION + 1) * LANES, dy)
+        store(rays.packets, at + (DIRECTION + 2) * LANES, dz)
         fx, fy, fz = triple(f, row + np.int32(first_eye))
         along = dx * fx + dy * fy + dz * fz
-        depth = choose(surface, -along, along)
+        depth = select(surface, -along, along)
         beyond = depth > near
-        share = near / choose(beyond, depth, one)
-        end = choose(beyond, one - EYE_END * share, -one)  # a hit that is too near is hidden
-        put_lanes(rays.packets, at + TNEAR * LANES, choose(surface, nothing, share))
-        put_lanes(rays.packets, at + TFAR * LANES, choose(surface, end, np.float32(np.inf)))
+        share = near / select(beyond, depth, one)
+        end = select(beyond, one - EYE_END * share, -one)  # a hit that is too near is hidden
+        store(rays.packets, at + TNEAR * LANES, select(surface, nothing, share))
+        store(rays.packets, at + TFAR * LANES, select(surface, end, np.float32(np.inf)))
 
 
 @kernel
@@ -100,7 +100,7 @@ def _confirm(
             if density.size > 0:
                 flat_density[rays.place[ray]] = 0.0
     for first in range(0, n, LANES):  # shadow rays take the same packets, and start at 0
-        put_lanes(rays.packets, (first >> 4) * rays.packets.shape[1] * LANES + TNEAR * LANES, np.float32(0.0))
+        store(rays.packets, (first >> 4) * rays.packets.shape[1] * LANES + TNEAR * LANES, np.float32(0.0))
 
 
 @kernel
@@ -132,20 +132,20 @@ def outer_hits(
             seen, facing, depth = _seen(cams, k, hits, i)
             if k == c:  # the eye that found the hit sees it, whatever rounding says of borders and grazing angles
                 seen = gather(hits.pixel, lane_numbers() + np.int32(i))
-            put_lanes(pixel, row * stride + i, seen)
+            store(pixel, row * stride + i, seen)
             wanted = (seen >= np.int32(0)) & (lane_numbers() < np.int32(n - i))
             if density.size > 0:
-                p = choose(seen >= np.int32(0), cams.focal * cams.focal * facing / (depth * depth * depth), 0.0)
+                p = select(seen >= np.int32(0), cams.focal * cams.focal * facing / (depth * depth * depth), 0.0)
                 if k == c:
-                    p = choose(p > 1e-30, p, 1e-30)
-                put_lanes(density, row * stride + i, p)
+                    p = select(p > 1e-30, p, 1e-30)
+                store(density, row * stride + i, p)
             if k != c:
                 if waiting > capacity - LANES:
                     _confirm(cams, first_eye, hits, tracer, rays, waiting, pixel, density)
                     total, waiting = total + waiting, 0
                 compress(wanted, lane_numbers() + np.int32(row * stride + i), rays.place, waiting)
-                put_lanes(rays.number, waiting, np.int32(row))
-                waiting += count(wanted)
+                store(rays.number, waiting, np.int32(row))
+                waiting += popcount(wanted)
     _confirm(cams, first_eye, hits, tracer, rays, waiting, pixel, density)
     return total + waiting
 

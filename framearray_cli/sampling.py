@@ -12,7 +12,7 @@ import numpy as np
 
 from .arrays import Real, Triple
 from .kernel import inlined
-from .lanes import choose, integers, reals, root, words
+from .lanes import integers, reals, select, sqrt, words
 
 # Dimensions: one stream a purpose.
 PIXEL, HEMISPHERE, CHOICE, STEPS, OTHER_HALF = 0, 1, 2, 3, 4
@@ -82,8 +82,8 @@ def disc(u: Real, v: Real) -> tuple[Real, Real]:
     one = np.float32(1.0)
     a, b = np.float32(2.0) * u - one, np.float32(2.0) * v - one
     steep = b * b > a * a
-    radius, other = choose(steep, b, a), choose(steep, a, b)
-    angle = np.float32(np.pi / 4) * other / choose(radius * radius > np.float32(0.0), radius, one)
+    radius, other = select(steep, b, a), select(steep, a, b)
+    angle = np.float32(np.pi / 4) * other / select(radius * radius > np.float32(0.0), radius, one)
     square = angle * angle
     # Taylor series of cosine and sine; the first terms left out are below 3e-8 for angles up to pi/4
     cosine = one + square * (
@@ -93,7 +93,7 @@ def disc(u: Real, v: Real) -> tuple[Real, Real]:
     sine = angle * (
         one + square * (np.float32(-1 / 6) + square * (np.float32(1 / 120) + square * np.float32(-1 / 5040)))
     )
-    return radius * choose(steep, sine, cosine), radius * choose(steep, cosine, sine)
+    return radius * select(steep, sine, cosine), radius * select(steep, cosine, sine)
 
 
 @inlined
@@ -102,8 +102,8 @@ def cosine_direction(nx: Real, ny: Real, nz: Real, u: Real, v: Real) -> Triple:
     nothing, one = np.float32(0.0), np.float32(1.0)
     x, y = disc(u, v)
     height = one - x * x - y * y
-    z = root(choose(height > nothing, height, nothing))
-    sign = choose(nz >= nothing, one, -one)
+    z = sqrt(select(height > nothing, height, nothing))
+    sign = select(nz >= nothing, one, -one)
     a = -one / (sign + nz)
     b = nx * ny * a
     return (
@@ -120,5 +120,5 @@ def above(x: Real, y: Real, z: Real, gx: Real, gy: Real, gz: Real) -> Triple:
     Interpolated normals tilt the hemisphere; what falls below the triangle would only meet the triangle itself.
     """
     height = x * gx + y * gy + z * gz
-    twice = choose(height < np.float32(0.0), np.float32(2.0) * height, np.float32(0.0))
+    twice = select(height < np.float32(0.0), np.float32(2.0) * height, np.float32(0.0))
     return x - twice * gx, y - twice * gy, z - twice * gz

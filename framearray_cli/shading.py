@@ -8,7 +8,7 @@ from .arrays import Float32, Rgb
 from .crew import Scratch
 from .hits import ESCAPED, Hits
 from .kernel import inlined, kernel
-from .lanes import LANES, bits, lanes_at
+from .lanes import LANES, bits, load
 from .terms.direct import direct
 from .terms.direct_steps import direct_by_steps
 from .terms.obscurance import obscurance
@@ -110,7 +110,7 @@ def _lit(irradiance: Float32, i: int) -> int:
     for channel in range(channels):
         row = (i * channels + channel) * n_lights
         for l in range(0, n_lights, LANES):
-            light = bits(~(lanes_at(irradiance, row + l) == np.float32(0.0)))
+            light = bits(~(load(irradiance, row + l) == np.float32(0.0)))
             if l + LANES > n_lights:
                 light &= (1 << (n_lights - l)) - 1
             found |= int(light != 0) << lit_bit(n_lights, l)

@@ -12,7 +12,7 @@ import numpy as np
 from .arrays import Bytes, Corners, CornerUvs, Float32, Int32, Real, Rgb, Triple
 from .colour import linear_from_srgb8
 from .kernel import inlined
-from .lanes import choose, count, doubles, floor, gather, integers, reals, root
+from .lanes import doubles, floor, gather, integers, popcount, reals, select, sqrt
 from .scene import Scene
 
 # Ray offsets: 16 units in the last place of the largest coordinate of the triangle. Of the rules tried it alone had
@@ -101,13 +101,13 @@ def texture_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real,
     x = (u - floor(u)) * doubles(width) - 0.5
     y = (1.0 - (v - floor(v))) * doubles(height) - 0.5
     finite = (x * x < 1e18) & (y * y < 1e18)  # a non-finite coordinate has no texel; the first stands in
-    x, y = choose(finite, x, 0.0), choose(finite, y, 0.0)
+    x, y = select(finite, x, 0.0), select(finite, y, 0.0)
     one, fx, fy = np.float32(1.0), reals(x - floor(x)), reals(y - floor(y))
     left, top = integers(floor(x)), integers(floor(y))  # -1 to the last
     right, bottom = left + np.int32(1), top + np.int32(1)
-    left, top = choose(left < np.int32(0), left + width, left), choose(top < np.int32(0), top + height, top)
-    right = choose(right >= width, right - width, right)
-    bottom = choose(bottom >= height, bottom - height, bottom)
+    left, top = select(left < np.int32(0), left + width, left), select(top < np.int32(0), top + height, top)
+    right = select(right >= width, right - width, right)
+    bottom = select(bottom >= height, bottom - height, bottom)
     upper, lower = first + top * width, first + bottom * width
     r0, g0, b0, a0 = _texel(s, upper + left, (one - fx) * (one - fy))
     r1, g1, b1, a1 = _texel(s, upper + right, fx * (one - fy))
@@ -122,8 +122,8 @@ def nearest_texel_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real,
     first, width, height = _place_in(s, texture)
     x, y = (u - floor(u)) * reals(width), (v - floor(v)) * reals(height)
     # what rounding moved to the far border is the next repetition's first; so is what is not finite
-    x = choose((x >= np.float32(0.0)) & (x < reals(width)), x, np.float32(0.0))
-    y = choose((y >= np.float32(0.0)) & (y < reals(height)), y, np.float32(0.0))
+    x = select((x >= np.float32(0.0)) & (x < reals(width)), x, np.float32(0.0))
+    y = select((y >= np.float32(0.0)) & (y < reals(height)), y, np.float32(0.0))
     row = height - np.int32(1) - integers(y)
     red, green, blue, alpha = _texel(s, first + row * width + integers(x), np.float32(1.0))
     return red, green, blue, alpha * np.float32(1.0 / 255.0)
@@ -145,14 +145,14 @@ def _tinted(
     """A material's factor times texture, blended between texels or not, and corner colour."""
     w = np.float32(1.0) - u - v
     textured = texture >= np.int32(0)
-    if count(textured) > 0:
+    if popcount(textured) > 0:
         tu, tv = _between(s.uvs, triangle, 2, 0, u, v, w), _between(s.uvs, triangle, 2, 1, u, v, w)
-        texture = choose(textured, texture, np.int32(0))
+        texture = select(textured, texture, np.int32(0))
         r, g, b, _ = texture_at(s, texture, tu, tv) if blended else nearest_texel_at(s, texture, tu, tv)
         red, green, blue = (
-            choose(textured, red * r, red),
-            choose(textured, green * g, green),
-            choose(textured, blue * b, blue),
+            select(textured, red * r, red),
+            select(textured, green * g, green),
+            select(textured, blue * b, blue),
         )
     if s.colours.shape[0] > 0:
         red = red * _between(s.colours, triangle, 3, 0, u, v, w)
@@ -178,7 +178,7 @@ def specular_at(s: Surfaces, triangle: int, u: Real, v: Real, blended: bool = Tr
     at, nothing = m * np.int32(3), np.float32(0.0)
     red, green = gather(s.specular, at), gather(s.specular, at + np.int32(1))
     blue = gather(s.specular, at + np.int32(2))
-    if count((red > nothing) | (green > nothing) | (blue > nothing)) > 0:
+    if popcount((red > nothing) | (green > nothing) | (blue > nothing)) > 0:
         texture = gather(s.specular_texture, m)
         red, green, blue = _tinted(s, red, green, blue, texture, triangle, u, v, blended)
     return red, green, blue
@@ -240,9 +240,9 @@ def geometric_normal(s: Surfaces, triangle: int, dx: Real, dy: Real, dz: Real) -
     e1z, e2x = doubles(gather(p, at + np.int32(5))) - az, doubles(gather(p, at + np.int32(6))) - ax
     e2y, e2z = doubles(gather(p, at + np.int32(7))) - ay, doubles(gather(p, at + np.int32(8))) - az
     nx, ny, nz = e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x
-    scale = 1.0 / root(nx * nx + ny * ny + nz * nz)
+    scale = 1.0 / sqrt(nx * nx + ny * ny + nz * nz)
     away = nx * doubles(dx) + ny * doubles(dy) + nz * doubles(dz) > 0.0
-    scale = choose(away, -scale, scale)
+    scale = select(away, -scale, scale)
     return reals(nx * scale), reals(ny * scale), reals(nz * scale)
 
 
@@ -256,6 +256,6 @@ def shading_normal(s: Surfaces, triangle: int, u: Real, v: Real, gx: Real, gy: R
     z = _between(k, triangle, 3, 2, u, v, w)
     square = x * x + y * y + z * z
     none = square < np.float32(1e-12)  # corner normals that cancel give no direction
-    scale = np.float32(1.0) / root(choose(none, np.float32(1.0), square))
-    scale = choose(x * gx + y * gy + z * gz < np.float32(0.0), -scale, scale)
-    return choose(none, gx, x * scale), choose(none, gy, y * scale), choose(none, gz, z * scale)
+    scale = np.float32(1.0) / sqrt(select(none, np.float32(1.0), square))
+    scale = select(x * gx + y * gy + z * gz < np.float32(0.0), -scale, scale)
+    return select(none, gx, x * scale), select(none, gy, y * scale), select(none, gz, z * scale)

@@ -15,7 +15,7 @@ from numba.extending import intrinsic
 
 from ..arrays import Float32, Real
 from ..kernel import inlined, kernel
-from ..lanes import LANES, choose
+from ..lanes import LANES, select
 
 RAY_ROWS = 12
 HIT_ROWS = 24  # RTCRayHit16 needs 20 to 22 rows, by how Embree was built; the rest is padding to whole cache lines
@@ -148,7 +148,7 @@ def is_blocked(packets: Float32, i: int) -> bool:
 @inlined
 def scene_triangle(tracer: Tracer, triangle: int, geometry: int) -> int:
     """The scene's number of a triangle of a geometry; for one ray, or for lanes."""
-    number: int = triangle + choose(geometry > np.int32(OPAQUE), np.int32(tracer.first_masked), np.int32(0))
+    number: int = triangle + select(geometry > np.int32(OPAQUE), np.int32(tracer.first_masked), np.int32(0))
     return number
 
 

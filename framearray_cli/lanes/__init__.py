@@ -5,36 +5,36 @@ for loops that look things up. Kernels that write packets therefore say what the
 int32, uint8 or uint64, and flags, with the operators of numbers. On processors with narrower registers LLVM splits
 the operations.
 
-What is written with `choose`, `gather`, `root` and their like works for single numbers, too.
+What is written with `select`, `gather`, `sqrt` and their like works for single numbers, too.
 
 Two things differ from numbers one at a time: sums and products may be fused (one rounding instead of two), and whole
 numbers are shifted to the right as bits, without their sign. What does not fit together is an error of typing.
 """
 
-from .arithmetic import bits, choose, count, doubles, floor, integers, lane_numbers, lowest, reals, root, words
+from .arithmetic import bits, ctz, doubles, floor, integers, lane_numbers, popcount, reals, select, sqrt, words
 from .kinds import LANES, Lanes
-from .memory import compress, gather, lanes_at, lanes_from, put_lanes, put_triples, scatter, stored, triples_at
+from .memory import compress, gather, lanes_from, load, put_triples, scatter, store, stored, triples_at
 
 __all__ = [
     "LANES",
     "Lanes",
     "bits",
-    "choose",
     "compress",
-    "count",
+    "ctz",
     "doubles",
     "floor",
     "gather",
     "integers",
     "lane_numbers",
-    "lanes_at",
     "lanes_from",
-    "lowest",
-    "put_lanes",
+    "load",
+    "popcount",
     "put_triples",
     "reals",
-    "root",
     "scatter",
+    "select",
+    "sqrt",
+    "store",
     "stored",
     "triples_at",
     "words",

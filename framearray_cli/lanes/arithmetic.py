@@ -77,7 +77,7 @@ for _sign, _compare in (
     _operator(_compare, _compared(_sign), (*REAL, *WHOLE), flags=True)
 
 
-def _count_of(typingctx: Any, flags: Any) -> Any:
+def _popcount_of(typingctx: Any, flags: Any) -> Any:
     """How many lanes are flagged; of a single flag 0 or 1."""
     if flags not in (FLAGS, types.boolean):
         return None
@@ -102,7 +102,7 @@ def _bits_of(typingctx: Any, flags: Any) -> Any:
     return types.intp(flags), codegen
 
 
-def _lowest_of(typingctx: Any, bits: Any) -> Any:
+def _ctz_of(typingctx: Any, bits: Any) -> Any:
     """The number of zeros below the lowest one of a number's bits."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -111,7 +111,7 @@ def _lowest_of(typingctx: Any, bits: Any) -> Any:
     return types.intp(types.intp), codegen
 
 
-def _choose_of(typingctx: Any, flags: Any, yes: Any, no: Any) -> Any:
+def _select_of(typingctx: Any, flags: Any, yes: Any, no: Any) -> Any:
     """`yes` where flagged, else `no`; either may be a number. With one flag, of two numbers, without a jump."""
     if flags not in (FLAGS, types.boolean):
         return None
@@ -181,11 +181,11 @@ def _lane_numbers_of(typingctx: Any) -> Any:
     return INTEGERS(), codegen
 
 
-count: Any = intrinsic(_count_of)
+popcount: Any = intrinsic(_popcount_of)
 bits: Any = intrinsic(_bits_of)
-lowest: Any = intrinsic(_lowest_of)
-choose: Any = intrinsic(_choose_of)
-root: Any = intrinsic(_function("sqrt"))
+ctz: Any = intrinsic(_ctz_of)
+select: Any = intrinsic(_select_of)
+sqrt: Any = intrinsic(_function("sqrt"))
 floor: Any = intrinsic(_function("floor"))
 reals: Any = intrinsic(_converted(types.float32))
 doubles: Any = intrinsic(_converted(types.float64))

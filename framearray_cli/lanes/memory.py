@@ -29,7 +29,7 @@ def _pointer_to_lanes(builder: Any, place: Any, lanes: Lanes) -> Any:
     return builder.bitcast(place, vector_of(lanes).as_pointer())
 
 
-def _lanes_at_of(typingctx: Any, array: Any, offset: Any) -> Any:
+def _load_of(typingctx: Any, array: Any, offset: Any) -> Any:
     """Elements offset to offset + 15 of a contiguous array, counted flat."""
     if not _is_array(array):
         return None
@@ -53,7 +53,7 @@ def _lanes_from_of(typingctx: Any, address: Any) -> Any:
     return lanes(types.intp), codegen
 
 
-def _put_lanes_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
+def _store_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
     """Write elements offset to offset + 15 of a contiguous array, counted flat; a number goes to all of them."""
     if not _is_array(array) or not (value == Lanes(array.dtype) or takes(Lanes(array.dtype), value)):
         return None
@@ -220,9 +220,9 @@ def _compress_of(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any
     return types.void(flags, value, array, offset), codegen
 
 
-lanes_at: Any = intrinsic(_lanes_at_of)
+load: Any = intrinsic(_load_of)
 lanes_from: Any = intrinsic(_lanes_from_of)
-put_lanes: Any = intrinsic(_put_lanes_of)
+store: Any = intrinsic(_store_of)
 stored: Any = intrinsic(_stored_of)
 gather: Any = intrinsic(_gather_of)
 triples_at: Any = intrinsic(_triples_at_of)

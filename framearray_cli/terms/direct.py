@@ -8,7 +8,7 @@ from ..arrays import Float32, Real, Triple
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude
 from ..hits import Hits, lift, ray_origin, reflecting, reflects, triple
 from ..kernel import inlined, kernel
-from ..lanes import LANES, bits, choose, compress, count, lane_numbers, lanes_at, lowest, put_lanes, root, triples_at
+from ..lanes import LANES, bits, compress, ctz, lane_numbers, load, popcount, select, sqrt, store, triples_at
 from ..lights import DIRECTIONAL, LightArrays
 from ..rays import Rays
 
@@ -34,8 +34,8 @@ def _facing(
     factor = cosine * lit
     if kind != DIRECTIONAL:
         square = x * x + y * y + z * z
-        factor = factor / (square * root(square))
-    return x, y, z, choose(in_front, factor, nothing)
+        factor = factor / (square * sqrt(square))
+    return x, y, z, select(in_front, factor, nothing)
 
 
 @inlined
@@ -48,11 +48,11 @@ def _look(hits: Hits, i: int, lights: LightArrays, s: int, l: int) -> tuple[Real
     """
     n_lights = lights.lit.shape[1]
     at = 3 * s * n_lights + l
-    x, y = lanes_at(lights.vector, at), lanes_at(lights.vector, at + n_lights)
-    z, lit = lanes_at(lights.vector, at + 2 * n_lights), lanes_at(lights.lit, s * n_lights + l)
+    x, y = load(lights.vector, at), load(lights.vector, at + n_lights)
+    z, lit = load(lights.vector, at + 2 * n_lights), load(lights.lit, s * n_lights + l)
     p, g, m = triple(hits.position, i), triple(hits.geometric, i), triple(hits.shading, i)
     x, y, z, factor = _facing(lights.kind[s], x, y, z, p, g, m, lit)
-    return x, y, z, choose(lane_numbers() < np.int32(n_lights - l), factor, np.float32(0.0))
+    return x, y, z, select(lane_numbers() < np.int32(n_lights - l), factor, np.float32(0.0))
 
 
 @inlined
@@ -60,10 +60,10 @@ def look(hits: Hits, i: int, lights: LightArrays, s: int, row: Float32, value: F
     """Write vectors (rows TO of `row`) and geometry factors (row 0 of `value`) of all light positions."""
     for l in range(0, lights.lit.shape[1], LANES):
         x, y, z, factor = _look(hits, i, lights, s, l)
-        put_lanes(row, TO * row.shape[1] + l, x)
-        put_lanes(row, (TO + 1) * row.shape[1] + l, y)
-        put_lanes(row, (TO + 2) * row.shape[1] + l, z)
-        put_lanes(value, l, factor)
+        store(row, TO * row.shape[1] + l, x)
+        store(row, (TO + 1) * row.shape[1] + l, y)
+        store(row, (TO + 2) * row.shape[1] + l, z)
+        store(value, l, factor)
 
 
 class _Start(NamedTuple):
@@ -97,17 +97,17 @@ def _queue(
     if lights.kind[s] != DIRECTIONAL:
         x, y, z = x - up[0], y - up[1], z - up[2]
     n_lights, room, row = lights.lit.shape[1], rays.row.shape[1], rays.row
-    put_lanes(row, FROM * room + waiting, origin[0])
-    put_lanes(row, (FROM + 1) * room + waiting, origin[1])
-    put_lanes(row, (FROM + 2) * room + waiting, origin[2])
-    put_lanes(row, TO * room + waiting, x)
-    put_lanes(row, (TO + 1) * room + waiting, y)
-    put_lanes(row, (TO + 2) * room + waiting, z)
-    put_lanes(row, REACH * room + waiting, np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END)
-    put_lanes(rays.place, waiting, lane_numbers() + np.int32(start.place + l))
+    store(row, FROM * room + waiting, origin[0])
+    store(row, (FROM + 1) * room + waiting, origin[1])
+    store(row, (FROM + 2) * room + waiting, origin[2])
+    store(row, TO * room + waiting, x)
+    store(row, (TO + 1) * room + waiting, y)
+    store(row, (TO + 2) * room + waiting, z)
+    store(row, REACH * room + waiting, np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END)
+    store(rays.place, waiting, lane_numbers() + np.int32(start.place + l))
     for channel in range(channels):
-        strength = lanes_at(lights.strength, (s * channels + channel) * n_lights + l)
-        put_lanes(rays.value, channel * rays.value.shape[1] + waiting, factor * strength)
+        strength = load(lights.strength, (s * channels + channel) * n_lights + l)
+        store(rays.value, channel * rays.value.shape[1] + waiting, factor * strength)
 
 
 @kernel
@@ -117,17 +117,17 @@ def _settle(tracer: Tracer, rays: Rays, n: int, irradiance: Float32) -> None:
     for first in range(0, n, LANES):
         at = (first >> 4) * packet
         for axis in range(3):
-            put_lanes(rays.packets, at + (ORIGIN + axis) * LANES, lanes_at(rays.row, (FROM + axis) * room + first))
-            put_lanes(rays.packets, at + (DIRECTION + axis) * LANES, lanes_at(rays.row, (TO + axis) * room + first))
-        put_lanes(rays.packets, at + TFAR * LANES, lanes_at(rays.row, REACH * room + first))
+            store(rays.packets, at + (ORIGIN + axis) * LANES, load(rays.row, (FROM + axis) * room + first))
+            store(rays.packets, at + (DIRECTION + axis) * LANES, load(rays.row, (TO + axis) * room + first))
+        store(rays.packets, at + TFAR * LANES, load(rays.row, REACH * room + first))
     occlude(tracer, rays.packets, n, True)
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]
     flat = irradiance.reshape(irradiance.size)
     for channel in range(channels):
         for first in range(0, n, LANES):
-            blocked = lanes_at(rays.packets, (first >> 4) * packet + TFAR * LANES) < np.float32(0.0)
+            blocked = load(rays.packets, (first >> 4) * packet + TFAR * LANES) < np.float32(0.0)
             at = channel * rays.value.shape[1] + first
-            put_lanes(rays.value, at, choose(blocked, np.float32(0.0), lanes_at(rays.value, at)))
+            store(rays.value, at, select(blocked, np.float32(0.0), load(rays.value, at)))
         for ray in range(n):
             flat[rays.place[ray] + channel * n_lights] += rays.value[channel, ray]
 
@@ -141,7 +141,7 @@ def _of_few(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays,
     for i in range(0, n, LANES):
         at, wanted = lane_numbers() + np.int32(i), reflecting(hits, i, n)
         p, g, m = triples_at(hits.position, i), triples_at(hits.geometric, i), triples_at(hits.shading, i)
-        e = lanes_at(hits.offset, i)
+        e = load(hits.offset, i)
         up = (e * g[0], e * g[1], e * g[2])
         for s in range(lights.kind.shape[0]):
             for l in range(n_lights):
@@ -155,12 +155,12 @@ def _of_few(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays,
                 for axis in range(3):
                     compress(traced, p[axis] + up[axis], row, (FROM + axis) * room + waiting)
                     compress(traced, to[axis] - from_point * up[axis], row, (TO + axis) * room + waiting)
-                put_lanes(row, REACH * room + waiting, np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END)
+                store(row, REACH * room + waiting, np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END)
                 compress(traced, at * np.int32(channels * n_lights) + np.int32(l), rays.place, waiting)
                 for channel in range(channels):
                     strength = lights.strength[s, channel, l]
                     compress(traced, factor * strength, rays.value, channel * rays.value.shape[1] + waiting)
-                waiting += count(traced)
+                waiting += popcount(traced)
     _settle(tracer, rays, waiting, irradiance)
     return total + waiting
 
@@ -187,8 +187,8 @@ def _of_many(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays
                         _queue(lights, s, l, (x, y, z), factor, start, rays, waiting)
                         waiting, lit = waiting + LANES, 0
                         continue
-                    skipped = lowest(lit)  # one run of positions after another
-                    m = lowest(~(lit >> skipped))
+                    skipped = ctz(lit)  # one run of positions after another
+                    m = ctz(~(lit >> skipped))
                     if skipped > 0:
                         x, y, z, factor = _look(hits, i, lights, s, l + skipped)
                     _queue(lights, s, l + skipped, (x, y, z), factor, start, rays, waiting)

@@ -28,17 +28,17 @@ from ..hits import Hits, reflecting, triple
 from ..kernel import inlined, kernel
 from ..lanes import (
     LANES,
-    choose,
     compress,
-    count,
     gather,
     integers,
     lane_numbers,
-    lanes_at,
-    put_lanes,
+    load,
+    popcount,
     reals,
-    root,
     scatter,
+    select,
+    sqrt,
+    store,
 )
 from ..rays import Rays
 from ..sampling import HEMISPHERE, UNIT_24, above, cosine_direction, word
@@ -100,7 +100,7 @@ def _aim(hits: Hits, rays: Rays, n: int, first_ray: int, n_rays: int, settings: 
         rays.place[k] = rays.place[n - 1]
     packet = 0
     for first in range(0, n, LANES):
-        hit = lanes_at(rays.place, first)
+        hit = load(rays.place, first)
         e = gather(hits.offset, hit)
         mx, my, mz = triple(hits.shading, hit)
         gx, gy, gz = triple(hits.geometric, hit)
@@ -109,19 +109,19 @@ def _aim(hits: Hits, rays: Rays, n: int, first_ray: int, n_rays: int, settings: 
         random = word(gather(hits.key, hit), HEMISPHERE)
         a, b = integers(random) + np.int32(first_ray) * step_x, integers(random >> np.uint64(32))
         b = b + np.int32(first_ray) * step_y
-        tfar = choose(lane_numbers() < np.int32(n - first), reach, idle)
+        tfar = select(lane_numbers() < np.int32(n - first), reach, idle)
         for _ in range(n_rays):
             u, v = reals(a >> np.int32(8)) * UNIT_24, reals(b >> np.int32(8)) * UNIT_24
             x, y, z = cosine_direction(mx, my, mz, u, v)
             x, y, z = above(x, y, z, gx, gy, gz)
             ray = packet * size
-            put_lanes(rays.packets, ray + ORIGIN * LANES, ox)
-            put_lanes(rays.packets, ray + (ORIGIN + 1) * LANES, oy)
-            put_lanes(rays.packets, ray + (ORIGIN + 2) * LANES, oz)
-            put_lanes(rays.packets, ray + DIRECTION * LANES, x)
-            put_lanes(rays.packets, ray + (DIRECTION + 1) * LANES, y)
-            put_lanes(rays.packets, ray + (DIRECTION + 2) * LANES, z)
-            put_lanes(rays.packets, ray + TFAR * LANES, tfar)
+            store(rays.packets, ray + ORIGIN * LANES, ox)
+            store(rays.packets, ray + (ORIGIN + 1) * LANES, oy)
+            store(rays.packets, ray + (ORIGIN + 2) * LANES, oz)
+            store(rays.packets, ray + DIRECTION * LANES, x)
+            store(rays.packets, ray + (DIRECTION + 1) * LANES, y)
+            store(rays.packets, ray + (DIRECTION + 2) * LANES, z)
+            store(rays.packets, ray + TFAR * LANES, tfar)
             a, b, packet = a + step_x, b + step_y, packet + 1
     return packet
 
@@ -131,13 +131,13 @@ def _rho_of_lanes(falloff: int, tau: Real, x: Real, room: Float32, at: int) -> R
     """`rho` of sixteen numbers; those that lanes cannot work out are worked out in `room`, from a flat offset on."""
     curve: Real = x
     if falloff == SQRT:
-        curve = root(x)
+        curve = sqrt(x)
     elif falloff != LINEAR:
-        put_lanes(room, at, x)
+        store(room, at, x)
         flat = room.reshape(room.size)
         for i in range(at, at + LANES):
             flat[i] = rho(falloff, tau, flat[i])
-        curve = lanes_at(room, at)
+        curve = load(room, at)
     return curve
 
 
@@ -156,25 +156,25 @@ def _value(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int, settings: Obs
     varied = 0
     for first in range(0, n, LANES):
         ray = (first >> 4) * packet
-        distance, triangle = lanes_at(rays.packets, ray + TFAR * LANES), lanes_at(bits, ray + TRIANGLE * LANES)
+        distance, triangle = load(rays.packets, ray + TFAR * LANES), load(bits, ray + TRIANGLE * LANES)
         missed = triangle < np.int32(0)
         within = ~missed & (distance < d_max)
         nothing = ~within
         if settings.sky:
             nothing = nothing & ~missed
-            put_lanes(rays.number, second + first, choose(missed, integers(1), np.int32(0)))
-        triangle = scene_triangle(tracer, triangle, lanes_at(bits, ray + GEOMETRY * LANES))
-        material = gather(surfaces.material, choose(within, triangle, np.int32(0)))
-        at, x = material * np.int32(3), choose(within, distance, np.float32(0.0)) / d_max
+            store(rays.number, second + first, select(missed, integers(1), np.int32(0)))
+        triangle = scene_triangle(tracer, triangle, load(bits, ray + GEOMETRY * LANES))
+        material = gather(surfaces.material, select(within, triangle, np.int32(0)))
+        at, x = material * np.int32(3), select(within, distance, np.float32(0.0)) / d_max
         weight = _rho_of_lanes(settings.falloff, settings.tau, x, rays.value, first)
         for channel in range(3):
             value = weight * gather(surfaces.total, at + np.int32(channel))
-            value = choose(within, value, choose(nothing, reals(settings.average[channel]), np.float32(0.0)))
-            put_lanes(rays.value, channel * rays.value.shape[1] + first, value)
+            value = select(within, value, select(nothing, reals(settings.average[channel]), np.float32(0.0)))
+            store(rays.value, channel * rays.value.shape[1] + first, value)
         if settings.falloff != CONSTANT:
             changing = within & (gather(surfaces.plain, material) == np.uint8(0))
             compress(changing, lane_numbers() + np.int32(first), rays.number, varied)
-            varied += count(changing)
+            varied += popcount(changing)
     return varied
 
 
@@ -188,7 +188,7 @@ def _tint(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int) -> None:
         rays.number[0, k] = rays.number[0, n - 1]  # worked out twice at once, and written twice
     bits = rays.packets.view(np.int32)
     for first in range(0, n, LANES):
-        i = lanes_at(rays.number, first)
+        i = load(rays.number, first)
         at = (i >> np.int32(4)) * packet + (i & np.int32(15))
         triangle, geometry = (
             gather(bits, at + np.int32(TRIANGLE * LANES)),
@@ -209,20 +209,20 @@ def _hand_over(
     """Add what was traced to the sums of the listed hits, ray by ray in their order; the last rays make them means."""
     share, second = np.float32(1.0 / settings.n_rays), rays.number.shape[1]
     for first in range(0, n, LANES):
-        hit = lanes_at(rays.place, first) * np.int32(3)
+        hit = load(rays.place, first) * np.int32(3)
         for channel in range(3):  # sums go where values were that are summed already
             row = channel * rays.value.shape[1]
             total = (
                 gather(result, hit + np.int32(channel)) if first_ray > 0 else reals(lane_numbers()) * np.float32(0.0)
             )
             for ray in range(n_rays):
-                total = total + lanes_at(rays.value, row + first * n_rays + ray * LANES)
-            put_lanes(rays.value, row + first, total)
+                total = total + load(rays.value, row + first * n_rays + ray * LANES)
+            store(rays.value, row + first, total)
         if settings.sky:
-            escaped = lanes_at(rays.number, second + first * n_rays)
+            escaped = load(rays.number, second + first * n_rays)
             for ray in range(1, n_rays):
-                escaped = escaped + lanes_at(rays.number, second + first * n_rays + ray * LANES)
-            put_lanes(rays.number, second + first, escaped)
+                escaped = escaped + load(rays.number, second + first * n_rays + ray * LANES)
+            store(rays.number, second + first, escaped)
     scale = share if first_ray + n_rays == settings.n_rays else np.float32(1.0)
     for k in range(n):
         hit = rays.place[k]
@@ -289,7 +289,7 @@ def obscurance(
     for first in range(0, n, LANES):
         wanted = reflecting(hits, first, n)
         compress(wanted, lane_numbers() + np.int32(first), rays.place, waiting)
-        waiting += count(wanted)
+        waiting += popcount(wanted)
         if waiting >= fit:
             _trace(hits, surfaces, tracer, rays, fit, settings, result, skylight)
             total, waiting = total + fit, waiting - fit

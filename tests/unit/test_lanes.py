@@ -13,21 +13,21 @@ from framearray_cli.kernel import inlined, kernel
 from framearray_cli.lanes import (
     LANES,
     bits,
-    choose,
     compress,
-    count,
+    ctz,
     doubles,
     floor,
     gather,
     integers,
     lane_numbers,
-    lanes_at,
-    lowest,
-    put_lanes,
+    load,
+    popcount,
     put_triples,
     reals,
-    root,
     scatter,
+    select,
+    sqrt,
+    store,
     stored,
     triples_at,
     words,
@@ -72,33 +72,33 @@ def flagged(number: int) -> Any:
 @kernel
 def with_reals(a: Any, b: Any, one: Any, out: Any, told: Any) -> None:
     """Operators of reals; `one` is a number of the same dtype."""
-    x, y = lanes_at(a, 3), lanes_at(b, 3)
-    put_lanes(out, 0, x + y)
-    put_lanes(out, 16, x - y)
-    put_lanes(out, 32, x * y)
-    put_lanes(out, 48, x / y)
-    put_lanes(out, 64, -x)
-    put_lanes(out, 80, root(x))
-    put_lanes(out, 96, floor(x))
-    put_lanes(out, 112, choose(x < y, x, one))
-    put_lanes(out, 128, choose(x < y, one, y))
-    put_lanes(out, 144, x + 2)  # numbers of other dtypes, on either side
-    put_lanes(out, 160, 1 - x)
-    put_lanes(out, 176, one)
+    x, y = load(a, 3), load(b, 3)
+    store(out, 0, x + y)
+    store(out, 16, x - y)
+    store(out, 32, x * y)
+    store(out, 48, x / y)
+    store(out, 64, -x)
+    store(out, 80, sqrt(x))
+    store(out, 96, floor(x))
+    store(out, 112, select(x < y, x, one))
+    store(out, 128, select(x < y, one, y))
+    store(out, 144, x + 2)  # numbers of other dtypes, on either side
+    store(out, 160, 1 - x)
+    store(out, 176, one)
     total = x
     for _ in range(3):
         total = total + y
-    put_lanes(out, 192, total)
+    store(out, 192, total)
     for i in range(16):
-        out[208 + i] = root(a[3 + i])
+        out[208 + i] = sqrt(a[3 + i])
         out[224 + i] = floor(a[3 + i])
-        out[240 + i] = choose(a[3 + i] < b[3 + i], a[3 + i], b[3 + i])
+        out[240 + i] = select(a[3 + i] < b[3 + i], a[3 + i], b[3 + i])
     less, more = x < y, x > y
     told[0], told[1], told[2] = bits(less), bits(x <= y), bits(more)
     told[3], told[4], told[5] = bits(x >= y), bits(x == y), bits(less | more)
     told[6], told[7], told[8] = bits(less & more), bits(~less), bits(less ^ (x <= y))
     told[9], told[10] = bits(x < one), bits(one < x)
-    told[11], told[12] = count(less), count(a[3] < b[3])
+    told[11], told[12] = popcount(less), popcount(a[3] < b[3])
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -124,17 +124,17 @@ def test_reals_are_those_of_numpy(dtype: Any) -> None:
 
 @kernel
 def with_integers(a: Any, b: Any, out: Any, told: Any) -> None:
-    x, y = lanes_at(a, 3), lanes_at(b, 3)
-    put_lanes(out, 0, x + y)
-    put_lanes(out, 16, x - y)
-    put_lanes(out, 32, x * y)
-    put_lanes(out, 48, x & y)
-    put_lanes(out, 64, x | y)
-    put_lanes(out, 80, x ^ y)
-    put_lanes(out, 96, ~x)
-    put_lanes(out, 112, -x)
-    put_lanes(out, 128, x >> 5)
-    put_lanes(out, 144, choose(x == y, x, 3))
+    x, y = load(a, 3), load(b, 3)
+    store(out, 0, x + y)
+    store(out, 16, x - y)
+    store(out, 32, x * y)
+    store(out, 48, x & y)
+    store(out, 64, x | y)
+    store(out, 80, x ^ y)
+    store(out, 96, ~x)
+    store(out, 112, -x)
+    store(out, 128, x >> 5)
+    store(out, 144, select(x == y, x, 3))
     told[0], told[1] = bits(x == y), bits(x == 9)
 
 
@@ -155,7 +155,7 @@ def test_integers_are_those_of_numpy_and_shifts_bring_in_zeros(dtype: Any) -> No
 
 @kernel
 def with_signs(a: Any, b: Any, told: Any) -> None:
-    x, y = lanes_at(a, 3), lanes_at(b, 3)
+    x, y = load(a, 3), load(b, 3)
     told[0], told[1], told[2], told[3] = bits(x < y), bits(x <= y), bits(x > y), bits(x >= 5)
 
 
@@ -170,22 +170,22 @@ def test_int32_has_an_order() -> None:
 @kernel
 def convert(f: Any, d: Any, i: Any, b: Any, u: Any, pixel: Any, to_f: Any, to_d: Any, to_i: Any, to_u: Any) -> None:
     """Each conversion of lanes (rows of 16), and in the row behind it of one number at a time."""
-    put_lanes(to_f, 0, reals(lanes_at(f, 3)))
-    put_lanes(to_f, 32, reals(lanes_at(d, 3)))
-    put_lanes(to_f, 64, reals(lanes_at(i, 3)))
-    put_lanes(to_d, 0, doubles(lanes_at(f, 3)))
-    put_lanes(to_d, 32, doubles(lanes_at(d, 3)))
-    put_lanes(to_d, 64, doubles(lanes_at(i, 3)))
-    put_lanes(to_i, 0, integers(lanes_at(f, 3)))
-    put_lanes(to_i, 32, integers(lanes_at(d, 3)))
-    put_lanes(to_i, 64, integers(lanes_at(i, 3)))
-    put_lanes(to_i, 96, integers(lanes_at(b, 3)))
-    put_lanes(to_i, 128, integers(lanes_at(u, 3)))
-    put_lanes(to_i, 160, lane_numbers())
-    put_lanes(to_i, 176, integers(2.9))
-    put_lanes(to_u, 0, words(lanes_at(b, 3)))
-    put_lanes(to_u, 32, words(lanes_at(u, 3)))
-    put_lanes(to_u, 64, words(lanes_at(pixel, 3)))
+    store(to_f, 0, reals(load(f, 3)))
+    store(to_f, 32, reals(load(d, 3)))
+    store(to_f, 64, reals(load(i, 3)))
+    store(to_d, 0, doubles(load(f, 3)))
+    store(to_d, 32, doubles(load(d, 3)))
+    store(to_d, 64, doubles(load(i, 3)))
+    store(to_i, 0, integers(load(f, 3)))
+    store(to_i, 32, integers(load(d, 3)))
+    store(to_i, 64, integers(load(i, 3)))
+    store(to_i, 96, integers(load(b, 3)))
+    store(to_i, 128, integers(load(u, 3)))
+    store(to_i, 160, lane_numbers())
+    store(to_i, 176, integers(2.9))
+    store(to_u, 0, words(load(b, 3)))
+    store(to_u, 32, words(load(u, 3)))
+    store(to_u, 64, words(load(pixel, 3)))
     for k in range(16):
         to_f[16 + k], to_f[48 + k], to_f[80 + k] = reals(f[3 + k]), reals(d[3 + k]), reals(i[3 + k])
         to_d[16 + k], to_d[48 + k], to_d[80 + k] = doubles(f[3 + k]), doubles(d[3 + k]), doubles(i[3 + k])
@@ -217,12 +217,12 @@ def test_conversions_are_those_of_numpy_for_lanes_and_for_numbers() -> None:
 
 @kernel
 def move(source: Any, at: Any, to: Any, put: Any, gathered: Any, one_by_one: Any, scattered: Any) -> None:
-    put_lanes(put, 5, lanes_at(source, 3))
-    found = gather(source, lanes_at(at, 3))
-    put_lanes(gathered, 5, found)
+    store(put, 5, load(source, 3))
+    found = gather(source, load(at, 3))
+    store(gathered, 5, found)
     for k in range(16):
         one_by_one[5 + k] = gather(source, at[3 + k])
-    scatter(scattered, lanes_at(to, 1), found)
+    scatter(scattered, load(to, 1), found)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int32, np.uint8, np.uint64])
@@ -252,9 +252,9 @@ def test_arrays_of_more_dimensions_are_counted_flat() -> None:
 @kernel
 def turn(source: Any, columns: Any, rows: Any) -> None:
     x, y, z = triples_at(source, 2)
-    put_lanes(columns, 0, x)
-    put_lanes(columns, LANES, y)
-    put_lanes(columns, 2 * LANES, z)
+    store(columns, 0, x)
+    store(columns, LANES, y)
+    store(columns, 2 * LANES, z)
     put_triples(rows, 1, x, y, z)
 
 
@@ -277,11 +277,11 @@ def test_of_two_lanes_at_one_place_the_later_stays() -> None:
 
 @kernel
 def pick(mask: Any, f: Any, d: Any, i: Any, out_f: Any, out_d: Any, out_i: Any, told: Any) -> None:
-    flags = lanes_at(mask, 0) > 0
-    compress(flags, lanes_at(f, 3), out_f, 5)
-    compress(flags, lanes_at(d, 3), out_d, 5)
-    compress(flags, lanes_at(i, 3), out_i, 5)
-    told[0], told[1], told[2] = count(flags), bits(flags), lowest(bits(flags))
+    flags = load(mask, 0) > 0
+    compress(flags, load(f, 3), out_f, 5)
+    compress(flags, load(d, 3), out_d, 5)
+    compress(flags, load(i, 3), out_i, 5)
+    told[0], told[1], told[2] = popcount(flags), bits(flags), ctz(bits(flags))
 
 
 @pytest.mark.parametrize("lanes", [[], [0], [15], [1, 4, 5, 11], list(range(LANES))])
@@ -298,13 +298,13 @@ def test_compress_writes_the_flagged_lanes_and_nothing_else(lanes: list[int]) ->
 
 
 MISUSES: dict[str, Callable[..., Any]] = {
-    "float32 + float64": lambda f, d, i: put_lanes(f, 0, lanes_at(f, 0) + lanes_at(d, 0)),
-    "float32 * int32": lambda f, d, i: put_lanes(f, 0, lanes_at(f, 0) * lanes_at(i, 0)),
-    "float32 < int32": lambda f, d, i: count(lanes_at(f, 0) < lanes_at(i, 0)),
-    "flags & int32": lambda f, d, i: count((lanes_at(f, 0) < 1.0) & lanes_at(i, 0)),
-    "lanes + an array": lambda f, d, i: put_lanes(f, 0, lanes_at(f, 0) + f),
-    "lanes !=": lambda f, d, i: count(lanes_at(f, 0) != lanes_at(f, 1)),
-    "if lanes": lambda f, d, i: 1 if lanes_at(f, 0) < 1.0 else 2,
+    "float32 + float64": lambda f, d, i: store(f, 0, load(f, 0) + load(d, 0)),
+    "float32 * int32": lambda f, d, i: store(f, 0, load(f, 0) * load(i, 0)),
+    "float32 < int32": lambda f, d, i: popcount(load(f, 0) < load(i, 0)),
+    "flags & int32": lambda f, d, i: popcount((load(f, 0) < 1.0) & load(i, 0)),
+    "lanes + an array": lambda f, d, i: store(f, 0, load(f, 0) + f),
+    "lanes !=": lambda f, d, i: popcount(load(f, 0) != load(f, 1)),
+    "if lanes": lambda f, d, i: 1 if load(f, 0) < 1.0 else 2,
 }
 
 
@@ -328,19 +328,19 @@ def sample_numbers(normal: Any, way: Any, uv: Any, out: Any) -> None:
 def sample_lanes(normal: Any, way: Any, uv: Any, out: Any) -> None:
     n = uv.shape[1]
     for i in range(0, n, LANES):
-        u, v = lanes_at(uv, i), lanes_at(uv, n + i)
-        gx, gy, gz = lanes_at(normal, i), lanes_at(normal, n + i), lanes_at(normal, 2 * n + i)
+        u, v = load(uv, i), load(uv, n + i)
+        gx, gy, gz = load(normal, i), load(normal, n + i), load(normal, 2 * n + i)
         a, b = disc(u, v)
         x, y, z = cosine_direction(gx, gy, gz, u, v)
-        dx, dy, dz = above(lanes_at(way, i), lanes_at(way, n + i), lanes_at(way, 2 * n + i), gx, gy, gz)
-        put_lanes(out, i, a)
-        put_lanes(out, n + i, b)
-        put_lanes(out, 2 * n + i, x)
-        put_lanes(out, 3 * n + i, y)
-        put_lanes(out, 4 * n + i, z)
-        put_lanes(out, 5 * n + i, dx)
-        put_lanes(out, 6 * n + i, dy)
-        put_lanes(out, 7 * n + i, dz)
+        dx, dy, dz = above(load(way, i), load(way, n + i), load(way, 2 * n + i), gx, gy, gz)
+        store(out, i, a)
+        store(out, n + i, b)
+        store(out, 2 * n + i, x)
+        store(out, 3 * n + i, y)
+        store(out, 4 * n + i, z)
+        store(out, 5 * n + i, dx)
+        store(out, 6 * n + i, dy)
+        store(out, 7 * n + i, dz)
 
 
 def units(rng: Any, n: int) -> Any:
@@ -382,11 +382,11 @@ def texture_numbers(s: Surfaces, texture: Any, uv: Any, out: Any) -> None:
 def texture_lanes(s: Surfaces, texture: Any, uv: Any, out: Any) -> None:
     n = uv.shape[1]
     for i in range(0, n, LANES):
-        number, u, v = lanes_at(texture, i), lanes_at(uv, i), lanes_at(uv, n + i)
+        number, u, v = load(texture, i), load(uv, i), load(uv, n + i)
         blended, nearest = texture_at(s, number, u, v), nearest_texel_at(s, number, u, v)
         for k in range(4):
-            put_lanes(out, k * n + i, blended[k])
-            put_lanes(out, (4 + k) * n + i, nearest[k])
+            store(out, k * n + i, blended[k])
+            store(out, (4 + k) * n + i, nearest[k])
 
 
 def test_textures_of_lanes_are_those_of_numbers() -> None:
@@ -440,11 +440,11 @@ def find_numbers(s: Surfaces, triangle: Any, uv: Any, way: Any, out: Any) -> Non
 def find_lanes(s: Surfaces, triangle: Any, uv: Any, way: Any, out: Any) -> None:
     n = uv.shape[1]
     for i in range(0, n, LANES):
-        x, y, z = lanes_at(way, i), lanes_at(way, n + i), lanes_at(way, 2 * n + i)
-        found = everything(s, lanes_at(triangle, i), lanes_at(uv, i), lanes_at(uv, n + i), x, y, z)
+        x, y, z = load(way, i), load(way, n + i), load(way, 2 * n + i)
+        found = everything(s, load(triangle, i), load(uv, i), load(uv, n + i), x, y, z)
         for k in range(5):
             for axis in range(3):
-                put_lanes(out, (3 * k + axis) * n + i, found[k][axis])
+                store(out, (3 * k + axis) * n + i, found[k][axis])
 
 
 def nasty_room() -> Any:
@@ -514,9 +514,9 @@ def project_numbers(cams: Cameras, k: int, points: Any, pixel: Any, depth: Any) 
 def project_lanes(cams: Cameras, k: int, points: Any, pixel: Any, depth: Any) -> None:
     n = points.shape[1]
     for i in range(0, n, LANES):
-        seen, far = project(cams, k, lanes_at(points, i), lanes_at(points, n + i), lanes_at(points, 2 * n + i))
-        put_lanes(pixel, i, seen)
-        put_lanes(depth, i, far)
+        seen, far = project(cams, k, load(points, i), load(points, n + i), load(points, 2 * n + i))
+        store(pixel, i, seen)
+        store(depth, i, far)
 
 
 def projected(cams: Cameras, k: int, points: Any) -> Any:
@@ -566,9 +566,9 @@ def test_lanes_are_seen_where_numbers_are() -> None:
 
 
 @kernel
-def store(array: Any, out: Any) -> None:
+def store_whole(array: Any, out: Any) -> None:
     for first in range(0, array.size, LANES):
-        put_lanes(out, first, stored(out, lanes_at(array, first)))
+        store(out, first, stored(out, load(array, first)))
 
 
 def test_halves_are_those_of_numpy_and_never_infinite() -> None:
@@ -577,14 +577,14 @@ def test_halves_are_those_of_numpy_and_never_infinite() -> None:
     borders = [0.0, -0.0, 65504, 65519.9, 65520, 1e9, -1e9, 2.0**-24, 2.0**-25, 2.0**-25 * 1.001, 2.0**-14, 6e-5]
     exact = np.concatenate([some, borders, np.ldexp(1.0, np.arange(-30, 17)), np.zeros(5)]).astype(np.float32)
     out = np.empty(len(exact), np.uint16)
-    store(exact, out)
+    store_whole(exact, out)
     np.testing.assert_array_equal(out, np.clip(exact, -65504, 65504).astype(np.float16).view(np.uint16))
     same = np.empty_like(exact)
-    store(exact, same)
+    store_whole(exact, same)
     np.testing.assert_array_equal(same, exact)
 
 
 @pytest.mark.parametrize("array", [np.zeros((32, 2), np.float32)[:, 0], np.zeros(32, np.int64), np.zeros(32, bool)])
 def test_arrays_that_lanes_cannot_read_are_refused(array: Any) -> None:
     with pytest.raises(nb.TypingError):
-        store(array, np.zeros(32, np.float32))
+        store_whole(array, np.zeros(32, np.float32))
