@@ -1,32 +1,32 @@
-"""Notices when kernels are compiled: the first run on a machine does that for up to a minute, later ones not at all."""
+"""Measure compiling: the first run on a machine compiles kernels for up to a minute, later runs load them."""
 
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-# When each function that is being compiled was begun. Numba compiles one at a time, and within it those that it calls.
+# When the compiling of each function began, innermost last: numba compiles one function, and within it those it calls.
 _begun: list[float] = []
 
 
 @dataclass(slots=True, kw_only=True)
 class CompileClock:
-    """How long kernels were compiled so far, seconds."""
+    """The time that compiling took so far, in seconds."""
 
     seconds: float = 0.0
 
 
 @contextmanager
 def compile_clock(begins: Callable[[], None] = lambda: None) -> Iterator[CompileClock]:
-    """Measure the time that goes into compiling; kernels that are loaded from the disk do not count.
+    """Measure the time spent compiling; kernels loaded from disk do not count.
 
     Args:
-        begins: called when the first kernel starts to compile, from any thread.
+        begins: is called when the first kernel starts to compile, on any thread.
     """
     from numba.core import event
 
     clock = CompileClock()
-    own: list[float] = []  # of this clock: there may be several
+    own: list[float] = []  # of this clock; several may run
 
     class CompileEvents(event.Listener):
         def on_start(self, event: object) -> None:

@@ -1,14 +1,14 @@
-"""How hot loops are compiled, and kept on disk.
+"""Compile hot loops, and keep them on disk.
 
-`kernel` leaves out two things that numba does by default and that cost more than the loops themselves here: counting
-references to every array that is passed on (an atomic instruction each, for arrays that the caller holds anyway), and
-a check for division by zero at every division. So a kernel must not allocate: it is given its scratch arrays. It
-releases the GIL and is compiled once for all runs.
+`kernel` turns off two defaults of numba that cost more than the loops themselves here: counting references to every
+array that is passed on (an atomic instruction each, for arrays that the caller holds anyway), and checking every
+division for zero. So a kernel must not allocate: its caller passes scratch arrays. A kernel releases the GIL, and is
+compiled once for all runs.
 
 `inlined` is for the small functions that kernels are written with.
 
-To decorate a function only declares it. The first call looks for its machine code on disk, and compiles it if there
-is none; only then is there a folder for it (`kernelcache.py`), and numba's settings stay as they are.
+Decorating a function only declares it. The first call loads its machine code from disk, or compiles it; only then is
+a folder made for it (`kernelcache.py`). numba's own settings stay untouched.
 """
 
 import platform
@@ -28,7 +28,7 @@ from .kernelcache import forgive, kernel_folder
 F = TypeVar("F", bound=Callable[..., Any])
 
 _LINE = 64  # bytes
-# What of numba has no types.
+# Parts of numba without type annotations.
 _njit: Any = nb.njit
 _Locator: Any = caching._CacheLocator
 _OfSourceFile: Any = caching._SourceFileBackedLocatorMixin
@@ -38,7 +38,7 @@ _OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False}
 
 
 class _OwnLocator(_OfSourceFile, _Locator):  # type: ignore[misc]
-    """Names the folder of the kernels of a source file, in that of this state of the package."""
+    """Names the folder for the kernels of a source file, inside the one for this state of the package."""
 
     def __init__(self, function: Any, file: str, folder: Path) -> None:
         self._py_file, self._lineno = file, function.__code__.co_firstlineno
@@ -58,7 +58,7 @@ class _OwnFiles(_Files):  # type: ignore[misc]
 
 
 class _OwnCache(_FunctionCache):  # type: ignore[misc]
-    """numba's cache of a function, in our folder, and without it where that fails."""
+    """numba's cache of a function, in our folder; where that fails, numba compiles."""
 
     _impl_class = _OwnFiles
 
@@ -67,7 +67,7 @@ class _OwnCache(_FunctionCache):  # type: ignore[misc]
 
 
 class _LazyCache:
-    """What numba asks for the machine code of a function; opens the cache when it is asked first."""
+    """Stands in for numba's cache of a function, and opens it when numba first asks for machine code."""
 
     def __init__(self, function: Any) -> None:
         self._function = function
@@ -78,7 +78,7 @@ class _LazyCache:
         if self._opened is None:
             try:
                 self._opened = _OwnCache(self._function)
-            except RuntimeError:  # no folder, or a function that was typed in
+            except RuntimeError:  # no folder, or a function without a source file
                 self._opened = caching.NullCache()
         return self._opened
 
@@ -97,7 +97,7 @@ class _LazyCache:
 
 
 def keep_on_disk(function: F) -> F:
-    """Keep the machine code of a function that numba has declared (`nb.njit`, `CFunc`) for later runs."""
+    """Keep the machine code of a declared function (`nb.njit`, `CFunc`) for later runs."""
     compiled: Any = function
     if hasattr(compiled, "enable_caching"):  # not where NUMBA_DISABLE_JIT leaves Python's functions as they are
         compiled._cache = _LazyCache(getattr(compiled, "py_func", None) or compiled.__wrapped__)
@@ -105,19 +105,19 @@ def keep_on_disk(function: F) -> F:
 
 
 def kernel(function: F) -> F:
-    """Compile a hot loop; it must not allocate."""
+    """Declare a hot loop, to be compiled at its first call; it must not allocate."""
     declared: F = _njit(**_OPTIONS)(function)
     return keep_on_disk(declared)
 
 
 def inlined(function: F) -> F:
-    """Compile a function into every kernel that calls it."""
+    """Declare a function, to be compiled into every kernel that calls it."""
     declared: F = _njit(inline="always", **_OPTIONS)(function)
     return keep_on_disk(declared)
 
 
 def _prefetch_of(typingctx: Any, address: Any, n_bytes: Any) -> Any:
-    """Ask for the bytes from an address on to be brought into the cache, a line at a time; nothing waits for it."""
+    """Prefetch bytes from an address on into the processor's cache, line by line, without waiting."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         word, byte = ir.IntType(64), ir.IntType(8).as_pointer()
@@ -133,6 +133,8 @@ def _prefetch_of(typingctx: Any, address: Any, n_bytes: Any) -> Any:
 
 
 def _number_at(dtype: Any, element: Any) -> Callable[..., Any]:
+    """Load element i of an array of a dtype at an address."""
+
     def of(typingctx: Any, address: Any, i: Any) -> Any:
         def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             return builder.load(builder.gep(builder.inttoptr(args[0], element.as_pointer()), [args[1]]))
@@ -142,14 +144,14 @@ def _number_at(dtype: Any, element: Any) -> Callable[..., Any]:
     return of
 
 
-# For lists of arrays, of which a kernel takes the addresses: each array by itself would cost more than a short loop.
+# For kernels that take the addresses of many arrays: passing each array by itself would cost more than a short loop.
 prefetch: Any = intrinsic(_prefetch_of)
 real_at: Any = intrinsic(_number_at(types.float32, ir.FloatType()))
 integer_at: Any = intrinsic(_number_at(types.int32, ir.IntType(32)))
 
 
 def processor() -> str:
-    """Name of this machine and of the processor that kernels are compiled for: those of others round differently."""
+    """The name of the system and of the processor that kernels are compiled for: those of others round differently."""
     from llvmlite import binding
 
     return f"{platform.system()} {platform.machine()} {binding.get_host_cpu_name()}"

@@ -1,9 +1,9 @@
 """Where compiled kernels are kept between runs.
 
-numba keeps a compiled function for as long as its own source file does not change. Kernels here are written with small
-functions of other files, so that is not enough: after an edit, or an update by git, old machine code would run on. So
-kernels are kept in a folder whose name is a digest of all source files, and of what else machine code depends on.
-Nothing here is done before the first kernel is needed.
+numba keeps a compiled function until the function's own source file changes. Kernels here call small functions of other
+files, so that is not enough: after an edit, or an update by git, old machine code would run on. This module therefore
+keeps kernels in a folder whose name is a digest of all source files, and of what else the machine code depends on.
+It touches the disk only when the first kernel is needed.
 """
 
 import hashlib
@@ -19,7 +19,7 @@ from typing import Any
 
 from .files import reason
 
-# Folders of earlier states of the source that are kept: enough to change between a few branches.
+# Folders of earlier states of the source to keep: enough to switch between a few branches.
 KEPT = 3
 # Processors that Linux guards against Downfall take ten times as long for their gather instruction.
 _GUARD = Path("/sys/devices/system/cpu/vulnerabilities/gather_data_sampling")
@@ -29,14 +29,14 @@ _problems: list[str] = []
 
 @cache
 def slow_gathers() -> bool:
-    """Whether this machine's gather instruction is slower than single loads; kernels are then compiled without it."""
+    """Whether gather instructions are slower than single loads on this machine; kernels then do without them."""
     with suppress(OSError):
         return "Mitigation" in _GUARD.read_text()
     return False
 
 
 def package_folder() -> Path:
-    """The folder of the whole package, wherever in it this module stands."""
+    """The folder of the whole package, wherever in it this module lies."""
     package: Any = importlib.import_module(__name__.partition(".")[0])
     return Path(package.__path__[0])
 
@@ -54,12 +54,12 @@ def source_digest(package: Path) -> str:
 
 @cache
 def kernel_folder() -> Path | None:
-    """Find, or make, the folder for kernels of this state of the source, and drop those of old states.
+    """Find or make the folder for kernels of this state of the source, and remove those of old states.
 
-    It stands in the user's choice (NUMBA_CACHE_DIR), else in the user's cache folder, else beside the source.
+    It lies in the folder of NUMBA_CACHE_DIR, else in the user's cache folder, else beside the source.
 
     Returns:
-        None where no folder can be written: kernels are then compiled in each run, and `problem` says why.
+        None if no folder can be written: each run then compiles its kernels, and `problem` says why.
     """
     from numba.misc import appdirs
 
@@ -79,15 +79,15 @@ def kernel_folder() -> Path | None:
 
 
 def problem() -> str:
-    """Why kernels could not be read or kept; nothing where they could."""
+    """Why kernels could not be read or kept; empty if they could."""
     return _problems[0] if _problems else ""
 
 
 @contextmanager
 def forgive(kept: Any) -> Iterator[None]:
-    """Around reading and writing a kernel: where that fails it is compiled, as if there were no cache.
+    """Ignore errors of reading or writing a kernel: numba then compiles it, as if there were no cache.
 
-    A disk may be full, and a file damaged: then reading it may raise anything.
+    A disk may be full. A file may be damaged, and reading it may raise anything.
 
     Args:
         kept: numba's cache of the kernel.
@@ -98,11 +98,11 @@ def forgive(kept: Any) -> Iterator[None]:
         why = reason(error) if isinstance(error, OSError) else f"damaged: {error}"
         _problems.append(f"{kept.cache_path}: {why}")
         with suppress(OSError):
-            kept.flush()  # what is damaged would stay for ever
+            kept.flush()  # a damaged file would stay forever
 
 
 def _usable(folder: Path) -> bool:
-    """Make a folder, if need be, and say whether files can be written there."""
+    """Make a folder if needed, and return whether files can be written there."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -114,7 +114,7 @@ def _usable(folder: Path) -> bool:
 
 
 def _drop_old(base: Path, digest: str) -> None:
-    """Remove the folders of states of the source that were not used for the longest time."""
+    """Remove the folders of the states of the source that were used least recently."""
     with suppress(OSError):  # another process does the same
         others = sorted((f for f in base.iterdir() if f.name != digest), key=lambda f: f.stat().st_mtime)
         for old in others[: -KEPT or None]:

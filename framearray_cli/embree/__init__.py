@@ -1,10 +1,10 @@
 """The door to Embree: build a scene, find first hits, test visibility.
 
-A kernel traces packets through a `Tracer`, which holds nothing but addresses; that keeps compiled kernels cacheable
-and lets two engines serve the same kernels:
+Kernels trace packets through a `Tracer`, which holds only addresses. So compiled kernels can be cached, and two engines
+can serve the same kernels:
 
-- `packets`: Embree's C functions `rtcIntersect16` and `rtcOccluded16`, 16 rays a call. The default.
-- `embreex`: the public API of embreex, which calls Embree once a ray. The fallback where the symbols cannot be
+- `packets`: Embree's C functions `rtcIntersect16` and `rtcOccluded16`, 16 rays per call. The default.
+- `embreex`: the public API of embreex, which calls Embree once per ray. The fallback where the symbols cannot be
   reached, and the twin that tests compare with.
 """
 
@@ -23,17 +23,17 @@ Engine = Literal["auto", "packets", "embreex"]
 
 
 class EmbreeScene:
-    """A scene that rays can be traced through; owns Embree's structures and frees them on `close`."""
+    """A scene to trace rays through; owns Embree's structures and frees them on `close`."""
 
     def __init__(self, scene: Scene, engine: Engine = "auto") -> None:
         """Build the acceleration structure.
 
         Args:
             scene: the triangles; opaque ones become geometry 0, those with an alpha mask geometry 1.
-            engine: "auto" takes packets where Embree's symbols can be reached, else embreex.
+            engine: "auto" uses packets where Embree's symbols can be reached, else embreex.
 
         Raises:
-            SceneError: Embree refuses the scene, or `engine="packets"` cannot be had.
+            SceneError: Embree rejects the scene, or `engine="packets"` is not available.
         """
         library = None if engine == "embreex" else embree_library()
         if engine == "packets" and library is None:
@@ -43,7 +43,7 @@ class EmbreeScene:
         self.tracer: Tracer = self._built.tracer
 
     def close(self) -> None:
-        """Free Embree's memory; tracing afterwards is an error."""
+        """Free Embree's memory; do not trace afterwards."""
         self._built.close()
 
     def __enter__(self) -> Self:

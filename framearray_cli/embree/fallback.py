@@ -1,4 +1,4 @@
-"""The same interface on embreex's public API: slower, and independent of how the wheel was linked."""
+"""The same interface over embreex's public API: slower, and independent of how the wheel was linked."""
 
 import ctypes
 from typing import Any
@@ -28,13 +28,13 @@ from .packets import (
 )
 
 _CALLBACK = ctypes.CFUNCTYPE(None, *[ctypes.c_ssize_t] * 4)
-_FAR = 1e37  # embreex's own "no limit"; a larger distance is not distinguished from it
-# Through this many cut-out layers a ray is followed; each costs a call
+_FAR = 1e37  # embreex's own "no limit"; larger distances mean the same
+# Follow a ray through at most this many cut-out layers; each costs a call.
 _MAX_LAYERS = 256
 
 
 class EmbreexScene:
-    """Owns an embreex scene and the C callbacks that kernels call; a callback takes the GIL."""
+    """Owns an embreex scene and the C callbacks that kernels call; each callback acquires the GIL."""
 
     def __init__(self, scene: Scene) -> None:
         from embreex.mesh_construction import TriangleMesh
@@ -55,9 +55,9 @@ class EmbreexScene:
         self._scene = self._mesh = None
 
     def first_hits(self, origins: Float32, directions: Float32, tnear: Float32, tfar: Float32) -> dict[str, Any]:
-        """Embreex's output for rays (n, 3), (n, 3), (n,), (n,): tfar, u, v, primID, Ng.
+        """Trace rays (n, 3), (n, 3), (n,), (n,) and return embreex's output: tfar, u, v, primID, Ng.
 
-        What is nearer than tnear and what is cut out is passed over.
+        Hits nearer than tnear and hits that are cut out do not count.
         """
         out = dict(self._scene.run(origins, directions, tfar.copy(), query="INTERSECT", output=1))
         if self._scene_has_masks or tnear.any():
@@ -67,14 +67,14 @@ class EmbreexScene:
     def _pass_over(
         self, origins: Float32, directions: Float32, tnear: Float32, tfar: Float32, out: dict[str, Any]
     ) -> None:
-        """Trace on behind every hit that does not count, until rays meet one that does, or nothing."""
+        """Continue each ray behind a hit that does not count, until it finds one that does, or nothing."""
         start = np.zeros(len(origins), np.float32)
         todo = self._ignored(out, tnear)
         for _ in range(_MAX_LAYERS):
             rays = np.flatnonzero(todo)
             if not len(rays):
                 return
-            # a step past the layer: a few units in the last place of everything that made up its distance
+            # step past the layer by a few units in the last place of all that its distance was computed from
             reach = np.abs(origins[rays]).max(axis=1) / np.maximum(np.abs(directions[rays]).max(axis=1), 1e-30)
             step = np.float32(4e-7) * (out["tfar"][rays] + start[rays] + reach)
             start[rays] = np.maximum(out["tfar"][rays] + step, tnear[rays])
@@ -83,7 +83,7 @@ class EmbreexScene:
             again = self._scene.run(
                 moved, directions[rays], np.maximum(left, 0).astype(np.float32), query="INTERSECT", output=1
             )
-            # a line meets a triangle once: the same one again is a step that rounding swallowed
+            # a line hits a triangle once: hitting the same one again means that rounding swallowed the step
             same = (again["primID"] == out["primID"][rays]) & (again["primID"] >= 0)
             for name in ("u", "v", "primID", "Ng"):
                 out[name][rays] = again[name]
@@ -92,7 +92,7 @@ class EmbreexScene:
             todo[rays] = same | self._ignored({name: out[name][rays] for name in out}, tnear[rays])
 
     def _ignored(self, out: dict[str, Any], tnear: Float32) -> Any:
-        """Which hits do not count."""
+        """(n,) whether a hit does not count."""
         return ((out["primID"] >= 0) & (out["tfar"] < tnear)) | self._cut_out(out["primID"], out["u"], out["v"])
 
     def _cut_out(self, triangles: Int32, u: Float32, v: Float32) -> Any:
@@ -134,7 +134,7 @@ def _view(address: int, n_packets: int, rows: int) -> Float32:
 
 
 def _rays(packets: Float32) -> tuple[Any, tuple[Float32, Float32, Float32, Float32]]:
-    """Lanes that are not idle, and their rays as embreex takes them."""
+    """Find the lanes that are not idle, and their rays in the form that embreex takes."""
     live = packets[:, TFAR] >= 0  # (n_packets, 16)
     by_lane = packets.transpose(0, 2, 1)[live]
     origins = np.ascontiguousarray(by_lane[:, ORIGIN : ORIGIN + 3])

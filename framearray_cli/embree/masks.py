@@ -1,6 +1,6 @@
-"""Alpha masks as an Embree filter: a hit whose texel is cut out never happened, for every kind of ray.
+"""Alpha masks as an Embree filter: for every kind of ray, a hit whose texel is cut out never happened.
 
-Embree calls the filter for masked triangles alone, so scenes without masks pay nothing.
+Embree calls the filter only for masked triangles, so scenes without masks pay nothing.
 """
 
 from functools import cache
@@ -22,7 +22,7 @@ _HIT_U, _HIT_V, _HIT_TRIANGLE = 3, 4, 5  # rows of RTCHitN
 
 
 def _pointer_to(typingctx: Any, address: Any) -> Any:
-    """An integer address as a pointer that `carray` takes."""
+    """Turn an integer address into a pointer that `carray` takes."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.inttoptr(args[0], context.get_value_type(types.voidptr))
@@ -38,7 +38,7 @@ _carray = _numba.carray
 @keep_on_disk
 @nb.njit()
 def _surfaces_at(table: Any) -> Surfaces:
-    """Rebuild `Surfaces` from the addresses and lengths that `MaskTable` wrote down."""
+    """Rebuild `Surfaces` from the addresses and lengths in a `MaskTable`; fields that masks do not need are empty."""
     n, m, n_texels, n_textures = table[0], table[1], table[2], table[3]
     none3 = _carray(_pointer(table[4]), (0, 3, 3), np.float32)
     uvs = _carray(_pointer(table[5]), (n, 3, 2), np.float32)
@@ -61,6 +61,7 @@ def _filter() -> Any:
     """The compiled callback `void (RTCFilterFunctionNArguments*)`."""
 
     def filter_masked(address: int) -> None:
+        # what Embree passes: n rays, which of them have a hit, the user's table, and the hits
         arguments = _carray(_pointer(address), (6,), np.int64)
         n = _carray(_pointer(address + 40), (1,), np.uint32)[0]
         valid = _carray(_pointer(arguments[_VALID]), (n,), np.int32)
@@ -69,6 +70,7 @@ def _filter() -> Any:
         triangles = _carray(_pointer(arguments[_HIT]), (8, n), np.uint32)
         s = _surfaces_at(table)
         first_masked = table[13]
+        # take back the hits on points that are cut out
         for lane in range(n):
             if valid[lane] != 0:
                 triangle = np.int64(triangles[_HIT_TRIANGLE, lane]) + first_masked
@@ -82,7 +84,7 @@ def _filter() -> Any:
 
 
 class MaskTable:
-    """What the filter reads: addresses of the scene's arrays in one block; keeps those arrays alive."""
+    """What the filter reads: the addresses of the scene's arrays in one block. Keeps those arrays alive."""
 
     def __init__(self, scene: Scene) -> None:
         s = surfaces(scene)

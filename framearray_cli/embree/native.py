@@ -1,4 +1,4 @@
-"""Embree through its C functions, found in the library that the embreex wheel carries."""
+"""Embree through its C functions, from the library in the embreex wheel."""
 
 import ctypes
 import os
@@ -24,10 +24,10 @@ _ROBUST = 1 << 2  # RTC_SCENE_FLAG_ROBUST: no ray slips between neighbouring tri
 
 @cache
 def embree_library() -> ctypes.CDLL | None:
-    """Embree inside the embreex wheel, or None where its symbols cannot be reached.
+    """Load Embree from the embreex wheel; None where its symbols cannot be reached.
 
-    Opening the extension module again resolves every `rtc...` symbol through the module's own dependency, whatever
-    the wheel named that library.
+    Opening the extension module again resolves every `rtc...` symbol through the module's own dependency, whatever the
+    wheel calls that library.
     """
     from embreex import rtcore_scene
 
@@ -66,15 +66,15 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {
 
 
 class NativeScene:
-    """Embree through its C functions; vertices are shared with the scene, not copied."""
+    """Owns an Embree device and scene, built and traced through Embree's C functions."""
 
     def __init__(self, scene: Scene, library: ctypes.CDLL) -> None:
         self._library = library
         self._device = library.rtcNewDevice(_configuration())
         self._scene = library.rtcNewScene(self._device)
-        self._kept: list[Any] = [scene]  # what Embree points into
+        self._kept: list[Any] = [scene]  # memory that Embree points into
         library.rtcSetSceneFlags(self._scene, _ROBUST)
-        # Embree reads 16 bytes at every vertex: one float of padding behind the last one
+        # Embree reads 16 bytes per vertex of 12: the last one needs a float of padding
         vertices = np.empty(scene.corners.size + 4, np.float32)
         vertices[: scene.corners.size] = scene.corners.reshape(-1)
         self._kept.append(vertices)

@@ -1,9 +1,9 @@
 """Rays in packets, and how kernels trace them.
 
-Rays live in structure-of-arrays blocks of 16 in Embree's own layout (RTCRay16, RTCRayHit16), so that kernels write
-rays where Embree reads them. A packet is (rows, 16) float32: 12 rows of ray (origin xyz, tnear, direction xyz, time,
-tfar, mask, id, flags) and, for first hits, the hit (Ng xyz, u, v, triangle, geometry, instance) with room to spare.
-A lane with tfar < 0 is idle.
+Kernels write rays where Embree reads them: in blocks of 16, structures of arrays, in Embree's own layout (RTCRay16,
+RTCRayHit16). A packet is (rows, 16) float32: 12 rows of ray (origin xyz, tnear, direction xyz, time, tfar, mask, id,
+flags) and, for first hits, the hit (Ng xyz, u, v, triangle, geometry, instance), then padding. A lane with tfar < 0 is
+idle.
 """
 
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ from ..kernel import inlined, kernel
 from ..lanes import LANES, select
 
 RAY_ROWS = 12
-HIT_ROWS = 24  # RTCRayHit16 needs 20 to 22 rows, by how Embree was built; the rest is padding to whole cache lines
+HIT_ROWS = 24  # RTCRayHit16 has 20 to 22 rows, depending on how Embree was built; the rest is padding
 ORIGIN, TNEAR, DIRECTION, TFAR, MASK, NORMAL, U, V, TRIANGLE, GEOMETRY = 0, 3, 4, 8, 9, 12, 15, 16, 17, 18
 
 MISS = -1
@@ -27,14 +27,15 @@ ALL_RAYS = -1  # a ray mask with every bit set; Embree skips geometry whose mask
 
 
 class Tracer(NamedTuple):
-    """What a kernel needs to trace rays: addresses, and nothing that would keep it from being cached.
+    """What a kernel needs to trace rays: only addresses and numbers, so that numba can cache the kernel.
 
     Attributes:
-        batch: 0 where the functions take one packet, as Embree's do: `(valid, scene, packet, arguments)`;
-            1 where they take many: `(n_packets, scene, packets, unused)`.
-        coherent: where the arguments stand that tell Embree that the rays of each packet stay together.
-        lanes: where 16 words of -1 stand: the mask of a packet whose lanes all count.
-        first_masked: number of the first triangle with an alpha mask; those are a geometry of their own.
+        scene: address of the scene; of the functions `intersect` and `occluded`, likewise.
+        batch: 0 if the functions take one packet, as Embree's do: `(valid, scene, packet, arguments)`;
+            1 if they take many: `(n_packets, scene, packets, unused)`.
+        coherent: address of the arguments that mark the rays of a packet as coherent.
+        lanes: address of 16 words of -1: the mask of a packet in which all lanes count.
+        first_masked: index of the first triangle with an alpha mask; those form a geometry of their own.
     """
 
     scene: int
@@ -47,7 +48,7 @@ class Tracer(NamedTuple):
 
 
 def _call_at(typingctx: Any, function: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
-    """Call the C function `void (intptr, intptr, intptr, intptr)` at an address that is only known at run time."""
+    """Call the C function `void (intptr, intptr, intptr, intptr)` at an address known only at run time."""
     signature = types.void(*[types.intp] * 5)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -75,14 +76,14 @@ def _trace(tracer: Tracer, function: int, packets: Float32, n_packets: int, cohe
 
 
 def aligned(n_words: int) -> Float32:
-    """(n,) zeros that start at a cache line, as Embree demands."""
+    """(n,) zeros that start at a cache line, as Embree requires."""
     block = np.zeros(n_words + LANES, np.float32)
     start = ((-block.ctypes.data) % 64) // 4
     return block[start : start + n_words]
 
 
 def empty_packets(n_packets: int, rows: int) -> Float32:
-    """Room for packets, (n, rows, 16) float32; tnear 0 and the mask of all rays are set."""
+    """Allocate packets, (n, rows, 16) float32, with tnear 0 and the mask of all rays."""
     packets = aligned(n_packets * rows * LANES).reshape(n_packets, rows, LANES)
     packets.view(np.int32)[:, MASK] = ALL_RAYS
     return packets
@@ -90,7 +91,7 @@ def empty_packets(n_packets: int, rows: int) -> Float32:
 
 @inlined
 def set_ray(packets: Float32, i: int, ox: Real, oy: Real, oz: Real, dx: Real, dy: Real, dz: Real, tfar: Real) -> None:
-    """Write ray i of a packet array; it reaches from its origin to tfar, in lengths of the direction."""
+    """Write ray i of an array of packets; it ends at tfar, in lengths of its direction."""
     p, lane = i >> 4, i & 15
     packets[p, ORIGIN, lane] = ox
     packets[p, ORIGIN + 1, lane] = oy
@@ -103,7 +104,7 @@ def set_ray(packets: Float32, i: int, ox: Real, oy: Real, oz: Real, dx: Real, dy
 
 @inlined
 def _idle_from(packets: Float32, n_rays: int) -> int:
-    """Make the lanes after the last ray idle; returns the number of packets."""
+    """Make the lanes after the last ray idle, and return the number of packets."""
     n_packets = (n_rays + LANES - 1) // LANES
     for i in range(n_rays, n_packets * LANES):
         set_ray(packets, i, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0)
@@ -115,9 +116,9 @@ def intersect(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = Fa
     """Find the first hits of rays 0 to n_rays - 1; see `hit_triangle`.
 
     Args:
-        near: what is nearer is passed over, in lengths of the directions.
-        coherent: the rays of a packet run close together: Embree then keeps them together, which halves the time of
-            shadow rays and takes a fifth of that of eye rays. For rays that scatter it gains nothing.
+        coherent: the rays of a packet run close together. Embree then traverses them together, which halves the time
+            of shadow rays and saves a fifth of that of eye rays; for rays that scatter it gains nothing.
+        near: ignore hits nearer than this, in lengths of the directions.
     """
     n_packets = _idle_from(packets, n_rays)
     bits = packets.view(np.int32)
@@ -131,7 +132,7 @@ def intersect(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = Fa
 
 @kernel
 def occlude(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = False) -> None:
-    """Test rays 0 to n_rays - 1; afterwards row TFAR is -inf where something blocks the ray (`is_blocked`).
+    """Test rays 0 to n_rays - 1: row TFAR becomes -inf where something blocks the ray (`is_blocked`).
 
     Args:
         coherent: see `intersect`.
@@ -141,20 +142,20 @@ def occlude(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = Fals
 
 @inlined
 def is_blocked(packets: Float32, i: int) -> bool:
-    """Whether ray i met something, after `occlude`."""
+    """Whether something blocks ray i, after `occlude`."""
     return packets[i >> 4, TFAR, i & 15] < 0.0  # type: ignore[no-any-return]
 
 
 @inlined
 def scene_triangle(tracer: Tracer, triangle: int, geometry: int) -> int:
-    """The scene's number of a triangle of a geometry; for one ray, or for lanes."""
+    """The index in the scene of a triangle of a geometry; for one ray, or for lanes."""
     number: int = triangle + select(geometry > np.int32(OPAQUE), np.int32(tracer.first_masked), np.int32(0))
     return number
 
 
 @inlined
 def hit_triangle(tracer: Tracer, packets: Float32, i: int) -> int:
-    """The scene's triangle that ray i met, or MISS, after `intersect`."""
+    """The scene's triangle that ray i hit, or MISS, after `intersect`."""
     bits = packets.view(np.int32)
     p, lane = i >> 4, i & 15
     return scene_triangle(tracer, bits[p, TRIANGLE, lane], bits[p, GEOMETRY, lane])

@@ -1,14 +1,13 @@
-"""Sixteen numbers at a time in kernels: the lanes of a ray packet, computed with one instruction each.
+"""Sixteen numbers at a time in kernels: one instruction computes all lanes of a ray packet.
 
-LLVM turns plain loops into such instructions only where it can prove that no array overlaps another, which it cannot
-for loops that look things up. Kernels that write packets therefore say what they want: `Lanes` of float32, float64,
-int32, uint8 or uint64, and flags, with the operators of numbers. On processors with narrower registers LLVM splits
-the operations.
+LLVM vectorizes a plain loop only where it can prove that no array overlaps another. It cannot prove that for loops that
+look things up, so kernels that write packets ask for vectors: `Lanes` of float32, float64, int32, uint8 or uint64, and
+flags, with the operators of numbers. On processors with narrower registers LLVM splits the operations.
 
-What is written with `select`, `gather`, `sqrt` and their like works for single numbers, too.
+A function written with `select`, `gather`, `sqrt` and their like also works for single numbers.
 
-Two things differ from numbers one at a time: sums and products may be fused (one rounding instead of two), and whole
-numbers are shifted to the right as bits, without their sign. What does not fit together is an error of typing.
+Two things differ from single numbers. LLVM may fuse sums and products (one rounding instead of two), and `>>` shifts
+int32 as bits, without the sign. Operands that do not fit together raise a typing error.
 """
 
 from .arithmetic import bits, ctz, doubles, floor, integers, lane_numbers, popcount, reals, select, sqrt, words

@@ -1,4 +1,7 @@
-"""Operators and functions of sixteen numbers."""
+"""Operators and functions of sixteen numbers.
+
+Each `_..._of` types one function of kernels, and generates its LLVM code.
+"""
 
 import operator
 from collections.abc import Callable
@@ -19,7 +22,13 @@ _FUSED = ("contract",)
 
 
 def _operator(function: Any, compute: Callable[..., Any], dtypes: tuple[Any, ...], flags: bool = False) -> None:
-    """Define an operator of two lanes of one dtype, or of lanes and a number."""
+    """Define an operator for two lanes of one dtype, or for lanes and a number.
+
+    Args:
+        compute: generates the code from a builder, the dtype and the operands.
+        dtypes: for which the operator exists.
+        flags: the result is flags instead of lanes of the same dtype.
+    """
 
     class _Typed(_Template):  # type: ignore[misc]
         def generic(self, args: Any, kws: Any) -> Any:
@@ -78,7 +87,7 @@ for _sign, _compare in (
 
 
 def _popcount_of(typingctx: Any, flags: Any) -> Any:
-    """How many lanes are flagged; of a single flag 0 or 1."""
+    """Count the lanes that are flagged; a single flag counts 0 or 1."""
     if flags not in (FLAGS, types.boolean):
         return None
 
@@ -92,7 +101,7 @@ def _popcount_of(typingctx: Any, flags: Any) -> Any:
 
 
 def _bits_of(typingctx: Any, flags: Any) -> Any:
-    """The flags as the bits of a number, lane 0 the lowest."""
+    """Pack the flags into the bits of a number; lane 0 is the lowest bit."""
     if flags != FLAGS:
         return None
 
@@ -103,7 +112,7 @@ def _bits_of(typingctx: Any, flags: Any) -> Any:
 
 
 def _ctz_of(typingctx: Any, bits: Any) -> Any:
-    """The number of zeros below the lowest one of a number's bits."""
+    """Count the trailing zeros of a number: the index of its lowest bit that is set."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.cttz(args[0], ir.Constant(ir.IntType(1), 0))
@@ -112,7 +121,7 @@ def _ctz_of(typingctx: Any, bits: Any) -> Any:
 
 
 def _select_of(typingctx: Any, flags: Any, yes: Any, no: Any) -> Any:
-    """`yes` where flagged, else `no`; either may be a number. With one flag, of two numbers, without a jump."""
+    """Select `yes` where flagged, else `no`; either may be a number. A single flag selects without a jump."""
     if flags not in (FLAGS, types.boolean):
         return None
     lanes = next((arg for arg in (yes, no) if isinstance(arg, Lanes)), None)
@@ -130,6 +139,8 @@ def _select_of(typingctx: Any, flags: Any, yes: Any, no: Any) -> Any:
 
 
 def _function(name: str) -> Callable[..., Any]:
+    """LLVM's own function of reals, of lanes or of one number."""
+
     def of(typingctx: Any, value: Any) -> Any:
         if (value.dtype if isinstance(value, Lanes) else value) not in REAL:
             return None
@@ -145,6 +156,7 @@ def _function(name: str) -> Callable[..., Any]:
 
 
 def _converted(dtype: Any) -> Callable[..., Any]:
+    """The conversion of lanes, or of one number, to a dtype."""
     lanes = Lanes(dtype)
 
     def of(typingctx: Any, value: Any) -> Any:
@@ -173,7 +185,7 @@ def _converted(dtype: Any) -> Callable[..., Any]:
 
 
 def _lane_numbers_of(typingctx: Any) -> Any:
-    """0 to 15."""
+    """The numbers 0 to 15, one per lane."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return ir.Constant(vector_of(INTEGERS), list(range(LANES)))

@@ -1,4 +1,4 @@
-"""The type of sixteen numbers, and what may stand beside them."""
+"""The type of sixteen numbers, and which numbers may be its other operand."""
 
 from typing import Any
 
@@ -7,8 +7,8 @@ from numba import types
 from numba.core import cgutils, datamodel
 from numba.extending import lower_cast
 
-LANES = 16  # that many numbers
-# What of numba has no types.
+LANES = 16  # rays in a packet
+# Parts of numba without type annotations.
 _Type: Any = types.Type
 _PrimitiveModel: Any = datamodel.models.PrimitiveModel
 _register: Any = datamodel.registry.register_default
@@ -47,13 +47,13 @@ class _LanesModel(_PrimitiveModel):  # type: ignore[misc]
 
 
 def vector_of(lanes: Lanes) -> Any:
-    """LLVM's type of them."""
+    """LLVM's vector type for lanes."""
     return ir.VectorType(ELEMENTS[lanes.dtype], LANES)
 
 
 @_lower_cast(types.Number, Lanes)  # type: ignore[untyped-decorator,unused-ignore]
 def _spread(context: Any, builder: Any, source: Any, target: Lanes, value: Any) -> Any:
-    """The same number in all lanes."""
+    """Copy a number into all lanes."""
     element = context.cast(builder, value, source, target.dtype)
     vector = vector_of(target)
     one = builder.insert_element(ir.Constant(vector, ir.Undefined), element, WORD(0))
@@ -63,5 +63,5 @@ def _spread(context: Any, builder: Any, source: Any, target: Lanes, value: Any) 
 
 
 def takes(lanes: Lanes, number: Any) -> bool:
-    """Whether a number may stand beside lanes: whole ones beside all, others beside reals."""
+    """Whether a number may be combined with lanes: integers with all, reals only with reals."""
     return isinstance(number, types.Integer) or (isinstance(number, types.Float) and lanes.dtype in REAL)

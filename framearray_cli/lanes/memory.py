@@ -1,4 +1,8 @@
-"""Sixteen numbers from arrays and back: in a row, as rows of three, and from anywhere."""
+"""Load sixteen numbers from arrays and store them: contiguous, as rows of three, or at any offsets.
+
+Offsets count elements of the flat array; nothing checks them. Each `_..._of` types one function of kernels, and
+generates its LLVM code.
+"""
 
 from typing import Any
 
@@ -10,11 +14,11 @@ from ..kernelcache import slow_gathers
 from .kinds import ELEMENTS, FLAGS, INTEGERS, LANES, SUFFIX, WORD, Lanes, declared, takes, vector_of
 
 _LARGEST_HALF = 0x477FE000  # 65504 as the bits of a float32
-_Tuple: Any = types.UniTuple  # of numba has no types
+_Tuple: Any = types.UniTuple  # numba does not annotate it
 
 
 def _is_array(array: Any, lanes: Any = None) -> bool:
-    """Whether something is a contiguous array of a dtype that lanes have, or that these lanes have."""
+    """Whether a type is a contiguous array of a dtype that lanes can have, or of the dtype of the given lanes."""
     fits = isinstance(array, types.Array) and array.layout == "C" and array.dtype in ELEMENTS
     return fits and array.dtype != types.boolean and (lanes is None or lanes == Lanes(array.dtype))
 
@@ -30,7 +34,7 @@ def _pointer_to_lanes(builder: Any, place: Any, lanes: Lanes) -> Any:
 
 
 def _load_of(typingctx: Any, array: Any, offset: Any) -> Any:
-    """Elements offset to offset + 15 of a contiguous array, counted flat."""
+    """Load elements offset to offset + 15 of a contiguous array."""
     if not _is_array(array):
         return None
     lanes = Lanes(array.dtype)
@@ -43,7 +47,7 @@ def _load_of(typingctx: Any, array: Any, offset: Any) -> Any:
 
 
 def _lanes_from_of(typingctx: Any, address: Any) -> Any:
-    """16 float32 numbers from an address on."""
+    """Load 16 float32 numbers from an address."""
     lanes = Lanes(types.float32)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -54,7 +58,7 @@ def _lanes_from_of(typingctx: Any, address: Any) -> Any:
 
 
 def _store_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
-    """Write elements offset to offset + 15 of a contiguous array, counted flat; a number goes to all of them."""
+    """Store to elements offset to offset + 15 of a contiguous array; a single number goes to all of them."""
     if not _is_array(array) or not (value == Lanes(array.dtype) or takes(Lanes(array.dtype), value)):
         return None
 
@@ -68,9 +72,9 @@ def _store_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
 
 
 def _stored_of(typingctx: Any, array: Any, value: Any) -> Any:
-    """Float32 numbers as an array stores them: as they are, or in uint16 as the bits of halves.
+    """Convert float32 numbers to what an array stores: themselves, or for uint16 the bits of halves.
 
-    A half is the nearest one, of two equally near ones the even; numbers beyond the largest half become that.
+    Rounds to the nearest half, ties to even; numbers beyond the largest half become the largest.
     """
     if not isinstance(array, types.Array) or value != Lanes(types.float32):
         return None
@@ -83,17 +87,20 @@ def _stored_of(typingctx: Any, array: Any, value: Any) -> Any:
         def number(x: int) -> Any:
             return ir.Constant(kind, [x] * LANES)
 
+        # the sign apart, the size at most the largest half
         bits = builder.bitcast(args[1], kind)
         sign = builder.and_(bits, number(-(1 << 31)))
         size = builder.xor(bits, sign)
         size = builder.select(builder.icmp_signed("<", size, number(_LARGEST_HALF)), size, number(_LARGEST_HALF))
-        # one step of float32 is the smallest half there: adding it rounds to what a subnormal half can hold
+        # subnormal halves: at this number one step of float32 is the smallest half, so adding it rounds
         coarse = number((127 - 15 + 23 - 10 + 1) << 23)
         small = builder.fadd(builder.bitcast(size, reals), builder.bitcast(coarse, reals))
         small = builder.sub(builder.bitcast(small, kind), coarse)
+        # normal halves: change the bias of the exponent, and round to even the 13 bits that are dropped
         odd = builder.and_(builder.lshr(size, number(13)), number(1))
         normal = builder.add(builder.add(size, number(((15 - 127) << 23) + 0xFFF)), odd)
         normal = builder.lshr(normal, number(13))
+        # 2^-14 is the smallest normal half
         half = builder.select(builder.icmp_signed("<", size, number(113 << 23)), small, normal)
         half = builder.or_(half, builder.lshr(sign, number(16)))
         return builder.trunc(half, vector_of(Lanes(types.uint16)))
@@ -102,7 +109,7 @@ def _stored_of(typingctx: Any, array: Any, value: Any) -> Any:
 
 
 def _gather_of(typingctx: Any, array: Any, offsets: Any) -> Any:
-    """The elements of a contiguous array at 16 flat offsets, or the one at one offset."""
+    """Load the elements of a contiguous array at 16 offsets, or one element at one offset."""
     if not _is_array(array) or not (offsets == INTEGERS or isinstance(offsets, types.Integer)):
         return None
     if not isinstance(offsets, Lanes):
@@ -128,11 +135,11 @@ def _gather_of(typingctx: Any, array: Any, offsets: Any) -> Any:
 
 
 def _gathered(builder: Any, lanes: Lanes, data: Any, offsets: Any) -> Any:
-    """LLVM's own gather, which it makes single loads of where the processor has no such instruction."""
+    """LLVM's own gather; it becomes single loads where the processor has no such instruction."""
     result, flags = vector_of(lanes), vector_of(FLAGS)
     wide = builder.sext(offsets, ir.VectorType(ir.IntType(64), LANES))
     at, places = builder.gep(data, [ir.IntType(64)(0)]), ir.VectorType(data.type, LANES)
-    at.indices, at.type = [wide], places  # llvmlite's builder knows no places of lanes; LLVM does
+    at.indices, at.type = [wide], places  # llvmlite's builder cannot index by vectors; LLVM can
     suffix = SUFFIX[lanes.dtype]
     kind = ir.FunctionType(result, [places, WORD, flags, result])
     load = declared(builder.module, kind, f"llvm.masked.gather.v{LANES}{suffix}.v{LANES}p0{suffix}")
@@ -140,7 +147,7 @@ def _gathered(builder: Any, lanes: Lanes, data: Any, offsets: Any) -> Any:
 
 
 def _triples_at_of(typingctx: Any, array: Any, row: Any) -> Any:
-    """The three columns of rows `row` to `row` + 15 of a contiguous (n, 3) array."""
+    """Load rows `row` to `row` + 15 of a contiguous (n, 3) array, as three columns."""
     if not _is_array(array) or not isinstance(row, types.Integer):
         return None
     lanes = Lanes(array.dtype)
@@ -157,7 +164,7 @@ def _triples_at_of(typingctx: Any, array: Any, row: Any) -> Any:
 
 
 def _put_triples_of(typingctx: Any, array: Any, row: Any, x: Any, y: Any, z: Any) -> Any:
-    """Write rows `row` to `row` + 15 of a contiguous (n, 3) array, given its columns."""
+    """Store three columns to rows `row` to `row` + 15 of a contiguous (n, 3) array."""
     if not _is_array(array, x) or not isinstance(row, types.Integer) or not x == y == z:
         return None
 
@@ -171,7 +178,7 @@ def _put_triples_of(typingctx: Any, array: Any, row: Any, x: Any, y: Any, z: Any
 
 
 def _thirds(context: Any, builder: Any, sig: Any, args: Any) -> list[Any]:
-    """Where the three times sixteen numbers of sixteen rows stand."""
+    """Pointers to the three vectors of sixteen numbers that sixteen rows consist of."""
     row = context.cast(builder, args[1], sig.args[1], types.intp)
     offsets = [builder.add(builder.mul(row, ir.IntType(64)(3)), ir.IntType(64)(part * LANES)) for part in range(3)]
     places = [_place(context, builder, sig.args[0], args[0], types.intp, offset) for offset in offsets]
@@ -179,7 +186,7 @@ def _thirds(context: Any, builder: Any, sig: Any, args: Any) -> list[Any]:
 
 
 def _picked(builder: Any, three: Any, numbers: list[int]) -> Any:
-    """Sixteen of the 48 numbers of three vectors."""
+    """Pick sixteen of the 48 numbers of three vectors."""
     a, b, c = three
 
     def constant(indices: list[int]) -> Any:
@@ -191,7 +198,7 @@ def _picked(builder: Any, three: Any, numbers: list[int]) -> Any:
 
 
 def _scatter_of(typingctx: Any, array: Any, offsets: Any, value: Any) -> Any:
-    """Write 16 values to the flat offsets of a contiguous array."""
+    """Store 16 values at 16 offsets of a contiguous array."""
     if not _is_array(array, value) or offsets != INTEGERS:
         return None
 
@@ -206,7 +213,7 @@ def _scatter_of(typingctx: Any, array: Any, offsets: Any, value: Any) -> Any:
 
 
 def _compress_of(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any) -> Any:
-    """Write the flagged lanes one after another to a contiguous array, from a flat offset on."""
+    """Store the flagged lanes next to each other in a contiguous array, from an offset on."""
     if flags != FLAGS or not _is_array(array, value) or array.dtype not in SUFFIX:
         return None
 

@@ -1,4 +1,4 @@
-"""Mesh files -> triangles, materials and textures; the only door to trimesh."""
+"""Mesh files -> triangles, materials and textures. The only door to trimesh."""
 
 from .cleaning import finite, has_area, repeated
 from .gltf_stage import Stage, StageCamera, StageLight

@@ -1,4 +1,4 @@
-"""Files that a scene file refers to: buffers, material libraries, images; only from folders that it may use."""
+"""Read the files that a scene file names (buffers, material libraries, images), only from folders that it may use."""
 
 import os
 from dataclasses import dataclass, field
@@ -9,20 +9,20 @@ from ..errors import SceneError
 from .limit import Limit
 from .model import listed
 
-LONGEST_NAME = 200  # characters of a file's name that a message repeats
+LONGEST_NAME = 200  # characters of a file name that a message repeats
 REMEDY = "copy it beside the scene file, or name its folder in scene.folders of the job"
 
 
 class AssetError(Exception):
-    """A referenced file that is missing or may not be read; the message says which and why."""
+    """A named file is missing or may not be read; the message says which and why."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assets:
-    """What a scene may use: the folder of its file and all below, folders that the job adds, and memory.
+    """What a scene may use: the folder of its file with everything below, folders that the job adds, and memory.
 
     Attributes:
-        refused: names of files that lie elsewhere, in the order in which they were asked for.
+        refused: names of files that lie elsewhere, in the order in which the scene named them.
     """
 
     folder: Path
@@ -31,39 +31,39 @@ class Assets:
     refused: list[str] = field(default_factory=list)
 
     def read(self, name: str) -> bytes:
-        """Return the bytes of a file named by the scene.
+        """Return the bytes of a file that the scene names.
 
-        Windows paths, percent codes, quotes and `file:` are understood. Where the named path does not exist, or leads
-        elsewhere, a file of the same name directly in one of the folders is taken, as exporters often write paths of
-        another machine. Links are followed, and must not lead elsewhere either.
+        Accepts Windows paths, percent codes, quotes and `file:`. Exporters often write paths of another machine: where
+        the named path does not exist, or leads elsewhere, a file of the same name directly in one of the folders is
+        read instead. Links are followed, and must not lead elsewhere either.
 
         Raises:
             AssetError: missing, elsewhere, or unreadable.
             SceneError: larger than the memory that may be used.
         """
-        told = shortened(name)
+        shown = shortened(name)
         clean = name.strip().strip('"')
         outside = is_url(clean)
         for spelling in () if outside else _spellings(clean):
             for root in (self.folder, *self.folders):
                 whole = Path(os.path.abspath(root / spelling))
                 if not any(_below(whole, allowed) for allowed in self._roots(lexical=True)):
-                    outside = True  # told by its name alone: nothing elsewhere is even looked at
+                    outside = True  # by its name only: nothing elsewhere is even looked at
                 elif not any(_below(_real(whole), allowed) for allowed in self._roots(lexical=False)):
                     outside = True
                 elif _is_file(whole):
-                    return self._bytes(whole, told)
+                    return self._bytes(whole, shown)
         if outside or _leads_away(clean):
-            if told not in self.refused:
-                self.refused.append(told)
-            raise AssetError(f"{told}: refused, it lies outside the scene's folder; {REMEDY}")
-        raise AssetError(f"{told}: no such file beside the scene")
+            if shown not in self.refused:
+                self.refused.append(shown)
+            raise AssetError(f"{shown}: refused, it lies outside the scene's folder; {REMEDY}")
+        raise AssetError(f"{shown}: no such file beside the scene")
 
     def require_inside(self) -> None:
-        """Refuse a scene that asked for files elsewhere.
+        """Refuse a scene that named files elsewhere.
 
         Raises:
-            SceneError: names them.
+            SceneError: lists them.
         """
         if self.refused:
             many = len(self.refused) > 1
@@ -71,12 +71,12 @@ class Assets:
             remedy = REMEDY if not many else REMEDY.replace("it ", "them ", 1).replace("its folder", "their folders")
             raise SceneError(f"refused to read {listed(self.refused)}: {lie} outside the scene's folder; {remedy}")
 
-    def _bytes(self, file: Path, told: str) -> bytes:
+    def _bytes(self, file: Path, shown: str) -> bytes:
         try:
             self.limit.take("files", file.stat().st_size)
             return file.read_bytes()
         except OSError as error:
-            raise AssetError(f"{told}: {error.strerror or error}") from error
+            raise AssetError(f"{shown}: {error.strerror or error}") from error
 
     def _roots(self, *, lexical: bool) -> list[Path]:
         roots = [Path(os.path.abspath(root)) for root in (self.folder, *self.folders)]
@@ -84,19 +84,19 @@ class Assets:
 
 
 def is_url(name: str) -> bool:
-    """Whether a name says where on a network a file is; `C:` is a drive."""
+    """Whether a name is a URL on a network; `C:` is a drive."""
     scheme, colon, rest = name.partition(":")
     return bool(colon) and len(scheme) > 1 and rest.startswith("//") and scheme.lower() != "file" and scheme.isalnum()
 
 
 def shortened(name: str) -> str:
-    """A name as a message repeats it: on one line, and not too long."""
+    """A name as messages repeat it: on one line, and not too long."""
     plain = "".join(c if c.isprintable() else "?" for c in name.strip())
     return plain if len(plain) <= LONGEST_NAME else plain[:LONGEST_NAME] + "..."
 
 
 def _spellings(name: str) -> list[str]:
-    """Ways to read a file name, likeliest first."""
+    """The paths that a file name may stand for, the likeliest first."""
     found: list[str] = []
     for text in (name, unquote(name)):
         slashes = _without_scheme(text).replace("\\", "/")
@@ -114,7 +114,7 @@ def _without_scheme(name: str) -> str:
 
 
 def _leads_away(name: str) -> bool:
-    """Whether a name starts at a drive, a server or the root, on whatever system."""
+    """Whether a name starts at a drive, a server or the root, on any system."""
     return any(bool(PureWindowsPath(_without_scheme(text)).anchor) for text in (name, unquote(name)))
 
 
@@ -123,7 +123,7 @@ def _below(path: Path, root: Path) -> bool:
 
 
 def _real(path: Path) -> Path:
-    """A path with its links followed; a loop of links leads nowhere."""
+    """Follow the links of a path; one whose links form a loop stays as it is."""
     try:
         return Path(os.path.realpath(path))
     except (OSError, ValueError):
@@ -131,7 +131,7 @@ def _real(path: Path) -> Path:
 
 
 def _is_file(path: Path) -> bool:
-    """Whether a path is a plain file; pipes and devices, which may never end, are not."""
+    """Whether a path is a regular file; pipes and devices, which may never end, are not."""
     try:
         return path.is_file()
     except (OSError, ValueError):

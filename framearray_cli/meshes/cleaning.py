@@ -1,4 +1,4 @@
-"""Which triangles can be rendered: finite, with an area, and none twice."""
+"""Find the triangles that can be rendered: finite, with an area, and not repeated."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,24 +8,24 @@ from ..arrays import Corners, Float64
 Mask = NDArray[np.bool_]
 Keys = NDArray[np.uint64]
 
-# A triangle whose height is below this share of its longest side is narrower than float32 can place its corners;
+# Relative to its longest side, a triangle lower than this is narrower than float32 can place its corners:
 # its normal would be noise.
 SLIVER = 2.0**-23
 
 
 def finite(corners: Float64) -> Mask:
-    """(n,) whether all corners of a triangle are numbers."""
+    """(n,) whether all corners of a triangle are finite."""
     return np.asarray(np.isfinite(corners).all(axis=(1, 2)))
 
 
 def has_area(corners: Float64 | Corners) -> Mask:
-    """(n,) whether a triangle is more than a line; independent of the scale of the scene.
+    """(n,) whether a triangle is more than a line, whatever the scale of the scene.
 
     Args:
         corners: (n, 3, 3) finite positions.
     """
     # float64 holds differences and products of float32 coordinates exactly, so flat means flat
-    with np.errstate(all="ignore"):  # beyond float64's range a triangle compares false, and is left out
+    with np.errstate(all="ignore"):  # a triangle beyond the range of float64 compares false, and is left out
         first = corners[:, 1].astype(np.float64) - corners[:, 0]
         second = corners[:, 2].astype(np.float64) - corners[:, 0]
         longest = np.maximum(_largest(first), _largest(second))
@@ -35,7 +35,7 @@ def has_area(corners: Float64 | Corners) -> Mask:
 
 
 def _largest(vectors: Float64) -> Float64:
-    """(n,) the largest coordinate by size; much quicker than a reduction along so short an axis."""
+    """(n,) the largest absolute coordinate; much faster than a reduction along an axis of three."""
     x, y, z = np.abs(vectors).T
     return np.asarray(np.maximum(np.maximum(x, y), z))
 
@@ -45,7 +45,7 @@ def repeated(corners: Corners, group: NDArray[np.integer]) -> Mask:
 
     Args:
         corners: (n, 3, 3) positions.
-        group: (n,) only triangles of one group are compared.
+        group: (n,) only triangles of the same group are compared.
     """
     hashes = _corner_hashes(corners)  # (n, 3)
     keys = hashes.sum(axis=1, dtype=np.uint64) + _mix(group.astype(np.uint64))
@@ -54,7 +54,7 @@ def repeated(corners: Corners, group: NDArray[np.integer]) -> Mask:
     new[1:] = keys[order][1:] != keys[order][:-1]
     first = order[new][np.cumsum(new) - 1]  # the earliest triangle with the same key
     again, earlier = order[~new], first[~new]
-    # equal keys are all but sure; the corners themselves decide
+    # equal keys almost always mean equal corners; the corners themselves decide
     same = (_sorted_corners(corners, hashes, again) == _sorted_corners(corners, hashes, earlier)).all(axis=(1, 2))
     same &= group[again] == group[earlier]
     found = np.zeros(len(keys), dtype=np.bool_)

@@ -23,10 +23,10 @@ class Gltf:
 
     tree: Tree
     blob: bytes
-    _read: dict[int, NDArray[Any]] = field(default_factory=dict)  # accessors, each of which is read once
+    _read: dict[int, NDArray[Any]] = field(default_factory=dict)  # accessors; each is read once
 
     def items(self, key: str) -> list[Tree]:
-        """A top-level list of the JSON, empty where it is missing."""
+        """A top-level list of the JSON; empty if it is missing."""
         found: list[Tree] = self.tree.get(key) or []
         return found
 
@@ -37,7 +37,7 @@ class Gltf:
         return self.blob[start : start + view["byteLength"]]
 
     def read_accessor(self, index: int) -> NDArray[Any]:
-        """(count, width) values of an accessor; normalised integers become floats, sparse values are filled in."""
+        """Read an accessor: (count, width) values. Normalised integers become floats; sparse values are filled in."""
         if index not in self._read:
             self._read[index] = self._values(index)
         return self._read[index]
@@ -62,7 +62,7 @@ class Gltf:
         return normalised(values, accessor)
 
     def _rows(self, view_index: int, offset: int, dtype: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
-        """(count, width) copy of strided data; raises ValueError where the view is too short."""
+        """Copy strided data to (count, width); raise ValueError if the view is too short."""
         row = width * dtype.itemsize
         stride = int(self.tree["bufferViews"][view_index].get("byteStride") or row)
         data = np.frombuffer(self.view_bytes(view_index), dtype=np.uint8)[offset:]
@@ -75,7 +75,7 @@ class Gltf:
 
 
 def normalised(values: NDArray[Any], accessor: Tree) -> NDArray[Any]:
-    """Values of an accessor; integers that stand for numbers from 0 or -1 to 1 become these."""
+    """Convert the values of an accessor: integers that encode numbers from 0 or -1 to 1 become these."""
     if accessor.get("normalized") and values.dtype.kind in "iu":
         largest = 2.0 ** (8 * values.dtype.itemsize - (values.dtype.kind == "i")) - 1.0
         return np.asarray(np.maximum(values.astype(np.float64) / largest, -1.0))
@@ -86,9 +86,9 @@ def open_gltf(data: bytes, assets: Assets) -> Gltf:
     """Read the JSON and all buffers of a GLB or glTF file.
 
     Raises:
-        ValueError: not glTF 2, cut short, or a buffer shorter than it says.
-        SceneError: a tree that cannot be read as it is.
-        AssetError: a buffer file that is missing.
+        ValueError: not glTF 2, cut short, or a buffer is shorter than it says.
+        SceneError: the JSON is invalid (`check_gltf`).
+        AssetError: a buffer file is missing.
     """
     text, binary = _split_glb(data) if data[:4] == MAGIC else (data, None)
     tree = _parsed(text)
@@ -111,10 +111,10 @@ def open_gltf(data: bytes, assets: Assets) -> Gltf:
 
 
 def _parsed(text: bytes) -> Tree:
-    """The JSON of a glTF without keys whose value is null."""
+    """Parse the JSON of a glTF file, without keys whose value is null."""
     try:
         tree = json.loads(text.decode("utf-8-sig"), object_hook=_without_null if b"null" in text else None)
-        if b"\\ud" in text.lower():  # half of a letter beyond 16 bits is none, and cannot be written again
+        if b"\\ud" in text.lower():  # half of a surrogate pair is no character, and could not be encoded later
             tree = json.loads(json.dumps(tree, ensure_ascii=False).encode(errors="replace"))
     except RecursionError as error:
         raise ValueError("lists or objects are nested too deeply") from error
@@ -128,7 +128,7 @@ def _without_null(table: Tree) -> Tree:
 
 
 def _split_glb(data: bytes) -> tuple[bytes, bytes | None]:
-    """The JSON and the binary chunk of a GLB."""
+    """Split a GLB into its JSON chunk and its binary chunk, if it has one."""
     if len(data) < 20:
         raise ValueError(f"cut short: {len(data)} bytes")
     version, length = struct.unpack_from("<II", data, 4)
@@ -166,7 +166,7 @@ def _buffer(buffer: Tree, index: int, binary: bytes | None, assets: Assets) -> b
 
 
 def uri_bytes(uri: str, assets: Assets) -> bytes:
-    """The bytes behind a URI: embedded data, or a file beside the scene."""
+    """Read the bytes behind a URI: embedded data, or a file beside the scene."""
     if uri.startswith("data:"):
         head, comma, data = uri.partition(",")
         if not comma or not head.endswith(";base64"):

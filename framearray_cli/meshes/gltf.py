@@ -1,4 +1,4 @@
-"""GLB and glTF -> parts: every mesh of the default scene, in each of its places."""
+"""GLB and glTF -> parts: every mesh of the default scene, at each of its places."""
 
 from .assets import Assets
 from .container import open_gltf
@@ -15,8 +15,8 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
     """Read a GLB or glTF file.
 
     Raises:
-        ValueError, AssetError, KeyError, ...: a broken file.
-        SceneError: a file in a form that cannot be read.
+        ValueError, AssetError, KeyError, ...: the file is broken.
+        SceneError: the file has a form that cannot be read.
     """
     notes = Notes()
     gltf = open_gltf(data, assets)
@@ -58,7 +58,7 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
 
 
 def _defaults(parts: list[Part], plain: int, coloured: int, notes: Notes) -> list[Material]:
-    """The stand-ins for missing materials, as far as some part needs them."""
+    """The defaults for missing materials, as far as some part needs them."""
     needed = max((part.material for part in parts), default=-1)
     found = []
     if needed >= plain:

@@ -1,6 +1,6 @@
-"""What a glTF file must say for its readers: types, bounds and references, checked before anything of it is used.
+"""Check a glTF file before anything of it is used: types, bounds and references of all keys that a reader reads.
 
-Only keys that some reader reads are checked; a key with the value null counts as missing.
+A key whose value is null counts as missing.
 """
 
 from collections.abc import Iterator
@@ -13,14 +13,14 @@ from .limit import Limit
 
 COMPONENTS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-MOST_SHOWN = 3  # problems of a file; the next ones are most often the same
-LARGEST = 2**53  # whole numbers beyond are not whole in JSON
+MOST_SHOWN = 3  # problems per file; further ones are mostly the same
+LARGEST = 2**53  # a double does not hold all whole numbers beyond
 TRIANGLES = (4, 5, 6)  # modes: list, strip, fan
 KINDS = {"POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TEXCOORD": ("VEC2",), "COLOR": ("VEC3", "VEC4")}
 
 
 def check_gltf(tree: Tree, limit: Limit) -> None:
-    """Refuse a tree that cannot be read as it is.
+    """Refuse a tree that breaks the format.
 
     Raises:
         SceneError: names the first problems and their places.
@@ -38,7 +38,7 @@ def check_gltf(tree: Tree, limit: Limit) -> None:
 
 
 def _problems(tree: Tree) -> Iterator[str]:
-    """All problems; those of bounds only where types are right."""
+    """Find all problems; check bounds only if all types are right."""
     wrong = False
     for problem in FILE(tree, "", tree):
         wrong = True
@@ -142,12 +142,12 @@ FILE = table(
 
 
 def _row(accessor: Tree) -> int:
-    """Bytes of one value of an accessor."""
+    """Bytes per value of an accessor."""
     return WIDTHS[accessor["type"]] * np.dtype(COMPONENTS[accessor["componentType"]]).itemsize
 
 
 def _views(tree: Tree) -> Iterator[str]:
-    """Buffer views that reach beyond their buffer."""
+    """Find buffer views that reach beyond their buffer."""
     buffers = tree.get("buffers") or []
     for index, view in enumerate(tree.get("bufferViews") or []):
         end, size = (view.get("byteOffset") or 0) + view["byteLength"], buffers[view["buffer"]]["byteLength"]
@@ -156,7 +156,7 @@ def _views(tree: Tree) -> Iterator[str]:
 
 
 def _accessors(tree: Tree) -> Iterator[str]:
-    """Accessors that reach beyond their view, or whose values overlap."""
+    """Find accessors that reach beyond their view, or whose values overlap."""
     views = tree.get("bufferViews") or []
     for index, accessor in enumerate(tree.get("accessors") or []):
         if accessor.get("bufferView") is None or not accessor["count"]:
@@ -171,7 +171,7 @@ def _accessors(tree: Tree) -> Iterator[str]:
 
 
 def _primitives(tree: Tree) -> Iterator[str]:
-    """Attributes of triangles that are of another type than readers take."""
+    """Find attributes and indices of triangles whose type no reader takes."""
     accessors = tree.get("accessors") or []
     for m, mesh in enumerate(tree.get("meshes") or []):
         for p, primitive in enumerate(mesh["primitives"]):

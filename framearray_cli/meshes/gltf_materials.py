@@ -16,18 +16,18 @@ from .model import Material, Notes
 from .textures import TextureTable
 
 MIRROR_ROUGHNESS = 0.1  # up to it a metal is a mirror
-GLOSSY_SPECULAR = 0.2  # specular factor (old extension) above which a surface counts as metal; dielectrics have 0.04
+GLOSSY_SPECULAR = 0.2  # a specular factor (old extension) above it means metal; dielectrics have 0.04
 KNOWN = {"KHR_materials_transmission", "KHR_materials_pbrSpecularGlossiness"}
-SILENT = {"KHR_materials_ior", "KHR_materials_volume"}  # they matter inside glass only, which is left out
+SILENT = {"KHR_materials_ior", "KHR_materials_volume"}  # they only matter inside glass, which is left out
 REPEAT = 10497
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GltfMaterial:
-    """A material and how meshes that use it find their texture coordinates.
+    """A material, and how meshes that use it find their texture coordinates.
 
     Attributes:
-        uv_set: number of the TEXCOORD attribute; -1 without texture.
+        uv_set: index of the TEXCOORD attribute; -1 without texture.
         uv_matrix: (2, 3) transform of (u, v down, 1), or None.
         repeats: whether the sampler repeats in both directions.
     """
@@ -41,7 +41,7 @@ class GltfMaterial:
 def read_materials(
     gltf: Gltf, used: set[int], assets: Assets, textures: TextureTable, notes: Notes
 ) -> list[GltfMaterial]:
-    """Map every material; textures are read only for those that some primitive uses."""
+    """Map every material; read textures only for those that some primitive uses."""
     found = []
     for index, entry in enumerate(gltf.items("materials")):
         name = str(entry.get("name") or f"material {index}")
@@ -55,7 +55,7 @@ def _material(
     extensions: Tree = entry.get("extensions") or {}
     gloss: Tree | None = extensions.get("KHR_materials_pbrSpecularGlossiness")
     pbr: Tree = entry.get("pbrMetallicRoughness") or {}
-    if not used:  # no triangle has it: the name is kept for overrides, its images are not read
+    if not used:  # no triangle has it: keep the name for overrides, read no image
         return GltfMaterial(material=Material(name=name))
     source = ImageFinder(name, gltf, assets, textures)
     info: Tree | None = pbr.get("baseColorTexture") if gloss is None else gloss.get("diffuseTexture")
@@ -84,7 +84,7 @@ def _material(
 
 @dataclass(frozen=True, slots=True)
 class ImageFinder:
-    """Finds the images that a material's texture infos point to."""
+    """Finds the images that the texture infos of a material refer to."""
 
     name: str
     gltf: Gltf
@@ -92,19 +92,19 @@ class ImageFinder:
     textures: TextureTable
 
     def index(self, info: Tree | None) -> int:
-        """Index in the texture table, or -1; what cannot be read becomes a note."""
+        """Index in the texture table; -1 without texture, and with a note if it cannot be read."""
         image = self._image(info)
         if image is None:
             return -1
         return self.textures.index(("image", image), f"material {self.name}", self._reader(image))
 
     def mean(self, info: Tree) -> Float64 | None:
-        """(4,) mean of an image's raw channels, or None where it cannot be read."""
+        """(4,) mean of an image's raw channels; None if it cannot be read."""
         image = self._image(info)
         return None if image is None else self.textures.mean(f"material {self.name}", self._reader(image))
 
     def _image(self, info: Tree | None) -> int | None:
-        """Number of the image behind a texture info."""
+        """Index of the image that a texture info refers to."""
         if info is None:
             return None
         texture = self.gltf.tree["textures"][info["index"]]
@@ -136,7 +136,7 @@ class ImageFinder:
 
 
 def _metal(name: str, base: Float64, pbr: Tree, source: ImageFinder, notes: Notes) -> tuple[Rgb3, Rgb3]:
-    """Diffuse and mirror part: the smooth metal share of the base colour mirrors, all else is diffuse."""
+    """Split the base colour: the share of smooth metal is the mirror part, all else is diffuse."""
     metallic, roughness = float(pbr.get("metallicFactor", 1.0)), float(pbr.get("roughnessFactor", 1.0))
     if pbr.get("metallicRoughnessTexture") is not None and metallic > 0:
         mean = source.mean(pbr["metallicRoughnessTexture"])
@@ -151,7 +151,7 @@ def _metal(name: str, base: Float64, pbr: Tree, source: ImageFinder, notes: Note
 
 
 def _glossy(name: str, base: Float64, gloss: Tree, notes: Notes) -> tuple[Rgb3, Rgb3]:
-    """The same from the older specular-glossiness description."""
+    """Diffuse and mirror part of the older specular-glossiness description."""
     specular = np.array(gloss.get("specularFactor", [1.0, 1.0, 1.0]), dtype=np.float64)
     if gloss.get("specularGlossinessTexture") is not None:
         notes.add("specular-glossiness textures, and the mirror part they describe, are left out", name)
@@ -185,7 +185,7 @@ def _opacity(name: str, entry: Tree, alpha: float, texture: int, source: ImageFi
 
 
 def uv_matrix(transform: Tree) -> Float64 | None:
-    """(2, 3) matrix of KHR_texture_transform, for (u, v, 1) with v downwards; None where it changes nothing."""
+    """(2, 3) matrix of KHR_texture_transform, for (u, v, 1) with v downwards; None if it changes nothing."""
     offset = np.array(transform.get("offset", [0.0, 0.0]), dtype=np.float64)
     scale = np.array(transform.get("scale", [1.0, 1.0]), dtype=np.float64)
     angle = float(transform.get("rotation", 0.0))

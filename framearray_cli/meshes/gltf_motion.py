@@ -1,4 +1,4 @@
-"""Where the nodes of a glTF file are at any time: its hierarchy, moved by all its animations together.
+"""Place the nodes of a glTF file at any time: its hierarchy, moved by all of its animations together.
 
 Notation of glTF 2.0, section 3.11 and appendix C: a channel moves one property of one node by a sampler, which has key
 times, key values and an interpolation.
@@ -20,7 +20,7 @@ AT_REST: dict[str, Sequence[float]] = {
     "rotation": (0.0, 0.0, 0.0, 1.0),
     "scale": (1.0, 1.0, 1.0),
 }
-NEARLY_EQUAL = 1e-4  # radians between two rotations below which a straight line is exact to 1e-9
+NEARLY_EQUAL = 1e-4  # radians; between two rotations closer than this a straight line is exact to 1e-9
 
 
 class Channel(NamedTuple):
@@ -29,7 +29,7 @@ class Channel(NamedTuple):
     Attributes:
         times: (k,) seconds, rising.
         values: (k, w) at the keys.
-        tangents: (k, 2, w) arriving and leaving, a second; of a cubic spline only.
+        tangents: (k, 2, w) arriving and leaving, per second; only of a cubic spline.
     """
 
     times: Float64
@@ -40,11 +40,11 @@ class Channel(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Motion:
-    """All nodes of a file and what moves them.
+    """All nodes of a file, and what moves them.
 
     Attributes:
-        nodes: of the file's JSON.
-        parents: by node; -1 for a root.
+        nodes: those of the file's JSON.
+        parents: the parent of each node; -1 for a root.
         channels: (node, property) -> how it moves.
     """
 
@@ -53,14 +53,14 @@ class Motion:
     channels: dict[tuple[int, str], Channel]
 
     def chain(self, node: int) -> list[int]:
-        """A node and its ancestors, upwards."""
+        """A node and its ancestors, from the node upwards."""
         found = [node]
         while self.parents[found[-1]] >= 0:
             found.append(self.parents[found[-1]])
         return found
 
     def span(self, nodes: Sequence[int]) -> tuple[float, float] | None:
-        """First and last key time, in seconds, of what moves any of some nodes; None where nothing does."""
+        """First and last key time, in seconds, of the channels that move any of some nodes; None without any."""
         links = {link for node in nodes for link in self.chain(node)}
         times = [channel.times for (node, _), channel in self.channels.items() if node in links]
         if not times:
@@ -78,7 +78,7 @@ class Motion:
     def _local(self, node: int, at: Float64) -> Float64:
         """(n, 4, 4) transform of a node in its parent."""
         entry = self.nodes[node]
-        if "matrix" in entry:  # column after column; a node with a matrix must not be animated
+        if "matrix" in entry:  # column by column; a node with a matrix must not be animated
             return np.tile(np.array(entry["matrix"], dtype=np.float64).reshape(4, 4).T, (len(at), 1, 1))
         parts = {}
         for path in PATHS:
@@ -93,7 +93,7 @@ class Motion:
 
 
 def at_rest(node: Tree) -> Float64:
-    """(4, 4) transform of a node in its parent, unmoved; a rotation of any length is taken as one of length 1."""
+    """(4, 4) transform of a node in its parent, unanimated; a rotation is normalised to length 1."""
     if node.get("matrix") is not None:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
     parts = {path: np.array(node.get(path) or AT_REST[path], dtype=np.float64) for path in PATHS}
@@ -106,7 +106,7 @@ def at_rest(node: Tree) -> Float64:
 
 
 def read_motion(gltf: Gltf) -> Motion:
-    """Gather the hierarchy and the channels of every animation; where two move the same property, the first counts."""
+    """Read the hierarchy and the channels of all animations; if two move the same property, the first counts."""
     nodes = gltf.items("nodes")
     parents = [-1] * len(nodes)
     for index, node in enumerate(nodes):
@@ -126,7 +126,7 @@ def _channel(gltf: Gltf, sampler: Tree) -> Channel:
     """Read one sampler.
 
     Raises:
-        ValueError: times that do not rise, or another number of values.
+        ValueError: the times do not rise, or the number of values is another.
     """
     times = gltf.read_accessor(sampler["input"])[:, 0].astype(np.float64)
     values = gltf.read_accessor(sampler["output"]).astype(np.float64)
@@ -145,9 +145,9 @@ def _channel(gltf: Gltf, sampler: Tree) -> Channel:
 
 
 def sampled(channel: Channel, at: Float64, is_rotation: bool) -> Float64:
-    """Value of a channel at n times, (n, w); before the first and after the last key it rests.
+    """Evaluate a channel at n times, (n, w); before the first and after the last key it rests.
 
-    Rotations are unit quaternions x, y, z, w, and take the shorter way between two keys.
+    Rotations are unit quaternions x, y, z, w, and turn the shorter way between two keys.
     """
     times, values = channel.times, channel.values
     before = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 1)
@@ -170,7 +170,7 @@ def _line(a: Float64, b: Float64, t: Float64) -> Float64:
 
 
 def _hermite(a: Float64, b: Float64, leave: Float64, arrive: Float64, t: Float64) -> Float64:
-    """The cubic from a to b with the tangents `leave` and `arrive`, a whole span."""
+    """The cubic from a to b with the tangents `leave` and `arrive`, per span."""
     return np.asarray(
         (2 * t**3 - 3 * t**2 + 1) * a
         + (t**3 - 2 * t**2 + t) * leave

@@ -1,4 +1,4 @@
-"""Nodes of a glTF file: what can be read of them, and every place where a mesh stands."""
+"""Nodes of a glTF file: what of them can be read, and every place of a mesh."""
 
 import importlib.util
 
@@ -14,8 +14,8 @@ from .gltf_values import Tree
 from .limit import Limit
 from .model import Notes
 
-# Memory that a triangle takes while a scene is read, at least: measured 460 to 800 bytes, with texture coordinates,
-# normals and colours; and a place of a mesh.
+# Least memory per triangle while a scene is read (measured: 460 to 800 bytes, with texture coordinates, normals and
+# colours), and per place of a mesh.
 TRIANGLE_BYTES, PLACE_BYTES = 450, 1000
 INSTANCE_KEYS = {"TRANSLATION": "translation", "ROTATION": "rotation", "SCALE": "scale"}
 HANDLED = KNOWN | SILENT | {"KHR_texture_transform", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}
@@ -23,10 +23,10 @@ HANDLED |= {"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_materials_unl
 
 
 def check_readable(gltf: Gltf) -> None:
-    """Refuse what would load as nothing or as garbage.
+    """Refuse a file that would load as nothing or as garbage.
 
     Raises:
-        SceneError: compressed geometry, no scene, or a node graph with a cycle.
+        SceneError: the geometry is compressed, there is no scene, or the node graph has a cycle.
     """
     used = set(gltf.tree.get("extensionsUsed") or [])
     for meshopt in ("EXT_meshopt_compression", "KHR_meshopt_compression"):
@@ -42,7 +42,7 @@ def check_readable(gltf: Gltf) -> None:
 
 
 def _check_nodes(gltf: Gltf) -> None:
-    """Raise where a node is its own ancestor, by taking away leaves until none is left."""
+    """Refuse nodes that are their own ancestors or have several parents; removes leaves until none is left."""
     nodes = gltf.items("nodes")
     waiting = [len(node.get("children") or []) for node in nodes]
     parents: list[list[int]] = [[] for _ in nodes]
@@ -65,13 +65,13 @@ def _check_nodes(gltf: Gltf) -> None:
 
 
 def used_materials(gltf: Gltf) -> set[int]:
-    """Indices of the materials that some primitive has."""
+    """Indices of the materials that some primitive uses."""
     primitives = [primitive for mesh in gltf.items("meshes") for primitive in mesh["primitives"]]
     return {primitive["material"] for primitive in primitives if "material" in primitive}
 
 
 def note_unread(gltf: Gltf, notes: Notes) -> None:
-    """Note what the file has and the renderer does not show."""
+    """Note what the file contains and the renderer does not show."""
     for extension in sorted(set(gltf.tree.get("extensionsUsed") or []) - HANDLED):
         if extension == "KHR_lights_punctual":
             notes.add("lights in the scene file are left out; the job gives the lights")
@@ -88,13 +88,13 @@ def note_unread(gltf: Gltf, notes: Notes) -> None:
 
 
 def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64]]:
-    """Every mesh that the default scene shows, by its number, with its places: (n, 4, 4) `world_from_mesh`.
+    """List every mesh that the default scene shows: its index and its places, (n, 4, 4) `world_from_mesh`.
 
     Args:
-        limit: counts triangles and places, before they are there.
+        limit: counts triangles and places before they are allocated.
 
     Raises:
-        SceneError: they take more memory than there is.
+        SceneError: they need more memory than there is.
     """
     nodes, meshes = gltf.items("nodes"), gltf.items("meshes")
     triangles = [sum(triangle_count(gltf, primitive) for primitive in mesh["primitives"]) for mesh in meshes]
@@ -121,7 +121,7 @@ def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64]]:
 
 
 def _places(gltf: Gltf, node: Tree, limit: Limit) -> Float64:
-    """(n, 4, 4) transforms of the instances of a node in the node; of a plain node, one that changes nothing."""
+    """(n, 4, 4) transforms of the instances of a node, in the node; of a plain node, one identity."""
     instancing = (node.get("extensions") or {}).get("EXT_mesh_gpu_instancing")
     if instancing is None:
         return np.eye(4)[None]

@@ -1,4 +1,4 @@
-"""Cameras and lights that a glTF file brings along, and where they are at any time."""
+"""Cameras and lights of a glTF file, and where they are at any time."""
 
 import math
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ class StageCamera:
 
     Attributes:
         fov_deg: vertical field of view, degrees.
-        aspect: width over height, where the file says it.
+        aspect: width over height, if the file gives it.
     """
 
     name: str
@@ -46,8 +46,8 @@ class Stage:
     """Cameras and lights of a scene file, in the order of its nodes; both may be missing.
 
     Attributes:
-        motion: None where the format has none.
-        notes: what was found and cannot be used.
+        motion: None for a format without animations.
+        notes: what the file has and cannot be used.
     """
 
     cameras: tuple[StageCamera, ...] = ()
@@ -61,7 +61,7 @@ class Stage:
         return self.motion.world_from_node(node, times)
 
     def span(self, nodes: list[int]) -> tuple[float, float] | None:
-        """First and last time, seconds, of what moves any of some nodes."""
+        """First and last time, in seconds, of what moves any of some nodes."""
         return self.motion.span(nodes) if self.motion else None
 
 
@@ -69,7 +69,7 @@ def read_gltf_stage(gltf: Gltf) -> Stage:
     """Find the cameras and lights of the file's default scene.
 
     Raises:
-        ValueError, KeyError, IndexError, ...: a broken file.
+        ValueError, KeyError, IndexError, ...: the file is broken.
     """
     motion = read_motion(gltf)
     lights_table = ((gltf.tree.get("extensions") or {}).get(PUNCTUAL) or {}).get("lights") or []
@@ -88,7 +88,7 @@ def read_gltf_stage(gltf: Gltf) -> Stage:
 
 
 def _shown(gltf: Gltf) -> list[int]:
-    """Numbers of the nodes that the default scene shows; every node once, whatever the graph is like."""
+    """Indices of the nodes that the default scene shows; each node once, even if the graph is no tree."""
     nodes, scenes = gltf.items("nodes"), gltf.items("scenes")
     waiting = list(scenes[gltf.tree.get("scene", 0)].get("nodes") or []) if scenes else []
     found: set[int] = set()
@@ -108,7 +108,7 @@ def _camera(index: int, node: Tree, entry: Tree, notes: list[str]) -> StageCamer
         return None
     lens = entry["perspective"]
     fov, aspect = math.degrees(float(lens["yfov"])), lens.get("aspectRatio")
-    if not 0.001 <= fov <= 179.9:  # what a job takes
+    if not 0.001 <= fov <= 179.9:  # the range that a job accepts
         notes.append(f"camera {name}: has a field of view of {fov:g} degrees and is left out")
         return None
     return StageCamera(name=name, node=index, fov_deg=fov, aspect=float(aspect) if aspect else None)

@@ -27,13 +27,13 @@ class Triangles:
     """f triangles of one material between v vertices, in the coordinates of their mesh.
 
     Attributes:
-        material: number.
+        material: its index.
         vertices: (v, 3).
         faces: (f, 3), all of them between 0 and v.
         normals: (v, 3), or None.
         uvs: (v, 2) with v upwards, or None.
         colours: (v, 3) linear, or None.
-        outside: triangles that are left out because a vertex of theirs is not there.
+        outside: the number of triangles left out because a vertex of theirs does not exist.
     """
 
     material: int
@@ -46,7 +46,7 @@ class Triangles:
 
 
 def triangle_count(gltf: Gltf, primitive: Tree) -> int:
-    """How many triangles a primitive says that it has."""
+    """The number of triangles that a primitive declares."""
     number = primitive.get("indices", primitive["attributes"].get("POSITION"))
     mode = primitive.get("mode", LIST)
     if number is None or mode not in TRIANGLES:
@@ -56,11 +56,11 @@ def triangle_count(gltf: Gltf, primitive: Tree) -> int:
 
 
 def read_triangles(gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], notes: Notes) -> Triangles | None:
-    """Read one primitive; None where it holds no triangles.
+    """Read one primitive; None if it holds no triangles.
 
     Args:
-        materials: what those of the file were mapped to; the numbers behind them stand for none, with and without
-            colours at the vertices.
+        materials: those of the file. The two indices behind them stand for no material: without and with vertex
+            colours.
         notes: takes what is left out.
     """
     mode = primitive.get("mode", LIST)
@@ -83,7 +83,7 @@ def read_triangles(gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], n
         return None
     inside = ((faces >= 0) & (faces < count)).all(axis=1)
     kept = faces[inside]
-    if kept.size < count:  # many primitives may share the vertices of all
+    if kept.size < count:  # primitives may share one large array of vertices
         found = {name: values[kept.reshape(-1)] for name, values in found.items()}
         kept = np.arange(kept.size, dtype=np.int64).reshape(-1, 3)
     if number is None:
@@ -101,7 +101,7 @@ def read_triangles(gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], n
 
 
 def _arrays(gltf: Gltf, primitive: Tree, names: tuple[str, ...]) -> tuple[Attributes, Faces | None]:
-    """Those of the named attributes that there are, and the indices, if any."""
+    """Read those of the named attributes that exist, and the indices, if any."""
     attributes: Mapping[str, int] = primitive["attributes"]
     packed: Attributes = {}
     indices: NDArray[Any] | None = None
@@ -119,7 +119,7 @@ def _arrays(gltf: Gltf, primitive: Tree, names: tuple[str, ...]) -> tuple[Attrib
 
 
 def _unpacked(gltf: Gltf, draco: Tree, attributes: Mapping[str, int]) -> tuple[Attributes, NDArray[Any]]:
-    """Attributes and indices of a primitive that is compressed with Draco."""
+    """Decode the attributes and indices of a primitive that is compressed with Draco."""
     import DracoPy
 
     mesh: Any = DracoPy.decode(gltf.view_bytes(draco["bufferView"]))

@@ -1,4 +1,4 @@
-"""Checks of values in a glTF tree: numbers, texts, lists and objects; each yields what is wrong, with its place."""
+"""Checks of values in a glTF tree: numbers, texts, lists and objects. Each yields problems with their places."""
 
 import itertools
 import math
@@ -11,7 +11,7 @@ Tree = dict[str, Any]
 Check = Callable[[Any, str, Tree], Iterator[str]]  # value, its place, the whole tree -> problems
 
 LARGEST_FLOAT = 1.7e308
-LIGHTS = "lights"  # of the extension, beside the top-level lists
+LIGHTS = "lights"  # the list of KHR_lights_punctual, which is not at the top level
 
 
 def _got(value: Any) -> str:
@@ -34,7 +34,7 @@ def number(low: float = -math.inf, high: float = math.inf, *, whole: bool = Fals
 
 
 def numbers(count: int) -> Check:
-    """A list of that many numbers; of several that are wrong, the first is reported."""
+    """A list of `count` numbers; only the first wrong one is reported."""
     one = number()
 
     def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
@@ -78,7 +78,7 @@ def number_of(key: str) -> Check:
 
 
 def _lights(tree: Tree) -> Any:
-    """The lights of a tree, whatever it is like."""
+    """The list of lights of a tree; an empty object if the tree has none."""
     for key in ("extensions", "KHR_lights_punctual", LIGHTS):
         tree = tree.get(key) or {} if isinstance(tree, dict) else {}
     return tree
@@ -98,7 +98,7 @@ def list_of(one: Check) -> Check:
 
 
 def table(keys: Mapping[str, Check], needed: tuple[str, ...] = ()) -> Check:
-    """An object: known keys have such values, needed ones are there, others may be anything."""
+    """An object whose known keys have such values and whose needed keys exist; other keys may hold anything."""
 
     def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
         if not isinstance(value, dict):
@@ -116,7 +116,7 @@ def table(keys: Mapping[str, Check], needed: tuple[str, ...] = ()) -> Check:
 
 
 def map_of(one: Check) -> Check:
-    """An object with whatever keys."""
+    """An object with any keys, and such values."""
 
     def check(value: Any, place: str, tree: Tree) -> Iterator[str]:
         if not isinstance(value, dict):

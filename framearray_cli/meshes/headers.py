@@ -1,4 +1,4 @@
-"""What files that trimesh reads say of themselves, checked beforehand: numbers of things, what would be unpacked."""
+"""Check what a file claims of itself before trimesh reads it: counts, and the size of what would be unpacked."""
 
 import io
 import re
@@ -11,8 +11,8 @@ from .limit import Limit
 
 ARCHIVES = ("3mf", "3dxml", "zae")  # each is a ZIP with XML in it
 XML = ("dae", "xaml")
-LONGEST_HEADER = 100_000  # bytes; some have comments, none has a novel
-# Bytes of the kinds of numbers of PLY.
+LONGEST_HEADER = 100_000  # bytes; comments take some, never this many
+# Bytes per number of each PLY kind.
 PLY_KINDS = {
     "char": 1,
     "uchar": 1,
@@ -30,10 +30,10 @@ BETWEEN_SOLIDS = re.compile(rb"^[ \t]*endsolid[^\r\n]*[\r\n\s]+solid[^\r\n]*$", 
 
 
 def check_headers(data: bytes, extension: str, limit: Limit) -> None:
-    """Refuse a file whose beginning says what cannot be.
+    """Refuse a file whose header claims the impossible.
 
     Raises:
-        SceneError: with the reason.
+        SceneError: gives the reason.
     """
     if extension == "ply":
         _check_ply(data)
@@ -46,21 +46,21 @@ def check_headers(data: bytes, extension: str, limit: Limit) -> None:
 
 
 def one_solid(data: bytes) -> bytes:
-    """ASCII STL with its solids joined; trimesh makes a mesh of each, which takes its time with very many."""
+    """Join the solids of an ASCII STL: trimesh makes a mesh of each, which is slow for very many."""
     if data[:200].lstrip()[:5].lower() != b"solid" or b"\0" in data[:200]:
         return data
     return BETWEEN_SOLIDS.sub(b"", data)
 
 
 def _check_ply(data: bytes) -> None:
-    """Elements with counts for which the file is too short, and kinds that do not exist."""
+    """Refuse counts for which the file is too short, and kinds that do not exist."""
     head, mark, _ = data[:LONGEST_HEADER].partition(b"end_header")
     lines = [line.split() for line in head.decode("latin-1").splitlines() if line.strip()]
     if not mark or lines[0][0].lower() != "ply":
         raise SceneError("broken PLY: expected a header from 'ply' to 'end_header', got none; export it anew")
     if not head.isascii():
         raise SceneError("broken PLY: expected a header of plain letters, got other bytes in it; export it anew")
-    text, least, count, row = False, 0, 0, 0  # bytes of the shortest body, rows of an element, bytes of a row
+    text, least, count, row = False, 0, 0, 0  # bytes of the shortest body, rows per element, bytes per row
     missing = {"x", "y", "z"}
     for words in lines[1:]:
         if words[0] == "format":
@@ -89,13 +89,13 @@ def _line(words: list[str]) -> str:
 
 
 def _check_off(data: bytes) -> None:
-    """Counts for which the file is too short."""
+    """Refuse counts for which the file is too short."""
     words = (line.split(b"#")[0].split() for line in data[:LONGEST_HEADER].splitlines())
     numbers = [word for line in words for word in line if word.lstrip(b"-").isdigit()]
     counts = [_whole(word.decode("latin-1")) for word in numbers[:2]]
     if len(counts) < 2 or min(counts) < 0:
         raise SceneError("broken OFF: expected the numbers of vertices and faces, got none; export it anew")
-    if 2 * sum(counts) > len(data):  # a row takes two bytes at least
+    if 2 * sum(counts) > len(data):  # a row takes at least two bytes
         raise SceneError(
             f"broken OFF: its header promises {counts[0]} vertices and {counts[1]} faces, the file has "
             f"{len(data)} bytes; export it anew"
@@ -103,12 +103,12 @@ def _check_off(data: bytes) -> None:
 
 
 def _whole(word: str) -> int:
-    """A whole number of at least 0, or -1."""
+    """Parse a whole number of at least 0; -1 for anything else."""
     return int(word) if word.isdecimal() and word.isascii() and len(word) < 19 else -1
 
 
 def _check_archive(data: bytes, limit: Limit) -> None:
-    """Count what would be unpacked, and look for what XML must not have."""
+    """Count the bytes that would be unpacked, and refuse XML that defines entities."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         limit.take("unpacked files", sum(info.file_size for info in archive.infolist()))
         for info in archive.infolist():
@@ -117,7 +117,7 @@ def _check_archive(data: bytes, limit: Limit) -> None:
 
 
 def _starts(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> Iterator[bytes]:
-    """The beginning of a file in an archive, where definitions stand."""
+    """Yield the beginning of a file in an archive, where entities are defined."""
     if info.is_dir() or info.flag_bits & 1:
         return
     with archive.open(info) as file:
@@ -125,7 +125,7 @@ def _starts(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> Iterator[bytes]:
 
 
 def _check_xml(data: bytes, name: str) -> None:
-    """Refuse XML that defines entities: they read other files, or grow without end; no program exports any."""
+    """Refuse XML that defines entities: they can read other files, or grow without end. No exporter writes any."""
     plain = data.replace(b"\0", b"")  # UTF-16 and UTF-32 as well
     if b"<!ENTITY" in plain or (b"<!DOCTYPE" in plain and (b"[" in plain.partition(b"<!DOCTYPE")[2][:1000])):
         raise SceneError(f"{name} defines XML entities, which are refused; export it anew")

@@ -1,4 +1,4 @@
-"""How much memory reading a scene may take: counted before it is taken, as a small file can hold a huge scene."""
+"""Limit the memory for reading a scene, counted before it is allocated: a small file can hold a huge scene."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,10 +11,10 @@ from ..usage import free_memory
 
 @dataclass(slots=True, kw_only=True)
 class Limit:
-    """Bytes that may be taken, and what they were taken for.
+    """The number of bytes that may be taken, and what they were taken for.
 
     Attributes:
-        most: bytes; by default, what is free.
+        most: bytes; by default all free memory.
         taken: kind of data -> bytes.
     """
 
@@ -25,7 +25,7 @@ class Limit:
         """Count bytes that are about to be taken.
 
         Raises:
-            SceneError: they are more than are left.
+            SceneError: there are fewer left.
         """
         self.taken[kind] = self.taken.get(kind, 0) + size
         if sum(self.taken.values()) > self.most:
@@ -37,7 +37,7 @@ class Limit:
 
     @contextmanager
     def lent(self, kind: str, size: int) -> Iterator[None]:
-        """Count bytes that are given back at the end."""
+        """Count bytes that are returned at the end."""
         self.take(kind, size)
         try:
             yield

@@ -1,8 +1,8 @@
-"""What a file says of a surface -> a `Material`: the same rules for the readers of all formats.
+"""Materials: the same rules for the readers of all formats.
 
-Readers map their format to a diffuse part, a mirror part and an opacity. Here these become a material: no surface
-reflects more than it receives, glass is left out, blended textures are cut out, and where a file gives no material, or
-colours that are not colours, something stands in.
+A reader maps what its file says of a surface to a diffuse part, a mirror part and an opacity; `make_material` puts them
+together. No surface reflects more than it receives. Glass is left out, blended textures are cut out. There are defaults
+for missing materials, and for colours that are not colours.
 """
 
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from ..arrays import Float32, Float64
 from .model import GREY, Material, Notes
 from .textures import TextureTable
 
-TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light than this is taken as glass and left out for now
-CUTOFF = 0.5  # where a blended texture turns from hole to surface; also glTF's default for masks
-BRIGHTEST = 1e30  # what infinite reflectivities are taken for, before they are scaled to 1
+TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light counts as glass, which is left out for now
+CUTOFF = 0.5  # alpha where a blended texture turns from hole to surface; also glTF's default for masks
+BRIGHTEST = 1e30  # stands in for infinite reflectivities, before they are scaled to 1
 DEFAULT_NAME = "default"
 COLOURED_NAME = "vertex colours"
 
@@ -42,14 +42,14 @@ def make_material(
     texture: int = -1,
     mirror_texture: int = -1,
 ) -> Material:
-    """Make a material of what a reader found.
+    """Make a material from what a reader found.
 
     Args:
-        diffuse: reflectivity of the diffuse part, whatever numbers the file has.
+        diffuse: reflectivity of the diffuse part, of any size.
         specular: that of the mirror part.
-        notes: takes a note where the two have to be brought into range.
+        notes: gets a note if the two have to be brought into range.
         texture: multiplies the diffuse part.
-        mirror_texture: multiplies the mirror part, if there is one.
+        mirror_texture: multiplies the mirror part, unless that is 0.
     """
     reflectivity, specular = limited(name, diffuse, specular, notes)
     return Material(
@@ -88,7 +88,7 @@ def masked(alpha: float, texture: int, cutoff: float, textures: TextureTable) ->
 
 
 def blended(name: str, alpha: float, texture: int, textures: TextureTable, notes: Notes) -> Opacity:
-    """Opacity of a material that lets light through by alpha: glass, a cut-out texture, or nearly opaque."""
+    """Opacity of a material that lets light through by alpha: glass, cut out, or taken as opaque."""
     lowest, highest = textures.alpha_range(texture)
     if alpha * highest < TRANSMISSIVE_ALPHA:
         notes.add("transmissive materials are left out", name)
@@ -102,7 +102,7 @@ def blended(name: str, alpha: float, texture: int, textures: TextureTable, notes
 
 
 def default_material(coloured: bool, notes: Notes, name: str = "") -> Material:
-    """What stands in for a missing material: white under vertex colours, grey otherwise."""
+    """The default for a missing material: white under vertex colours, else grey."""
     if coloured:
         return Material(name=name or COLOURED_NAME, reflectivity=(1.0, 1.0, 1.0))
     notes.add(f"surfaces without material have a grey of reflectivity {GREY}")
@@ -110,7 +110,7 @@ def default_material(coloured: bool, notes: Notes, name: str = "") -> Material:
 
 
 def clean_colours(colours: Float64, notes: Notes) -> Float32:
-    """Bring colours into [0, 1]: 0 to 255 is scaled, NaN becomes white."""
+    """Bring colours into [0, 1]: scale 0 to 255, replace NaN by white."""
     bad = np.asarray(~np.isfinite(colours).all(axis=-1))
     if bad.any():
         notes.add("vertex colours that are not numbers are taken as white")

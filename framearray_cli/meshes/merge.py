@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from ..arrays import Corners, CornerUvs, Float64
 from .model import Material, Notes, Part
 
-FAR_UV = 16.0  # beyond it float32 texture coordinates lose texels, so whole repeats are taken off
+FAR_UV = 16.0  # float32 texture coordinates beyond it lose texels: whole repeats are subtracted
 
 
 def untextured_variants(
     parts: Sequence[Part], materials: Sequence[Material], notes: Notes
 ) -> tuple[list[Part], list[Material]]:
-    """Give parts without texture coordinates a variant of their material that has no texture."""
+    """Give each part without texture coordinates a variant of its material without textures."""
     variants: dict[int, int] = {}
     new_parts, new_materials = [], list(materials)
     for part in parts:
@@ -35,14 +35,14 @@ def untextured_variants(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Merged:
-    """All triangles of all parts; optional data is None where no part has it, and filled in where some have.
+    """All triangles of all parts. Optional data is None if no part has it; if some have, the others get defaults.
 
     Attributes:
         corners: (n, 3, 3) in file coordinates.
-        normals: (n, 3, 3) NaN where a part has none.
+        normals: (n, 3, 3); NaN for parts without.
         has_normals: (n,) whether the file gives normals.
         uvs: (n, 3, 2).
-        colours: (n, 3, 3) white where a part has none.
+        colours: (n, 3, 3); white for parts without.
         material: (n,).
     """
 
@@ -55,7 +55,7 @@ class Merged:
 
 
 def merge(parts: Sequence[Part]) -> Merged:
-    """Join parts, in order."""
+    """Join the parts, in order."""
     counts = [len(part.corners) for part in parts]
     n = sum(counts)
     ends = np.cumsum(counts)
@@ -83,19 +83,19 @@ def merge(parts: Sequence[Part]) -> Merged:
 
 
 def _bounded(normals: Float64) -> Float64:
-    """Normals scaled so that their largest component is 1; a tiny node scale must not make them vanish in float32."""
+    """Scale normals so that their largest component is 1: float32 would round those of a tiny node to 0."""
     with np.errstate(all="ignore"):
         return np.asarray(normals / np.abs(normals).max(axis=-1, keepdims=True))
 
 
 def unit_normals(normals: Corners, has_normals: NDArray[np.bool_], corners: Corners, notes: Notes) -> Corners:
-    """Unit shading normals; the geometric one where the file has none, zero, or not a number.
+    """Compute unit shading normals; geometric ones where the file has none, zero, or not a number.
 
     Args:
         normals: (n, 3, 3) of any length.
         has_normals: (n,) whether the file gives normals for a triangle.
-        corners: (n, 3, 3) positions of triangles that have an area.
-        notes: takes how many normals are broken.
+        corners: (n, 3, 3) positions of triangles with an area.
+        notes: gets the number of broken normals.
     """
     with np.errstate(all="ignore"):
         lengths = np.linalg.norm(normals, axis=-1, keepdims=True)
@@ -110,7 +110,7 @@ def unit_normals(normals: Corners, has_normals: NDArray[np.bool_], corners: Corn
 
 
 def geometric_normals(corners: Corners) -> Corners:
-    """(n, 3) unit normals by winding, for triangles that have an area."""
+    """(n, 3) unit normals by winding, for triangles with an area."""
     first = corners[:, 1].astype(np.float64) - corners[:, 0]
     second = corners[:, 2].astype(np.float64) - corners[:, 0]
     first /= np.abs(first).max(axis=1, keepdims=True)
@@ -120,7 +120,7 @@ def geometric_normals(corners: Corners) -> Corners:
 
 
 def near_uvs(uvs: Float64, notes: Notes) -> CornerUvs:
-    """Texture coordinates in float32; textures repeat, so far ones are moved back by whole repeats."""
+    """Convert texture coordinates to float32; move far ones back by whole repeats, as textures repeat."""
     bad = np.asarray(~np.isfinite(uvs).all(axis=-1))
     if bad.any():
         notes.add(f"{int(bad.sum())} texture coordinates are missing or not numbers, taken as 0")

@@ -1,18 +1,18 @@
-"""What every reader of scene files hands over: parts, materials, textures and notes, in the file's own coordinates."""
+"""What every reader of scene files returns: parts, materials, textures and notes, in the file's own coordinates."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from ..arrays import Bytes, Float32, Float64
 
-GREY = 0.5  # reflectivity of surfaces without any material: neither black nor a white that hides all shading
+GREY = 0.5  # reflectivity of surfaces without material: neither black, nor a white that hides all shading
 NAMES_IN_A_NOTE = 6  # names that one note lists before it says "and n more"
 MOST_NOTES = 50  # more would scroll away what matters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
-    """One material as the renderer sees it; textures are indices into `Meshes.textures`, or -1.
+    """A material as the renderer sees it; textures are indices into `Meshes.textures`, or -1.
 
     Attributes:
         reflectivity: diffuse part, linear RGB in [0, 1].
@@ -37,11 +37,11 @@ class Material:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Part:
-    """n triangles of one material, one row a corner, in file coordinates.
+    """n triangles of one material, one row per corner, in file coordinates.
 
     Attributes:
         corners: (n, 3, 3) positions; may hold non-finite values.
-        normals: (n, 3, 3) normals from the file, of any length, or None where the file has none.
+        normals: (n, 3, 3) from the file, of any length, or None.
         uvs: (n, 3, 2) texture coordinates, v upwards, or None.
         colours: (n, 3, 3) linear colours, or None.
     """
@@ -55,11 +55,11 @@ class Part:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Meshes:
-    """All that a scene file holds.
+    """The contents of a scene file.
 
     Attributes:
         textures: (height, width, 4) RGBA each, row 0 on top, colours sRGB encoded, alpha linear.
-        dropped: reason -> number of triangles that could not even be read.
+        dropped: reason -> the number of triangles that could not even be read.
     """
 
     parts: tuple[Part, ...]
@@ -71,18 +71,18 @@ class Meshes:
 
 @dataclass(slots=True)
 class Notes:
-    """Collects what the user should know; one sentence a kind of finding, with the names it concerns."""
+    """Collects what the user should know: one sentence per kind of finding, with the names it concerns."""
 
     found: dict[str, dict[str, None]] = field(default_factory=dict)  # sentence -> names, in the order found
 
     def add(self, sentence: str, name: str = "") -> None:
-        """Note a finding; the same sentence with several names becomes one line."""
+        """Add a finding; several names with the same sentence become one line."""
         names = self.found.setdefault(sentence, {})
         if name:
             names[name] = None
 
     def lines(self) -> tuple[str, ...]:
-        """One line a finding, in the order found; of very many, the first ones."""
+        """One line per finding, in the order found; only the first ones of very many."""
         shown = list(self.found.items())[:MOST_NOTES]
         lines = [f"{sentence}: {listed(list(names))}" if names else sentence for sentence, names in shown]
         more = len(self.found) - len(shown)
@@ -90,7 +90,7 @@ class Notes:
 
 
 def listed(names: Sequence[str], limit: int = NAMES_IN_A_NOTE) -> str:
-    """Join names for a sentence; a long list is cut short."""
+    """Join names for a sentence; cut a long list short."""
     shown = ", ".join(names[:limit])
     more = len(names) - limit
     return f"{shown} and {more} more" if more > 0 else shown

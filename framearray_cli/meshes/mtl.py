@@ -1,4 +1,4 @@
-"""MTL text -> materials. Read here because trimesh knows no map options, Windows paths, `d` or `illum`."""
+"""MTL text -> materials. trimesh does not read them: it ignores map options, Windows paths, `d` and `illum`."""
 
 import shlex
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ IGNORED_MAPS += ["bump", "norm", "disp", "refl"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapUse:
-    """A texture of a material: file name, and uv' = scale * uv + offset."""
+    """A texture of a material: its file, and uv' = scale * uv + offset."""
 
     file: str
     scale: tuple[float, float] = (1.0, 1.0)
@@ -31,14 +31,14 @@ class MapUse:
 
 @dataclass(slots=True)
 class MtlEntry:
-    """The lines of one `newmtl` block: lower-case key -> the rest of the line."""
+    """The lines of a `newmtl` block: lower-case key -> the rest of the line."""
 
     name: str
     values: dict[str, str] = field(default_factory=dict)
 
 
 def parse_mtl(text: str) -> dict[str, MtlEntry]:
-    """Split the text of a material library into its materials; the first of a name counts."""
+    """Split the text of a material library into its materials; the first of each name counts."""
     entries: dict[str, MtlEntry] = {}
     entry: MtlEntry | None = None
     for line in text.splitlines():
@@ -57,7 +57,7 @@ def parse_mtl(text: str) -> dict[str, MtlEntry]:
 def to_material(
     entry: MtlEntry, assets: Assets, textures: TextureTable, notes: Notes
 ) -> tuple[Material, MapUse | None]:
-    """Map one MTL material to a diffuse part, a mirror part and an opacity.
+    """Map an MTL material to a diffuse part, a mirror part and an opacity.
 
     Returns:
         The material, and the use of its base texture, whose scale and offset the reader applies.
@@ -83,7 +83,7 @@ def to_material(
 
 
 def _base_colour(name: str, values: Mapping[str, str], textured: bool, notes: Notes) -> Rgb3:
-    """Kd; white beneath a texture where Kd is missing or black, as such exporters mean the texture alone."""
+    """Kd; white under a texture if Kd is missing or black: exporters then mean only the texture."""
     kd = _rgb(values, "kd")
     if "kd" in values and kd is None:
         notes.add("Kd is not three numbers, taken as grey", name)
@@ -150,7 +150,7 @@ def _map_use(value: str | None) -> MapUse | None:
 
 
 def _rgb(values: Mapping[str, str], key: str) -> Rgb3 | None:
-    """Three numbers, or one for all three; None where the key is missing or something else."""
+    """Three numbers, or one for all three; None if the key is missing or holds something else."""
     words = values.get(key, "").split()
     if not words or not all(_is_number(word) for word in words[:3]):
         return None
@@ -161,7 +161,7 @@ def _rgb(values: Mapping[str, str], key: str) -> Rgb3 | None:
 
 
 def _number(values: Mapping[str, str], key: str, default: float) -> float:
-    """The last word as a number (`d -halo 0.5` has an option first)."""
+    """The last word as a number (in `d -halo 0.5` an option comes first)."""
     words = values.get(key, "").split()
     if not words or not _is_number(words[-1]):
         return default

@@ -1,7 +1,7 @@
 """OBJ text -> parts.
 
-Read here and not by trimesh, which takes relative indices from the end of the file, skips "v<TAB>x", reads
-only the first material library, fans concave polygons, and drops colours and normals that only some lines have.
+trimesh does not read them: it takes relative indices from the end of the file, skips "v<TAB>x", reads only the first
+material library, splits concave polygons into fans, and drops colours and normals that only some lines have.
 """
 
 import re
@@ -21,19 +21,19 @@ from .textures import TextureTable
 
 Indices = NDArray[np.int64]
 
-MOST_LIBRARIES = 1000  # a scene has one or two; each takes a look at the disk
+MOST_LIBRARIES = 1000  # a scene has one or two; each costs an access to the disk
 
 
 @dataclass(slots=True)
 class ObjText:
-    """The lines of an OBJ file sorted by keyword; one entry a line."""
+    """The lines of an OBJ file by keyword; one entry per line."""
 
     v: list[str] = field(default_factory=list)
     vt: list[str] = field(default_factory=list)
     vn: list[str] = field(default_factory=list)
     faces: list[str] = field(default_factory=list)
-    seen: list[tuple[int, int, int]] = field(default_factory=list)  # v, vt, vn lines above a face
-    face_material: list[int] = field(default_factory=list)  # place in `materials`, or -1
+    seen: list[tuple[int, int, int]] = field(default_factory=list)  # the numbers of v, vt, vn lines above a face
+    face_material: list[int] = field(default_factory=list)  # index in `materials`, or -1
     materials: list[str] = field(default_factory=list)  # names after usemtl
     libraries: list[str] = field(default_factory=list)
     others: set[str] = field(default_factory=set)  # keywords that hold points, lines or curved surfaces
@@ -43,8 +43,8 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
     """Read an OBJ file and its material libraries.
 
     Raises:
-        ValueError: a line that holds something else than numbers.
-        SceneError: an image too large to read.
+        ValueError: a line holds something other than numbers.
+        SceneError: an image is too large to read.
     """
     notes = Notes()
     text = split_lines(decode_text(data))
@@ -90,7 +90,7 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
 
 
 def decode_text(data: bytes) -> str:
-    """Decode text in UTF-8, UTF-16 (told by its mark or its zero bytes) or Latin-1."""
+    """Decode text in UTF-8, UTF-16 (recognised by its mark or its zero bytes) or Latin-1."""
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data.decode("utf-16")
     head = data[:64]
@@ -105,7 +105,7 @@ def decode_text(data: bytes) -> str:
 
 
 def split_lines(text: str) -> ObjText:
-    """Sort the lines of an OBJ file by their keyword; a backslash joins a line with the next."""
+    """Group the lines of an OBJ file by keyword; a backslash joins a line with the next."""
     out = ObjText()
     places: dict[str, int] = {}
     material = -1
@@ -133,7 +133,7 @@ def split_lines(text: str) -> ObjText:
 
 
 def _columns(lines: Sequence[str], n: int, keyword: str) -> Float64:
-    """(lines, n) numbers; a line with fewer is filled with 0, more are cut off."""
+    """Parse lines to (lines, n) numbers; fill shorter lines with 0, cut longer ones."""
     rows = [line.split() for line in lines]
     widths = np.array([len(row) for row in rows], dtype=np.int64)
     out = np.zeros((len(rows), n))
@@ -149,7 +149,7 @@ def _columns(lines: Sequence[str], n: int, keyword: str) -> Float64:
 
 
 def _number(word: str, keyword: str) -> float:
-    """A number, also with the sign of its exponent in the wrong place: 3.1-e2 is 3.1e-2."""
+    """Parse a number, even with the sign of its exponent in the wrong place: 3.1-e2 is 3.1e-2."""
     try:
         return float(re.sub(r"([+-])[eE](\d)", r"e\1\2", word))
     except ValueError as error:
@@ -157,7 +157,7 @@ def _number(word: str, keyword: str) -> float:
 
 
 def _vertices(lines: Sequence[str], notes: Notes) -> tuple[Float64, Float32 | None]:
-    """(n, 3) positions, and (n, 3) colours where any vertex has one; white for the others."""
+    """Parse (n, 3) positions, and (n, 3) colours if any vertex has one; the others are white."""
     table = _columns(lines, 6, "v")
     widths = np.array([len(line.split()) for line in lines], dtype=np.int64)
     if len(widths) and widths.min() < 3:
@@ -176,7 +176,7 @@ def _triangles(text: ObjText, positions: Float64, notes: Notes) -> tuple[Indices
     """Triangulate every face.
 
     Returns:
-        (n, 3, 3) zero-based v, vt, vn indices a corner (-1: none), and (n,) face line, both in file order.
+        (n, 3, 3) zero-based v, vt, vn indices per corner (-1: none), and (n,) the face line, both in file order.
     """
     rows = [line.split() for line in text.faces]
     sizes = np.array([len(row) for row in rows], dtype=np.int64)
@@ -209,7 +209,7 @@ def _triangles(text: ObjText, positions: Float64, notes: Notes) -> tuple[Indices
 
 
 def _pick(table: Float64, index: Indices) -> Float64 | None:
-    """Rows of a table by (n, 3) index; NaN for an index that is missing; None where all are."""
+    """Pick rows of a table by (n, 3) index: NaN for a missing index, None if all are missing."""
     known = (index >= 0) & (index < len(table))
     if not known.any():
         return None
@@ -219,7 +219,7 @@ def _pick(table: Float64, index: Indices) -> Float64 | None:
 
 
 def _libraries(names: Sequence[str], assets: Assets, notes: Notes) -> dict[str, MtlEntry]:
-    """All materials of all `mtllib` lines; the first of a name counts."""
+    """Read the materials of all `mtllib` lines; the first of each name counts."""
     entries: dict[str, MtlEntry] = {}
     different = list(dict.fromkeys(names))
     if len(different) > MOST_LIBRARIES:
@@ -233,13 +233,13 @@ def _libraries(names: Sequence[str], assets: Assets, notes: Notes) -> dict[str, 
 
 
 def _first_readable(readings: Sequence[list[str]], assets: Assets, notes: Notes) -> list[bytes]:
-    """The files of the first reading of a line (one name with spaces, or several names) whose files all exist."""
+    """Read the files of the first reading of a line (one name with spaces, or several names) of which all exist."""
     reason: AssetError | None = None
     before = len(assets.refused)
     for names in readings:
         try:
             found = [assets.read(name) for name in names]
-            del assets.refused[before:]  # by other readings of the line
+            del assets.refused[before:]  # other readings of the line added these
             return found
         except AssetError as error:
             reason = reason or error
@@ -256,7 +256,7 @@ def _material(
     textures: TextureTable,
     notes: Notes,
 ) -> tuple[Material, MapUse | None]:
-    """The material at a place of `usemtl` names, or a default one for faces without."""
+    """The material at an index of the `usemtl` names, or a default for faces without."""
     name = text.materials[place] if place >= 0 else ""
     entry = library.get(name) or library.get(name.split("#", 1)[0].strip())
     if entry is not None:

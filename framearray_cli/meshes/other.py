@@ -1,4 +1,4 @@
-"""PLY, STL and whatever else trimesh reads -> parts."""
+"""PLY, STL and all other formats that trimesh reads -> parts."""
 
 import io
 from typing import Any
@@ -19,14 +19,14 @@ HINT = "; install it (for COLLADA: pip install pycollada), or convert the file t
 
 
 class FolderResolver:
-    """Gives trimesh's loaders the files beside the scene, and no others."""
+    """Gives trimesh's loaders the files beside the scene, and only those."""
 
     def __init__(self, assets: Assets, notes: Notes) -> None:
         self.assets = assets
         self.notes = notes
 
     def get(self, name: str) -> bytes:
-        """The bytes of a named file."""
+        """Read the bytes of a named file."""
         try:
             return self.assets.read(name)
         except AssetError as error:
@@ -38,19 +38,19 @@ class FolderResolver:
 
 
 def readable_formats() -> set[str]:
-    """File extensions of meshes that trimesh knows, without the dot; some need a further package."""
+    """The file extensions of meshes that trimesh reads, without the dot; some need a further package."""
     from trimesh.exchange.load import mesh_loaders
 
     return set(mesh_loaders) - {"dict", "dict64", "json", "msgpack", "stl_ascii"}
 
 
 def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
-    """Read a file of any format that trimesh knows."""
-    import PIL.Image  # noqa: F401  (trimesh reads no texture without it, and does not say so)
+    """Read a file of any format that trimesh reads."""
+    import PIL.Image  # noqa: F401  (without it trimesh silently reads no texture)
     import trimesh
 
     notes = Notes()
-    folder: Any = FolderResolver(assets, notes)  # it has what loaders use of trimesh's own resolvers
+    folder: Any = FolderResolver(assets, notes)  # it has the methods of trimesh's own resolvers that loaders use
     check_headers(data, extension, assets.limit)
     if extension == "ply":
         data = _without_blank_lines(data)
@@ -105,14 +105,14 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
 
 
 def _without_blank_lines(data: bytes) -> bytes:
-    """ASCII PLY without its empty lines, on which trimesh fails; other data as it is."""
+    """Remove the empty lines of an ASCII PLY, on which trimesh fails; leave other data as it is."""
     if b"format ascii" not in data[:200].lower():
         return data
     return b"\n".join(line for line in data.splitlines() if line.strip()) + b"\n"
 
 
 def _colours(mesh: Any, notes: Notes) -> tuple[Float32 | None, Float32 | None]:
-    """(v, 3) vertex colours and (f, 3) face colours; at most one of them is there."""
+    """(v, 3) vertex colours and (f, 3) face colours; at least one of them is None."""
     visual = mesh.visual
     kind = visual.kind
     found = {"vertex": lambda: visual.vertex_colors, "face": lambda: visual.face_colors}

@@ -1,4 +1,4 @@
-"""The job's own values for materials of the scene, by name."""
+"""Replace values of the scene's materials by those of the job, by name."""
 
 import difflib
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ NAMES_IN_AN_ERROR = 12
 
 
 class Override(Protocol):
-    """What a job may say about one material; None keeps what the file says."""
+    """What a job may say about a material; None keeps the value of the file."""
 
     @property
     def reflectivity(self) -> Sequence[float] | None:
@@ -25,7 +25,7 @@ class Override(Protocol):
 
 
 def overridden(materials: Sequence[Material], overrides: Mapping[str, Override], notes: Notes) -> list[Material]:
-    """Materials with the job's values; an overridden glass is shown, as whoever sets its colour wants to see it."""
+    """Apply the job's values. Glass with an override is shown: whoever sets its colour wants to see it."""
     names = sorted({material.name for material in materials})
     unknown = [name for name in overrides if name not in names]
     if unknown:
@@ -52,7 +52,7 @@ def _rgb(values: Sequence[float]) -> tuple[float, float, float]:
 
 
 def _unknown_material(name: str, names: Sequence[str]) -> str:
-    """Say which materials there are, the nearest name first."""
+    """Word the error: it lists the materials of the scene, the nearest name first."""
 
     def likeness(known: str) -> float:
         return difflib.SequenceMatcher(None, name.lower(), known.lower()).ratio()

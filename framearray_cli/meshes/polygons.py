@@ -1,4 +1,4 @@
-"""Polygons -> triangles, concave ones too."""
+"""Polygons -> triangles, also concave ones."""
 
 from dataclasses import dataclass
 
@@ -10,13 +10,13 @@ from ..arrays import Float64
 Indices = NDArray[np.int64]
 
 
-# Cutting ears off one polygon takes time that grows with the square of its corners; for this many squared, 3 s.
+# Cutting the ears off a polygon of k corners takes time in proportion to k^2; for this sum of k^2 it takes 3 s.
 MOST_WORK = 50_000_000
 
 
 @dataclass(slots=True)
 class Ears:
-    """How much cutting of ears is left for a file, and how many concave polygons were too large for it."""
+    """The work of cutting ears that is left for a file, and the number of concave polygons too large for it."""
 
     work: int = MOST_WORK
     fans: int = 0
@@ -25,12 +25,12 @@ class Ears:
 def triangulate(corners: Float64, ears: Ears) -> Indices:
     """Split m polygons of k corners each.
 
-    Convex polygons become fans, all at once. Concave ones lose one ear after the other; quads are cut at the reflex
+    Convex polygons become fans, all at once. Concave ones lose one ear after another; quads are cut at the reflex
     corner.
 
     Args:
         corners: (m, k, 3) positions, k at least 3.
-        ears: work is taken off; concave polygons for which none is left become fans.
+        ears: its work is reduced; concave polygons for which none is left become fans.
 
     Returns:
         (m, k - 2, 3) corner numbers from 0 to k - 1.
@@ -57,8 +57,8 @@ OTHER_DIAGONAL = np.array([[1, 2, 3], [1, 3, 0]])
 
 
 def _concave(corners: Float64) -> tuple[NDArray[np.bool_], Indices]:
-    """(m,) whether a polygon turns both ways along its outline, and the corner where it turns back most."""
-    with np.errstate(all="ignore"):  # non-finite corners compare false: their triangles are dropped later anyway
+    """(m,) whether a polygon turns both ways along its outline, and the corner where it turns back the most."""
+    with np.errstate(all="ignore"):  # non-finite corners compare false; their triangles are dropped later
         centred = corners - corners.mean(axis=1, keepdims=True)
         normal = np.cross(centred, np.roll(centred, -1, axis=1)).sum(axis=1)  # (m, 3), Newell
         ahead = np.roll(corners, -1, axis=1) - corners
@@ -69,7 +69,7 @@ def _concave(corners: Float64) -> tuple[NDArray[np.bool_], Indices]:
 
 
 def _clip_ears(corners: Float64) -> Indices:
-    """Triangulate one polygon in the plane where its area is largest; (k - 2, 3) corner numbers."""
+    """Triangulate one polygon in the axis plane where its area is largest; (k - 2, 3) corner numbers."""
     centred = corners - corners.mean(axis=0)
     normal = np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)
     flat = np.delete(centred, int(np.argmax(np.abs(normal))), axis=1)  # (k, 2)
@@ -86,7 +86,7 @@ def _clip_ears(corners: Float64) -> Indices:
 
 
 def _ear(flat: Float64, left: list[int], sign: float) -> int:
-    """Place in `left` of a corner that can be cut off; where there is none (a crossing outline), 1."""
+    """Find the index in `left` of a corner that can be cut off; 1 if there is none (the outline crosses itself)."""
     points = flat[left]  # (r, 2)
     before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
     turn = sign * _cross(points - before, after - points)
@@ -97,7 +97,7 @@ def _ear(flat: Float64, left: list[int], sign: float) -> int:
             & (sign * _cross(c - b, points - b) >= 0)
             & (sign * _cross(a - c, points - c) >= 0)
         )
-        # corners that coincide with the ear's own (a bridge to a hole) do not block it
+        # corners that coincide with those of the ear (a bridge to a hole) do not block it
         same = (points == a).all(axis=1) | (points == b).all(axis=1) | (points == c).all(axis=1)
         if not (inside & ~same).any():
             return int(at)

@@ -1,4 +1,4 @@
-"""A scene file -> Meshes, or one SceneError; nothing is printed on the way."""
+"""A scene file -> Meshes, or one SceneError; libraries print nothing on the way."""
 
 import logging
 import warnings
@@ -21,9 +21,9 @@ from .obj import read_obj
 from .other import read_other, readable_formats
 
 LOGGERS = ("trimesh", "PIL")
-# What images take is counted here, and a texture that is left out is told with its name.
-UNTOLD_WARNINGS = ("DeprecationWarning", "DecompressionBombWarning")
-UNTOLD = ("unable to load image!",)
+# Not reported: the limit counts what images take, and a note names each texture that is left out.
+SILENT_WARNINGS = ("DeprecationWarning", "DecompressionBombWarning")
+SILENT_MESSAGES = ("unable to load image!",)
 MAX_REASON = 200  # characters of a library's own message that an error repeats
 
 
@@ -31,16 +31,16 @@ def read_meshes(file: Path, folders: Sequence[Path] = (), memory: int | None = N
     """Read a scene file of any format.
 
     Args:
-        folders: that files named by the scene may lie in, beside its own.
-        memory: bytes that may be taken; None: what is free.
+        folders: where files that the scene names may lie, beside its own folder.
+        memory: bytes that reading may take; None: all that are free.
 
     Raises:
-        SceneError: missing, a folder, of an unknown kind, broken, without triangles, too large, or one that wants to
-            read files elsewhere.
+        SceneError: the file is missing, a folder, of an unknown kind, broken, without triangles or too large, or names
+            files elsewhere.
     """
     assets = _assets(file, folders, memory)
     extension = file.suffix[1:].lower()
-    with _quiet() as messages, np.errstate(all="ignore"), _told(file, extension):
+    with _quiet() as messages, np.errstate(all="ignore"), _scene_errors(file, extension):
         meshes = _read(_bytes_of(file, assets.limit), extension, assets)
         assets.require_inside()
     if not any(len(part.corners) for part in meshes.parts):
@@ -50,27 +50,27 @@ def read_meshes(file: Path, folders: Sequence[Path] = (), memory: int | None = N
 
 
 def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
-    """Read the cameras and lights of a scene file; only glTF has any that are read.
+    """Read the cameras and lights of a scene file; other formats than glTF have none that are read.
 
     Args:
-        folders: that files named by the scene may lie in, beside its own.
+        folders: where files that the scene names may lie, beside its own folder.
 
     Raises:
-        SceneError: missing, a folder, or broken.
+        SceneError: the file is missing, a folder, or broken.
     """
     extension = file.suffix[1:].lower()
     if extension not in ("glb", "gltf"):
         return Stage()
     assets = _assets(file, folders, None)
-    with np.errstate(all="ignore"), _told(file, extension):
+    with np.errstate(all="ignore"), _scene_errors(file, extension):
         gltf = open_gltf(_bytes_of(file, assets.limit), assets)
         check_readable(gltf)
         return read_gltf_stage(gltf)
 
 
 @contextmanager
-def _told(file: Path, extension: str) -> Iterator[None]:
-    """Turn whatever readers raise into a SceneError that names the file."""
+def _scene_errors(file: Path, extension: str) -> Iterator[None]:
+    """Turn any error of the readers into a SceneError that names the file."""
     try:
         yield
     except SceneError as error:
@@ -82,7 +82,7 @@ def _told(file: Path, extension: str) -> Iterator[None]:
         raise SceneError(f"{file}: does not fit into memory, or its header claims more than it holds") from error
     except AssetError as error:
         raise SceneError(f"{file}: {error}") from error
-    except Exception as error:  # readers of broken files raise whatever comes first
+    except Exception as error:  # broken files make readers raise anything
         kind = "" if type(error) is ValueError and str(error) else f"{type(error).__name__}: "
         reason = " ".join(f"{kind}{error}".split())[:MAX_REASON].rstrip(" :")
         raise SceneError(f"{file}: broken, or not {extension.upper()} ({reason}); export it anew") from error
@@ -94,7 +94,7 @@ def _assets(file: Path, folders: Sequence[Path], memory: int | None) -> Assets:
 
 
 def _bytes_of(file: Path, limit: Limit) -> bytes:
-    """The bytes of a scene file; pipes and devices, which may never end, are none."""
+    """Read the bytes of a scene file; refuse pipes and devices, which may never end."""
     try:
         if not file.exists():
             raise SceneError("no such scene file; paths are relative to the job file")
@@ -125,13 +125,13 @@ def _read(data: bytes, extension: str, assets: Assets) -> Meshes:
 
 @contextmanager
 def _quiet() -> Iterator[list[str]]:
-    """Collect what the libraries log or warn of, each message once, instead of printing it."""
+    """Collect the messages that libraries log or warn with, each once, instead of printing them."""
     messages: list[str] = []
 
     class Collect(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
             note = record.getMessage()
-            if note not in (*messages, *UNTOLD):
+            if note not in (*messages, *SILENT_MESSAGES):
                 messages.append(note)
 
     handler = Collect(level=logging.WARNING)
@@ -146,7 +146,7 @@ def _quiet() -> Iterator[list[str]]:
             yield messages
         for warning in caught:
             text = " ".join(str(warning.message).split())
-            if text not in messages and warning.category.__name__ not in UNTOLD_WARNINGS:
+            if text not in messages and warning.category.__name__ not in SILENT_WARNINGS:
                 messages.append(text)
     finally:
         for logger, before in zip(loggers, propagate, strict=True):

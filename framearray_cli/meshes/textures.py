@@ -16,21 +16,21 @@ from .model import Notes
 
 MAX_TEXELS = 2**31 - 1  # texel indices are int32
 MAX_BYTE = 255.0
-# Kinds of images that scenes come with. Pillow opens others too, some of them with programs of other people (EPS).
+# The kinds of images that scenes come with. Pillow opens others too, some through external programs (EPS).
 FORMATS = tuple(
     ["PNG", "JPEG", "WEBP", "TGA", "BMP", "TIFF", "GIF", "DDS", "JPEG2000", "AVIF", "PSD", "PPM", "PCX", "SGI"]
 )
 SEVERAL = "MPO"  # what Pillow calls a JPEG of several pictures, as phones write them
-KEPT = 8  # bytes a texel: RGBA, twice while the textures of a scene are joined
-DECODING = 16  # bytes a texel while an image is decoded: as Pillow holds it, as RGBA, and copies on the way
-# A picture of a camera has ten scans at most; each of a thousand takes as long as the whole picture.
+KEPT = 8  # bytes per texel: RGBA, twice while the textures of a scene are joined
+DECODING = 16  # bytes per texel while an image is decoded: Pillow's own, RGBA, and copies on the way
+# A camera's JPEG has at most ten scans. Decoding one scan takes as long as decoding a whole picture.
 MOST_SCANS = 100
 SCAN = b"\xff\xda"
 
 
 @dataclass(slots=True)
 class TextureTable:
-    """The textures of one scene; each image is decoded once."""
+    """The textures of a scene; each image is decoded once."""
 
     notes: Notes
     limit: Limit
@@ -38,15 +38,15 @@ class TextureTable:
     indices: dict[Hashable, int] = field(default_factory=dict)
 
     def index(self, key: Hashable, label: str, read: Callable[[], bytes]) -> int:
-        """Return the texture's index, or -1 with a note where the image cannot be had.
+        """Return the index of a texture; -1, with a note, if the image cannot be read.
 
         Args:
-            key: tells images apart.
-            label: how a note names the image.
-            read: gives the encoded image; may raise AssetError.
+            key: identifies the image.
+            label: names the image in notes.
+            read: returns the encoded image; may raise AssetError.
 
         Raises:
-            SceneError: an image that takes more memory than there is.
+            SceneError: the image takes more memory than there is.
         """
         if key not in self.indices:
             self.indices[key] = self._index(label, read)
@@ -63,7 +63,7 @@ class TextureTable:
         return self.indices[key]
 
     def cutout(self, key: Hashable, label: str, read: Callable[[], bytes]) -> int:
-        """As `index`, for an image that is an opacity map: its alpha, or its brightness where it has none."""
+        """As `index`, for an image that is an opacity map: its alpha, or its brightness if it has none."""
         cut_key = ("opacity", key)
         if cut_key not in self.indices:
             texels = self._decode(label, read)
@@ -84,12 +84,12 @@ class TextureTable:
         return float(alpha.min()) / MAX_BYTE, float(alpha.max()) / MAX_BYTE
 
     def mean(self, label: str, read: Callable[[], bytes]) -> Float64 | None:
-        """(4,) mean of the raw channels in [0, 1] of an image that holds numbers, not colours; it is not kept."""
+        """(4,) mean in [0, 1] of the raw channels of an image that holds numbers, not colours; not kept."""
         texels = self._decode(label, read)
         return None if texels is None else np.asarray(texels.reshape(-1, 4).mean(axis=0, dtype=np.float64) / MAX_BYTE)
 
     def _index(self, label: str, read: Callable[[], bytes]) -> int:
-        """Decode an image unless its bytes are known by another key."""
+        """Decode an image, unless its bytes are already there under another key."""
         try:
             data = read()
         except AssetError as error:
@@ -124,7 +124,7 @@ def decode_image(data: bytes, label: str, limit: Limit) -> Bytes:
         (height, width, 4) uint8 RGBA, row 0 on top.
 
     Raises:
-        AssetError: not an image, or a broken one.
+        AssetError: not an image, or broken.
         SceneError: it takes more memory than there is.
     """
     from PIL import Image, UnidentifiedImageError
@@ -140,15 +140,15 @@ def decode_image(data: bytes, label: str, limit: Limit) -> Bytes:
         raise SceneError(f"{label}: {str(error).rstrip('.')}; make the image smaller") from error
     except UnidentifiedImageError as error:
         raise AssetError(f"{label}: not an image that can be read; PNG and JPEG are") from error
-    except Exception as error:  # Pillow's readers of broken images raise whatever comes first
+    except Exception as error:  # broken images make Pillow raise anything
         raise AssetError(f"{label}: not an image that can be read ({type(error).__name__}: {error})") from error
 
 
 def decoded(image: Any, label: str, limit: Limit) -> Bytes:
-    """The texels of an image that Pillow has opened; its size is known before any of it is decoded.
+    """Decode the texels of an image that Pillow has opened; its size counts before any of it is decoded.
 
     Raises:
-        AssetError: of a kind that scenes do not come with, empty, or broken.
+        AssetError: empty, broken, or of a kind that scenes do not come with.
         SceneError: it takes more memory than there is.
     """
     texels = image.width * image.height
@@ -168,7 +168,7 @@ def decoded(image: Any, label: str, limit: Limit) -> Bytes:
 def rgba(image: Any) -> Bytes:
     """Convert a Pillow image of any mode to (height, width, 4) uint8 RGBA.
 
-    Pillow cuts 16-bit and float greys off at 255 instead of scaling them, so these are scaled here.
+    Pillow clips 16-bit and float greys at 255 instead of scaling them, so these are scaled here.
     """
     if image.mode.startswith("I"):
         wide = np.asarray(image).astype(np.int64)

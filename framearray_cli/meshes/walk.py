@@ -1,4 +1,4 @@
-"""Meshes into their places in the scene; and those of a trimesh scene, one an instance."""
+"""Put meshes at their places in the scene; list the instances of a trimesh scene."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -11,7 +11,7 @@ from .model import Part
 
 
 def instances(scene: Any) -> Iterator[tuple[Any, Float64]]:
-    """Every triangle mesh of a trimesh scene with its (4, 4) `world_from_mesh`; a mesh may come several times."""
+    """Yield each instance of a triangle mesh in a trimesh scene with its (4, 4) `world_from_mesh`."""
     import trimesh
 
     for node in scene.graph.nodes_geometry:
@@ -32,23 +32,23 @@ def place(
     colours: Float32 | None,
     face_colours: Float32 | None = None,
 ) -> Part:
-    """Put a mesh into all of its places, one after the other, in float64, one row a triangle corner.
+    """Put a mesh at all of its places, one after another, in float64, one row per corner of a triangle.
 
-    A mirrored transform turns triangles inside out: their winding is turned back. Normals go with the
-    cofactors of the matrix, which are its inverse transpose times its determinant and exist for flat matrices too.
+    A mirroring transform turns triangles inside out, so their winding is reversed. The cofactors of the matrix are its
+    inverse transpose times its determinant, and also exist for singular matrices; they transform the normals.
 
     Args:
         vertices: (v, 3).
         faces: (f, 3), all of them between 0 and v.
-        world_from_mesh: (n, 4, 4), one a place.
-        material: number that the part gets.
-        normals: (v, 3) that the file gives.
-        uvs: (v, 2) a vertex.
-        colours: (v, 3) a vertex.
-        face_colours: (f, 3) a face; count where `colours` is None.
+        world_from_mesh: (n, 4, 4), one per place.
+        material: index for the part.
+        normals: (v, 3) from the file.
+        uvs: (v, 2) per vertex.
+        colours: (v, 3) per vertex.
+        face_colours: (f, 3) per face; used if `colours` is None.
     """
     linear = world_from_mesh[:, :3, :3]
-    with np.errstate(all="ignore"):  # non-finite vertices are counted and dropped by whoever takes the part
+    with np.errstate(all="ignore"):  # the scene counts and drops non-finite triangles later
         world = vertices @ linear.transpose(0, 2, 1) + world_from_mesh[:, None, :3, 3]
         mirrored = np.linalg.det(linear) < 0
         if normals is not None:
@@ -56,14 +56,14 @@ def place(
             normals = normals @ (cofactors(linear) * sign).transpose(0, 2, 1)
 
     def turned(rows: NDArray[Any]) -> NDArray[Any]:
-        """(n f, 3, k) of (n, f, 3, k), the corners of mirrored places in the other order."""
+        """Reshape (n, f, 3, k) to (n f, 3, k), the corners of mirrored places in reverse order."""
         if mirrored.any():
             rows = rows.copy()
             rows[mirrored] = rows[mirrored][:, :, ::-1]
         return rows.reshape(-1, *rows.shape[2:])
 
     def everywhere(rows: NDArray[Any]) -> NDArray[Any]:
-        """The same (f, 3, k) in all places."""
+        """Repeat (f, 3, k) at all places."""
         return turned(np.broadcast_to(rows, (len(linear), *rows.shape)))
 
     if colours is None and face_colours is not None:
@@ -80,13 +80,13 @@ def place(
 
 
 def cofactors(matrices: Float64) -> Float64:
-    """(n, 3, 3) cofactor matrices: rows are cross products of the other rows."""
+    """(n, 3, 3) cofactor matrices: each row is the cross product of the two other rows."""
     a, b, c = matrices[:, 0], matrices[:, 1], matrices[:, 2]
     return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
 
 
 def file_normals(mesh: Any) -> Float64 | None:
-    """(v, 3) vertex normals that the file itself has; trimesh would make some up for any other mesh."""
+    """(v, 3) vertex normals of the file itself; trimesh would invent some for a mesh without."""
     if "vertex_normals" not in mesh._cache:
         return None
     return np.asarray(mesh._cache["vertex_normals"], dtype=np.float64)
