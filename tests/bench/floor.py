@@ -36,6 +36,7 @@ from framearray_cli.embree.packets import (
     empty_packets,
 )
 from framearray_cli.frame import find_frame
+from framearray_cli.kernel import keep_on_disk
 from framearray_cli.lanes import LANES
 
 from .cases import Case
@@ -150,14 +151,16 @@ def _pieces(ends: Sequence[tuple[int, str]], kinds: tuple[str, ...], flags: Byte
     return np.array(found, np.int64).reshape(-1, 3)
 
 
-@nb.njit(nogil=True, cache=True)
+@keep_on_disk
+@nb.njit(nogil=True)
 def _now(clock: Any, which: int, spec: Any) -> Any:
     """Seconds of a clock of the system."""
     _call(clock, which, spec.ctypes.data, 0, 0)
     return spec[0] + 1e-9 * spec[1]
 
 
-@nb.njit(nogil=True, cache=True)
+@keep_on_disk
+@nb.njit(nogil=True)
 def _replay(
     tracer: Tracer, rays: Float32, flags: Bytes, pieces: Indices, hit_room: Float32, test_room: Float32,
     clock: int, clocks: Any, spec: Any, seconds: Float64,
