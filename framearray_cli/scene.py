@@ -19,7 +19,7 @@ from .meshes import (
     has_area,
     merge,
     near_uvs,
-    overridden,
+    override_materials,
     read_meshes,
     repeated,
     unit_normals,
@@ -128,7 +128,7 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
     """Turn what a file holds into the arrays that kernels read."""
     notes = Notes()
     parts, materials = untextured_variants(meshes.parts, meshes.materials, notes)
-    materials = overridden(materials, overrides, notes)
+    materials = override_materials(materials, overrides, notes)
     plain = {name for name, override in overrides.items() if override.reflectivity is not None}
     parts = [replace(p, colours=None) if materials[p.material].name in plain else p for p in parts]
     merged = merge(parts)

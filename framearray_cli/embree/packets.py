@@ -30,7 +30,7 @@ class Tracer(NamedTuple):
     """What a kernel needs to trace rays: only addresses and numbers, so that numba can cache the kernel.
 
     Attributes:
-        scene: address of the scene; of the functions `intersect` and `occluded`, likewise.
+        scene, intersect, occluded: addresses of the scene, and of the two functions that trace rays through it.
         batch: 0 if the functions take one packet, as Embree's do: `(valid, scene, packet, arguments)`;
             1 if they take many: `(n_packets, scene, packets, unused)`.
         coherent: address of the arguments that mark the rays of a packet as coherent.

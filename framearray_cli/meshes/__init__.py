@@ -4,7 +4,7 @@ from .cleaning import finite, has_area, repeated
 from .gltf_stage import Stage, StageCamera, StageLight
 from .merge import Merged, merge, near_uvs, unit_normals, untextured_variants
 from .model import Material, Meshes, Notes, Part
-from .overrides import Override, overridden
+from .overrides import Override, override_materials
 from .read import read_meshes, read_stage
 
 __all__ = [
@@ -21,7 +21,7 @@ __all__ = [
     "has_area",
     "merge",
     "near_uvs",
-    "overridden",
+    "override_materials",
     "read_meshes",
     "read_stage",
     "repeated",

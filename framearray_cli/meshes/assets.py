@@ -7,7 +7,7 @@ from urllib.parse import unquote
 
 from ..errors import SceneError
 from .limit import Limit
-from .model import listed
+from .model import join_names
 
 LONGEST_NAME = 200  # characters of a file name that a message repeats
 REMEDY = "copy it beside the scene file, or name its folder in scene.folders of the job"
@@ -41,7 +41,7 @@ class Assets:
             AssetError: missing, elsewhere, or unreadable.
             SceneError: larger than the memory that may be used.
         """
-        shown = shortened(name)
+        shown = shorten(name)
         clean = name.strip().strip('"')
         outside = is_url(clean)
         for spelling in () if outside else _spellings(clean):
@@ -69,7 +69,7 @@ class Assets:
             many = len(self.refused) > 1
             lie = "they lie" if many else "it lies"
             remedy = REMEDY if not many else REMEDY.replace("it ", "them ", 1).replace("its folder", "their folders")
-            raise SceneError(f"refused to read {listed(self.refused)}: {lie} outside the scene's folder; {remedy}")
+            raise SceneError(f"refused to read {join_names(self.refused)}: {lie} outside the scene's folder; {remedy}")
 
     def _bytes(self, file: Path, shown: str) -> bytes:
         try:
@@ -89,7 +89,7 @@ def is_url(name: str) -> bool:
     return bool(colon) and len(scheme) > 1 and rest.startswith("//") and scheme.lower() != "file" and scheme.isalnum()
 
 
-def shortened(name: str) -> str:
+def shorten(name: str) -> str:
     """A name as messages repeat it: on one line, and not too long."""
     plain = "".join(c if c.isprintable() else "?" for c in name.strip())
     return plain if len(plain) <= LONGEST_NAME else plain[:LONGEST_NAME] + "..."

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .assets import AssetError, Assets, shortened
+from .assets import AssetError, Assets, shorten
 from .gltf_check import COMPONENTS, WIDTHS, check_gltf
 from .gltf_values import Tree
 
@@ -59,7 +59,7 @@ class Gltf:
                 raise ValueError(f"accessors[{index}]: expected sparse places below {count}, got {places.max()}")
             values = values.copy()
             values[places] = self._rows(what["bufferView"], what.get("byteOffset", 0), dtype, n, width)
-        return normalised(values, accessor)
+        return normalise(values, accessor)
 
     def _rows(self, view_index: int, offset: int, dtype: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
         """Copy strided data to (count, width); raise ValueError if the view is too short."""
@@ -74,7 +74,7 @@ class Gltf:
         return np.ascontiguousarray(rows).view(dtype).reshape(count, width)
 
 
-def normalised(values: NDArray[Any], accessor: Tree) -> NDArray[Any]:
+def normalise(values: NDArray[Any], accessor: Tree) -> NDArray[Any]:
     """Convert the values of an accessor: integers that encode numbers from 0 or -1 to 1 become these."""
     if accessor.get("normalized") and values.dtype.kind in "iu":
         largest = 2.0 ** (8 * values.dtype.itemsize - (values.dtype.kind == "i")) - 1.0
@@ -170,6 +170,6 @@ def uri_bytes(uri: str, assets: Assets) -> bytes:
     if uri.startswith("data:"):
         head, comma, data = uri.partition(",")
         if not comma or not head.endswith(";base64"):
-            raise AssetError(f"{shortened(head)}: expected data in base64")
+            raise AssetError(f"{shorten(head)}: expected data in base64")
         return base64.b64decode(data)
     return assets.read(uri)

@@ -11,7 +11,7 @@ from ..arrays import Float64
 from .assets import AssetError, Assets
 from .container import Gltf, uri_bytes
 from .gltf_values import Tree
-from .materials import CUTOFF, Opacity, Rgb3, blended, make_material, masked
+from .materials import CUTOFF, Opacity, Rgb3, blended_opacity, make_material, masked_opacity
 from .model import Material, Notes
 from .textures import TextureTable
 
@@ -170,17 +170,17 @@ def _opacity(name: str, entry: Tree, alpha: float, texture: int, source: ImageFi
     if transmission.get("transmissionTexture") is not None and passed > 0:
         notes.add("transmission textures are left out, their factor counts", name)
     if passed > 0:
-        through = blended(name, 1.0 - passed, -1, source.textures, notes)
+        through = blended_opacity(name, 1.0 - passed, -1, source.textures, notes)
         if through.left_out:
             return through
     mode = entry.get("alphaMode", "OPAQUE")
     if mode == "MASK":
-        opacity = masked(alpha, texture, float(entry.get("alphaCutoff", CUTOFF)), source.textures)
+        opacity = masked_opacity(alpha, texture, float(entry.get("alphaCutoff", CUTOFF)), source.textures)
         if opacity.left_out:
             notes.add("materials that their alpha mask removes everywhere are left out", name)
         return opacity
     if mode == "BLEND":
-        return blended(name, alpha, texture, source.textures, notes)
+        return blended_opacity(name, alpha, texture, source.textures, notes)
     return Opacity()
 
 

@@ -84,7 +84,9 @@ class Motion:
         for path in PATHS:
             channel = self.channels.get((node, path))
             rest = np.array(entry.get(path, AT_REST[path]), dtype=np.float64)
-            parts[path] = np.tile(rest, (len(at), 1)) if channel is None else sampled(channel, at, path == "rotation")
+            parts[path] = (
+                np.tile(rest, (len(at), 1)) if channel is None else sample_channel(channel, at, path == "rotation")
+            )
         matrix = np.zeros((len(at), 4, 4))
         matrix[:, :3, :3] = rotations(parts["rotation"]) * parts["scale"][:, None, :]
         matrix[:, :3, 3] = parts["translation"]
@@ -144,7 +146,7 @@ def _channel(gltf: Gltf, sampler: Tree) -> Channel:
     return Channel(times, rows[:, 1], rows[:, ::2], interpolation)
 
 
-def sampled(channel: Channel, at: Float64, is_rotation: bool) -> Float64:
+def sample_channel(channel: Channel, at: Float64, is_rotation: bool) -> Float64:
     """Evaluate a channel at n times, (n, w); before the first and after the last key it rests.
 
     Rotations are unit quaternions x, y, z, w, and turn the shorter way between two keys.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Float32, Float64
-from .container import Gltf, normalised
+from .container import Gltf, normalise
 from .gltf_check import TRIANGLES
 from .gltf_materials import GltfMaterial
 from .gltf_values import Tree
@@ -126,7 +126,7 @@ def _unpacked(gltf: Gltf, draco: Tree, attributes: Mapping[str, int]) -> tuple[A
     names = {number: name for name, number in draco["attributes"].items()}
     found = {names[entry["unique_id"]]: entry["data"] for entry in mesh.attributes if entry["unique_id"] in names}
     flat = {
-        name: normalised(np.asarray(values).reshape(len(values), -1), gltf.tree["accessors"][attributes[name]])
+        name: normalise(np.asarray(values).reshape(len(values), -1), gltf.tree["accessors"][attributes[name]])
         for name, values in found.items()
         if name in attributes
     }

@@ -6,7 +6,7 @@ import zipfile
 from collections.abc import Iterator
 
 from ..errors import SceneError
-from .assets import shortened
+from .assets import shorten
 from .limit import Limit
 
 ARCHIVES = ("3mf", "3dxml", "zae")  # each is a ZIP with XML in it
@@ -85,7 +85,7 @@ def _check_ply(data: bytes) -> None:
 
 
 def _line(words: list[str]) -> str:
-    return f"'{shortened(' '.join(words))}'"
+    return f"'{shorten(' '.join(words))}'"
 
 
 def _check_off(data: bytes) -> None:
@@ -113,7 +113,7 @@ def _check_archive(data: bytes, limit: Limit) -> None:
         limit.take("unpacked files", sum(info.file_size for info in archive.infolist()))
         for info in archive.infolist():
             for start in _starts(archive, info):
-                _check_xml(start, f"{shortened(info.filename)} in it")
+                _check_xml(start, f"{shorten(info.filename)} in it")
 
 
 def _starts(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> Iterator[bytes]:

@@ -51,7 +51,7 @@ def make_material(
         texture: multiplies the diffuse part.
         mirror_texture: multiplies the mirror part, unless that is 0.
     """
-    reflectivity, specular = limited(name, diffuse, specular, notes)
+    reflectivity, specular = limit_reflectivity(name, diffuse, specular, notes)
     return Material(
         name=name,
         reflectivity=reflectivity,
@@ -65,7 +65,7 @@ def make_material(
     )
 
 
-def limited(name: str, reflectivity: Rgb3, specular: Rgb3, notes: Notes) -> tuple[Rgb3, Rgb3]:
+def limit_reflectivity(name: str, reflectivity: Rgb3, specular: Rgb3, notes: Notes) -> tuple[Rgb3, Rgb3]:
     """Bring both parts into [0, 1], and their sum to at most 1: no surface reflects more than it receives."""
     diffuse = [0.0 if value != value else min(max(value, 0.0), BRIGHTEST) for value in reflectivity]
     mirror = [0.0 if value != value else min(max(value, 0.0), BRIGHTEST) for value in specular]
@@ -77,7 +77,7 @@ def limited(name: str, reflectivity: Rgb3, specular: Rgb3, notes: Notes) -> tupl
     return (d[0], d[1], d[2]), (s[0], s[1], s[2])
 
 
-def masked(alpha: float, texture: int, cutoff: float, textures: TextureTable) -> Opacity:
+def masked_opacity(alpha: float, texture: int, cutoff: float, textures: TextureTable) -> Opacity:
     """Opacity of a material whose points are absent where alpha is below the cutoff."""
     lowest, highest = textures.alpha_range(texture)
     if alpha * lowest >= cutoff:
@@ -87,7 +87,7 @@ def masked(alpha: float, texture: int, cutoff: float, textures: TextureTable) ->
     return Opacity(alpha=alpha, alpha_texture=texture, alpha_cutoff=cutoff)
 
 
-def blended(name: str, alpha: float, texture: int, textures: TextureTable, notes: Notes) -> Opacity:
+def blended_opacity(name: str, alpha: float, texture: int, textures: TextureTable, notes: Notes) -> Opacity:
     """Opacity of a material that lets light through by alpha: glass, cut out, or taken as opaque."""
     lowest, highest = textures.alpha_range(texture)
     if alpha * highest < TRANSMISSIVE_ALPHA:

@@ -84,12 +84,12 @@ class Notes:
     def lines(self) -> tuple[str, ...]:
         """One line per finding, in the order found; only the first ones of very many."""
         shown = list(self.found.items())[:MOST_NOTES]
-        lines = [f"{sentence}: {listed(list(names))}" if names else sentence for sentence, names in shown]
+        lines = [f"{sentence}: {join_names(list(names))}" if names else sentence for sentence, names in shown]
         more = len(self.found) - len(shown)
         return (*lines, *([f"and {more} more notes"] if more else []))
 
 
-def listed(names: Sequence[str], limit: int = NAMES_IN_A_NOTE) -> str:
+def join_names(names: Sequence[str], limit: int = NAMES_IN_A_NOTE) -> str:
     """Join names for a sentence; cut a long list short."""
     shown = ", ".join(names[:limit])
     more = len(names) - limit

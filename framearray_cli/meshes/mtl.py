@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from .assets import Assets
-from .materials import Opacity, Rgb3, blended, make_material
+from .materials import Opacity, Rgb3, blended_opacity, make_material
 from .model import GREY, Material, Notes
 from .textures import TextureTable
 
@@ -106,7 +106,7 @@ def _opacity(
     if use is not None:
         file = use.file
         texture = textures.cutout(("file", file), f"material {name}", lambda: assets.read(file))
-    opacity = blended(name, alpha, texture, textures, notes)
+    opacity = blended_opacity(name, alpha, texture, textures, notes)
     if not opacity.left_out and int(_number(values, "illum", 2)) in GLASS_MODELS:
         notes.add("glass that is not nearly clear (d from 0.25) is taken as opaque", name)
     return opacity

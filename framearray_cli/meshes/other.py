@@ -9,7 +9,7 @@ from ..arrays import Float32
 from ..errors import SceneError
 from .assets import AssetError, Assets
 from .headers import check_headers, one_solid
-from .materials import blended, clean_colours, default_material, make_material
+from .materials import blended_opacity, clean_colours, default_material, make_material
 from .model import Material, Meshes, Notes, Part
 from .textures import TextureTable
 from .walk import file_normals, instances, place
@@ -138,6 +138,6 @@ def _material(source: Any, number: int, textures: TextureTable, notes: Notes) ->
     colour = np.asarray(source.main_color, dtype=np.float64) / BYTE
     if texture >= 0 and getattr(source, "diffuse", None) is not None:
         colour = np.array([1.0, 1.0, 1.0, colour[3]])  # trimesh's default grey must not darken an image
-    opacity = blended(name, float(colour[3]), texture, textures, notes)
+    opacity = blended_opacity(name, float(colour[3]), texture, textures, notes)
     base = (float(colour[0]), float(colour[1]), float(colour[2]))
     return make_material(name, base, (0.0, 0.0, 0.0), opacity, notes, texture=texture)

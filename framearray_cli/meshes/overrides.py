@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from ..errors import SceneError
-from .model import Material, Notes, listed
+from .model import Material, Notes, join_names
 
 LONGEST_NAME = 100  # characters of a name in a message
 NAMES_IN_AN_ERROR = 12
@@ -24,7 +24,9 @@ class Override(Protocol):
         """Mirror reflectivity, linear RGB."""
 
 
-def overridden(materials: Sequence[Material], overrides: Mapping[str, Override], notes: Notes) -> list[Material]:
+def override_materials(
+    materials: Sequence[Material], overrides: Mapping[str, Override], notes: Notes
+) -> list[Material]:
     """Apply the job's values. Glass with an override is shown: whoever sets its colour wants to see it."""
     names = sorted({material.name for material in materials})
     unknown = [name for name in overrides if name not in names]
@@ -59,4 +61,4 @@ def _unknown_material(name: str, names: Sequence[str]) -> str:
 
     nearest = sorted(names, key=likeness, reverse=True)
     short = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
-    return f'scene.materials."{short}": no such material in the scene; it has {listed(nearest, NAMES_IN_AN_ERROR)}'
+    return f'scene.materials."{short}": no such material in the scene; it has {join_names(nearest, NAMES_IN_AN_ERROR)}'

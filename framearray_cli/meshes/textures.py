@@ -56,7 +56,7 @@ class TextureTable:
         """As `index`, for an image that Pillow has opened."""
         if key not in self.indices:
             try:
-                self.indices[key] = self._append(decoded(image, label, self.limit))
+                self.indices[key] = self._append(decode_opened(image, label, self.limit))
             except AssetError as error:
                 self.notes.add(f"texture left out, {error}")
                 self.indices[key] = -1
@@ -133,7 +133,7 @@ def decode_image(data: bytes, label: str, limit: Limit) -> Bytes:
         with Image.open(io.BytesIO(data), formats=FORMATS) as image:
             if image.format in ("JPEG", SEVERAL) and data.count(SCAN) > MOST_SCANS:
                 raise AssetError(f"{label}: expected an image of at most {MOST_SCANS} scans, got {data.count(SCAN)}")
-            return decoded(image, label, limit)
+            return decode_opened(image, label, limit)
     except (AssetError, SceneError):
         raise
     except Image.DecompressionBombError as error:
@@ -144,7 +144,7 @@ def decode_image(data: bytes, label: str, limit: Limit) -> Bytes:
         raise AssetError(f"{label}: not an image that can be read ({type(error).__name__}: {error})") from error
 
 
-def decoded(image: Any, label: str, limit: Limit) -> Bytes:
+def decode_opened(image: Any, label: str, limit: Limit) -> Bytes:
     """Decode the texels of an image that Pillow has opened; its size counts before any of it is decoded.
 
     Raises:
