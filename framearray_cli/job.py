@@ -75,7 +75,7 @@ class SceneTable(Table):
     file: FileName = Field(description="Scene file: GLB, glTF, OBJ, PLY, STL or anything else trimesh reads.")
     up: Literal["y", "z"] = Field(
         default="y",
-        description="Axis that points up. Says how cameras without `up` are held; the model is not turned.",
+        description="Axis that points up. It is the up direction of cameras without `up`; the model is not turned.",
         json_schema_extra=computed('"z" for STL, PLY and 3MF, else "y"'),
     )
     background: Emission = Field(
@@ -86,8 +86,8 @@ class SceneTable(Table):
         default=(),
         strict=False,
         max_length=100,
-        description="Further folders, with all below them, where files that the scene names may lie, such as textures. "
-        "Without them a scene reads only what lies beside it, or below.",
+        description="Further folders, with all below them, for files that the scene names, such as textures. "
+        "Without them a scene may only name files in its own folder or below.",
         json_schema_extra={"x-words": "a list of folders"},
     )
     materials: dict[str, MaterialTable] = Field(
@@ -114,17 +114,20 @@ class OutputTable(Table):
         description="Image format. EXR and TIFF hold linear radiance; PNG and JPEG are sRGB, clipped to 0..1.",
     )
     fps: float = Field(
-        default=24.0, ge=LEAST_FPS, le=MOST_FPS, description="Frames a second, kept in the images and used for movies."
+        default=24.0,
+        ge=LEAST_FPS,
+        le=MOST_FPS,
+        description="Frames per second, stored in the images and used for movies.",
     )
     compression: Literal["none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"] = Field(
         default="none",
-        description="Compression of EXR. zip takes a third off and makes a render up to 1.6 times as long. pxr24, b44, "
-        "b44a, dwaa and dwab lose precision.",
+        description="Compression of EXR. zip saves a third of the space and makes a render up to 1.6 times as long. "
+        "pxr24, b44, b44a, dwaa and dwab lose precision.",
     )
     half: Literal["auto", "always", "never"] = Field(
         default="auto",
-        description='EXR with 16 bit a channel. "auto": 32 bit for an image with values above 65504, which 16 bit '
-        'cannot hold. "always": such values are cut to 65504. "never": always 32 bit.',
+        description='EXR with 16 bits per channel. "auto": 32 bits for an image with values above 65504, which 16 bits '
+        'cannot hold. "always": clip such values to 65504. "never": always 32 bits.',
     )
     quality: int = Field(default=95, ge=1, le=100, description="Quality of JPEG.")
     exposure: float = Field(
@@ -135,7 +138,7 @@ class OutputTable(Table):
     )
     layers: bool = Field(
         default=True,
-        description="Also write one multi-channel EXR a camera: obscurance, indirect, reflectivity, normal, depth, "
+        description="Also write one multi-channel EXR per camera: obscurance, indirect, reflectivity, normal, depth, "
         "sample count.",
     )
 
@@ -145,15 +148,15 @@ class RenderTable(Table):
 
     memory: Bytes | None = Field(
         default=None,
-        description='Most memory that the program may take, such as "8 GiB". What needs more is rendered in '
-        "blocks of light positions, one after the other; the images are the same, the time is longer.",
+        description='Maximum memory of the program, such as "8 GiB". A job that needs more is rendered in blocks of '
+        "light positions, one after the other; the images are the same, the time is longer.",
         json_schema_extra=computed("two thirds of what is free"),
     )
     threads: int | None = Field(
         default=None,
         ge=1,
         le=MOST_THREADS,
-        description="Threads that render.",
+        description="Number of threads that render.",
         json_schema_extra=computed("one for each core"),
     )
 

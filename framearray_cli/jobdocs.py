@@ -40,22 +40,23 @@ INTRODUCTION = f"""\
 
 <!-- Made by `python -m framearray_cli.jobdocs docs/guide/` from framearray_cli/job.py; edit there. -->
 
-A job file says what to render: a scene, a camera path, a light path, and how. It is written in [TOML](https://toml.io).
-This is a whole job of 96 eyes and 48 light positions:
+A job file says what to render and how: a scene, a camera path, a light path, and settings. It is written in
+[TOML](https://toml.io). This is a whole job of 96 camera positions (eyes) and 48 light positions:
 
 ```toml
 {EXAMPLE}```
 
-File names start at the folder of the job file. Positions and directions are in the coordinates of the scene file.
-Colours are linear, with Rec. 709 primaries. An unknown key is an error, and all problems of a file are told at once.
+File names are relative to the folder of the job file. Positions and directions are in the coordinates of the scene
+file. Colours are linear, with Rec. 709 primaries. An unknown key is an error, and the program reports all problems of a
+file at once.
 
 [job.schema.json](job.schema.json) is the same reference for editors: an editor with a TOML plugin, such as Taplo,
 completes and checks a job file whose first line names it, as above.
 """
 
 EYE_FILE = """\
-A `file` of eyes replaces `keys`. As CSV it starts with a row that names the columns, in any order; the `up_`
-columns may be left out:
+A `file` of eyes replaces `keys`. As CSV it starts with a row that names the columns, in any order; you may leave out
+the `up_` columns:
 
 ```csv
 eye_x,eye_y,eye_z,target_x,target_y,target_z,up_x,up_y,up_z
@@ -64,7 +65,7 @@ eye_x,eye_y,eye_z,target_x,target_y,target_z,up_x,up_y,up_z
 ```
 
 As JSON it is a list: `[{"eye": [0.0, 1.6, 3.0], "target": [0.0, 1.2, 0.0]}, ...]`, with `"up"` where wanted.
-The first eye is frame 0, the next frame 1, and so on.
+The first eye is that of frame 0, the next that of frame 1, and so on.
 """
 
 

@@ -128,14 +128,14 @@ class CameraTable(Table):
     )
     file: FileName | None = Field(
         default=None,
-        description="CSV or JSON file with one eye a frame, instead of `keys`.",
+        description="CSV or JSON file with one eye per frame, instead of `keys`.",
         json_schema_extra=computed("none"),
     )
     keys: tuple[CameraKey, ...] = Field(
         default=(),
         strict=False,
         validate_default=True,
-        description="Where the eye is at some frames; between them it moves smoothly, before the first and after "
+        description="Positions of the eye at some frames; between them it moves smoothly, before the first and after "
         "the last it stands still. One key: a fixed camera.",
         json_schema_extra={**computed("the eyes in `file`"), "minItems": 1},
     )
@@ -171,8 +171,9 @@ class _Source(Table):
 
     group: GroupName | None = Field(
         default=None,
-        description="Name of a group. If any source has one, the light of every group is stored by itself, so that its "
-        f'strength and colour can be changed in the finished array; sources without one are the group "{REST_GROUP}".',
+        description="Name of a group. If any source has one, the program stores the light of every group separately, "
+        "so that its strength and colour can change in the finished array; sources without a group are the group "
+        f'"{REST_GROUP}".',
         json_schema_extra=computed("none"),
     )
     axis: GroupName | None = Field(
@@ -221,7 +222,7 @@ class SunSource(_Source):
     )
     north: Direction | None = Field(
         default=None,
-        description="Direction in the scene that points north; what of it is up does not count.",
+        description="Direction in the scene that points north; its component along the up axis does not count.",
         json_schema_extra=computed("-z in a scene with y up, y in one with z up, so that east is x"),
     )
     irradiance: Emission = Field(

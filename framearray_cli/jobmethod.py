@@ -15,42 +15,42 @@ class SamplesTable(Table):
 
     hits: HitCount = Field(
         default=DEFAULT_HITS,
-        description="Native hits of a pixel in a frame. With reuse a pixel averages up to (2 n_r + 1) times as many. "
-        "0.5: one in every second pixel, in the others the next frame; likewise a third, down to an eighth. "
+        description="Native hits per pixel and frame. With reuse a pixel averages up to (2 n_r + 1) times as many. "
+        "0.5: one in every second pixel, and in the others in the next frame; likewise a third, down to an eighth. "
         '"auto": chosen from the camera path, to take the least time for the error that n_r = 3 and hits = 2 have on '
         "an ordinary walk.",
     )
-    obscurance: int = Field(default=5, ge=1, le=65535, description="Obscurance rays of a hit.")
+    obscurance: int = Field(default=5, ge=1, le=65535, description="Obscurance rays per hit.")
     shadow_step: int = Field(
         default=1,
         ge=1,
         le=1024,
-        description="Test shadows at every so many-th light position of a hit, and between two where they differ. "
-        "1: at every position. What hides a light between two tests alone is overlooked.",
+        description="N: test the shadows of a hit at every Nth light position, and between two tests that differ. "
+        "1: at every position. The program overlooks what hides a light only between two tests.",
     )
     shadow_unbiased: bool = Field(
         default=False,
-        description="With `shadow_step`: check one random position of every interval that was taken for granted, and "
-        "count a disagreement for all of them. The mean is then right; single hits are noisier, and dark pixels may "
-        "come out below 0.",
+        description="With `shadow_step`: check one random position of every interval whose ends agree, and let a "
+        "disagreement count for all its positions. The mean is then right; single hits are noisier, and dark pixels "
+        "may come out below 0.",
     )
 
     error: float | None = Field(
         default=None,
         gt=0,
         le=10,
-        description="Instead of `hits`: the error that is wanted of every image, the root mean square over its pixels "
-        "of their standard error, over the mean radiance of the array. A pilot settles how many native hits each place "
-        "of each frame gets, most where it is noisy and few frames see it. What mirrors show is left out.",
+        description="Instead of `hits`: the wanted error of every image, that is, the root mean square of the standard "
+        "errors of its pixels, over the mean radiance of the array. A pilot settles the number of native hits for each "
+        "place of each frame; noisy places that few frames see get most. What mirrors show does not count.",
         json_schema_extra=computed("`hits` says how many samples there are"),
     )
     most_hits: int = Field(
-        default=32, ge=1, le=1024, description="With `error`: native hits of a pixel in a frame, at most."
+        default=32, ge=1, le=1024, description="With `error`: maximum number of native hits per pixel and frame."
     )
     halves: bool = Field(
         default=False,
-        description="Sample every pixel in two independent halves. What they differ by gives each pixel's standard "
-        "error, which EXR images then have as channels `error` and `difference`.",
+        description="Sample every pixel in two independent halves. Their difference gives the standard error of each "
+        "pixel, which EXR images then hold in channels `error` and `difference`.",
     )
 
     @model_validator(mode="after")
@@ -67,13 +67,14 @@ class ReuseTable(Table):
 
     n_r: Window = Field(
         default=DEFAULT_N_R,
-        description="Frames before and frames after that share their hits, N_r. 0: no reuse. "
-        '"auto": chosen from the camera path, likewise; where `hits` is given, for the error that n_r = 3 has with it.',
+        description="Number of frames before and of frames after that share their hits, N_r. 0: no reuse. "
+        '"auto": chosen from the camera path, likewise; if `hits` is given, for the error that n_r = 3 has with it.',
     )
     weights: Literal["average", "balance"] = Field(
         default="balance",
-        description='"average": all hits of a pixel count the same. "balance": each counts by how densely its eye '
-        "sees the place, which removes the error at silhouettes and texture edges and costs more rays.",
+        description='"average": all hits of a pixel have the same weight. "balance": the weight of a hit follows from '
+        "how densely its eye samples the place, which removes the error at silhouettes and texture edges and costs "
+        "more rays.",
     )
 
 
@@ -110,8 +111,9 @@ class ObscuranceTable(Table):
     )
     outside: Literal["average", "background"] = Field(
         default="average",
-        description='What a ray brings that meets nothing within `range`. "average": the average reflectivity times '
-        'the ambient light. "background": rays are traced on, and those that leave the scene bring its background.',
+        description='What a ray contributes if it meets nothing within `range`. "average": the average reflectivity '
+        'times the ambient light. "background": the ray continues, and contributes the background if it leaves the '
+        "scene.",
     )
 
 
@@ -133,7 +135,7 @@ class AmbientTable(Table):
         default=None,
         ge=1,
         le=2**24,
-        description='Walks ("eye", "fit") or particles a light position ("light").',
+        description='Number of walks ("eye", "fit") or particles ("light") per light position.',
         json_schema_extra=computed("as many as a standard error of 1 % needs"),
     )
 
@@ -153,7 +155,7 @@ class SpecularTable(Table):
         default=0,
         ge=1,
         le=MOST_HITS,
-        description="Native hits of a pixel that sees a mirror; what a mirror shows is never reused.",
+        description="Native hits per pixel that sees a mirror; what a mirror shows is never reused.",
         json_schema_extra=computed(
             '(2 n_r + 1) times `samples.hits`; 7 times with n_r = "auto", 14 with hits = "auto"'
         ),
