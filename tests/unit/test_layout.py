@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -101,6 +102,7 @@ HEAVY = (
 FILES = {path.relative_to(PACKAGE).with_suffix("").as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}
 
 
+@cache
 def tree_of(name: str) -> ast.Module:
     return ast.parse(FILES[name].read_text(encoding="utf-8"))
 
@@ -121,6 +123,7 @@ def imported(name: str) -> set[str]:
     return found - {name}
 
 
+@cache
 def libraries(name: str) -> set[str]:
     """Libraries that a file imports, wherever in it."""
     found = set()
