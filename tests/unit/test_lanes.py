@@ -7,9 +7,10 @@ import numba as nb
 import numpy as np
 import pytest
 import tiny
+from triangles import everything, find_numbers
 
 from framearray_cli.camera import OUTSIDE, Cameras, project
-from framearray_cli.kernel import inlined, kernel
+from framearray_cli.kernel import kernel
 from framearray_cli.lanes import (
     LANES,
     bits,
@@ -35,12 +36,7 @@ from framearray_cli.lanes import (
 from framearray_cli.sampling import above, cosine_direction, disc
 from framearray_cli.surface import (
     Surfaces,
-    geometric_normal,
     nearest_texel_at,
-    position_at,
-    reflectivity_at,
-    shading_normal,
-    specular_at,
     surfaces,
     texture_at,
 )
@@ -412,28 +408,6 @@ def test_textures_of_lanes_are_those_of_numbers() -> None:
     assert np.isfinite(numbers).all() and numbers.std() > 0.1
     np.testing.assert_allclose(lanes[:4], numbers[:4], rtol=0, atol=FEW)
     assert np.array_equal(lanes[4:], numbers[4:])  # texels themselves
-
-
-@inlined
-def everything(s: Surfaces, triangle: Any, u: Any, v: Any, dx: Any, dy: Any, dz: Any) -> Any:
-    gx, gy, gz = geometric_normal(s, triangle, dx, dy, dz)
-    shading = shading_normal(s, triangle, u, v, gx, gy, gz)
-    return (
-        position_at(s, triangle, u, v),
-        (gx, gy, gz),
-        shading,
-        reflectivity_at(s, triangle, u, v),
-        specular_at(s, triangle, u, v),
-    )
-
-
-@kernel
-def find_numbers(s: Surfaces, triangle: Any, uv: Any, way: Any, out: Any) -> None:
-    for i in range(uv.shape[1]):
-        found = everything(s, triangle[i], uv[0, i], uv[1, i], way[0, i], way[1, i], way[2, i])
-        for k in range(5):
-            for axis in range(3):
-                out[k, axis, i] = found[k][axis]
 
 
 @kernel

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tiny
+from triangles import QUANTITIES, find_numbers
 
 from framearray_cli.colour import linear_from_srgb8
 from framearray_cli.kernel import kernel
@@ -13,13 +14,8 @@ from framearray_cli.surface import (
     OFFSET_ULPS,
     ULP,
     Surfaces,
-    geometric_normal,
     is_cut_out,
     nearest_texel_at,
-    position_at,
-    reflectivity_at,
-    shading_normal,
-    specular_at,
     surfaces,
     texture_at,
     total_at,
@@ -48,19 +44,6 @@ def add_up(s: Surfaces, triangle: int, uv: Any, out: Any) -> None:
 
 
 @kernel
-def at(s: Surfaces, triangle: int, uv: Any, way: Any, out: Any) -> None:
-    """Everything about points (n, 2) of a triangle, seen along `way`; (n, 15)."""
-    for i in range(uv.shape[0]):
-        u, v = uv[i, 0], uv[i, 1]
-        out[i, 0], out[i, 1], out[i, 2] = position_at(s, triangle, u, v)
-        gx, gy, gz = geometric_normal(s, triangle, way[0], way[1], way[2])
-        out[i, 3], out[i, 4], out[i, 5] = gx, gy, gz
-        out[i, 6], out[i, 7], out[i, 8] = shading_normal(s, triangle, u, v, gx, gy, gz)
-        out[i, 9], out[i, 10], out[i, 11] = reflectivity_at(s, triangle, u, v)
-        out[i, 12], out[i, 13], out[i, 14] = specular_at(s, triangle, u, v)
-
-
-@kernel
 def cut_out(s: Surfaces, triangle: int, uv: Any, out: Any) -> None:
     for i in range(uv.shape[0]):
         out[i] = is_cut_out(s, triangle, uv[i, 0], uv[i, 1])
@@ -78,13 +61,13 @@ def looked_up(s: Surfaces, uv: Any) -> Any:
 
 
 def found(s: Surfaces, uv: Any = ((0.25, 0.25),), way: Any = (0, 0, -1), triangle: int = 0) -> Any:
-    uv = np.asarray(uv, np.float32)
-    out = np.empty((len(uv), 15), np.float32)
-    at(s, triangle, uv, np.asarray(way, np.float32), out)
-    return {
-        name: out[:, 3 * i : 3 * i + 3]
-        for i, name in enumerate(("position", "geometric", "shading", "diffuse", "mirror"))
-    }
+    """Quantities (n, 3) by name, at points (n, 2) of a triangle."""
+    points = np.ascontiguousarray(np.asarray(uv, np.float32).T)
+    n = points.shape[1]
+    ways = np.repeat(np.asarray(way, np.float32)[:, None], n, axis=1)
+    out = np.empty((len(QUANTITIES), 3, n), np.float32)
+    find_numbers(s, np.full(n, triangle, np.int32), points, ways, out)
+    return {name: part.T for name, part in zip(QUANTITIES, out, strict=True)}
 
 
 def centres(width: int, height: int) -> Any:
