@@ -153,7 +153,7 @@ def test_our_own_mistakes_keep_their_traceback(tmp_path, monkeypatch):
     def fail(*arguments: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr("framearray_cli.render.prepare", fail)
+    monkeypatch.setattr("framearray_cli.session.prepare", fail)
     from framearray_cli.cli import main
 
     with pytest.raises(ZeroDivisionError):
