@@ -69,7 +69,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
     n = sum(part.n for part in parts)
     frames = setup.frames_around(c, setup.n_r)
     take = pool.arrays.take
-    records = empty_records(setup, n, take)
+    records = empty_records(n, *setup.stored_light, take)
     pixel = take("pixel", (len(frames), n), np.int32)
     order = take("order", (len(frames), n), np.int32)
     weight = take("weight", (len(frames), n if setup.balance else 0), np.float32)
@@ -112,7 +112,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
 def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> list[tuple[Placed, HitRecords]]:
     """One native hit for each of some pixels of eye c that nothing else reaches; then what mirrors show there."""
     n, samples = len(pixels), Samples(setup.seed, pixels, per_pixel=1, first=HOLE_SAMPLE)
-    records = empty_records(setup, n)
+    records = empty_records(n, *setup.stored_light)
 
     def batch(first: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
         m = min(pool.batch, n - first)
@@ -137,7 +137,7 @@ def _joined(setup: FrameSetup, parts: list[tuple[Int32, HitRecords]], pool: Trac
     def take(name: str, *shape_and_type: Any) -> Any:
         return pool.arrays.take(f"mirrored {name}", *shape_and_type)
 
-    pixel, whole = np.empty(n, np.int32), empty_records(setup, n, take)
+    pixel, whole = np.empty(n, np.int32), empty_records(n, *setup.stored_light, take)
 
     def copy(first: int, _scratch: Scratch) -> None:
         for part in range(first, len(parts), pool.threads):

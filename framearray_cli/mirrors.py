@@ -29,7 +29,7 @@ def mirror_paths(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch) -> lis
         reflect(hits, n, throughput, setup.world, scratch.hit_rays.packets, reflected, next_throughput)
         scratch.rays["mirror"] += m
         hits, n, throughput = reflected, m, next_throughput
-        records = empty_records(setup, m)
+        records = empty_records(m, *setup.stored_light)
         estimate_terms(setup, hits, m, scratch, records, "mirror obscurance", "mirror shadow", throughput)
         found.append((hits.pixel[:m].copy(), records))
     scratch.seconds["mirror"] += perf_counter() - started

@@ -166,7 +166,7 @@ class _Pilot:
         samples, packets = Samples(setup.seed, pixels, per_pixel=2, first=0, halves=True), scratch.hit_rays.packets
         native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, scratch.hits)
         scratch.rays["pilot"] += n
-        records = empty_records(setup, n)
+        records = empty_records(n, *setup.stored_light)
         estimate_terms(setup, scratch.hits, n, scratch, records, "pilot", "pilot")
         return _radiance(setup, self.ambient, records)
 

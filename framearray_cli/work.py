@@ -99,6 +99,11 @@ class FrameSetup:
         return first_with_background(self.planes)
 
     @property
+    def stored_light(self) -> tuple[int, int]:
+        """Channels of irradiance, and light positions whose irradiance is stored with a hit."""
+        return self.lights.channels, len(self.kept)
+
+    @property
     def keeps_all(self) -> bool:
         """Whether all light that is computed is stored too."""
         return len(self.kept) == self.lights.n_lights
@@ -179,13 +184,17 @@ def _fresh(_name: str, shape: tuple[int, ...], dtype: Any) -> Any:
     return with_room(shape, dtype)
 
 
-def empty_records(setup: FrameSetup, n: int, take: Callable[[str, tuple[int, ...], Any], Any] = _fresh) -> HitRecords:
-    """Room for n hits; contents are arbitrary.
+def empty_records(
+    n: int, channels: int, n_lights: int, take: Callable[[str, tuple[int, ...], Any], Any] = _fresh
+) -> HitRecords:
+    """Allocate records of n hits; contents are arbitrary.
 
     Args:
+        channels: of irradiance, 1 or 3.
+        n_lights: light positions whose irradiance is stored.
         take: makes an array of a name, shape and dtype.
     """
     return HitRecords(
         row=take("row", (n, LANES), np.float32),
-        irradiance=take("irradiance", (n, setup.lights.channels, len(setup.kept)), np.float32),
+        irradiance=take("irradiance", (n, channels, n_lights), np.float32),
     )
