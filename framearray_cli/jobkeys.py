@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from itertools import pairwise
 from math import hypot
-from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
+from typing import Annotated, Any, Literal, NamedTuple, Protocol, TypeAlias
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
@@ -82,10 +82,14 @@ class DirectionalKey(Table):
     )
 
 
-Key: TypeAlias = CameraKey | PointKey | DirectionalKey
+class KeyFrame(Protocol):
+    """A table of values at one frame."""
+
+    @property
+    def frame(self) -> int: ...
 
 
-def _key_problems(keys: Sequence[Key], directions: str, optional: str) -> list[tuple[Place, str]]:
+def key_problems(keys: Sequence[KeyFrame], directions: str, optional: str) -> list[tuple[Place, str]]:
     """Check keys against each other: their order, what they leave out, and directions that turn half a circle."""
     problems: list[tuple[Place, str]] = []
     for i, (before, key) in enumerate(pairwise(keys), start=1):
@@ -108,7 +112,7 @@ def _opposite(a: Float3, b: Float3) -> bool:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] <= -hypot(*a) * hypot(*b) * (1 - 1e-8)  # 1e-8: within 0.01 degrees
 
 
-def _late_keys(keys: Sequence[Key], frames: int) -> list[tuple[Place, str]]:
+def late_keys(keys: Sequence[KeyFrame], frames: int) -> list[tuple[Place, str]]:
     """Check that no key lies beyond the last frame; `frames` 0 means that the keys decide."""
     late = [(i, key.frame) for i, key in enumerate(keys) if frames and key.frame >= frames]
     return [((i, "frame"), f"expected at most {frames - 1} (frames = {frames}), got {frame}") for i, frame in late]
@@ -148,7 +152,7 @@ class CameraTable(Table):
             fail([((), "expected either `keys` or `file`, got both")])
         if not keys and not has_file and "file" in info.data:
             fail([((), "expected a list of at least 1 table, got none; give `keys` or `file`")])
-        if problems := _key_problems(keys, "up", "up") + _late_keys(keys, info.data.get("frames", 0)):
+        if problems := key_problems(keys, "up", "up") + late_keys(keys, info.data.get("frames", 0)):
             fail(problems)
         return keys
 
@@ -161,7 +165,7 @@ class CameraTable(Table):
 
 def _consistent_light_keys(keys: Any) -> Any:
     """Check the keys of one source against each other."""
-    if problems := _key_problems(keys, "direction", "color"):
+    if problems := key_problems(keys, "direction", "color"):
         fail(problems)
     return keys
 
@@ -301,7 +305,7 @@ class LightTable(Table):
         late = [
             ((i, "keys", *place), text)
             for i, s in enumerate(sources)
-            for place, text in _late_keys(s.keys, axes.get(s.axis, 0) if s.axis else frames)
+            for place, text in late_keys(s.keys, axes.get(s.axis, 0) if s.axis else frames)
         ]
         if problems := late + _group_problems(sources):
             fail(problems)
