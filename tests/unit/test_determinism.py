@@ -11,8 +11,10 @@ import tiny
 from tiny import WALK
 
 from framearray_cli.crew import TracePool
+from framearray_cli.hits import World
 from framearray_cli.job import Job
 from framearray_cli.render import render
+from framearray_cli.terms.ambient_light import LightWalks, ambient_by_light
 
 SKY = {"background": [0.3, 0.4, 0.5]}
 LAMP = tiny.TABLE["light"]["sources"][0]
@@ -47,6 +49,26 @@ def digests(folder: Path) -> dict[str, str]:
 def written(scene: Path, folder: Path, threads: int, engine: Any = "auto", **changes: Any) -> dict[str, str]:
     render(job(scene, folder, threads, **changes), engine=engine)
     return digests(folder)
+
+
+@pytest.mark.parametrize("paths", [None, 100, 10_000])
+def test_particles_from_the_lights_are_the_same_for_any_number_of_threads(paths: int | None) -> None:
+    """Batches beyond the one that is enough are forgotten, and their rays too."""
+    inputs = tiny.prepared(tiny.job(scene=SKY, light={"sources": [LAMP, tiny.SUN]}))
+    with tiny.open_embree(inputs) as embree:
+        walks = LightWalks(
+            seed=5,
+            paths=paths,
+            world=World(inputs.surfaces, embree.tracer),
+            lights=inputs.light_arrays,
+            background=np.array(SKY["background"], np.float32),
+        )
+        one, *others = (ambient_by_light(walks, threads) for threads in (1, 2, 5))
+    assert one.paths == (paths or 4096)
+    for other in others:
+        assert (other.paths, other.rays, other.notes) == (one.paths, one.rays, one.notes)
+        for name in ("intensity", "standard_error", "reflectivity"):
+            np.testing.assert_array_equal(getattr(other, name), getattr(one, name))
 
 
 @pytest.mark.parametrize("weights", ["balance", "average"])
