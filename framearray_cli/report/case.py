@@ -13,7 +13,6 @@ from ..errors import JobError
 from ..job import Job
 from ..jobvalues import MOST_HITS, changed
 from ..lights import some_lights
-from ..planes import pictures
 from ..prepare import Prepared, open_embree, plan_work, prepare
 from ..terms.ambient import Ambient
 from ..work import FrameSetup
@@ -99,5 +98,7 @@ def under(case: Case, l: Sequence[int]) -> Case:
         standard_error=case.ambient.standard_error[list(l)],
     )
     return replace(
-        case, setup=replace(case.setup, lights=lights, kept=range(len(l)), planes=pictures(len(l))), ambient=ambient
+        case,
+        setup=replace(case.setup, lights=lights, kept=range(len(l)), planes=tuple(case.setup.planes[i] for i in l)),
+        ambient=ambient,
     )
