@@ -268,14 +268,19 @@ def fill(table: Table, key: str, value: object) -> None:
 def changed(table: _Table, **values: object) -> _Table:
     """Copy a table with other values, each checked as one of a file is; `model_copy` takes any name and any value.
 
-    Only single values are checked: a report measures settings that do not go together in a file.
+    Only single values are checked: a report measures settings that do not go together in a file. A value that is a
+    table has been checked already; its own rules on what goes together would refuse such settings.
 
     Raises:
         ValidationError: a key has no such value.
+        TypeError: a key holds another table.
         KeyError: there is no such key.
     """
     for key, value in values.items():
-        _value_check(type(table), key).validate_python(value, strict=True)
+        if not isinstance(value, Table):
+            _value_check(type(table), key).validate_python(value, strict=True)
+        elif not isinstance(value, type(getattr(table, key))):
+            raise TypeError(f"{key}: expected a {type(getattr(table, key)).__name__}, got a {type(value).__name__}")
     return table.model_copy(update=values)
 
 
