@@ -45,23 +45,26 @@ def peak(tmp_path: Path, frames: int, size: tuple[int, int], lights: int, n_r: i
     return int(run.stdout)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _compiled(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Kernels are there: to compile them takes memory."""
+    peak(tmp_path_factory.mktemp("first"), 2, (24, 18), 3, 1)
+
+
 @pytest.mark.slow
 def test_peak_memory_of_24_and_of_96_cameras_is_the_same(tmp_path: Path) -> None:
     """A frame takes 11 MB here and 3 % are 16 MB: of the 72 frames more, two that stayed would show."""
-    peak(tmp_path, 2, (24, 18), 3, 1)  # compiles kernels where that was not done yet, which takes memory
     short, long = (peak(tmp_path, frames, (200, 150), 24, 3) for frames in (24, 96))
     assert long == pytest.approx(short, rel=0.03)
 
 
 def test_a_window_that_keeps_its_frames_would_be_seen(tmp_path: Path) -> None:
     """The measure can fail: a larger n_r holds more frames."""
-    peak(tmp_path, 2, (24, 18), 3, 1)
     narrow, wide = (peak(tmp_path, 12, (120, 90), 24, n_r) for n_r in (1, 4))
     assert wide > 1.03 * narrow
 
 
 def test_peak_memory_of_a_short_and_of_a_long_path_is_the_same(tmp_path: Path) -> None:
-    peak(tmp_path, 2, (24, 18), 3, 1)
     short, long = (peak(tmp_path, frames, (120, 90), 24, 1) for frames in (6, 24))
     assert long == pytest.approx(short, rel=0.03)
 
