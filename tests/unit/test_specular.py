@@ -56,10 +56,10 @@ def test_a_mirror_shows_the_mirrored_scene() -> None:
         assert 50 < mirrors.sum() == count_mirrors(hits, len(hits.kind))
         seen, through, m = reflected(setup, hits)
         assert m == mirrors.sum()
-        plane = hits.position[mirrors][:, 2].mean()
-        flip = np.float32([1, 1, -1])
-        eye = setup.cams.position[0] * flip + np.float32([0, 0, 2 * plane])
-        way = hits.position[mirrors] - eye
+        mirror = hits.position[mirrors].astype(np.float64)  # so that the roundings below are those of the program
+        flip = np.array([1, 1, -1])
+        eye = setup.cams.position[0] * flip + np.array([0, 0, 2 * mirror[:, 2].mean()])
+        way = mirror - eye
         np.testing.assert_allclose(seen.incoming, hits.incoming[mirrors] * flip, atol=1e-6)
         surface = seen.kind == SURFACE
         assert surface.sum() > 50
