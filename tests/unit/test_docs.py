@@ -1,6 +1,5 @@
 """README and docs/: every link, file, target, job, command and reference in them exists, and README's example runs."""
 
-import ast
 import re
 import shlex
 from pathlib import Path
@@ -149,46 +148,6 @@ def test_references_are_listed():
     assert len(listed) == len(set(listed))
     for file in (*PAGES, *PACKAGE.rglob("*.py")):
         assert set(KEY.findall(text(file))) <= set(listed), file
-
-
-def groups() -> list[list[str]]:
-    """The groups of modules in contributing.md, from the first on; "meshes/" is all files in that folder."""
-    table = text(DOCS / "develop" / "contributing.md").split("| Group |")[1].split("\n\n")[0]
-    rows = [re.findall(r"`([\w/.]+)`", row) for row in table.splitlines()[2:]]
-    return [[file for name in row for file in members(name)] for row in rows]
-
-
-def members(name: str) -> list[str]:
-    files = sorted((PACKAGE / name).rglob("*.py")) if name.endswith("/") else [PACKAGE / name]
-    return [file.relative_to(PACKAGE).as_posix() for file in files if file.name != "__init__.py" or text(file)]
-
-
-def imports(file: Path) -> set[str]:
-    """Files of the package that a file imports, anywhere in it."""
-    found = set()
-    for node in ast.walk(ast.parse(text(file))):
-        if isinstance(node, ast.ImportFrom) and node.level:
-            start = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
-            for name in [""] if node.module else [alias.name for alias in node.names]:
-                for target in ((start / name).with_suffix(".py"), start / name / "__init__.py"):
-                    if target.is_file() and target != PACKAGE / "__init__.py":
-                        found.add(target.relative_to(PACKAGE).as_posix())
-    return found
-
-
-def test_the_layout_is_complete():
-    listed = [name for group in groups() for name in group]
-    assert {*members("./")} - {"__init__.py"} == set(listed), (
-        "docs/develop/contributing.md lists every file of the package"
-    )
-    assert len(listed) == len(set(listed))
-
-
-def test_files_import_from_above():
-    assert imports(PACKAGE / "window.py") >= {"compose.py", "frame.py", "terms/ambient.py"}
-    rank = {name: i for i, group in enumerate(groups()) for name in group}
-    pairs = [(name, other) for name in rank for other in sorted(imports(PACKAGE / name)) if other in rank]
-    assert not [f"{name} imports {other}" for name, other in pairs if rank[other] > rank[name]]
 
 
 def box(file: Path) -> None:

@@ -1,87 +1,124 @@
-"""The package's shape: data flows one way, each library has one door, hot loops are compiled in one way."""
+"""The package's shape: rooms import only what their table allows, each library has one door, files stay small."""
 
 import ast
+import re
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 
 import pytest
+from support import ROOT
+from support.imports import against_the_table, circle, import_graph, libraries, modules
 
-import framearray_cli
-
-PACKAGE = Path(framearray_cli.__file__).parent
-
-# Every file, in the order in which data flows; a file imports only from those before it.
-FLOW = """
-__init__ errors extras units tomltext arrays files limits
-kernelcache kernel lanes/kinds lanes/arithmetic lanes/memory lanes/__init__
-compiling fingerprint colour sphere usage
-jobvalues jobtimes jobkeys jobmethod job jobschema jobdocs problems eyefile jobfile
-meshes/limit meshes/model meshes/assets meshes/gltf_values meshes/gltf_check meshes/container meshes/headers
-meshes/cleaning
-meshes/polygons meshes/merge meshes/overrides meshes/textures meshes/materials meshes/mtl meshes/walk
-meshes/gltf_materials meshes/gltf_motion meshes/gltf_triangles meshes/gltf_nodes meshes/gltf_stage
-meshes/gltf meshes/obj meshes/other meshes/read meshes/__init__
-scene sun planes paths camera lights sampling surface
-embree/packets embree/masks embree/native embree/fallback embree/__init__
-rays hits eyehits plan allotment
-terms/__init__ terms/walks terms/obscurance terms/direct terms/direct_steps terms/specular terms/ambient
-terms/ambient_eye terms/ambient_area terms/ambient_light terms/ambient_fit
-reuse work crew shading mirrors frame denoise standarderror compose accumulate window loop
-imageattributes pngjpeg exrtiff images filepatterns manifest manifestfile pictures ranges record resume folderlock
-outfolder stored
-prepare writer memory acceptance expected auto allot target identity describe summary progress session render
-check verify
-start/rays start/sample start/views start/room start/orbit start/model start/staged start/expose start/plan
-start/text start/__init__
-imagecheck
-movie/__init__ movie/places movie/easing movie/curves movie/pathfile movie/timeline movie/sweep
-movie/cube movie/display movie/label movie/look movie/yuv movie/video movie/animation movie/sequence movie/assemble
-places sheet
-export/selection export/folder export/points export/colmap export/nerfstudio export/cinema export/write export/__init__
-view/coding view/streams view/index view/tiles view/prepare view/pagefiles view/server view/export view/run
-view/__init__
-report/settings report/case report/probes report/metrics report/reference report/flip report/quality report/measure
-report/offsets report/front report/run report/tables report/plots report/crops report/page report/__init__
-screen interrupts
-parts/chunks wording parts/openjd parts/progress parts/worker parts/cluster parts/handout parts/run parts/__init__
-commands/__init__ commands/options commands/init commands/render commands/check commands/verify
-commands/assemble commands/sheet commands/export commands/openjd commands/report commands/schema
-commands/view
-cli __main__
-"""
-ORDER = FLOW.split()
+PACKAGE = ROOT / "framearray_cli"
+PAGE = ROOT / "docs" / "develop" / "contributing.md"
+FILES = modules(PACKAGE)
+TREES = {name: ast.parse(file.read_text(encoding="utf-8")) for name, file in FILES.items()}
+GRAPH = import_graph(PACKAGE)
 
 # Which files may import a library; what is not here may be imported anywhere.
 DOORS = {
-    "embreex": ("embree/",),
-    "llvmlite": ("embree/", "kernel", "lanes/"),
+    "embreex": (
+        "engine/embree/",
+        "embree/",
+    ),
+    "llvmlite": (
+        "engine/embree/",
+        "engine/kernels/",
+        "embree/",
+        "kernel",
+        "lanes/",
+    ),
     "numba": (
+        "engine/embree/",
+        "engine/kernels/",
+        "engine/hits/native",
         "embree/",
         "kernelcache",
         "kernel",
         "lanes/",
         "compiling",
         "eyehits",
-    ),  # eyehits: one function that allocates, so no kernel
-    "trimesh": ("meshes/",),
-    "OpenImageIO": ("exrtiff", "movie/display"),
-    "PIL": ("meshes/", "pngjpeg", "movie/label", "movie/animation", "sheet"),
-    "tomllib": ("jobfile", "manifestfile"),
-    "tomli_w": ("manifestfile", "tomltext", "report/tables"),
+    ),
+    "trimesh": (
+        "scene/files/",
+        "meshes/",
+    ),
+    "OpenImageIO": (
+        "array/images/exr",
+        "tools/movie/display",
+        "exrtiff",
+        "movie/display",
+    ),
+    "PIL": (
+        "scene/files/",
+        "array/images/png",
+        "tools/movie/label",
+        "tools/movie/animation",
+        "tools/sheet",
+        "meshes/",
+        "pngjpeg",
+        "movie/label",
+        "movie/animation",
+        "sheet",
+    ),
+    "tomllib": (
+        "base/forms/toml",
+        "array/manifest_toml",
+        "jobfile",
+        "manifestfile",
+    ),
+    "tomli_w": (
+        "base/forms/text",
+        "array/manifest_toml",
+        "report/tables",
+        "manifestfile",
+        "tomltext",
+    ),
     "matplotlib": ("report/plots",),
     "jinja2": ("report/page",),
     "flip_evaluator": ("report/flip",),
-    "typer": ("cli", "commands/"),
-    "rich": ("screen",),
-    "av": ("movie/video",),
-    "scipy": ("paths", "standarderror", "allotment"),
-    "psutil": ("usage",),
-    "xxhash": ("record",),
-    "filelock": ("folderlock",),
-    "pvlib": ("sun",),
-    "distributed": ("parts/",),
+    "typer": (
+        "cli/",
+        "cli",
+        "commands/",
+    ),
+    "rich": (
+        "cli/screen",
+        "screen",
+    ),
+    "av": (
+        "tools/movie/video",
+        "movie/video",
+    ),
+    "scipy": (
+        "scene/paths/paths",
+        "engine/images/standard_error",
+        "engine/frames/blocks",
+        "paths",
+        "standarderror",
+        "allotment",
+    ),
+    "psutil": (
+        "base/memory",
+        "usage",
+    ),
+    "xxhash": (
+        "base/hashing",
+        "record",
+    ),
+    "filelock": (
+        "array/lock",
+        "folderlock",
+    ),
+    "pvlib": (
+        "scene/paths/sun",
+        "sun",
+    ),
+    "distributed": (
+        "render/parts/",
+        "parts/",
+    ),
 }
 # What takes long to import, or may be absent: `framearray --help` does without.
 HEAVY = (
@@ -99,92 +136,108 @@ HEAVY = (
     "distributed",
 )
 
-FILES = {path.relative_to(PACKAGE).with_suffix("").as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}
+
+def rooms_table() -> dict[str, tuple[str, set[str]]]:
+    """Read the table of rooms in the contributors' page: room -> purpose, rooms that it may import."""
+    rows = re.findall(r"^\| `(\w+)/` \| (.+?) \| (.+?) \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+    every = {name for name, _, _ in rows}
+    return {
+        name: (purpose, every - {name} if may == "all" else every & set(re.findall(r"\w+", may)))
+        for name, purpose, may in rows
+    }
 
 
-@cache
-def tree_of(name: str) -> ast.Module:
-    return ast.parse(FILES[name].read_text(encoding="utf-8"))
+ROOMS = rooms_table()
+ALLOWED = {name: may for name, (_, may) in ROOMS.items()}
 
 
-def imported(name: str) -> set[str]:
-    """Files of the package that a file imports, wherever in it."""
-    found = set()
-    for node in ast.walk(tree_of(name)):
-        if not (isinstance(node, ast.ImportFrom) and node.level):
-            continue
-        folder = Path(name).parent
-        for _ in range(node.level - 1):
-            folder = folder.parent
-        inside = folder / (node.module or "").replace(".", "/")
-        for target in [inside] if node.module else [inside / alias.name for alias in node.names]:
-            names = (target.as_posix(), (target / "__init__").as_posix(), (target.parent / "__init__").as_posix())
-            found.add(next(name for name in names if name in FILES))
-    return found - {name}
+def test_the_table_gives_an_order() -> None:
+    """Each room imports rooms above it; what it names exists."""
+    above: set[str] = set()
+    for name, may in ALLOWED.items():
+        assert may <= above
+        above.add(name)
 
 
-@cache
-def libraries(name: str) -> set[str]:
-    """Libraries that a file imports, wherever in it."""
-    found = set()
-    for node in ast.walk(tree_of(name)):
-        if isinstance(node, ast.Import):
-            found |= {alias.name.split(".")[0] for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
-            found.add(node.module.split(".")[0])
-    return found
+@pytest.mark.parametrize("name", ROOMS)
+def test_a_room_says_its_purpose_as_the_table_does(name: str) -> None:
+    if f"{name}/__init__" not in FILES or name == "report":  # rooms are moved into one after the other
+        return
+    said = ast.get_docstring(TREES[f"{name}/__init__"]) or ""
+    assert said.splitlines()[0] == f"{ROOMS[name][0]}."
 
 
-def test_every_file_has_its_place() -> None:
-    assert len(set(ORDER)) == len(ORDER)
-    assert FILES.keys() <= set(ORDER), "name new files in FLOW, where their data flows"
+def test_rooms_import_what_the_table_allows() -> None:
+    assert against_the_table(GRAPH, ALLOWED) == []
 
 
-@pytest.mark.parametrize("name", [name for name in ORDER if name in FILES])
-def test_a_file_imports_only_from_those_before_it(name: str) -> None:
-    before = set(ORDER[: ORDER.index(name)])
-    assert imported(name) <= before
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    assert circle(GRAPH) == []
 
 
-def test_the_package_does_not_import_itself_by_name() -> None:
-    assert not [name for name in FILES if "framearray_cli" in libraries(name)]
+def test_an_import_against_the_table_is_seen(tmp_path: Path) -> None:
+    """The test of rooms can fail: one more import, in whatever form, inside a function too."""
+    for text in (
+        "from framearray_cli.render.render import render\n",
+        "from ..render import render\n",
+        "import framearray_cli.render.render\n",
+        "def later() -> None:\n    from framearray_cli.render import render\n",
+    ):
+        package = tmp_path / "framearray_cli"
+        for module in ("__init__", "engine/__init__", "engine/loop", "render/__init__", "render/render"):
+            (package / module).parent.mkdir(parents=True, exist_ok=True)
+            down = "from framearray_cli.engine import loop\n" if module == "render/render" else ""
+            (package / f"{module}.py").write_text(down)
+        assert against_the_table(import_graph(package), ALLOWED) == []
+        assert circle(import_graph(package)) == []
+        (package / "engine" / "loop.py").write_text(text)
+        assert against_the_table(import_graph(package), ALLOWED) == ["engine/loop imports render/render"]
+
+
+def test_a_circle_inside_a_room_is_seen(tmp_path: Path) -> None:
+    package = tmp_path / "framearray_cli"
+    (package / "engine").mkdir(parents=True)
+    for name, text in {"a": "from .b import x\n", "b": "from . import c\n", "c": "", "__init__": ""}.items():
+        (package / "engine" / f"{name}.py").write_text(text)
+    assert circle(import_graph(package)) == []
+    (package / "engine" / "c.py").write_text("from framearray_cli.engine.a import y\n")
+    assert circle(import_graph(package)) == ["engine/a", "engine/b", "engine/c", "engine/a"]
 
 
 @pytest.mark.parametrize("library", DOORS)
 def test_each_library_has_one_door(library: str) -> None:
-    users = [name for name in FILES if library in libraries(name)]
-    strangers = [name for name in users if not name.startswith(DOORS[library])]
-    assert users or library == "av"
-    assert not strangers
-
-
-def test_imports_are_seen() -> None:
-    """The tests above can fail: what they look for is there to be found."""
-    assert {"window", "loop", "writer", "terms/ambient"} <= imported("render")
-    assert "errors" in imported("meshes/gltf_nodes") and "surface" in imported("embree/masks")
-    assert {"embreex", "ctypes"} <= libraries("embree/native")
+    users = [module for module, file in FILES.items() if library in libraries(file)]
+    assert users
+    assert [module for module in users if not module.startswith(DOORS[library])] == []
 
 
 def test_hot_loops_are_compiled_by_the_decorators_of_kernel() -> None:
     """numba's own decorators stand where a function allocates, or is called by Embree, and nowhere else."""
     own = {}
-    for name in FILES:
-        for node in ast.walk(tree_of(name)):
+    for module, tree in TREES.items():
+        for node in ast.walk(tree):
             if isinstance(node, ast.FunctionDef):
                 texts = [ast.unparse(decorator) for decorator in node.decorator_list]
                 if any(text.startswith(("nb.", "numba.", "njit")) for text in texts):
-                    own[f"{name}.{node.name}"] = texts
-    assert set(own) <= {"eyehits.pixel_order", "embree/masks._surfaces_at", "embree/masks.filter_masked"}
+                    own[f"{module}.{node.name}"] = texts
+    assert set(own) <= {
+        "engine/hits/native.pixel_order",
+        "eyehits.pixel_order",
+        "embree/masks._surfaces_at",
+        "embree/masks.filter_masked",
+        "engine/embree/masks._surfaces_at",
+        "engine/embree/masks.filter_masked",
+    }
 
 
 @pytest.mark.parametrize("name", ["kernel", "inlined"])
 def test_kernels_say_what_they_do(name: str) -> None:
     """Each has a docstring, or is a private step of a few lines."""
-    for file in FILES:
-        for node in ast.walk(tree_of(file)):
+    for module, tree in TREES.items():
+        for node in ast.walk(tree):
             if isinstance(node, ast.FunctionDef) and name in [ast.unparse(d) for d in node.decorator_list]:
                 short = node.name.startswith("_") and len(node.body) <= 6
-                assert ast.get_docstring(node) or short, f"{file}.{node.name}"
+                assert ast.get_docstring(node) or short, f"{module}.{node.name}"
 
 
 def test_help_imports_nothing_heavy() -> None:

@@ -1,0 +1,85 @@
+"""Who imports whom in a package, read from its source files: the graph that tests of the layout judge."""
+
+import ast
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TypeAlias
+
+Graph: TypeAlias = Mapping[str, set[str]]  # module -> modules of the package that it imports; "engine/loop"
+
+
+def modules(package: Path) -> dict[str, Path]:
+    """Find every module of a package: its path without the ending, relative to the package -> its file."""
+    return {file.relative_to(package).with_suffix("").as_posix(): file for file in sorted(package.rglob("*.py"))}
+
+
+def import_graph(package: Path) -> Graph:
+    """Read all imports between modules of a package, those inside functions too."""
+    files = modules(package)
+    return {name: set(_imported(package.name, name, files)) - {name} for name in files}
+
+
+def _imported(package: str, name: str, files: Mapping[str, Path]) -> Iterator[str]:
+    """Each module that one module imports; a name that a package exports counts as that package's `__init__`."""
+    for node in ast.walk(ast.parse(files[name].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            targets = [alias.name.split(".") for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            start = [package, *name.split("/")[:-1]]
+            base = start[: len(start) + 1 - node.level] if node.level else []
+            base += node.module.split(".") if node.module else []
+            targets = [[*base, alias.name] for alias in node.names]
+        else:
+            continue
+        for target in targets:
+            if target[0] != package:
+                continue
+            inside, outside = "/".join(target[1:]), "/".join(target[1:-1])
+            places = (inside, f"{inside}/__init__".lstrip("/"), outside, f"{outside}/__init__".lstrip("/"))
+            yield next(place for place in places if place in files)
+
+
+def libraries(file: Path) -> set[str]:
+    """Find the libraries that a file imports, wherever in it."""
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
+            found.add(node.module.split(".")[0])
+    return found
+
+
+def room(module: str) -> str:
+    """Name the room that a module stands in; the package's own files are in none: ""."""
+    return module.split("/")[0] if "/" in module else ""
+
+
+def against_the_table(graph: Graph, table: Mapping[str, set[str]]) -> list[str]:
+    """List the imports between rooms that a table does not allow.
+
+    Args:
+        table: room -> rooms that it may import. Files outside all rooms may import all, and be imported by all.
+    """
+    return [
+        f"{module} imports {other}"
+        for module, others in graph.items()
+        for other in sorted(others)
+        if room(module) in table and room(other) in table.keys() - {room(module), *table[room(module)]}
+    ]
+
+
+def circle(graph: Graph) -> list[str]:
+    """Find modules that import each other in a circle, in turn; none: []."""
+    done: set[str] = set()
+
+    def follow(path: list[str]) -> list[str]:
+        for other in sorted(graph.get(path[-1], ())):
+            if other in path:
+                return [*path[path.index(other) :], other]
+            if other not in done and (found := follow([*path, other])):
+                return found
+        done.add(path[-1])
+        return []
+
+    return next((found for module in graph if module not in done and (found := follow([module]))), [])
