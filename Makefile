@@ -60,7 +60,7 @@ check: $(VENV)/installed-dev ## Check format, style and types
 	$(BIN)/mypy
 
 docs: $(VENV)/installed-dev ## Write the generated pages of docs/
-	$(BIN)/python -m framearray_cli.jobdocs docs/guide/
+	$(BIN)/python -m framearray_cli.job.docs docs/guide/
 
 bench: $(VENV)/installed-bench ## Measure what an image costs, and write docs/measured/speed.md
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)

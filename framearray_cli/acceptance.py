@@ -4,17 +4,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Float64, Int32, with_room
+from framearray_cli.base.arrays import Float64, Int32, with_room
+from framearray_cli.embree import EmbreeScene
+from framearray_cli.lanes import LANES
+from framearray_cli.terms.direct import direct
+
 from .camera import Cameras
-from .embree import EmbreeScene
 from .eyehits import Samples, native_hits, pixel_order
 from .hits import SURFACE, Hits, World, empty_hits
-from .lanes import LANES
 from .lights import some_lights
 from .prepare import Prepared, eye_cameras
 from .rays import Rays, room_for_hits, room_for_tests
 from .reuse import outer_hits
-from .terms.direct import direct
 
 # Frames of the path that are looked at, native hits of each, and light positions that shadow rays are counted for.
 PROBE_FRAMES, PROBE_HITS, PROBE_LIGHTS = 16, 512, 32

@@ -6,10 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from .arrays import Addresses, Float32, Float64, Int32, Real
+from framearray_cli.base.arrays import Addresses, Float32, Float64, Int32, Real
+from framearray_cli.lanes import LANES, lane_numbers, lanes_from, load, reals, store
+
 from .compose import INVERSE_PI, MOST, Band, Finish, Stored, finish
 from .kernel import inlined, integer_at, kernel, prefetch, real_at
-from .lanes import LANES, lane_numbers, lanes_from, load, reals, store
 from .work import BY_SAMPLE, HALF, INDIRECT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, HitRecords, Placed, lit_bit
 
 # Columns of a list of sources: addresses of arrays, 0 for one that is empty; and what these hold.

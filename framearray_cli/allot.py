@@ -15,8 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from framearray_cli.base.arrays import Float64, Int32
+
 from .allotment import Blocks
-from .arrays import Float64, Int32
 from .expected import EVENNESS, independent_hits
 
 # The fewest hits a pixel of a frame: below, most pixels would rest on hits of frames far away.

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Float32, Float64, Int32
+from framearray_cli.base.arrays import Float32, Float64, Int32
 
 # Edge of a block in pixels, and the most blocks of a frame: in larger frames blocks are larger.
 EDGE, MOST_BLOCKS = 8, 4096

@@ -9,12 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from framearray_cli.base.forms.table import changed
+from framearray_cli.embree import EmbreeScene
+from framearray_cli.job.job import Job
+from framearray_cli.job.method import DEFAULT_HITS, DEFAULT_N_R
+from framearray_cli.job.values import MOST_HITS, SHARES
+
 from .acceptance import probe
-from .embree import EmbreeScene
 from .expected import Model, Reuse, independent_hits
-from .job import Job
-from .jobmethod import DEFAULT_HITS, DEFAULT_N_R
-from .jobvalues import MOST_HITS, SHARES, changed
 from .memory import light_blocks, require_memory
 from .prepare import Prepared
 

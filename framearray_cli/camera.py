@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Directions, Float64, Points, Real, Triple
+from framearray_cli.base.arrays import Directions, Float64, Points, Real, Triple
+from framearray_cli.lanes import doubles, floor, integers, reals, select
+
 from .kernel import inlined
-from .lanes import doubles, floor, integers, reals, select
 from .paths import Eyes
 
 OUTSIDE = -1  # the "pixel" of a point that an eye does not see

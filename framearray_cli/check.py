@@ -8,23 +8,19 @@ from pathlib import Path
 
 import numpy as np
 
+from framearray_cli.base.memory import free_memory, resident_memory
+from framearray_cli.job.job import Job
+from framearray_cli.terms.ambient import Ambient
+
 from .auto import AutoSettings, require_least_memory, resolve_auto
 from .compiling import compile_clock
 from .crew import TracePool
 from .identity import identity_of
-from .job import Job
 from .loop import ready_frames
-from .memory import (
-    ambient_memory,
-    light_blocks,
-    mirror_share,
-    window_memory,
-)
+from .memory import ambient_memory, light_blocks, mirror_share, window_memory
 from .outfolder import Identity, differences, free_space, in_the_way, read_array
 from .prepare import Prepared, composed_with, open_embree, plan_work, prepare
 from .target import Target, allot_hits
-from .terms.ambient import Ambient
-from .usage import free_memory, resident_memory
 from .window import Window
 from .work import FrameSetup
 from .writer import ArrayWriter, array_target

@@ -12,9 +12,10 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Addresses, Float32, Images, Int32, Real, Rgb, with_room
+from framearray_cli.base.arrays import Addresses, Float32, Images, Int32, Real, Rgb, with_room
+from framearray_cli.lanes import LANES, compress, gather, lane_numbers, store, stored
+
 from .kernel import kernel
-from .lanes import LANES, compress, gather, lane_numbers, store, stored
 from .work import INDIRECT, LIGHT_INDEPENDENT
 
 # Images as they are stored: float32, or the bits of halves; (n_lights, n_pixels, 3).

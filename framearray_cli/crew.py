@@ -8,10 +8,11 @@ from typing import Any, Self
 
 import numpy as np
 
-from .arrays import reshaped, with_room
+from framearray_cli.base.arrays import reshaped, with_room
+from framearray_cli.terms.direct_steps import room_for_steps
+
 from .hits import empty_hits
 from .rays import room_for_hits, room_for_tests
-from .terms.direct_steps import room_for_steps
 from .work import FrameSetup
 
 # Hits of a batch: large enough that calls and changes of threads cost nothing, small enough that a frame has several

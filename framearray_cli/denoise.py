@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Float32
-from .extras import extra
+from framearray_cli.base.arrays import Float32
+from framearray_cli.base.extras import extra
 
 
 def require_denoiser() -> Any:

@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from framearray_cli.base.arrays import Float64
+from framearray_cli.terms.ambient import Ambient
+
 from . import __version__
-from .arrays import Float64
 from .auto import AutoSettings
 from .manifest import BACKGROUND, Manifest, ManifestCamera, ManifestGroup, ManifestLight, matrix_rows
 from .outfolder import Identity
@@ -15,7 +17,6 @@ from .planes import Plane
 from .prepare import Prepared
 from .stored import AMBIENT, ArrayNames, array_names
 from .target import Target
-from .terms.ambient import Ambient
 
 _KEYS = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
 

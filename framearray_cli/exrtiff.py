@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Float32
-from .errors import OutputError
-from .extras import extra
-from .files import refusal, whole_file
+from framearray_cli.base.arrays import Float32
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.extras import extra
+from framearray_cli.base.files import refusal, whole_file
+
 from .imageattributes import FIXED_DATE, Attribute, Attributes
 from .pngjpeg import check_size
 

@@ -5,12 +5,13 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from .arrays import Float32, Int32, Real
+from framearray_cli.base.arrays import Float32, Int32, Real
+from framearray_cli.embree.packets import DIRECTION, ORIGIN, TFAR, intersect
+from framearray_cli.lanes import LANES, doubles, floor, gather, integers, lane_numbers, put_triples, select, store
+
 from .camera import Cameras, corner_of, eye_ray
-from .embree.packets import DIRECTION, ORIGIN, TFAR, intersect
 from .hits import Hits, World, decode_hits, record_hits
 from .kernel import inlined, keep_on_disk, kernel
-from .lanes import LANES, doubles, floor, gather, integers, lane_numbers, put_triples, select, store
 from .sampling import OTHER_HALF, PIXEL, PIXEL_SAMPLE, r2, stream, word
 from .surface import specular_at
 

@@ -5,7 +5,7 @@ import string
 from collections.abc import Mapping
 from pathlib import PurePosixPath
 
-from .jobvalues import shown
+from framearray_cli.base.forms.words import shown
 
 _FIELD = re.compile(r"\{[^{}]*\}")  # one field with its format, whose colon is no part of a name
 

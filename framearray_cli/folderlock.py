@@ -10,8 +10,9 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from .errors import BusyError, OutputError
-from .files import make_folder, reason
+from framearray_cli.base.errors import BusyError, OutputError
+from framearray_cli.base.files import make_folder, reason
+
 from .ranges import parse_frames
 from .record import FOLDER, MOST, record_file
 

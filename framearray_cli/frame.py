@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Float32, Int32
+from framearray_cli.base.arrays import Float32, Int32
+
 from .camera import Cameras
 from .crew import ArrayPool, Scratch, TracePool
 from .eyehits import Samples, extra_hits, native_hits

@@ -7,36 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Bytes, Directions, Float32, Int32, Keys, Points, Real, Rgb, Triple
-from .embree.packets import (
-    DIRECTION,
-    GEOMETRY,
-    TRIANGLE,
-    Tracer,
-    U,
-    V,
-    scene_triangle,
-)
+from framearray_cli.base.arrays import Bytes, Directions, Float32, Int32, Keys, Points, Real, Rgb, Triple
+from framearray_cli.embree.packets import DIRECTION, GEOMETRY, TRIANGLE, Tracer, U, V, scene_triangle
+from framearray_cli.lanes import LANES, gather, lane_numbers, load, put_triples, select, sqrt, store, triples_at
+
 from .kernel import inlined, kernel
-from .lanes import (
-    LANES,
-    gather,
-    lane_numbers,
-    load,
-    put_triples,
-    select,
-    sqrt,
-    store,
-    triples_at,
-)
-from .surface import (
-    Surfaces,
-    geometric_normal,
-    position_at,
-    reflectivity_at,
-    shading_normal,
-    specular_at,
-)
+from .surface import Surfaces, geometric_normal, position_at, reflectivity_at, shading_normal, specular_at
 
 ESCAPED, SURFACE = 0, 1
 

@@ -4,8 +4,9 @@ import json
 
 import numpy as np
 
-from .fingerprint import fingerprint
-from .jobfile import job_table
+from framearray_cli.base.hashing import fingerprint
+from framearray_cli.job.read import job_table
+
 from .manifestfile import plain
 from .outfolder import Identity
 from .prepare import Prepared

@@ -10,8 +10,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from .arrays import Float64
-from .units import frame_rate
+from framearray_cli.base.arrays import Float64
+from framearray_cli.base.units import frame_rate
 
 # A (4, 4) array is a matrix that acts on columns; three floats are a point or a colour; a Fraction is a rational.
 Attribute: TypeAlias = str | int | float | Fraction | tuple[float, float, float] | Float64

@@ -3,9 +3,10 @@
 import os
 from pathlib import Path
 
-from .errors import OutputError
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import require_file
+
 from .exrtiff import last_row
-from .files import require_file
 from .images import format_name, read_image
 from .pngjpeg import opened_picture
 

@@ -13,11 +13,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Bytes, Float32, Image
-from .colour import linear_from_srgb8, srgb8_from_linear
-from .errors import MissingExtraError, OutputError
+from framearray_cli.base.arrays import Bytes, Float32, Image
+from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
+from framearray_cli.base.errors import MissingExtraError, OutputError
+from framearray_cli.base.files import write_bytes
+
 from .exrtiff import OIIO_NAMES, oiio, read_pixels, spec_of, write_pixels
-from .files import write_bytes
 from .imageattributes import Attributes
 from .pngjpeg import can_encode, encode_jpeg, encode_png, read_codes
 

@@ -6,23 +6,15 @@ import threading
 from contextlib import suppress
 from types import FrameType
 
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.signals import Stopped
+
 from .compiling import is_compiling
-from .errors import OutputError
 from .screen import err, out, say
 
 PATIENCE = 1.0  # seconds that threads get to end by themselves after a signal
 # Callbacks from C and optional imports, in which every exception is caught.
 FORGETFUL = ("numba", "llvmlite", "importlib", "_frozen_importlib", "_frozen_importlib_external")
-
-
-class Stopped(BaseException):
-    """A signal asked the program to end, as Ctrl-C does."""
-
-    def __init__(self, signum: int) -> None:
-        super().__init__(signum)
-        # what shells expect of a program that a signal ended
-        self.exit_code = 128 + signum
-        self.word = "interrupted" if signum == signal.SIGINT else "terminated"
 
 
 def listen() -> None:
@@ -31,23 +23,6 @@ def listen() -> None:
         number = getattr(signal, name, None)  # Windows lacks the last
         if number is not None and (name != "SIGHUP" or signal.getsignal(number) != signal.SIG_IGN):
             signal.signal(number, stop)
-
-
-def stopped_by(error: BaseException | None) -> Stopped | None:
-    """The signal that an exception goes back to, if any.
-
-    Python's own locks may fail when a signal interrupts them at the wrong moment ("cannot release un-acquired lock");
-    the error that they raise then comes while `Stopped` is handled.
-    """
-    while error is not None and not isinstance(error, Stopped):
-        error = error.__context__
-    return error
-
-
-def forget() -> None:
-    """Raise no `Stopped` again for a signal that was heard."""
-    if hasattr(signal, "setitimer"):
-        signal.setitimer(signal.ITIMER_REAL, 0)
 
 
 def stop(signum: int, frame: FrameType | None) -> None:

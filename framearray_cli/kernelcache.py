@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from .files import reason
+from framearray_cli.base.files import reason
 
 # Folders of earlier states of the source to keep: enough to switch between a few branches.
 KEPT = 3

@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .arrays import Float32, Float64, Int32, with_room
+from framearray_cli.base.arrays import Float32, Float64, Int32, with_room
+
 from .paths import Lights
 
 POINT, DIRECTIONAL = 0, 1

@@ -3,9 +3,10 @@
 from collections import deque
 from collections.abc import Iterator, Sequence
 
+from framearray_cli.terms.ambient import Ambient
+
 from .crew import TracePool
 from .frame import find_frame
-from .terms.ambient import Ambient
 from .window import Window
 from .work import FrameSetup
 

@@ -10,11 +10,12 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from .arrays import Float64, is_number
-from .errors import OutputError
+from framearray_cli.base.arrays import Float64, is_number
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.forms.words import shown
+from framearray_cli.base.units import LEAST_FPS, MOST_FPS
+
 from .filepatterns import check_pattern, file_name
-from .jobvalues import shown
-from .units import LEAST_FPS, MOST_FPS
 
 FILE_NAME = "manifest.toml"
 BACKGROUND = "background"  # stands beside the groups: what comes from outside the scene

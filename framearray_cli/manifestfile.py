@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from .errors import OutputError
-from .files import reason, require_file, write_bytes
-from .jobvalues import long_key, shown
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import reason, require_file, write_bytes
+from framearray_cli.base.forms.text import inline, numbers
+from framearray_cli.base.forms.words import long_key, shown
+
 from .manifest import FILE_NAME, Manifest, ManifestCamera, ManifestGroup, ManifestLight
-from .tomltext import inline, numbers
 
 # Of the manifest itself; a program that knows format 1 may not understand 2, which has groups of sources.
 FORMAT, FORMAT_OF_GROUPS = 1, 2

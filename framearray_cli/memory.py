@@ -2,17 +2,18 @@
 
 import numpy as np
 
-from .arrays import Float64
-from .errors import JobError
+from framearray_cli.base.arrays import Float64
+from framearray_cli.base.errors import JobError
+from framearray_cli.base.memory import free_memory, resident_memory
+from framearray_cli.base.units import gibibytes
+from framearray_cli.lanes import LANES
+from framearray_cli.terms.ambient import BATCH
+
 from .eyehits import pilot_hits
 from .hits import empty_hits
-from .lanes import LANES
 from .plan import flag_mirrors, frame_hits
 from .prepare import Prepared
 from .rays import room_for_hits
-from .terms.ambient import BATCH
-from .units import gibibytes
-from .usage import free_memory, resident_memory
 from .work import FrameSetup
 from .writer import BLOCKS, image_format
 

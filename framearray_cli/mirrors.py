@@ -4,13 +4,14 @@ from time import perf_counter
 
 import numpy as np
 
-from .arrays import Int32
+from framearray_cli.base.arrays import Int32
+from framearray_cli.terms.specular import count_mirrors, reflect
+
 from .crew import Scratch, TracePool
 from .eyehits import Samples, extra_hits, pilot_hits
 from .hits import Hits
 from .plan import Pass, flag_mirrors, halves_of
 from .shading import estimate_terms
-from .terms.specular import count_mirrors, reflect
 from .work import FrameSetup, HitRecords, empty_records
 
 

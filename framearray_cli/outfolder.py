@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import make_folder, reason
+from framearray_cli.base.forms.schema import dotted
+
 from . import __version__
-from .errors import OutputError
-from .files import make_folder, reason
-from .jobschema import dotted
 from .manifest import FILE_NAME, Manifest, array_files
 from .manifestfile import read_manifest
 from .record import FOLDER, record_files

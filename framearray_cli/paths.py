@@ -11,10 +11,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from .arrays import Float64, WorldPoints
-from .errors import JobError
-from .job import Job
-from .jobkeys import CameraKey, DirectionalKey, PointKey, SunSource
+from framearray_cli.base.arrays import Float64, WorldPoints
+from framearray_cli.base.errors import JobError
+from framearray_cli.job.camera import CameraKey
+from framearray_cli.job.job import Job
+from framearray_cli.job.light import DirectionalKey, PointKey, SunSource
+
 from .planes import Plane, pictures, planes_of_groups
 from .sphere import directions_between, unit
 from .sun import NEVER, daylight, sun_between, to_sun

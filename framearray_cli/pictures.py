@@ -16,8 +16,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from .arrays import Image
-from .errors import OutputError
+from framearray_cli.base.arrays import Image
+from framearray_cli.base.errors import OutputError
+
 from .filepatterns import file_name
 from .images import read_image
 from .manifest import BACKGROUND, Manifest, ManifestGroup, ManifestLight, Vector, image_path

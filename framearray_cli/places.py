@@ -8,10 +8,11 @@ from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import TypeAlias
 
-from .errors import JobError
-from .jobvalues import shown
+from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.words import shown
+from framearray_cli.movie.places import nearest, position_of, read_place
+
 from .manifest import MAIN_AXIS, Manifest
-from .movie.places import nearest, position_of, read_place
 
 LightPlace: TypeAlias = tuple[int, ...]
 

@@ -12,7 +12,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from .arrays import Bytes, Float64, Int32
+from framearray_cli.base.arrays import Bytes, Float64, Int32
+
 from .hits import Hits
 from .kernel import kernel
 

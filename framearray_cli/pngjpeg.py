@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Bytes
-from .errors import OutputError
-from .files import reason, require_file
+from framearray_cli.base.arrays import Bytes
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import reason, require_file
+
 from .imageattributes import Attributes
 
 MOST_PIXELS = 16384**2  # of an image; the largest that a job may have

@@ -4,26 +4,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .arrays import Float32
+from framearray_cli.base.arrays import Float32
+from framearray_cli.base.memory import available_cores, resident_memory
+from framearray_cli.embree import EmbreeScene, Engine
+from framearray_cli.job.job import Job
+from framearray_cli.terms.ambient import Ambient
+from framearray_cli.terms.ambient_eye import EyeWalks, ambient_by_eye, fixed_ambient
+from framearray_cli.terms.ambient_fit import ObscuranceCurve, ambient_by_fit
+from framearray_cli.terms.ambient_light import LightWalks, ambient_by_light
+from framearray_cli.terms.obscurance import FALLOFFS, ObscuranceSettings
+
 from .camera import Cameras, cameras
 from .denoise import require_denoiser
-from .embree import EmbreeScene, Engine
 from .hits import World
-from .job import Job
 from .lights import LightArrays, light_arrays
-from .limits import available_cores
 from .paths import Eyes, Lights, eyes, lights
 from .plan import frame_hits, turns
 from .planes import Plane
 from .sampling import lattice_steps
 from .scene import Scene, load_scene
 from .surface import Surfaces, nearest, surfaces
-from .terms.ambient import Ambient
-from .terms.ambient_eye import EyeWalks, ambient_by_eye, fixed_ambient
-from .terms.ambient_fit import ObscuranceCurve, ambient_by_fit
-from .terms.ambient_light import LightWalks, ambient_by_light
-from .terms.obscurance import FALLOFFS, ObscuranceSettings
-from .usage import resident_memory
 from .work import BY_SAMPLE, FrameSetup
 
 # Native hits of a pixel of a frame from which on they are sampled in two halves.

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from framearray_cli.terms.ambient import Ambient
+
     from .auto import AutoSettings
     from .prepare import Prepared
     from .resume import OnDisk
     from .target import Target
-    from .terms.ambient import Ambient
 
 
 class RenderEvents:

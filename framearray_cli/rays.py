@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Float32, Int32
-from .embree.packets import HIT_ROWS, RAY_ROWS, empty_packets
-from .lanes import LANES
+from framearray_cli.base.arrays import Float32, Int32
+from framearray_cli.embree.packets import HIT_ROWS, RAY_ROWS, empty_packets
+from framearray_cli.lanes import LANES
 
 
 class Rays(NamedTuple):

@@ -18,9 +18,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from .arrays import is_number
-from .errors import OutputError
-from .files import make_folder, reason, require_file
+from framearray_cli.base.arrays import is_number
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import make_folder, reason, require_file
+from framearray_cli.base.hashing import digest
 
 FOLDER = "records"
 MOST = 10**6  # cameras, and light positions of all groups: more than any job has
@@ -75,23 +76,6 @@ class ArrayRecords:
     def checksums(self) -> dict[str, tuple[int, str]]:
         """Size and checksum of every file that was finished."""
         return {name: known for entry in self.entries for name, known in entry.files.items()}
-
-
-def digest(path: Path) -> tuple[int, str]:
-    """Size and checksum of a file: XXH3, 128 bits, which notices damage and is as fast as memory.
-
-    Raises:
-        OSError: it cannot be read.
-    """
-    import xxhash
-
-    with path.open("rb") as file:
-        total = xxhash.xxh3_128()
-        size = 0
-        while block := file.read(1 << 22):
-            total.update(block)
-            size += len(block)
-    return size, total.hexdigest()
 
 
 class RecordWriter:

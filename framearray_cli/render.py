@@ -9,12 +9,14 @@ from threading import Lock
 
 import numpy as np
 
+from framearray_cli.base.errors import OutputError
+from framearray_cli.embree import Engine
+from framearray_cli.job.job import Job
+from framearray_cli.terms.ambient import Ambient
+
 from .crew import TracePool
 from .describe import describe
-from .embree import Engine
-from .errors import OutputError
 from .images import require_writer
-from .job import Job
 from .loop import ready_frames
 from .manifest import Manifest
 from .manifestfile import write_manifest
@@ -26,7 +28,6 @@ from .resume import OnDisk
 from .session import RenderSession, nothing_to_do, open_session
 from .summary import Summary, summarize, with_summary
 from .target import allot_hits
-from .terms.ambient import Ambient
 from .window import Window
 from .work import FrameSetup
 from .writer import ArrayWriter, FinishedFiles, array_target

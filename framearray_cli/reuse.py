@@ -14,12 +14,24 @@ p_j / sum of n_k p_k over the eyes k of the window of j (balance heuristic, [Vea
 
 import numpy as np
 
-from .arrays import Float32, Float64, Int32, Real
+from framearray_cli.base.arrays import Float32, Float64, Int32, Real
+from framearray_cli.embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, is_blocked, occlude
+from framearray_cli.lanes import (
+    LANES,
+    compress,
+    doubles,
+    gather,
+    lane_numbers,
+    load,
+    popcount,
+    select,
+    store,
+    triples_at,
+)
+
 from .camera import OUTSIDE, Cameras, project
-from .embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, is_blocked, occlude
 from .hits import SURFACE, Hits, triple
 from .kernel import inlined, kernel
-from .lanes import LANES, compress, doubles, gather, lane_numbers, load, popcount, select, store, triples_at
 from .rays import Rays
 
 # Visibility rays end this many times as far before an eye as it sees from: their directions are rounded, and an eye

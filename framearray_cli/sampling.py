@@ -10,9 +10,10 @@ import math
 
 import numpy as np
 
-from .arrays import Real, Triple
+from framearray_cli.base.arrays import Real, Triple
+from framearray_cli.lanes import integers, reals, select, sqrt, words
+
 from .kernel import inlined
-from .lanes import integers, reals, select, sqrt, words
 
 # Dimensions: one stream a purpose.
 PIXEL, HEMISPHERE, CHOICE, STEPS, OTHER_HALF = 0, 1, 2, 3, 4

@@ -13,10 +13,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColum
 from rich.status import Status
 from rich.text import Text
 
-from .errors import OutputError
-from .files import reason
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import reason
+from framearray_cli.base.units import duration
+
 from .kernelcache import problem
-from .units import duration
 
 out, err = Console(), Console(stderr=True)
 

@@ -5,11 +5,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
+from framearray_cli.embree import EmbreeScene, Engine
+from framearray_cli.job.job import Job
+
 from .auto import AutoSettings, require_least_memory, resolve_auto
-from .embree import EmbreeScene, Engine
 from .folderlock import ArrayFolder
 from .identity import identity_of
-from .job import Job
 from .kernel import processor
 from .manifestfile import read_manifest, write_manifest
 from .outfolder import Identity, check_folder, claim_folder

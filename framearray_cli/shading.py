@@ -4,14 +4,15 @@ from time import perf_counter
 
 import numpy as np
 
-from .arrays import Float32, Rgb
+from framearray_cli.base.arrays import Float32, Rgb
+from framearray_cli.lanes import LANES, bits, load
+from framearray_cli.terms.direct import direct
+from framearray_cli.terms.direct_steps import direct_by_steps
+from framearray_cli.terms.obscurance import obscurance
+
 from .crew import Scratch
 from .hits import ESCAPED, Hits
 from .kernel import inlined, kernel
-from .lanes import LANES, bits, load
-from .terms.direct import direct
-from .terms.direct_steps import direct_by_steps
-from .terms.obscurance import obscurance
 from .work import (
     HALF,
     INDIRECT,

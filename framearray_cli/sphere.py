@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .arrays import Float64
+from framearray_cli.base.arrays import Float64
 
 
 def unit(vectors: Float64) -> Float64:

@@ -17,7 +17,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .arrays import Flags, Float32, Float64, Int32
+from framearray_cli.base.arrays import Flags, Float32, Float64, Int32
 
 RADIUS = 2  # of the neighbourhood, pixels: 25 values tell a standard error to 14 %
 

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from framearray_cli.job.job import Job
+
 from .filepatterns import camera_pattern, file_name, file_patterns
-from .job import Job
 from .manifest import BACKGROUND
 from .paths import Lights
 from .planes import Plane

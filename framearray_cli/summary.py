@@ -5,13 +5,14 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Any
 
+from framearray_cli.base.memory import peak_memory
+
 from .kernel import processor
 from .manifest import Manifest
 from .paths import Lights
 from .prepare import Prepared
 from .record import ArrayRecords
 from .standarderror import summed_up
-from .usage import peak_memory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Float64
-from .extras import extra
-from .jobtimes import moment, zone_of
+from framearray_cli.base.arrays import Float64
+from framearray_cli.base.extras import extra
+from framearray_cli.job.times import moment, zone_of
 
 PRESSURE_HPA, TEMPERATURE_C = 1013.25, 12.0  # of the air that bends the light, standard at sea level; pvlib's defaults
 REFRACTION_DEG = 0.5667  # at the horizon, pvlib's default

@@ -9,10 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Bytes, Corners, CornerUvs, Float32, Int32, Real, Rgb, Triple
-from .colour import linear_from_srgb8
+from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Int32, Real, Rgb, Triple
+from framearray_cli.base.colour import linear_from_srgb8
+from framearray_cli.lanes import doubles, floor, gather, integers, popcount, reals, select, sqrt
+
 from .kernel import inlined
-from .lanes import doubles, floor, gather, integers, popcount, reals, select, sqrt
 from .scene import Scene
 
 # Ray offsets: 16 units in the last place of the largest coordinate of the triangle. Of the rules tried it alone had

@@ -9,17 +9,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from framearray_cli.base.arrays import Float32, Float64, Int32
+from framearray_cli.lanes import LANES
+from framearray_cli.terms.ambient import Ambient
+
 from .acceptance import MOST_DENSE, spread_in_shares
 from .allot import FEWEST, Witnesses, allot
 from .allotment import Allotment, Blocks, blocks_of
-from .arrays import Float32, Float64, Int32
 from .crew import Scratch, TracePool
 from .eyehits import Samples, native_hits
-from .lanes import LANES
 from .prepare import Prepared
 from .reuse import outer_hits
 from .shading import estimate_terms
-from .terms.ambient import Ambient
 from .work import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY, FrameSetup, HitRecords, empty_records
 
 # Added to the job's seed for the pilot; no job's seed is as large.

@@ -6,7 +6,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from .errors import OutputError
+from framearray_cli.base.errors import OutputError
+
 from .images import read_image, read_layers
 from .manifest import Manifest, array_files
 from .manifestfile import read_manifest

@@ -14,6 +14,9 @@ from time import perf_counter
 
 import numpy as np
 
+from framearray_cli.base.arrays import Float32, Images, Int32, Rgb
+from framearray_cli.terms.ambient import Ambient
+
 from .accumulate import (
     HitSource,
     Pixels,
@@ -24,14 +27,12 @@ from .accumulate import (
     compose_pixels,
     weigh_halves,
 )
-from .arrays import Float32, Images, Int32, Rgb
 from .compose import Band, Finish, as_stored, empty_band
 from .crew import Scratch, TracePool
 from .denoise import denoised
 from .frame import FrameHits, fill_holes
 from .kernel import kernel
 from .standarderror import fill_unknown, half_factors
-from .terms.ambient import Ambient
 from .work import BY_SAMPLE, INDIRECT, REFLECTIVITY, FrameSetup, HitRecords, Placed
 
 # Pixels whose sums over all lights are held together: they fit a core's cache. And pixels of a task.

@@ -3,17 +3,19 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from framearray_cli.base.units import duration, size
+
 from .progress import ambient_figures
-from .units import duration, size
 
 if TYPE_CHECKING:
+    from framearray_cli.job.job import Job
+    from framearray_cli.parts.chunks import Chunks
+    from framearray_cli.report import Report
+
     from .auto import AutoSettings
     from .check import Estimate
-    from .job import Job
-    from .parts.chunks import Chunks
     from .prepare import Prepared
     from .progress import AmbientFigures
-    from .report import Report
     from .resume import OnDisk
     from .summary import Summary
     from .target import Target
@@ -177,7 +179,7 @@ def _error_lines(summary: "Summary") -> list[str]:
 
 def report_lines(made: "Report") -> list[str]:
     """What a report found: the job's own settings, and the cheapest ones for some errors."""
-    from .report import advice_lines
+    from framearray_cli.report import advice_lines
 
     own = made.measured[0]
     lines = [f"as the job says: {own.ms:.3g} ms an image before writing, RMSE {own.quality.rmse:.1%}"]

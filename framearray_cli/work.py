@@ -6,19 +6,20 @@ from typing import Any
 
 import numpy as np
 
+from framearray_cli.base.arrays import Float32, Float64, Int32, Rgb, with_room
+from framearray_cli.embree.packets import Tracer
+from framearray_cli.lanes import LANES
+from framearray_cli.terms.obscurance import ObscuranceSettings
+
 from .allotment import Allotment
-from .arrays import Float32, Float64, Int32, Rgb, with_room
 from .camera import Cameras
-from .embree.packets import Tracer
 from .eyehits import pixel_order
 from .hits import World
 from .kernel import inlined
-from .lanes import LANES
 from .lights import LightArrays, some_lights
 from .plan import Pass, passes, passes_of_counts
 from .planes import Plane, first_with_background
 from .surface import Surfaces
-from .terms.obscurance import ObscuranceSettings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -12,15 +12,16 @@ from typing import Self
 
 import numpy as np
 
-from .arrays import Float32, Images
-from .errors import OutputError
-from .files import reason
+from framearray_cli.base.arrays import Float32, Images
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import reason
+from framearray_cli.base.hashing import digest
+from framearray_cli.job.job import Job
+
 from .imageattributes import Attributes, frame_attributes
 from .images import ImageFormat, write_image, write_layers
-from .job import Job
 from .paths import Eyes
 from .prepare import Prepared
-from .record import digest
 from .standarderror import square_mean, standard_error
 from .stored import ArrayNames, array_names
 from .window import Composed, Layers

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.arrays import Image
+from framearray_cli.base.arrays import Image
 from framearray_cli.images import ImageFormat, write_image, write_layers
 from framearray_cli.manifest import (
     Manifest,

@@ -11,7 +11,7 @@ from scenes import Glb, png
 
 from framearray_cli.crew import TracePool
 from framearray_cli.embree import Engine
-from framearray_cli.job import Job
+from framearray_cli.job.job import Job
 from framearray_cli.loop import ready_frames
 from framearray_cli.meshes import Material, Meshes, Part
 from framearray_cli.paths import eyes, lights

@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
-from ..screen import Screen, out, say
-from ..units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS
+from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS
+from framearray_cli.screen import Screen, out, say
+
 from .options import Quiet, place
 
 
@@ -66,10 +67,10 @@ def assemble(
     quiet: Quiet = False,
 ) -> None:
     """Cut a movie or an image sequence out of a frame array."""
-    from ..movie.assemble import assemble as run
-    from ..movie.display import find_view
-    from ..movie.look import Look
-    from ..movie.sweep import Kind, Sweep
+    from framearray_cli.movie.assemble import assemble as run
+    from framearray_cli.movie.display import find_view
+    from framearray_cli.movie.look import Look
+    from framearray_cli.movie.sweep import Kind, Sweep
 
     choices: dict[Kind, bool] = {"walk": walk, "light": light, "diagonal": diagonal}
     kinds = [kind for kind, wanted in choices.items() if wanted]

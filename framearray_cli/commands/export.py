@@ -5,7 +5,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from ..screen import Screen, out, say
+from framearray_cli.screen import Screen, out, say
+
 from .options import Exposure, Quiet, place
 
 
@@ -41,8 +42,8 @@ def export(
     quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Hand a frame array to other tools: images with cameras, lights, depth and points."""
-    from ..export import export as run
-    from ..images import FOR_SCREENS, ImageFormat
+    from framearray_cli.export import export as run
+    from framearray_cli.images import FOR_SCREENS, ImageFormat
 
     if exposure and image_format not in FOR_SCREENS:
         raise typer.BadParameter("changes PNG and JPEG alone", param_hint="--exposure")

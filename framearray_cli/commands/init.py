@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
-from ..compiling import compile_clock
-from ..screen import Screen, out, say
+from framearray_cli.compiling import compile_clock
+from framearray_cli.screen import Screen, out, say
+
 from .options import Quiet, place
 
 MOST = 1000  # frames or lights of a first job
@@ -41,8 +42,8 @@ def init(
     job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else place(target)
     with Screen(out, quiet=quiet) as screen:
         screen.wait("looking around in the scene")
-        from ..start import Wishes
-        from ..start import init as run
+        from framearray_cli.start import Wishes
+        from framearray_cli.start import init as run
 
         with compile_clock(screen.compiling):
             wishes = Wishes(camera=camera, frames=frames, lights=lights, inside=inside)

@@ -6,9 +6,10 @@ from typing import Annotated
 
 import typer
 
-from ..screen import Screen, out, say
-from ..units import MOST_THREADS
-from ..wording import chunks_line
+from framearray_cli.base.units import MOST_THREADS
+from framearray_cli.screen import Screen, out, say
+from framearray_cli.wording import chunks_line
+
 from .options import JobFile, Quiet, place, read
 
 
@@ -41,9 +42,9 @@ def openjd(
         )
     with Screen(out, quiet=quiet) as screen:
         screen.wait("reading the job")
-        from ..parts.chunks import default_size, in_chunks, reach
-        from ..parts.openjd import template, write_template
-        from ..paths import eyes
+        from framearray_cli.parts.chunks import default_size, in_chunks, reach
+        from framearray_cli.parts.openjd import template, write_template
+        from framearray_cli.paths import eyes
 
         n_r, still = reach(job), eyes(job).at_rest
         size = chunk or (frames if still else default_size(frames, n_r))

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..units import MOST_STOPS, MOST_THREADS
+from framearray_cli.base.units import MOST_STOPS, MOST_THREADS
 
 if TYPE_CHECKING:
-    from ..job import Job
+    from framearray_cli.job.job import Job
 
 JobFile = Annotated[Path, typer.Argument(metavar="JOB", help="Job file, TOML.", show_default=False)]
 Threads = Annotated[
@@ -34,8 +34,8 @@ At = Annotated[
 
 def read(job_file: Path, threads: int | None, output: str | None) -> "Job":
     """Read a job file; options replace what it says."""
-    from ..jobfile import read_job
-    from ..jobvalues import changed
+    from framearray_cli.base.forms.table import changed
+    from framearray_cli.job.read import read_job
 
     job = with_threads(read_job(job_file), threads)
     if output is None:
@@ -48,14 +48,14 @@ def with_threads(job: "Job", threads: int | None) -> "Job":
     """The same job with so many threads, if that is wished."""
     if threads is None:
         return job
-    from ..jobvalues import changed
+    from framearray_cli.base.forms.table import changed
 
     return changed(job, render=changed(job.render, threads=threads))
 
 
 def frames_of(text: str, n: int) -> tuple[int, ...]:
     """The frames of an option `--cameras`."""
-    from ..ranges import parse_frames
+    from framearray_cli.ranges import parse_frames
 
     try:
         return parse_frames(text, n)

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..compiling import compile_clock
-from ..errors import OutputError
-from ..parts.progress import PartEvents
-from ..progress import ambient_figures
-from ..screen import Screen, out, say
-from ..units import MOST_THREADS, size
-from ..wording import (
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.units import MOST_THREADS, size
+from framearray_cli.compiling import compile_clock
+from framearray_cli.parts.progress import PartEvents
+from framearray_cli.progress import ambient_figures
+from framearray_cli.screen import Screen, out, say
+from framearray_cli.wording import (
     ambient_lines,
     chunks_line,
     on_disk_lines,
@@ -23,18 +23,19 @@ from ..wording import (
     target_lines,
     workers_text,
 )
+
 from .options import JobFile, Output, Quiet, Threads, frames_of, read
 
 if TYPE_CHECKING:
-    from ..auto import AutoSettings
-    from ..job import Job
-    from ..parts.chunks import Chunks
-    from ..parts.run import WorkerOptions
-    from ..prepare import Prepared
-    from ..progress import AmbientFigures
-    from ..resume import OnDisk
-    from ..target import Target
-    from ..terms.ambient import Ambient
+    from framearray_cli.auto import AutoSettings
+    from framearray_cli.job.job import Job
+    from framearray_cli.parts.chunks import Chunks
+    from framearray_cli.parts.run import WorkerOptions
+    from framearray_cli.prepare import Prepared
+    from framearray_cli.progress import AmbientFigures
+    from framearray_cli.resume import OnDisk
+    from framearray_cli.target import Target
+    from framearray_cli.terms.ambient import Ambient
 
 LITTLE_SPACE = 64 * 1024 * 1024  # bytes; with less, a full disk is the likely reason of an error
 FEW_FILES = 100  # fewer than a run has open, and leaves when it fails
@@ -81,7 +82,7 @@ def _worker_options(workers: int | None, dask: str | None, chunk: int | None) ->
         return None
     if dask is not None and not dask.strip():  # most often a shell variable that is not set
         raise typer.BadParameter("expected an address, got none", param_hint="--dask")
-    from ..parts.run import WorkerOptions
+    from framearray_cli.parts.run import WorkerOptions
 
     return WorkerOptions(workers=workers or 1, address=dask, chunk=chunk)
 
@@ -97,7 +98,7 @@ def render_shown(
     """Render, and show on the screen what goes on."""
     with Screen(out, quiet=quiet) as screen:
         screen.wait("reading the scene")
-        from ..render import render as run
+        from framearray_cli.render import render as run
 
         shown = Shown(screen, job)
         try:
@@ -105,7 +106,7 @@ def render_shown(
                 if options is None:
                     summary = run(job, shown, restart=restart, cameras=cameras)
                 else:
-                    from ..parts.run import render_in_parts
+                    from framearray_cli.parts.run import render_in_parts
 
                     summary = render_in_parts(job, shown, options, restart=restart, cameras=cameras)
         except BaseException as error:
@@ -183,7 +184,7 @@ class Shown(PartEvents):
 
 def _add_space(error: OutputError, folder: Path) -> None:
     """Say it where little space is left on the disk that could not be written to."""
-    from ..outfolder import free_files, free_space
+    from framearray_cli.outfolder import free_files, free_space
 
     with suppress(OSError):  # that disk may have gone
         if (free := free_space(folder)) < LITTLE_SPACE:

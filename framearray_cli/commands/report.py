@@ -5,13 +5,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..compiling import compile_clock
-from ..screen import Screen, out, say
-from ..wording import report_lines, scene_lines
+from framearray_cli.compiling import compile_clock
+from framearray_cli.screen import Screen, out, say
+from framearray_cli.wording import report_lines, scene_lines
+
 from .options import JobFile, Quiet, Threads, read
 
 if TYPE_CHECKING:
-    from ..report.case import Case
+    from framearray_cli.report.case import Case
 
 
 def report(
@@ -48,7 +49,7 @@ def report(
     job = read(job_file, threads, None)
     with Screen(out, quiet=quiet) as screen:
         screen.wait("reading the scene")
-        from .. import report as reporting
+        from framearray_cli import report as reporting
 
         class Shown(reporting.ReportEvents):
             """Prints the scene, then a progress bar."""

@@ -1,12 +1,12 @@
 """`framearray schema`."""
 
-from ..screen import out, say
+from framearray_cli.screen import out, say
 
 
 def schema() -> None:
     """Print the JSON Schema of job files, for editors that complete and check them."""
     import json
 
-    from ..jobschema import job_schema
+    from framearray_cli.job.schema import job_schema
 
     say(out, json.dumps(job_schema(), indent=2).splitlines())

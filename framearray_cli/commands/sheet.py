@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from ..screen import Screen, out, say
+from framearray_cli.screen import Screen, out, say
+
 from .options import At, Exposure, Quiet, place
 
 MOST_WIDTH = 20_000  # pixels; more is a typing error
@@ -33,7 +34,7 @@ def sheet(
     quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Draw a contact sheet: cameras from left to right, light positions from top to bottom."""
-    from ..sheet import make_sheet
+    from framearray_cli.sheet import make_sheet
 
     with Screen(out, quiet=quiet) as screen:
 

@@ -5,10 +5,11 @@ from typing import Annotated
 
 import typer
 
-from ..errors import CheckError
-from ..limits import RENDERS, available_cores, require_address_space
-from ..screen import Screen, out, say
-from ..wording import verified_lines
+from framearray_cli.base.errors import CheckError
+from framearray_cli.base.memory import RENDERS, available_cores, require_address_space
+from framearray_cli.screen import Screen, out, say
+from framearray_cli.wording import verified_lines
+
 from .options import Quiet, Threads, with_threads
 
 
@@ -21,7 +22,7 @@ def verify(
     quiet: Quiet = False,
 ) -> None:
     """Look whether every image of a frame array is there, whole and unchanged."""
-    from ..verify import verify as run
+    from framearray_cli.verify import verify as run
 
     with Screen(out, quiet=quiet) as screen:
 
@@ -38,8 +39,9 @@ def verify(
         if not quiet:
             say(out, lines)
         return
-    from ..jobfile import job_of_table
-    from ..manifest import FILE_NAME
+    from framearray_cli.job.read import job_of_table
+    from framearray_cli.manifest import FILE_NAME
+
     from .render import render_shown
 
     require_address_space(RENDERS)

@@ -5,14 +5,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..interrupts import Stopped, forget
-from ..limits import available_cores
-from ..screen import Screen, out, say
-from ..units import MOST_THREADS, size
+from framearray_cli.base.memory import available_cores
+from framearray_cli.base.signals import Stopped, forget
+from framearray_cli.base.units import MOST_THREADS, size
+from framearray_cli.screen import Screen, out, say
+
 from .options import Quiet, place
 
 if TYPE_CHECKING:
-    from ..errors import OutputError
+    from framearray_cli.base.errors import OutputError
 
 MOST_PROBLEMS = 5  # told in full
 
@@ -36,7 +37,7 @@ def view(
     quiet: Quiet = False,
 ) -> None:
     """Walk through a frame array in the browser."""
-    from ..view.run import open_tiles, show, write_page
+    from framearray_cli.view.run import open_tiles, show, write_page
 
     workers = threads or available_cores()
     tiles = open_tiles(array, place(cache, "--cache") if cache is not None else None, workers)

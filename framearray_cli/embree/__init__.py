@@ -11,8 +11,9 @@ can serve the same kernels:
 from types import TracebackType
 from typing import Literal, Self
 
-from ..errors import SceneError
-from ..scene import Scene
+from framearray_cli.base.errors import SceneError
+from framearray_cli.scene import Scene
+
 from .fallback import EmbreexScene
 from .native import NativeScene, embree_library
 from .packets import Tracer

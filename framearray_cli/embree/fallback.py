@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Float32, Int32
-from ..lanes import LANES
-from ..scene import Scene
-from ..surface import is_cut_out, surfaces
+from framearray_cli.base.arrays import Float32, Int32
+from framearray_cli.lanes import LANES
+from framearray_cli.scene import Scene
+from framearray_cli.surface import is_cut_out, surfaces
+
 from .packets import (
     DIRECTION,
     GEOMETRY,

@@ -12,9 +12,9 @@ from numba import types
 from numba.core.ccallback import CFunc
 from numba.extending import intrinsic
 
-from ..kernel import keep_on_disk
-from ..scene import Scene
-from ..surface import Surfaces, is_cut_out, surfaces
+from framearray_cli.kernel import keep_on_disk
+from framearray_cli.scene import Scene
+from framearray_cli.surface import Surfaces, is_cut_out, surfaces
 
 # RTCFilterFunctionNArguments: valid, geometryUserPtr, context, ray, hit (pointers), N
 _VALID, _USER, _HIT = 0, 1, 4

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Float32
-from ..errors import SceneError
-from ..lanes import LANES
-from ..scene import Scene
+from framearray_cli.base.arrays import Float32
+from framearray_cli.base.errors import SceneError
+from framearray_cli.lanes import LANES
+from framearray_cli.scene import Scene
+
 from .masks import MaskTable
 from .packets import MASKED, OPAQUE, Tracer, aligned
 

@@ -13,9 +13,9 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from ..arrays import Float32, Real
-from ..kernel import inlined, kernel
-from ..lanes import LANES, select
+from framearray_cli.base.arrays import Float32, Real
+from framearray_cli.kernel import inlined, kernel
+from framearray_cli.lanes import LANES, select
 
 RAY_ROWS = 12
 HIT_ROWS = 24  # RTCRayHit16 has 20 to 22 rows, depending on how Embree was built; the rest is padding

@@ -10,8 +10,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..files import write_bytes
-from ..places import plain_names
+from framearray_cli.base.files import write_bytes
+from framearray_cli.places import plain_names
+
 from .selection import ExportedFrame, Selection, rigid_pose, sources_at
 
 FILE = MARK = "data.csv"

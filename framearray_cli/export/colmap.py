@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arrays import Float64
-from ..files import write_bytes
+from framearray_cli.base.arrays import Float64
+from framearray_cli.base.files import write_bytes
+
 from .points import Cloud, Sight
 from .selection import ExportedFrame, Selection, focal_length, numbers, rigid_pose
 

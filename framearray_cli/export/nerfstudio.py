@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ..files import write_bytes
-from ..manifest import Manifest
-from ..places import plain_names
+from framearray_cli.base.files import write_bytes
+from framearray_cli.manifest import Manifest
+from framearray_cli.places import plain_names
+
 from .points import Cloud, read_depth
 from .selection import ExportedFrame, Selection, focal_length, numbers, rigid_pose, sources_at
 

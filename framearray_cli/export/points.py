@@ -9,11 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Bytes, Float32, Float64
-from ..errors import OutputError
-from ..images import read_layers
-from ..manifest import Manifest, layers_path
-from ..places import spread_with_ends
+from framearray_cli.base.arrays import Bytes, Float32, Float64
+from framearray_cli.base.errors import OutputError
+from framearray_cli.images import read_layers
+from framearray_cli.manifest import Manifest, layers_path
+from framearray_cli.places import spread_with_ends
+
 from .selection import focal_length, rigid_pose
 
 SOURCES = 16  # cameras that points are taken from, evenly along the path; more add the same surfaces again

@@ -7,13 +7,14 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from ..colour import srgb8_from_linear
-from ..errors import JobError, OutputError
-from ..files import whole_folder
-from ..images import ImageFormat, require_writer
-from ..manifestfile import read_manifest
-from ..pictures import Pictures
-from ..places import ALL, MIDDLE, indices, light_places
+from framearray_cli.base.colour import srgb8_from_linear
+from framearray_cli.base.errors import JobError, OutputError
+from framearray_cli.base.files import whole_folder
+from framearray_cli.images import ImageFormat, require_writer
+from framearray_cli.manifestfile import read_manifest
+from framearray_cli.pictures import Pictures
+from framearray_cli.places import ALL, MIDDLE, indices, light_places
+
 from . import cinema, colmap, nerfstudio
 from .folder import earlier_export, place_picture
 from .points import Cloud, find_points, source_cameras

@@ -10,7 +10,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from ..kernelcache import slow_gathers
+from framearray_cli.kernelcache import slow_gathers
+
 from .kinds import ELEMENTS, FLAGS, INTEGERS, LANES, SUFFIX, WORD, Lanes, declared, takes, vector_of
 
 _LARGEST_HALF = 0x477FE000  # 65504 as the bits of a float32

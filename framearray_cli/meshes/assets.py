@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path, PureWindowsPath
 from urllib.parse import unquote
 
-from ..errors import SceneError
+from framearray_cli.base.errors import SceneError
+
 from .limit import Limit
 from .model import join_names
 

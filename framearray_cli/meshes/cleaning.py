@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Corners, Float64
+from framearray_cli.base.arrays import Corners, Float64
 
 Mask = NDArray[np.bool_]
 Keys = NDArray[np.uint64]

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..errors import SceneError
+from framearray_cli.base.errors import SceneError
+
 from .gltf_values import LIGHTS, Tree, extensions, list_of, map_of, number, number_of, numbers, one_of, table, text
 from .limit import Limit
 

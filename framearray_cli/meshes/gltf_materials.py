@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Float64
+from framearray_cli.base.arrays import Float64
+
 from .assets import AssetError, Assets
 from .container import Gltf, uri_bytes
 from .gltf_values import Tree

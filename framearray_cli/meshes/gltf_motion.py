@@ -10,7 +10,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from ..arrays import Float64
+from framearray_cli.base.arrays import Float64
+
 from .container import Gltf
 from .gltf_values import Tree
 

@@ -4,8 +4,9 @@ import importlib.util
 
 import numpy as np
 
-from ..arrays import Float64
-from ..errors import SceneError
+from framearray_cli.base.arrays import Float64
+from framearray_cli.base.errors import SceneError
+
 from .container import Gltf
 from .gltf_materials import KNOWN, SILENT
 from .gltf_motion import AT_REST, PATHS, at_rest, rotations

@@ -4,7 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from ..arrays import Float64
+from framearray_cli.base.arrays import Float64
+
 from .container import Gltf
 from .gltf_motion import Motion, read_motion
 from .gltf_values import Tree

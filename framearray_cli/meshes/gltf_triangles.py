@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Float32, Float64
+from framearray_cli.base.arrays import Float32, Float64
+
 from .container import Gltf, normalise
 from .gltf_check import TRIANGLES
 from .gltf_materials import GltfMaterial

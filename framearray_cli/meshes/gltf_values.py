@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from ..jobvalues import shown
+from framearray_cli.base.forms.words import shown
 
 Tree = dict[str, Any]
 Check = Callable[[Any, str, Tree], Iterator[str]]  # value, its place, the whole tree -> problems

@@ -5,7 +5,8 @@ import re
 import zipfile
 from collections.abc import Iterator
 
-from ..errors import SceneError
+from framearray_cli.base.errors import SceneError
+
 from .assets import shorten
 from .limit import Limit
 

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from ..errors import SceneError
-from ..units import amount
-from ..usage import free_memory
+from framearray_cli.base.errors import SceneError
+from framearray_cli.base.memory import free_memory
+from framearray_cli.base.units import amount
 
 
 @dataclass(slots=True, kw_only=True)

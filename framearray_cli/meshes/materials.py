@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Float32, Float64
+from framearray_cli.base.arrays import Float32, Float64
+
 from .model import GREY, Material, Notes
 from .textures import TextureTable
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Corners, CornerUvs, Float64
+from framearray_cli.base.arrays import Corners, CornerUvs, Float64
+
 from .model import Material, Notes, Part
 
 FAR_UV = 16.0  # float32 texture coordinates beyond it lose texels: whole repeats are subtracted

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from ..arrays import Bytes, Float32, Float64
+from framearray_cli.base.arrays import Bytes, Float32, Float64
 
 GREY = 0.5  # reflectivity of surfaces without material: neither black, nor a white that hides all shading
 NAMES_IN_A_NOTE = 6  # names that one note lists before it says "and n more"

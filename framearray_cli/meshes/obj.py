@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Float32, Float64
+from framearray_cli.base.arrays import Float32, Float64
+
 from .assets import AssetError, Assets
 from .materials import clean_colours, default_material
 from .model import Material, Meshes, Notes, Part

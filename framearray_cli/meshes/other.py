@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Float32
-from ..errors import SceneError
+from framearray_cli.base.arrays import Float32
+from framearray_cli.base.errors import SceneError
+
 from .assets import AssetError, Assets
 from .headers import check_headers, one_solid
 from .materials import blended_opacity, clean_colours, default_material, make_material

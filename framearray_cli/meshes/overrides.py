@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from ..errors import SceneError
+from framearray_cli.base.errors import SceneError
+
 from .model import Material, Notes, join_names
 
 LONGEST_NAME = 100  # characters of a name in a message

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Float64
+from framearray_cli.base.arrays import Float64
 
 Indices = NDArray[np.int64]
 

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import SceneError
+from framearray_cli.base.errors import SceneError
+
 from .assets import AssetError, Assets
 from .container import open_gltf
 from .gltf import read_gltf

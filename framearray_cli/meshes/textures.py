@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Bytes, Float64
-from ..errors import SceneError
+from framearray_cli.base.arrays import Bytes, Float64
+from framearray_cli.base.errors import SceneError
+
 from .assets import AssetError
 from .limit import Limit
 from .model import Notes

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Float32, Float64
+from framearray_cli.base.arrays import Float32, Float64
+
 from .model import Part
 
 

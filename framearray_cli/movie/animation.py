@@ -15,9 +15,9 @@ from typing import Any, BinaryIO, Protocol
 
 from numpy.typing import NDArray
 
-from ..arrays import Bytes
-from ..errors import MissingExtraError, OutputError
-from ..files import whole_file
+from framearray_cli.base.arrays import Bytes
+from framearray_cli.base.errors import MissingExtraError, OutputError
+from framearray_cli.base.files import whole_file
 
 GIF_UNITS, WEBP_UNITS = 100, 1000  # of time, a second
 GIF_FASTEST = 50  # frames a second; browsers show what is faster ten times as slowly as they should

@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Float32, Image
+from framearray_cli.base.arrays import Float32, Image
 
 Encode: TypeAlias = Callable[[Image], Float32]
 

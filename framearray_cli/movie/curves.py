@@ -8,9 +8,11 @@ from typing import Annotated, Any, TypeAlias
 
 from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
 
-from ..jobschema import dotted
-from ..jobvalues import Float3, Place, Table, fail, shown
-from ..pictures import AS_RENDERED, Relight
+from framearray_cli.base.forms.schema import dotted
+from framearray_cli.base.forms.table import Float3, Place, Table, fail
+from framearray_cli.base.forms.words import shown
+from framearray_cli.pictures import AS_RENDERED, Relight
+
 from .places import percent
 
 STRONGEST = 1e6  # times the light that was rendered; halves overflow before that

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Float32, Image
-from ..colour import srgb_from_linear
-from ..errors import JobError
-from ..jobvalues import shown
+from framearray_cli.base.arrays import Float32, Image
+from framearray_cli.base.colour import srgb_from_linear
+from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.words import shown
+
 from .cube import Encode, tabled
 
 BUILT_IN = "ocio://default"  # the configuration that OpenColorIO carries: ACES 2.0

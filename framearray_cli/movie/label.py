@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Float32
-from ..extras import extra
+from framearray_cli.base.arrays import Float32
+from framearray_cli.base.extras import extra
 
 LINES_A_PICTURE = 18  # heights of the text in that of the picture
 SMALLEST = 10  # pixels; smaller letters cannot be read

@@ -10,8 +10,9 @@ from typing import Annotated, Any, TypeAlias
 
 from pydantic import PlainValidator, WithJsonSchema
 
-from ..arrays import is_number
-from ..jobvalues import fail, shown
+from framearray_cli.base.arrays import is_number
+from framearray_cli.base.forms.table import fail
+from framearray_cli.base.forms.words import shown
 
 # An index (negative: from the end; 3.25 is a quarter of the way from 3 to 4), "first", "last", or a percentage of the
 # way from first to last.

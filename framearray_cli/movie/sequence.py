@@ -11,12 +11,13 @@ from typing import get_args
 
 import numpy as np
 
-from ..errors import OutputError
-from ..files import folder_for, reason, temporary_folder
-from ..imageattributes import Attribute, frame_attributes
-from ..images import FOR_SCREENS, Extension, ImageFormat, format_name, read_image, write_codes, write_image
-from ..manifest import Manifest
-from ..pictures import Pictures, Relight
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import folder_for, reason, temporary_folder
+from framearray_cli.imageattributes import Attribute, frame_attributes
+from framearray_cli.images import FOR_SCREENS, Extension, ImageFormat, format_name, read_image, write_codes, write_image
+from framearray_cli.manifest import Manifest
+from framearray_cli.pictures import Pictures, Relight
+
 from .look import Look, place_text, shown
 from .timeline import Shot, Timeline
 

@@ -11,9 +11,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import MissingExtraError, OutputError
-from ..extras import extra
-from ..files import whole_file
+from framearray_cli.base.errors import MissingExtraError, OutputError
+from framearray_cli.base.extras import extra
+from framearray_cli.base.files import whole_file
+
 from .yuv import planes_422_10
 
 

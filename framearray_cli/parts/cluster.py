@@ -8,8 +8,8 @@ from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from ..errors import JobError
-from ..extras import extra
+from framearray_cli.base.errors import JobError
+from framearray_cli.base.extras import extra
 
 PATIENCE = 5.0  # seconds in which a scheduler must answer
 SILENT = logging.CRITICAL + 1

@@ -6,12 +6,13 @@ from concurrent.futures import CancelledError
 from contextlib import suppress
 from typing import Any
 
-from .. import errors
-from ..errors import JobError, OutputError, WorkerError
-from ..progress import AmbientFigures
-from ..ranges import frames_text
-from ..session import RenderSession
-from ..target import Target
+from framearray_cli.base import errors
+from framearray_cli.base.errors import JobError, OutputError, WorkerError
+from framearray_cli.progress import AmbientFigures
+from framearray_cli.ranges import frames_text
+from framearray_cli.session import RenderSession
+from framearray_cli.target import Target
+
 from .chunks import Chunks
 from .progress import PartEvents
 

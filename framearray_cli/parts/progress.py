@@ -2,10 +2,11 @@
 
 from typing import TYPE_CHECKING
 
-from ..progress import AmbientFigures, RenderEvents
+from framearray_cli.progress import AmbientFigures, RenderEvents
 
 if TYPE_CHECKING:
-    from ..target import Target
+    from framearray_cli.target import Target
+
     from .chunks import Chunks
 
 

@@ -8,21 +8,23 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from .. import __version__
-from ..auto import require_least_memory
-from ..errors import JobError, OutputError, SceneError, WorkerError
-from ..files import reason
-from ..interrupts import forget
-from ..job import Job
-from ..jobfile import job_table
-from ..jobvalues import changed
-from ..manifestfile import read_manifest, write_manifest
-from ..prepare import Prepared
-from ..record import FOLDER, digest, read_records
-from ..session import RenderSession, nothing_to_do, open_session
-from ..summary import Summary, summarize, with_summary
-from ..usage import free_memory
-from ..wording import workers_text
+from framearray_cli import __version__
+from framearray_cli.auto import require_least_memory
+from framearray_cli.base.errors import JobError, OutputError, SceneError, WorkerError
+from framearray_cli.base.files import reason
+from framearray_cli.base.forms.table import changed
+from framearray_cli.base.hashing import digest
+from framearray_cli.base.memory import free_memory
+from framearray_cli.base.signals import forget
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import job_table
+from framearray_cli.manifestfile import read_manifest, write_manifest
+from framearray_cli.prepare import Prepared
+from framearray_cli.record import FOLDER, read_records
+from framearray_cli.session import RenderSession, nothing_to_do, open_session
+from framearray_cli.summary import Summary, summarize, with_summary
+from framearray_cli.wording import workers_text
+
 from .chunks import Chunks, default_size, in_chunks
 from .cluster import connected, local, require_dask
 from .handout import LOOK_EVERY, ChunkQueue, count_workers, lacks_program

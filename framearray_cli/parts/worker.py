@@ -12,21 +12,21 @@ from typing import Any
 
 from distributed import Reschedule, Worker, WorkerPlugin, get_worker
 
-from .. import __version__
-from ..compiling import compile_clock
-from ..errors import BusyError, FrameArrayError, JobError
-from ..job import Job
-from ..jobfile import job_of_table
-from ..jobvalues import changed
-from ..prepare import Prepared
-from ..progress import RenderEvents, ambient_figures
-from ..record import digest
-from ..render import render
-from ..resume import OnDisk
-from ..summary import Summary
-from ..target import Target
-from ..terms.ambient import Ambient
-from ..units import MOST_THREADS
+from framearray_cli import __version__
+from framearray_cli.base.errors import BusyError, FrameArrayError, JobError
+from framearray_cli.base.forms.table import changed
+from framearray_cli.base.hashing import digest
+from framearray_cli.base.units import MOST_THREADS
+from framearray_cli.compiling import compile_clock
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import job_of_table
+from framearray_cli.prepare import Prepared
+from framearray_cli.progress import RenderEvents, ambient_figures
+from framearray_cli.render import render
+from framearray_cli.resume import OnDisk
+from framearray_cli.summary import Summary
+from framearray_cli.target import Target
+from framearray_cli.terms.ambient import Ambient
 
 # Seconds between two looks whether the chunk is still wanted, and between two messages on how far it is.
 LOOK_EVERY, SEND_EVERY = 0.2, 0.5

@@ -7,15 +7,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..auto import resolve_auto
-from ..embree import EmbreeScene
-from ..errors import JobError
-from ..job import Job
-from ..jobvalues import MOST_HITS, changed
-from ..lights import some_lights
-from ..prepare import Prepared, open_embree, plan_work, prepare
-from ..terms.ambient import Ambient
-from ..work import FrameSetup
+from framearray_cli.auto import resolve_auto
+from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.table import changed
+from framearray_cli.embree import EmbreeScene
+from framearray_cli.job.job import Job
+from framearray_cli.job.values import MOST_HITS
+from framearray_cli.lights import some_lights
+from framearray_cli.prepare import Prepared, open_embree, plan_work, prepare
+from framearray_cli.terms.ambient import Ambient
+from framearray_cli.work import FrameSetup
+
 from .settings import Settings
 
 

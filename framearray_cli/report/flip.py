@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Float32, Image
-from ..extras import not_installed
+from framearray_cli.base.arrays import Float32, Image
+from framearray_cli.base.extras import not_installed
 
 # What the extra `report` brings.
 EXTRA = ("matplotlib", "flip_evaluator", "jinja2")

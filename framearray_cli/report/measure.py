@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Float32, Int32
-from ..crew import TracePool
-from ..frame import FrameHits
-from ..loop import ready_frames
-from ..terms.ambient import Ambient
-from ..window import Window
-from ..work import FrameSetup
+from framearray_cli.base.arrays import Float32, Int32
+from framearray_cli.crew import TracePool
+from framearray_cli.frame import FrameHits
+from framearray_cli.loop import ready_frames
+from framearray_cli.terms.ambient import Ambient
+from framearray_cli.window import Window
+from framearray_cli.work import FrameSetup
+
 from .case import Case, under, varied
 from .quality import Quality, mean_quality, quality
 from .reference import Reference

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Float32, Float64, Image
+from framearray_cli.base.arrays import Float32, Float64, Image
 
 # relMSE divides by R^2 + EPSILON: below a radiance of 0.1 an error counts as if it were at 0.1.
 EPSILON = 0.01

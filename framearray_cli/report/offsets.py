@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..crew import TracePool
-from ..loop import window_of
+from framearray_cli.crew import TracePool
+from framearray_cli.loop import window_of
+
 from .case import Case, varied
 from .measure import SEEDS
 from .metrics import squared_bias

@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from importlib.resources import files
 
-from .. import __version__
-from ..files import whole_file
+from framearray_cli import __version__
+from framearray_cli.base.files import whole_file
+
 from .crops import draw_crops, draw_maps
 from .front import times_faster
 from .measure import Measured

@@ -5,7 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ..files import write_bytes
+from framearray_cli.base.files import write_bytes
+
 from .measure import Measured
 from .run import Report
 from .settings import LIGHT_REUSE, SCRATCH

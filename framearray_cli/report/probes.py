@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..errors import JobError
+from framearray_cli.base.errors import JobError
 
 # Where on the camera path and on the light path, 0 to 1.
 CAMERA_PLACES = (1 / 3, 2 / 3)

@@ -5,8 +5,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..arrays import Float32, Float64, Image
-from ..terms.ambient import Ambient
+from framearray_cli.base.arrays import Float32, Float64, Image
+from framearray_cli.terms.ambient import Ambient
+
 from .flip import flip_map
 from .metrics import EPSILON, errors, shadow_edges, squared_bias
 from .reference import Reference

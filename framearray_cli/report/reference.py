@@ -13,14 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arrays import Float32, Float64, Image, Rgb
-from ..crew import TracePool
-from ..files import make_folder, whole_file
-from ..fingerprint import fingerprint
-from ..identity import job_fingerprint
-from ..loop import window_of
-from ..window import Layers
-from ..work import FrameSetup
+from framearray_cli.base.arrays import Float32, Float64, Image, Rgb
+from framearray_cli.base.files import make_folder, whole_file
+from framearray_cli.base.hashing import fingerprint
+from framearray_cli.crew import TracePool
+from framearray_cli.identity import job_fingerprint
+from framearray_cli.loop import window_of
+from framearray_cli.window import Layers
+from framearray_cli.work import FrameSetup
+
 from .case import Case, under
 from .metrics import rmse
 

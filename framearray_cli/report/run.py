@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Float32
-from ..job import Job
+from framearray_cli.base.arrays import Float32
+from framearray_cli.job.job import Job
+
 from .case import Case, opened
 from .flip import flip_map, require_extra
 from .front import Advice, advice, worth_trying

@@ -8,10 +8,10 @@ from dataclasses import dataclass, fields, replace
 from importlib.util import find_spec
 from typing import Any, Literal
 
-from ..errors import JobError
-from ..job import Job
-from ..jobvalues import changed
-from ..tomltext import brief
+from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.table import changed
+from framearray_cli.base.forms.text import brief
+from framearray_cli.job.job import Job
 
 # Settings by the job file's key.
 KEYS = {

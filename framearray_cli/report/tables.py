@@ -7,7 +7,8 @@ from typing import Any
 
 import tomli_w
 
-from ..files import whole_file
+from framearray_cli.base.files import whole_file
+
 from .front import Advice, times_faster
 from .measure import Measured
 from .run import Report

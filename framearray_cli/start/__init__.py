@@ -3,8 +3,9 @@
 import os
 from pathlib import Path
 
-from ..errors import OutputError, SceneError
-from ..files import write_bytes
+from framearray_cli.base.errors import OutputError, SceneError
+from framearray_cli.base.files import write_bytes
+
 from .model import Start, checked, table_of
 from .plan import Wishes, plan_start
 from .text import to_text

@@ -5,15 +5,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Float64, Images
-from ..colour import srgb_from_linear
-from ..crew import TracePool
-from ..embree import EmbreeScene
-from ..loop import ready_frames
-from ..paths import LightPath, eyes, lights, shining_together
-from ..prepare import plan_work, prepared_from
-from ..scene import Scene
-from ..window import Window
+from framearray_cli.base.arrays import Float64, Images
+from framearray_cli.base.colour import srgb_from_linear
+from framearray_cli.crew import TracePool
+from framearray_cli.embree import EmbreeScene
+from framearray_cli.loop import ready_frames
+from framearray_cli.paths import LightPath, eyes, lights, shining_together
+from framearray_cli.prepare import plan_work, prepared_from
+from framearray_cli.scene import Scene
+from framearray_cli.window import Window
+
 from .model import Start, checked, table_of
 
 PICTURES = 3  # eyes, and light positions, that are tried

@@ -6,10 +6,10 @@ from typing import Any, Literal
 
 from pydantic import ValidationError
 
-from ..arrays import Float64
-from ..errors import SceneError
-from ..job import Job
-from ..problems import problems_of
+from framearray_cli.base.arrays import Float64
+from framearray_cli.base.errors import SceneError
+from framearray_cli.base.forms.problems import problems_of
+from framearray_cli.job.job import Job
 
 MOST_PROBLEMS = 3  # that are told of a job; a light that is nowhere has one for every key
 Vector = tuple[float, float, float]

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from ..arrays import Float64
+from framearray_cli.base.arrays import Float64
+
 from .rays import Probe
 from .sample import level_directions
 from .views import ASPECT, view_worth

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Float64, Int32
-from ..embree import EmbreeScene
-from ..embree.packets import (
+from framearray_cli.base.arrays import Float64, Int32
+from framearray_cli.embree import EmbreeScene
+from framearray_cli.embree.packets import (
     DIRECTION,
     GEOMETRY,
     HIT_ROWS,
@@ -22,8 +22,8 @@ from ..embree.packets import (
     intersect,
     occlude,
 )
-from ..lanes import LANES
-from ..scene import Scene
+from framearray_cli.lanes import LANES
+from framearray_cli.scene import Scene
 
 SHORTENED = 1e-4  # of a segment, left out at both of its ends, so that it does not meet what it starts or ends on
 

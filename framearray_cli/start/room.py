@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Float64
+from framearray_cli.base.arrays import Float64
+
 from .rays import Probe
 from .sample import directions_around, level_directions, points_in
 from .views import view_directions, view_worth

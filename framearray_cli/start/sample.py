@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..arrays import Float64
+from framearray_cli.base.arrays import Float64
 
 GOLDEN_TURN = np.pi * (3 - np.sqrt(5))  # radians; the turn that fills a circle most evenly
 # 1 / g^k of the root g of x^4 = x + 1: the sequence R3 of [Roberts18].

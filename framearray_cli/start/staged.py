@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from ..arrays import Float64
-from ..errors import JobError, SceneError
-from ..meshes import Stage, StageCamera, StageLight
+from framearray_cli.base.arrays import Float64
+from framearray_cli.base.errors import JobError, SceneError
+from framearray_cli.meshes import Stage, StageCamera, StageLight
+
 from .model import Camera, EyeKey, LightKeys, rounded
 
 FPS = 24.0  # of the job; times of animations are seconds

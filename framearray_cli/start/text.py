@@ -8,7 +8,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..tomltext import inline, numbers, quoted
+from framearray_cli.base.forms.text import inline, numbers, quoted
+
 from .model import Camera, LightKeys, MaterialNote, Start, source_keys
 
 MOST_STEPS_UP = 2  # folders that a relative name of the scene may climb; beyond, it is absolute

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..arrays import Float64
+from framearray_cli.base.arrays import Float64
+
 from .rays import Probe
 
 COLUMNS, ROWS = 16, 12  # rays of a view

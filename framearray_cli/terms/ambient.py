@@ -13,12 +13,13 @@ from typing import Protocol, Self, TypeVar
 
 import numpy as np
 
-from ..arrays import Float32, Float64, Rgb
-from ..embree.packets import Tracer
-from ..hits import ESCAPED, Hits, World, empty_hits
-from ..kernel import kernel
-from ..lights import LightArrays
-from ..rays import room_for_hits, room_for_tests
+from framearray_cli.base.arrays import Float32, Float64, Rgb
+from framearray_cli.embree.packets import Tracer
+from framearray_cli.hits import ESCAPED, Hits, World, empty_hits
+from framearray_cli.kernel import kernel
+from framearray_cli.lights import LightArrays
+from framearray_cli.rays import room_for_hits, room_for_tests
+
 from .direct import direct
 from .walks import DIFFUSE, Walkers, advance, choose_step, deposit, empty_walkers
 

@@ -9,15 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Bytes, Float32, Float64, Int32
-from ..embree.packets import Tracer, is_blocked, occlude, set_ray
-from ..hits import ESCAPED, SURFACE, Hits, World, ray_origin
-from ..kernel import kernel
-from ..lanes import LANES
-from ..lights import LightArrays
-from ..rays import Rays
-from ..sampling import HEMISPHERE, PIXEL, r2, stream, word
-from ..surface import Surfaces, geometric_normal, position_at, reflectivity_at, specular_at
+from framearray_cli.base.arrays import Bytes, Float32, Float64, Int32
+from framearray_cli.embree.packets import Tracer, is_blocked, occlude, set_ray
+from framearray_cli.hits import ESCAPED, SURFACE, Hits, World, ray_origin
+from framearray_cli.kernel import kernel
+from framearray_cli.lanes import LANES
+from framearray_cli.lights import LightArrays
+from framearray_cli.rays import Rays
+from framearray_cli.sampling import HEMISPHERE, PIXEL, r2, stream, word
+from framearray_cli.surface import Surfaces, geometric_normal, position_at, reflectivity_at, specular_at
+
 from .ambient import AMBIENT_STREAM, BATCH, Workspace, choose_all
 from .walks import DIFFUSE, END, Walkers
 

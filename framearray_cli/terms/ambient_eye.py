@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Float32, Float64, Points, Rgb
-from ..camera import Cameras, eye_ray
-from ..embree.packets import intersect, set_ray
-from ..hits import SURFACE, Hits, World, record_hits
-from ..kernel import kernel
-from ..lights import LightArrays
-from ..sampling import CHOICE, PIXEL, PIXEL_SAMPLE, r2, stream, word
+from framearray_cli.base.arrays import Float32, Float64, Points, Rgb
+from framearray_cli.camera import Cameras, eye_ray
+from framearray_cli.embree.packets import intersect, set_ray
+from framearray_cli.hits import SURFACE, Hits, World, record_hits
+from framearray_cli.kernel import kernel
+from framearray_cli.lights import LightArrays
+from framearray_cli.sampling import CHOICE, PIXEL, PIXEL_SAMPLE, r2, stream, word
+
 from .ambient import (
     AMBIENT_STREAM,
     FEWEST,

@@ -17,8 +17,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..arrays import Float32, Float64
-from ..kernel import kernel
+from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.kernel import kernel
+
 from .ambient import FEWEST, TARGET_ERROR, Ambient, Workspace, choose_all, summarise, walk_until
 from .ambient_eye import EyeWalks, Steps, start_at_eyes, to_first_vertices, total_reflectivity
 from .obscurance import rho

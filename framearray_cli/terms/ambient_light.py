@@ -11,12 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Float32, Float64, Real, Rgb, Triple
-from ..embree.packets import intersect, set_ray
-from ..hits import SURFACE, Hits, World, record_hits
-from ..kernel import inlined, kernel
-from ..lights import DIRECTIONAL, LightArrays
-from ..sampling import PIXEL, cosine_direction, r2, stream, word
+from framearray_cli.base.arrays import Float32, Float64, Real, Rgb, Triple
+from framearray_cli.embree.packets import intersect, set_ray
+from framearray_cli.hits import SURFACE, Hits, World, record_hits
+from framearray_cli.kernel import inlined, kernel
+from framearray_cli.lights import DIRECTIONAL, LightArrays
+from framearray_cli.sampling import PIXEL, cosine_direction, r2, stream, word
+
 from .ambient import AMBIENT_STREAM, BATCH, TARGET_ERROR, Ambient, Workspace, choose_all, summarise, walk_until
 from .ambient_area import KEPT_BOUNCES, Pool, empty_pool, keep, reached_area
 from .walks import MAX_BOUNCES, Walkers

@@ -4,13 +4,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Float32, Real, Triple
-from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude
-from ..hits import Hits, lift, ray_origin, reflecting, reflects, triple
-from ..kernel import inlined, kernel
-from ..lanes import LANES, bits, compress, ctz, lane_numbers, load, popcount, select, sqrt, store, triples_at
-from ..lights import DIRECTIONAL, LightArrays
-from ..rays import Rays
+from framearray_cli.base.arrays import Float32, Real, Triple
+from framearray_cli.embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude
+from framearray_cli.hits import Hits, lift, ray_origin, reflecting, reflects, triple
+from framearray_cli.kernel import inlined, kernel
+from framearray_cli.lanes import (
+    LANES,
+    bits,
+    compress,
+    ctz,
+    lane_numbers,
+    load,
+    popcount,
+    select,
+    sqrt,
+    store,
+    triples_at,
+)
+from framearray_cli.lights import DIRECTIONAL, LightArrays
+from framearray_cli.rays import Rays
 
 # A shadow ray ends this share of its length before the light, so that a light on a surface is not hidden by it.
 FAR_END = np.float32(1.0 - 1e-4)

@@ -14,14 +14,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Float32, Int32
-from ..embree.packets import Tracer, is_blocked, occlude, set_ray
-from ..hits import Hits, lift, ray_origin, reflects
-from ..kernel import inlined, kernel
-from ..lanes import LANES
-from ..lights import DIRECTIONAL, LightArrays
-from ..rays import Rays
-from ..sampling import STEPS, mix, word
+from framearray_cli.base.arrays import Float32, Int32
+from framearray_cli.embree.packets import Tracer, is_blocked, occlude, set_ray
+from framearray_cli.hits import Hits, lift, ray_origin, reflects
+from framearray_cli.kernel import inlined, kernel
+from framearray_cli.lanes import LANES
+from framearray_cli.lights import DIRECTIONAL, LightArrays
+from framearray_cli.rays import Rays
+from framearray_cli.sampling import STEPS, mix, word
+
 from .direct import FAR_END, TO, look
 
 # Hits that are worked on together: enough to fill packets in the later, sparser rounds.

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Float32, Real, Rgb
-from ..embree.packets import (
+from framearray_cli.base.arrays import Float32, Real, Rgb
+from framearray_cli.embree.packets import (
     DIRECTION,
     GEOMETRY,
     ORIGIN,
@@ -24,9 +24,9 @@ from ..embree.packets import (
     intersect,
     scene_triangle,
 )
-from ..hits import Hits, reflecting, triple
-from ..kernel import inlined, kernel
-from ..lanes import (
+from framearray_cli.hits import Hits, reflecting, triple
+from framearray_cli.kernel import inlined, kernel
+from framearray_cli.lanes import (
     LANES,
     compress,
     gather,
@@ -40,9 +40,9 @@ from ..lanes import (
     sqrt,
     store,
 )
-from ..rays import Rays
-from ..sampling import HEMISPHERE, UNIT_24, above, cosine_direction, word
-from ..surface import Surfaces, total_at
+from framearray_cli.rays import Rays
+from framearray_cli.sampling import HEMISPHERE, UNIT_24, above, cosine_direction, word
+from framearray_cli.surface import Surfaces, total_at
 
 SQRT, LINEAR, CBRT, EXPONENTIAL, CONSTANT = range(5)
 FALLOFFS = {"sqrt": SQRT, "linear": LINEAR, "cbrt": CBRT, "exponential": EXPONENTIAL, "constant": CONSTANT}

@@ -6,11 +6,11 @@ obscurance. So what a mirror pixel needs is a list of reflected hits, each with 
 
 import numpy as np
 
-from ..arrays import Float32, Rgb
-from ..embree.packets import intersect, set_ray
-from ..hits import SURFACE, Hits, World, record_hits
-from ..kernel import inlined, kernel
-from ..sampling import mix
+from framearray_cli.base.arrays import Float32, Rgb
+from framearray_cli.embree.packets import intersect, set_ray
+from framearray_cli.hits import SURFACE, Hits, World, record_hits
+from framearray_cli.kernel import inlined, kernel
+from framearray_cli.sampling import mix
 
 
 @inlined

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Float32, Int32, Rgb, Triple
-from ..embree.packets import intersect, set_ray
-from ..hits import SURFACE, Hits, World, record_hits
-from ..kernel import inlined, kernel
-from ..sampling import CHOICE, HEMISPHERE, above, cosine_direction, mix, r2, word
+from framearray_cli.base.arrays import Float32, Int32, Rgb, Triple
+from framearray_cli.embree.packets import intersect, set_ray
+from framearray_cli.hits import SURFACE, Hits, World, record_hits
+from framearray_cli.kernel import inlined, kernel
+from framearray_cli.sampling import CHOICE, HEMISPHERE, above, cosine_direction, mix, r2, word
 
 DIFFUSE, MIRROR, END = 0, 1, 2
 # Walks end here whatever they carry: 0.97^256 is four ten-thousandths. Nearly all end long before by themselves.

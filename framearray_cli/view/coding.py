@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Bytes, Float32
-from ..colour import linear_from_srgb8, srgb_from_linear
+from framearray_cli.base.arrays import Bytes, Float32
+from framearray_cli.base.colour import linear_from_srgb8, srgb_from_linear
 
 # Beyond it a step of the code is more than a tenth of the value, and a lamp seen directly is white at any exposure.
 MOST_WHITE = 64.0

@@ -4,8 +4,9 @@ import os
 import shutil
 from pathlib import Path
 
-from ..errors import OutputError
-from ..files import reason, whole_folder
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import reason, whole_folder
+
 from .pagefiles import page_files
 from .tiles import INDEX, TILES, Tiles
 

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Float32, is_number
-from ..images import FOR_SCREENS, format_name
-from ..manifest import Manifest
+from framearray_cli.base.arrays import Float32, is_number
+from framearray_cli.images import FOR_SCREENS, format_name
+from framearray_cli.manifest import Manifest
+
 from .streams import LAYERS, Stream
 
 FORMAT = 1  # of the index and the tiles; another number makes them all anew

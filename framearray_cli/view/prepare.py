@@ -3,7 +3,8 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, as_completed
 
-from ..errors import OutputError
+from framearray_cli.base.errors import OutputError
+
 from .tiles import Tiles
 
 

@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..errors import OutputError
-from ..files import make_folder
-from ..images import require_writer
-from ..manifestfile import read_manifest
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import make_folder
+from framearray_cli.images import require_writer
+from framearray_cli.manifestfile import read_manifest
+
 from .export import check_target, export
 from .prepare import prepare_all
 from .server import PageServer

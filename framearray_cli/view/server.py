@@ -10,8 +10,9 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 from urllib.parse import urlsplit
 
-from ..errors import OutputError
-from ..files import reason
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import reason
+
 from .pagefiles import content_type, page_files
 from .tiles import INDEX, Tiles
 

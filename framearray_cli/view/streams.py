@@ -7,11 +7,12 @@ from typing import Literal
 
 import numpy as np
 
-from ..arrays import Float32, Image
-from ..errors import OutputError
-from ..filepatterns import file_name
-from ..images import FOR_SCREENS, format_name, read_image
-from ..manifest import Manifest, ManifestGroup, image_path, layers_path
+from framearray_cli.base.arrays import Float32, Image
+from framearray_cli.base.errors import OutputError
+from framearray_cli.filepatterns import file_name
+from framearray_cli.images import FOR_SCREENS, format_name, read_image
+from framearray_cli.manifest import Manifest, ManifestGroup, image_path, layers_path
+
 from .coding import PLAIN, Coding, coding_for, data_coding
 
 Role = Literal["image", "group", "ambient", "background", "layer"]

@@ -22,12 +22,13 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Bytes
-from ..errors import OutputError
-from ..files import reason, whole_file, write_bytes
-from ..images import read_layers
-from ..manifest import Manifest, layers_path
-from ..pngjpeg import encode_jpeg
+from framearray_cli.base.arrays import Bytes
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import reason, whole_file, write_bytes
+from framearray_cli.images import read_layers
+from framearray_cli.manifest import Manifest, layers_path
+from framearray_cli.pngjpeg import encode_jpeg
+
 from .coding import Coding, encode
 from .index import index_table, sheet_layout
 from .streams import Stream, choose_coding, layer_streams, read_values, source_file, streams_of

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.arrays import Float64
+from framearray_cli.base.arrays import Float64
 from framearray_cli.embree import EmbreeScene
 from framearray_cli.prepare import Prepared, open_embree, plan_work
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import uniform_filter
 
-from framearray_cli.arrays import Float32, Float64, Image
+from framearray_cli.base.arrays import Float32, Float64, Image
 from framearray_cli.crew import TracePool
 from framearray_cli.loop import window_of
 from framearray_cli.report.case import Case, planned, under

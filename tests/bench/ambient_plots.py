@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image as Pillow
 
-from framearray_cli.arrays import Float32, Image
-from framearray_cli.colour import srgb8_from_linear
+from framearray_cli.base.arrays import Float32, Image
+from framearray_cli.base.colour import srgb8_from_linear
 
 from .ambient_levels import METHODS
 from .plots import ready, tick

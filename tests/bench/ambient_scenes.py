@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.arrays import Float64
-from framearray_cli.job import Job
-from framearray_cli.jobfile import read_job
+from framearray_cli.base.arrays import Float64
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import read_job
 from framearray_cli.lights import some_lights
 from framearray_cli.meshes import Material
 from framearray_cli.meshes.model import Part

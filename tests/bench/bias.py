@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from framearray_cli.arrays import Float32, Float64
+from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.camera import Cameras
 
 from .campaths import CAMERAS, MIDDLE, N_R, seen_by

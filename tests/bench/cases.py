@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-from framearray_cli.job import Job
-from framearray_cli.jobfile import read_job
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import read_job
 from framearray_cli.report.case import Case as Case
 from framearray_cli.report.case import opened as opened
 from framearray_cli.report.case import under as under

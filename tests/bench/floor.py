@@ -20,7 +20,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from framearray_cli.arrays import Bytes, Float32, Float64
+from framearray_cli.base.arrays import Bytes, Float32, Float64
 from framearray_cli.crew import TracePool
 from framearray_cli.embree.masks import _pointer
 from framearray_cli.embree.packets import (

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import tomli_w
 
-from framearray_cli.jobfile import job_table
+from framearray_cli.job.read import job_table
 
 from .cases import JOBS, job_named
 from .machine import busy

@@ -5,7 +5,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.arrays import Float32, Float64
+from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.camera import Cameras
 
 Mask: TypeAlias = NDArray[np.bool_]

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from framearray_cli.arrays import Float64
-from framearray_cli.job import Job
+from framearray_cli.base.arrays import Float64
+from framearray_cli.job.job import Job
 from framearray_cli.meshes import Material, Meshes
 from framearray_cli.meshes.model import Part
 from framearray_cli.paths import eyes, lights

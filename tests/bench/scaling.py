@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.arrays import Float32, Float64
+from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.lights import DIRECTIONAL, LightArrays, padded
 from framearray_cli.paths import Eyes
 from framearray_cli.planes import pictures

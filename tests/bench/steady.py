@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.arrays import Images, Int32
+from framearray_cli.base.arrays import Images, Int32
 from framearray_cli.crew import TracePool
 from framearray_cli.images import ImageFormat
 from framearray_cli.loop import ready_frames

@@ -15,7 +15,7 @@ from handed import JOB, N, begun_again, finished, same
 from program import PACKAGE_PARENT, finish, start, wait_for, write_job
 
 import framearray_cli
-from framearray_cli.record import digest
+from framearray_cli.base.hashing import digest
 
 pytest.importorskip("distributed", reason="Dask distributed is not installed (extra dask)")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 there")

@@ -5,8 +5,7 @@ import importlib
 import pytest
 
 from framearray_cli import cli
-from framearray_cli.cli import ending
-from framearray_cli.errors import (
+from framearray_cli.base.errors import (
     BusyError,
     CheckError,
     JobError,
@@ -16,7 +15,8 @@ from framearray_cli.errors import (
     SceneError,
     WorkerError,
 )
-from framearray_cli.interrupts import Stopped
+from framearray_cli.base.signals import Stopped
+from framearray_cli.cli import ending
 
 COMMANDS = [command.callback.__name__ for command in cli.app.registered_commands]
 ENDINGS = [

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from program import run
 
-from framearray_cli import __version__, errors
+from framearray_cli import __version__
+from framearray_cli.base import errors
 from framearray_cli.cli import app
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "guide" / "cli.md"

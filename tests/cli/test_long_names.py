@@ -10,7 +10,7 @@ OUT, OTHER = "out", "other.png"
 @pytest.fixture(scope="module")
 def rendered(tmp_path_factory):
     """A folder with a job, and its frame array in `out`."""
-    from framearray_cli.jobfile import read_job
+    from framearray_cli.job.read import read_job
     from framearray_cli.render import render
 
     folder = tmp_path_factory.mktemp("array")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from program import finish, names, run, start, write_job
 
-from framearray_cli.errors import CheckError, JobError, OutputError, SceneError
+from framearray_cli.base.errors import CheckError, JobError, OutputError, SceneError
 
 
 def test_exit_codes_are_those_of_the_documentation():

@@ -7,9 +7,9 @@ import pytest
 from rich.console import Console
 
 from framearray_cli import screen
-from framearray_cli.errors import OutputError
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.units import duration, size
 from framearray_cli.screen import Screen, say
-from framearray_cli.units import duration, size
 
 
 class Clock:

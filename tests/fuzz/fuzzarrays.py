@@ -9,7 +9,7 @@ import numpy as np
 import tiny
 import tomli_w
 
-from framearray_cli.jobfile import read_job
+from framearray_cli.job.read import read_job
 from framearray_cli.render import render
 
 from . import jobseeds

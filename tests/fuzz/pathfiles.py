@@ -10,7 +10,7 @@ from typing import Any
 
 from bench.results import ROOT
 
-from framearray_cli.jobschema import file_schema
+from framearray_cli.base.forms.schema import file_schema
 from framearray_cli.movie.pathfile import MoviePath
 
 from .case import Arguments, Case

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator
 from random import Random
 from typing import Any, TypeAlias
 
-from framearray_cli.jobschema import Schema, find, resolved, variants
-from framearray_cli.jobvalues import Place
+from framearray_cli.base.forms.schema import Schema, find, resolved, variants
+from framearray_cli.base.forms.table import Place
 
 from . import values
 

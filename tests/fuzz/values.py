@@ -4,7 +4,7 @@ import datetime
 from random import Random
 from typing import Any
 
-from framearray_cli.jobschema import Schema, resolved, variants
+from framearray_cli.base.forms.schema import Schema, resolved, variants
 
 NUMBERS: tuple[Any, ...] = (
     0, 1, -1, 2, 7, 255, 65535, 65536, 2**31 - 1, 2**31, -(2**31), 2**32, 2**53 + 1, 2**63 - 1, 2**63, -(2**63), 2**64,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from framearray_cli.accumulate import HitSource, SourceList, accumulate
-from framearray_cli.arrays import with_room
+from framearray_cli.base.arrays import with_room
 from framearray_cli.compose import empty_band
 from framearray_cli.lanes import LANES
 from framearray_cli.work import INDIRECT, LIT, REFLECTIVITY, WEIGHT, HitRecords, Placed

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from framearray_cli.arrays import Bytes
+from framearray_cli.base.arrays import Bytes
 
 PATIENCE_S = 30.0
 # WebGL 2 without a graphics card; root, as in containers, has no sandbox.

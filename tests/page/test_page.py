@@ -7,7 +7,7 @@ from chromium import PHONE, shown
 from expected import bounds, outside
 from handmade import N_C, N_L, soft
 
-from framearray_cli.colour import linear_from_srgb, srgb8_from_linear
+from framearray_cli.base.colour import linear_from_srgb, srgb8_from_linear
 from framearray_cli.images import write_image
 from framearray_cli.manifest import image_path
 from framearray_cli.pictures import Pictures, Relight, ambient_at

@@ -10,7 +10,7 @@ import pytest
 from chromium import shown
 from expected import bounds, outside
 
-from framearray_cli.errors import OutputError
+from framearray_cli.base.errors import OutputError
 from framearray_cli.view.run import open_tiles, write_page
 
 

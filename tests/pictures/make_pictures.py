@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from framearray_cli.arrays import Float32
-from framearray_cli.colour import srgb8_from_linear
+from framearray_cli.base.arrays import Float32
+from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.images import read_image, read_layers
-from framearray_cli.job import Job
-from framearray_cli.jobfile import job_table, read_job
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import job_table, read_job
 from framearray_cli.manifest import Manifest, image_path, layers_path
 from framearray_cli.manifestfile import read_manifest
 from framearray_cli.movie.assemble import assemble

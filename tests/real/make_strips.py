@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from framearray_cli.colour import srgb8_from_linear
+from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.images import read_image
 from framearray_cli.manifest import image_path
 from framearray_cli.manifestfile import read_manifest

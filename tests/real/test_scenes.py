@@ -11,7 +11,7 @@ import pytest
 from scenes import scenes_folder, shared_scene
 
 from framearray_cli.images import read_image, read_layers
-from framearray_cli.job import Job
+from framearray_cli.job.job import Job
 from framearray_cli.manifest import Manifest, image_path, layers_path
 from framearray_cli.manifestfile import read_manifest
 from framearray_cli.render import render

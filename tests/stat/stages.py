@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.images import read_image
-from framearray_cli.job import Job
+from framearray_cli.job.job import Job
 from framearray_cli.manifest import image_path
 from framearray_cli.manifestfile import read_manifest
 from framearray_cli.progress import RenderEvents

@@ -12,7 +12,7 @@ from stages import FURNACE, Part, box, make_job, point, quad, sun, write_scene
 from ztests import Estimate, chi2_bounds, difference, estimate
 
 from framearray_cli.hits import World
-from framearray_cli.job import Job
+from framearray_cli.job.job import Job
 from framearray_cli.prepare import open_embree, plan_work, prepare
 from framearray_cli.terms.ambient import Ambient
 from framearray_cli.terms.ambient_light import LightWalks, ambient_by_light

@@ -12,7 +12,7 @@ from stages import Part, look, make_job, point, quad, result_of, sun, write_scen
 from framearray_cli.crew import Scratch
 from framearray_cli.eyehits import Samples, native_hits
 from framearray_cli.hits import SURFACE
-from framearray_cli.job import Job
+from framearray_cli.job.job import Job
 from framearray_cli.prepare import open_embree, plan_work, prepare
 from framearray_cli.terms.direct import direct
 

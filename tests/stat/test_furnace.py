@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from stages import result_of
 from ztests import Estimate, chi2_bounds, estimate
 
-from framearray_cli.job import Job
-from framearray_cli.jobfile import read_job
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import read_job
 from framearray_cli.paths import eyes, lights
 
 JOBS = Path(__file__).resolve().parents[2] / "jobs"

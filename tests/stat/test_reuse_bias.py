@@ -16,7 +16,7 @@ from ztests import differing
 
 from framearray_cli.allotment import Allotment, blocks_of
 from framearray_cli.crew import TracePool
-from framearray_cli.job import Job
+from framearray_cli.job.job import Job
 from framearray_cli.loop import window_of
 from framearray_cli.prepare import open_embree, plan_work, prepare
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from stages import box, make_job, quad, write_scene
 
 from framearray_cli.crew import TracePool
-from framearray_cli.job import Job
+from framearray_cli.job.job import Job
 from framearray_cli.loop import window_of
 from framearray_cli.prepare import open_embree, plan_work, prepare
 from framearray_cli.standarderror import standard_error

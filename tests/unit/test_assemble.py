@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from framearray_cli.colour import srgb8_from_linear
-from framearray_cli.errors import JobError, MissingExtraError, OutputError
+from framearray_cli.base.colour import srgb8_from_linear
+from framearray_cli.base.errors import JobError, MissingExtraError, OutputError
 from framearray_cli.filepatterns import file_patterns
 from framearray_cli.images import ImageFormat, read_image, write_image
 from framearray_cli.manifest import Manifest, ManifestCamera, ManifestLight, image_path

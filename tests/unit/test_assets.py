@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scenes import QUAD_UVS, Glb, png
 
-from framearray_cli.errors import SceneError
+from framearray_cli.base.errors import SceneError
 from framearray_cli.meshes import read_meshes, read_stage
 from framearray_cli.meshes.assets import AssetError, Assets
 from framearray_cli.meshes.limit import Limit

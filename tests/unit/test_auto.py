@@ -20,7 +20,7 @@ from framearray_cli.auto import (
 )
 from framearray_cli.expected import Model, Reuse
 from framearray_cli.identity import job_fingerprint
-from framearray_cli.jobfile import job_table
+from framearray_cli.job.read import job_table
 from framearray_cli.prepare import open_embree
 
 AUTO = {"reuse": {"n_r": "auto"}, "samples": {"hits": "auto"}}

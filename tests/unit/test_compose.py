@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from framearray_cli.accumulate import HitSource, SourceList, accumulate, compose_differences, weigh_halves
-from framearray_cli.arrays import with_room
+from framearray_cli.base.arrays import with_room
 from framearray_cli.compose import MOST, Band, Finish, as_stored, empty_band, finish
 from framearray_cli.lanes import LANES
 from framearray_cli.reuse import sort_by_pixel

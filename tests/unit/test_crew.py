@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import tiny
 
-from framearray_cli.arrays import LINE
+from framearray_cli.base.arrays import LINE
 from framearray_cli.crew import ArrayPool, TracePool
 
 

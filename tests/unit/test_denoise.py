@@ -7,8 +7,8 @@ import pytest
 import tiny
 
 from framearray_cli import denoise, window
+from framearray_cli.base.errors import MissingExtraError
 from framearray_cli.denoise import denoised
-from framearray_cli.errors import MissingExtraError
 
 SKY = {"background": [0.5, 0.5, 0.5]}
 

@@ -12,7 +12,7 @@ from tiny import WALK
 
 from framearray_cli.crew import TracePool
 from framearray_cli.hits import World
-from framearray_cli.job import Job
+from framearray_cli.job.job import Job
 from framearray_cli.render import render
 from framearray_cli.terms.ambient_light import LightWalks, ambient_by_light
 

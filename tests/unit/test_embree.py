@@ -15,6 +15,7 @@ import tiny
 from embreex import rtcore_scene
 
 from framearray_cli import embree
+from framearray_cli.base.errors import SceneError
 from framearray_cli.embree import EmbreeScene
 from framearray_cli.embree.packets import (
     DIRECTION,
@@ -33,7 +34,6 @@ from framearray_cli.embree.packets import (
     intersect,
     occlude,
 )
-from framearray_cli.errors import SceneError
 from framearray_cli.lanes import LANES
 from framearray_cli.meshes import Material
 from framearray_cli.scene import Scene, load_scene

@@ -18,8 +18,8 @@ from boxarrays import (
     write_groups,
 )
 
-from framearray_cli.colour import linear_from_srgb8, srgb8_from_linear
-from framearray_cli.errors import JobError, OutputError
+from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
+from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.export import KINDS, export
 from framearray_cli.images import ImageFormat, read_image
 from framearray_cli.manifest import Manifest, image_path

@@ -10,7 +10,7 @@ from boxarrays import HIGH, LOW, RESOLUTION, colour_at, look_at, plain_manifest,
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from framearray_cli.colour import srgb8_from_linear
+from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.export import export
 from framearray_cli.export.colmap import camera_from_world, quaternion
 from framearray_cli.export.points import smooth

@@ -2,8 +2,8 @@
 
 import pytest
 
-from framearray_cli.errors import MissingExtraError
-from framearray_cli.extras import extra
+from framearray_cli.base.errors import MissingExtraError
+from framearray_cli.base.extras import extra
 
 
 def test_the_message_says_how_to_install_it() -> None:

@@ -9,10 +9,10 @@ import handmade
 import pytest
 from boxarrays import plain_manifest, write_array
 
-from framearray_cli.errors import OutputError
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import whole_folder
+from framearray_cli.base.signals import Stopped
 from framearray_cli.export import export as export_array
-from framearray_cli.files import whole_folder
-from framearray_cli.interrupts import Stopped
 from framearray_cli.view.export import export as export_page
 from framearray_cli.view.prepare import prepare_all
 from framearray_cli.view.run import open_tiles

@@ -9,7 +9,7 @@ import pytest
 from scenes import Glb
 from staged import QUARTER, animate, camera, light, shift, turn_y
 
-from framearray_cli.errors import SceneError
+from framearray_cli.base.errors import SceneError
 from framearray_cli.meshes import read_stage
 
 

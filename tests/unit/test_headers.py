@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from framearray_cli.errors import SceneError
+from framearray_cli.base.errors import SceneError
 from framearray_cli.meshes import read_meshes
 from framearray_cli.meshes.headers import check_headers
 from framearray_cli.meshes.limit import Limit

@@ -8,11 +8,11 @@ import jsonschema
 import pytest
 from pydantic import ValidationError
 
-from framearray_cli.job import Job
-from framearray_cli.jobfile import job_table
-from framearray_cli.jobschema import job_schema
-from framearray_cli.jobvalues import changed
-from framearray_cli.problems import problems_of
+from framearray_cli.base.forms.problems import problems_of
+from framearray_cli.base.forms.table import changed
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import job_table
+from framearray_cli.job.schema import job_schema
 
 EXAMPLE = """
 name = "cabin"                    # starts every file name

@@ -4,12 +4,12 @@ import re
 import tomllib
 from pathlib import Path
 
-from framearray_cli.job import Job
-from framearray_cli.jobdocs import EXAMPLE, reference, schema_text
-from framearray_cli.jobschema import file_schema, find, sections, words
+from framearray_cli.base.forms.schema import file_schema, find, sections, words
+from framearray_cli.job.docs import EXAMPLE, reference, schema_text
+from framearray_cli.job.job import Job
 
 GUIDE = Path(__file__).resolve().parents[2] / "docs" / "guide"
-REMEDY = "out of date: run `python -m framearray_cli.jobdocs docs/guide/`"
+REMEDY = "out of date: run `python -m framearray_cli.job.docs docs/guide/`"
 
 
 def test_published_files_are_up_to_date():

@@ -9,11 +9,12 @@ import tomli_w
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import framearray_cli.problems
-from framearray_cli.errors import JobError
-from framearray_cli.job import Job
-from framearray_cli.jobfile import job_table, load_toml, read_job
-from framearray_cli.jobvalues import shown
+import framearray_cli.base.forms.problems
+from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.toml import load_toml
+from framearray_cli.base.forms.words import shown
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import job_table, read_job
 
 JOB = """
 name = "room"
@@ -122,8 +123,10 @@ def test_dots_within_a_text_are_no_keys(tmp_path):
 )
 def test_a_hundred_thousand_problems_are_not_all_put_into_words(tmp_path, more, monkeypatch):
     told = []
-    whole = framearray_cli.problems._problem
-    monkeypatch.setattr(framearray_cli.problems, "_problem", lambda *given: told.append(given) or whole(*given))
+    whole = framearray_cli.base.forms.problems._problem
+    monkeypatch.setattr(
+        framearray_cli.base.forms.problems, "_problem", lambda *given: told.append(given) or whole(*given)
+    )
     path = write(tmp_path)
     path.write_text(path.read_text() + "".join(more.format(k) for k in range(5000)))
     assert re.fullmatch(r"and \d{4,5} more problems", problems(path)[-1])
@@ -303,7 +306,7 @@ def test_no_content_gives_anything_but_a_job_or_a_job_error(data):
     """Put rubbish anywhere into a good job: every way it fails has words, and none of them are pydantic's."""
     from pydantic import ValidationError
 
-    from framearray_cli.problems import problems_of
+    from framearray_cli.base.forms.problems import problems_of
 
     key = {"frame": 0, "eye": [0, 0, 5], "target": [0, 0, 0]}
     lamp = {"type": "point", "keys": [{"frame": 0, "position": [1, 2, 0], "intensity": 10}]}

@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from framearray_cli.arrays import Float64
-from framearray_cli.job import Job
-from framearray_cli.jobfile import load_toml, read_job
+from framearray_cli.base.arrays import Float64
+from framearray_cli.base.forms.toml import load_toml
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import read_job
 from framearray_cli.paths import eyes, lights
 from framearray_cli.scene import Scene, load_scene
 

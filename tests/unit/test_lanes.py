@@ -34,12 +34,7 @@ from framearray_cli.lanes import (
     words,
 )
 from framearray_cli.sampling import above, cosine_direction, disc
-from framearray_cli.surface import (
-    Surfaces,
-    nearest_texel_at,
-    surfaces,
-    texture_at,
-)
+from framearray_cli.surface import Surfaces, nearest_texel_at, surfaces, texture_at
 
 ULP = 2.0**-23  # one float32 rounding, of a number of size 1, is at most half of it
 FEW = 8 * ULP

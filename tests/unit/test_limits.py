@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from framearray_cli import limits, usage
-from framearray_cli.errors import LimitError
-from framearray_cli.limits import available_cores, group_memory, require_address_space
+from framearray_cli.base import memory as limits
+from framearray_cli.base import memory as usage
+from framearray_cli.base.errors import LimitError
+from framearray_cli.base.memory import available_cores, group_memory, require_address_space
 
 resource = pytest.importorskip("resource")
 
@@ -158,7 +159,7 @@ def test_free_memory_without_any_limit_is_the_machine_s(monkeypatch):
 
 def test_free_memory_is_what_the_address_space_has_left():
     code = (
-        "import resource; from framearray_cli.usage import free_memory; a = free_memory();"
+        "import resource; from framearray_cli.base.memory import free_memory; a = free_memory();"
         "resource.setrlimit(resource.RLIMIT_AS, (3 << 30,) * 2); b = free_memory();"
         "kept = bytearray(1 << 30); print(a, b, b - free_memory())"
     )

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from framearray_cli.errors import OutputError
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.hashing import fingerprint
 from framearray_cli.filepatterns import file_patterns
-from framearray_cli.fingerprint import fingerprint
 from framearray_cli.manifest import Manifest, ManifestCamera, ManifestLight, image_path, layers_path, matrix_rows
 from framearray_cli.manifestfile import read_manifest, to_toml, write_manifest
 

@@ -72,6 +72,6 @@ def test_peak_memory_of_a_short_and_of_a_long_path_is_the_same(tmp_path: Path) -
 def test_the_peak_is_that_of_this_process_alone() -> None:
     """A process that a large one starts is not large itself."""
     ballast = np.ones(400 * 2**20, np.uint8)
-    code = "from framearray_cli.usage import peak_memory; print(peak_memory())"
+    code = "from framearray_cli.base.memory import peak_memory; print(peak_memory())"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert int(run.stdout) < ballast.nbytes

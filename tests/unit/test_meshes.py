@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scenes import QUAD, QUAD_UVS, Glb, png, shared_scene
 
-from framearray_cli.errors import SceneError
+from framearray_cli.base.errors import SceneError
 from framearray_cli.meshes import Meshes, read_meshes
 from framearray_cli.meshes.limit import Limit
 from framearray_cli.meshes.polygons import Ears, triangulate

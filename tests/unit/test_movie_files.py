@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from movies import Decoded, barred, decoded, path_file, plain, rms
 
-from framearray_cli.colour import srgb8_from_linear, srgb_from_linear
-from framearray_cli.errors import MissingExtraError, OutputError
+from framearray_cli.base.colour import srgb8_from_linear, srgb_from_linear
+from framearray_cli.base.errors import MissingExtraError, OutputError
 from framearray_cli.movie.animation import delays
 from framearray_cli.movie.assemble import assemble
 from framearray_cli.movie.yuv import planes_422_10

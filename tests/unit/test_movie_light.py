@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from movies import grouped, path_file, plain
 
-from framearray_cli.errors import JobError
+from framearray_cli.base.errors import JobError
 from framearray_cli.images import read_image
-from framearray_cli.jobfile import read_job
+from framearray_cli.job.read import read_job
 from framearray_cli.manifest import BACKGROUND, Manifest
 from framearray_cli.movie.assemble import assemble
 from framearray_cli.movie.curves import at, relights
@@ -103,7 +103,7 @@ intensity = [{ time = 0, value = 1 }, { time = "50%", value = 0 }, { time = "100
 
 
 def test_codes_of_frames_are_those_of_the_pictures(array: Manifest, tmp_path: Path) -> None:
-    from framearray_cli.colour import srgb8_from_linear
+    from framearray_cli.base.colour import srgb8_from_linear
 
     path = path_file(tmp_path, "[[segments]]\nframes = 4\nlight = [0, 3]\n[groups.sun]\nintensity = 0.5\n")
     assemble(array.directory, path, tmp_path / "f.#.png")

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from movies import decoded, grouped, path_file, plain
 
-from framearray_cli.colour import srgb8_from_linear
-from framearray_cli.errors import JobError
+from framearray_cli.base.colour import srgb8_from_linear
+from framearray_cli.base.errors import JobError
 from framearray_cli.movie.assemble import assemble
 from framearray_cli.movie.display import SRGB, find_view
 from framearray_cli.movie.label import burn

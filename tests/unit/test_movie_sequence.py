@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from movies import barred, grouped, path_file, plain
 
-from framearray_cli.errors import OutputError
+from framearray_cli.base.errors import OutputError
 from framearray_cli.imagecheck import check_image
 from framearray_cli.images import ImageFormat, read_image, write_image
 from framearray_cli.manifest import Manifest, image_path

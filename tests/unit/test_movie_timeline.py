@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from framearray_cli.errors import JobError
+from framearray_cli.base.errors import JobError
 from framearray_cli.filepatterns import file_patterns
 from framearray_cli.manifest import Manifest, ManifestCamera, ManifestGroup, ManifestLight
 from framearray_cli.movie.easing import eased

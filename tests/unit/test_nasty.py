@@ -8,7 +8,7 @@ import pytest
 from scenes import scenes_folder, shared_scene
 from test_scene import check_shapes
 
-from framearray_cli.errors import SceneError
+from framearray_cli.base.errors import SceneError
 from framearray_cli.scene import Scene, load_scene, scene_report_lines
 
 INDEX = scenes_folder() / "nasty" / "INDEX.json"

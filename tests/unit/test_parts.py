@@ -82,7 +82,7 @@ def test_by_default_all_workers_have_work_to_the_end(workers, n, n_r):
 def test_dask_is_named_where_it_is_missing(monkeypatch):
     import sys
 
-    from framearray_cli.errors import MissingExtraError
+    from framearray_cli.base.errors import MissingExtraError
 
     cluster = importlib.import_module("framearray_cli.parts.cluster")
     monkeypatch.setitem(sys.modules, "distributed", None)

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from framearray_cli.errors import JobError
-from framearray_cli.job import Job
+from framearray_cli.base.errors import JobError
+from framearray_cli.job.job import Job
 from framearray_cli.paths import between_keys, eyes, lights
 from framearray_cli.sphere import directions_between, slerp, turn, unit
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from handmade import cameras, grouped_manifest, light
 
-from framearray_cli.errors import OutputError
+from framearray_cli.base.errors import OutputError
 from framearray_cli.images import ImageFormat, write_image
 from framearray_cli.manifest import Manifest, array_files
 from framearray_cli.manifestfile import read_manifest, write_manifest

@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 from boxarrays import grouped_manifest, plain_manifest
 
-from framearray_cli.errors import JobError
+from framearray_cli.base.errors import JobError
 from framearray_cli.places import indices, light_places, plain_names, spread_with_ends
 
 

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from framearray_cli.errors import OutputError
+from framearray_cli.base.errors import OutputError
 from framearray_cli.record import Entry, RecordedRun, RecordWriter, read_records, record_file
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import tiny
 
-from framearray_cli.errors import JobError, MissingExtraError
+from framearray_cli.base.errors import JobError, MissingExtraError
 from framearray_cli.report import flip, read_vary
 from framearray_cli.report.crops import _heat, _signed, _worst
 from framearray_cli.report.front import advice, times_faster, worth_trying

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scenes import QUAD, QUAD_FACES, QUAD_UVS, Glb, png, shared_scene
 
-from framearray_cli.errors import SceneError
-from framearray_cli.meshes import Material, Meshes, Part, has_area, repeated
+from framearray_cli.base.errors import SceneError
+from framearray_cli.meshes import Material, Meshes, Part
+from framearray_cli.meshes.cleaning import has_area, repeated
 from framearray_cli.scene import Scene, build_scene, load_scene, scene_report_lines
 
 

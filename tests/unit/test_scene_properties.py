@@ -14,7 +14,7 @@ from fuzz.sceneseeds import Seed, made_seeds, split_glb
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from framearray_cli.errors import SceneError
+from framearray_cli.base.errors import SceneError
 from framearray_cli.meshes import read_stage
 from framearray_cli.scene import Scene, load_scene
 

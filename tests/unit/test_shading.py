@@ -7,7 +7,7 @@ import pytest
 from test_compose import lit_packets
 from test_obscurance import points
 
-from framearray_cli.arrays import with_room
+from framearray_cli.base.arrays import with_room
 from framearray_cli.hits import ESCAPED, SURFACE
 from framearray_cli.lanes import LANES
 from framearray_cli.shading import write_rows

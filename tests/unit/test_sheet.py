@@ -8,8 +8,8 @@ from boxarrays import grouped_manifest, plain_manifest, write_array, write_group
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from framearray_cli.colour import srgb8_from_linear
-from framearray_cli.errors import JobError, OutputError
+from framearray_cli.base.colour import srgb8_from_linear
+from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.images import read_image
 from framearray_cli.manifest import Manifest, image_path
 from framearray_cli.pictures import Pictures

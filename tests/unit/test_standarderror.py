@@ -10,7 +10,7 @@ from tiny import WALK
 
 from framearray_cli.crew import TracePool
 from framearray_cli.images import read_image, read_layers
-from framearray_cli.job import Job
+from framearray_cli.job.job import Job
 from framearray_cli.loop import window_of
 from framearray_cli.manifestfile import read_manifest
 from framearray_cli.render import render

@@ -10,11 +10,12 @@ import tiny
 from scenes import Glb
 from staged import LENS, QUARTER, animate, camera, light, shift, turn_y
 
+from framearray_cli.base.colour import srgb_from_linear
+from framearray_cli.base.errors import JobError, OutputError, SceneError
+from framearray_cli.base.forms.toml import load_toml
 from framearray_cli.cli import main
-from framearray_cli.colour import srgb_from_linear
-from framearray_cli.errors import JobError, OutputError, SceneError
-from framearray_cli.job import Job
-from framearray_cli.jobfile import load_toml, read_job
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import read_job
 from framearray_cli.paths import eyes, lights
 from framearray_cli.scene import load_scene
 from framearray_cli.start import Start, Wishes, init

@@ -12,9 +12,9 @@ import pytest
 import tiny
 import tomli_w
 
-from framearray_cli.errors import JobError, MissingExtraError
-from framearray_cli.job import Job
-from framearray_cli.jobfile import job_table, read_job
+from framearray_cli.base.errors import JobError, MissingExtraError
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import job_table, read_job
 from framearray_cli.lights import light_arrays
 from framearray_cli.manifestfile import read_manifest
 from framearray_cli.paths import lights

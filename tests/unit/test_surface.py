@@ -7,7 +7,7 @@ import pytest
 import tiny
 from triangles import QUANTITIES, find_numbers
 
-from framearray_cli.colour import linear_from_srgb8
+from framearray_cli.base.colour import linear_from_srgb8
 from framearray_cli.kernel import kernel
 from framearray_cli.meshes import Material
 from framearray_cli.surface import (

@@ -11,13 +11,13 @@ from pydantic import ValidationError
 from tiny import WALK
 
 from framearray_cli.allotment import Allotment, blocks_of
+from framearray_cli.base.errors import JobError
 from framearray_cli.camera import OUTSIDE
 from framearray_cli.crew import TracePool
-from framearray_cli.errors import JobError
 from framearray_cli.eyehits import Samples, native_hits
 from framearray_cli.frame import find_frame
 from framearray_cli.hits import empty_hits
-from framearray_cli.job import Job
+from framearray_cli.job.job import Job
 from framearray_cli.memory import require_memory
 from framearray_cli.rays import room_for_hits
 from framearray_cli.reuse import balance_weights, divide_by_own_hits, scale_by_expected_hits

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from framearray_cli import tomltext
-from framearray_cli.units import GIB, MIB, amount, gibibytes, size
+from framearray_cli.base.forms import text as tomltext
+from framearray_cli.base.units import GIB, MIB, amount, gibibytes, size
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import movies
 import numpy as np
 import pytest
 
-from framearray_cli.errors import OutputError
+from framearray_cli.base.errors import OutputError
 from framearray_cli.exrtiff import last_row
 from framearray_cli.imagecheck import check_image
 from framearray_cli.images import read_image

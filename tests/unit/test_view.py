@@ -13,8 +13,8 @@ import handmade
 import numpy as np
 import pytest
 
-from framearray_cli.colour import srgb8_from_linear
-from framearray_cli.errors import OutputError
+from framearray_cli.base.colour import srgb8_from_linear
+from framearray_cli.base.errors import OutputError
 from framearray_cli.images import ImageFormat, write_image
 from framearray_cli.manifest import image_path, layers_path
 from framearray_cli.pngjpeg import read_codes

@@ -9,20 +9,12 @@ from typing import Any, TypeAlias
 
 from pydantic import BaseModel
 
-from .job import Job
-from .jobvalues import Place, between, number
+from .table import Place
+from .words import between, number
 
 Schema: TypeAlias = dict[str, Any]
 
 LONGEST_KEY = 100  # characters of a key in a message
-
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
-
-
-def job_schema() -> Schema:
-    """Make the JSON Schema (2020-12) of the job file, for editors."""
-    schema = _published(file_schema(Job))
-    return {"$schema": DIALECT, **schema, "title": "framearray job"}
 
 
 @cache  # a file of eyes may have a problem in each of its rows
@@ -49,19 +41,6 @@ def _without_null(node: Any) -> Any:
         node["anyOf"] = options
     if "x-default" in node or ("default" in node and node["default"] is None):
         node.pop("default", None)
-    return node
-
-
-def _published(node: Any) -> Any:
-    """Turn our own keywords into descriptions that every editor shows."""
-    if isinstance(node, list):
-        return [_published(item) for item in node]
-    if not isinstance(node, dict):
-        return node
-    node = {key: _published(value) for key, value in node.items()}
-    node.pop("x-words", None)
-    if (text := node.pop("x-default", None)) is not None:
-        node["description"] = f"{node['description']} Default: {text}."
     return node
 
 

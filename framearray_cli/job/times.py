@@ -8,7 +8,8 @@ from zoneinfo import ZoneInfo, available_timezones
 
 from pydantic import PlainValidator, WithJsonSchema
 
-from .jobvalues import fail, shown
+from framearray_cli.base.forms.table import fail
+from framearray_cli.base.forms.words import shown
 
 MOST_OFFSET = 14.0  # hours; no place on Earth is farther from UTC
 YEARS = (1000, 3000)  # farther away nobody knows how the Earth turns to a second, and its calendar was another

@@ -2,18 +2,19 @@
 
 import re
 from collections.abc import Sequence
-from itertools import pairwise
-from math import hypot
-from typing import Annotated, Any, Literal, NamedTuple, Protocol, TypeAlias
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
-from .jobtimes import Clock, Date, Zone
-from .jobvalues import Direction, Emission, FileName, Float3, Place, Point, Size, Table, computed, fail, fill, shown
+from framearray_cli.base.forms.table import Place, Table, computed, fail, fill
+from framearray_cli.base.forms.words import shown
+
+from .keys import MOST_EYES, key_problems, late_keys
+from .times import Clock, Date, Zone
+from .values import Direction, Emission, Point
 
 MAIN_AXIS = "light"  # of sources that name no axis
 REST_GROUP = "main"  # sources that name no group, where others do
-MOST_EYES = 100_000  # an hour at 24 frames a second; more is a typing error
 
 
 _GROUP_NAME = "[A-Za-z0-9_][A-Za-z0-9_-]{0,39}"
@@ -32,26 +33,6 @@ def _group_name(name: str) -> str:
 GroupName: TypeAlias = Annotated[
     str, AfterValidator(_group_name), Field(json_schema_extra={"pattern": f"^{_GROUP_NAME}$", "x-words": "a name"})
 ]
-
-
-class CameraKey(Table):
-    """Where the camera is at one frame."""
-
-    frame: int = Field(ge=0, lt=MOST_EYES, description="Camera frame, counted from 0.")
-    eye: Point = Field(description="Position of the eye, in the coordinates of the scene file.")
-    target: Point = Field(description="Point that the eye looks at, in the coordinates of the scene file.")
-    up: Direction | None = Field(
-        default=None,
-        description="Direction that is up in the picture. Given at every key or at none.",
-        json_schema_extra=computed("the scene's up axis"),
-    )
-
-    @field_validator("target")
-    @classmethod
-    def _differs_from_eye(cls, target: Float3, info: ValidationInfo) -> Float3:
-        if target == info.data.get("eye"):
-            fail([((), f"expected a point other than the eye, got {shown(target)}, the eye itself")])
-        return target
 
 
 class PointKey(Table):
@@ -80,87 +61,6 @@ class DirectionalKey(Table):
         description="Multiplies `irradiance` by channel. Given at every key of a source or at none.",
         json_schema_extra=computed("1"),
     )
-
-
-class KeyFrame(Protocol):
-    """A table of values at one frame."""
-
-    @property
-    def frame(self) -> int: ...
-
-
-def key_problems(keys: Sequence[KeyFrame], directions: str, optional: str) -> list[tuple[Place, str]]:
-    """Check keys against each other: their order, what they leave out, and directions that turn half a circle."""
-    problems: list[tuple[Place, str]] = []
-    for i, (before, key) in enumerate(pairwise(keys), start=1):
-        if key.frame <= before.frame:
-            text = f"expected more than {before.frame}, the frame of the key before, got {key.frame}"
-            problems.append(((i, "frame"), text))
-        a, b = getattr(before, directions, None), getattr(key, directions, None)
-        if a and b and _opposite(a, b):
-            text = "expected less than half a turn from the key before, got the opposite direction; add a key between"
-            problems.append(((i, directions), text))
-    given = [i for i, key in enumerate(keys) if getattr(key, optional) is not None]
-    if given and len(given) < len(keys):
-        missing = next(i for i in range(len(keys)) if i not in given)
-        problems.append(((missing, optional), f"missing; keys[{given[0]}] gives it, so every key of this list must"))
-    return problems
-
-
-def _opposite(a: Float3, b: Float3) -> bool:
-    """Whether two directions are so close to opposite that no shortest way leads from one to the other."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] <= -hypot(*a) * hypot(*b) * (1 - 1e-8)  # 1e-8: within 0.01 degrees
-
-
-def late_keys(keys: Sequence[KeyFrame], frames: int) -> list[tuple[Place, str]]:
-    """Check that no key lies beyond the last frame; `frames` 0 means that the keys decide."""
-    late = [(i, key.frame) for i, key in enumerate(keys) if frames and key.frame >= frames]
-    return [((i, "frame"), f"expected at most {frames - 1} (frames = {frames}), got {frame}") for i, frame in late]
-
-
-class CameraTable(Table):
-    """The eyes."""
-
-    resolution: Size = Field(default=(400, 300), description="Width and height of every image, pixels.")
-    fov: float = Field(default=60.0, ge=1e-3, le=179.9, description="Vertical field of view, degrees.")
-    frames: int = Field(
-        default=0,
-        ge=1,
-        le=MOST_EYES,
-        description="Number of eyes, N_c.",
-        json_schema_extra=computed("the last key's frame + 1, or the eyes in `file`"),
-    )
-    file: FileName | None = Field(
-        default=None,
-        description="CSV or JSON file with one eye per frame, instead of `keys`.",
-        json_schema_extra=computed("none"),
-    )
-    keys: tuple[CameraKey, ...] = Field(
-        default=(),
-        strict=False,
-        validate_default=True,
-        description="Positions of the eye at some frames; between them it moves smoothly, before the first and after "
-        "the last it stands still. One key: a fixed camera.",
-        json_schema_extra={**computed("the eyes in `file`"), "minItems": 1},
-    )
-
-    @field_validator("keys")
-    @classmethod
-    def _consistent(cls, keys: tuple[CameraKey, ...], info: ValidationInfo) -> tuple[CameraKey, ...]:
-        has_file = info.data.get("file") is not None
-        if has_file and keys:
-            fail([((), "expected either `keys` or `file`, got both")])
-        if not keys and not has_file and "file" in info.data:
-            fail([((), "expected a list of at least 1 table, got none; give `keys` or `file`")])
-        if problems := key_problems(keys, "up", "up") + late_keys(keys, info.data.get("frames", 0)):
-            fail(problems)
-        return keys
-
-    @model_validator(mode="after")
-    def _fill_frames(self) -> "CameraTable":
-        if "frames" not in self.model_fields_set and self.keys:
-            fill(self, "frames", self.keys[-1].frame + 1)
-        return self
 
 
 def _consistent_light_keys(keys: Any) -> Any:

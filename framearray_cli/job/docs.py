@@ -1,13 +1,15 @@
-"""Reference page and JSON Schema of the job file, made from the job: `python -m framearray_cli.jobdocs docs/guide/`."""
+"""Generated pages of docs/guide/: the job file and its schema (`python -m framearray_cli.job.docs docs/guide/`)."""
 
 import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from framearray_cli.base.forms.schema import Schema, Section, file_schema, sections, words
+from framearray_cli.base.forms.text import inline
+
 from .job import Job
-from .jobschema import Schema, Section, file_schema, job_schema, sections, words
-from .tomltext import inline
+from .schema import job_schema
 
 EXAMPLE = """\
 #:schema job.schema.json
@@ -38,7 +40,7 @@ range = 1.5
 INTRODUCTION = f"""\
 # The job file
 
-<!-- Made by `python -m framearray_cli.jobdocs docs/guide/` from framearray_cli/job.py; edit there. -->
+<!-- Made by `python -m framearray_cli.job.docs docs/guide/` from framearray_cli/job/job.py; edit there. -->
 
 A job file says what to render and how: a scene, a camera path, a light path, and settings. It is written in
 [TOML](https://toml.io). This is a whole job of 96 camera positions (eyes) and 48 light positions:

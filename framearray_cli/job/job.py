@@ -11,8 +11,13 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
-from .jobkeys import CameraTable, LightTable
-from .jobmethod import (
+from framearray_cli.base.forms.table import Float3, Place, Table, computed, fail, fill
+from framearray_cli.base.forms.words import shown
+from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_STOPS, MOST_THREADS
+
+from .camera import CameraTable
+from .light import LightTable
+from .method import (
     DEFAULT_HITS,
     DEFAULT_N_R,
     AmbientTable,
@@ -22,22 +27,7 @@ from .jobmethod import (
     SamplesTable,
     SpecularTable,
 )
-from .jobvalues import (
-    MOST_HITS,
-    Bytes,
-    Emission,
-    FileName,
-    Float3,
-    Place,
-    Reflectivity,
-    Table,
-    absolute,
-    computed,
-    fail,
-    fill,
-    shown,
-)
-from .units import LEAST_FPS, MOST_FPS, MOST_STOPS, MOST_THREADS
+from .values import MOST_HITS, Bytes, Emission, FileName, Reflectivity, absolute
 
 Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; every other format is taken as y up
 NAME = "[A-Za-z0-9_][A-Za-z0-9._-]{0,99}"  # what can start a file name on every system

@@ -1,85 +1,24 @@
-"""What a job file is made of: points, directions, colours, sizes, file names, and the base of its tables.
+"""Kinds of values that tables of a job hold, each with its check and its schema."""
 
-Each kind checks itself and says in plain words what it expected and what it found.
-"""
-
-import json
 import math
 import os
 import re
-from collections.abc import Callable, Sequence
-from functools import cache
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Literal, NoReturn, TypeAlias, TypeVar
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, PlainValidator, TypeAdapter, ValidationError, ValidationInfo, WithJsonSchema
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic import PlainValidator, ValidationInfo, WithJsonSchema
 
-Place: TypeAlias = tuple[int | str, ...]  # keys and list positions from the value at hand down to the problem
-Float3: TypeAlias = tuple[float, float, float]
+from framearray_cli.base.forms.table import Float3, fail
+from framearray_cli.base.forms.words import FARTHEST, between, shown
+
 Auto: TypeAlias = Literal["auto"]  # chosen from the camera path, see auto.py
 
-FARTHEST = 1e12  # scene units; squares and cubes of it still fit in float32 (3e38)
 BRIGHTEST = 1e20  # W/sr, W/m2 or radiance; times any reflectivity and over any squared distance it stays finite
+
 SHORTEST = 1e-12  # scene units; a shorter direction is taken for zero
-LONGEST_SHOWN = 40  # characters of a found value in a message
+
 LONGEST_NAME = 1000  # characters of a file name with its folders; systems take 1024, some 4096
-
-
-def fail(problems: Sequence[tuple[Place, str]]) -> NoReturn:
-    """Raise every problem of one value at once, each at its own place below that value."""
-    details = [
-        InitErrorDetails(type=PydanticCustomError("job", "{text}", {"text": text}), loc=place, input=None)
-        for place, text in problems
-    ]
-    raise ValidationError.from_exception_data("job", details)
-
-
-def shown(value: object) -> str:
-    """Describe a found value as it would stand in a TOML file, shortened."""
-    if isinstance(value, dict):
-        return "a table"
-    if isinstance(value, list | tuple):
-        if 0 < len(value) <= 4 and not any(isinstance(item, dict | list | tuple) for item in value):
-            whole = f"[{', '.join(shown(item) for item in value)}]"
-            if len(whole) <= LONGEST_SHOWN:
-                return whole
-        kind = "table" if value and isinstance(value[0], dict) else "value"
-        return f"a list of {len(value)} {kind}{'s' if len(value) != 1 else ''}"
-    if isinstance(value, bool | str):
-        text = json.dumps(value[:1000] if isinstance(value, str) else value, ensure_ascii=False)
-    elif isinstance(value, int) and value.bit_length() > 64:
-        return "a number beyond 64 bits"
-    else:
-        text = str(value)
-    return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 4] + "..." + text[-1]
-
-
-# The reader of TOML takes time and memory by the square of this number.
-MOST_PARTS = 6  # keys with dots between them; no file has more than 4
-_KEY = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
-_LONG_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*+{_KEY}(?:[ \t]*+\.[ \t]*+{_KEY}){{{MOST_PARTS}}}", re.MULTILINE)
-
-
-def long_key(text: str) -> str | None:
-    """What is wrong with a TOML text whose keys have too many parts, or None."""
-    found = _LONG_KEY.search(text)
-    if not found:
-        return None
-    line = text.count("\n", 0, found.start()) + 1
-    return f"line {line}: expected at most {MOST_PARTS} keys with dots between them, got more"
-
-
-def between(low: float, high: float) -> str:
-    """Say a range of numbers, "from 0 to 1"; bounds that only protect the arithmetic are left out."""
-    if high >= FARTHEST:
-        return "" if low <= -FARTHEST else f"of at least {number(low)}"
-    return f"from {number(low)} to {number(high)}"
-
-
-def number(value: float) -> str:
-    """Write a bound: whole numbers in full where they are short."""
-    return str(int(value)) if value == int(value) and abs(value) < FARTHEST else f"{value:g}"
 
 
 def _number_problem(value: object, low: float, high: float, whole: bool) -> str | None:
@@ -174,6 +113,7 @@ def _bytes(value: object) -> int:
 
 
 MOST_HITS = 65000  # hits of one pixel in one frame; random streams tell 2^16 apart
+
 SHARES = (1 / 2, 1 / 3, 1 / 4, 1 / 5, 1 / 6, 1 / 7, 1 / 8)  # of pixels that may get a hit in a frame
 
 
@@ -210,18 +150,23 @@ def _vector_schema(count: int, *, grey: bool = False, whole: bool = False, **bou
 
 
 Point: TypeAlias = Annotated[Float3, PlainValidator(_vector(3, -FARTHEST, FARTHEST)), _vector_schema(3)]
+
 Direction: TypeAlias = Annotated[Float3, PlainValidator(_direction), _vector_schema(3)]
+
 Emission: TypeAlias = Annotated[
     Float3, PlainValidator(_vector(3, 0.0, BRIGHTEST, grey=True)), _vector_schema(3, grey=True, minimum=0)
 ]
+
 Reflectivity: TypeAlias = Annotated[
     Float3, PlainValidator(_vector(3, 0.0, 1.0, grey=True)), _vector_schema(3, grey=True, minimum=0, maximum=1)
 ]
+
 Size: TypeAlias = Annotated[
     tuple[int, int],
     PlainValidator(_vector(2, 1, 16384, whole=True)),
     _vector_schema(2, whole=True, minimum=1, maximum=16384),
 ]
+
 HitCount: TypeAlias = Annotated[
     int | float | Auto,
     PlainValidator(_hits),
@@ -234,11 +179,13 @@ HitCount: TypeAlias = Annotated[
         }
     ),
 ]
+
 Window: TypeAlias = Annotated[
     int | Auto,
     PlainValidator(_window),
     WithJsonSchema({"anyOf": [{"type": "integer", "minimum": 0, "maximum": LONGEST_WINDOW}, {"const": "auto"}]}),
 ]
+
 Bytes: TypeAlias = Annotated[
     int,
     PlainValidator(_bytes),
@@ -246,52 +193,7 @@ Bytes: TypeAlias = Annotated[
         {"anyOf": [{"type": "string"}, {"type": "integer", "minimum": 1}], "x-words": 'text such as "8 GiB"'}
     ),
 ]
+
 FileName: TypeAlias = Annotated[
     Path, PlainValidator(_file_name), WithJsonSchema({"type": "string", "minLength": 1, "x-words": "a file name"})
 ]
-
-
-class Table(BaseModel):
-    """Base of all tables: unknown keys, loose types and non-finite numbers are errors."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-
-_Table = TypeVar("_Table", bound=Table)
-
-
-def fill(table: Table, key: str, value: object) -> None:
-    """Set what the file left out; only while a table is being made."""
-    object.__setattr__(table, key, value)
-
-
-def changed(table: _Table, **values: object) -> _Table:
-    """Copy a table with other values, each checked as one of a file is; `model_copy` takes any name and any value.
-
-    Only single values are checked: a report measures settings that do not go together in a file. A value that is a
-    table has been checked already; its own rules on what goes together would refuse such settings.
-
-    Raises:
-        ValidationError: a key has no such value.
-        TypeError: a key holds another table.
-        KeyError: there is no such key.
-    """
-    for key, value in values.items():
-        if not isinstance(value, Table):
-            _value_check(type(table), key).validate_python(value, strict=True)
-        elif not isinstance(value, type(getattr(table, key))):
-            raise TypeError(f"{key}: expected a {type(getattr(table, key)).__name__}, got a {type(value).__name__}")
-    return table.model_copy(update=values)
-
-
-@cache
-def _value_check(kind: type[Table], key: str) -> TypeAdapter[Any]:
-    field = kind.model_fields[key]
-    bounds = tuple(field.metadata)
-    checked: Any = Annotated[(field.annotation, *bounds)] if bounds else field.annotation
-    return TypeAdapter(checked)
-
-
-def computed(text: str) -> dict[str, Any]:
-    """Describe a default that depends on other keys; it replaces the stored default in schema and docs."""
-    return {"x-default": text}

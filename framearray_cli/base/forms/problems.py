@@ -7,8 +7,8 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from .jobschema import Schema, dotted, either, file_schema, find, sections, variants, words
-from .jobvalues import FARTHEST, shown
+from .schema import Schema, dotted, either, file_schema, find, sections, variants, words
+from .words import FARTHEST, shown
 
 MOST_PROBLEMS = 50  # of a file; more would scroll away what matters
 

@@ -1,19 +1,18 @@
-"""TOML text -> Job, or one JobError with every problem; and Job -> plain tables."""
+"""Job file -> `Job`, or one error with every problem; and `Job` -> plain tables."""
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from .errors import JobError
-from .eyefile import EyeFileError, read_eyes
-from .files import read_at_most
-from .job import Job
-from .jobvalues import absolute, long_key, shown
-from .problems import problems_of
+from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.problems import problems_of
+from framearray_cli.base.forms.toml import load_toml
+from framearray_cli.base.forms.words import shown
 
-LARGEST_FILE = 4 * 1024 * 1024  # bytes; a hand-written job is a thousand times smaller, so more is the wrong file
+from .eyefile import EyeFileError, read_eyes
+from .job import Job
+from .values import absolute
 
 
 def read_job(path: Path) -> Job:
@@ -86,53 +85,3 @@ def _with_eyes(table: dict[str, Any], job_file: Path) -> tuple[dict[str, Any], l
         problems = [f"camera.frames: expected {len(keys)}, the number of eyes in {shown(name)}, got {shown(frames)}"]
         del rest["frames"]
     return {**table, "camera": {**rest, "keys": keys}}, problems
-
-
-def load_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file into plain tables.
-
-    Raises:
-        JobError: the file is missing, not a file, too big, not UTF-8, not TOML or nested too deeply.
-    """
-    data = _read_bytes(path)
-    text = _decode(path, data)
-    if problem := long_key(text):
-        raise JobError(path, [problem])
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise JobError(path, [f"not valid TOML: {error}"]) from error
-    except RecursionError as error:
-        raise JobError(path, ["tables or lists are nested too deeply"]) from error
-    except ValueError as error:  # a number of more digits than Python reads
-        raise JobError(path, ["a number has too many digits"]) from error
-
-
-def _read_bytes(path: Path) -> bytes:
-    """Read a whole file whose size is checked first."""
-    try:
-        if path.is_dir():
-            raise JobError(path, ["expected a TOML file, got a folder"])
-        data = read_at_most(path, LARGEST_FILE)
-    except FileNotFoundError as error:
-        raise JobError(path, ["no such file"]) from error
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise JobError(path, [f"cannot be read: {reason}"]) from error
-    if data is None:
-        raise JobError(path, [f"expected a TOML file of at most {LARGEST_FILE >> 20} MB, got a bigger one"])
-    return data
-
-
-def _decode(path: Path, data: bytes) -> str:
-    """Decode UTF-8, with or without the mark that Windows editors put first."""
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise JobError(path, ["expected UTF-8 text, got UTF-16; save the file as UTF-8"])
-    if b"\0" in data:
-        raise JobError(path, ["expected UTF-8 text, got a binary file"])
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        found = f"byte 0x{data[error.start]:02x} in line {line}"
-        raise JobError(path, [f"expected UTF-8 text, got {found}; save the file as UTF-8"]) from error

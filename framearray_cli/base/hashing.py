@@ -1,6 +1,7 @@
 """Fingerprints of what went into a render: equal inputs, equal text."""
 
 import hashlib
+from pathlib import Path
 
 
 def fingerprint(*parts: bytes | memoryview) -> str:
@@ -12,3 +13,20 @@ def fingerprint(*parts: bytes | memoryview) -> str:
     for part in parts:
         total.update(hashlib.sha256(part).digest())  # all of one length, so no part runs into the next
     return f"sha256:{total.hexdigest()}"
+
+
+def digest(path: Path) -> tuple[int, str]:
+    """Size and checksum of a file: XXH3, 128 bits, which notices damage and is as fast as memory.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    import xxhash
+
+    with path.open("rb") as file:
+        total = xxhash.xxh3_128()
+        size = 0
+        while block := file.read(1 << 22):
+            total.update(block)
+            size += len(block)
+    return size, total.hexdigest()

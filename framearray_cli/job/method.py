@@ -5,7 +5,10 @@ from typing import Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from .jobvalues import MOST_HITS, Emission, HitCount, Table, Window, computed, fail, shown
+from framearray_cli.base.forms.table import Table, computed, fail
+from framearray_cli.base.forms.words import shown
+
+from .values import MOST_HITS, Emission, HitCount, Window
 
 DEFAULT_N_R, DEFAULT_HITS = 3, 2  # those of [FA]; what is chosen for "auto" is to be as exact
 

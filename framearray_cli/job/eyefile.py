@@ -12,9 +12,11 @@ from typing import Any, TypeAlias
 
 from pydantic import ValidationError
 
-from .files import read_at_most
-from .jobkeys import MOST_EYES, CameraKey
-from .problems import cut, problems_of
+from framearray_cli.base.files import read_at_most
+from framearray_cli.base.forms.problems import cut, problems_of
+
+from .camera import CameraKey
+from .keys import MOST_EYES
 
 LARGEST_FILE = 64 * 1024 * 1024  # bytes; MOST_EYES rows of nine long numbers are 20 MB
 MOST_PROBLEMS = 10  # a column that is wrong is wrong in every row

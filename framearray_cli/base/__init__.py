@@ -1,0 +1,1 @@
+"""Types, errors, files, colour, hashing, memory, units, optional libraries, forms of files."""

@@ -1,0 +1,69 @@
+"""What a job file is made of: points, directions, colours, sizes, file names, and the base of its tables.
+
+Each kind checks itself and says in plain words what it expected and what it found.
+"""
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Annotated, Any, NoReturn, TypeAlias, TypeVar
+
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+Place: TypeAlias = tuple[int | str, ...]  # keys and list positions from the value at hand down to the problem
+Float3: TypeAlias = tuple[float, float, float]
+
+
+def fail(problems: Sequence[tuple[Place, str]]) -> NoReturn:
+    """Raise every problem of one value at once, each at its own place below that value."""
+    details = [
+        InitErrorDetails(type=PydanticCustomError("job", "{text}", {"text": text}), loc=place, input=None)
+        for place, text in problems
+    ]
+    raise ValidationError.from_exception_data("job", details)
+
+
+class Table(BaseModel):
+    """Base of all tables: unknown keys, loose types and non-finite numbers are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+_Table = TypeVar("_Table", bound=Table)
+
+
+def fill(table: Table, key: str, value: object) -> None:
+    """Set what the file left out; only while a table is being made."""
+    object.__setattr__(table, key, value)
+
+
+def changed(table: _Table, **values: object) -> _Table:
+    """Copy a table with other values, each checked as one of a file is; `model_copy` takes any name and any value.
+
+    Only single values are checked: a report measures settings that do not go together in a file. A value that is a
+    table has been checked already; its own rules on what goes together would refuse such settings.
+
+    Raises:
+        ValidationError: a key has no such value.
+        TypeError: a key holds another table.
+        KeyError: there is no such key.
+    """
+    for key, value in values.items():
+        if not isinstance(value, Table):
+            _value_check(type(table), key).validate_python(value, strict=True)
+        elif not isinstance(value, type(getattr(table, key))):
+            raise TypeError(f"{key}: expected a {type(getattr(table, key)).__name__}, got a {type(value).__name__}")
+    return table.model_copy(update=values)
+
+
+@cache
+def _value_check(kind: type[Table], key: str) -> TypeAdapter[Any]:
+    field = kind.model_fields[key]
+    bounds = tuple(field.metadata)
+    checked: Any = Annotated[(field.annotation, *bounds)] if bounds else field.annotation
+    return TypeAdapter(checked)
+
+
+def computed(text: str) -> dict[str, Any]:
+    """Describe a default that depends on other keys; it replaces the stored default in schema and docs."""
+    return {"x-default": text}
