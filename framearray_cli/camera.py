@@ -9,9 +9,9 @@ import numpy as np
 
 from framearray_cli.base.arrays import Directions, Float64, Points, Real, Triple
 from framearray_cli.lanes import doubles, floor, integers, reals, select
+from framearray_cli.scene.paths.paths import Eyes
 
 from .kernel import inlined
-from .paths import Eyes
 
 OUTSIDE = -1  # the "pixel" of a point that an eye does not see
 

@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
+from framearray_cli.scene.paths.paths import LightPath
+from framearray_cli.scene.paths.planes import Plane
 from framearray_cli.terms.ambient import Ambient
 
 from . import __version__
 from .auto import AutoSettings
 from .manifest import BACKGROUND, Manifest, ManifestCamera, ManifestGroup, ManifestLight, matrix_rows
 from .outfolder import Identity
-from .paths import LightPath
-from .planes import Plane
 from .prepare import Prepared
 from .stored import AMBIENT, ArrayNames, array_names
 from .target import Target

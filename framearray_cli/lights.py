@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Int32, with_room
-
-from .paths import Lights
+from framearray_cli.scene.paths.paths import Lights
 
 POINT, DIRECTIONAL = 0, 1
 

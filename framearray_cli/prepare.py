@@ -8,6 +8,9 @@ from framearray_cli.base.arrays import Float32
 from framearray_cli.base.memory import available_cores, resident_memory
 from framearray_cli.embree import EmbreeScene, Engine
 from framearray_cli.job.job import Job
+from framearray_cli.scene.paths.paths import Eyes, Lights, eyes, lights
+from framearray_cli.scene.paths.planes import Plane
+from framearray_cli.scene.scene import Scene, load_scene
 from framearray_cli.terms.ambient import Ambient
 from framearray_cli.terms.ambient_eye import EyeWalks, ambient_by_eye, fixed_ambient
 from framearray_cli.terms.ambient_fit import ObscuranceCurve, ambient_by_fit
@@ -18,11 +21,8 @@ from .camera import Cameras, cameras
 from .denoise import require_denoiser
 from .hits import World
 from .lights import LightArrays, light_arrays
-from .paths import Eyes, Lights, eyes, lights
 from .plan import frame_hits, turns
-from .planes import Plane
 from .sampling import lattice_steps
-from .scene import Scene, load_scene
 from .surface import Surfaces, nearest, surfaces
 from .work import BY_SAMPLE, FrameSetup
 

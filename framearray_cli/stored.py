@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from framearray_cli.job.job import Job
+from framearray_cli.scene.paths.paths import Lights
+from framearray_cli.scene.paths.planes import Plane
 
 from .filepatterns import camera_pattern, file_name, file_patterns
 from .manifest import BACKGROUND
-from .paths import Lights
-from .planes import Plane
 
 AMBIENT = "ambient"  # stands beside the groups: R W
 _UNLIT = {Plane.INDIRECT: AMBIENT, Plane.BACKGROUND: BACKGROUND}

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from framearray_cli.base.memory import peak_memory
+from framearray_cli.scene.paths.paths import Lights
 
 from .kernel import processor
 from .manifest import Manifest
-from .paths import Lights
 from .prepare import Prepared
 from .record import ArrayRecords
 from .standarderror import summed_up

@@ -12,9 +12,9 @@ import numpy as np
 from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Int32, Real, Rgb, Triple
 from framearray_cli.base.colour import linear_from_srgb8
 from framearray_cli.lanes import doubles, floor, gather, integers, popcount, reals, select, sqrt
+from framearray_cli.scene.scene import Scene
 
 from .kernel import inlined
-from .scene import Scene
 
 # Ray offsets: 16 units in the last place of the largest coordinate of the triangle. Of the rules tried it alone had
 # no self-hits and no leaks at every scale (docs/decisions/ray-offsets.md).

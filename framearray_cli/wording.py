@@ -58,7 +58,7 @@ def _blocks(n: int) -> str:
 
 def scene_lines(prepared: "Prepared") -> list[str]:
     """What a scene holds, and what was left out of it."""
-    from .scene import scene_report_lines
+    from framearray_cli.scene.scene import scene_report_lines
 
     return scene_report_lines(prepared.scene.report, prepared.job.scene.file)
 

@@ -9,6 +9,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Int32, Rgb, with_room
 from framearray_cli.embree.packets import Tracer
 from framearray_cli.lanes import LANES
+from framearray_cli.scene.paths.planes import Plane, first_with_background
 from framearray_cli.terms.obscurance import ObscuranceSettings
 
 from .allotment import Allotment
@@ -18,7 +19,6 @@ from .hits import World
 from .kernel import inlined
 from .lights import LightArrays, some_lights
 from .plan import Pass, passes, passes_of_counts
-from .planes import Plane, first_with_background
 from .surface import Surfaces
 
 

@@ -17,10 +17,10 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 from framearray_cli.base.hashing import digest
 from framearray_cli.job.job import Job
+from framearray_cli.scene.paths.paths import Eyes
 
 from .imageattributes import Attributes, frame_attributes
 from .images import ImageFormat, write_image, write_layers
-from .paths import Eyes
 from .prepare import Prepared
 from .standarderror import square_mean, standard_error
 from .stored import ArrayNames, array_names

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.scene import Scene
+from framearray_cli.scene.scene import Scene
 
 OFFSET = 16 * 2.0**-23  # a ray starts this share of its triangle's largest coordinate above it
 

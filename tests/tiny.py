@@ -13,10 +13,10 @@ from framearray_cli.crew import TracePool
 from framearray_cli.embree import Engine
 from framearray_cli.job.job import Job
 from framearray_cli.loop import ready_frames
-from framearray_cli.meshes import Material, Meshes, Part
-from framearray_cli.paths import eyes, lights
 from framearray_cli.prepare import Prepared, open_embree, plan_work, prepared_from
-from framearray_cli.scene import Scene, build_scene
+from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.paths.paths import eyes, lights
+from framearray_cli.scene.scene import Scene, build_scene
 from framearray_cli.terms.ambient import Ambient
 from framearray_cli.window import Composed, Window
 from framearray_cli.work import FrameSetup

@@ -44,7 +44,7 @@ def openjd(
         screen.wait("reading the job")
         from framearray_cli.parts.chunks import default_size, in_chunks, reach
         from framearray_cli.parts.openjd import template, write_template
-        from framearray_cli.paths import eyes
+        from framearray_cli.scene.paths.paths import eyes
 
         n_r, still = reach(job), eyes(job).at_rest
         size = chunk or (frames if still else default_size(frames, n_r))

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Literal, Self
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.scene import Scene
+from framearray_cli.scene.scene import Scene
 
 from .fallback import EmbreexScene
 from .native import NativeScene, embree_library

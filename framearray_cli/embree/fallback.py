@@ -7,7 +7,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32
 from framearray_cli.lanes import LANES
-from framearray_cli.scene import Scene
+from framearray_cli.scene.scene import Scene
 from framearray_cli.surface import is_cut_out, surfaces
 
 from .packets import (

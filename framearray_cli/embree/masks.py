@@ -13,7 +13,7 @@ from numba.core.ccallback import CFunc
 from numba.extending import intrinsic
 
 from framearray_cli.kernel import keep_on_disk
-from framearray_cli.scene import Scene
+from framearray_cli.scene.scene import Scene
 from framearray_cli.surface import Surfaces, is_cut_out, surfaces
 
 # RTCFilterFunctionNArguments: valid, geometryUserPtr, context, ray, hit (pointers), N

@@ -10,7 +10,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.errors import SceneError
 from framearray_cli.lanes import LANES
-from framearray_cli.scene import Scene
+from framearray_cli.scene.scene import Scene
 
 from .masks import MaskTable
 from .packets import MASKED, OPAQUE, Tracer, aligned

@@ -1,4 +1,4 @@
-"""Generated pages of docs/guide/: the job file and its schema (`python -m framearray_cli.job.docs docs/guide/`)."""
+"""Reference page and JSON Schema of the job file: `python -m framearray_cli.job.docs docs/guide/`."""
 
 import json
 import sys

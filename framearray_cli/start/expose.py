@@ -10,9 +10,9 @@ from framearray_cli.base.colour import srgb_from_linear
 from framearray_cli.crew import TracePool
 from framearray_cli.embree import EmbreeScene
 from framearray_cli.loop import ready_frames
-from framearray_cli.paths import LightPath, eyes, lights, shining_together
 from framearray_cli.prepare import plan_work, prepared_from
-from framearray_cli.scene import Scene
+from framearray_cli.scene.paths.paths import LightPath, eyes, lights, shining_together
+from framearray_cli.scene.scene import Scene
 from framearray_cli.window import Window
 
 from .model import Start, checked, table_of

@@ -23,7 +23,7 @@ from framearray_cli.embree.packets import (
     occlude,
 )
 from framearray_cli.lanes import LANES
-from framearray_cli.scene import Scene
+from framearray_cli.scene.scene import Scene
 
 SHORTENED = 1e-4  # of a segment, left out at both of its ends, so that it does not meet what it starts or ends on
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError, SceneError
-from framearray_cli.meshes import Stage, StageCamera, StageLight
+from framearray_cli.scene.files import Stage, StageCamera, StageLight
 
 from .model import Camera, EyeKey, LightKeys, rounded
 

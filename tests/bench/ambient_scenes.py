@@ -14,9 +14,9 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.lights import some_lights
-from framearray_cli.meshes import Material
-from framearray_cli.meshes.model import Part
 from framearray_cli.prepare import Prepared, prepare
+from framearray_cli.scene.files import Material
+from framearray_cli.scene.files.model import Part
 
 from .cases import JOBS, QUICK_RESOLUTION, with_resolution
 from .results import ROOT

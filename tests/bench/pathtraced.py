@@ -15,7 +15,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Image
 from framearray_cli.lights import DIRECTIONAL
 from framearray_cli.prepare import Prepared
-from framearray_cli.scene import Scene
+from framearray_cli.scene.scene import Scene
 
 from .ambient_scenes import Probe, probe_named, resized
 from .processes import asked

@@ -8,11 +8,11 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.job.job import Job
-from framearray_cli.meshes import Material, Meshes
-from framearray_cli.meshes.model import Part
-from framearray_cli.paths import eyes, lights
 from framearray_cli.prepare import Prepared, prepared_from
-from framearray_cli.scene import Scene, build_scene
+from framearray_cli.scene.files import Material, Meshes
+from framearray_cli.scene.files.model import Part
+from framearray_cli.scene.paths.paths import eyes, lights
+from framearray_cli.scene.scene import Scene, build_scene
 
 SIZE = (8.0, 3.0, 8.0)  # of the room
 COUNT = (5, 2, 5)  # spheres along each axis

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.lights import DIRECTIONAL, LightArrays, padded
-from framearray_cli.paths import Eyes
-from framearray_cli.planes import pictures
 from framearray_cli.prepare import open_embree, plan_work
 from framearray_cli.report.settings import Settings
+from framearray_cli.scene.paths.paths import Eyes
+from framearray_cli.scene.paths.planes import pictures
 
 from .cases import FRAME_ARRAY, QUICK_RESOLUTION, Case, job_named, opened, varied
 from .machine import busy, describe

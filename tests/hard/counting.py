@@ -21,10 +21,10 @@ from framearray_cli.eyehits import Samples, native_hits, pixel_order
 from framearray_cli.hits import SURFACE, World, empty_hits
 from framearray_cli.lanes import LANES
 from framearray_cli.lights import light_arrays
-from framearray_cli.paths import LightPath, shining_together
 from framearray_cli.rays import room_for_hits, room_for_tests
 from framearray_cli.reuse import outer_hits
 from framearray_cli.sampling import lattice_steps
+from framearray_cli.scene.paths.paths import LightPath, shining_together
 from framearray_cli.surface import nearest
 from framearray_cli.terms.direct import FAR_END, direct
 from framearray_cli.terms.obscurance import SQRT, ObscuranceSettings, _aim

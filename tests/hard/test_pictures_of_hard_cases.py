@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import tiny
 
-from framearray_cli.meshes import Material
+from framearray_cli.scene.files import Material
 
 SMALL = {"resolution": [96, 72]}
 # A picture of another unit of length or place differs where a ray passes an edge, or a corner of a texel, on its other

@@ -11,7 +11,7 @@ import tiny
 from framearray_cli.camera import OUTSIDE, Cameras, project
 from framearray_cli.compose import MOST
 from framearray_cli.kernel import kernel
-from framearray_cli.meshes import Material
+from framearray_cli.scene.files import Material
 
 
 @kernel

@@ -12,7 +12,7 @@ import tiny
 from scenes import Glb
 from test_pictures_of_hard_cases import FLIPPED, differing, pictures, walk
 
-from framearray_cli.scene import load_scene
+from framearray_cli.scene.scene import load_scene
 
 FAR = (1e7, -1e7, 1e7)
 

@@ -20,8 +20,8 @@ from framearray_cli.manifest import Manifest, image_path, layers_path
 from framearray_cli.manifestfile import read_manifest
 from framearray_cli.movie.assemble import assemble
 from framearray_cli.movie.look import Look
-from framearray_cli.paths import eyes, lights
 from framearray_cli.render import render
+from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.sheet import make_sheet
 
 ROOT = Path(__file__).resolve().parents[2]

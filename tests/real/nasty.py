@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.scene import Scene
+from framearray_cli.scene.scene import Scene
 
 
 def nasty_files(scenes: Path) -> list[str]:

@@ -16,7 +16,7 @@ from ztests import Estimate, chi2_bounds, estimate
 
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
-from framearray_cli.paths import eyes, lights
+from framearray_cli.scene.paths.paths import eyes, lights
 
 JOBS = Path(__file__).resolve().parents[2] / "jobs"
 SEEDS = 6

@@ -11,9 +11,9 @@ import pytest
 from scenes import QUAD_UVS, Glb, png
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.meshes import read_meshes, read_stage
-from framearray_cli.meshes.assets import AssetError, Assets
-from framearray_cli.meshes.limit import Limit
+from framearray_cli.scene.files import read_meshes, read_stage
+from framearray_cli.scene.files.assets import AssetError, Assets
+from framearray_cli.scene.files.limit import Limit
 
 IMAGE = png(np.full((2, 2, 3), 200, np.uint8))
 OBJ = "mtllib {}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl Paint\nf 1/1 2/2 3/3\n"
@@ -198,7 +198,7 @@ def test_an_image_bomb_is_refused(folder: Path) -> None:
 
 def test_images_count_before_they_are_decoded(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (folder / "large.png").write_bytes(huge_png(9_000, 9_000))
-    monkeypatch.setattr("framearray_cli.meshes.textures.rgba", None)
+    monkeypatch.setattr("framearray_cli.scene.files.textures.rgba", None)
     with pytest.raises(SceneError, match=r"an image of 9000 x 9000 pixels 1\.8 GiB\), 1\.0 GiB may be used; make"):
         read_meshes(obj(folder, "large.png"), memory=2**30)
 

@@ -8,7 +8,7 @@ import tiny
 
 from framearray_cli.camera import OUTSIDE, Cameras, cameras, eye_ray, project
 from framearray_cli.kernel import kernel
-from framearray_cli.paths import Eyes, eyes
+from framearray_cli.scene.paths.paths import Eyes, eyes
 
 
 @kernel

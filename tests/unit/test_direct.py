@@ -11,9 +11,9 @@ from test_obscurance import points
 from framearray_cli.embree import EmbreeScene
 from framearray_cli.hits import ESCAPED, Hits
 from framearray_cli.lights import LightArrays, light_arrays
-from framearray_cli.paths import LightPath, shining_together
 from framearray_cli.rays import room_for_tests
-from framearray_cli.scene import Scene
+from framearray_cli.scene.paths.paths import LightPath, shining_together
+from framearray_cli.scene.scene import Scene
 from framearray_cli.terms.direct import direct
 from framearray_cli.terms.direct_steps import direct_by_steps, room_for_steps
 

@@ -35,8 +35,8 @@ from framearray_cli.embree.packets import (
     occlude,
 )
 from framearray_cli.lanes import LANES
-from framearray_cli.meshes import Material
-from framearray_cli.scene import Scene, load_scene
+from framearray_cli.scene.files import Material
+from framearray_cli.scene.scene import Scene, load_scene
 
 CHUNK = 1 << 16
 # Embree divides by a reciprocal that it refines by one Newton step, an instruction set its own way; step and product

@@ -10,8 +10,8 @@ import pytest
 from scenes import QUAD_UVS, Glb, png
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.meshes import read_meshes, read_stage
-from framearray_cli.scene import load_scene
+from framearray_cli.scene.files import read_meshes, read_stage
+from framearray_cli.scene.scene import load_scene
 
 
 def quad() -> Glb:

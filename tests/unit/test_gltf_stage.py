@@ -10,7 +10,7 @@ from scenes import Glb
 from staged import QUARTER, animate, camera, light, shift, turn_y
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.meshes import read_stage
+from framearray_cli.scene.files import read_stage
 
 
 def test_a_file_without_any_has_none(tmp_path: Path) -> None:

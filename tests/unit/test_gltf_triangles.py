@@ -9,8 +9,8 @@ import pytest
 import trimesh
 from scenes import QUAD, Glb
 
-from framearray_cli.meshes.model import Meshes
-from framearray_cli.meshes.read import read_meshes
+from framearray_cli.scene.files.model import Meshes
+from framearray_cli.scene.files.read import read_meshes
 
 JOBS = Path(__file__).resolve().parents[2] / "jobs" / "scenes"
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 2, 0]], dtype=np.float32)

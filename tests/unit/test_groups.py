@@ -12,8 +12,8 @@ from framearray_cli.images import read_layers
 from framearray_cli.manifest import array_files
 from framearray_cli.manifestfile import read_manifest
 from framearray_cli.pictures import Pictures, Relight
-from framearray_cli.planes import Plane
 from framearray_cli.render import render
+from framearray_cli.scene.paths.planes import Plane
 
 SKY = [0.3, 0.4, 0.5]
 LAMP = {**tiny.TABLE["light"]["sources"][0], "group": "lamps", "axis": "lamps"}
@@ -190,8 +190,8 @@ def test_jobs_that_do_not_go_with_groups(changes: Any, message: str) -> None:
 def test_notes_and_lines_tell_groups(scene: Path) -> None:
     from dataclasses import replace as changed
 
-    from framearray_cli.paths import lights
     from framearray_cli.prepare import _named
+    from framearray_cli.scene.paths.paths import lights
     from framearray_cli.terms.ambient import Ambient
 
     job = tiny.Job.model_validate({**tiny.table(), "light": {"sources": SOURCES}})

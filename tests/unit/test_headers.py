@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.meshes import read_meshes
-from framearray_cli.meshes.headers import check_headers
-from framearray_cli.meshes.limit import Limit
+from framearray_cli.scene.files import read_meshes
+from framearray_cli.scene.files.headers import check_headers
+from framearray_cli.scene.files.limit import Limit
 
 PLY = """ply
 format {} 1.0

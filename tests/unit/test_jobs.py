@@ -17,8 +17,8 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.forms.toml import load_toml
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
-from framearray_cli.paths import eyes, lights
-from framearray_cli.scene import Scene, load_scene
+from framearray_cli.scene.paths.paths import eyes, lights
+from framearray_cli.scene.scene import Scene, load_scene
 
 JOBS = Path(__file__).resolve().parents[2] / "jobs"
 ROOMS = ("cabin", "kitchen", "stairs")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from framearray_cli.lights import DIRECTIONAL, POINT, light_arrays
-from framearray_cli.paths import LightPath, shining_together
+from framearray_cli.scene.paths.paths import LightPath, shining_together
 
 WHITE = np.array([1.0, 1.0, 1.0])
 

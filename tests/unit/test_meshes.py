@@ -10,10 +10,10 @@ import pytest
 from scenes import QUAD, QUAD_UVS, Glb, png, shared_scene
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.meshes import Meshes, read_meshes
-from framearray_cli.meshes.limit import Limit
-from framearray_cli.meshes.polygons import Ears, triangulate
-from framearray_cli.meshes.textures import decode_image, rgba
+from framearray_cli.scene.files import Meshes, read_meshes
+from framearray_cli.scene.files.limit import Limit
+from framearray_cli.scene.files.obj.polygons import Ears, triangulate
+from framearray_cli.scene.files.textures import decode_image, rgba
 
 RED, GREEN, BLUE, WHITE = [255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]
 IMAGE = [[RED, GREEN], [BLUE, WHITE]]  # row 0 is the top
@@ -576,7 +576,7 @@ def test_without_pillow_no_texture_is_lost_in_silence(tmp_path, monkeypatch):
 
 
 def test_help_never_waits_for_trimesh():
-    code = "import sys, framearray_cli.scene; sys.exit('trimesh' in sys.modules or 'PIL' in sys.modules)"
+    code = "import sys, framearray_cli.scene.scene; sys.exit('trimesh' in sys.modules or 'PIL' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

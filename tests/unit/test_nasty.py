@@ -9,7 +9,7 @@ from scenes import scenes_folder, shared_scene
 from test_scene import check_shapes
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.scene import Scene, load_scene, scene_report_lines
+from framearray_cli.scene.scene import Scene, load_scene, scene_report_lines
 
 INDEX = scenes_folder() / "nasty" / "INDEX.json"
 FILES = [entry["file"] for entry in json.loads(INDEX.read_text())] if INDEX.is_file() else []

@@ -10,10 +10,10 @@ import tiny
 from framearray_cli.embree import EmbreeScene
 from framearray_cli.hits import ESCAPED, SURFACE, Hits, empty_hits
 from framearray_cli.kernel import kernel
-from framearray_cli.meshes import Material
 from framearray_cli.rays import room_for_hits
 from framearray_cli.sampling import lattice_steps
-from framearray_cli.scene import Scene
+from framearray_cli.scene.files import Material
+from framearray_cli.scene.scene import Scene
 from framearray_cli.surface import surfaces
 from framearray_cli.terms.obscurance import CONSTANT, FALLOFFS, SQRT, ObscuranceSettings, obscurance, rho
 

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
-from framearray_cli.paths import between_keys, eyes, lights
-from framearray_cli.sphere import directions_between, slerp, turn, unit
+from framearray_cli.scene.paths.directions import directions_between, slerp, turn, unit
+from framearray_cli.scene.paths.paths import between_keys, eyes, lights
 
 FEW = settings(max_examples=60, deadline=None)
 numbers = st.floats(-1e6, 1e6)

@@ -9,9 +9,9 @@ import pytest
 from scenes import QUAD, QUAD_FACES, QUAD_UVS, Glb, png, shared_scene
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.meshes import Material, Meshes, Part
-from framearray_cli.meshes.cleaning import has_area, repeated
-from framearray_cli.scene import Scene, build_scene, load_scene, scene_report_lines
+from framearray_cli.scene.cleaning import has_area, repeated
+from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.scene import Scene, build_scene, load_scene, scene_report_lines
 
 
 @dataclass(frozen=True)

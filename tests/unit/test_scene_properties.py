@@ -15,8 +15,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.meshes import read_stage
-from framearray_cli.scene import Scene, load_scene
+from framearray_cli.scene.files import read_stage
+from framearray_cli.scene.scene import Scene, load_scene
 
 SUFFIXES = ("glb", "gltf", "obj", "ply", "stl", "off", "3mf", "dae", "txt")
 FEW = settings(max_examples=250, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -8,9 +8,9 @@ import tiny
 from test_hits import native
 
 from framearray_cli.hits import SURFACE, Hits, empty_hits
-from framearray_cli.meshes import Material, Meshes, Part
 from framearray_cli.rays import room_for_hits
-from framearray_cli.scene import Scene, build_scene
+from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.scene import Scene, build_scene
 from framearray_cli.terms.specular import count_mirrors, reflect
 from framearray_cli.work import FrameSetup
 

@@ -16,8 +16,8 @@ from framearray_cli.base.forms.toml import load_toml
 from framearray_cli.cli import main
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
-from framearray_cli.paths import eyes, lights
-from framearray_cli.scene import load_scene
+from framearray_cli.scene.paths.paths import eyes, lights
+from framearray_cli.scene.scene import load_scene
 from framearray_cli.start import Start, Wishes, init
 from framearray_cli.start.expose import CLIPPED, LUMINANCE, ROOM, solved
 from framearray_cli.start.model import table_of

@@ -17,10 +17,10 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.lights import light_arrays
 from framearray_cli.manifestfile import read_manifest
-from framearray_cli.paths import lights
 from framearray_cli.pictures import Pictures
 from framearray_cli.render import render
-from framearray_cli.sun import daylight, sun_at, sun_between
+from framearray_cli.scene.paths.paths import lights
+from framearray_cli.scene.paths.sun import daylight, sun_at, sun_between
 
 pytest.importorskip("pvlib", reason="the extra `sun` is not installed")
 

@@ -9,7 +9,7 @@ from triangles import QUANTITIES, find_numbers
 
 from framearray_cli.base.colour import linear_from_srgb8
 from framearray_cli.kernel import kernel
-from framearray_cli.meshes import Material
+from framearray_cli.scene.files import Material
 from framearray_cli.surface import (
     OFFSET_ULPS,
     ULP,

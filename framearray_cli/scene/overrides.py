@@ -7,7 +7,7 @@ from typing import Protocol
 
 from framearray_cli.base.errors import SceneError
 
-from .model import Material, Notes, join_names
+from .files.model import Material, Notes, join_names
 
 LONGEST_NAME = 100  # characters of a name in a message
 NAMES_IN_AN_ERROR = 12

@@ -4,10 +4,10 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from .assets import Assets
-from .materials import Opacity, Rgb3, blended_opacity, make_material
-from .model import GREY, Material, Notes
-from .textures import TextureTable
+from ..assets import Assets
+from ..materials import Opacity, Rgb3, blended_opacity, make_material
+from ..model import GREY, Material, Notes
+from ..textures import TextureTable
 
 MIRROR_MODELS = (3, 5)  # illum: ray traced reflection, without and with Fresnel
 GLASS_MODELS = (4, 6, 7, 9)

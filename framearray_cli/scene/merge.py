@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Corners, CornerUvs, Float64
 
-from .model import Material, Notes, Part
+from .files.model import Material, Notes, Part
 
 FAR_UV = 16.0  # float32 texture coordinates beyond it lose texels: whole repeats are subtracted
 

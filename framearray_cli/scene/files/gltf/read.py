@@ -1,14 +1,14 @@
 """GLB and glTF -> parts: every mesh of the default scene, at each of its places."""
 
-from .assets import Assets
+from ..assets import Assets
+from ..materials import default_material
+from ..model import Material, Meshes, Notes, Part
+from ..placing import place
+from ..textures import TextureTable
 from .container import open_gltf
-from .gltf_materials import read_materials
-from .gltf_nodes import check_readable, note_unread, placed_meshes, used_materials
-from .gltf_triangles import Triangles, read_triangles
-from .materials import default_material
-from .model import Material, Meshes, Notes, Part
-from .textures import TextureTable
-from .walk import place
+from .materials import read_materials
+from .nodes import check_readable, note_unread, placed_meshes, used_materials
+from .triangles import Triangles, read_triangles
 
 
 def read_gltf(data: bytes, assets: Assets) -> Meshes:

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Float64, Int32, Rgb
 from framearray_cli.base.errors import SceneError
-from framearray_cli.meshes import Material, Meshes, Notes, override_materials, read_meshes
-from framearray_cli.meshes.cleaning import finite, has_area, repeated
-from framearray_cli.meshes.merge import Merged, merge, near_uvs, unit_normals, untextured_variants
-from framearray_cli.meshes.overrides import Override
+
+from .cleaning import finite, has_area, repeated
+from .files import Material, Meshes, Notes, override_materials, read_meshes
+from .merge import Merged, merge, near_uvs, unit_normals, untextured_variants
+from .overrides import Override
 
 # Sizes between which tracing was measured to be right; far below, float32 falls into denormals, above, nothing is hit.
 SMALLEST_SCENE, LARGEST_SCENE = 1e-12, 1e12

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
 
+from ..materials import clean_colours
+from ..model import Notes
+from .check import TRIANGLES
 from .container import Gltf, normalise
-from .gltf_check import TRIANGLES
-from .gltf_materials import GltfMaterial
-from .gltf_values import Tree
-from .materials import clean_colours
-from .model import Notes
+from .materials import GltfMaterial
+from .values import Tree
 
 LIST, STRIP, FAN = TRIANGLES
 DRACO = "KHR_draco_mesh_compression"

@@ -9,12 +9,12 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 
-from .assets import AssetError, Assets
+from ..assets import AssetError, Assets
+from ..materials import CUTOFF, Opacity, Rgb3, blended_opacity, make_material, masked_opacity
+from ..model import Material, Notes
+from ..textures import TextureTable
 from .container import Gltf, uri_bytes
-from .gltf_values import Tree
-from .materials import CUTOFF, Opacity, Rgb3, blended_opacity, make_material, masked_opacity
-from .model import Material, Notes
-from .textures import TextureTable
+from .values import Tree
 
 MIRROR_ROUGHNESS = 0.1  # up to it a metal is a mirror
 GLOSSY_SPECULAR = 0.2  # a specular factor (old extension) above it means metal; dielectrics have 0.04

@@ -13,7 +13,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float64
 
 from .container import Gltf
-from .gltf_values import Tree
+from .values import Tree
 
 PATHS = ("translation", "rotation", "scale")
 AT_REST: dict[str, Sequence[float]] = {

@@ -17,8 +17,8 @@ from framearray_cli.job.camera import CameraKey
 from framearray_cli.job.job import Job
 from framearray_cli.job.light import DirectionalKey, PointKey, SunSource
 
+from .directions import directions_between, unit
 from .planes import Plane, pictures, planes_of_groups
-from .sphere import directions_between, unit
 from .sun import NEVER, daylight, sun_between, to_sun
 
 # Look and up closer to parallel than this (radians) leave no digits to tell what is right of the picture.

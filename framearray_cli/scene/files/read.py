@@ -12,13 +12,13 @@ import numpy as np
 from framearray_cli.base.errors import SceneError
 
 from .assets import AssetError, Assets
-from .container import open_gltf
-from .gltf import read_gltf
-from .gltf_nodes import check_readable
-from .gltf_stage import Stage, read_gltf_stage
+from .gltf.container import open_gltf
+from .gltf.nodes import check_readable
+from .gltf.read import read_gltf
+from .gltf.stage import Stage, read_gltf_stage
 from .limit import Limit
 from .model import Meshes
-from .obj import read_obj
+from .obj.read import read_obj
 from .other import read_other, readable_formats
 
 LOGGERS = ("trimesh", "PIL")

@@ -7,8 +7,8 @@ from typing import Literal
 from framearray_cli.base.arrays import Float64
 
 from .container import Gltf
-from .gltf_motion import Motion, read_motion
-from .gltf_values import Tree
+from .motion import Motion, read_motion
+from .values import Tree
 
 PUNCTUAL = "KHR_lights_punctual"
 

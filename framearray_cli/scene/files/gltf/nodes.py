@@ -7,13 +7,13 @@ import numpy as np
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import SceneError
 
+from ..limit import Limit
+from ..model import Notes
 from .container import Gltf
-from .gltf_materials import KNOWN, SILENT
-from .gltf_motion import AT_REST, PATHS, at_rest, rotations
-from .gltf_triangles import triangle_count
-from .gltf_values import Tree
-from .limit import Limit
-from .model import Notes
+from .materials import KNOWN, SILENT
+from .motion import AT_REST, PATHS, at_rest, rotations
+from .triangles import triangle_count
+from .values import Tree
 
 # Least memory per triangle while a scene is read (measured: 460 to 800 bytes, with texture coordinates, normals and
 # colours), and per place of a mesh.

@@ -12,8 +12,8 @@ from .assets import AssetError, Assets
 from .headers import check_headers, one_solid
 from .materials import blended_opacity, clean_colours, default_material, make_material
 from .model import Material, Meshes, Notes, Part
+from .placing import file_normals, instances, place
 from .textures import TextureTable
-from .walk import file_normals, instances, place
 
 BYTE = 255.0
 HINT = "; install it (for COLLADA: pip install pycollada), or convert the file to GLB"

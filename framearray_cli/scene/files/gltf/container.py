@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .assets import AssetError, Assets, shorten
-from .gltf_check import COMPONENTS, WIDTHS, check_gltf
-from .gltf_values import Tree
+from ..assets import AssetError, Assets, shorten
+from .check import COMPONENTS, WIDTHS, check_gltf
+from .values import Tree
 
 MAGIC = b"glTF"
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
 
-from .assets import AssetError, Assets
-from .materials import clean_colours, default_material
-from .model import Material, Meshes, Notes, Part
+from ..assets import AssetError, Assets
+from ..materials import clean_colours, default_material
+from ..model import Material, Meshes, Notes, Part
+from ..textures import TextureTable
 from .mtl import MapUse, MtlEntry, parse_mtl, to_material
 from .polygons import Ears, triangulate
-from .textures import TextureTable
 
 Indices = NDArray[np.int64]
 

@@ -1,10 +1,10 @@
 """Mesh files -> triangles, materials and textures. The only door to trimesh."""
 
-from .cleaning import finite, has_area, repeated
-from .gltf_stage import Stage, StageCamera, StageLight
-from .merge import Merged, merge, near_uvs, unit_normals, untextured_variants
+from ..cleaning import finite, has_area, repeated
+from ..merge import Merged, merge, near_uvs, unit_normals, untextured_variants
+from ..overrides import Override, override_materials
+from .gltf.stage import Stage, StageCamera, StageLight
 from .model import Material, Meshes, Notes, Part
-from .overrides import Override, override_materials
 from .read import read_meshes, read_stage
 
 __all__ = [

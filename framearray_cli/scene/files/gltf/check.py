@@ -9,8 +9,8 @@ import numpy as np
 
 from framearray_cli.base.errors import SceneError
 
-from .gltf_values import LIGHTS, Tree, extensions, list_of, map_of, number, number_of, numbers, one_of, table, text
-from .limit import Limit
+from ..limit import Limit
+from .values import LIGHTS, Tree, extensions, list_of, map_of, number, number_of, numbers, one_of, table, text
 
 COMPONENTS = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}

@@ -1,0 +1,1 @@
+"""Mesh files -> `Scene`; paths of eyes and lights."""

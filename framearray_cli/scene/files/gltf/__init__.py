@@ -1,0 +1,1 @@
+"""glTF and GLB files -> parts, materials, cameras, lights and their motion."""

@@ -1,0 +1,1 @@
+"""Key frames -> positions of every eye and light."""
