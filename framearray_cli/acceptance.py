@@ -5,17 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from framearray_cli.base.arrays import Float64, Int32, with_room
-from framearray_cli.embree import EmbreeScene
-from framearray_cli.lanes import LANES
-from framearray_cli.terms.direct import direct
+from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.hits.hits import SURFACE, Hits, World, empty_hits
+from framearray_cli.engine.hits.native import Samples, native_hits, pixel_order
+from framearray_cli.engine.hits.outer import outer_hits
+from framearray_cli.engine.hits.rays import Rays, room_for_hits, room_for_tests
+from framearray_cli.engine.inputs.cameras import Cameras
+from framearray_cli.engine.inputs.lights import some_lights
+from framearray_cli.engine.kernels.simd import LANES
+from framearray_cli.engine.terms.direct import direct
 
-from .camera import Cameras
-from .eyehits import Samples, native_hits, pixel_order
-from .hits import SURFACE, Hits, World, empty_hits
-from .lights import some_lights
 from .prepare import Prepared, eye_cameras
-from .rays import Rays, room_for_hits, room_for_tests
-from .reuse import outer_hits
 
 # Frames of the path that are looked at, native hits of each, and light positions that shadow rays are counted for.
 PROBE_FRAMES, PROBE_HITS, PROBE_LIGHTS = 16, 512, 32

@@ -9,20 +9,20 @@ from pathlib import Path
 import numpy as np
 
 from framearray_cli.base.memory import free_memory, resident_memory
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.kernels.clock import compile_clock
+from framearray_cli.engine.loop import ready_frames
+from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
-from framearray_cli.terms.ambient import Ambient
 
 from .auto import AutoSettings, require_least_memory, resolve_auto
-from .compiling import compile_clock
-from .crew import TracePool
 from .identity import identity_of
-from .loop import ready_frames
 from .memory import ambient_memory, light_blocks, mirror_share, window_memory
 from .outfolder import Identity, differences, free_space, in_the_way, read_array
 from .prepare import Prepared, composed_with, open_embree, plan_work, prepare
 from .target import Target, allot_hits
-from .window import Window
-from .work import FrameSetup
 from .writer import ArrayWriter, array_target
 
 # A probe traces about this many rays, which takes a second or two.

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
+from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.scene.paths.paths import LightPath
 from framearray_cli.scene.paths.planes import Plane
-from framearray_cli.terms.ambient import Ambient
 
 from . import __version__
 from .auto import AutoSettings

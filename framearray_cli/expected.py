@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
+from framearray_cli.engine.frames.passes import frame_hits
 
 from .acceptance import Acceptance
-from .plan import frame_hits
 
 # The variance of a pixel falls with this power of the hits that one eye finds in it: they are spread evenly.
 EVENNESS = 1.3

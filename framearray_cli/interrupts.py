@@ -8,8 +8,8 @@ from types import FrameType
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.signals import Stopped
+from framearray_cli.engine.kernels.clock import is_compiling
 
-from .compiling import is_compiling
 from .screen import err, out, say
 
 PATIENCE = 1.0  # seconds that threads get to end by themselves after a signal

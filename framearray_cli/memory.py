@@ -6,15 +6,15 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.memory import free_memory, resident_memory
 from framearray_cli.base.units import gibibytes
-from framearray_cli.lanes import LANES
-from framearray_cli.terms.ambient import BATCH
+from framearray_cli.engine.frames.passes import frame_hits
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.hits.hits import empty_hits
+from framearray_cli.engine.hits.native import flag_mirrors, pilot_hits
+from framearray_cli.engine.hits.rays import room_for_hits
+from framearray_cli.engine.kernels.simd import LANES
+from framearray_cli.engine.terms.ambient.estimate import BATCH
 
-from .eyehits import pilot_hits
-from .hits import empty_hits
-from .plan import flag_mirrors, frame_hits
 from .prepare import Prepared
-from .rays import room_for_hits
-from .work import FrameSetup
 from .writer import BLOCKS, image_format
 
 # Share of the free memory that frames under way may take unless the job says; the rest is for scene, files and others.

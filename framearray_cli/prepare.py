@@ -6,25 +6,25 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.memory import available_cores, resident_memory
-from framearray_cli.embree import EmbreeScene, Engine
+from framearray_cli.engine.embree import EmbreeScene, Engine
+from framearray_cli.engine.frames.passes import frame_hits, turns
+from framearray_cli.engine.frames.records import BY_SAMPLE
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.hits.hits import World
+from framearray_cli.engine.images.denoise import require_denoiser
+from framearray_cli.engine.inputs.cameras import Cameras, cameras
+from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
+from framearray_cli.engine.inputs.random import lattice_steps
+from framearray_cli.engine.inputs.surfaces import Surfaces, nearest, surfaces
+from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.fitted import ObscuranceCurve, ambient_by_fit
+from framearray_cli.engine.terms.ambient.from_eyes import EyeWalks, ambient_by_eye, fixed_ambient
+from framearray_cli.engine.terms.ambient.from_lights import LightWalks, ambient_by_light
+from framearray_cli.engine.terms.obscurance import FALLOFFS, ObscuranceSettings
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Eyes, Lights, eyes, lights
 from framearray_cli.scene.paths.planes import Plane
 from framearray_cli.scene.scene import Scene, load_scene
-from framearray_cli.terms.ambient import Ambient
-from framearray_cli.terms.ambient_eye import EyeWalks, ambient_by_eye, fixed_ambient
-from framearray_cli.terms.ambient_fit import ObscuranceCurve, ambient_by_fit
-from framearray_cli.terms.ambient_light import LightWalks, ambient_by_light
-from framearray_cli.terms.obscurance import FALLOFFS, ObscuranceSettings
-
-from .camera import Cameras, cameras
-from .denoise import require_denoiser
-from .hits import World
-from .lights import LightArrays, light_arrays
-from .plan import frame_hits, turns
-from .sampling import lattice_steps
-from .surface import Surfaces, nearest, surfaces
-from .work import BY_SAMPLE, FrameSetup
 
 # Native hits of a pixel of a frame from which on they are sampled in two halves.
 FEWEST_SPLIT = 4

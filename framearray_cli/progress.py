@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from framearray_cli.terms.ambient import Ambient
+    from framearray_cli.engine.terms.ambient.estimate import Ambient
 
     from .auto import AutoSettings
     from .prepare import Prepared

@@ -10,14 +10,16 @@ from threading import Lock
 import numpy as np
 
 from framearray_cli.base.errors import OutputError
-from framearray_cli.embree import Engine
+from framearray_cli.engine.embree import Engine
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.loop import ready_frames
+from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
-from framearray_cli.terms.ambient import Ambient
 
-from .crew import TracePool
 from .describe import describe
 from .images import require_writer
-from .loop import ready_frames
 from .manifest import Manifest
 from .manifestfile import write_manifest
 from .memory import light_blocks, mirror_share, require_memory
@@ -28,8 +30,6 @@ from .resume import OnDisk
 from .session import RenderSession, nothing_to_do, open_session
 from .summary import Summary, summarize, with_summary
 from .target import allot_hits
-from .window import Window
-from .work import FrameSetup
 from .writer import ArrayWriter, FinishedFiles, array_target
 
 

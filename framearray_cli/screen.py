@@ -16,8 +16,7 @@ from rich.text import Text
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 from framearray_cli.base.units import duration
-
-from .kernelcache import problem
+from framearray_cli.engine.kernels.cache import problem
 
 out, err = Console(), Console(stderr=True)
 

@@ -5,13 +5,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
-from framearray_cli.embree import EmbreeScene, Engine
+from framearray_cli.engine.embree import EmbreeScene, Engine
+from framearray_cli.engine.kernels.kernel import processor
 from framearray_cli.job.job import Job
 
 from .auto import AutoSettings, require_least_memory, resolve_auto
 from .folderlock import ArrayFolder
 from .identity import identity_of
-from .kernel import processor
 from .manifestfile import read_manifest, write_manifest
 from .outfolder import Identity, check_folder, claim_folder
 from .prepare import Prepared, open_embree, prepare

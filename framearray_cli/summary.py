@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from framearray_cli.base.memory import peak_memory
+from framearray_cli.engine.images.standard_error import summed_up
+from framearray_cli.engine.kernels.kernel import processor
 from framearray_cli.scene.paths.paths import Lights
 
-from .kernel import processor
 from .manifest import Manifest
 from .prepare import Prepared
 from .record import ArrayRecords
-from .standarderror import summed_up
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,18 +10,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Int32
-from framearray_cli.lanes import LANES
-from framearray_cli.terms.ambient import Ambient
+from framearray_cli.engine.frames.blocks import Allotment, Blocks, blocks_of
+from framearray_cli.engine.frames.records import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY, HitRecords, empty_records
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.frames.shading import estimate_terms
+from framearray_cli.engine.frames.threads import Scratch, TracePool
+from framearray_cli.engine.hits.native import Samples, native_hits
+from framearray_cli.engine.hits.outer import outer_hits
+from framearray_cli.engine.kernels.simd import LANES
+from framearray_cli.engine.terms.ambient.estimate import Ambient
 
 from .acceptance import MOST_DENSE, spread_in_shares
 from .allot import FEWEST, Witnesses, allot
-from .allotment import Allotment, Blocks, blocks_of
-from .crew import Scratch, TracePool
-from .eyehits import Samples, native_hits
 from .prepare import Prepared
-from .reuse import outer_hits
-from .shading import estimate_terms
-from .work import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY, FrameSetup, HitRecords, empty_records
 
 # Added to the job's seed for the pilot; no job's seed is as large.
 PILOT_SEED = 1 << 40

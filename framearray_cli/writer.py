@@ -16,15 +16,15 @@ from framearray_cli.base.arrays import Float32, Images
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 from framearray_cli.base.hashing import digest
+from framearray_cli.engine.images.composed import Composed, Layers
+from framearray_cli.engine.images.standard_error import square_mean, standard_error
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Eyes
 
 from .imageattributes import Attributes, frame_attributes
 from .images import ImageFormat, write_image, write_layers
 from .prepare import Prepared
-from .standarderror import square_mean, standard_error
 from .stored import ArrayNames, array_names
-from .window import Composed, Layers
 
 # Blocks of images in memory: one is filled while the other is written.
 BLOCKS = 2

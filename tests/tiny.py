@@ -9,17 +9,18 @@ from typing import Any
 import numpy as np
 from scenes import Glb, png
 
-from framearray_cli.crew import TracePool
-from framearray_cli.embree import Engine
+from framearray_cli.engine.embree import Engine
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.composed import Composed
+from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.loop import ready_frames
+from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
-from framearray_cli.loop import ready_frames
 from framearray_cli.prepare import Prepared, open_embree, plan_work, prepared_from
 from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.scene.scene import Scene, build_scene
-from framearray_cli.terms.ambient import Ambient
-from framearray_cli.window import Composed, Window
-from framearray_cli.work import FrameSetup
 
 PLAIN, FLOOR, PAINTED, SMOOTH, MIRROR, GLOSSY = range(6)
 MATERIALS = (

@@ -2,8 +2,15 @@
 
 from typing import Any
 
-from framearray_cli.kernel import inlined, kernel
-from framearray_cli.surface import Surfaces, geometric_normal, position_at, reflectivity_at, shading_normal, specular_at
+from framearray_cli.engine.inputs.surfaces import (
+    Surfaces,
+    geometric_normal,
+    position_at,
+    reflectivity_at,
+    shading_normal,
+    specular_at,
+)
+from framearray_cli.engine.kernels.kernel import inlined, kernel
 
 QUANTITIES = ("position", "geometric", "shading", "diffuse", "mirror")
 

@@ -1,6 +1,6 @@
 """`framearray check`."""
 
-from framearray_cli.compiling import compile_clock
+from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.screen import Screen, out, say
 from framearray_cli.wording import estimate_lines
 

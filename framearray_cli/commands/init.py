@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from framearray_cli.compiling import compile_clock
+from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.screen import Screen, out, say
 
 from .options import Quiet, place

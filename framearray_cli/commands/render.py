@@ -9,7 +9,7 @@ import typer
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.units import MOST_THREADS, size
-from framearray_cli.compiling import compile_clock
+from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.parts.progress import PartEvents
 from framearray_cli.progress import ambient_figures
 from framearray_cli.screen import Screen, out, say
@@ -28,6 +28,7 @@ from .options import JobFile, Output, Quiet, Threads, frames_of, read
 
 if TYPE_CHECKING:
     from framearray_cli.auto import AutoSettings
+    from framearray_cli.engine.terms.ambient.estimate import Ambient
     from framearray_cli.job.job import Job
     from framearray_cli.parts.chunks import Chunks
     from framearray_cli.parts.run import WorkerOptions
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from framearray_cli.progress import AmbientFigures
     from framearray_cli.resume import OnDisk
     from framearray_cli.target import Target
-    from framearray_cli.terms.ambient import Ambient
 
 LITTLE_SPACE = 64 * 1024 * 1024  # bytes; with less, a full disk is the likely reason of an error
 FEW_FILES = 100  # fewer than a run has open, and leaves when it fails

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from framearray_cli.compiling import compile_clock
+from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.screen import Screen, out, say
 from framearray_cli.wording import report_lines, scene_lines
 

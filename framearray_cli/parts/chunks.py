@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from framearray_cli.base.errors import SceneError
+from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.job.job import Job
-from framearray_cli.plan import frame_hits
 from framearray_cli.prepare import open_embree, prepare
 
 # Frames of a chunk for each frame of N_r unless somebody says: the halo of 2 N_r frames is a quarter of it then.

@@ -17,7 +17,8 @@ from framearray_cli.base.errors import BusyError, FrameArrayError, JobError
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.hashing import digest
 from framearray_cli.base.units import MOST_THREADS
-from framearray_cli.compiling import compile_clock
+from framearray_cli.engine.kernels.clock import compile_clock
+from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_of_table
 from framearray_cli.prepare import Prepared
@@ -26,7 +27,6 @@ from framearray_cli.render import render
 from framearray_cli.resume import OnDisk
 from framearray_cli.summary import Summary
 from framearray_cli.target import Target
-from framearray_cli.terms.ambient import Ambient
 
 # Seconds between two looks whether the chunk is still wanted, and between two messages on how far it is.
 LOOK_EVERY, SEND_EVERY = 0.2, 0.5

@@ -10,13 +10,13 @@ import numpy as np
 from framearray_cli.auto import resolve_auto
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.table import changed
-from framearray_cli.embree import EmbreeScene
+from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.inputs.lights import some_lights
+from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.job.values import MOST_HITS
-from framearray_cli.lights import some_lights
 from framearray_cli.prepare import Prepared, open_embree, plan_work, prepare
-from framearray_cli.terms.ambient import Ambient
-from framearray_cli.work import FrameSetup
 
 from .settings import Settings
 

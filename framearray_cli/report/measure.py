@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32
-from framearray_cli.crew import TracePool
-from framearray_cli.frame import FrameHits
-from framearray_cli.loop import ready_frames
-from framearray_cli.terms.ambient import Ambient
-from framearray_cli.window import Window
-from framearray_cli.work import FrameSetup
+from framearray_cli.engine.frames.frame import FrameHits
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.loop import ready_frames
+from framearray_cli.engine.terms.ambient.estimate import Ambient
 
 from .case import Case, under, varied
 from .quality import Quality, mean_quality, quality

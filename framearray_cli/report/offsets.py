@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from framearray_cli.crew import TracePool
-from framearray_cli.loop import window_of
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.loop import window_of
 
 from .case import Case, varied
 from .measure import SEEDS

@@ -16,11 +16,11 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Image, Rgb
 from framearray_cli.base.files import make_folder, whole_file
 from framearray_cli.base.hashing import fingerprint
-from framearray_cli.crew import TracePool
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.composed import Layers
+from framearray_cli.engine.loop import window_of
 from framearray_cli.identity import job_fingerprint
-from framearray_cli.loop import window_of
-from framearray_cli.window import Layers
-from framearray_cli.work import FrameSetup
 
 from .case import Case, under
 from .metrics import rmse

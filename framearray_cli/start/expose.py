@@ -7,13 +7,13 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64, Images
 from framearray_cli.base.colour import srgb_from_linear
-from framearray_cli.crew import TracePool
-from framearray_cli.embree import EmbreeScene
-from framearray_cli.loop import ready_frames
+from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.loop import ready_frames
 from framearray_cli.prepare import plan_work, prepared_from
 from framearray_cli.scene.paths.paths import LightPath, eyes, lights, shining_together
 from framearray_cli.scene.scene import Scene
-from framearray_cli.window import Window
 
 from .model import Start, checked, table_of
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import SceneError
-from framearray_cli.embree import EmbreeScene
+from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.job.job import NAME, Z_UP_FORMATS
 from framearray_cli.scene.files import Stage, read_stage
 from framearray_cli.scene.scene import Scene, load_scene

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float64, Int32
-from framearray_cli.embree import EmbreeScene
-from framearray_cli.embree.packets import (
+from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.packets import (
     DIRECTION,
     GEOMETRY,
     HIT_ROWS,
@@ -22,7 +22,7 @@ from framearray_cli.embree.packets import (
     intersect,
     occlude,
 )
-from framearray_cli.lanes import LANES
+from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.scene.scene import Scene
 
 SHORTENED = 1e-4  # of a segment, left out at both of its ends, so that it does not meet what it starts or ends on

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
-from framearray_cli.embree import EmbreeScene
+from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.prepare import Prepared, open_embree, plan_work
 
 from .ambient_scenes import FURNACE, FURNACE_LEVEL, Probe, under_one, with_ambient

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter
 
 from framearray_cli.base.arrays import Float32, Float64, Image
-from framearray_cli.crew import TracePool
-from framearray_cli.loop import window_of
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.loop import window_of
 from framearray_cli.report.case import Case, planned, under
 from framearray_cli.report.metrics import EPSILON
 from framearray_cli.report.reference import noise, reference

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64
-from framearray_cli.camera import Cameras
+from framearray_cli.engine.inputs.cameras import Cameras
 
 from .campaths import CAMERAS, MIDDLE, N_R, seen_by
 from .cases import Case, Variant, job_named, opened, under, varied, with_resolution

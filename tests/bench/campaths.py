@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.camera import Cameras
+from framearray_cli.engine.inputs.cameras import Cameras
 
 from .cases import Case
 from .frames import frame

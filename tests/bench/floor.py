@@ -21,9 +21,8 @@ from numba import types
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes, Float32, Float64
-from framearray_cli.crew import TracePool
-from framearray_cli.embree.masks import _pointer
-from framearray_cli.embree.packets import (
+from framearray_cli.engine.embree.masks import _pointer
+from framearray_cli.engine.embree.packets import (
     GEOMETRY,
     HIT_ROWS,
     MISS,
@@ -35,9 +34,10 @@ from framearray_cli.embree.packets import (
     _trace,
     empty_packets,
 )
-from framearray_cli.frame import find_frame
-from framearray_cli.kernel import keep_on_disk
-from framearray_cli.lanes import LANES
+from framearray_cli.engine.frames.frame import find_frame
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.kernels.kernel import keep_on_disk
+from framearray_cli.engine.kernels.simd import LANES
 
 from .cases import Case
 

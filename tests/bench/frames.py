@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from framearray_cli.crew import TracePool
-from framearray_cli.loop import window_of
-from framearray_cli.window import Composed
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.composed import Composed
+from framearray_cli.engine.loop import window_of
 
 from .cases import Case
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Image
-from framearray_cli.lights import DIRECTIONAL
+from framearray_cli.engine.inputs.lights import DIRECTIONAL
 from framearray_cli.prepare import Prepared
 from framearray_cli.scene.scene import Scene
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
-from framearray_cli.camera import Cameras
+from framearray_cli.engine.inputs.cameras import Cameras
 
 Mask: TypeAlias = NDArray[np.bool_]
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.plan import turns
+from framearray_cli.engine.frames.passes import turns
+from framearray_cli.engine.frames.records import BY_SAMPLE
+from framearray_cli.engine.images.standard_error import square_mean, standard_error
 from framearray_cli.prepare import FEWEST_SPLIT
 from framearray_cli.report.metrics import rmse
 from framearray_cli.report.reference import HITS, PASSES, Reference, reference
-from framearray_cli.standarderror import square_mean, standard_error
-from framearray_cli.work import BY_SAMPLE
 
 from .cases import Case, Variant, job_named, opened, under, varied, with_resolution
 from .frames import frame
@@ -37,8 +37,8 @@ PAGE = """
 # The error that images tell of themselves
 
 `[samples] halves = true` keeps the hits of every pixel apart in two halves, and what these differ by tells the
-standard error of every pixel without a reference (`framearray_cli/standarderror.py`). Here it is held against the
-error that the images have: the root mean square over a picture of what is told, and the RMSE from a reference of
+standard error of every pixel without a reference (`framearray_cli/engine/images/standard_error.py`). Here it is held
+against the error that the images have: the root mean square over a picture of what is told, and the RMSE from a reference of
 {hits:,} hits a pixel, whose own error is taken off; both over the mean of the reference. {width} x {height} pixels,
 {cameras} cameras under {lights} light positions of each job. Written by `python -m bench told`, from the folder
 `tests`.

@@ -13,21 +13,21 @@ import tiny
 from rooms import INSIDE, ON_WALLS, OUTSIDE, TURN, WIDTH, planes
 from staging import Stage, facing, staged
 
-from framearray_cli.camera import OUTSIDE as HIDDEN
-from framearray_cli.camera import Cameras
-from framearray_cli.embree import EmbreeScene
-from framearray_cli.embree.packets import DIRECTION, ORIGIN, TFAR, intersect
-from framearray_cli.eyehits import Samples, native_hits, pixel_order
-from framearray_cli.hits import SURFACE, World, empty_hits
-from framearray_cli.lanes import LANES
-from framearray_cli.lights import light_arrays
-from framearray_cli.rays import room_for_hits, room_for_tests
-from framearray_cli.reuse import outer_hits
-from framearray_cli.sampling import lattice_steps
+from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.packets import DIRECTION, ORIGIN, TFAR, intersect
+from framearray_cli.engine.hits.hits import SURFACE, World, empty_hits
+from framearray_cli.engine.hits.native import Samples, native_hits, pixel_order
+from framearray_cli.engine.hits.outer import outer_hits
+from framearray_cli.engine.hits.rays import room_for_hits, room_for_tests
+from framearray_cli.engine.inputs.cameras import OUTSIDE as HIDDEN
+from framearray_cli.engine.inputs.cameras import Cameras
+from framearray_cli.engine.inputs.lights import light_arrays
+from framearray_cli.engine.inputs.random import lattice_steps
+from framearray_cli.engine.inputs.surfaces import nearest
+from framearray_cli.engine.kernels.simd import LANES
+from framearray_cli.engine.terms.direct import FAR_END, direct
+from framearray_cli.engine.terms.obscurance import SQRT, ObscuranceSettings, _aim
 from framearray_cli.scene.paths.paths import LightPath, shining_together
-from framearray_cli.surface import nearest
-from framearray_cli.terms.direct import FAR_END, direct
-from framearray_cli.terms.obscurance import SQRT, ObscuranceSettings, _aim
 
 FAR_OFF = np.array([(1, 1, 1), (1.1, 1, 1), (1, 1.1, 1)]) * 1e10
 NOTHING = tiny.scene_of(np.stack([FAR_OFF, -FAR_OFF]))  # in nobody's way

@@ -9,13 +9,13 @@ import numpy as np
 import tiny
 from rooms import ROOMS, TURN, WIDTH, plain, planes
 
-from framearray_cli.embree import EmbreeScene
-from framearray_cli.embree.packets import intersect, set_ray
-from framearray_cli.hits import SURFACE, Hits, World, empty_hits, record_hits
-from framearray_cli.kernel import kernel
-from framearray_cli.rays import room_for_hits
+from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.packets import intersect, set_ray
+from framearray_cli.engine.hits.hits import SURFACE, Hits, World, empty_hits, record_hits
+from framearray_cli.engine.hits.rays import room_for_hits
+from framearray_cli.engine.inputs.surfaces import ULP, Surfaces, surfaces
+from framearray_cli.engine.kernels.kernel import kernel
 from framearray_cli.scene.scene import Scene
-from framearray_cli.surface import ULP, Surfaces, surfaces
 
 HERE, BETWEEN = np.array([0.11, 0.0, -0.17]), np.array([2.1, 1.9, 1.7])  # from where the points of a room are seen
 # How far from its wall a ray may end: roundings of corners, origin and distance, of coordinates up to 1.7.

@@ -22,7 +22,7 @@ from counting import (
 from rooms import ON_WALLS, ROOMS, TURN
 from staging import Stage, staged
 
-from framearray_cli.surface import OFFSET_ULPS, ULP
+from framearray_cli.engine.inputs.surfaces import OFFSET_ULPS, ULP
 
 # In a wedge of angle a, points nearer to the edge than offset / tan(a) start behind the other wall.
 WEDGE_SHARE = 2 * OFFSET_ULPS * ULP / np.tan(np.radians(1.0))

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import tiny
 
-from framearray_cli.camera import OUTSIDE, Cameras, project
-from framearray_cli.compose import MOST
-from framearray_cli.kernel import kernel
+from framearray_cli.engine.images.band import MOST
+from framearray_cli.engine.inputs.cameras import OUTSIDE, Cameras, project
+from framearray_cli.engine.kernels.kernel import kernel
 from framearray_cli.scene.files import Material
 
 

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from framearray_cli.accumulate import HitSource, SourceList, accumulate
 from framearray_cli.base.arrays import with_room
-from framearray_cli.compose import empty_band
-from framearray_cli.lanes import LANES
-from framearray_cli.work import INDIRECT, LIT, REFLECTIVITY, WEIGHT, HitRecords, Placed
+from framearray_cli.engine.frames.records import INDIRECT, LIT, REFLECTIVITY, WEIGHT, HitRecords, Placed
+from framearray_cli.engine.images.band import empty_band
+from framearray_cli.engine.images.compose import HitSource, SourceList, accumulate
+from framearray_cli.engine.kernels.simd import LANES
 
 
 def mean_of_many(n: int) -> tuple[Any, Any]:

@@ -19,7 +19,7 @@ import test_reuse_bias as reuse
 from stages import write_scene
 from ztests import Estimate, chi2_bounds, difference, differing, estimate
 
-from framearray_cli.terms.obscurance import FALLOFFS
+from framearray_cli.engine.terms.obscurance import FALLOFFS
 
 HEAD = """# Accuracy
 

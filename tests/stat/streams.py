@@ -18,8 +18,8 @@ import numpy as np
 from scipy.stats import chi2, norm
 from ztests import CHANCE, sidak
 
-from framearray_cli.kernel import kernel
-from framearray_cli.sampling import CHOICE, HEMISPHERE, PIXEL, PIXEL_SAMPLE, STEPS, stream, word
+from framearray_cli.engine.inputs.random import CHOICE, HEMISPHERE, PIXEL, PIXEL_SAMPLE, STEPS, stream, word
+from framearray_cli.engine.kernels.kernel import kernel
 
 WIDTH, N = 240, 43_200  # an image of 240 x 180
 DIMENSIONS = {"pixel": PIXEL, "hemisphere": HEMISPHERE, "choice": CHOICE, "steps": STEPS}

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import ztests
 
-from framearray_cli.terms.obscurance import FALLOFFS
+from framearray_cli.engine.terms.obscurance import FALLOFFS
 
 
 @pytest.mark.parametrize("k", [0.1, 0.4, 1.0, 3.0, 200.0])

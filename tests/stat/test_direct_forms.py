@@ -9,12 +9,12 @@ import pytest
 from numpy.typing import NDArray
 from stages import Part, look, make_job, point, quad, result_of, sun, write_scene
 
-from framearray_cli.crew import Scratch
-from framearray_cli.eyehits import Samples, native_hits
-from framearray_cli.hits import SURFACE
+from framearray_cli.engine.frames.threads import Scratch
+from framearray_cli.engine.hits.hits import SURFACE
+from framearray_cli.engine.hits.native import Samples, native_hits
+from framearray_cli.engine.terms.direct import direct
 from framearray_cli.job.job import Job
 from framearray_cli.prepare import open_embree, plan_work, prepare
-from framearray_cli.terms.direct import direct
 
 Array = NDArray[np.float64]
 

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from stages import box, make_job, point, quad, sun, write_scene
 from ztests import differing
 
-from framearray_cli.allotment import Allotment, blocks_of
-from framearray_cli.crew import TracePool
+from framearray_cli.engine.frames.blocks import Allotment, blocks_of
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
-from framearray_cli.loop import window_of
 from framearray_cli.prepare import open_embree, plan_work, prepare
 
 Array = NDArray[np.float64]

@@ -1,7 +1,7 @@
 """The standard error that an image tells of itself against the spread of the same image over seeds.
 
-D^2 (`framearray_cli/standarderror.py`) averaged over seeds is the variance of a pixel, so over pixels and seeds its
-root mean square is that of the spread. Two light positions, so that sums and differences of images are judged too.
+D^2 (`framearray_cli/engine/images/standard_error.py`) averaged over seeds is the variance of a pixel, so
+over pixels and seeds its root mean square is that of the spread. Two light positions, so that sums and differences of images are judged too.
 """
 
 from collections.abc import Callable
@@ -14,11 +14,11 @@ import pytest
 from numpy.typing import NDArray
 from stages import box, make_job, quad, write_scene
 
-from framearray_cli.crew import TracePool
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.standard_error import standard_error
+from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
-from framearray_cli.loop import window_of
 from framearray_cli.prepare import open_embree, plan_work, prepare
-from framearray_cli.standarderror import standard_error
 from framearray_cli.target import allot_hits
 
 Array = NDArray[np.float64]

@@ -7,9 +7,9 @@ import pytest
 from scipy.optimize import minimize
 
 from framearray_cli.allot import FEWEST, Witnesses, allot, fewest_hits, variances
-from framearray_cli.allotment import Allotment, blocks_of
+from framearray_cli.engine.frames.blocks import Allotment, blocks_of
+from framearray_cli.engine.frames.passes import passes_of_counts
 from framearray_cli.expected import EVENNESS, independent_hits
-from framearray_cli.plan import passes_of_counts
 
 MANY = 1e9
 

@@ -10,7 +10,7 @@ from bench.results import DOCS, load, median, save, site_for, site_in
 from bench.scaling import resampled
 from bench.steady import mean
 
-from framearray_cli.lights import DIRECTIONAL, POINT, LightArrays
+from framearray_cli.engine.inputs.lights import DIRECTIONAL, POINT, LightArrays
 from framearray_cli.report.metrics import block_mean, errors, relmse, rmse, shadow_edges, squared_bias
 
 SETTINGS = [

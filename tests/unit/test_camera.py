@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import tiny
 
-from framearray_cli.camera import OUTSIDE, Cameras, cameras, eye_ray, project
-from framearray_cli.kernel import kernel
+from framearray_cli.engine.inputs.cameras import OUTSIDE, Cameras, cameras, eye_ray, project
+from framearray_cli.engine.kernels.kernel import kernel
 from framearray_cli.scene.paths.paths import Eyes, eyes
 
 

@@ -2,7 +2,7 @@
 
 import numba
 
-from framearray_cli.compiling import compile_clock, is_compiling
+from framearray_cli.engine.kernels.clock import compile_clock, is_compiling
 
 
 def test_each_clock_tells_once_and_measures_by_itself() -> None:

@@ -7,12 +7,8 @@ from weakref import ref
 import numpy as np
 import pytest
 
-from framearray_cli.accumulate import HitSource, SourceList, accumulate, compose_differences, weigh_halves
 from framearray_cli.base.arrays import with_room
-from framearray_cli.compose import MOST, Band, Finish, as_stored, empty_band, finish
-from framearray_cli.lanes import LANES
-from framearray_cli.reuse import sort_by_pixel
-from framearray_cli.work import (
+from framearray_cli.engine.frames.records import (
     BY_SAMPLE,
     HALF,
     INDIRECT,
@@ -25,6 +21,10 @@ from framearray_cli.work import (
     HitRecords,
     Placed,
 )
+from framearray_cli.engine.hits.outer import sort_by_pixel
+from framearray_cli.engine.images.band import MOST, Band, Finish, as_stored, empty_band, finish
+from framearray_cli.engine.images.compose import HitSource, SourceList, accumulate, compose_differences, weigh_halves
+from framearray_cli.engine.kernels.simd import LANES
 
 N_PIXELS, N_LIGHTS, NOTHING = 40, 7, np.empty(0, np.float32)
 

@@ -8,7 +8,7 @@ import pytest
 import tiny
 
 from framearray_cli.base.arrays import LINE
-from framearray_cli.crew import ArrayPool, TracePool
+from framearray_cli.engine.frames.threads import ArrayPool, TracePool
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import tiny
 
-from framearray_cli import denoise, window
 from framearray_cli.base.errors import MissingExtraError
-from framearray_cli.denoise import denoised
+from framearray_cli.engine.images import denoise, window
+from framearray_cli.engine.images.denoise import denoised
 
 SKY = {"background": [0.5, 0.5, 0.5]}
 

@@ -8,14 +8,14 @@ import pytest
 import tiny
 from test_obscurance import points
 
-from framearray_cli.embree import EmbreeScene
-from framearray_cli.hits import ESCAPED, Hits
-from framearray_cli.lights import LightArrays, light_arrays
-from framearray_cli.rays import room_for_tests
+from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.hits.hits import ESCAPED, Hits
+from framearray_cli.engine.hits.rays import room_for_tests
+from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
+from framearray_cli.engine.terms.direct import direct
+from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
 from framearray_cli.scene.paths.paths import LightPath, shining_together
 from framearray_cli.scene.scene import Scene
-from framearray_cli.terms.direct import direct
-from framearray_cli.terms.direct_steps import direct_by_steps, room_for_steps
 
 UP = (0.0, 1.0, 0.0)
 RNG = np.random.default_rng(7)

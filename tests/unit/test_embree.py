@@ -14,10 +14,10 @@ import scenes
 import tiny
 from embreex import rtcore_scene
 
-from framearray_cli import embree
 from framearray_cli.base.errors import SceneError
-from framearray_cli.embree import EmbreeScene
-from framearray_cli.embree.packets import (
+from framearray_cli.engine import embree
+from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.packets import (
     DIRECTION,
     GEOMETRY,
     HIT_ROWS,
@@ -34,7 +34,7 @@ from framearray_cli.embree.packets import (
     intersect,
     occlude,
 )
-from framearray_cli.lanes import LANES
+from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.scene.files import Material
 from framearray_cli.scene.scene import Scene, load_scene
 

@@ -190,9 +190,9 @@ def test_jobs_that_do_not_go_with_groups(changes: Any, message: str) -> None:
 def test_notes_and_lines_tell_groups(scene: Path) -> None:
     from dataclasses import replace as changed
 
+    from framearray_cli.engine.terms.ambient.estimate import Ambient
     from framearray_cli.prepare import _named
     from framearray_cli.scene.paths.paths import lights
-    from framearray_cli.terms.ambient import Ambient
 
     job = tiny.Job.model_validate({**tiny.table(), "light": {"sources": SOURCES}})
     found = lights(job)

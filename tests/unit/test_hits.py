@@ -7,10 +7,10 @@ import pytest
 import tiny
 from oracle import Oracle
 
-from framearray_cli.eyehits import Samples, extra_hits, native_hits, pilot_hits, pixel_order
-from framearray_cli.hits import ESCAPED, SURFACE, Hits, empty_hits, record_hits
-from framearray_cli.rays import room_for_hits
-from framearray_cli.work import FrameSetup
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.hits.hits import ESCAPED, SURFACE, Hits, empty_hits, record_hits
+from framearray_cli.engine.hits.native import Samples, extra_hits, native_hits, pilot_hits, pixel_order
+from framearray_cli.engine.hits.rays import room_for_hits
 
 
 def native(setup: FrameSetup, c: int, per_pixel: int, batch: int = 2048) -> Hits:

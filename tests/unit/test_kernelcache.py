@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 import framearray_cli
-from framearray_cli import kernelcache
-from framearray_cli.kernel import keep_on_disk, kernel
+from framearray_cli.engine.kernels import cache as kernelcache
+from framearray_cli.engine.kernels.kernel import keep_on_disk, kernel
 
 PACKAGE = Path(framearray_cli.__file__).parent
 elsewhere = pytest.mark.skipif(os.name == "nt", reason="the place of caches is set by XDG_CACHE_HOME elsewhere only")

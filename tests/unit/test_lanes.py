@@ -9,9 +9,11 @@ import pytest
 import tiny
 from triangles import everything, find_numbers
 
-from framearray_cli.camera import OUTSIDE, Cameras, project
-from framearray_cli.kernel import kernel
-from framearray_cli.lanes import (
+from framearray_cli.engine.inputs.cameras import OUTSIDE, Cameras, project
+from framearray_cli.engine.inputs.random import above, cosine_direction, disc
+from framearray_cli.engine.inputs.surfaces import Surfaces, nearest_texel_at, surfaces, texture_at
+from framearray_cli.engine.kernels.kernel import kernel
+from framearray_cli.engine.kernels.simd import (
     LANES,
     bits,
     compress,
@@ -33,8 +35,6 @@ from framearray_cli.lanes import (
     triples_at,
     words,
 )
-from framearray_cli.sampling import above, cosine_direction, disc
-from framearray_cli.surface import Surfaces, nearest_texel_at, surfaces, texture_at
 
 ULP = 2.0**-23  # one float32 rounding, of a number of size 1, is at most half of it
 FEW = 8 * ULP

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from framearray_cli.lights import DIRECTIONAL, POINT, light_arrays
+from framearray_cli.engine.inputs.lights import DIRECTIONAL, POINT, light_arrays
 from framearray_cli.scene.paths.paths import LightPath, shining_together
 
 WHITE = np.array([1.0, 1.0, 1.0])

@@ -10,9 +10,9 @@ import tiny
 from tiny import WALK
 
 import framearray_cli
-from framearray_cli.crew import TracePool
-from framearray_cli.loop import ready_frames, window_of
-from framearray_cli.window import Window
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.loop import ready_frames, window_of
 
 PACKAGE = Path(framearray_cli.__file__).parent
 

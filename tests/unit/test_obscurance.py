@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 import tiny
 
-from framearray_cli.embree import EmbreeScene
-from framearray_cli.hits import ESCAPED, SURFACE, Hits, empty_hits
-from framearray_cli.kernel import kernel
-from framearray_cli.rays import room_for_hits
-from framearray_cli.sampling import lattice_steps
+from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.hits.hits import ESCAPED, SURFACE, Hits, empty_hits
+from framearray_cli.engine.hits.rays import room_for_hits
+from framearray_cli.engine.inputs.random import lattice_steps
+from framearray_cli.engine.inputs.surfaces import surfaces
+from framearray_cli.engine.kernels.kernel import kernel
+from framearray_cli.engine.terms.obscurance import CONSTANT, FALLOFFS, SQRT, ObscuranceSettings, obscurance, rho
 from framearray_cli.scene.files import Material
 from framearray_cli.scene.scene import Scene
-from framearray_cli.surface import surfaces
-from framearray_cli.terms.obscurance import CONSTANT, FALLOFFS, SQRT, ObscuranceSettings, obscurance, rho
 
 AVERAGE = np.float32([0.5, 0.25, 0.125])
 

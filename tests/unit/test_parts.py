@@ -5,8 +5,8 @@ import importlib
 import numpy as np
 import pytest
 
+from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.parts.chunks import cut, default_size, in_chunks
-from framearray_cli.plan import frame_hits
 from framearray_cli.wording import chunks_line
 
 

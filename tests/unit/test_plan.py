@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import tiny
 
-from framearray_cli.eyehits import pixel_order
-from framearray_cli.hits import empty_hits
-from framearray_cli.plan import flag_mirrors, frame_hits, passes
+from framearray_cli.engine.frames.passes import frame_hits, passes
+from framearray_cli.engine.hits.hits import empty_hits
+from framearray_cli.engine.hits.native import flag_mirrors, pixel_order
 
 PATHS = [(n_c, n_r) for n_c in (1, 2, 3, 4, 5, 7, 12, 24) for n_r in (0, 1, 2, 3, 5, 8, 30, 64)]
 

@@ -3,7 +3,7 @@
 import numpy as np
 from bench.regions import regions
 
-from framearray_cli.camera import Cameras
+from framearray_cli.engine.inputs.cameras import Cameras
 
 H, W, F = 40, 60, 50.0
 

@@ -10,12 +10,12 @@ from oracle import Oracle
 from test_hits import native
 from tiny import WALK
 
-from framearray_cli.camera import OUTSIDE
-from framearray_cli.crew import TracePool
-from framearray_cli.frame import find_frame
-from framearray_cli.hits import SURFACE
-from framearray_cli.rays import room_for_tests
-from framearray_cli.reuse import balance_weights, outer_hits, sort_by_pixel
+from framearray_cli.engine.frames.frame import find_frame
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.hits.hits import SURFACE
+from framearray_cli.engine.hits.outer import balance_weights, outer_hits, sort_by_pixel
+from framearray_cli.engine.hits.rays import room_for_tests
+from framearray_cli.engine.inputs.cameras import OUTSIDE
 
 SKY = {"background": [0.3, 0.4, 0.5]}
 

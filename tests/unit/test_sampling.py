@@ -7,8 +7,8 @@ import oracle_random as twin
 import pytest
 from scipy.stats import chi2, norm
 
-from framearray_cli.kernel import kernel
-from framearray_cli.sampling import above, cosine_direction, disc, lattice_steps, r2, stream, word
+from framearray_cli.engine.inputs.random import above, cosine_direction, disc, lattice_steps, r2, stream, word
+from framearray_cli.engine.kernels.kernel import kernel
 
 # Chance that a right generator fails one test; with some hundred tests here, 1e-6 makes it 1e-4 for all of them.
 # Seeds are fixed, so a test that passes once passes always.

@@ -8,10 +8,19 @@ from test_compose import lit_packets
 from test_obscurance import points
 
 from framearray_cli.base.arrays import with_room
-from framearray_cli.hits import ESCAPED, SURFACE
-from framearray_cli.lanes import LANES
-from framearray_cli.shading import write_rows
-from framearray_cli.work import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, LIT_BITS, OBSCURANCE, REFLECTIVITY, WEIGHT
+from framearray_cli.engine.frames.records import (
+    HALF,
+    INDIRECT,
+    LIGHT_INDEPENDENT,
+    LIT,
+    LIT_BITS,
+    OBSCURANCE,
+    REFLECTIVITY,
+    WEIGHT,
+)
+from framearray_cli.engine.frames.shading import write_rows
+from framearray_cli.engine.hits.hits import ESCAPED, SURFACE
+from framearray_cli.engine.kernels.simd import LANES
 
 N = 37
 NOTHING = np.empty((0, 3), np.float32)

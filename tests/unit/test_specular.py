@@ -7,12 +7,12 @@ import pytest
 import tiny
 from test_hits import native
 
-from framearray_cli.hits import SURFACE, Hits, empty_hits
-from framearray_cli.rays import room_for_hits
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.hits.hits import SURFACE, Hits, empty_hits
+from framearray_cli.engine.hits.rays import room_for_hits
+from framearray_cli.engine.terms.mirrors import count_mirrors, reflect
 from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.scene import Scene, build_scene
-from framearray_cli.terms.specular import count_mirrors, reflect
-from framearray_cli.work import FrameSetup
 
 TINT = np.float32([0.9, 0.8, 0.7])
 

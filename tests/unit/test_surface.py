@@ -8,9 +8,7 @@ import tiny
 from triangles import QUANTITIES, find_numbers
 
 from framearray_cli.base.colour import linear_from_srgb8
-from framearray_cli.kernel import kernel
-from framearray_cli.scene.files import Material
-from framearray_cli.surface import (
+from framearray_cli.engine.inputs.surfaces import (
     OFFSET_ULPS,
     ULP,
     Surfaces,
@@ -20,6 +18,8 @@ from framearray_cli.surface import (
     texture_at,
     total_at,
 )
+from framearray_cli.engine.kernels.kernel import kernel
+from framearray_cli.scene.files import Material
 
 QUAD = tiny.quad((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0))
 UVS = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float64)

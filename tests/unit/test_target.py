@@ -10,17 +10,17 @@ import tiny
 from pydantic import ValidationError
 from tiny import WALK
 
-from framearray_cli.allotment import Allotment, blocks_of
 from framearray_cli.base.errors import JobError
-from framearray_cli.camera import OUTSIDE
-from framearray_cli.crew import TracePool
-from framearray_cli.eyehits import Samples, native_hits
-from framearray_cli.frame import find_frame
-from framearray_cli.hits import empty_hits
+from framearray_cli.engine.frames.blocks import Allotment, blocks_of
+from framearray_cli.engine.frames.frame import find_frame
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.hits.hits import empty_hits
+from framearray_cli.engine.hits.native import Samples, native_hits
+from framearray_cli.engine.hits.outer import balance_weights, divide_by_own_hits, scale_by_expected_hits
+from framearray_cli.engine.hits.rays import room_for_hits
+from framearray_cli.engine.inputs.cameras import OUTSIDE
 from framearray_cli.job.job import Job
 from framearray_cli.memory import require_memory
-from framearray_cli.rays import room_for_hits
-from framearray_cli.reuse import balance_weights, divide_by_own_hits, scale_by_expected_hits
 from framearray_cli.target import allot_hits, of_samples
 from framearray_cli.wording import target_lines
 

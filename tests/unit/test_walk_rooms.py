@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import tiny
 
-from framearray_cli.lanes import LANES
-from framearray_cli.terms import ambient
-from framearray_cli.terms.ambient import BATCH, Workspace
+from framearray_cli.engine.kernels.simd import LANES
+from framearray_cli.engine.terms.ambient import estimate as ambient
+from framearray_cli.engine.terms.ambient.estimate import BATCH, Workspace
 
 
 def test_hits_of_walks_have_room_for_whole_packets(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,10 +8,10 @@ import pytest
 import tiny
 from tiny import WALK
 
-from framearray_cli.crew import TracePool
-from framearray_cli.frame import FrameHits
-from framearray_cli.loop import ready_frames, window_of
-from framearray_cli.window import Window
+from framearray_cli.engine.frames.frame import FrameHits
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.loop import ready_frames, window_of
 
 SKY = {"background": [0.3, 0.4, 0.5]}
 
@@ -80,7 +80,7 @@ def test_a_task_that_fails_gives_its_sums_to_the_next(kernel: str, monkeypatch: 
         before = window.compose(1, np.empty(shape, np.float32)).images
         for _ in range(3):
             with monkeypatch.context() as broken, pytest.raises(MemoryError):
-                broken.setattr(f"framearray_cli.window.{kernel}", fail)
+                broken.setattr(f"framearray_cli.engine.images.window.{kernel}", fail)
                 window.compose(1, np.empty(shape, np.float32))
         np.testing.assert_array_equal(window.compose(1, np.empty(shape, np.float32)).images, before)
 

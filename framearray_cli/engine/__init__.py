@@ -1,0 +1,1 @@
+"""Arrays in, images out; knows no job and no file."""

@@ -1,0 +1,139 @@
+"""Embree through its C functions, from the library in the embreex wheel."""
+
+import ctypes
+import os
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from framearray_cli.base.arrays import Float32
+from framearray_cli.base.errors import SceneError
+from framearray_cli.scene.scene import Scene
+
+from ..kernels.simd import LANES
+from .masks import MaskTable
+from .packets import MASKED, OPAQUE, Tracer, aligned
+
+_TRIANGLES = 0  # RTC_GEOMETRY_TYPE_TRIANGLE
+_INDEX_BUFFER, _VERTEX_BUFFER = 0, 1
+_UINT3, _FLOAT3 = 0x5003, 0x9003
+_COHERENT = 1 << 16  # RTC_RAY_QUERY_FLAG_COHERENT
+_ALL_FEATURES = 0xFFFFFFFF
+_ROBUST = 1 << 2  # RTC_SCENE_FLAG_ROBUST: no ray slips between neighbouring triangles
+
+
+@cache
+def embree_library() -> ctypes.CDLL | None:
+    """Load Embree from the embreex wheel; None where its symbols cannot be reached.
+
+    Opening the extension module again resolves every `rtc...` symbol through the module's own dependency, whatever the
+    wheel calls that library.
+    """
+    from embreex import rtcore_scene
+
+    try:
+        library = ctypes.CDLL(rtcore_scene.__file__)
+        for name in _SIGNATURES:
+            getattr(library, name)
+    except (OSError, AttributeError):
+        return None
+    for name, (result, *arguments) in _SIGNATURES.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+    return library
+
+
+_POINTER, _UINT, _SIZE, _INT = ctypes.c_void_p, ctypes.c_uint, ctypes.c_size_t, ctypes.c_int
+_SIGNATURES: dict[str, tuple[Any, ...]] = {
+    "rtcNewDevice": (_POINTER, ctypes.c_char_p),
+    "rtcGetDeviceError": (_INT, _POINTER),
+    "rtcReleaseDevice": (None, _POINTER),
+    "rtcNewScene": (_POINTER, _POINTER),
+    "rtcSetSceneFlags": (None, _POINTER, _INT),
+    "rtcCommitScene": (None, _POINTER),
+    "rtcReleaseScene": (None, _POINTER),
+    "rtcNewGeometry": (_POINTER, _POINTER, _INT),
+    "rtcSetSharedGeometryBuffer": (None, _POINTER, _INT, _UINT, _INT, _POINTER, _SIZE, _SIZE, _SIZE),
+    "rtcSetGeometryUserData": (None, _POINTER, _POINTER),
+    "rtcSetGeometryIntersectFilterFunction": (None, _POINTER, _POINTER),
+    "rtcSetGeometryOccludedFilterFunction": (None, _POINTER, _POINTER),
+    "rtcCommitGeometry": (None, _POINTER),
+    "rtcAttachGeometryByID": (None, _POINTER, _POINTER, _UINT),
+    "rtcReleaseGeometry": (None, _POINTER),
+    "rtcIntersect16": (None, _POINTER, _POINTER, _POINTER, _POINTER),
+    "rtcOccluded16": (None, _POINTER, _POINTER, _POINTER, _POINTER),
+}
+
+
+class NativeScene:
+    """Owns an Embree device and scene, built and traced through Embree's C functions."""
+
+    def __init__(self, scene: Scene, library: ctypes.CDLL) -> None:
+        self._library = library
+        self._device = library.rtcNewDevice(_configuration())
+        self._scene = library.rtcNewScene(self._device)
+        self._kept: list[Any] = [scene]  # memory that Embree points into
+        library.rtcSetSceneFlags(self._scene, _ROBUST)
+        # Embree reads 16 bytes per vertex of 12: the last one needs a float of padding
+        vertices = np.empty(scene.corners.size + 4, np.float32)
+        vertices[: scene.corners.size] = scene.corners.reshape(-1)
+        self._kept.append(vertices)
+        n = len(scene.corners)
+        self._attach(vertices, 0, scene.n_opaque, masks=None)
+        if scene.n_opaque < n:
+            masks = MaskTable(scene)
+            self._kept.append(masks)
+            self._attach(vertices, scene.n_opaque, n, masks)
+        library.rtcCommitScene(self._scene)
+        problem = library.rtcGetDeviceError(self._device)
+        if problem:
+            raise SceneError(f"embree: building {n} triangles failed with error {problem}")
+        self._lanes = aligned(LANES).view(np.int32)
+        self._lanes[:] = -1
+        # RTCIntersectArguments and RTCOccludedArguments: flags, features; pointers to context, filter and function
+        self._arguments = np.zeros(8, np.uint64)
+        self._arguments.view(np.uint32)[:2] = _COHERENT, _ALL_FEATURES
+        self.tracer = Tracer(
+            self._scene,
+            _address(library.rtcIntersect16),
+            _address(library.rtcOccluded16),
+            0,
+            self._arguments.ctypes.data,
+            self._lanes.ctypes.data,
+            scene.n_opaque,
+        )
+
+    def _attach(self, vertices: Float32, start: int, stop: int, masks: "MaskTable | None") -> None:
+        if start == stop:
+            return
+        library = self._library
+        indices = np.arange(3 * start, 3 * stop, dtype=np.uint32)
+        self._kept.append(indices)
+        geometry = library.rtcNewGeometry(self._device, _TRIANGLES)
+        share = library.rtcSetSharedGeometryBuffer
+        share(geometry, _VERTEX_BUFFER, 0, _FLOAT3, vertices.ctypes.data, 0, 12, 3 * stop)
+        share(geometry, _INDEX_BUFFER, 0, _UINT3, indices.ctypes.data, 0, 12, stop - start)
+        if masks:
+            library.rtcSetGeometryUserData(geometry, masks.address)
+            library.rtcSetGeometryIntersectFilterFunction(geometry, masks.filter_address)
+            library.rtcSetGeometryOccludedFilterFunction(geometry, masks.filter_address)
+        library.rtcCommitGeometry(geometry)
+        library.rtcAttachGeometryByID(self._scene, geometry, MASKED if masks else OPAQUE)
+        library.rtcReleaseGeometry(geometry)
+
+    def close(self) -> None:
+        """Release Embree's scene and device."""
+        if self._device:
+            self._library.rtcReleaseScene(self._scene)
+            self._library.rtcReleaseDevice(self._device)
+            self._device = None
+
+
+def _configuration() -> bytes | None:
+    """Embree's settings for a device: none, but in tests that force an instruction set."""
+    return os.environ.get("FRAMEARRAY_EMBREE", "").encode() or None
+
+
+def _address(function: Any) -> int:
+    return ctypes.cast(function, ctypes.c_void_p).value or 0

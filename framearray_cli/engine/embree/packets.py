@@ -1,0 +1,162 @@
+"""Rays in packets, and how kernels trace them.
+
+Kernels write rays where Embree reads them: in blocks of 16, structures of arrays, in Embree's own layout (RTCRay16,
+RTCRayHit16). A packet is (rows, 16) float32: 12 rows of ray (origin xyz, tnear, direction xyz, time, tfar, mask, id,
+flags) and, for first hits, the hit (Ng xyz, u, v, triangle, geometry, instance), then padding. A lane with tfar < 0 is
+idle.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from framearray_cli.base.arrays import Float32, Real
+
+from ..kernels.kernel import inlined, kernel
+from ..kernels.simd import LANES, select
+
+RAY_ROWS = 12
+HIT_ROWS = 24  # RTCRayHit16 has 20 to 22 rows, depending on how Embree was built; the rest is padding
+ORIGIN, TNEAR, DIRECTION, TFAR, MASK, NORMAL, U, V, TRIANGLE, GEOMETRY = 0, 3, 4, 8, 9, 12, 15, 16, 17, 18
+
+MISS = -1
+OPAQUE, MASKED = 0, 1  # geometry numbers
+ALL_RAYS = -1  # a ray mask with every bit set; Embree skips geometry whose mask shares no bit with the ray's
+
+
+class Tracer(NamedTuple):
+    """What a kernel needs to trace rays: only addresses and numbers, so that numba can cache the kernel.
+
+    Attributes:
+        scene, intersect, occluded: addresses of the scene, and of the two functions that trace rays through it.
+        batch: 0 if the functions take one packet, as Embree's do: `(valid, scene, packet, arguments)`;
+            1 if they take many: `(n_packets, scene, packets, unused)`.
+        coherent: address of the arguments that mark the rays of a packet as coherent.
+        lanes: address of 16 words of -1: the mask of a packet in which all lanes count.
+        first_masked: index of the first triangle with an alpha mask; those form a geometry of their own.
+    """
+
+    scene: int
+    intersect: int
+    occluded: int
+    batch: int
+    coherent: int
+    lanes: int
+    first_masked: int
+
+
+def _call_at(typingctx: Any, function: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
+    """Call the C function `void (intptr, intptr, intptr, intptr)` at an address known only at run time."""
+    signature = types.void(*[types.intp] * 5)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        word = ir.IntType(64)
+        pointer = ir.FunctionType(ir.VoidType(), [word] * 4).as_pointer()
+        builder.call(builder.inttoptr(args[0], pointer), list(args[1:]))
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+_call: Any = intrinsic(_call_at)
+
+
+@kernel
+def _trace(tracer: Tracer, function: int, packets: Float32, n_packets: int, coherent: bool) -> None:
+    address = packets.ctypes.data
+    if tracer.batch:
+        _call(function, n_packets, tracer.scene, address, 0)
+        return
+    arguments = tracer.coherent if coherent else 0
+    size = 4 * LANES * packets.shape[1]
+    for p in range(n_packets):
+        _call(function, tracer.lanes, tracer.scene, address + p * size, arguments)
+
+
+def aligned(n_words: int) -> Float32:
+    """(n,) zeros that start at a cache line, as Embree requires."""
+    block = np.zeros(n_words + LANES, np.float32)
+    start = ((-block.ctypes.data) % 64) // 4
+    return block[start : start + n_words]
+
+
+def empty_packets(n_packets: int, rows: int) -> Float32:
+    """Allocate packets, (n, rows, 16) float32, with tnear 0 and the mask of all rays."""
+    packets = aligned(n_packets * rows * LANES).reshape(n_packets, rows, LANES)
+    packets.view(np.int32)[:, MASK] = ALL_RAYS
+    return packets
+
+
+@inlined
+def set_ray(packets: Float32, i: int, ox: Real, oy: Real, oz: Real, dx: Real, dy: Real, dz: Real, tfar: Real) -> None:
+    """Write ray i of an array of packets; it ends at tfar, in lengths of its direction."""
+    p, lane = i >> 4, i & 15
+    packets[p, ORIGIN, lane] = ox
+    packets[p, ORIGIN + 1, lane] = oy
+    packets[p, ORIGIN + 2, lane] = oz
+    packets[p, DIRECTION, lane] = dx
+    packets[p, DIRECTION + 1, lane] = dy
+    packets[p, DIRECTION + 2, lane] = dz
+    packets[p, TFAR, lane] = tfar
+
+
+@inlined
+def _idle_from(packets: Float32, n_rays: int) -> int:
+    """Make the lanes after the last ray idle, and return the number of packets."""
+    n_packets = (n_rays + LANES - 1) // LANES
+    for i in range(n_rays, n_packets * LANES):
+        set_ray(packets, i, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0)
+    return n_packets
+
+
+@kernel
+def intersect(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = False, near: float = 0.0) -> None:
+    """Find the first hits of rays 0 to n_rays - 1; see `hit_triangle`.
+
+    Args:
+        coherent: the rays of a packet run close together. Embree then traverses them together, which halves the time
+            of shadow rays and saves a fifth of that of eye rays; for rays that scatter it gains nothing.
+        near: ignore hits nearer than this, in lengths of the directions.
+    """
+    n_packets = _idle_from(packets, n_rays)
+    bits = packets.view(np.int32)
+    for p in range(n_packets):
+        for lane in range(LANES):
+            packets[p, TNEAR, lane] = near
+            bits[p, TRIANGLE, lane] = MISS
+            bits[p, GEOMETRY, lane] = MISS
+    _trace(tracer, tracer.intersect, packets, n_packets, coherent)
+
+
+@kernel
+def occlude(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = False) -> None:
+    """Test rays 0 to n_rays - 1: row TFAR becomes -inf where something blocks the ray (`is_blocked`).
+
+    Args:
+        coherent: see `intersect`.
+    """
+    _trace(tracer, tracer.occluded, packets, _idle_from(packets, n_rays), coherent)
+
+
+@inlined
+def is_blocked(packets: Float32, i: int) -> bool:
+    """Whether something blocks ray i, after `occlude`."""
+    return packets[i >> 4, TFAR, i & 15] < 0.0  # type: ignore[no-any-return]
+
+
+@inlined
+def scene_triangle(tracer: Tracer, triangle: int, geometry: int) -> int:
+    """The index in the scene of a triangle of a geometry; for one ray, or for lanes."""
+    number: int = triangle + select(geometry > np.int32(OPAQUE), np.int32(tracer.first_masked), np.int32(0))
+    return number
+
+
+@inlined
+def hit_triangle(tracer: Tracer, packets: Float32, i: int) -> int:
+    """The scene's triangle that ray i hit, or MISS, after `intersect`."""
+    bits = packets.view(np.int32)
+    p, lane = i >> 4, i & 15
+    return scene_triangle(tracer, bits[p, TRIANGLE, lane], bits[p, GEOMETRY, lane])

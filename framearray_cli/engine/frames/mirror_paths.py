@@ -1,0 +1,80 @@
+"""What mirrors show: native hits followed from mirror to mirror; a reflected hit is a hit seen through a tint."""
+
+from time import perf_counter
+
+import numpy as np
+
+from framearray_cli.base.arrays import Int32
+
+from ..hits.hits import Hits
+from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
+from ..terms.mirrors import count_mirrors, reflect
+from .passes import Pass, halves_of
+from .records import HitRecords, empty_records
+from .setup import FrameSetup
+from .shading import estimate_terms
+from .threads import Scratch, TracePool
+
+
+def mirror_paths(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
+    """Follow the mirrors among hits 0 to n - 1; a (pixels, records) pair a bounce."""
+    found: list[tuple[Int32, HitRecords]] = []
+    if count_mirrors(hits, n) == 0:
+        return found
+    started = perf_counter()
+    throughput = np.ones((n, 3), np.float32)
+    for bounce in range(setup.depth):
+        m = count_mirrors(hits, n)
+        if m == 0:
+            break
+        reflected, next_throughput = scratch.reflected[bounce % 2], scratch.throughput[bounce % 2]
+        reflect(hits, n, throughput, setup.world, scratch.hit_rays.packets, reflected, next_throughput)
+        scratch.rays["mirror"] += m
+        hits, n, throughput = reflected, m, next_throughput
+        records = empty_records(m, *setup.stored_light)
+        estimate_terms(setup, hits, m, scratch, records, "mirror obscurance", "mirror shadow", throughput)
+        found.append((hits.pixel[:m].copy(), records))
+    scratch.seconds["mirror"] += perf_counter() - started
+    return found
+
+
+def extra_mirror_hits(
+    setup: FrameSetup, c: int, parts: tuple[Pass, ...], pool: TracePool, own: Int32
+) -> list[tuple[Int32, HitRecords]]:
+    """Follow the native hits that only mirror pixels have.
+
+    Args:
+        own: (2, n_pixels) overwritten: native hits of each pixel, of even and of odd sample numbers.
+    """
+    most = max((part.first_sample + part.per_pixel for part in parts), default=0)
+    extra = max(setup.mirror_hits - setup.fewest_hits(c), 0)
+    own[:] = 0
+    for part in parts:
+        counts = halves_of(part.first_sample, part.per_pixel)[:, None]
+        if len(part.pixels) == setup.n_pixels:
+            own += counts
+        else:
+            own[:, part.pixels] += counts
+    if not extra:
+        return []
+    flags = np.zeros(setup.n_pixels, np.uint8)
+
+    def look(first: int, scratch: Scratch) -> None:
+        n = min(pool.batch, setup.n_pixels - first)
+        hits = scratch.hits
+        pilot_hits(setup.cams, c, setup.order, first, n, setup.world, scratch.hit_rays.packets, hits)
+        scratch.rays["pilot"] += n
+        flag_mirrors(hits, n, setup.cams.width, setup.cams.height, flags)
+
+    def follow(first: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
+        n = min(pool.batch, len(pixels) * extra - first)
+        extra_hits(setup.cams, c, samples, first, n, setup.world, scratch.hit_rays.packets, scratch.hits)
+        scratch.rays["mirror"] += n
+        return mirror_paths(setup, scratch.hits, n, scratch)
+
+    pool.run(look, range(0, setup.n_pixels, pool.batch))
+    pixels = setup.order[flags[setup.order] > 0]
+    samples = Samples(setup.seed, pixels, extra, most, setup.halves != 0)
+    found = pool.run(follow, range(0, len(pixels) * extra, pool.batch))
+    own += halves_of(most, extra)[:, None] * flags
+    return [path for batch in found for path in batch]

@@ -1,0 +1,108 @@
+"""The terms of a batch of hits: obscurance W, what is the same under every light, and the irradiance of every light."""
+
+from time import perf_counter
+
+import numpy as np
+
+from framearray_cli.base.arrays import Float32, Rgb
+
+from ..hits.hits import ESCAPED, Hits
+from ..kernels.kernel import inlined, kernel
+from ..kernels.simd import LANES, bits, load
+from ..terms.direct import direct
+from ..terms.direct_steps import direct_by_steps
+from ..terms.obscurance import obscurance
+from .records import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, HitRecords, lit_bit
+from .setup import FrameSetup
+from .threads import Scratch
+
+_NOTHING = np.empty((0, 3), np.float32)
+
+
+def estimate_terms(
+    setup: FrameSetup,
+    hits: Hits,
+    n: int,
+    scratch: Scratch,
+    out: HitRecords,
+    obscurance_kind: str,
+    shadow_kind: str,
+    throughput: Rgb = _NOTHING,
+) -> None:
+    """Estimate W, the constant part and E[l] of hits 0 to n - 1.
+
+    Args:
+        throughput: (>= n, 3) what mirrors leave of the light of each hit, or (0, 3).
+    """
+    started = perf_counter()
+    scratch.rays[obscurance_kind] += obscurance(
+        hits, n, setup.obscurance, setup.surfaces, setup.tracer, scratch.hit_rays, scratch.obscurance, scratch.skylight
+    )
+    middle = perf_counter()
+    if scratch.steps is None:
+        rays = direct(hits, n, setup.lights, setup.tracer, scratch.test_rays, out.irradiance)
+    else:
+        irradiance = out.irradiance if setup.keeps_all else scratch.irradiance
+        rays = direct_by_steps(
+            hits, n, setup.lights, setup.shadow_step, setup.shadow_unbiased, setup.tracer, scratch.test_rays,
+            scratch.steps, irradiance,
+        )  # fmt: skip
+        if not setup.keeps_all:
+            out.irradiance[:n] = irradiance[:n, :, setup.kept.start : setup.kept.stop]
+    scratch.rays[shadow_kind] += rays
+    write_rows(hits, n, setup.background, scratch.obscurance, scratch.skylight, throughput, out.irradiance, out.row)
+    scratch.seconds[obscurance_kind] += middle - started
+    scratch.seconds[shadow_kind] += perf_counter() - middle
+
+
+@kernel
+def write_rows(
+    hits: Hits,
+    n: int,
+    background: Rgb,
+    obscurance: Rgb,
+    skylight: Rgb,
+    throughput: Rgb,
+    irradiance: Float32,
+    row: Float32,
+) -> None:
+    """Write what composing needs of hits 0 to n - 1 beside their irradiance; see `HitRecords`.
+
+    Args:
+        background: (3,) what escaped rays see.
+        obscurance: (>= n, 3) W.
+        skylight: (>= n, 3) background that reaches each hit, or (0, 3).
+        throughput: (>= n, 3) what mirrors leave of the light of each hit, or (0, 3).
+        row: (n, LANES) overwritten.
+    """
+    for i in range(n):
+        row[i, WEIGHT] = 1.0
+        for channel in range(3):
+            tint = throughput[i, channel] if throughput.shape[0] else np.float32(1.0)
+            reflectivity = tint * hits.reflectivity[i, channel]
+            steady = tint * background[channel] if hits.kind[i] == ESCAPED else np.float32(0.0)
+            if skylight.shape[0]:
+                steady += reflectivity * skylight[i, channel]
+            row[i, INDIRECT + channel] = reflectivity * obscurance[i, channel]
+            row[i, LIGHT_INDEPENDENT + channel] = steady
+            row[i, OBSCURANCE + channel] = obscurance[i, channel]
+            row[i, REFLECTIVITY + channel] = reflectivity
+        row[i, LIT] = _lit(irradiance, i)
+        row[i, HALF] = hits.half[i]
+        for column in range(HALF + 1, LANES):
+            row[i, column] = 0.0
+
+
+@inlined
+def _lit(irradiance: Float32, i: int) -> int:
+    """Which packets of light positions give hit i any light, a bit each or one for several."""
+    channels, n_lights = irradiance.shape[1], irradiance.shape[2]
+    found = 0
+    for channel in range(channels):
+        row = (i * channels + channel) * n_lights
+        for l in range(0, n_lights, LANES):
+            light = bits(~(load(irradiance, row + l) == np.float32(0.0)))
+            if l + LANES > n_lights:
+                light &= (1 << (n_lights - l)) - 1
+            found |= int(light != 0) << lit_bit(n_lights, l)
+    return found

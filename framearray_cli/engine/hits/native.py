@@ -1,0 +1,177 @@
+"""Eye rays and the hits that they find: native ones, those that only mirror pixels have, and a look for mirrors."""
+
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+
+from framearray_cli.base.arrays import Bytes, Float32, Int32, Real
+
+from ..embree.packets import DIRECTION, ORIGIN, TFAR, intersect
+from ..inputs.cameras import Cameras, corner_of, eye_ray
+from ..inputs.random import OTHER_HALF, PIXEL, PIXEL_SAMPLE, r2, stream, word
+from ..inputs.surfaces import specular_at
+from ..kernels.kernel import inlined, keep_on_disk, kernel
+from ..kernels.simd import LANES, doubles, floor, gather, integers, lane_numbers, put_triples, select, store
+from .hits import Hits, World, decode_hits, record_hits
+
+
+class Samples(NamedTuple):
+    """Which samples of which pixels are taken.
+
+    Attributes:
+        seed: of the job.
+        pixels: (n,) of the image.
+        per_pixel: samples of each of them, numbered from `first` on.
+        halves: whether even and odd samples of a pixel are independent of each other.
+    """
+
+    seed: int
+    pixels: Int32
+    per_pixel: int
+    first: int
+    halves: bool = False
+
+
+@keep_on_disk
+@nb.njit()
+def pixel_order(width: int, height: int) -> Int32:
+    """All pixels, in 4 x 4 blocks within 32 x 32 tiles.
+
+    16 neighbours make a coherent packet, and a tile's triangles stay in the cache.
+    """
+    order = np.empty(width * height, np.int32)
+    n = 0
+    for ty in range(0, height, 32):
+        for tx in range(0, width, 32):
+            for by in range(ty, min(ty + 32, height), 4):
+                for bx in range(tx, min(tx + 32, width), 4):
+                    for y in range(by, min(by + 4, height)):
+                        for x in range(bx, min(bx + 4, width)):
+                            order[n] = y * width + x
+                            n += 1
+    return order
+
+
+@inlined
+def _numbers(i: int, n: int) -> int:
+    """The numbers i to i + 15, but none above n - 1."""
+    number = lane_numbers() + np.int32(i)
+    kept: int = select(number < np.int32(n), number, np.int32(n - 1))
+    return kept
+
+
+@inlined
+def _shoot(cams: Cameras, c: int, pixel: int, jx: Real, jy: Real, i: int, packets: Float32, hits: Hits) -> None:
+    """Write eye rays i to i + 15, through (jx, jy) within the boxes of pixels."""
+    x, y = corner_of(cams, pixel)
+    dx, dy, dz = eye_ray(cams, c, x + doubles(jx), y + doubles(jy))
+    o, at = cams.position, (i >> 4) * packets.shape[1] * LANES
+    store(packets, at + ORIGIN * LANES, o[c, 0])
+    store(packets, at + (ORIGIN + 1) * LANES, o[c, 1])
+    store(packets, at + (ORIGIN + 2) * LANES, o[c, 2])
+    store(packets, at + DIRECTION * LANES, dx)
+    store(packets, at + (DIRECTION + 1) * LANES, dy)
+    store(packets, at + (DIRECTION + 2) * LANES, dz)
+    store(packets, at + TFAR * LANES, np.float32(np.inf))
+    store(hits.pixel, i, pixel)
+
+
+@inlined
+def _shoot_samples(
+    cams: Cameras, c: int, samples: Samples, pixel: int, sample: int, i: int, packets: Float32, hits: Hits
+) -> None:
+    """Write the eye rays of 16 samples; the samples of a pixel are spread by the golden ratio sequence.
+
+    Where they are taken in two halves, even and odd ones are spread each by a sequence of its own.
+    """
+    key, number = stream(samples.seed, c, pixel, PIXEL_SAMPLE), sample
+    random = word(key, PIXEL)
+    odd = (sample & np.int32(1)) == np.int32(1)
+    store(hits.half, i, select(odd, np.uint8(1), np.uint8(0)))
+    if samples.halves:
+        random, number = select(odd, word(key, OTHER_HALF), random), integers(sample >> np.int32(1))
+    jx, jy = r2(random, number)
+    _shoot(cams, c, pixel, jx, jy, i, packets, hits)
+    store(hits.key, i, stream(samples.seed, c, pixel, sample))
+
+
+@kernel
+def native_hits(
+    cams: Cameras,
+    c: int,
+    samples: Samples,
+    first: int,
+    n: int,
+    world: World,
+    mirrors: bool,
+    packets: Float32,
+    hits: Hits,
+) -> None:
+    """Find native hits first to first + n - 1 of eye c.
+
+    They are numbered by groups of 16 pixels, within a group by sample, then by pixel.
+
+    Args:
+        mirrors: whether the scene has any; else the hits' `specular` is left alone.
+    """
+    # a frame may have more hits than an int32 counts; the quotients of such numbers are exact in float64
+    n_pixels, of_group = np.float64(samples.pixels.shape[0]), np.float64(16 * samples.per_pixel)
+    for i in range(0, n, LANES):
+        number = doubles(_numbers(i, n)) + np.float64(first)
+        group = floor(number / of_group)
+        rest, left = number - group * of_group, n_pixels - group * 16.0
+        members = select(left < 16.0, left, 16.0)
+        sample = floor(rest / members)
+        pixel = gather(samples.pixels, integers(group * 16.0 + rest - sample * members))
+        _shoot_samples(cams, c, samples, pixel, integers(sample) + np.int32(samples.first), i, packets, hits)
+    intersect(world.tracer, packets, n, True, cams.near)
+    record_hits(world, packets, n, mirrors, hits)
+
+
+@kernel
+def extra_hits(
+    cams: Cameras, c: int, samples: Samples, first: int, n: int, world: World, packets: Float32, hits: Hits
+) -> None:
+    """Find additional native hits of some pixels of eye c: numbers first to first + n - 1, counted pixel by pixel."""
+    for i in range(0, n, LANES):
+        number = doubles(_numbers(i, n)) + np.float64(first)
+        at = floor(number / np.float64(samples.per_pixel))
+        sample = integers(number - at * np.float64(samples.per_pixel)) + np.int32(samples.first)
+        _shoot_samples(cams, c, samples, gather(samples.pixels, integers(at)), sample, i, packets, hits)
+    intersect(world.tracer, packets, n, True, cams.near)
+    record_hits(world, packets, n, True, hits)
+
+
+@kernel
+def pilot_hits(
+    cams: Cameras, c: int, order: Int32, first: int, n: int, world: World, packets: Float32, hits: Hits
+) -> None:
+    """Look through the centres of pixels order[first : first + n] for mirrors; of the hits only `specular` is known.
+
+    What they show decides how many samples a pixel gets; no sample's place depends on them, so that is unbiased.
+    """
+    for i in range(0, n, LANES):
+        _shoot(cams, c, gather(order, _numbers(i, n) + np.int32(first)), 0.5, 0.5, i, packets, hits)
+    surfaces, tracer = world
+    intersect(tracer, packets, n, True, cams.near)
+    for i in range(0, n, LANES):
+        missed, triangle, u, v = decode_hits(tracer, packets, i)
+        red, green, blue = specular_at(surfaces, triangle, u, v)
+        put_triples(hits.specular, i, select(missed, 0.0, red), select(missed, 0.0, green), select(missed, 0.0, blue))
+
+
+@kernel
+def flag_mirrors(hits: Hits, n: int, width: int, height: int, flags: Bytes) -> None:
+    """Flag the pixels of mirror hits and their neighbours: a mirror's edge may pass beside the one ray that looked.
+
+    Args:
+        flags: (n_pixels,) set to 1 where a mirror may be seen.
+    """
+    for i in range(n):
+        s = hits.specular[i]
+        if s[0] > 0.0 or s[1] > 0.0 or s[2] > 0.0:
+            x, y = hits.pixel[i] % width, hits.pixel[i] // width
+            for v in range(max(y - 1, 0), min(y + 2, height)):
+                for u in range(max(x - 1, 0), min(x + 2, width)):
+                    flags[v * width + u] = 1

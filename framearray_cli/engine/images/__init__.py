@@ -1,0 +1,1 @@
+"""Hits of a window of frames -> images."""

@@ -1,0 +1,60 @@
+"""What composing a frame gives: its images, layers and errors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from framearray_cli.base.arrays import Float32, Images, Int32
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Layers:
+    """What a frame shows whatever the light, per pixel; (height, width, channels) or (height, width).
+
+    Attributes:
+        obscurance, indirect, reflectivity: W, R W and R, averaged over all hits.
+        normal, depth: shading normal and distance along the optical axis, averaged over native hits; 0 if all escape.
+        samples: hits that the pixel rests on, native and outer.
+    """
+
+    obscurance: Float32
+    indirect: Float32
+    reflectivity: Float32
+    normal: Float32
+    depth: Float32
+    samples: Float32
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Composed:
+    """One finished frame.
+
+    Attributes:
+        images: (n_lights, height, width, 3) radiance.
+        layers: None unless the job keeps them.
+        hits: (n_pixels,) number of hits that each pixel rests on, native and outer.
+        beyond: number of values beyond the largest half; where images are halves, such values were cut to it.
+        bad: number of values that were not finite or negative; each was replaced by 0.
+        first_bad: light index and pixel of the first of them, or None.
+        differences: (n_lights, height, width, 3) of the halves of the hits, see standarderror.py; or None.
+    """
+
+    c: int
+    images: Images
+    layers: Layers | None
+    hits: Int32
+    beyond: int
+    bad: int
+    first_bad: tuple[int, int] | None
+    differences: Float32 | None = None
+
+
+def _layers(maps: Float32, own: Float32, samples: Int32, shape: tuple[int, ...]) -> Layers:
+    return Layers(
+        obscurance=maps[:, :3].reshape(*shape, 3),
+        indirect=maps[:, 3:6].reshape(*shape, 3),
+        reflectivity=maps[:, 6:].reshape(*shape, 3),
+        normal=own[:, :3].reshape(*shape, 3),
+        depth=own[:, 3].reshape(shape),
+        samples=samples.astype(np.float32).reshape(shape),
+    )

@@ -1,0 +1,1 @@
+"""Scene, eyes, lights and random numbers, as kernels take them."""

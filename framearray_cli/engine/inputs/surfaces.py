@@ -1,0 +1,262 @@
+"""What a ray finds where it meets a triangle: point, normals, reflectivity, opacity.
+
+The functions take one triangle with numbers u and v, or sixteen with lanes of them.
+
+`Surfaces` is `Scene` as kernels take it; an array of length 0 stands for a feature that the scene does not use.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Int32, Real, Rgb, Triple
+from framearray_cli.base.colour import linear_from_srgb8
+from framearray_cli.scene.scene import Scene
+
+from ..kernels.kernel import inlined
+from ..kernels.simd import doubles, floor, gather, integers, popcount, reals, select, sqrt
+
+# Ray offsets: 16 units in the last place of the largest coordinate of the triangle. Of the rules tried it alone had
+# no self-hits and no leaks at every scale (docs/decisions/ray-offsets.md).
+OFFSET_ULPS = 16.0
+ULP = 2.0**-23
+
+
+class Surfaces(NamedTuple):
+    """Arrays of `Scene` for kernels, plus what is derived from them once.
+
+    Attributes:
+        offset: (n,) how far a ray that leaves a triangle starts above it, scene units.
+        linear: (256,) sRGB code value -> linear value.
+        plain: (n_materials,) whether a material looks the same everywhere on its triangles.
+        total: (n_materials, 3) diffuse and mirror reflectivity of a plain material together; 1 of others.
+    """
+
+    corners: Corners
+    normals: Corners
+    uvs: CornerUvs
+    colours: Corners
+    material: Int32
+    reflectivity: Rgb
+    specular: Rgb
+    reflectivity_texture: Int32
+    specular_texture: Int32
+    alpha: Float32
+    alpha_texture: Int32
+    alpha_cutoff: Float32
+    texels: Bytes
+    textures: Int32
+    offset: Float32
+    linear: Float32
+    plain: Bytes
+    total: Rgb
+
+
+def surfaces(scene: Scene) -> Surfaces:
+    """Gather what kernels read of a scene; shares memory with it."""
+    largest = np.abs(scene.corners).max(axis=(1, 2), initial=0.0)
+    arrays = {name: np.ascontiguousarray(getattr(scene, name)) for name in Surfaces._fields if hasattr(scene, name)}
+    textured = (scene.reflectivity_texture >= 0) | (scene.specular_texture >= 0)
+    plain = ~textured & (len(scene.colours) == 0)
+    return Surfaces(
+        **arrays,
+        offset=(OFFSET_ULPS * ULP * largest).astype(np.float32),
+        linear=linear_from_srgb8(np.arange(256, dtype=np.uint8)),
+        plain=plain.astype(np.uint8),
+        total=np.where(plain[:, None], scene.reflectivity + scene.specular, np.float32(1.0)),
+    )
+
+
+def nearest(s: Surfaces) -> float:
+    """The depth from which on eyes see a scene: the largest ray offset, scene units.
+
+    An eye exactly on a surface sees nothing of it, whichever side float32 rounds it to.
+    """
+    return float(s.offset.max(initial=0.0))
+
+
+@inlined
+def _texel(s: Surfaces, texel: int, weight: Real) -> tuple[Real, Real, Real, Real]:
+    """Linear red, green, blue, and alpha (0 to 255) of a texel, times a weight."""
+    code, last = gather(s.texels.view(np.int32), texel), np.int32(255)
+    return (
+        weight * gather(s.linear, code & last),
+        weight * gather(s.linear, (code >> np.int32(8)) & last),
+        weight * gather(s.linear, (code >> np.int32(16)) & last),
+        weight * reals((code >> np.int32(24)) & last),
+    )
+
+
+@inlined
+def _place_in(s: Surfaces, texture: int) -> tuple[int, int, int]:
+    """First texel, width and height of a texture."""
+    at = texture * np.int32(3)
+    return gather(s.textures, at), gather(s.textures, at + np.int32(1)), gather(s.textures, at + np.int32(2))
+
+
+@inlined
+def texture_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real, Real, Real]:
+    """Bilinear, repeating look-up: linear red, green, blue, and alpha; texel centres at half-integers, v upwards."""
+    first, width, height = _place_in(s, texture)
+    u, v = doubles(u), doubles(v)
+    x = (u - floor(u)) * doubles(width) - 0.5
+    y = (1.0 - (v - floor(v))) * doubles(height) - 0.5
+    finite = (x * x < 1e18) & (y * y < 1e18)  # a non-finite coordinate has no texel; the first stands in
+    x, y = select(finite, x, 0.0), select(finite, y, 0.0)
+    one, fx, fy = np.float32(1.0), reals(x - floor(x)), reals(y - floor(y))
+    left, top = integers(floor(x)), integers(floor(y))  # -1 to the last
+    right, bottom = left + np.int32(1), top + np.int32(1)
+    left, top = select(left < np.int32(0), left + width, left), select(top < np.int32(0), top + height, top)
+    right = select(right >= width, right - width, right)
+    bottom = select(bottom >= height, bottom - height, bottom)
+    upper, lower = first + top * width, first + bottom * width
+    r0, g0, b0, a0 = _texel(s, upper + left, (one - fx) * (one - fy))
+    r1, g1, b1, a1 = _texel(s, upper + right, fx * (one - fy))
+    r2, g2, b2, a2 = _texel(s, lower + left, (one - fx) * fy)
+    r3, g3, b3, a3 = _texel(s, lower + right, fx * fy)
+    return r0 + r1 + r2 + r3, g0 + g1 + g2 + g3, b0 + b1 + b2 + b3, (a0 + a1 + a2 + a3) * np.float32(1.0 / 255.0)
+
+
+@inlined
+def nearest_texel_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real, Real, Real]:
+    """The texel that a place lies in, as `texture_at` gives it half-way between neighbours."""
+    first, width, height = _place_in(s, texture)
+    x, y = (u - floor(u)) * reals(width), (v - floor(v)) * reals(height)
+    # what rounding moved to the far border is the next repetition's first; so is what is not finite
+    x = select((x >= np.float32(0.0)) & (x < reals(width)), x, np.float32(0.0))
+    y = select((y >= np.float32(0.0)) & (y < reals(height)), y, np.float32(0.0))
+    row = height - np.int32(1) - integers(y)
+    red, green, blue, alpha = _texel(s, first + row * width + integers(x), np.float32(1.0))
+    return red, green, blue, alpha * np.float32(1.0 / 255.0)
+
+
+@inlined
+def _between(corners: Float32, triangle: int, stride: int, axis: int, u: Real, v: Real, w: Real) -> Real:
+    """One coordinate of what stands at the corners of a triangle, at barycentric (u, v), w = 1 - u - v."""
+    at = triangle * np.int32(3 * stride) + np.int32(axis)
+    a, b, c = gather(corners, at), gather(corners, at + np.int32(stride)), gather(corners, at + np.int32(2 * stride))
+    mixed: Real = w * a + u * b + v * c
+    return mixed
+
+
+@inlined
+def _tinted(
+    s: Surfaces, red: Real, green: Real, blue: Real, texture: int, triangle: int, u: Real, v: Real, blended: bool
+) -> Triple:
+    """A material's factor times texture, blended between texels or not, and corner colour."""
+    w = np.float32(1.0) - u - v
+    textured = texture >= np.int32(0)
+    if popcount(textured) > 0:
+        tu, tv = _between(s.uvs, triangle, 2, 0, u, v, w), _between(s.uvs, triangle, 2, 1, u, v, w)
+        texture = select(textured, texture, np.int32(0))
+        r, g, b, _ = texture_at(s, texture, tu, tv) if blended else nearest_texel_at(s, texture, tu, tv)
+        red, green, blue = (
+            select(textured, red * r, red),
+            select(textured, green * g, green),
+            select(textured, blue * b, blue),
+        )
+    if s.colours.shape[0] > 0:
+        red = red * _between(s.colours, triangle, 3, 0, u, v, w)
+        green = green * _between(s.colours, triangle, 3, 1, u, v, w)
+        blue = blue * _between(s.colours, triangle, 3, 2, u, v, w)
+    return red, green, blue
+
+
+@inlined
+def reflectivity_at(s: Surfaces, triangle: int, u: Real, v: Real, blended: bool = True) -> Triple:
+    """Diffuse reflectivity, RGB 0 to 1, at barycentric (u, v) of a triangle."""
+    m = gather(s.material, triangle)
+    at = m * np.int32(3)
+    red, green = gather(s.reflectivity, at), gather(s.reflectivity, at + np.int32(1))
+    blue = gather(s.reflectivity, at + np.int32(2))
+    return _tinted(s, red, green, blue, gather(s.reflectivity_texture, m), triangle, u, v, blended)
+
+
+@inlined
+def specular_at(s: Surfaces, triangle: int, u: Real, v: Real, blended: bool = True) -> Triple:
+    """Mirror reflectivity, RGB 0 to 1, at barycentric (u, v) of a triangle."""
+    m = gather(s.material, triangle)
+    at, nothing = m * np.int32(3), np.float32(0.0)
+    red, green = gather(s.specular, at), gather(s.specular, at + np.int32(1))
+    blue = gather(s.specular, at + np.int32(2))
+    if popcount((red > nothing) | (green > nothing) | (blue > nothing)) > 0:
+        texture = gather(s.specular_texture, m)
+        red, green, blue = _tinted(s, red, green, blue, texture, triangle, u, v, blended)
+    return red, green, blue
+
+
+@inlined
+def total_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
+    """Diffuse and mirror reflectivity together, of the nearest texel: what an average over many places takes.
+
+    Blending between texels would cost three times as much and leave the average as it is.
+    """
+    red, green, blue = reflectivity_at(s, triangle, u, v, False)
+    s_red, s_green, s_blue = specular_at(s, triangle, u, v, False)
+    return red + s_red, green + s_green, blue + s_blue
+
+
+@inlined
+def is_cut_out(s: Surfaces, triangle: int, u: Real, v: Real) -> bool:
+    """Whether the alpha mask of a triangle removes the point (u, v)."""
+    m = s.material[triangle]
+    alpha = s.alpha[m]
+    if s.alpha_texture[m] >= 0:
+        w = np.float32(1.0) - u - v
+        tu, tv = _between(s.uvs, triangle, 2, 0, u, v, w), _between(s.uvs, triangle, 2, 1, u, v, w)
+        alpha *= texture_at(s, s.alpha_texture[m], tu, tv)[3]
+    return bool(alpha < s.alpha_cutoff[m])
+
+
+@inlined
+def position_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
+    """The point itself, from the corners: nearer to the triangle than origin + t * direction is."""
+    u64, v64 = doubles(u), doubles(v)
+    w64 = 1.0 - u64 - v64
+    return (
+        reals(_weighed(s.corners, triangle, 0, u64, v64, w64)),
+        reals(_weighed(s.corners, triangle, 1, u64, v64, w64)),
+        reals(_weighed(s.corners, triangle, 2, u64, v64, w64)),
+    )
+
+
+@inlined
+def _weighed(corners: Corners, triangle: int, axis: int, u: Real, v: Real, w: Real) -> Real:
+    at = triangle * np.int32(9) + np.int32(axis)
+    a, b, c = gather(corners, at), gather(corners, at + np.int32(3)), gather(corners, at + np.int32(6))
+    mixed: Real = w * doubles(a) + u * doubles(b) + v * doubles(c)
+    return mixed
+
+
+@inlined
+def geometric_normal(s: Surfaces, triangle: int, dx: Real, dy: Real, dz: Real) -> Triple:
+    """Unit normal of the triangle, on the side that a ray of direction (dx, dy, dz) comes from.
+
+    In float64: the cross product of edges of 1e-12 would underflow in float32.
+    """
+    p, at = s.corners, triangle * np.int32(9)
+    ax, ay = doubles(gather(p, at)), doubles(gather(p, at + np.int32(1)))
+    az = doubles(gather(p, at + np.int32(2)))
+    e1x, e1y = doubles(gather(p, at + np.int32(3))) - ax, doubles(gather(p, at + np.int32(4))) - ay
+    e1z, e2x = doubles(gather(p, at + np.int32(5))) - az, doubles(gather(p, at + np.int32(6))) - ax
+    e2y, e2z = doubles(gather(p, at + np.int32(7))) - ay, doubles(gather(p, at + np.int32(8))) - az
+    nx, ny, nz = e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x
+    scale = 1.0 / sqrt(nx * nx + ny * ny + nz * nz)
+    away = nx * doubles(dx) + ny * doubles(dy) + nz * doubles(dz) > 0.0
+    scale = select(away, -scale, scale)
+    return reals(nx * scale), reals(ny * scale), reals(nz * scale)
+
+
+@inlined
+def shading_normal(s: Surfaces, triangle: int, u: Real, v: Real, gx: Real, gy: Real, gz: Real) -> Triple:
+    """Interpolated unit normal on the side of the geometric normal (gx, gy, gz), or that one where there is none."""
+    if s.normals.shape[0] == 0:
+        return gx, gy, gz
+    w, k = np.float32(1.0) - u - v, s.normals
+    x, y = _between(k, triangle, 3, 0, u, v, w), _between(k, triangle, 3, 1, u, v, w)
+    z = _between(k, triangle, 3, 2, u, v, w)
+    square = x * x + y * y + z * z
+    none = square < np.float32(1e-12)  # corner normals that cancel give no direction
+    scale = np.float32(1.0) / sqrt(select(none, np.float32(1.0), square))
+    scale = select(x * gx + y * gy + z * gz < np.float32(0.0), -scale, scale)
+    return select(none, gx, x * scale), select(none, gy, y * scale), select(none, gz, z * scale)

@@ -1,0 +1,1 @@
+"""How hot loops are compiled, and where compiled ones are kept."""

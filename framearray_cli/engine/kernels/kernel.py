@@ -1,0 +1,157 @@
+"""Compile hot loops, and keep them on disk.
+
+`kernel` turns off two defaults of numba that cost more than the loops themselves here: counting references to every
+array that is passed on (an atomic instruction each, for arrays that the caller holds anyway), and checking every
+division for zero. So a kernel must not allocate: its caller passes scratch arrays. A kernel releases the GIL, and is
+compiled once for all runs.
+
+`inlined` is for the small functions that kernels are written with.
+
+Decorating a function only declares it. The first call loads its machine code from disk, or compiles it; only then is
+a folder made for it (`kernelcache.py`). numba's own settings stay untouched.
+"""
+
+import platform
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba as nb
+from llvmlite import ir
+from numba import types
+from numba.core import caching, cgutils
+from numba.extending import intrinsic
+
+from .cache import forgive, kernel_folder
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_LINE = 64  # bytes
+# Parts of numba without type annotations.
+_njit: Any = nb.njit
+_Locator: Any = caching._CacheLocator
+_OfSourceFile: Any = caching._SourceFileBackedLocatorMixin
+_Files: Any = caching.CompileResultCacheImpl
+_FunctionCache: Any = caching.FunctionCache
+_OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False}
+
+
+class _OwnLocator(_OfSourceFile, _Locator):  # type: ignore[misc]
+    """Names the folder for the kernels of a source file, inside the one for this state of the package."""
+
+    def __init__(self, function: Any, file: str, folder: Path) -> None:
+        self._py_file, self._lineno = file, function.__code__.co_firstlineno
+        self._folder = str(folder / self.get_suitable_cache_subpath(file))
+
+    def get_cache_path(self) -> str:
+        return self._folder
+
+    @classmethod
+    def from_function(cls, function: Any, file: str) -> "_OwnLocator | None":
+        folder = kernel_folder()
+        return cls(function, file, folder) if folder and Path(file).exists() else None
+
+
+class _OwnFiles(_Files):  # type: ignore[misc]
+    _locator_classes = (_OwnLocator,)
+
+
+class _OwnCache(_FunctionCache):  # type: ignore[misc]
+    """numba's cache of a function, in our folder; where that fails, numba compiles."""
+
+    _impl_class = _OwnFiles
+
+    def _guard_against_spurious_io_errors(self) -> AbstractContextManager[None]:
+        return forgive(self)
+
+
+class _LazyCache:
+    """Stands in for numba's cache of a function, and opens it when numba first asks for machine code."""
+
+    def __init__(self, function: Any) -> None:
+        self._function = function
+        self._opened: Any = None
+
+    @property
+    def cache(self) -> Any:
+        if self._opened is None:
+            try:
+                self._opened = _OwnCache(self._function)
+            except RuntimeError:  # no folder, or a function without a source file
+                self._opened = caching.NullCache()
+        return self._opened
+
+    @property
+    def cache_path(self) -> Any:
+        return self.cache.cache_path
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        return self.cache.load_overload(signature, context)
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        self.cache.save_overload(signature, compiled)
+
+    def flush(self) -> None:
+        self.cache.flush()
+
+
+def keep_on_disk(function: F) -> F:
+    """Keep the machine code of a declared function (`nb.njit`, `CFunc`) for later runs."""
+    compiled: Any = function
+    if hasattr(compiled, "enable_caching"):  # not where NUMBA_DISABLE_JIT leaves Python's functions as they are
+        compiled._cache = _LazyCache(getattr(compiled, "py_func", None) or compiled.__wrapped__)
+    return function
+
+
+def kernel(function: F) -> F:
+    """Declare a hot loop, to be compiled at its first call; it must not allocate."""
+    declared: F = _njit(**_OPTIONS)(function)
+    return keep_on_disk(declared)
+
+
+def inlined(function: F) -> F:
+    """Declare a function, to be compiled into every kernel that calls it."""
+    declared: F = _njit(inline="always", **_OPTIONS)(function)
+    return keep_on_disk(declared)
+
+
+def _prefetch_of(typingctx: Any, address: Any, n_bytes: Any) -> Any:
+    """Prefetch bytes from an address on into the processor's cache, line by line, without waiting."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        word, byte = ir.IntType(64), ir.IntType(8).as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [byte, ir.IntType(32), ir.IntType(32), ir.IntType(32)])
+        fetch = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
+        flags = [ir.Constant(ir.IntType(32), value) for value in (0, 3, 1)]  # to read, keep in all levels, data
+        first_line, end = builder.and_(args[0], word(-_LINE)), builder.add(args[0], args[1])
+        with cgutils.for_range_slice(builder, first_line, end, word(_LINE), word) as (line, _):
+            builder.call(fetch, [builder.inttoptr(line, byte), *flags])
+        return context.get_dummy_value()
+
+    return types.void(types.intp, types.intp), codegen
+
+
+def _number_at(dtype: Any, element: Any) -> Callable[..., Any]:
+    """Load element i of an array of a dtype at an address."""
+
+    def of(typingctx: Any, address: Any, i: Any) -> Any:
+        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            return builder.load(builder.gep(builder.inttoptr(args[0], element.as_pointer()), [args[1]]))
+
+        return dtype(types.intp, types.intp), codegen
+
+    return of
+
+
+# For kernels that take the addresses of many arrays: passing each array by itself would cost more than a short loop.
+prefetch: Any = intrinsic(_prefetch_of)
+real_at: Any = intrinsic(_number_at(types.float32, ir.FloatType()))
+integer_at: Any = intrinsic(_number_at(types.int32, ir.IntType(32)))
+
+
+def processor() -> str:
+    """The name of the system and of the processor that kernels are compiled for: those of others round differently."""
+    from llvmlite import binding
+
+    return f"{platform.system()} {platform.machine()} {binding.get_host_cpu_name()}"

@@ -1,0 +1,1 @@
+"""The ambient light I_A, by each method."""

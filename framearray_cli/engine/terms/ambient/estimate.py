@@ -1,0 +1,183 @@
+"""Average ambient intensity I_A[l] = E[l] / pi, found before the first frame [FA eq. 2].
+
+E[l] is the average irradiance, all bounces counted, over the surface sides that light on its way to the eye comes
+from. Here is what all methods share: the estimate, batches of walks and their errors. `method = "eye"` is in
+`ambient_eye.py`, `method = "light"` in `ambient_light.py`, `method = "fit"` in `ambient_fit.py`.
+"""
+
+import math
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Protocol, Self, TypeVar
+
+import numpy as np
+
+from framearray_cli.base.arrays import Float32, Float64, Rgb
+
+from ...embree.packets import Tracer
+from ...hits.hits import ESCAPED, Hits, World, empty_hits
+from ...hits.rays import room_for_hits, room_for_tests
+from ...inputs.lights import LightArrays
+from ...kernels.kernel import kernel
+from ..direct import direct
+from .walks import DIFFUSE, Walkers, advance, choose_step, deposit, empty_walkers
+
+BATCH = 4096
+# Automatic number of walks: as many batches as it takes to reach this standard error, within bounds.
+TARGET_ERROR = 0.01
+FEWEST, MOST = BATCH, 64 * BATCH
+# No walk of a frame uses this camera index, so that ambient walks are independent of every frame's samples.
+AMBIENT_STREAM = (1 << 20) - 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Ambient:
+    """The ambient estimate of a job.
+
+    Attributes:
+        intensity: (n_lights, 3) I_A, radiance.
+        standard_error: (n_lights,) of I_A, relative to it, of the mean of the channels; 0 where I_A is 0 or given.
+        reflectivity: (3,) average reflectivity over the surfaces that E averages; where there are none, over those
+            that the eyes see.
+        paths: walks or particles a light position that were spent.
+        rays: rays that were traced.
+        notes: what the user should know, e.g. that the target error was not reached.
+    """
+
+    intensity: Rgb
+    standard_error: Float64
+    reflectivity: Rgb
+    paths: int
+    rays: int
+    notes: tuple[str, ...] = ()
+
+    def for_lights(self, block: range) -> "Ambient":
+        """The estimate of some light positions."""
+        span = slice(block.start, block.stop)
+        return replace(self, intensity=self.intensity[span], standard_error=self.standard_error[span])
+
+
+class Workspace:
+    """Arrays for one batch of walks, kept from batch to batch."""
+
+    def __init__(self, lights: LightArrays) -> None:
+        self.hit_packets = room_for_hits(BATCH).packets
+        self.test_rays = room_for_tests(BATCH, lights.n_lights)
+        self.hits = [empty_hits(BATCH), empty_hits(BATCH)]
+        self.walkers = [empty_walkers(BATCH), empty_walkers(BATCH)]
+        self.leaves = np.zeros((BATCH, 3), np.float32)  # whole packets, as all that kernels read of hits
+        self.irradiance = np.empty((BATCH, lights.channels, lights.n_lights), np.float32)
+        self.sums = np.empty((BATCH, 3, lights.n_lights), np.float32)
+        self.rays = 0
+
+    def advance(self, n: int, world: World) -> int:
+        """Move all walks on; `hits[0]` and `walkers[0]` are the current ones before and after."""
+        n = advance(self.hits[0], self.walkers[0], n, world, self.hit_packets, self.hits[1], self.walkers[1])
+        self.hits.reverse()
+        self.walkers.reverse()
+        self.rays += n
+        return n
+
+    def diffuse_direct(self, n: int, lights: LightArrays, tracer: Tracer) -> Float32:
+        """Direct irradiance at the first n current hits, (n, channels, n_lights); 0 where no walk goes on diffusely."""
+        self.leaves[:n] = self.walkers[0].step[:n, None] == DIFFUSE
+        hits = self.hits[0]._replace(reflectivity=self.leaves)
+        self.rays += direct(hits, n, lights, tracer, self.test_rays, self.irradiance)
+        return self.irradiance[:n]
+
+    def gather(self, n: int, lights: LightArrays, tracer: Tracer) -> None:
+        """Add the direct irradiance at every current hit that its walk leaves diffusely to the walk's sums."""
+        deposit(self.walkers[0], n, self.diffuse_direct(n, lights, tracer), lights.colour, self.sums)
+
+
+@kernel
+def choose_all(hits: Hits, walkers: Walkers, n: int, must_go_on: bool) -> None:
+    """Choose the next step of walks 0 to n - 1; see `choose_step`."""
+    for i in range(n):
+        choose_step(hits, walkers, i, must_go_on)
+
+
+@kernel
+def see_background(hits: Hits, walkers: Walkers, n: int, background: Rgb, sums: Float32) -> None:
+    """A walk that leaves the scene brings the background's irradiance: pi times its radiance."""
+    for i in range(n):
+        if hits.kind[i] == ESCAPED:
+            for channel in range(3):
+                light = walkers.throughput[i, channel] * np.float32(np.pi) * background[channel]
+                for l in range(sums.shape[2]):
+                    sums[walkers.walk[i], channel, l] += light
+
+
+class Sum(Protocol):
+    """What a batch of walks found, and what several did together."""
+
+    def and_then(self, other: Self) -> Self:
+        """Both together."""
+
+
+S = TypeVar("S", bound=Sum)
+
+
+def walk_until(
+    batch: Callable[[Workspace, int, int], S],
+    enough: Callable[[S], bool],
+    paths: int | None,
+    lights: LightArrays,
+    threads: int,
+    most: int = MOST,
+) -> S:
+    """Walk batch after batch, as many at once as there are threads; what lies behind the last one is forgotten.
+
+    So the result is the same for any number of threads.
+
+    Args:
+        batch: walks a number of walks from a first one on.
+        enough: whether what the batches so far have found will do.
+        paths: the number of walks; None: `most`.
+    """
+    limit, found = paths or most, None
+    workspaces = [Workspace(lights) for _ in range(threads)]
+    with ThreadPoolExecutor(threads, thread_name_prefix="ambient") as pool:
+        for group in range(0, limit, threads * BATCH):
+            starts = range(group, min(group + threads * BATCH, limit), BATCH)
+            sizes = [min(BATCH, limit - first) for first in starts]
+            for walked in pool.map(batch, workspaces, starts, sizes):
+                found = found.and_then(walked) if found else walked
+                if enough(found):
+                    return found
+    assert found
+    return found
+
+
+def relative_error(total: Float64, squares: Float64, count: int) -> Float64:
+    """Standard error of the mean over the channels' mean, per light position; 0 where nothing arrives."""
+    mean = total.mean(axis=0) / count
+    variance = np.maximum(squares / count - mean**2, 0.0) / max(count - 1, 1)
+    error: Float64 = np.divide(np.sqrt(variance), mean, out=np.zeros_like(mean), where=mean > 0)
+    return error
+
+
+def summarise(mean: Float64, error: Float64, reflectivity: Float64, spent: int, rays: int, automatic: bool) -> Ambient:
+    """Put an estimate together, and note where it missed its target.
+
+    Args:
+        mean: (3, n_lights) irradiance.
+        error: (n_lights,) its relative standard error.
+        reflectivity: (3,) average.
+        automatic: whether the number of walks was left to the program.
+    """
+    notes: tuple[str, ...] = ()
+    if automatic and error.max() > TARGET_ERROR:
+        notes = (
+            f"ambient: standard error {error.max():.1%} at light {int(error.argmax())} after {spent} walks, "
+            f"the most that are spent by themselves; set ambient.paths for more",
+        )
+    return Ambient(
+        intensity=(mean.T / math.pi).astype(np.float32),
+        standard_error=error,
+        reflectivity=reflectivity.astype(np.float32),
+        paths=spent,
+        rays=rays,
+        notes=notes,
+    )

@@ -1,0 +1,244 @@
+"""Ambient intensity by particles from the light, as in [FA]: deposited power divided by the area that light reaches.
+
+    E[l] = (power deposited, all bounces) / (area of the surface sides that light of position l reaches)
+
+In a house the sunlit roof and facade count too, which makes E[l] too large indoors; `method = "eye"` does not have
+that fault.
+"""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from framearray_cli.base.arrays import Float32, Float64, Real, Rgb, Triple
+
+from ...embree.packets import intersect, set_ray
+from ...hits.hits import SURFACE, Hits, World, record_hits
+from ...inputs.lights import DIRECTIONAL, LightArrays
+from ...inputs.random import PIXEL, cosine_direction, r2, stream, word
+from ...kernels.kernel import inlined, kernel
+from .estimate import AMBIENT_STREAM, BATCH, TARGET_ERROR, Ambient, Workspace, choose_all, summarise, walk_until
+from .lit_area import KEPT_BOUNCES, Pool, empty_pool, keep, reached_area
+from .walks import MAX_BOUNCES, Walkers
+
+# Particles a light position, unless the job says.
+MOST = 32 * BATCH
+# Particles are spread so well that their mean errs less than independent ones would. So they are dealt to groups of
+# independent random numbers, and the groups' means tell the error, to 1 in sqrt(2 (GROUPS - 1)).
+GROUPS = 32
+_PARTICLES, _STARTS = 1, 3  # sample numbers of the walks, and of where they start
+
+
+@inlined
+def _on_sphere(a: Real, b: Real) -> Triple:
+    """Uniform unit direction."""
+    z = 1.0 - 2.0 * b
+    r, angle = np.sqrt(np.maximum(0.0, 1.0 - z * z)), 2.0 * np.pi * a
+    return r * np.cos(angle), r * np.sin(angle), z
+
+
+@inlined
+def _across(x: Real, y: Real, z: Real, a: Real, b: Real) -> Triple:
+    """Uniform point of the unit disc normal to the unit vector (x, y, z)."""
+    sx, sy = (0.0, 1.0) if x * x > 0.25 else (1.0, 0.0)
+    ux, uy, uz = -z * sy, z * sx, x * sy - y * sx
+    wx, wy, wz = y * uz - z * uy, z * ux - x * uz, x * uy - y * ux
+    scale, angle = np.sqrt(b / (ux * ux + uy * uy + uz * uz)), 2.0 * np.pi * a
+    p, q = scale * np.cos(angle), scale * np.sin(angle)
+    return p * ux + q * wx, p * uy + q * wy, p * uz + q * wz
+
+
+class Emitter(NamedTuple):
+    """What sends particles: source s at light position l, in a scene of some radius.
+
+    The source after the last is the background.
+    """
+
+    lights: LightArrays
+    s: int
+    l: int
+    radius: float
+
+
+@kernel
+def _emit(
+    emitter: Emitter, seed: int, first: int, n: int, world: World, packets: Float32, hits: Hits, walkers: Walkers
+) -> None:
+    """Send particles first to first + n - 1; their random numbers are the same for every light position.
+
+    A directional source sends them through a disc as wide as the scene, placed before it, and the background through a
+    sphere around the scene.
+    """
+    lights, s, l, radius = emitter
+    for i in range(n):
+        group, place = (first + i) % GROUPS, (first + i) // GROUPS
+        a, b = r2(word(stream(seed, AMBIENT_STREAM, group, _STARTS), PIXEL), place)
+        key = stream(seed, AMBIENT_STREAM, (first + i) & ((1 << 28) - 1), _PARTICLES)
+        if s == lights.kind.shape[0]:
+            x, y, z = _on_sphere(a, b)
+            ox, oy, oz = radius * x, radius * y, radius * z
+            a, b = r2(word(key, PIXEL), 0)
+            dx, dy, dz = cosine_direction(np.float32(-x), np.float32(-y), np.float32(-z), a, b)
+        elif lights.kind[s] == DIRECTIONAL:
+            dx, dy, dz = lights.vector[s, 0, l], lights.vector[s, 1, l], lights.vector[s, 2, l]
+            x, y, z = _across(dx, dy, dz, a, b)
+            ox, oy, oz = radius * (x - 2.0 * dx), radius * (y - 2.0 * dy), radius * (z - 2.0 * dz)
+        else:
+            ox, oy, oz = lights.vector[s, 0, l], lights.vector[s, 1, l], lights.vector[s, 2, l]
+            dx, dy, dz = _on_sphere(a, b)
+        set_ray(packets, i, ox, oy, oz, dx, dy, dz, np.float32(np.inf))
+        hits.key[i] = key
+        walkers.walk[i] = i
+        for channel in range(3):
+            walkers.throughput[i, channel] = 1.0
+    intersect(world.tracer, packets, n, False)
+    record_hits(world, packets, n, True, hits)
+
+
+@kernel
+def _land(hits: Hits, walkers: Walkers, n: int, power: Float32, first: int, last: int, sums: Float32) -> None:
+    """Leave the power of every particle that met a surface with its walk, for light positions first to last - 1."""
+    for i in range(n):
+        if hits.kind[i] == SURFACE:
+            for channel in range(3):
+                arriving = walkers.throughput[i, channel] * power[channel]
+                for l in range(first, last):
+                    sums[walkers.walk[i], channel, l] += arriving
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Landed:
+    """What a batch of particles left.
+
+    Attributes:
+        spent, rays: particles per light position, and rays.
+        total: (3, n_lights) sum of the power that surfaces took up.
+        groups: (GROUPS, n_lights) sums over groups of particles, of the mean of the channels.
+        reached: of the first batch: the area that light reaches, its relative variance and its reflectivity, see
+            `reached_area`.
+    """
+
+    spent: int
+    rays: int
+    total: Float64
+    groups: Float64
+    reached: tuple[Float64, Float64, Float64] | None
+
+    def and_then(self, other: "_Landed") -> "_Landed":
+        """Both together."""
+        return _Landed(
+            spent=self.spent + other.spent,
+            rays=self.rays + other.rays,
+            total=self.total + other.total,
+            groups=self.groups + other.groups,
+            reached=self.reached or other.reached,
+        )
+
+    @property
+    def area(self) -> tuple[Float64, Float64, Float64]:
+        """What the first batch reached."""
+        assert self.reached is not None
+        return self.reached
+
+    @property
+    def error(self) -> Float64:
+        """(n_lights,) relative standard error."""
+        error: Float64 = np.sqrt(_group_variance(self.groups, self.spent) + self.area[1])
+        return error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LightWalks:
+    """Where particles start and what they meet; arguments of `ambient_by_light`.
+
+    Attributes:
+        paths: particles per light position; None: as many as a standard error of 1 % takes, at most `MOST`.
+        background: (3,) radiance outside the scene, which lights the surfaces too; None: black.
+        radius: of the scene.
+    """
+
+    seed: int
+    paths: int | None
+    world: World
+    lights: LightArrays
+    background: Rgb | None = None
+    radius: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        corners = self.world.surfaces.corners.reshape(-1, 3).astype(np.float64)
+        object.__setattr__(self, "radius", float(np.sqrt((corners**2).sum(axis=1).max())))
+
+    def batch(self, work: Workspace, first: int, n: int) -> _Landed:
+        """Follow particles first to first + n - 1 of every source and light position to their ends."""
+        lights, rays = self.lights, work.rays
+        n_sources, n_lights = len(lights.kind), lights.n_lights
+        sky = self.background is not None and bool(self.background.any())
+        pool = empty_pool(n_lights, n_sources + sky) if first == 0 else None
+        radius = self.radius
+        work.sums[:] = 0.0
+        for s in range(n_sources):
+            flow = np.pi * radius**2 if lights.kind[s] == DIRECTIONAL else 4 * np.pi
+            for l in range(n_lights):
+                if lights.lit[s, l]:
+                    power = flow * lights.strength[s, :, l] * lights.colour[l]
+                    self._follow(work, Emitter(lights, s, l, radius), range(l, l + 1), power, (first, n), pool)
+        if sky and self.background is not None:
+            power = 4 * np.pi**2 * radius**2 * self.background
+            self._follow(work, Emitter(lights, n_sources, 0, radius), range(n_lights), power, (first, n), pool)
+        reached = reached_area(work, self.seed, self.world, lights, pool, sky) if pool else None
+        deposited = work.sums[:n].astype(np.float64)
+        groups = np.zeros((GROUPS, n_lights))
+        for group in range(min(GROUPS, n)):  # a batch is a multiple of GROUPS
+            groups[group] = deposited[group::GROUPS].mean(axis=1).sum(axis=0)
+        total = deposited.sum(axis=0)
+        return _Landed(spent=n, rays=work.rays - rays, total=total, groups=groups, reached=reached)
+
+    def _follow(
+        self, work: Workspace, emitter: Emitter, positions: range, power: Float32, batch: tuple[int, int],
+        pool: Pool | None,
+    ) -> None:  # fmt: skip
+        """Follow particles to their ends, and leave what they deposit in `work.sums`.
+
+        Args:
+            positions: light positions that the particles count for.
+            power: (3,) of the source, at that position.
+            batch: number of the first particle, number of particles.
+            pool: takes in vertices, or None.
+        """
+        first, n = batch
+        carried = power.astype(np.float32)
+        _emit(emitter, self.seed, first, n, self.world, work.hit_packets, work.hits[0], work.walkers[0])
+        work.rays += n
+        for bounce in range(MAX_BOUNCES):
+            hits, walkers = work.hits[0], work.walkers[0]
+            _land(hits, walkers, n, carried, positions.start, positions.stop, work.sums)
+            choose_all(hits, walkers, n, False)
+            if pool and bounce < KEPT_BOUNCES:
+                keep(pool, hits, walkers, n, positions)
+            n = work.advance(n, self.world)
+            if n == 0:
+                break
+
+
+def ambient_by_light(walks: LightWalks, threads: int = 1) -> Ambient:
+    """Estimate I_A[l] and the average reflectivity by particles from the lights [FA]; threads change nothing."""
+
+    def enough(found: _Landed) -> bool:
+        return walks.paths is None and bool(found.error.max() <= TARGET_ERROR)
+
+    found = walk_until(walks.batch, enough, walks.paths, walks.lights, threads, MOST)
+    area, _, reflectivity = found.area
+    per_area = np.divide(1.0, area, out=np.zeros_like(area), where=area > 0)
+    mean = found.total / found.spent * per_area
+    return summarise(mean, found.error, reflectivity, found.spent, found.rays, walks.paths is None)
+
+
+def _group_variance(groups: Float64, n: int) -> Float64:
+    """Relative variance of the mean of n particles, (n_lights,), from sums (GROUPS, n_lights) over groups of them."""
+    size = np.bincount(np.arange(n) % GROUPS, minlength=GROUPS)[:, None]
+    whole = groups.sum(axis=0)
+    used = min(n, GROUPS)
+    squares = ((groups - size / n * whole) ** 2).sum(axis=0) * used / max(used - 1, 1)
+    variance: Float64 = np.divide(squares, whole**2, out=np.zeros_like(whole), where=whole > 0)
+    return variance
