@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from framearray_cli.array.folder import Identity, differences, free_space, in_the_way, read_array
 from framearray_cli.base.memory import free_memory, resident_memory
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
@@ -20,7 +21,6 @@ from framearray_cli.job.job import Job
 from .auto import AutoSettings, require_least_memory, resolve_auto
 from .identity import identity_of
 from .memory import ambient_memory, light_blocks, mirror_share, window_memory
-from .outfolder import Identity, differences, free_space, in_the_way, read_array
 from .prepare import Prepared, composed_with, open_embree, plan_work, prepare
 from .target import Target, allot_hits
 from .writer import ArrayWriter, array_target

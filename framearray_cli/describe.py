@@ -5,6 +5,15 @@ from typing import Any
 
 import numpy as np
 
+from framearray_cli.array.folder import Identity
+from framearray_cli.array.manifest import (
+    BACKGROUND,
+    Manifest,
+    ManifestCamera,
+    ManifestGroup,
+    ManifestLight,
+    matrix_rows,
+)
 from framearray_cli.base.arrays import Float64
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.scene.paths.paths import LightPath
@@ -12,8 +21,6 @@ from framearray_cli.scene.paths.planes import Plane
 
 from . import __version__
 from .auto import AutoSettings
-from .manifest import BACKGROUND, Manifest, ManifestCamera, ManifestGroup, ManifestLight, matrix_rows
-from .outfolder import Identity
 from .prepare import Prepared
 from .stored import AMBIENT, ArrayNames, array_names
 from .target import Target

@@ -4,11 +4,11 @@ import json
 
 import numpy as np
 
+from framearray_cli.array.folder import Identity
+from framearray_cli.array.manifest_toml import plain
 from framearray_cli.base.hashing import fingerprint
 from framearray_cli.job.read import job_table
 
-from .manifestfile import plain
-from .outfolder import Identity
 from .prepare import Prepared
 
 

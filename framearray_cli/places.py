@@ -8,11 +8,10 @@ from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import TypeAlias
 
+from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.words import shown
 from framearray_cli.movie.places import nearest, position_of, read_place
-
-from .manifest import MAIN_AXIS, Manifest
 
 LightPlace: TypeAlias = tuple[int, ...]
 

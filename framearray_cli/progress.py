@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from framearray_cli.array.integrity import OnDisk
     from framearray_cli.engine.terms.ambient.estimate import Ambient
 
     from .auto import AutoSettings
     from .prepare import Prepared
-    from .resume import OnDisk
     from .target import Target
 
 

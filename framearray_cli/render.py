@@ -9,6 +9,11 @@ from threading import Lock
 
 import numpy as np
 
+from framearray_cli.array.images.images import require_writer
+from framearray_cli.array.integrity import OnDisk
+from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.manifest_toml import write_manifest
+from framearray_cli.array.record import Entry, RecordWriter, read_records, record_file
 from framearray_cli.base.errors import OutputError
 from framearray_cli.engine.embree import Engine
 from framearray_cli.engine.frames.setup import FrameSetup
@@ -19,14 +24,9 @@ from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 
 from .describe import describe
-from .images import require_writer
-from .manifest import Manifest
-from .manifestfile import write_manifest
 from .memory import light_blocks, mirror_share, require_memory
 from .prepare import Prepared, composed_with, plan_work
 from .progress import RenderEvents
-from .record import Entry, RecordWriter, read_records, record_file
-from .resume import OnDisk
 from .session import RenderSession, nothing_to_do, open_session
 from .summary import Summary, summarize, with_summary
 from .target import allot_hits

@@ -5,20 +5,20 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
+from framearray_cli.array.folder import Identity, check_folder, claim_folder
+from framearray_cli.array.integrity import OnDisk, scan_output
+from framearray_cli.array.lock import ArrayFolder
+from framearray_cli.array.manifest_toml import read_manifest, write_manifest
+from framearray_cli.array.ranges import frames_text
+from framearray_cli.array.record import RecordedRun
 from framearray_cli.engine.embree import EmbreeScene, Engine
 from framearray_cli.engine.kernels.kernel import processor
 from framearray_cli.job.job import Job
 
 from .auto import AutoSettings, require_least_memory, resolve_auto
-from .folderlock import ArrayFolder
 from .identity import identity_of
-from .manifestfile import read_manifest, write_manifest
-from .outfolder import Identity, check_folder, claim_folder
 from .prepare import Prepared, open_embree, prepare
 from .progress import RenderEvents
-from .ranges import frames_text
-from .record import RecordedRun
-from .resume import OnDisk, scan_output
 from .summary import Summary, summarize, with_summary
 
 

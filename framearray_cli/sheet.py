@@ -8,16 +8,24 @@ from typing import Any, TypeAlias, get_args
 
 import numpy as np
 
+from framearray_cli.array.images.images import (
+    FOR_SCREENS,
+    Extension,
+    ImageFormat,
+    format_name,
+    require_writer,
+    write_codes,
+    write_image,
+)
+from framearray_cli.array.manifest import MAIN_AXIS, Manifest
+from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.arrays import Bytes, Float32, Image
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.words import shown
 from framearray_cli.movie.label import typeface
 
-from .images import FOR_SCREENS, Extension, ImageFormat, format_name, require_writer, write_codes, write_image
-from .manifest import MAIN_AXIS, Manifest
-from .manifestfile import read_manifest
-from .pictures import Pictures
 from .places import MIDDLE, light_places, spread_with_ends
 
 Progress: TypeAlias = Callable[[int, int], None]  # images done, images in all

@@ -5,14 +5,14 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Any
 
+from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.record import ArrayRecords
 from framearray_cli.base.memory import peak_memory
 from framearray_cli.engine.images.standard_error import summed_up
 from framearray_cli.engine.kernels.kernel import processor
 from framearray_cli.scene.paths.paths import Lights
 
-from .manifest import Manifest
 from .prepare import Prepared
-from .record import ArrayRecords
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

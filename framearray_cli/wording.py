@@ -8,6 +8,7 @@ from framearray_cli.base.units import duration, size
 from .progress import ambient_figures
 
 if TYPE_CHECKING:
+    from framearray_cli.array.integrity import OnDisk, Verified
     from framearray_cli.job.job import Job
     from framearray_cli.parts.chunks import Chunks
     from framearray_cli.report import Report
@@ -16,10 +17,8 @@ if TYPE_CHECKING:
     from .check import Estimate
     from .prepare import Prepared
     from .progress import AmbientFigures
-    from .resume import OnDisk
     from .summary import Summary
     from .target import Target
-    from .verify import Verified
 
 
 MOST_DAMAGED = 5  # files that are told by name

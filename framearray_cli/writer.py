@@ -12,6 +12,8 @@ from typing import Self
 
 import numpy as np
 
+from framearray_cli.array.images.attributes import Attributes, frame_attributes
+from framearray_cli.array.images.images import ImageFormat, write_image, write_layers
 from framearray_cli.base.arrays import Float32, Images
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
@@ -21,8 +23,6 @@ from framearray_cli.engine.images.standard_error import square_mean, standard_er
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Eyes
 
-from .imageattributes import Attributes, frame_attributes
-from .images import ImageFormat, write_image, write_layers
 from .prepare import Prepared
 from .stored import ArrayNames, array_names
 

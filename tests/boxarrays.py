@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.images import Extension, ImageFormat, write_image, write_layers
-from framearray_cli.manifest import (
+from framearray_cli.array.images.images import Extension, ImageFormat, write_image, write_layers
+from framearray_cli.array.manifest import (
     Manifest,
     ManifestCamera,
     ManifestGroup,
@@ -19,7 +19,7 @@ from framearray_cli.manifest import (
     layers_path,
     matrix_rows,
 )
-from framearray_cli.manifestfile import write_manifest
+from framearray_cli.array.manifest_toml import write_manifest
 
 LOW, HIGH = np.array([-2.0, 0.0, -3.0]), np.array([2.0, 2.5, 3.0])
 RESOLUTION = (60, 40)

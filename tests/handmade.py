@@ -4,9 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.base.arrays import Image
-from framearray_cli.images import ImageFormat, write_image, write_layers
-from framearray_cli.manifest import (
+from framearray_cli.array.images.images import ImageFormat, write_image, write_layers
+from framearray_cli.array.manifest import (
     Manifest,
     ManifestCamera,
     ManifestGroup,
@@ -15,7 +14,8 @@ from framearray_cli.manifest import (
     layers_path,
     matrix_rows,
 )
-from framearray_cli.manifestfile import write_manifest
+from framearray_cli.array.manifest_toml import write_manifest
+from framearray_cli.base.arrays import Image
 
 SIZE = (64, 48)
 N_C, N_L = 7, 5

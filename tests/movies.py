@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.filepatterns import file_patterns
-from framearray_cli.images import ImageFormat, write_image
-from framearray_cli.manifest import (
+from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.array.manifest import (
     Manifest,
     ManifestCamera,
     ManifestGroup,
@@ -19,7 +18,8 @@ from framearray_cli.manifest import (
     image_path,
     matrix_rows,
 )
-from framearray_cli.manifestfile import write_manifest
+from framearray_cli.array.manifest_toml import write_manifest
+from framearray_cli.array.names import file_patterns
 
 CAMERA = ManifestCamera(world_from_camera=matrix_rows(np.eye(4)), fov=60.0)
 

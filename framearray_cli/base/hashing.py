@@ -1,4 +1,4 @@
-"""Fingerprints of what went into a render: equal inputs, equal text."""
+"""Fingerprints of what went into a render, and checksums of files and lines: equal bytes, equal text."""
 
 import hashlib
 from pathlib import Path
@@ -30,3 +30,10 @@ def digest(path: Path) -> tuple[int, str]:
             total.update(block)
             size += len(block)
     return size, total.hexdigest()
+
+
+def line_digest(line: bytes) -> bytes:
+    """Digest a line of a record: XXH3 of 64 bits, 16 hexadecimal digits."""
+    import xxhash
+
+    return xxhash.xxh3_64_hexdigest(line).encode()

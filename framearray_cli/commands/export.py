@@ -42,8 +42,8 @@ def export(
     quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Hand a frame array to other tools: images with cameras, lights, depth and points."""
+    from framearray_cli.array.images.images import FOR_SCREENS, ImageFormat
     from framearray_cli.export import export as run
-    from framearray_cli.images import FOR_SCREENS, ImageFormat
 
     if exposure and image_format not in FOR_SCREENS:
         raise typer.BadParameter("changes PNG and JPEG alone", param_hint="--exposure")

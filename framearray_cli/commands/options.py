@@ -55,7 +55,7 @@ def with_threads(job: "Job", threads: int | None) -> "Job":
 
 def frames_of(text: str, n: int) -> tuple[int, ...]:
     """The frames of an option `--cameras`."""
-    from framearray_cli.ranges import parse_frames
+    from framearray_cli.array.ranges import parse_frames
 
     try:
         return parse_frames(text, n)

@@ -27,6 +27,7 @@ from framearray_cli.wording import (
 from .options import JobFile, Output, Quiet, Threads, frames_of, read
 
 if TYPE_CHECKING:
+    from framearray_cli.array.integrity import OnDisk
     from framearray_cli.auto import AutoSettings
     from framearray_cli.engine.terms.ambient.estimate import Ambient
     from framearray_cli.job.job import Job
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from framearray_cli.parts.run import WorkerOptions
     from framearray_cli.prepare import Prepared
     from framearray_cli.progress import AmbientFigures
-    from framearray_cli.resume import OnDisk
     from framearray_cli.target import Target
 
 LITTLE_SPACE = 64 * 1024 * 1024  # bytes; with less, a full disk is the likely reason of an error
@@ -184,7 +184,7 @@ class Shown(PartEvents):
 
 def _add_space(error: OutputError, folder: Path) -> None:
     """Say it where little space is left on the disk that could not be written to."""
-    from framearray_cli.outfolder import free_files, free_space
+    from framearray_cli.array.folder import free_files, free_space
 
     with suppress(OSError):  # that disk may have gone
         if (free := free_space(folder)) < LITTLE_SPACE:

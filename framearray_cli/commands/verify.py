@@ -22,7 +22,7 @@ def verify(
     quiet: Quiet = False,
 ) -> None:
     """Look whether every image of a frame array is there, whole and unchanged."""
-    from framearray_cli.verify import verify as run
+    from framearray_cli.array.integrity import verify as run
 
     with Screen(out, quiet=quiet) as screen:
 
@@ -39,8 +39,8 @@ def verify(
         if not quiet:
             say(out, lines)
         return
+    from framearray_cli.array.manifest import FILE_NAME
     from framearray_cli.job.read import job_of_table
-    from framearray_cli.manifest import FILE_NAME
 
     from .render import render_shown
 

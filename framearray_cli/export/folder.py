@@ -5,10 +5,10 @@ import shutil
 from contextlib import suppress
 from pathlib import Path
 
+from framearray_cli.array.images.attributes import frame_attributes
+from framearray_cli.array.images.images import ImageFormat, format_name, write_image
+from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import OutputError
-from framearray_cli.imageattributes import frame_attributes
-from framearray_cli.images import ImageFormat, format_name, write_image
-from framearray_cli.pictures import Pictures
 
 from .selection import ExportedFrame
 

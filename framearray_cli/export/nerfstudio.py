@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.files import write_bytes
-from framearray_cli.manifest import Manifest
 from framearray_cli.places import plain_names
 
 from .points import Cloud, read_depth

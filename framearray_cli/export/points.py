@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from framearray_cli.array.images.images import read_layers
+from framearray_cli.array.manifest import Manifest, layers_path
 from framearray_cli.base.arrays import Bytes, Float32, Float64
 from framearray_cli.base.errors import OutputError
-from framearray_cli.images import read_layers
-from framearray_cli.manifest import Manifest, layers_path
 from framearray_cli.places import spread_with_ends
 
 from .selection import focal_length, rigid_pose

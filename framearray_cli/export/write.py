@@ -7,12 +7,12 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from framearray_cli.array.images.images import ImageFormat, require_writer
+from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import whole_folder
-from framearray_cli.images import ImageFormat, require_writer
-from framearray_cli.manifestfile import read_manifest
-from framearray_cli.pictures import Pictures
 from framearray_cli.places import ALL, MIDDLE, indices, light_places
 
 from . import cinema, colmap, nerfstudio

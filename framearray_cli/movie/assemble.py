@@ -10,14 +10,14 @@ from typing import Any, Protocol, TypeAlias
 
 from numpy.typing import NDArray
 
+from framearray_cli.array.images.check import check_image
+from framearray_cli.array.images.images import format_name, require_writer
+from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import folder_for
 from framearray_cli.base.forms.table import changed
-from framearray_cli.imagecheck import check_image
-from framearray_cli.images import format_name, require_writer
-from framearray_cli.manifest import Manifest
-from framearray_cli.manifestfile import read_manifest
-from framearray_cli.pictures import Pictures, Relight
 
 from .animation import ANIMATIONS, open_animation, require_animation
 from .label import SMALLEST, typeface

@@ -8,10 +8,10 @@ from typing import Annotated, Any, TypeAlias
 
 from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
 
+from framearray_cli.array.pictures import AS_RENDERED, Relight
 from framearray_cli.base.forms.schema import dotted
 from framearray_cli.base.forms.table import Float3, Place, Table, fail
 from framearray_cli.base.forms.words import shown
-from framearray_cli.pictures import AS_RENDERED, Relight
 
 from .places import percent
 

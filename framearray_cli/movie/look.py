@@ -6,9 +6,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.base.arrays import Image
 from framearray_cli.base.colour import srgb8_from_linear
-from framearray_cli.manifest import MAIN_AXIS, Manifest
 
 from .display import SRGB, View
 from .label import burn

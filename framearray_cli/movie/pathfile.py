@@ -6,12 +6,12 @@ from typing import Literal, TypeAlias
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
+from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.problems import problems_of
 from framearray_cli.base.forms.table import Table, fail
 from framearray_cli.base.forms.toml import load_toml
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, frame_rate
-from framearray_cli.manifest import MAIN_AXIS, Manifest
 
 from .curves import LightChange
 from .easing import Ease

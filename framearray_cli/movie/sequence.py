@@ -11,12 +11,20 @@ from typing import get_args
 
 import numpy as np
 
+from framearray_cli.array.images.attributes import Attribute, frame_attributes
+from framearray_cli.array.images.images import (
+    FOR_SCREENS,
+    Extension,
+    ImageFormat,
+    format_name,
+    read_image,
+    write_codes,
+    write_image,
+)
+from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import folder_for, reason, temporary_folder
-from framearray_cli.imageattributes import Attribute, frame_attributes
-from framearray_cli.images import FOR_SCREENS, Extension, ImageFormat, format_name, read_image, write_codes, write_image
-from framearray_cli.manifest import Manifest
-from framearray_cli.pictures import Pictures, Relight
 
 from .look import Look, place_text, shown
 from .timeline import Shot, Timeline

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.words import shown
-from framearray_cli.manifest import MAIN_AXIS, Manifest
 
 from .pathfile import MoviePath, Segment
 from .places import IndexPlace, positions, read_place

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
+from framearray_cli.array.manifest import MAIN_AXIS, Manifest
+from framearray_cli.array.pictures import Relight
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.schema import dotted
-from framearray_cli.manifest import MAIN_AXIS, Manifest
-from framearray_cli.pictures import Relight
 
 from .curves import relights
 from .easing import eased

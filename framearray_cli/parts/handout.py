@@ -6,10 +6,10 @@ from concurrent.futures import CancelledError
 from contextlib import suppress
 from typing import Any
 
+from framearray_cli.array.ranges import frames_text
 from framearray_cli.base import errors
 from framearray_cli.base.errors import JobError, OutputError, WorkerError
 from framearray_cli.progress import AmbientFigures
-from framearray_cli.ranges import frames_text
 from framearray_cli.session import RenderSession
 from framearray_cli.target import Target
 

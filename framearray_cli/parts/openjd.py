@@ -8,11 +8,11 @@ import json
 from pathlib import Path
 from typing import Any
 
+from framearray_cli.array.ranges import frames_text
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import write_bytes
 from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.job.job import Job
-from framearray_cli.ranges import frames_text
 
 SUFFIXES = (".json", ".yaml", ".yml")  # what readers of templates go by
 

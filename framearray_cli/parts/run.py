@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from framearray_cli import __version__
+from framearray_cli.array.manifest_toml import read_manifest, write_manifest
+from framearray_cli.array.record import FOLDER, read_records
 from framearray_cli.auto import require_least_memory
 from framearray_cli.base.errors import JobError, OutputError, SceneError, WorkerError
 from framearray_cli.base.files import reason
@@ -18,9 +20,7 @@ from framearray_cli.base.memory import free_memory
 from framearray_cli.base.signals import forget
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table
-from framearray_cli.manifestfile import read_manifest, write_manifest
 from framearray_cli.prepare import Prepared
-from framearray_cli.record import FOLDER, read_records
 from framearray_cli.session import RenderSession, nothing_to_do, open_session
 from framearray_cli.summary import Summary, summarize, with_summary
 from framearray_cli.wording import workers_text

@@ -13,6 +13,7 @@ from typing import Any
 from distributed import Reschedule, Worker, WorkerPlugin, get_worker
 
 from framearray_cli import __version__
+from framearray_cli.array.integrity import OnDisk
 from framearray_cli.base.errors import BusyError, FrameArrayError, JobError
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.hashing import digest
@@ -24,7 +25,6 @@ from framearray_cli.job.read import job_of_table
 from framearray_cli.prepare import Prepared
 from framearray_cli.progress import RenderEvents, ambient_figures
 from framearray_cli.render import render
-from framearray_cli.resume import OnDisk
 from framearray_cli.summary import Summary
 from framearray_cli.target import Target
 

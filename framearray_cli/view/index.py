@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from framearray_cli.array.images.images import FOR_SCREENS, format_name
+from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.arrays import Float32, is_number
-from framearray_cli.images import FOR_SCREENS, format_name
-from framearray_cli.manifest import Manifest
 
 from .streams import LAYERS, Stream
 

@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from framearray_cli.array.images.images import require_writer
+from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import make_folder
-from framearray_cli.images import require_writer
-from framearray_cli.manifestfile import read_manifest
 
 from .export import check_target, export
 from .prepare import prepare_all

@@ -7,11 +7,11 @@ from typing import Literal
 
 import numpy as np
 
+from framearray_cli.array.images.images import FOR_SCREENS, format_name, read_image
+from framearray_cli.array.manifest import Manifest, ManifestGroup, image_path, layers_path
+from framearray_cli.array.names import file_name
 from framearray_cli.base.arrays import Float32, Image
 from framearray_cli.base.errors import OutputError
-from framearray_cli.filepatterns import file_name
-from framearray_cli.images import FOR_SCREENS, format_name, read_image
-from framearray_cli.manifest import Manifest, ManifestGroup, image_path, layers_path
 
 from .coding import PLAIN, Coding, coding_for, data_coding
 

@@ -22,12 +22,12 @@ from typing import Any
 
 import numpy as np
 
+from framearray_cli.array.images.images import read_layers
+from framearray_cli.array.images.png import encode_jpeg
+from framearray_cli.array.manifest import Manifest, layers_path
 from framearray_cli.base.arrays import Bytes
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, whole_file, write_bytes
-from framearray_cli.images import read_layers
-from framearray_cli.manifest import Manifest, layers_path
-from framearray_cli.pngjpeg import encode_jpeg
 
 from .coding import Coding, encode
 from .index import index_table, sheet_layout

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from framearray_cli.array.images.images import ImageFormat, read_image, write_image
 from framearray_cli.base.arrays import Images
-from framearray_cli.images import ImageFormat, read_image, write_image
 from framearray_cli.report.metrics import errors, rmse, shadow_edges, squared_bias
 from framearray_cli.report.reference import PASSES, Reference, noise, reference
 

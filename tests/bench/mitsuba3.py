@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from framearray_cli.array.images.images import write_image
 from framearray_cli.engine.terms.obscurance import FALLOFFS
-from framearray_cli.images import write_image
 
 from .cases import SCRATCH, Case, job_named, opened, under, varied
 from .machine import busy

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 
-from framearray_cli.images import ImageFormat
+from framearray_cli.array.images.images import ImageFormat
 
 from .cases import VARIANTS, Case, Variant, job_named, opened, parts_of
 from .floor import record, replay

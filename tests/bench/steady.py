@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from framearray_cli.array.images.images import ImageFormat
 from framearray_cli.base.arrays import Images, Int32
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.composed import Composed
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
-from framearray_cli.images import ImageFormat
 from framearray_cli.stored import names_without_groups
 from framearray_cli.writer import BLOCKS, ArrayWriter, array_target
 

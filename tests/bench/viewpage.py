@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 import psutil
 
-from framearray_cli.images import ImageFormat, write_image
-from framearray_cli.manifest import Manifest, ManifestCamera, ManifestLight, image_path, matrix_rows
-from framearray_cli.manifestfile import write_manifest
+from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight, image_path, matrix_rows
+from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.view.prepare import prepare_all
 from framearray_cli.view.run import open_tiles, serving
 from framearray_cli.view.tiles import TILES, Tiles

@@ -7,7 +7,7 @@ from typing import Any
 
 import tiny
 
-from framearray_cli.record import record_files, unsealed
+from framearray_cli.array.record import record_files, unsealed
 
 N = 24
 WALK = tiny.WALK | {"frames": N, "resolution": [80, 60]}

@@ -11,7 +11,7 @@ import PIL.ImageFont
 import pytest
 from program import PACKAGE_PARENT, names, run, write_job
 
-from framearray_cli import exrtiff
+from framearray_cli.array.images import exr as exrtiff
 from framearray_cli.movie import label, video
 
 # Runs the command line where some libraries cannot be found.

@@ -16,7 +16,7 @@ import tiny
 from program import Result, finish, start, wait_for, write_job
 
 from framearray_cli import interrupts
-from framearray_cli.images import read_image
+from framearray_cli.array.images.images import read_image
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of other kinds there")
 

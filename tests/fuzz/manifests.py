@@ -10,7 +10,7 @@ from itertools import count
 from pathlib import Path
 from random import Random
 
-from framearray_cli.manifest import FILE_NAME
+from framearray_cli.array.manifest import FILE_NAME
 
 from .case import Case
 from .fuzzarrays import any_command, copy_of, make_arrays, replace, secrets_lost, with_secrets

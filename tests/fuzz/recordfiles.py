@@ -9,7 +9,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from framearray_cli.record import FOLDER, sealed
+from framearray_cli.array.record import FOLDER, sealed
 
 from .case import Arguments, Case
 from .fuzzarrays import copy_of, make_arrays, replace, secrets_lost, with_secrets

@@ -7,10 +7,10 @@ from chromium import PHONE, shown
 from expected import bounds, outside
 from handmade import N_C, N_L, soft
 
+from framearray_cli.array.images.images import write_image
+from framearray_cli.array.manifest import image_path
+from framearray_cli.array.pictures import Pictures, Relight, ambient_at
 from framearray_cli.base.colour import linear_from_srgb, srgb8_from_linear
-from framearray_cli.images import write_image
-from framearray_cli.manifest import image_path
-from framearray_cli.pictures import Pictures, Relight, ambient_at
 from framearray_cli.view.run import open_tiles, serving
 
 ONE = (1.0, 1.0, 1.0)

@@ -9,9 +9,9 @@ import pytest
 from chromium import shown
 from typer.testing import CliRunner
 
+from framearray_cli.array.images.images import read_image
+from framearray_cli.array.manifest import image_path
 from framearray_cli.cli import app
-from framearray_cli.images import read_image
-from framearray_cli.manifest import image_path
 
 takes_curves = pytest.mark.skipif(
     find_spec("framearray_cli.movie") is None, reason="assemble does not take lists of places"
@@ -101,7 +101,7 @@ def test_assemble_takes_the_light_of_groups(browser, grouped, tmp_path):
     target = tmp_path / "frames" / "frame.####.png"
     told = CliRunner().invoke(app, ["assemble", str(manifest.directory), str(file), "-o", str(target)])
     assert told.exit_code == 0, told.output
-    from framearray_cli.pngjpeg import read_codes
+    from framearray_cli.array.images.png import read_codes
 
     last = read_codes(sorted(target.parent.glob("*.png"))[-1])
     assert np.abs(last - pixels.astype(float)).mean() < 1.0

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from framearray_cli.array.images.images import read_image, read_layers
+from framearray_cli.array.manifest import Manifest, image_path, layers_path
+from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.colour import srgb8_from_linear
-from framearray_cli.images import read_image, read_layers
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
-from framearray_cli.manifest import Manifest, image_path, layers_path
-from framearray_cli.manifestfile import read_manifest
 from framearray_cli.movie.assemble import assemble
 from framearray_cli.movie.look import Look
 from framearray_cli.render import render

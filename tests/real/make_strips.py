@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from framearray_cli.array.images.images import read_image
+from framearray_cli.array.manifest import image_path
+from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.colour import srgb8_from_linear
-from framearray_cli.images import read_image
-from framearray_cli.manifest import image_path
-from framearray_cli.manifestfile import read_manifest
 
 # kind, camera, light; of a scene with fewer, the last one
 CHOSEN = (("sun", 0, 0), ("sun", 3, 2), ("lamp", 2, 0), ("lamp", 5, 3))

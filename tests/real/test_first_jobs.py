@@ -7,13 +7,13 @@ import pytest
 from nasty import nasty_files
 from scenes import scenes_folder
 
+from framearray_cli.array.images.images import read_layers
+from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.manifest import image_path, layers_path
+from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import SceneError
 from framearray_cli.cli import main
-from framearray_cli.images import read_layers
 from framearray_cli.job.read import read_job
-from framearray_cli.manifest import image_path, layers_path
-from framearray_cli.manifestfile import read_manifest
-from framearray_cli.pngjpeg import read_codes
 from framearray_cli.start import Wishes, init
 
 JOBS = Path(__file__).resolve().parents[2] / "jobs"

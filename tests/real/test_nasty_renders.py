@@ -10,9 +10,9 @@ import tomli_w
 from nasty import job_table, nasty_files
 from scenes import scenes_folder
 
+from framearray_cli.array.images.images import read_image
 from framearray_cli.base.errors import SceneError
 from framearray_cli.cli import main
-from framearray_cli.images import read_image
 from framearray_cli.scene.scene import Scene, load_scene
 
 FILES = nasty_files(scenes_folder())

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scenes import scenes_folder, shared_scene
 
-from framearray_cli.images import read_image, read_layers
+from framearray_cli.array.images.images import read_image, read_layers
+from framearray_cli.array.manifest import Manifest, image_path, layers_path
+from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.job.job import Job
-from framearray_cli.manifest import Manifest, image_path, layers_path
-from framearray_cli.manifestfile import read_manifest
 from framearray_cli.render import render
 
 SCENES = make_jobs.scene_names(scenes_folder())

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from framearray_cli.array.images.images import read_image
+from framearray_cli.array.manifest import image_path
+from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.engine.terms.ambient.estimate import Ambient
-from framearray_cli.images import read_image
 from framearray_cli.job.job import Job
-from framearray_cli.manifest import image_path
-from framearray_cli.manifestfile import read_manifest
 from framearray_cli.progress import RenderEvents
 from framearray_cli.render import render
 

@@ -8,12 +8,12 @@ import pytest
 import tiny
 from movies import decoded, path_file, rms
 
+from framearray_cli.array.images.images import read_image
+from framearray_cli.array.manifest import Manifest, image_path
+from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.colour import srgb8_from_linear
-from framearray_cli.images import read_image
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
-from framearray_cli.manifest import Manifest, image_path
-from framearray_cli.manifestfile import read_manifest
 from framearray_cli.movie.assemble import assemble
 from framearray_cli.movie.pathfile import load_movie_path
 from framearray_cli.movie.timeline import timeline

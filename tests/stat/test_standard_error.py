@@ -1,7 +1,8 @@
 """The standard error that an image tells of itself against the spread of the same image over seeds.
 
 D^2 (`framearray_cli/engine/images/standard_error.py`) averaged over seeds is the variance of a pixel, so
-over pixels and seeds its root mean square is that of the spread. Two light positions, so that sums and differences of images are judged too.
+over pixels and seeds its root mean square is that of the spread. Two light positions, so that sums and differences of
+images are judged too.
 """
 
 from collections.abc import Callable

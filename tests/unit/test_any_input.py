@@ -14,20 +14,20 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from test_moviepath import array_of
 
+from framearray_cli.array.manifest_toml import read_manifest, to_toml
+from framearray_cli.array.names import check_pattern
+from framearray_cli.array.ranges import frames_text, parse_frames
+from framearray_cli.array.record import sealed, unsealed
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.problems import problems_of
 from framearray_cli.base.forms.schema import file_schema
-from framearray_cli.filepatterns import check_pattern
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.job.schema import job_schema
-from framearray_cli.manifestfile import read_manifest, to_toml
 from framearray_cli.movie.pathfile import MoviePath, load_movie_path
 from framearray_cli.movie.places import position_of, read_place
 from framearray_cli.movie.timeline import MOST_FRAMES, timeline
 from framearray_cli.places import indices
-from framearray_cli.ranges import frames_text, parse_frames
-from framearray_cli.record import sealed, unsealed
 
 SEEDS = jobseeds.tables("a.glb")
 SCHEMA = job_schema()

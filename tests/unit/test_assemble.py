@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from framearray_cli.array.images.images import ImageFormat, read_image, write_image
+from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight, image_path
+from framearray_cli.array.manifest_toml import write_manifest
+from framearray_cli.array.names import file_patterns
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, MissingExtraError, OutputError
-from framearray_cli.filepatterns import file_patterns
-from framearray_cli.images import ImageFormat, read_image, write_image
-from framearray_cli.manifest import Manifest, ManifestCamera, ManifestLight, image_path
-from framearray_cli.manifestfile import write_manifest
 from framearray_cli.movie.assemble import assemble
 from framearray_cli.movie.look import Look
-from framearray_cli.pngjpeg import read_codes
 
 av = pytest.importorskip("av")
 

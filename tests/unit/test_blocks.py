@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import tiny
 
+from framearray_cli.array.images.images import read_image
 from framearray_cli.base.errors import JobError
-from framearray_cli.images import read_image
 from framearray_cli.memory import light_blocks, mirror_share, require_memory, window_memory
 from framearray_cli.render import render
 

@@ -9,10 +9,10 @@ import pytest
 from scenes import Glb
 from typer.testing import CliRunner
 
+from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.manifest import image_path, layers_path
+from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.cli import app
-from framearray_cli.manifest import image_path, layers_path
-from framearray_cli.manifestfile import read_manifest
-from framearray_cli.pngjpeg import read_codes
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

@@ -18,13 +18,13 @@ from boxarrays import (
     write_groups,
 )
 
+from framearray_cli.array.images.images import ImageFormat, read_image
+from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.manifest import Manifest, image_path
+from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.export import KINDS, export
-from framearray_cli.images import ImageFormat, read_image
-from framearray_cli.manifest import Manifest, image_path
-from framearray_cli.pictures import Pictures
-from framearray_cli.pngjpeg import read_codes
 
 
 @pytest.fixture

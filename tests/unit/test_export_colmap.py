@@ -10,11 +10,11 @@ from boxarrays import HIGH, LOW, RESOLUTION, colour_at, look_at, plain_manifest,
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.export import export
 from framearray_cli.export.colmap import camera_from_world, quaternion
 from framearray_cli.export.points import smooth
-from framearray_cli.manifest import Manifest
 
 FAR = (4e6, -2e5, 7e5)
 
@@ -118,8 +118,8 @@ def test_who_sees_a_point_is_who_has_nothing_in_front_of_it(tmp_path: Path) -> N
     """A panel stands in front of one eye; what it hides is in no track of that eye, and what it does not hide is."""
     array = write_array(plain_manifest(tmp_path / "out"))
     depth, _ = see(array, 0)
-    from framearray_cli.images import write_layers
-    from framearray_cli.manifest import layers_path
+    from framearray_cli.array.images.images import write_layers
+    from framearray_cli.array.manifest import layers_path
 
     panel = np.zeros(depth.shape, bool)
     panel[10:30, 20:40] = True

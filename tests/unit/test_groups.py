@@ -8,10 +8,10 @@ import pytest
 import tiny
 from pydantic import ValidationError
 
-from framearray_cli.images import read_layers
-from framearray_cli.manifest import array_files
-from framearray_cli.manifestfile import read_manifest
-from framearray_cli.pictures import Pictures, Relight
+from framearray_cli.array.images.images import read_layers
+from framearray_cli.array.manifest import array_files
+from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.render import render
 from framearray_cli.scene.paths.planes import Plane
 

@@ -12,13 +12,13 @@ import OpenImageIO as oiio
 import PIL.Image
 import pytest
 
+from framearray_cli.array.images.attributes import exr_camera_from_world, exr_ndc_from_world, frame_attributes
+from framearray_cli.array.images.check import check_image
+from framearray_cli.array.images.images import HALF_MAX, ImageFormat, read_image, read_layers, write_image, write_layers
 from framearray_cli.base.colour import linear_from_srgb, linear_from_srgb8, srgb8_from_linear, srgb_from_linear
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import whole_file, write_bytes
 from framearray_cli.base.units import frame_rate
-from framearray_cli.imageattributes import exr_camera_from_world, exr_ndc_from_world, frame_attributes
-from framearray_cli.imagecheck import check_image
-from framearray_cli.images import HALF_MAX, ImageFormat, read_image, read_layers, write_image, write_layers
 
 FORMATS = ("exr", "png", "tif", "jpg")
 

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight, image_path, layers_path, matrix_rows
+from framearray_cli.array.manifest_toml import read_manifest, to_toml, write_manifest
+from framearray_cli.array.names import file_patterns
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.hashing import fingerprint
-from framearray_cli.filepatterns import file_patterns
-from framearray_cli.manifest import Manifest, ManifestCamera, ManifestLight, image_path, layers_path, matrix_rows
-from framearray_cli.manifestfile import read_manifest, to_toml, write_manifest
 
 
 def make_manifest(n_cameras: int = 3, n_lights: int = 2, **changes: Any) -> Manifest:

@@ -10,16 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from movies import grouped, path_file, plain
 
+from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.manifest import BACKGROUND, Manifest
+from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
 from framearray_cli.base.errors import JobError
-from framearray_cli.images import read_image
 from framearray_cli.job.read import read_job
-from framearray_cli.manifest import BACKGROUND, Manifest
 from framearray_cli.movie.assemble import assemble
 from framearray_cli.movie.curves import at, relights
 from framearray_cli.movie.pathfile import MoviePath, load_movie_path
 from framearray_cli.movie.timeline import timeline
-from framearray_cli.pictures import AS_RENDERED, Pictures, Relight
-from framearray_cli.pngjpeg import read_codes
 
 JOBS = Path(__file__).resolve().parents[2] / "jobs"
 GREY = (1.0, 1.0, 1.0)

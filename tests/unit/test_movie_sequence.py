@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from movies import barred, grouped, path_file, plain
 
+from framearray_cli.array.images.check import check_image
+from framearray_cli.array.images.images import ImageFormat, read_image, write_image
+from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.manifest import Manifest, image_path
+from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import OutputError
-from framearray_cli.imagecheck import check_image
-from framearray_cli.images import ImageFormat, read_image, write_image
-from framearray_cli.manifest import Manifest, image_path
 from framearray_cli.movie import sequence
 from framearray_cli.movie.assemble import assemble
 from framearray_cli.movie.look import Look
-from framearray_cli.pictures import Pictures
-from framearray_cli.pngjpeg import read_codes
 
 WALK = "[[segments]]\nframes = 9\ncamera = [0, 4]\nlight = 1\n"
 EYES = [0, 1, 1, 2, 2, 3, 3, 4, 4]  # halves go up

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestGroup, ManifestLight
+from framearray_cli.array.names import file_patterns
 from framearray_cli.base.errors import JobError
-from framearray_cli.filepatterns import file_patterns
-from framearray_cli.manifest import Manifest, ManifestCamera, ManifestGroup, ManifestLight
 from framearray_cli.movie.easing import eased
 from framearray_cli.movie.pathfile import MoviePath, Segment
 from framearray_cli.movie.places import along, read_place

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight
+from framearray_cli.array.names import file_patterns
 from framearray_cli.base.errors import JobError
-from framearray_cli.filepatterns import file_patterns
-from framearray_cli.manifest import Manifest, ManifestCamera, ManifestLight
 from framearray_cli.movie.pathfile import load_movie_path, movie_fps
 from framearray_cli.movie.timeline import timeline
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from handmade import cameras, grouped_manifest, light
 
+from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.array.manifest import Manifest, array_files
+from framearray_cli.array.manifest_toml import read_manifest, write_manifest
+from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.base.errors import OutputError
-from framearray_cli.images import ImageFormat, write_image
-from framearray_cli.manifest import Manifest, array_files
-from framearray_cli.manifestfile import read_manifest, write_manifest
-from framearray_cli.pictures import Pictures, Relight
 
 SIZE = (6, 4)
 
@@ -27,7 +27,7 @@ def array(tmp_path: Path) -> Manifest:
 
 
 def read(manifest: Manifest, name: str) -> np.ndarray:
-    from framearray_cli.images import read_image
+    from framearray_cli.array.images.images import read_image
 
     return read_image(manifest.directory / name).astype(np.float64)
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import tiny
 
+from framearray_cli.array.manifest import array_files
 from framearray_cli.describe import describe
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.identity import identity_of
-from framearray_cli.manifest import array_files
 from framearray_cli.prepare import composed_with
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.scene.paths.planes import Plane, first_with_background, pictures, planes_of_groups

@@ -4,8 +4,8 @@ import sys
 
 import pytest
 
+from framearray_cli.array.record import Entry, RecordedRun, RecordWriter, read_records, record_file
 from framearray_cli.base.errors import OutputError
-from framearray_cli.record import Entry, RecordedRun, RecordWriter, read_records, record_file
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="an open file cannot be removed there")

@@ -10,17 +10,17 @@ import tiny
 from tiny import WALK
 
 import framearray_cli.render as rendering
+from framearray_cli.array.integrity import scan_output
+from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.ranges import frames_text, parse_frames
+from framearray_cli.array.record import damaged, read_records, record_files, sealed, unsealed
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.hashing import digest
 from framearray_cli.engine.terms.ambient import estimate as ambient
 from framearray_cli.job.job import Job
-from framearray_cli.manifest import Manifest
-from framearray_cli.manifestfile import read_manifest
 from framearray_cli.progress import RenderEvents
-from framearray_cli.ranges import frames_text, parse_frames
-from framearray_cli.record import damaged, read_records, record_files, sealed, unsealed
 from framearray_cli.render import render
-from framearray_cli.resume import scan_output
 
 N = 7
 CAMERA = {**WALK, "frames": N, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": N - 1}]}

@@ -8,12 +8,12 @@ from boxarrays import grouped_manifest, plain_manifest, write_array, write_group
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.manifest import Manifest, image_path
+from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.images import read_image
-from framearray_cli.manifest import Manifest, image_path
-from framearray_cli.pictures import Pictures
-from framearray_cli.pngjpeg import read_codes
 from framearray_cli.sheet import BACKGROUND, GAP, area_mean, make_sheet
 
 

@@ -8,12 +8,12 @@ import pytest
 import tiny
 from tiny import WALK
 
+from framearray_cli.array.images.images import read_image, read_layers
+from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.standard_error import fill_unknown, half_factors, standard_error, summed_up
 from framearray_cli.engine.loop import window_of
-from framearray_cli.images import read_image, read_layers
 from framearray_cli.job.job import Job
-from framearray_cli.manifestfile import read_manifest
 from framearray_cli.render import render
 
 

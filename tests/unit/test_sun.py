@@ -12,12 +12,12 @@ import pytest
 import tiny
 import tomli_w
 
+from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import JobError, MissingExtraError
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
-from framearray_cli.manifestfile import read_manifest
-from framearray_cli.pictures import Pictures
 from framearray_cli.render import render
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.scene.paths.sun import daylight, sun_at, sun_between

@@ -7,13 +7,13 @@ import movies
 import numpy as np
 import pytest
 
+from framearray_cli.array.images.check import check_image
+from framearray_cli.array.images.exr import last_row
+from framearray_cli.array.images.images import read_image
+from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.record import Entry, RecordedRun, RecordWriter, damaged, read_records, record_file, sealed
 from framearray_cli.base.errors import OutputError
 from framearray_cli.engine.images.standard_error import standard_error
-from framearray_cli.exrtiff import last_row
-from framearray_cli.imagecheck import check_image
-from framearray_cli.images import read_image
-from framearray_cli.manifestfile import read_manifest
-from framearray_cli.record import Entry, RecordedRun, RecordWriter, damaged, read_records, record_file, sealed
 
 PRINT = "sha256:0"
 GOOD = {"c": 0, "lights": [0, 2], "files": {"a.exr": [4, "0"]}, "hits": 1.0, "rays": {"native": 5}, "seconds": 2.0}

@@ -13,11 +13,11 @@ import handmade
 import numpy as np
 import pytest
 
+from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.manifest import image_path, layers_path
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import OutputError
-from framearray_cli.images import ImageFormat, write_image
-from framearray_cli.manifest import image_path, layers_path
-from framearray_cli.pngjpeg import read_codes
 from framearray_cli.view.coding import MOST_WHITE, Coding, coding_for, data_coding, decode, encode
 from framearray_cli.view.index import sheet_layout
 from framearray_cli.view.prepare import prepare_all

@@ -15,7 +15,7 @@ from framearray_cli.base.arrays import Bytes
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, require_file
 
-from .imageattributes import Attributes
+from .attributes import Attributes
 
 MOST_PIXELS = 16384**2  # of an image; the largest that a job may have
 _PNG_HEAD, _JPEG_HEAD = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"

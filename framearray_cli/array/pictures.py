@@ -19,9 +19,9 @@ import numpy as np
 from framearray_cli.base.arrays import Image
 from framearray_cli.base.errors import OutputError
 
-from .filepatterns import file_name
-from .images import read_image
+from .images.images import read_image
 from .manifest import BACKGROUND, Manifest, ManifestGroup, ManifestLight, Vector, image_path
+from .names import file_name
 
 Positions: TypeAlias = Sequence[float]
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import require_file
 
-from .exrtiff import last_row
+from .exr import last_row
 from .images import format_name, read_image
-from .pngjpeg import opened_picture
+from .png import opened_picture
 
 JPEG_END = b"\xff\xd9"
 

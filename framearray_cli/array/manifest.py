@@ -15,7 +15,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS
 
-from .filepatterns import check_pattern, file_name
+from .names import check_pattern, file_name
 
 FILE_NAME = "manifest.toml"
 BACKGROUND = "background"  # stands beside the groups: what comes from outside the scene

@@ -14,8 +14,8 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.extras import extra
 from framearray_cli.base.files import refusal, whole_file
 
-from .imageattributes import FIXED_DATE, Attribute, Attributes
-from .pngjpeg import check_size
+from .attributes import FIXED_DATE, Attribute, Attributes
+from .png import check_size
 
 OIIO_NAMES = {"exr": "openexr", "tif": "tiff"}
 _HEADS = (b"\x76\x2f\x31\x01", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")  # of EXR, TIFF and large TIFF

@@ -21,7 +21,7 @@ from typing import Any, Self
 from framearray_cli.base.arrays import is_number
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import make_folder, reason, require_file
-from framearray_cli.base.hashing import digest
+from framearray_cli.base.hashing import digest, line_digest
 
 FOLDER = "records"
 MOST = 10**6  # cameras, and light positions of all groups: more than any job has
@@ -192,7 +192,7 @@ def _lines(file: Path) -> Iterator[dict[str, Any]]:
 def sealed(table: Mapping[str, Any]) -> bytes:
     """A line of a record: JSON that begins with a checksum of all the rest."""
     body = json.dumps(table, separators=(",", ":")).encode()
-    return b'{"check":"' + _check(body) + b'",' + body[1:]
+    return b'{"check":"' + line_digest(body) + b'",' + body[1:]
 
 
 def unsealed(line: bytes) -> dict[str, Any] | None:
@@ -201,19 +201,13 @@ def unsealed(line: bytes) -> dict[str, Any] | None:
     if not match:
         return None
     body = b"{" + line[match.end() :]
-    if _check(body) != match[1]:
+    if line_digest(body) != match[1]:
         return None
     try:
         found = json.loads(body)
     except (ValueError, RecursionError):
         return None
     return found if isinstance(found, dict) else None
-
-
-def _check(body: bytes) -> bytes:
-    import xxhash
-
-    return xxhash.xxh3_64_hexdigest(body).encode()
 
 
 def _entry(line: Mapping[str, Any]) -> Entry | None:

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from framearray_cli import __version__
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import make_folder, reason
 from framearray_cli.base.forms.schema import dotted
 
-from . import __version__
 from .manifest import FILE_NAME, Manifest, array_files
-from .manifestfile import read_manifest
+from .manifest_toml import read_manifest
 from .record import FOLDER, record_files
 
 # Differences that a message tells, and how long the values of one may be.

@@ -18,9 +18,9 @@ from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import MissingExtraError, OutputError
 from framearray_cli.base.files import write_bytes
 
-from .exrtiff import OIIO_NAMES, oiio, read_pixels, spec_of, write_pixels
-from .imageattributes import Attributes
-from .pngjpeg import can_encode, encode_jpeg, encode_png, read_codes
+from .attributes import Attributes
+from .exr import OIIO_NAMES, oiio, read_pixels, spec_of, write_pixels
+from .png import can_encode, encode_jpeg, encode_png, read_codes
 
 Extension = Literal["exr", "png", "tif", "jpg"]
 

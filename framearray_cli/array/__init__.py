@@ -1,0 +1,1 @@
+"""A frame array on disk: names, manifest, record, lock, folder, images, pictures."""
