@@ -18,7 +18,7 @@ import oracle_random as rnd
 from oracle_scene import Model, Points, dot, unit
 
 from framearray_cli.engine.terms.ambient.estimate import Ambient
-from framearray_cli.prepare import Prepared
+from framearray_cli.render.prepare import Prepared
 
 SHADOW_END = 1 - 1e-4  # a shadow ray ends this share of its length before the light
 

@@ -1,8 +1,8 @@
 """`framearray check`."""
 
 from framearray_cli.engine.kernels.clock import compile_clock
+from framearray_cli.render.messages import estimate_lines
 from framearray_cli.screen import Screen, out, say
-from framearray_cli.wording import estimate_lines
 
 from .options import JobFile, Output, Threads, read
 
@@ -12,7 +12,7 @@ def check(job_file: JobFile, threads: Threads = None, output: Output = None) -> 
     job = read(job_file, threads, output)
     with Screen(out) as screen:
         screen.wait("reading the scene and rendering a few small frames")
-        from framearray_cli.check import check as run
+        from framearray_cli.render.estimate import check as run
 
         with compile_clock(screen.compiling):
             estimate = run(job)

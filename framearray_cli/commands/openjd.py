@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 
 from framearray_cli.base.units import MOST_THREADS
+from framearray_cli.render.messages import chunks_line
 from framearray_cli.screen import Screen, out, say
-from framearray_cli.wording import chunks_line
 
 from .options import JobFile, Quiet, place, read
 
@@ -42,8 +42,8 @@ def openjd(
         )
     with Screen(out, quiet=quiet) as screen:
         screen.wait("reading the job")
-        from framearray_cli.parts.chunks import default_size, in_chunks, reach
-        from framearray_cli.parts.openjd import template, write_template
+        from framearray_cli.render.parts.chunks import default_size, in_chunks, reach
+        from framearray_cli.render.parts.openjd import template, write_template
         from framearray_cli.scene.paths.paths import eyes
 
         n_r, still = reach(job), eyes(job).at_rest

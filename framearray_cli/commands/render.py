@@ -10,10 +10,7 @@ import typer
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.units import MOST_THREADS, size
 from framearray_cli.engine.kernels.clock import compile_clock
-from framearray_cli.parts.progress import PartEvents
-from framearray_cli.progress import ambient_figures
-from framearray_cli.screen import Screen, out, say
-from framearray_cli.wording import (
+from framearray_cli.render.messages import (
     ambient_lines,
     chunks_line,
     on_disk_lines,
@@ -23,19 +20,22 @@ from framearray_cli.wording import (
     target_lines,
     workers_text,
 )
+from framearray_cli.render.parts.progress import PartEvents
+from framearray_cli.render.progress import ambient_figures
+from framearray_cli.screen import Screen, out, say
 
 from .options import JobFile, Output, Quiet, Threads, frames_of, read
 
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk
-    from framearray_cli.auto import AutoSettings
     from framearray_cli.engine.terms.ambient.estimate import Ambient
     from framearray_cli.job.job import Job
-    from framearray_cli.parts.chunks import Chunks
-    from framearray_cli.parts.run import WorkerOptions
-    from framearray_cli.prepare import Prepared
-    from framearray_cli.progress import AmbientFigures
-    from framearray_cli.target import Target
+    from framearray_cli.render.automatic.choose import AutoSettings
+    from framearray_cli.render.parts.chunks import Chunks
+    from framearray_cli.render.parts.run import WorkerOptions
+    from framearray_cli.render.prepare import Prepared
+    from framearray_cli.render.progress import AmbientFigures
+    from framearray_cli.render.target.pilot import Target
 
 LITTLE_SPACE = 64 * 1024 * 1024  # bytes; with less, a full disk is the likely reason of an error
 FEW_FILES = 100  # fewer than a run has open, and leaves when it fails
@@ -82,7 +82,7 @@ def _worker_options(workers: int | None, dask: str | None, chunk: int | None) ->
         return None
     if dask is not None and not dask.strip():  # most often a shell variable that is not set
         raise typer.BadParameter("expected an address, got none", param_hint="--dask")
-    from framearray_cli.parts.run import WorkerOptions
+    from framearray_cli.render.parts.run import WorkerOptions
 
     return WorkerOptions(workers=workers or 1, address=dask, chunk=chunk)
 
@@ -98,7 +98,7 @@ def render_shown(
     """Render, and show on the screen what goes on."""
     with Screen(out, quiet=quiet) as screen:
         screen.wait("reading the scene")
-        from framearray_cli.render import render as run
+        from framearray_cli.render.render import render as run
 
         shown = Shown(screen, job)
         try:
@@ -106,7 +106,7 @@ def render_shown(
                 if options is None:
                     summary = run(job, shown, restart=restart, cameras=cameras)
                 else:
-                    from framearray_cli.parts.run import render_in_parts
+                    from framearray_cli.render.parts.run import render_in_parts
 
                     summary = render_in_parts(job, shown, options, restart=restart, cameras=cameras)
         except BaseException as error:

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from framearray_cli.engine.kernels.clock import compile_clock
+from framearray_cli.render.messages import scene_lines
 from framearray_cli.screen import Screen, out, say
-from framearray_cli.wording import report_lines, scene_lines
 
 from .options import JobFile, Quiet, Threads, read
 
 if TYPE_CHECKING:
     from framearray_cli.report.case import Case
+    from framearray_cli.report.run import Report
 
 
 def report(
@@ -76,3 +77,15 @@ def report(
         reporting.write_report(made)
     if not quiet:
         say(out, report_lines(made))
+
+
+def report_lines(made: "Report") -> list[str]:
+    """What a report found: the job's own settings, and the cheapest ones for some errors."""
+    from framearray_cli.report import advice_lines
+
+    own = made.measured[0]
+    lines = [f"as the job says: {own.ms:.3g} ms an image before writing, RMSE {own.quality.rmse:.1%}"]
+    for one in made.advice:
+        found = f"{one.best.named.name}, {one.best.ms:.3g} ms an image" if one.best else "nothing that was tried"
+        lines += [f"for an RMSE of {one.error:.1%}: {found}", *(f"  {line}" for line in advice_lines(one.best, made))]
+    return [*lines, f"report: {made.folder / 'index.html'}"]

@@ -1,16 +1,18 @@
 """`framearray verify`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from framearray_cli.base.errors import CheckError
 from framearray_cli.base.memory import RENDERS, available_cores, require_address_space
 from framearray_cli.screen import Screen, out, say
-from framearray_cli.wording import verified_lines
 
 from .options import Quiet, Threads, with_threads
+
+if TYPE_CHECKING:
+    from framearray_cli.array.integrity import Verified
 
 
 def verify(
@@ -51,3 +53,15 @@ def verify(
     render_shown(
         with_threads(job_of_table(found.manifest.job, folder / FILE_NAME, folder.absolute()), threads), quiet=quiet
     )
+
+
+def verified_lines(found: "Verified") -> list[str]:
+    """What is wrong with the files of an array, each by name."""
+    folder, n = found.manifest.directory, len(found.wrong)
+    lines = [f"{folder / name}: {problem}" for name, problem in found.wrong]
+    if found.unknown:
+        lines.append(f"note: {found.unknown:,} files are whole, but have no checksum to compare them with")
+    if not n:
+        return [*lines, f"{found.files:,} files of {found.manifest.name} are whole"]
+    advice = "`framearray verify --repair` renders them again"
+    return [*lines, f"{n:,} of {found.files:,} files are missing or damaged; {advice}"]

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from framearray_cli.auto import resolve_auto
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.table import changed
 from framearray_cli.engine.embree import EmbreeScene
@@ -16,7 +15,8 @@ from framearray_cli.engine.inputs.lights import some_lights
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.job.values import MOST_HITS
-from framearray_cli.prepare import Prepared, open_embree, plan_work, prepare
+from framearray_cli.render.automatic.choose import resolve_auto
+from framearray_cli.render.prepare import Prepared, open_embree, plan_work, prepare
 
 from .settings import Settings
 

@@ -20,7 +20,7 @@ from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.composed import Layers
 from framearray_cli.engine.loop import window_of
-from framearray_cli.identity import job_fingerprint
+from framearray_cli.render.identity import job_fingerprint
 
 from .case import Case, under
 from .metrics import rmse

@@ -11,7 +11,7 @@ from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
-from framearray_cli.prepare import plan_work, prepared_from
+from framearray_cli.render.prepare import plan_work, prepared_from
 from framearray_cli.scene.paths.paths import LightPath, eyes, lights, shining_together
 from framearray_cli.scene.scene import Scene
 

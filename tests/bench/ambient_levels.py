@@ -8,7 +8,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.engine.embree import EmbreeScene
-from framearray_cli.prepare import Prepared, open_embree, plan_work
+from framearray_cli.render.prepare import Prepared, open_embree, plan_work
 
 from .ambient_scenes import FURNACE, FURNACE_LEVEL, Probe, under_one, with_ambient
 from .results import Table

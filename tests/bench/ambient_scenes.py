@@ -14,7 +14,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.engine.inputs.lights import some_lights
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
-from framearray_cli.prepare import Prepared, prepare
+from framearray_cli.render.prepare import Prepared, prepare
 from framearray_cli.scene.files import Material
 from framearray_cli.scene.files.model import Part
 

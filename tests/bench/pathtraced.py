@@ -14,7 +14,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Image
 from framearray_cli.engine.inputs.lights import DIRECTIONAL
-from framearray_cli.prepare import Prepared
+from framearray_cli.render.prepare import Prepared
 from framearray_cli.scene.scene import Scene
 
 from .ambient_scenes import Probe, probe_named, resized

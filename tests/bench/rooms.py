@@ -8,7 +8,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.job.job import Job
-from framearray_cli.prepare import Prepared, prepared_from
+from framearray_cli.render.prepare import Prepared, prepared_from
 from framearray_cli.scene.files import Material, Meshes
 from framearray_cli.scene.files.model import Part
 from framearray_cli.scene.paths.paths import eyes, lights

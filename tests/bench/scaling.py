@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.engine.inputs.lights import DIRECTIONAL, LightArrays, padded
-from framearray_cli.prepare import open_embree, plan_work
+from framearray_cli.render.prepare import open_embree, plan_work
 from framearray_cli.report.settings import Settings
 from framearray_cli.scene.paths.paths import Eyes
 from framearray_cli.scene.paths.planes import pictures

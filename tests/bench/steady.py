@@ -22,8 +22,8 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.composed import Composed
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
-from framearray_cli.stored import names_without_groups
-from framearray_cli.writer import BLOCKS, ArrayWriter, array_target
+from framearray_cli.render.names import names_without_groups
+from framearray_cli.render.writer import BLOCKS, ArrayWriter, array_target
 
 from .cases import Case
 from .results import Table

@@ -13,7 +13,8 @@ import pytest
 import tiny
 from program import finish, run, start, wait_for, write_job
 
-from framearray_cli import interrupts, render
+from framearray_cli import interrupts
+from framearray_cli.render import render
 
 pty = pytest.importorskip("pty", reason="no such terminals there")
 

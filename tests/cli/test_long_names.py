@@ -11,7 +11,7 @@ OUT, OTHER = "out", "other.png"
 def rendered(tmp_path_factory):
     """A folder with a job, and its frame array in `out`."""
     from framearray_cli.job.read import read_job
-    from framearray_cli.render import render
+    from framearray_cli.render.render import render
 
     folder = tmp_path_factory.mktemp("array")
     render(read_job(write_job(folder)))

@@ -7,8 +7,8 @@ import psutil
 import pytest
 import tiny
 
-from framearray_cli.progress import RenderEvents
-from framearray_cli.render import render
+from framearray_cli.render.progress import RenderEvents
+from framearray_cli.render.render import render
 
 CAMERAS, LIGHTS = 5000, 4
 BLOCK = 2500  # images

@@ -116,7 +116,7 @@ def test_an_output_folder_that_is_a_file(tmp_path, capsys):
 
 @pytest.mark.parametrize("change", [{"camera": {"resolution": [16384, 16384]}}, {"light": {"frames": 100_000}}])
 def test_a_job_beyond_memory(change, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("framearray_cli.memory.free_memory", lambda: 2**30)
+    monkeypatch.setattr("framearray_cli.render.memory.free_memory", lambda: 2**30)
     told = run(capsys, "render", "-q", write_job(tmp_path, **change))
     assert (told.code, told.out) == (2, "")
     assert re.search(r"job\.toml: rendering needs at least [\d.]+ GiB of memory, 1\.0 GiB", told.err)
@@ -127,7 +127,7 @@ def test_memory_that_runs_out_all_the_same(tmp_path, capsys, monkeypatch):
     def fail(*arguments: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("framearray_cli.render.plan_work", fail)
+    monkeypatch.setattr("framearray_cli.render.render.plan_work", fail)
     told = run(capsys, "render", "-q", write_job(tmp_path))
     assert told.code == 2
     assert told.err.startswith("not enough memory; ")
@@ -153,7 +153,7 @@ def test_our_own_mistakes_keep_their_traceback(tmp_path, monkeypatch):
     def fail(*arguments: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr("framearray_cli.session.prepare", fail)
+    monkeypatch.setattr("framearray_cli.render.session.prepare", fail)
     from framearray_cli.cli import main
 
     with pytest.raises(ZeroDivisionError):

@@ -10,7 +10,7 @@ import tiny
 import tomli_w
 
 from framearray_cli.job.read import read_job
-from framearray_cli.render import render
+from framearray_cli.render.render import render
 
 from . import jobseeds
 

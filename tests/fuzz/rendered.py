@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli import check, render
 from framearray_cli.array.images.images import read_image, read_layers
 from framearray_cli.array.integrity import verify
 from framearray_cli.array.manifest import array_files
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.auto import require_least_memory
-from framearray_cli.prepare import prepare
+from framearray_cli.render import estimate as check
+from framearray_cli.render import render
+from framearray_cli.render.automatic.choose import require_least_memory
+from framearray_cli.render.prepare import prepare
 
 # A job is rendered where it takes at most so much, checked up to FAR_MORE times as much, and beyond that only prepared:
 # read, with its scene, and its memory estimated.

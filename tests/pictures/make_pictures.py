@@ -20,7 +20,7 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.movie.assemble import assemble
 from framearray_cli.movie.look import Look
-from framearray_cli.render import render
+from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.sheet import make_sheet
 

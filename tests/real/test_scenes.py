@@ -14,7 +14,7 @@ from framearray_cli.array.images.images import read_image, read_layers
 from framearray_cli.array.manifest import Manifest, image_path, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.job.job import Job
-from framearray_cli.render import render
+from framearray_cli.render.render import render
 
 SCENES = make_jobs.scene_names(scenes_folder())
 # The noted shares rest on some thousand rays, so they are known to about one in a hundred.

@@ -13,8 +13,8 @@ from framearray_cli.array.manifest import image_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
-from framearray_cli.progress import RenderEvents
-from framearray_cli.render import render
+from framearray_cli.render.progress import RenderEvents
+from framearray_cli.render.render import render
 
 Array = NDArray[np.float64]
 Vector = Sequence[float]

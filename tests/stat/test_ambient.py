@@ -15,7 +15,7 @@ from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.engine.terms.ambient.from_lights import LightWalks, ambient_by_light
 from framearray_cli.job.job import Job
-from framearray_cli.prepare import open_embree, plan_work, prepare
+from framearray_cli.render.prepare import open_embree, plan_work, prepare
 
 # A house of 5 x 3 x 4 m outside, walls 0.2 m thick, with one window in the wall x = 5 that the sun shines through.
 OUTER, WALL = np.array([5.0, 3.0, 4.0]), 0.2

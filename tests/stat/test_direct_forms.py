@@ -14,7 +14,7 @@ from framearray_cli.engine.hits.hits import SURFACE
 from framearray_cli.engine.hits.native import Samples, native_hits
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.job.job import Job
-from framearray_cli.prepare import open_embree, plan_work, prepare
+from framearray_cli.render.prepare import open_embree, plan_work, prepare
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from framearray_cli.job.read import read_job
 from framearray_cli.movie.assemble import assemble
 from framearray_cli.movie.pathfile import load_movie_path
 from framearray_cli.movie.timeline import timeline
-from framearray_cli.render import render
+from framearray_cli.render.render import render
 
 pytest.importorskip("av")
 

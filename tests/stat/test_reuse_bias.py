@@ -18,7 +18,7 @@ from framearray_cli.engine.frames.blocks import Allotment, blocks_of
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
-from framearray_cli.prepare import open_embree, plan_work, prepare
+from framearray_cli.render.prepare import open_embree, plan_work, prepare
 
 Array = NDArray[np.float64]
 

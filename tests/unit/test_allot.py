@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from framearray_cli.allot import FEWEST, Witnesses, allot, fewest_hits, variances
 from framearray_cli.engine.frames.blocks import Allotment, blocks_of
 from framearray_cli.engine.frames.passes import passes_of_counts
-from framearray_cli.expected import EVENNESS, independent_hits
+from framearray_cli.render.automatic.cost import EVENNESS, independent_hits
+from framearray_cli.render.target.allot import FEWEST, Witnesses, allot, fewest_hits, variances
 
 MANY = 1e9
 

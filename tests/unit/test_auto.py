@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import tiny
 
-from framearray_cli.acceptance import Acceptance, probe, spread_in_shares
-from framearray_cli.auto import (
+from framearray_cli.job.read import job_table
+from framearray_cli.render.automatic.choose import (
     DEFAULT,
     HITS,
     applied,
@@ -18,10 +18,10 @@ from framearray_cli.auto import (
     to_try,
     wanted_variance,
 )
-from framearray_cli.expected import Model, Reuse
-from framearray_cli.identity import job_fingerprint
-from framearray_cli.job.read import job_table
-from framearray_cli.prepare import open_embree
+from framearray_cli.render.automatic.cost import Model, Reuse
+from framearray_cli.render.automatic.probe import Acceptance, probe, spread_in_shares
+from framearray_cli.render.identity import job_fingerprint
+from framearray_cli.render.prepare import open_embree
 
 AUTO = {"reuse": {"n_r": "auto"}, "samples": {"hits": "auto"}}
 REACH = 16
@@ -141,7 +141,7 @@ def test_time_by_hand() -> None:
     found = Acceptance(
         n_frames=1000, frame=np.array([500], np.int32), density=np.ones((1, 5)), reflecting=1.0, shadow_rays=10.0
     )
-    from framearray_cli import expected as e
+    from framearray_cli.render.automatic import cost as e
 
     one = Model(found=found, n_lights=20, obscurance=3, balance=False)
     native = 2 * 1002 / 1000

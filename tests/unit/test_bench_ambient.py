@@ -12,7 +12,7 @@ from bench.ambient_plots import signed, strip
 from bench.ambient_scenes import FURNACE, FURNACE_LEVEL, probe_named, probes, under_one
 from bench.results import save, site_in
 
-from framearray_cli.prepare import open_embree
+from framearray_cli.render.prepare import open_embree
 
 SHAPE = (120, 160, 3)
 

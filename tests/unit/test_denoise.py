@@ -16,7 +16,7 @@ SKY = {"background": [0.5, 0.5, 0.5]}
 def test_a_denoiser_that_does_nothing_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """R times (R W / R) is R W again: at silhouettes, on mirrors and against the sky too."""
     monkeypatch.setattr(window, "denoised", lambda obscurance, reflectivity, normal: obscurance)
-    monkeypatch.setattr("framearray_cli.prepare.require_denoiser", lambda: None)
+    monkeypatch.setattr("framearray_cli.render.prepare.require_denoiser", lambda: None)
     images = [
         tiny.render_frames(
             tiny.prepared(tiny.job(camera=tiny.WALK, reuse={"n_r": 1}, scene=SKY, denoise={"obscurance": wanted}))

@@ -14,7 +14,7 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.terms.ambient.from_lights import LightWalks, ambient_by_light
 from framearray_cli.job.job import Job
-from framearray_cli.render import render
+from framearray_cli.render.render import render
 
 SKY = {"background": [0.3, 0.4, 0.5]}
 LAMP = tiny.TABLE["light"]["sources"][0]

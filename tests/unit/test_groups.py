@@ -12,7 +12,7 @@ from framearray_cli.array.images.images import read_layers
 from framearray_cli.array.manifest import array_files
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures, Relight
-from framearray_cli.render import render
+from framearray_cli.render.render import render
 from framearray_cli.scene.paths.planes import Plane
 
 SKY = [0.3, 0.4, 0.5]
@@ -141,7 +141,7 @@ def test_a_black_background_is_not_stored(scene: Path, tmp_path: Path) -> None:
 
 def test_blocks_of_light_positions_and_steps_give_the_same(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
     """A memory limit cuts the positions of all groups into blocks, wherever that falls."""
-    import framearray_cli.render as module
+    import framearray_cli.render.render as module
 
     cut = [range(0, 4), range(4, 8), range(8, 9)]
     with pytest.MonkeyPatch.context() as patch:
@@ -191,7 +191,7 @@ def test_notes_and_lines_tell_groups(scene: Path) -> None:
     from dataclasses import replace as changed
 
     from framearray_cli.engine.terms.ambient.estimate import Ambient
-    from framearray_cli.prepare import _named
+    from framearray_cli.render.prepare import _named
     from framearray_cli.scene.paths.paths import lights
 
     job = tiny.Job.model_validate({**tiny.table(), "light": {"sources": SOURCES}})

@@ -178,7 +178,7 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
 def test_an_import_against_the_table_is_seen(tmp_path: Path) -> None:
     """The test of rooms can fail: one more import, in whatever form, inside a function too."""
     for text in (
-        "from framearray_cli.render.render import render\n",
+        "from framearray_cli.render import render\n",
         "from ..render import render\n",
         "import framearray_cli.render.render\n",
         "def later() -> None:\n    from framearray_cli.render import render\n",

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from framearray_cli.engine.frames.passes import frame_hits
-from framearray_cli.parts.chunks import cut, default_size, in_chunks
-from framearray_cli.wording import chunks_line
+from framearray_cli.render.messages import chunks_line
+from framearray_cli.render.parts.chunks import cut, default_size, in_chunks
 
 
 @pytest.mark.parametrize(("n", "size"), [(1, 1), (5, 9), (24, 24), (25, 24), (96, 24), (100, 24), (101, 7), (8, 1)])
@@ -84,7 +84,7 @@ def test_dask_is_named_where_it_is_missing(monkeypatch):
 
     from framearray_cli.base.errors import MissingExtraError
 
-    cluster = importlib.import_module("framearray_cli.parts.cluster")
+    cluster = importlib.import_module("framearray_cli.render.parts.dask")
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(MissingExtraError, match=r'pip install "framearray\[dask\]"'):
         cluster.require_dask()

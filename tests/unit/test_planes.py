@@ -8,14 +8,14 @@ import pytest
 import tiny
 
 from framearray_cli.array.manifest import array_files
-from framearray_cli.describe import describe
 from framearray_cli.engine.terms.ambient.estimate import Ambient
-from framearray_cli.identity import identity_of
-from framearray_cli.prepare import composed_with
+from framearray_cli.render.identity import identity_of
+from framearray_cli.render.manifest import describe
+from framearray_cli.render.names import array_names
+from framearray_cli.render.prepare import composed_with
+from framearray_cli.render.writer import array_target
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.scene.paths.planes import Plane, first_with_background, pictures, planes_of_groups
-from framearray_cli.stored import array_names
-from framearray_cli.writer import array_target
 
 LAMP = {**tiny.TABLE["light"]["sources"][0], "group": "lamps", "axis": "lamps"}
 SKY, NIGHT = [0.3, 0.4, 0.5], [0.0, 0.0, 0.0]

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 import framearray_cli.commands.render as command
-import framearray_cli.parts.worker as worker
+import framearray_cli.render.parts.worker as worker
 from framearray_cli.engine.terms.ambient.estimate import Ambient
-from framearray_cli.parts.chunks import Chunks
-from framearray_cli.parts.handout import ChunkQueue
-from framearray_cli.parts.progress import PartEvents
-from framearray_cli.progress import AmbientFigures, RenderEvents, ambient_figures
-from framearray_cli.target import Target
-from framearray_cli.wording import ambient_lines, target_lines
+from framearray_cli.render.messages import ambient_lines, target_lines
+from framearray_cli.render.parts.chunks import Chunks
+from framearray_cli.render.parts.progress import PartEvents
+from framearray_cli.render.parts.queue import ChunkQueue
+from framearray_cli.render.progress import AmbientFigures, RenderEvents, ambient_figures
+from framearray_cli.render.target.pilot import Target
 
 FIGURES = AmbientFigures(lowest=0.25, highest=0.5, error=0.0123, paths=4096, notes=("a note", "another"))
 TARGET = Target(

@@ -9,7 +9,7 @@ import pytest
 import tiny
 from tiny import WALK
 
-import framearray_cli.render as rendering
+import framearray_cli.render.render as rendering
 from framearray_cli.array.integrity import scan_output
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
@@ -19,8 +19,8 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.hashing import digest
 from framearray_cli.engine.terms.ambient import estimate as ambient
 from framearray_cli.job.job import Job
-from framearray_cli.progress import RenderEvents
-from framearray_cli.render import render
+from framearray_cli.render.progress import RenderEvents
+from framearray_cli.render.render import render
 
 N = 7
 CAMERA = {**WALK, "frames": N, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": N - 1}]}

@@ -14,7 +14,7 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.standard_error import fill_unknown, half_factors, standard_error, summed_up
 from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
-from framearray_cli.render import render
+from framearray_cli.render.render import render
 
 
 def test_factors_make_a_difference_of_means_with_the_variance_of_the_mean() -> None:

@@ -18,7 +18,7 @@ from framearray_cli.base.errors import JobError, MissingExtraError
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
-from framearray_cli.render import render
+from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.scene.paths.sun import daylight, sun_at, sun_between
 

@@ -12,7 +12,8 @@ import numpy as np
 from framearray_cli.base.errors import SceneError
 from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.job.job import Job
-from framearray_cli.prepare import open_embree, prepare
+
+from ..prepare import open_embree, prepare
 
 # Frames of a chunk for each frame of N_r unless somebody says: the halo of 2 N_r frames is a quarter of it then.
 FRAMES_A_REACH = 8
@@ -90,7 +91,7 @@ def reach(job: Job) -> int:
         raise SceneError(f"{job.scene.file}: no such file")
     if job.reuse.n_r != "auto":
         return job.n_r
-    from framearray_cli.auto import resolve_auto
+    from ..automatic.choose import resolve_auto
 
     prepared = prepare(job)
     with open_embree(prepared) as embree:

@@ -9,10 +9,10 @@ from typing import Any
 from framearray_cli.array.ranges import frames_text
 from framearray_cli.base import errors
 from framearray_cli.base.errors import JobError, OutputError, WorkerError
-from framearray_cli.progress import AmbientFigures
-from framearray_cli.session import RenderSession
-from framearray_cli.target import Target
 
+from ..progress import AmbientFigures
+from ..session import RenderSession
+from ..target.pilot import Target
 from .chunks import Chunks
 from .progress import PartEvents
 

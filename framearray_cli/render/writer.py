@@ -23,8 +23,8 @@ from framearray_cli.engine.images.standard_error import square_mean, standard_er
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Eyes
 
+from .names import ArrayNames, array_names
 from .prepare import Prepared
-from .stored import ArrayNames, array_names
 
 # Blocks of images in memory: one is filled while the other is written.
 BLOCKS = 2

@@ -15,10 +15,10 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.method import DEFAULT_HITS, DEFAULT_N_R
 from framearray_cli.job.values import MOST_HITS, SHARES
 
-from .acceptance import probe
-from .expected import Model, Reuse, independent_hits
-from .memory import light_blocks, require_memory
-from .prepare import Prepared
+from ..memory import light_blocks, require_memory
+from ..prepare import Prepared
+from .cost import Model, Reuse, independent_hits
+from .probe import probe
 
 # Longest windows that are tried. With `average` old views of a place bring an error that no number of hits removes.
 LONGEST = {"balance": 16, "average": DEFAULT_N_R}

@@ -22,11 +22,12 @@ from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_of_table
-from framearray_cli.prepare import Prepared
-from framearray_cli.progress import RenderEvents, ambient_figures
-from framearray_cli.render import render
-from framearray_cli.summary import Summary
-from framearray_cli.target import Target
+
+from ..prepare import Prepared
+from ..progress import RenderEvents, ambient_figures
+from ..render import render
+from ..summary import Summary
+from ..target.pilot import Target
 
 # Seconds between two looks whether the chunk is still wanted, and between two messages on how far it is.
 LOOK_EVERY, SEND_EVERY = 0.2, 0.5

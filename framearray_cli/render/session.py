@@ -15,7 +15,7 @@ from framearray_cli.engine.embree import EmbreeScene, Engine
 from framearray_cli.engine.kernels.kernel import processor
 from framearray_cli.job.job import Job
 
-from .auto import AutoSettings, require_least_memory, resolve_auto
+from .automatic.choose import AutoSettings, require_least_memory, resolve_auto
 from .identity import identity_of
 from .prepare import Prepared, open_embree, prepare
 from .progress import RenderEvents

@@ -18,7 +18,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float64, Int32
 from framearray_cli.engine.frames.blocks import Blocks
 
-from .expected import EVENNESS, independent_hits
+from ..automatic.cost import EVENNESS, independent_hits
 
 # The fewest hits a pixel of a frame: below, most pixels would rest on hits of frames far away.
 FEWEST = 0.25

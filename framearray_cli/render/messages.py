@@ -8,17 +8,16 @@ from framearray_cli.base.units import duration, size
 from .progress import ambient_figures
 
 if TYPE_CHECKING:
-    from framearray_cli.array.integrity import OnDisk, Verified
+    from framearray_cli.array.integrity import OnDisk
     from framearray_cli.job.job import Job
-    from framearray_cli.parts.chunks import Chunks
-    from framearray_cli.report import Report
 
-    from .auto import AutoSettings
-    from .check import Estimate
+    from .automatic.choose import AutoSettings
+    from .estimate import Estimate
+    from .parts.chunks import Chunks
     from .prepare import Prepared
     from .progress import AmbientFigures
     from .summary import Summary
-    from .target import Target
+    from .target.pilot import Target
 
 
 MOST_DAMAGED = 5  # files that are told by name
@@ -74,7 +73,7 @@ def ambient_lines(figures: "AmbientFigures") -> list[str]:
 
 def settings_lines(settings: "AutoSettings") -> list[str]:
     """The settings that were chosen, and what is expected of them."""
-    from .auto import DEFAULT
+    from .automatic.choose import DEFAULT
 
     said = {"reuse.n_r": f"n_r = {settings.reuse.n_r}", "samples.hits": f"hits = {settings.reuse.hits:g}"}
     default = f"n_r = {DEFAULT.n_r}, hits = {DEFAULT.hits:g}"
@@ -174,27 +173,3 @@ def _error_lines(summary: "Summary") -> list[str]:
         f"standard error {found['rms']:.3g}, {found['relative']:.1%} of the mean radiance; "
         f"the largest of an image {found['largest']:.3g} ({where})"
     ]
-
-
-def report_lines(made: "Report") -> list[str]:
-    """What a report found: the job's own settings, and the cheapest ones for some errors."""
-    from framearray_cli.report import advice_lines
-
-    own = made.measured[0]
-    lines = [f"as the job says: {own.ms:.3g} ms an image before writing, RMSE {own.quality.rmse:.1%}"]
-    for one in made.advice:
-        found = f"{one.best.named.name}, {one.best.ms:.3g} ms an image" if one.best else "nothing that was tried"
-        lines += [f"for an RMSE of {one.error:.1%}: {found}", *(f"  {line}" for line in advice_lines(one.best, made))]
-    return [*lines, f"report: {made.folder / 'index.html'}"]
-
-
-def verified_lines(found: "Verified") -> list[str]:
-    """What is wrong with the files of an array, each by name."""
-    folder, n = found.manifest.directory, len(found.wrong)
-    lines = [f"{folder / name}: {problem}" for name, problem in found.wrong]
-    if found.unknown:
-        lines.append(f"note: {found.unknown:,} files are whole, but have no checksum to compare them with")
-    if not n:
-        return [*lines, f"{found.files:,} files of {found.manifest.name} are whole"]
-    advice = "`framearray verify --repair` renders them again"
-    return [*lines, f"{n:,} of {found.files:,} files are missing or damaged; {advice}"]

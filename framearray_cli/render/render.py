@@ -23,13 +23,13 @@ from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 
-from .describe import describe
+from .manifest import describe
 from .memory import light_blocks, mirror_share, require_memory
 from .prepare import Prepared, composed_with, plan_work
 from .progress import RenderEvents
 from .session import RenderSession, nothing_to_do, open_session
 from .summary import Summary, summarize, with_summary
-from .target import allot_hits
+from .target.pilot import allot_hits
 from .writer import ArrayWriter, FinishedFiles, array_target
 
 

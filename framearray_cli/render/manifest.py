@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from framearray_cli import __version__
 from framearray_cli.array.folder import Identity
 from framearray_cli.array.manifest import (
     BACKGROUND,
@@ -19,11 +20,10 @@ from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.scene.paths.paths import LightPath
 from framearray_cli.scene.paths.planes import Plane
 
-from . import __version__
-from .auto import AutoSettings
+from .automatic.choose import AutoSettings
+from .names import AMBIENT, ArrayNames, array_names
 from .prepare import Prepared
-from .stored import AMBIENT, ArrayNames, array_names
-from .target import Target
+from .target.pilot import Target
 
 _KEYS = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
 

@@ -18,11 +18,11 @@ from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 
-from .auto import AutoSettings, require_least_memory, resolve_auto
+from .automatic.choose import AutoSettings, require_least_memory, resolve_auto
 from .identity import identity_of
 from .memory import ambient_memory, light_blocks, mirror_share, window_memory
 from .prepare import Prepared, composed_with, open_embree, plan_work, prepare
-from .target import Target, allot_hits
+from .target.pilot import Target, allot_hits
 from .writer import ArrayWriter, array_target
 
 # A probe traces about this many rays, which takes a second or two.

@@ -11,7 +11,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float64
 from framearray_cli.engine.frames.passes import frame_hits
 
-from .acceptance import Acceptance
+from .probe import Acceptance
 
 # The variance of a pixel falls with this power of the hits that one eye finds in it: they are spread evenly.
 EVENNESS = 1.3

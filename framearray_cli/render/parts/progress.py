@@ -2,11 +2,10 @@
 
 from typing import TYPE_CHECKING
 
-from framearray_cli.progress import AmbientFigures, RenderEvents
+from ..progress import AmbientFigures, RenderEvents
 
 if TYPE_CHECKING:
-    from framearray_cli.target import Target
-
+    from ..target.pilot import Target
     from .chunks import Chunks
 
 

@@ -15,7 +15,7 @@ from framearray_cli.engine.inputs.lights import some_lights
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.direct import direct
 
-from .prepare import Prepared, eye_cameras
+from ..prepare import Prepared, eye_cameras
 
 # Frames of the path that are looked at, native hits of each, and light positions that shadow rays are counted for.
 PROBE_FRAMES, PROBE_HITS, PROBE_LIGHTS = 16, 512, 32

@@ -7,9 +7,9 @@ if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk
     from framearray_cli.engine.terms.ambient.estimate import Ambient
 
-    from .auto import AutoSettings
+    from .automatic.choose import AutoSettings
     from .prepare import Prepared
-    from .target import Target
+    from .target.pilot import Target
 
 
 class RenderEvents:

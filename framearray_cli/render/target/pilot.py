@@ -20,9 +20,9 @@ from framearray_cli.engine.hits.outer import outer_hits
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 
-from .acceptance import MOST_DENSE, spread_in_shares
+from ..automatic.probe import MOST_DENSE, spread_in_shares
+from ..prepare import Prepared
 from .allot import FEWEST, Witnesses, allot
-from .prepare import Prepared
 
 # Added to the job's seed for the pilot; no job's seed is as large.
 PILOT_SEED = 1 << 40

@@ -11,7 +11,6 @@ from typing import Any
 from framearray_cli import __version__
 from framearray_cli.array.manifest_toml import read_manifest, write_manifest
 from framearray_cli.array.record import FOLDER, read_records
-from framearray_cli.auto import require_least_memory
 from framearray_cli.base.errors import JobError, OutputError, SceneError, WorkerError
 from framearray_cli.base.files import reason
 from framearray_cli.base.forms.table import changed
@@ -20,15 +19,16 @@ from framearray_cli.base.memory import free_memory
 from framearray_cli.base.signals import forget
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table
-from framearray_cli.prepare import Prepared
-from framearray_cli.session import RenderSession, nothing_to_do, open_session
-from framearray_cli.summary import Summary, summarize, with_summary
-from framearray_cli.wording import workers_text
 
+from ..automatic.choose import require_least_memory
+from ..messages import workers_text
+from ..prepare import Prepared
+from ..session import RenderSession, nothing_to_do, open_session
+from ..summary import Summary, summarize, with_summary
 from .chunks import Chunks, default_size, in_chunks
-from .cluster import connected, local, require_dask
-from .handout import LOOK_EVERY, ChunkQueue, count_workers, lacks_program
+from .dask import connected, local, require_dask
 from .progress import PartEvents
+from .queue import LOOK_EVERY, ChunkQueue, count_workers, lacks_program
 
 # Share of the free memory that workers get; the rest is for files that the system keeps in memory.
 SHARE = 0.9

@@ -1,0 +1,1 @@
+"""Job + scene + engine -> array; automatic settings, error target, parts."""

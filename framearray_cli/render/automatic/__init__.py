@@ -1,0 +1,1 @@
+"""Settings that a job leaves to the program."""

@@ -1,0 +1,1 @@
+"""Native hits by place, for an error that a job asks for."""
