@@ -67,10 +67,10 @@ def assemble(
     quiet: Quiet = False,
 ) -> None:
     """Cut a movie or an image sequence out of a frame array."""
-    from framearray_cli.movie.assemble import assemble as run
-    from framearray_cli.movie.display import find_view
-    from framearray_cli.movie.look import Look
-    from framearray_cli.movie.sweep import Kind, Sweep
+    from framearray_cli.tools.movie.assemble import assemble as run
+    from framearray_cli.tools.movie.display import find_view
+    from framearray_cli.tools.movie.look import Look
+    from framearray_cli.tools.movie.sweep import Kind, Sweep
 
     choices: dict[Kind, bool] = {"walk": walk, "light": light, "diagonal": diagonal}
     kinds = [kind for kind, wanted in choices.items() if wanted]

@@ -43,7 +43,7 @@ def export(
 ) -> None:  # fmt: skip
     """Hand a frame array to other tools: images with cameras, lights, depth and points."""
     from framearray_cli.array.images.images import FOR_SCREENS, ImageFormat
-    from framearray_cli.export import export as run
+    from framearray_cli.tools.export import export as run
 
     if exposure and image_format not in FOR_SCREENS:
         raise typer.BadParameter("changes PNG and JPEG alone", param_hint="--exposure")

@@ -34,7 +34,7 @@ def sheet(
     quiet: Quiet = False,
 ) -> None:  # fmt: skip
     """Draw a contact sheet: cameras from left to right, light positions from top to bottom."""
-    from framearray_cli.sheet import make_sheet
+    from framearray_cli.tools.sheet import make_sheet
 
     with Screen(out, quiet=quiet) as screen:
 

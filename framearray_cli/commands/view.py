@@ -37,7 +37,7 @@ def view(
     quiet: Quiet = False,
 ) -> None:
     """Walk through a frame array in the browser."""
-    from framearray_cli.view.run import open_tiles, show, write_page
+    from framearray_cli.tools.view.run import open_tiles, show, write_page
 
     workers = threads or available_cores()
     tiles = open_tiles(array, place(cache, "--cache") if cache is not None else None, workers)

@@ -37,11 +37,11 @@ PAGE = """
 # The error that images tell of themselves
 
 `[samples] halves = true` keeps the hits of every pixel apart in two halves, and what these differ by tells the
-standard error of every pixel without a reference (`framearray_cli/engine/images/standard_error.py`). Here it is held
-against the error that the images have: the root mean square over a picture of what is told, and the RMSE from a
-reference of {hits:,} hits a pixel, whose own error is taken off; both over the mean of the reference. {width} x
-{height} pixels, {cameras} cameras under {lights} light positions of each job. Written by `python -m bench told`, from the folder
-`tests`.
+standard error of every pixel without a reference (`framearray_cli/engine/images/standard_error.py`). Here it is
+held against the error that the images have: the root mean square over a picture of what is told, and the RMSE from
+a reference of {hits:,} hits a pixel, whose own error is taken off; both over the mean of the reference. {width} x
+{height} pixels, {cameras} cameras under {lights} light positions of each job. Written by `python -m bench told`,
+from the folder `tests`.
 
 ![Told against true](../plots/standard-error.svg)
 

@@ -20,9 +20,8 @@ import psutil
 from framearray_cli.array.images.images import ImageFormat, write_image
 from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight, image_path, matrix_rows
 from framearray_cli.array.manifest_toml import write_manifest
-from framearray_cli.view.prepare import prepare_all
-from framearray_cli.view.run import open_tiles, serving
-from framearray_cli.view.tiles import TILES, Tiles
+from framearray_cli.tools.view.run import open_tiles, prepare_all, serving
+from framearray_cli.tools.view.tiles import TILES, Tiles
 
 from .machine import quiet
 from .markdown import grid, percent

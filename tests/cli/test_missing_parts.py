@@ -12,7 +12,7 @@ import pytest
 from program import PACKAGE_PARENT, names, run, write_job
 
 from framearray_cli.array.images import exr as exrtiff
-from framearray_cli.movie import label, video
+from framearray_cli.tools.movie import label, video
 
 # Runs the command line where some libraries cannot be found.
 HIDING = """

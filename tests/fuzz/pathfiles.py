@@ -11,7 +11,7 @@ from typing import Any
 from bench.results import ROOT
 
 from framearray_cli.base.forms.schema import file_schema
-from framearray_cli.movie.pathfile import MoviePath
+from framearray_cli.tools.movie.pathfile import MoviePath
 
 from .case import Arguments, Case
 from .fuzzarrays import copy_of, make_arrays
@@ -122,7 +122,7 @@ def cases(rng: Random, folder: Path) -> Iterator[Case]:
 
 def _within(own: Path) -> None:
     """Work in the folder of the case, on movies of few frames."""
-    from framearray_cli.movie import timeline
+    from framearray_cli.tools.movie import timeline
 
     os.chdir(own)
     timeline.MOST_FRAMES = MOST_FRAMES

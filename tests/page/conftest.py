@@ -7,9 +7,8 @@ import chromium
 import handmade
 import pytest
 
-from framearray_cli.view.prepare import prepare_all
-from framearray_cli.view.run import open_tiles, serving
-from framearray_cli.view.server import PageServer
+from framearray_cli.tools.view.run import open_tiles, prepare_all, serving
+from framearray_cli.tools.view.server import PageServer
 
 
 @pytest.fixture(scope="session")

@@ -5,8 +5,8 @@ import numpy as np
 from framearray_cli.array.images.png import read_codes
 from framearray_cli.base.arrays import Bytes, Float64
 from framearray_cli.base.colour import srgb_from_linear
-from framearray_cli.view.coding import decode
-from framearray_cli.view.tiles import Tiles
+from framearray_cli.tools.view.coding import decode
+from framearray_cli.tools.view.tiles import Tiles
 
 Part = tuple[str, int, tuple[float, float, float]]  # key of a stream, position, RGB factor
 

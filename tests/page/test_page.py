@@ -11,7 +11,7 @@ from framearray_cli.array.images.images import write_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.array.pictures import Pictures, Relight, ambient_at
 from framearray_cli.base.colour import linear_from_srgb, srgb8_from_linear
-from framearray_cli.view.run import open_tiles, serving
+from framearray_cli.tools.view.run import open_tiles, serving
 
 ONE = (1.0, 1.0, 1.0)
 

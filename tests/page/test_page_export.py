@@ -11,7 +11,7 @@ from chromium import shown
 from expected import bounds, outside
 
 from framearray_cli.base.errors import OutputError
-from framearray_cli.view.run import open_tiles, write_page
+from framearray_cli.tools.view.run import open_tiles, write_page
 
 
 class Silent(SimpleHTTPRequestHandler):

@@ -14,7 +14,7 @@ from framearray_cli.array.manifest import image_path
 from framearray_cli.cli import app
 
 takes_curves = pytest.mark.skipif(
-    find_spec("framearray_cli.movie") is None, reason="assemble does not take lists of places"
+    find_spec("framearray_cli.tools.movie") is None, reason="assemble does not take lists of places"
 )
 
 

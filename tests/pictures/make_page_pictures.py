@@ -14,8 +14,7 @@ from PIL import Image
 from framearray_cli.array.manifest import FILE_NAME
 from framearray_cli.job.read import read_job
 from framearray_cli.render.render import render
-from framearray_cli.view.prepare import prepare_all
-from framearray_cli.view.run import open_tiles, serving
+from framearray_cli.tools.view.run import open_tiles, prepare_all, serving
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "page"))

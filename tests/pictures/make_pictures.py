@@ -18,11 +18,11 @@ from framearray_cli.base.arrays import Float32
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
-from framearray_cli.movie.assemble import assemble
-from framearray_cli.movie.look import Look
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import eyes, lights
-from framearray_cli.sheet import make_sheet
+from framearray_cli.tools.movie.assemble import assemble
+from framearray_cli.tools.movie.look import Look
+from framearray_cli.tools.sheet import make_sheet
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "docs" / "pictures"

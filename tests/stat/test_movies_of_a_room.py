@@ -14,10 +14,10 @@ from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
-from framearray_cli.movie.assemble import assemble
-from framearray_cli.movie.pathfile import load_movie_path
-from framearray_cli.movie.timeline import timeline
 from framearray_cli.render.render import render
+from framearray_cli.tools.movie.assemble import assemble
+from framearray_cli.tools.movie.pathfile import load_movie_path
+from framearray_cli.tools.movie.timeline import timeline
 
 pytest.importorskip("av")
 

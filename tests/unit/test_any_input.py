@@ -24,10 +24,9 @@ from framearray_cli.base.forms.schema import file_schema
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.job.schema import job_schema
-from framearray_cli.movie.pathfile import MoviePath, load_movie_path
-from framearray_cli.movie.places import position_of, read_place
-from framearray_cli.movie.timeline import MOST_FRAMES, timeline
-from framearray_cli.places import indices
+from framearray_cli.tools.movie.pathfile import MoviePath, load_movie_path
+from framearray_cli.tools.movie.timeline import MOST_FRAMES, timeline
+from framearray_cli.tools.places import indices, position_of, read_place
 
 SEEDS = jobseeds.tables("a.glb")
 SCHEMA = job_schema()

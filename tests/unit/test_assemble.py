@@ -18,8 +18,8 @@ from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.names import file_patterns
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, MissingExtraError, OutputError
-from framearray_cli.movie.assemble import assemble
-from framearray_cli.movie.look import Look
+from framearray_cli.tools.movie.assemble import assemble
+from framearray_cli.tools.movie.look import Look
 
 av = pytest.importorskip("av")
 

@@ -24,7 +24,7 @@ from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.export import KINDS, export
+from framearray_cli.tools.export import KINDS, export
 
 
 @pytest.fixture

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.colour import srgb8_from_linear
-from framearray_cli.export import export
-from framearray_cli.export.colmap import camera_from_world, quaternion
-from framearray_cli.export.points import smooth
+from framearray_cli.tools.export import export
+from framearray_cli.tools.export.colmap import camera_from_world, quaternion
+from framearray_cli.tools.export.points import smooth
 
 FAR = (4e6, -2e5, 7e5)
 

@@ -12,10 +12,9 @@ from boxarrays import plain_manifest, write_array
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import whole_folder
 from framearray_cli.base.signals import Stopped
-from framearray_cli.export import export as export_array
-from framearray_cli.view.export import export as export_page
-from framearray_cli.view.prepare import prepare_all
-from framearray_cli.view.run import open_tiles
+from framearray_cli.tools.export import export as export_array
+from framearray_cli.tools.view.export import export as export_page
+from framearray_cli.tools.view.run import open_tiles, prepare_all
 
 FAILURES = [OSError(5, "Input/output error"), KeyboardInterrupt(), SystemExit(1), Stopped(15)]
 

@@ -11,9 +11,9 @@ from movies import Decoded, barred, decoded, path_file, plain, rms
 
 from framearray_cli.base.colour import srgb8_from_linear, srgb_from_linear
 from framearray_cli.base.errors import MissingExtraError, OutputError
-from framearray_cli.movie.animation import delays
-from framearray_cli.movie.assemble import assemble
-from framearray_cli.movie.yuv import planes_422_10
+from framearray_cli.tools.movie.animation import delays
+from framearray_cli.tools.movie.assemble import assemble
+from framearray_cli.tools.movie.yuv import planes_422_10
 
 pytest.importorskip("av")
 

@@ -16,10 +16,10 @@ from framearray_cli.array.manifest import BACKGROUND, Manifest
 from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.read import read_job
-from framearray_cli.movie.assemble import assemble
-from framearray_cli.movie.curves import at, relights
-from framearray_cli.movie.pathfile import MoviePath, load_movie_path
-from framearray_cli.movie.timeline import timeline
+from framearray_cli.tools.movie.assemble import assemble
+from framearray_cli.tools.movie.curves import at, relights
+from framearray_cli.tools.movie.pathfile import MoviePath, load_movie_path
+from framearray_cli.tools.movie.timeline import timeline
 
 JOBS = Path(__file__).resolve().parents[2] / "jobs"
 GREY = (1.0, 1.0, 1.0)

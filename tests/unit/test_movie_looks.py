@@ -10,11 +10,11 @@ from movies import decoded, grouped, path_file, plain
 from framearray_cli.array.images.png import read_codes
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError
-from framearray_cli.movie.assemble import assemble
-from framearray_cli.movie.display import SRGB, find_view
-from framearray_cli.movie.label import burn
-from framearray_cli.movie.look import Look, place_text, shown
-from framearray_cli.movie.timeline import Shot
+from framearray_cli.tools.movie.assemble import assemble
+from framearray_cli.tools.movie.display import SRGB, find_view
+from framearray_cli.tools.movie.label import burn
+from framearray_cli.tools.movie.look import Look, place_text, shown
+from framearray_cli.tools.movie.timeline import Shot
 
 GREYS = np.repeat(np.float32([0, 0.02, 0.18, 0.5, 1, 2, 4, 10, 100, 1000])[None, :, None], 3, axis=2)
 CONFIG = """ocio_profile_version: 2

@@ -17,9 +17,9 @@ from framearray_cli.array.images.png import read_codes
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import OutputError
-from framearray_cli.movie import sequence
-from framearray_cli.movie.assemble import assemble
-from framearray_cli.movie.look import Look
+from framearray_cli.tools.movie import sequence
+from framearray_cli.tools.movie.assemble import assemble
+from framearray_cli.tools.movie.look import Look
 
 WALK = "[[segments]]\nframes = 9\ncamera = [0, 4]\nlight = 1\n"
 EYES = [0, 1, 1, 2, 2, 3, 3, 4, 4]  # halves go up

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestGroup, ManifestLight
 from framearray_cli.array.names import file_patterns
 from framearray_cli.base.errors import JobError
-from framearray_cli.movie.easing import eased
-from framearray_cli.movie.pathfile import MoviePath, Segment
-from framearray_cli.movie.places import along, read_place
-from framearray_cli.movie.sweep import Sweep, swept
-from framearray_cli.movie.timeline import Shot, timeline
+from framearray_cli.tools.movie.easing import eased
+from framearray_cli.tools.movie.pathfile import MoviePath, Segment
+from framearray_cli.tools.movie.sweep import Sweep, swept
+from framearray_cli.tools.movie.timeline import Shot, timeline
+from framearray_cli.tools.places import along, read_place
 
 N_C, N_L, N_LAMPS = 20, 9, 5
 LIGHT = ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=())

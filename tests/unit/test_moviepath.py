@@ -7,8 +7,8 @@ import pytest
 from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight
 from framearray_cli.array.names import file_patterns
 from framearray_cli.base.errors import JobError
-from framearray_cli.movie.pathfile import load_movie_path, movie_fps
-from framearray_cli.movie.timeline import timeline
+from framearray_cli.tools.movie.pathfile import load_movie_path, movie_fps
+from framearray_cli.tools.movie.timeline import timeline
 
 JOBS = Path(__file__).resolve().parents[2] / "jobs"
 ROWS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))

@@ -6,7 +6,7 @@ import pytest
 from boxarrays import grouped_manifest, plain_manifest
 
 from framearray_cli.base.errors import JobError
-from framearray_cli.places import indices, light_places, plain_names, spread_with_ends
+from framearray_cli.tools.places import indices, light_places, plain_names, spread_with_ends
 
 
 def test_places_are_read() -> None:

@@ -14,7 +14,7 @@ from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.sheet import BACKGROUND, GAP, area_mean, make_sheet
+from framearray_cli.tools.sheet import BACKGROUND, GAP, area_mean, make_sheet
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from pathlib import Path
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, whole_folder
 
-from .pagefiles import page_files
+from .page import page_files
 from .tiles import INDEX, TILES, Tiles
 
 

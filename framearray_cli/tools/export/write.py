@@ -13,8 +13,8 @@ from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import whole_folder
-from framearray_cli.places import ALL, MIDDLE, indices, light_places
 
+from ..places import ALL, MIDDLE, indices, light_places
 from . import cinema, colmap, nerfstudio
 from .folder import earlier_export, place_picture
 from .points import Cloud, find_points, source_cameras

@@ -24,8 +24,8 @@ from framearray_cli.base.arrays import Bytes, Float32, Image
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.words import shown
-from framearray_cli.movie.label import typeface
 
+from .movie.label import typeface
 from .places import MIDDLE, light_places, spread_with_ends
 
 Progress: TypeAlias = Callable[[int, int], None]  # images done, images in all

@@ -13,9 +13,9 @@ from framearray_cli.base.forms.table import Table, fail
 from framearray_cli.base.forms.toml import load_toml
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, frame_rate
 
+from ..places import Span
 from .curves import LightChange
 from .easing import Ease
-from .places import Span
 
 MOST_FRAMES = 1_000_000  # eleven hours at 24 frames a second; more is a typing error
 MOST_LOOPS = 10_000

@@ -10,7 +10,8 @@ import numpy as np
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import OutputError
-from framearray_cli.places import LightPlace, plain_names
+
+from ..places import LightPlace, plain_names
 
 # A matrix counts as rigid where its columns are unit and at right angles to within this; written as float32 they are.
 RIGID = 1e-5

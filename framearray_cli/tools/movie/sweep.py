@@ -7,8 +7,8 @@ from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.words import shown
 
+from ..places import IndexPlace, positions, read_place
 from .pathfile import MoviePath, Segment
-from .places import IndexPlace, positions, read_place
 
 Kind: TypeAlias = Literal["walk", "light", "diagonal"]
 

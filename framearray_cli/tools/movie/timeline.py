@@ -10,10 +10,10 @@ from framearray_cli.array.pictures import Relight
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.schema import dotted
 
+from ..places import IndexPlace, along, nearest, positions
 from .curves import relights
 from .easing import eased
 from .pathfile import MOST_FRAMES, MoviePath, Segment, movie_fps
-from .places import IndexPlace, along, nearest, positions
 
 # Blended positions are rounded to a millionth of a step: far less than a picture can show, and then the same place
 # reached in two ways is the same.

@@ -4,6 +4,7 @@ import os
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -13,7 +14,6 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import make_folder
 
 from .export import check_target, export
-from .prepare import prepare_all
 from .server import PageServer
 from .tiles import Tiles
 
@@ -95,3 +95,39 @@ def write_page(
     check_target(target)
     problems = prepare_all(tiles, threads, progress)
     return export(tiles, target), problems
+
+
+def prepare_all(tiles: Tiles, threads: int, progress: Callable[[int], None]) -> list[OutputError]:
+    """Make every tile that is missing or out of date; what is made stays when this is interrupted.
+
+    Args:
+        progress: called with the number of pictures that became ready.
+
+    Returns:
+        What is wrong with images that are missing or damaged.
+
+    Raises:
+        OutputError: a tile cannot be written.
+    """
+    problems: list[OutputError] = []
+    # All streams of a camera go to one thread, in turn: its layers are in one file, which is read once.
+    with ThreadPoolExecutor(threads, thread_name_prefix="tiles") as pool:
+        try:
+            tasks = [pool.submit(_camera, tiles, c, progress) for c in range(tiles.manifest.n_cameras)]
+            for task in as_completed(tasks):
+                problems += task.result()
+        except BaseException:
+            tiles.stopping.set()
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+    return problems
+
+
+def _camera(tiles: Tiles, c: int, progress: Callable[[int], None]) -> list[OutputError]:
+    problems = []
+    for stream in tiles.streams:
+        if tiles.stopping.is_set():
+            break
+        problems += tiles.prepare(stream, c)
+        progress(stream.n)
+    return problems

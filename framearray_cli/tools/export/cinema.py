@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from framearray_cli.base.files import write_bytes
-from framearray_cli.places import plain_names
 
+from ..places import plain_names
 from .selection import ExportedFrame, Selection, rigid_pose, sources_at
 
 FILE = MARK = "data.csv"

@@ -11,8 +11,8 @@ import numpy as np
 
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.files import write_bytes
-from framearray_cli.places import plain_names
 
+from ..places import plain_names
 from .points import Cloud, read_depth
 from .selection import ExportedFrame, Selection, focal_length, numbers, rigid_pose, sources_at
 

@@ -13,7 +13,7 @@ from framearray_cli.base.forms.schema import dotted
 from framearray_cli.base.forms.table import Float3, Place, Table, fail
 from framearray_cli.base.forms.words import shown
 
-from .places import percent
+from ..places import percent
 
 STRONGEST = 1e6  # times the light that was rendered; halves overflow before that
 LONGEST_S = 1e6  # seconds; later key frames are typing errors

@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 
-from .pagefiles import content_type, page_files
+from .page import content_type, page_files
 from .tiles import INDEX, Tiles
 
 HOST = "127.0.0.1"

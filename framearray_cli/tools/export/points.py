@@ -13,8 +13,8 @@ from framearray_cli.array.images.images import read_layers
 from framearray_cli.array.manifest import Manifest, layers_path
 from framearray_cli.base.arrays import Bytes, Float32, Float64
 from framearray_cli.base.errors import OutputError
-from framearray_cli.places import spread_with_ends
 
+from ..places import spread_with_ends
 from .selection import focal_length, rigid_pose
 
 SOURCES = 16  # cameras that points are taken from, evenly along the path; more add the same surfaces again

@@ -13,7 +13,8 @@ TYPES = {
 
 def page_files() -> dict[str, bytes]:
     """Name -> content."""
-    return {entry.name: entry.read_bytes() for entry in (files(__package__) / "page").iterdir() if entry.is_file()}
+    entries = [entry for entry in files(__package__).iterdir() if PurePosixPath(entry.name).suffix in TYPES]
+    return {entry.name: entry.read_bytes() for entry in entries}
 
 
 def content_type(name: str) -> str:
