@@ -42,8 +42,8 @@ def init(
     job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else place(target)
     with Screen(out, quiet=quiet) as screen:
         screen.wait("looking around in the scene")
-        from framearray_cli.start import Wishes
-        from framearray_cli.start import init as run
+        from framearray_cli.starter import Wishes
+        from framearray_cli.starter import init as run
 
         with compile_clock(screen.compiling):
             wishes = Wishes(camera=camera, frames=frames, lights=lights, inside=inside)

@@ -14,7 +14,7 @@ from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import SceneError
 from framearray_cli.cli import main
 from framearray_cli.job.read import read_job
-from framearray_cli.start import Wishes, init
+from framearray_cli.starter import Wishes, init
 
 JOBS = Path(__file__).resolve().parents[2] / "jobs"
 KINDS = (".glb", ".obj", ".stl")

@@ -18,9 +18,9 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.scene.scene import load_scene
-from framearray_cli.start import Start, Wishes, init
-from framearray_cli.start.expose import CLIPPED, LUMINANCE, ROOM, solved
-from framearray_cli.start.model import table_of
+from framearray_cli.starter import Start, Wishes, init
+from framearray_cli.starter.expose import CLIPPED, LUMINANCE, ROOM, solved
+from framearray_cli.starter.model import table_of
 
 FEW = Wishes(frames=3, lights=2)
 
