@@ -15,7 +15,7 @@ def main() -> None:
     """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     gc.set_threshold(100_000, 50, 50)
-    from .cli import main as run
+    from framearray_cli.cli.main import main as run
 
     try:
         run()

@@ -1,4 +1,7 @@
-"""Speed against error: what each setting of a job buys and costs, as tables, plots and a page."""
+"""Quality and cost of settings.
+
+What each setting of a job buys and costs, as tables, plots and a page: `framearray report`.
+"""
 
 from .page import advice_lines, write_report
 from .run import Report, ReportEvents, ReportOptions, make_report

@@ -1,4 +1,7 @@
-"""A scene file -> a first job file that renders well at once: `framearray init`."""
+"""Scene -> first job (`init`).
+
+The job renders well at once: with the cameras, lights and animations of the file, or a walk or an orbit found in it.
+"""
 
 import os
 from pathlib import Path

@@ -13,7 +13,7 @@ import pytest
 import tiny
 import tomli_w
 
-from framearray_cli.cli import main
+from framearray_cli.cli.main import main
 
 PACKAGE_PARENT = Path(__file__).resolve().parents[2]
 

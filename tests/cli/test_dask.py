@@ -187,7 +187,8 @@ def test_what_a_worker_must_see(tmp_path):
 
 
 def test_dask_is_not_loaded_without_it(tmp_path, capsys):
-    code = "import sys; from framearray_cli.cli import main\ntry: main()\nfinally: print('distributed' in sys.modules)"
+    run = "from framearray_cli.cli.main import main\ntry: main()\nfinally: print('distributed' in sys.modules)"
+    code = f"import sys; {run}"
     job = write_job(tmp_path, **(JOB | {"camera": {"resolution": [24, 18]}}))
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(PACKAGE_PARENT), os.environ.get("PYTHONPATH", "")])}
     command = [sys.executable, "-c", code, "render", "-q", str(job)]

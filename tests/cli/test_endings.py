@@ -4,7 +4,6 @@ import importlib
 
 import pytest
 
-from framearray_cli import cli
 from framearray_cli.base.errors import (
     BusyError,
     CheckError,
@@ -16,7 +15,8 @@ from framearray_cli.base.errors import (
     WorkerError,
 )
 from framearray_cli.base.signals import Stopped
-from framearray_cli.cli import ending
+from framearray_cli.cli import main as cli
+from framearray_cli.cli.main import ending
 
 COMMANDS = [command.callback.__name__ for command in cli.app.registered_commands]
 ENDINGS = [

@@ -38,7 +38,7 @@ def disk(tmp_path: Path) -> Iterator[SmallDisk]:
 
 @pytest.fixture(scope="module")
 def array(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from framearray_cli.cli import main
+    from framearray_cli.cli.main import main
 
     folder = tmp_path_factory.mktemp("array")
     with pytest.MonkeyPatch.context():

@@ -13,7 +13,7 @@ import pytest
 import tiny
 from program import finish, run, start, wait_for, write_job
 
-from framearray_cli import interrupts
+from framearray_cli.cli import signals as interrupts
 from framearray_cli.render import render
 
 pty = pytest.importorskip("pty", reason="no such terminals there")

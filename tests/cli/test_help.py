@@ -10,7 +10,7 @@ from program import run
 
 from framearray_cli import __version__
 from framearray_cli.base import errors
-from framearray_cli.cli import app
+from framearray_cli.cli.main import app
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "guide" / "cli.md"
 COMMANDS = ["assemble", "check", "export", "init", "openjd", "render", "report", "schema", "sheet", "verify", "view"]

@@ -112,7 +112,7 @@ def test_threads_that_cannot_be_started(tmp_path, monkeypatch, capsys):
     """Simulated: who runs as root has no such limit."""
     from program import run
 
-    from framearray_cli import cli
+    from framearray_cli.cli import main as cli
 
     def refused(*_: object, **__: object) -> None:
         raise RuntimeError("can't start new thread")

@@ -154,7 +154,7 @@ def test_our_own_mistakes_keep_their_traceback(tmp_path, monkeypatch):
         raise ZeroDivisionError
 
     monkeypatch.setattr("framearray_cli.render.session.prepare", fail)
-    from framearray_cli.cli import main
+    from framearray_cli.cli.main import main
 
     with pytest.raises(ZeroDivisionError):
         main(["render", str(write_job(tmp_path))])

@@ -6,10 +6,10 @@ import re
 import pytest
 from rich.console import Console
 
-from framearray_cli import screen
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.units import duration, size
-from framearray_cli.screen import Screen, say
+from framearray_cli.cli import screen
+from framearray_cli.cli.screen import Screen, say
 
 
 class Clock:

@@ -15,8 +15,8 @@ import pytest
 import tiny
 from program import Result, finish, start, wait_for, write_job
 
-from framearray_cli import interrupts
 from framearray_cli.array.images.images import read_image
+from framearray_cli.cli import signals as interrupts
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of other kinds there")
 
@@ -139,9 +139,9 @@ def test_while_checking(tmp_path):
 def test_before_the_command_line_is_loaded(monkeypatch):
     """Ctrl-C ends the process by itself then, without the traceback of an import."""
     seen = []
-    fake = ModuleType("framearray_cli.cli")
+    fake = ModuleType("framearray_cli.cli.main")
     fake.main = lambda: seen.append(signal.getsignal(signal.SIGINT))
-    monkeypatch.setitem(sys.modules, "framearray_cli.cli", fake)
+    monkeypatch.setitem(sys.modules, "framearray_cli.cli.main", fake)
     monkeypatch.setattr(os, "_exit", lambda code: seen.append(code))  # how the process ends when all is done
     importlib.import_module("framearray_cli.__main__").main()
     assert seen == [signal.SIG_DFL, 0]
@@ -176,7 +176,7 @@ def test_an_exception_is_not_raised_where_it_would_be_forgotten(module):
 
 def test_a_lock_that_a_signal_broke_counts_as_the_signal(monkeypatch, capsys):
     """What happened once in some hundred runs, when a signal came while a thread pool took in work."""
-    from framearray_cli import cli
+    from framearray_cli.cli import main as cli
 
     def broken(*_: object, **__: object) -> None:
         try:

@@ -117,7 +117,7 @@ def _redirected(log: Path) -> int:
 def _code_of(arguments: Sequence[str | Path], before: Callable[[], None]) -> int:
     """Run a command in this process: its exit code."""
     try:
-        from framearray_cli.cli import main
+        from framearray_cli.cli.main import main
 
         before()
         main([str(argument) for argument in arguments])

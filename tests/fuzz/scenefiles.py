@@ -69,7 +69,7 @@ def cases(rng: Random, folder: Path) -> Iterator[Case]:
 
 def _load_program(folder: Path, seed: Seed) -> None:
     """Render and begin a job in this process, so that no case has to load what is compiled."""
-    from framearray_cli.cli import main
+    from framearray_cli.cli.main import main
 
     own = folder / "first"
     own.mkdir()

@@ -10,7 +10,7 @@ from pathlib import Path
 import tomli_w
 
 import framearray_cli
-from framearray_cli.cli import main
+from framearray_cli.cli.main import main
 
 from . import jobseeds
 

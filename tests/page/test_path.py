@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from framearray_cli.array.images.images import read_image
 from framearray_cli.array.manifest import image_path
-from framearray_cli.cli import app
+from framearray_cli.cli.main import app
 
 takes_curves = pytest.mark.skipif(
     find_spec("framearray_cli.tools.movie") is None, reason="assemble does not take lists of places"

@@ -12,7 +12,7 @@ from framearray_cli.array.images.png import read_codes
 from framearray_cli.array.manifest import image_path, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import SceneError
-from framearray_cli.cli import main
+from framearray_cli.cli.main import main
 from framearray_cli.job.read import read_job
 from framearray_cli.starter import Wishes, init
 

@@ -12,7 +12,7 @@ from scenes import scenes_folder
 
 from framearray_cli.array.images.images import read_image
 from framearray_cli.base.errors import SceneError
-from framearray_cli.cli import main
+from framearray_cli.cli.main import main
 from framearray_cli.scene.scene import Scene, load_scene
 
 FILES = nasty_files(scenes_folder())

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from framearray_cli.array.images.png import read_codes
 from framearray_cli.array.manifest import image_path, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.cli import app
+from framearray_cli.cli.main import app
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

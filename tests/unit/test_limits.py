@@ -123,7 +123,7 @@ def test_cores_without_a_quota(tmp_path, monkeypatch, many_cores):
 
 def test_render_view_and_verify_use_the_cores_that_there_are(tmp_path, monkeypatch):
     from framearray_cli.array import integrity as verifying
-    from framearray_cli.commands import verify, view
+    from framearray_cli.cli.commands import verify, view
     from framearray_cli.tools.view import run as viewing
 
     seen = []

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import framearray_cli.commands.render as command
+import framearray_cli.cli.commands.render as command
 import framearray_cli.render.parts.worker as worker
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.render.messages import ambient_lines, target_lines

@@ -13,7 +13,7 @@ from staged import LENS, QUARTER, animate, camera, light, shift, turn_y
 from framearray_cli.base.colour import srgb_from_linear
 from framearray_cli.base.errors import JobError, OutputError, SceneError
 from framearray_cli.base.forms.toml import load_toml
-from framearray_cli.cli import main
+from framearray_cli.cli.main import main
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.paths import eyes, lights

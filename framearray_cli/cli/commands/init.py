@@ -7,9 +7,9 @@ from typing import Annotated
 import typer
 
 from framearray_cli.engine.kernels.clock import compile_clock
-from framearray_cli.screen import Screen, out, say
 
-from .options import Quiet, place
+from ..options import Quiet, place
+from ..screen import Screen, out, say
 
 MOST = 1000  # frames or lights of a first job
 

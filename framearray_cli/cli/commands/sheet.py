@@ -5,9 +5,8 @@ from typing import Annotated
 
 import typer
 
-from framearray_cli.screen import Screen, out, say
-
-from .options import At, Exposure, Quiet, place
+from ..options import At, Exposure, Quiet, place
+from ..screen import Screen, out, say
 
 MOST_WIDTH = 20_000  # pixels; more is a typing error
 

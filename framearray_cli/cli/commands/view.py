@@ -8,9 +8,9 @@ import typer
 from framearray_cli.base.memory import available_cores
 from framearray_cli.base.signals import Stopped, forget
 from framearray_cli.base.units import MOST_THREADS, size
-from framearray_cli.screen import Screen, out, say
 
-from .options import Quiet, place
+from ..options import Quiet, place
+from ..screen import Screen, out, say
 
 if TYPE_CHECKING:
     from framearray_cli.base.errors import OutputError

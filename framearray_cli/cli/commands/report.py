@@ -7,9 +7,9 @@ import typer
 
 from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.render.messages import scene_lines
-from framearray_cli.screen import Screen, out, say
 
-from .options import JobFile, Quiet, Threads, read
+from ..options import JobFile, Quiet, Threads, read
+from ..screen import Screen, out, say
 
 if TYPE_CHECKING:
     from framearray_cli.report.case import Case

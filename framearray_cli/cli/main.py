@@ -9,24 +9,24 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from framearray_cli import __version__
 from framearray_cli.base.errors import FrameArrayError, JobError, OutputError
 from framearray_cli.base.memory import READS, RENDERS, require_address_space
 from framearray_cli.base.signals import Stopped, forget, stopped_by
-from framearray_cli.commands.assemble import assemble
-from framearray_cli.commands.check import check
-from framearray_cli.commands.export import export
-from framearray_cli.commands.init import init
-from framearray_cli.commands.openjd import openjd
-from framearray_cli.commands.render import render
-from framearray_cli.commands.report import report
-from framearray_cli.commands.schema import schema
-from framearray_cli.commands.sheet import sheet
-from framearray_cli.commands.verify import verify
-from framearray_cli.commands.view import view
 
-from . import __version__
-from .interrupts import listen
+from .commands.assemble import assemble
+from .commands.check import check
+from .commands.export import export
+from .commands.init import init
+from .commands.openjd import openjd
+from .commands.render import render
+from .commands.report import report
+from .commands.schema import schema
+from .commands.sheet import sheet
+from .commands.verify import verify
+from .commands.view import view
 from .screen import err, out, say
+from .signals import listen
 
 OUT_OF_MEMORY = 2  # the job asks for more than the machine has
 NO_THREADS = "can't start new thread"  # what Python says

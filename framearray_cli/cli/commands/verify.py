@@ -7,9 +7,9 @@ import typer
 
 from framearray_cli.base.errors import CheckError
 from framearray_cli.base.memory import RENDERS, available_cores, require_address_space
-from framearray_cli.screen import Screen, out, say
 
-from .options import Quiet, Threads, with_threads
+from ..options import Quiet, Threads, with_threads
+from ..screen import Screen, out, say
 
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import Verified

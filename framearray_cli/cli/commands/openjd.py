@@ -8,9 +8,9 @@ import typer
 
 from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.render.messages import chunks_line
-from framearray_cli.screen import Screen, out, say
 
-from .options import JobFile, Quiet, place, read
+from ..options import JobFile, Quiet, place, read
+from ..screen import Screen, out, say
 
 
 def openjd(

@@ -5,9 +5,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from framearray_cli.screen import Screen, out, say
-
-from .options import Exposure, Quiet, place
+from ..options import Exposure, Quiet, place
+from ..screen import Screen, out, say
 
 
 def export(

@@ -2,9 +2,9 @@
 
 from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.render.messages import estimate_lines
-from framearray_cli.screen import Screen, out, say
 
-from .options import JobFile, Output, Threads, read
+from ..options import JobFile, Output, Threads, read
+from ..screen import Screen, out, say
 
 
 def check(job_file: JobFile, threads: Threads = None, output: Output = None) -> None:

@@ -22,9 +22,9 @@ from framearray_cli.render.messages import (
 )
 from framearray_cli.render.parts.progress import PartEvents
 from framearray_cli.render.progress import ambient_figures
-from framearray_cli.screen import Screen, out, say
 
-from .options import JobFile, Output, Quiet, Threads, frames_of, read
+from ..options import JobFile, Output, Quiet, Threads, frames_of, read
+from ..screen import Screen, out, say
 
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk

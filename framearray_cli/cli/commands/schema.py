@@ -1,6 +1,6 @@
 """`framearray schema`."""
 
-from framearray_cli.screen import out, say
+from ..screen import out, say
 
 
 def schema() -> None:

@@ -7,9 +7,9 @@ from typing import Annotated
 import typer
 
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS
-from framearray_cli.screen import Screen, out, say
 
-from .options import Quiet, place
+from ..options import Quiet, place
+from ..screen import Screen, out, say
 
 
 def assemble(
