@@ -16,11 +16,11 @@ def pytest_configure() -> None:
         # as a shell starts what runs in the background; programs that tests start would ignore it, too
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if os.environ.get("FRAMEARRAY_EMBREE"):  # `make test-avx2`
-        import instructionset
+        from support import instructionset
 
         instructionset.force_embreex()
     if os.environ.get("PYTEST_XDIST_WORKER"):
-        import inturn
+        from support import inturn
 
         inturn.compile_in_turn()
 

@@ -3,26 +3,18 @@
 import argparse
 import json
 
-from . import (
-    ambient,
-    bias,
-    biaspage,
-    cycles,
-    error,
-    mitsuba3,
-    pathtraced,
-    peers,
-    processes,
-    reports,
-    scaling,
-    speed,
-    table,
-    told,
-    viewpage,
-)
-from .cases import FRAME_ARRAY, JOBS, Variant, job_named, opened, variant_named, varied, with_resolution
-from .results import folder, load, save
-from .steady import steady
+from bench.ambient import pathtraced
+from bench.ambient import run as ambient
+from bench.core.cases import FRAME_ARRAY, JOBS, Variant, job_named, opened, variant_named, varied, with_resolution
+from bench.core.results import folder, load, save
+from bench.core.steady import steady
+from bench.error import bias, error, reports
+from bench.error import bias_page as biaspage
+from bench.error import reported as told
+from bench.peers import cycles, mitsuba3, peers
+from bench.speed import page as table
+from bench.speed import processes, scaling, speed
+from bench.view import page as viewpage
 
 PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
 PARTS = ("speed", "error", "peers", "memory", "startup")

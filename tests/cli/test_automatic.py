@@ -5,8 +5,8 @@ import tomllib
 from pathlib import Path
 
 import pytest
-import tiny
-from program import run, write_job
+from support import tiny
+from support.program import run, write_job
 
 BOTH = {"camera": tiny.WALK, "reuse": {"n_r": "auto"}, "samples": {"hits": "auto"}}
 LINE = r"^automatic: n_r = (\d+), hits = ([\d.]+); expected: [\d.]+ hits a pixel \(1st percentile [\d.]+\), "

@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from handed import JOB, N, begun_again, finished, same
-from program import PACKAGE_PARENT, finish, start, wait_for, write_job
+from support.handed import JOB, N, begun_again, finished, same
+from support.program import PACKAGE_PARENT, finish, start, wait_for, write_job
 
 import framearray_cli
 from framearray_cli.base.hashing import digest

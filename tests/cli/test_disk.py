@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import tiny
-from program import finish, names, start, write_job
+from support import tiny
+from support.program import finish, names, start, write_job
 
 FULL = Path("/dev/full")
 

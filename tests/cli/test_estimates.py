@@ -6,8 +6,8 @@ import tomllib
 from pathlib import Path
 
 import pytest
-import tiny
-from program import Result, finish, start, write_job
+from support import tiny
+from support.program import Result, finish, start, write_job
 
 UNITS = {"bytes": 1, "KiB": 2**10, "MiB": 2**20, "GiB": 2**30}
 SECONDS = {"s": 1, "min": 60, "h": 3600}

@@ -13,8 +13,8 @@ import sys
 from pathlib import Path
 
 import pytest
-import tiny
-from program import Result, finish, run, start, write_job
+from support import tiny
+from support.program import Result, finish, run, start, write_job
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux" or not shutil.which("cc"), reason="no C compiler here")
 

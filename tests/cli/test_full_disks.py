@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import tiny
-from program import Result, run, write_job
-from smalldisk import PAGE, SmallDisk, mounted
+from support import tiny
+from support.program import Result, run, write_job
+from support.smalldisk import PAGE, SmallDisk, mounted
 
 N = 12
 WALK = tiny.WALK | {"frames": N, "resolution": [60, 45]}

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import tiny
-from program import names, run, write_job
-from smalldisk import PAGE, SmallDisk, mounted
+from support import tiny
+from support.program import names, run, write_job
+from support.smalldisk import PAGE, SmallDisk, mounted
 
 WALK = tiny.WALK | {"resolution": [60, 45]}
 FULL = "No space left on device"

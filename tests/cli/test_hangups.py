@@ -10,8 +10,8 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-import tiny
-from program import finish, run, start, wait_for, write_job
+from support import ROOT, tiny
+from support.program import finish, run, start, wait_for, write_job
 
 from framearray_cli.cli import signals as interrupts
 from framearray_cli.render import render
@@ -56,7 +56,7 @@ def test_a_terminal_that_is_closed(terminal, tmp_path):
         fcntl.ioctl(program, termios.TIOCSCTTY, 0)
 
     command = [sys.executable, "-m", "framearray_cli", "render", str(job)]
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[2])}
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
     process = subprocess.Popen(
         command, stdin=program, stdout=program, stderr=program, preexec_fn=own, env=environment, text=True
     )

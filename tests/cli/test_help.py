@@ -3,16 +3,16 @@
 import inspect
 import json
 import re
-from pathlib import Path
 
 import pytest
-from program import run
+from support import ROOT
+from support.program import run
 
 from framearray_cli import __version__
 from framearray_cli.base import errors
 from framearray_cli.cli.main import app
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "guide" / "cli.md"
+PAGE = ROOT / "docs" / "guide" / "cli.md"
 COMMANDS = ["assemble", "check", "export", "init", "openjd", "render", "report", "schema", "sheet", "verify", "view"]
 
 

@@ -10,8 +10,8 @@ import time
 from pathlib import Path
 
 import pytest
-import tiny
-from program import finish, start, write_job
+from support import tiny
+from support.program import finish, start, write_job
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 there")
 

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-import tiny
-from program import PACKAGE_PARENT, Result, finish, start, write_job
+from support import tiny
+from support.program import PACKAGE_PARENT, Result, finish, start, write_job
 
 resource = pytest.importorskip("resource")
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of other kinds there")
@@ -110,7 +110,7 @@ def test_a_job_that_does_not_fit_into_the_address_space(tmp_path):
 
 def test_threads_that_cannot_be_started(tmp_path, monkeypatch, capsys):
     """Simulated: who runs as root has no such limit."""
-    from program import run
+    from support.program import run
 
     from framearray_cli.cli import main as cli
 

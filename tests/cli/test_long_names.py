@@ -1,7 +1,7 @@
 """Names that the system refuses to look up: a message, whatever the name is for."""
 
 import pytest
-from program import names, run, write_job
+from support.program import names, run, write_job
 
 LONG = "x" * 300  # characters; file systems take 255
 OUT, OTHER = "out", "other.png"

@@ -5,7 +5,7 @@ import time
 
 import psutil
 import pytest
-import tiny
+from support import tiny
 
 from framearray_cli.render.progress import RenderEvents
 from framearray_cli.render.render import render

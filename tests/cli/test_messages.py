@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from program import finish, names, run, start, write_job
+from support.program import finish, names, run, start, write_job
 
 from framearray_cli.base.errors import CheckError, JobError, OutputError, SceneError
 

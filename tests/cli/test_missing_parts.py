@@ -9,7 +9,7 @@ from pathlib import Path
 import PIL.Image
 import PIL.ImageFont
 import pytest
-from program import PACKAGE_PARENT, names, run, write_job
+from support.program import PACKAGE_PARENT, names, run, write_job
 
 from framearray_cli.array.images import exr as exrtiff
 from framearray_cli.tools.movie import label, video

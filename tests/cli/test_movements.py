@@ -5,8 +5,8 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from movies import decoded, grouped, path_file, plain
-from program import names, run
+from support.movies import decoded, grouped, path_file, plain
+from support.program import names, run
 
 
 @pytest.fixture

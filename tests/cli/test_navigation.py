@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from boxarrays import plain_manifest, write_array
-from program import names, run, write_job
-from tiny import WALK
+from support.boxarrays import plain_manifest, write_array
+from support.program import names, run, write_job
+from support.tiny import WALK
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import tiny
-from program import Result, finish, names, run, start, write_job
-from smalldisk import mounted
+from support import ROOT, tiny
+from support.program import Result, finish, names, run, start, write_job
+from support.smalldisk import mounted
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="disks are mounted in another way there")
 
@@ -173,7 +173,7 @@ def _somebody_else(folder: Path) -> None:
 
     def told(*command: str | Path) -> Result:
         words = [*become, sys.executable, "-m", "framearray_cli", *map(str, command)]
-        environment = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[2])}
+        environment = os.environ | {"PYTHONPATH": str(ROOT)}
         return finish(subprocess.Popen(words, stdout=-1, stderr=-1, text=True, env=environment))
 
     assert told("verify", "-q", array).code == 0

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import tiny
-from program import PACKAGE_PARENT, run, write_job
+from support import tiny
+from support.program import PACKAGE_PARENT, run, write_job
 
 N = 6
 OPENJD = shutil.which("openjd", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-import tiny
-from program import finish, names, run, start, write_job
+from support import tiny
+from support.program import finish, names, run, start, write_job
 
 from framearray_cli.array.images.images import read_image
 

@@ -6,8 +6,8 @@ import tomllib
 from pathlib import Path
 
 import pytest
-import tiny
-from program import Result, run, write_job
+from support import tiny
+from support.program import Result, run, write_job
 
 pytest.importorskip("flip_evaluator")
 pytest.importorskip("jinja2")

@@ -12,8 +12,8 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-import tiny
-from program import Result, finish, start, wait_for, write_job
+from support import tiny
+from support.program import Result, finish, start, wait_for, write_job
 
 from framearray_cli.array.images.images import read_image
 from framearray_cli.cli import signals as interrupts

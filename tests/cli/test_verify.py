@@ -4,8 +4,8 @@ import random
 from pathlib import Path
 
 import pytest
-import tiny
-from program import run, write_job
+from support import tiny
+from support.program import run, write_job
 
 WALK = tiny.WALK | {"frames": 4, "keys": [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": 3}]}
 N_FILES = 4 * 3 + 4

@@ -5,9 +5,9 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-import tiny
 import tomli_w
-from program import run, write_job
+from support import tiny
+from support.program import run, write_job
 
 LINE = r"^error: 0\.2 of the mean radiance is wanted; ([\d.]+) native hits a pixel \(([\d.]+) to ([\d.]+) by frame\) "
 LINE += r"are expected to give ([\d.]+)$"

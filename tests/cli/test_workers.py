@@ -9,10 +9,10 @@ from pathlib import Path
 
 import psutil
 import pytest
-import tiny
-from handed import JOB, WALK, N, begun_again, finished, lines, manifest, same
-from program import finish, run, start, wait_for, write_job
-from smalldisk import mounted
+from support import tiny
+from support.handed import JOB, WALK, N, begun_again, finished, lines, manifest, same
+from support.program import finish, run, start, wait_for, write_job
+from support.smalldisk import mounted
 
 pytest.importorskip("distributed", reason="Dask distributed is not installed (extra dask)")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 there")

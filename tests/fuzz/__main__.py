@@ -8,7 +8,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from bench.results import ROOT, save
+from bench.core.results import ROOT, save
 
 from . import page
 from .run import run

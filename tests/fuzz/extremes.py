@@ -11,7 +11,7 @@ FAR = (1e12, -1e12, 1e11, 1e9, 1e6, 1e-6, 1e-12, 1e-300, 5e-324, -0.0, 0.0)
 BRIGHT = (1e20, 1e19, 1e6, 1e-20, 1e-45, 5e-324, 0.0, -0.0)
 DATES = ("1000-01-01", "3000-12-31", "2026-06-21", "2026-12-21", "2024-02-29", "2026-03-29", "1582-10-10")
 EYE, TARGET = [0.2, 1.3, 1.7], [-0.1, 0.9, -1.0]
-# Of the tiny room (tests/tiny.py): in floor, wall, corner and mirror, on an edge of the box, in it and in the ball.
+# Of the room in support/tiny.py: in floor, wall, corner and mirror, on an edge of the box, in it and in the ball.
 PLACES = (
     [0.0, 0.0, 0.0], [-2.0, 1.0, 0.0], [-2.0, 0.0, -2.0], [-1.9, 1.0, 0.0], [0.8, 0.9, -0.7], [0.8, 0.45, -0.7],
     [-0.6, 0.5, -0.7], EYE, TARGET, [0.0, 1.2, 0.0],

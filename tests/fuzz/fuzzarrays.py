@@ -4,10 +4,9 @@ import os
 from pathlib import Path
 from random import Random
 
-import movies
 import numpy as np
-import tiny
 import tomli_w
+from support import movies, tiny
 
 from framearray_cli.job.read import read_job
 from framearray_cli.render.render import render

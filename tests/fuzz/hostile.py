@@ -10,7 +10,7 @@ from random import Random
 from typing import Any
 
 import numpy as np
-from scenes import QUAD_UVS, Glb, png
+from support.scenes import QUAD_UVS, Glb, png
 
 Files = dict[str, bytes]  # name -> content; the scene comes first
 CORNERS = "v 0 0 0\nv 2 0 0\nv 0 2 0\nvt 0 0\nvt 1 0\nvt 0 1\n"

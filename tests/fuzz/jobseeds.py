@@ -4,9 +4,9 @@ import re
 from pathlib import Path
 from typing import Any
 
-import tiny
 import tomli_w
-from bench.results import ROOT
+from bench.core.results import ROOT
+from support import tiny
 
 SUN = {
     "type": "sun",

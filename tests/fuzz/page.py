@@ -5,8 +5,8 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from bench.markdown import grid
-from bench.results import ROOT, Table
+from bench.core.markdown import grid
+from bench.core.results import ROOT, Table
 
 from .found import FOUND
 from .outcome import MEMORY, PATIENCE, SECONDS

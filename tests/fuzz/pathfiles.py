@@ -8,7 +8,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from bench.results import ROOT
+from bench.core.results import ROOT
 
 from framearray_cli.base.forms.schema import file_schema
 from framearray_cli.tools.movie.pathfile import MoviePath

@@ -7,7 +7,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from bench.results import Table
+from bench.core.results import Table
 
 from .case import Case
 from .outcome import Outcome, outcome_of, outcomes_of

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tiny
-from scenes import QUAD_UVS, Glb, png, scenes_folder
-from staged import LENS, animate, light
+from support import tiny
+from support.scenes import QUAD_UVS, Glb, png, scenes_folder
+from support.staged import LENS, animate, light
 
 LARGEST_SEED, LARGEST_BESIDE = 120_000, 300_000  # bytes of real files that are taken along
 

@@ -1,7 +1,7 @@
 # ruff: noqa: E501 - rows of tables
 """Writes docs/measured/hard-cases.md: rays with a known answer in rooms that are hard to trace, and how many were wrong.
 
-PYTHONPATH=tests:tests/stat python tests/hard/report.py docs/measured/hard-cases.md
+PYTHONPATH=tests python tests/hard/report.py docs/measured/hard-cases.md
 """
 
 import inspect
@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import test_random_streams as bad
-from counting import (
+from support.counting import (
     GRAZING,
     LOWEST,
     Count,
@@ -23,11 +23,11 @@ from counting import (
     shadow_rays,
     visibility_rays,
 )
-from rooms import ON_WALLS, ROOMS
-from staging import Stage, staged
-from streams import all_chances, dependent, pairs, program
+from support.pictures import FLIPPED, ROUNDING
+from support.rooms import ON_WALLS, ROOMS
+from support.staging import Stage, staged
+from support.streams import all_chances, dependent, pairs, program
 from test_light_in_closed_rooms import allowed
-from test_pictures_of_hard_cases import FLIPPED, ROUNDING
 from test_reprojection import RIGHT, million_hits
 from test_sums import mean_of_many
 
@@ -43,7 +43,7 @@ PLACES = (
 
 HEAD = """# Hard cases
 
-Written by `PYTHONPATH=tests:tests/stat python tests/hard/report.py docs/measured/hard-cases.md`; `tests/hard/` tests
+Written by `PYTHONPATH=tests python tests/hard/report.py docs/measured/hard-cases.md`; `tests/hard/` tests
 all of it.
 """
 
@@ -83,7 +83,7 @@ CASES = f"""
 | all lengths times 1e-6 to 1e6, or moved by 1e7 | fewer than {FLIPPED:.0%} of the pixels differ by more than {ROUNDING:g} of the mean: samples that pass an edge on its other side | `tests/hard/test_pictures_of_hard_cases.py` |
 | moved by 1e7 by a node, by two nodes one of which has a matrix, in an OBJ, in an ASCII PLY | the same | `tests/hard/test_scenes_far_away.py` |
 | intensities times 1e-12 to 1e12 | all values in proportion, to 1e-5 | `tests/hard/test_pictures_of_hard_cases.py` |
-| fields of view of 1 and 170 degrees | every pixel that of the slow twin | `tests/unit/test_oracle.py` |
+| fields of view of 1 and 170 degrees | every pixel that of the slow twin | `tests/engine/test_oracle.py` |
 | ranges of obscurance of 0, infinity, or no number | a message, exit code 2, nothing written | `tests/cli/test_messages.py` |
 | ranges from 1e-9 to 1e12 | W is the average reflectivity, or goes to 0 | `tests/hard/test_pictures_of_hard_cases.py` |
 | reflectivity 0 and 1, in a closed room too | black, or finite | the same file |
@@ -94,8 +94,8 @@ CASES = f"""
 | equal eyes in a row, with both weights | equal means, which are those without reuse, by z-tests of all pixels | `tests/stat/test_pixels.py` |
 | facing mirrors of reflectivity 1, 16 bounces | nothing brighter than the background | `tests/hard/test_pictures_of_hard_cases.py` |
 | points exactly on borders of pixels and of the image, behind an eye, in its plane | each in one pixel, or none | `tests/hard/test_reprojection.py` |
-| eyes that move by exactly a pixel or an image, turn round, pass a wall, pass things | evenly lit pictures stay even; every pixel that of the slow twin | `tests/hard/test_reprojection.py`, `tests/unit/test_oracle.py` |
-| degenerate, doubled and non-finite triangles, mixed windings | rooms *broken* and *mixed* above; counted and told | `tests/unit/test_scene.py` |
+| eyes that move by exactly a pixel or an image, turn round, pass a wall, pass things | evenly lit pictures stay even; every pixel that of the slow twin | `tests/hard/test_reprojection.py`, `tests/engine/test_oracle.py` |
+| degenerate, doubled and non-finite triangles, mixed windings | rooms *broken* and *mixed* above; counted and told | `tests/scene/test_scene.py` |
 """
 
 
@@ -178,7 +178,7 @@ def streams_section() -> Iterator[str]:
     worst = min(found, key=lambda name: found[name])
     yield "\n## Random streams\n"
     yield "Scrambles of neighbours in pixels, frames, samples, seeds and dimensions are tested for independence:"
-    yield "chi-squared of joint cells, correlation, and the shift between the two (`tests/stat/streams.py`), by Holm's"
+    yield "chi-squared of joint cells, correlation, and the shift between the two (`tests/support/streams.py`), by Holm's"
     yield f"rule over all tests. {len(pairs())} pairs of places, {len(found)} tests: {len(dependent(found))} fail. The smallest chance is {found[worst]:.1e}"
     yield f"({worst}); of so many, {1 / len(found):.1e} is expected. Bad scrambles do fail:"
     yield "\n| Scramble | tests that fail |"

@@ -7,7 +7,7 @@ above their triangle: in the wedge's edge.
 
 import numpy as np
 import pytest
-from counting import (
+from support.counting import (
     FAR_SHARE,
     Count,
     eyes_on_walls,
@@ -19,8 +19,8 @@ from counting import (
     shadow_rays,
     visibility_rays,
 )
-from rooms import ON_WALLS, ROOMS, TURN
-from staging import Stage, staged
+from support.rooms import ON_WALLS, ROOMS, TURN
+from support.staging import Stage, staged
 
 from framearray_cli.engine.inputs.surfaces import OFFSET_ULPS, ULP
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tiny
+from support import tiny
 
 from framearray_cli.engine.images.band import MOST
 from framearray_cli.engine.inputs.cameras import OUTSIDE, Cameras, project

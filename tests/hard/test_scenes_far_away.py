@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tiny
-from scenes import Glb
-from test_pictures_of_hard_cases import FLIPPED, differing, pictures, walk
+from support import tiny
+from support.pictures import FLIPPED, differing, pictures, walk
+from support.scenes import Glb
 
 from framearray_cli.scene.scene import load_scene
 

@@ -1,24 +1,23 @@
-"""Makes the pictures of docs/guide/view.md, of the page in Chromium: `python tests/pictures/make_page_pictures.py`.
+"""Makes the pictures of docs/guide/view.md, of the page in Chromium.
+
+    PYTHONPATH=tests python tests/pictures/make_page_pictures.py
 
 Three of the jobs are rendered into out/page-pictures/, unless they are there.
 """
 
 import io
 import math
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from PIL import Image
+from support import ROOT
+from support.chromium import DESKTOP, PHONE, Shown, browser, shown
 
 from framearray_cli.array.manifest import FILE_NAME
 from framearray_cli.job.read import read_job
 from framearray_cli.render.render import render
 from framearray_cli.tools.view.run import open_tiles, prepare_all, serving
-
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests" / "page"))
-from chromium import DESKTOP, PHONE, Shown, browser, shown  # noqa: E402
 
 PICTURES = ROOT / "docs" / "pictures"
 ARRAYS = ROOT / "out" / "page-pictures"

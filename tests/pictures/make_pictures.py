@@ -1,4 +1,6 @@
-"""Makes the pictures of README and docs/ with the program itself: `python tests/pictures/make_pictures.py`.
+"""Makes the pictures of README and docs/ with the program itself.
+
+    PYTHONPATH=tests python tests/pictures/make_pictures.py
 
 Each picture comes from a job of this project, cut down to the eyes and light positions that are shown. An eye keeps
 the N_r eyes before and after it, so that it has the samples that it would have in the whole array.
@@ -10,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
+from support import ROOT
 
 from framearray_cli.array.images.images import read_image, read_layers
 from framearray_cli.array.manifest import Manifest, image_path, layers_path
@@ -24,7 +27,6 @@ from framearray_cli.tools.movie.assemble import assemble
 from framearray_cli.tools.movie.look import Look
 from framearray_cli.tools.sheet import make_sheet
 
-ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "docs" / "pictures"
 GAP = 4  # pixels between the images of a sheet
 QUALITY = 80  # of JPEG: a sheet of twelve stays below 150 kB

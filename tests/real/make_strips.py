@@ -2,7 +2,7 @@
 
     python tests/real/make_strips.py FOLDER STRIPS
 
-takes the arrays that the jobs of `make_jobs.py` left in FOLDER/out, and writes STRIPS/NAME.jpg for every scene.
+takes the arrays that the jobs of `support.real_jobs` left in FOLDER/out, and writes STRIPS/NAME.jpg for every scene.
 """
 
 import sys

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from nasty import nasty_files
-from scenes import scenes_folder
+from support import ROOT
+from support.nasty import nasty_files
+from support.scenes import scenes_folder
 
 from framearray_cli.array.images.images import read_layers
 from framearray_cli.array.images.png import read_codes
@@ -16,7 +17,7 @@ from framearray_cli.cli.main import main
 from framearray_cli.job.read import read_job
 from framearray_cli.starter import Wishes, init
 
-JOBS = Path(__file__).resolve().parents[2] / "jobs"
+JOBS = ROOT / "jobs"
 KINDS = (".glb", ".obj", ".stl")
 REAL = sorted(file for file in scenes_folder().glob("*/*.*") if file.suffix in KINDS and file.parent.name != "nasty")
 OWN = [JOBS / "scenes" / f"{name}.glb" for name in ("cabin", "kitchen", "stairs")]

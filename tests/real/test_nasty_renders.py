@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
-from nasty import job_table, nasty_files
-from scenes import scenes_folder
+from support import ROOT
+from support.nasty import job_table, nasty_files
+from support.scenes import scenes_folder
 
 from framearray_cli.array.images.images import read_image
 from framearray_cli.base.errors import SceneError
@@ -68,7 +69,7 @@ def test_pictures_or_a_clear_error(name, tmp_path, capfd):
 def test_as_a_command(name, tmp_path):
     job, scene = write_job(name, tmp_path)
     command = [sys.executable, "-m", "framearray_cli", "render", str(job)]
-    told = subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=Path(__file__).parents[2])
+    told = subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=ROOT)
     assert "Traceback" not in told.stderr
     assert told.returncode == (3 if scene is None else 0)
     assert told.stderr.count("\n") == (1 if scene is None else 0)

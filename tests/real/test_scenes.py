@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import make_jobs
 import numpy as np
 import pytest
-from scenes import scenes_folder, shared_scene
+from support import real_jobs
+from support.scenes import scenes_folder, shared_scene
 
 from framearray_cli.array.images.images import read_image, read_layers
 from framearray_cli.array.manifest import Manifest, image_path, layers_path
@@ -16,7 +16,7 @@ from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.job.job import Job
 from framearray_cli.render.render import render
 
-SCENES = make_jobs.scene_names(scenes_folder())
+SCENES = real_jobs.scene_names(scenes_folder())
 # The noted shares rest on some thousand rays, so they are known to about one in a hundred.
 NOTED = 0.025
 
@@ -30,7 +30,7 @@ def notes(name: str) -> dict[str, Any]:
 
 def table(name: str, kind: str, out: Path, **changes: Any) -> dict[str, Any]:
     """The job of a scene, with some keys of its tables changed."""
-    job = make_jobs.job_table(scenes_folder(), name, kind)
+    job = real_jobs.job_table(scenes_folder(), name, kind)
     for key, value in changes.items():
         job[key] = job.get(key, {}) | value
     job["output"]["directory"] = str(out)
@@ -113,7 +113,7 @@ def test_the_mirror_of_the_grey_and_white_room_shows_the_room(tmp_path):
     assert shown[4][:, ~black].mean() == pytest.approx(shown[0][:, ~black].mean(), rel=0.02)
 
 
-@pytest.fixture(scope="module", params=[f"{name}-{kind}" for name in SCENES for kind in make_jobs.KINDS])
+@pytest.fixture(scope="module", params=[f"{name}-{kind}" for name in SCENES for kind in real_jobs.KINDS])
 def array(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, str, Any]]:
     """The array of a scene's job, as images."""
     name, kind = request.param.rsplit("-", 1)

@@ -8,7 +8,6 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-import closed_forms as forms
 import numpy as np
 import test_ambient as ambient
 import test_direct_forms as direct
@@ -16,15 +15,16 @@ import test_furnace as furnace
 import test_mirror_forms as mirrors
 import test_obscurance_forms as obscurance
 import test_reuse_bias as reuse
-from stages import write_scene
-from ztests import Estimate, chi2_bounds, difference, differing, estimate
+from support import closed_forms as forms
+from support.stages import write_scene
+from support.ztests import Estimate, chi2_bounds, difference, differing, estimate
 
 from framearray_cli.engine.terms.obscurance import FALLOFFS
 
 HEAD = """# Accuracy
 
 Written by `python tests/stat/report.py docs/measured/accuracy.md`, from the same measurements as the tests in
-`tests/stat/`. Formulas and their derivations: `tests/stat/closed_forms.py`.
+`tests/stat/`. Formulas and their derivations: `tests/support/closed_forms.py`.
 
 Standard errors come from independent pixels or independent seeds. z is the difference in standard errors: of
 independent right values, 1 in 20 is beyond 2 and 1 in 370 beyond 3. Rows of one table share random numbers, so that
@@ -115,8 +115,8 @@ def ambient_section(folder: Folders) -> Iterator[str]:
     """I_A of a room with a window against a path tracer."""
     yield "\n## Ambient light of a room with a window\n"
     yield "The sun shines into a room of 5 x 3 x 4 m by one window. Mean irradiance against an independent path tracer"
-    yield "(`tests/stat/pathtracer.py`), whose own error is in the standard error: over the surfaces that light on its"
-    yield "way to the eye comes from (`eye`), and over all that light reaches, roof and facade included (`light`)."
+    yield "(`tests/support/pathtracer.py`), whose own error is in the standard error: over the surfaces that light on"
+    yield "its way to the eye comes from (`eye`), and over all that light reaches, roof and facade included (`light`)."
     yield from table("method, scene")
     traced = ambient.traced()
     for method in ("eye", "light"):

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pathtracer import PathTracer
-from stages import FURNACE, Part, box, make_job, point, quad, sun, write_scene
-from ztests import Estimate, chi2_bounds, difference, estimate
+from support.pathtracer import PathTracer
+from support.stages import FURNACE, Part, box, make_job, point, quad, sun, write_scene
+from support.ztests import Estimate, chi2_bounds, difference, estimate
 
 from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.terms.ambient.estimate import Ambient

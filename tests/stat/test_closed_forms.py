@@ -1,9 +1,9 @@
 """The formulas themselves: closed forms against quadrature, and statistics that must be able to say no."""
 
-import closed_forms as forms
 import numpy as np
 import pytest
-import ztests
+from support import closed_forms as forms
+from support import ztests
 
 from framearray_cli.engine.terms.obscurance import FALLOFFS
 

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import closed_forms as forms
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from stages import Part, look, make_job, point, quad, result_of, sun, write_scene
+from support import closed_forms as forms
+from support.stages import Part, look, make_job, point, quad, result_of, sun, write_scene
 
 from framearray_cli.engine.frames.threads import Scratch
 from framearray_cli.engine.hits.hits import SURFACE

@@ -7,18 +7,19 @@ every pixel is subtracted, and what is left must be the indirect light R / pi R 
 from functools import cache
 from pathlib import Path
 
-import closed_forms as forms
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from stages import result_of
-from ztests import Estimate, chi2_bounds, estimate
+from support import ROOT
+from support import closed_forms as forms
+from support.stages import result_of
+from support.ztests import Estimate, chi2_bounds, estimate
 
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.paths import eyes, lights
 
-JOBS = Path(__file__).resolve().parents[2] / "jobs"
+JOBS = ROOT / "jobs"
 SEEDS = 6
 FINE = 8  # places along each edge of a pixel that its expected direct light is averaged over
 

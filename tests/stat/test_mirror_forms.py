@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-import closed_forms as forms
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from stages import Part, box, look, make_job, mirrored, point, quad, repeats, result_of, sun, write_scene
-from ztests import differing
+from support import closed_forms as forms
+from support.stages import Part, box, look, make_job, mirrored, point, quad, repeats, result_of, sun, write_scene
+from support.ztests import differing
 
 Array = NDArray[np.float64]
 

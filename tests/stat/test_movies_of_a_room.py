@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tiny
-from movies import decoded, path_file, rms
+from support import ROOT, tiny
+from support.movies import decoded, path_file, rms
 
 from framearray_cli.array.images.images import read_image
 from framearray_cli.array.manifest import Manifest, image_path
@@ -21,7 +21,7 @@ from framearray_cli.tools.movie.timeline import timeline
 
 pytest.importorskip("av")
 
-JOBS = Path(__file__).resolve().parents[2] / "jobs"
+JOBS = ROOT / "jobs"
 KINDS = {
     "light": "camera = {at}\nlight = [0, -1]",
     "eye": "camera = [0, -1]\nlight = {at}",

@@ -6,10 +6,10 @@ radiance R (I_A W + S). I_A is fixed to 1, and the light gives nothing.
 
 from pathlib import Path
 
-import closed_forms as forms
 import pytest
-from stages import FURNACE, Part, disc, look, make_job, quad, result_of, write_scene
-from ztests import Estimate, estimate
+from support import closed_forms as forms
+from support.stages import FURNACE, Part, disc, look, make_job, quad, result_of, write_scene
+from support.ztests import Estimate, estimate
 
 from framearray_cli.engine.terms.obscurance import FALLOFFS
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import closed_forms as forms
 import numpy as np
 import pytest
-import tiny
-from stages import FURNACE, make_job, point, repeats, result_of
-from ztests import differing, off
+from support import closed_forms as forms
+from support import tiny
+from support.stages import FURNACE, make_job, point, repeats, result_of
+from support.ztests import differing, off
 
 from framearray_cli.engine.frames.threads import TracePool
 

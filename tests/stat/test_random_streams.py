@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.stats import kstest
-from streams import Words, all_chances, dependent, pairs, program
+from support.streams import Words, all_chances, dependent, pairs, program
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bench.squares import Squares, products, squares
+from bench.error.squares import Squares, products, squares
 from numpy.typing import NDArray
-from stages import box, make_job, point, quad, sun, write_scene
-from ztests import differing
+from support.stages import box, make_job, point, quad, sun, write_scene
+from support.ztests import differing
 
 from framearray_cli.engine.frames.blocks import Allotment, blocks_of
 from framearray_cli.engine.frames.threads import TracePool

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from stages import box, make_job, quad, write_scene
+from support.stages import box, make_job, quad, write_scene
 
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.standard_error import standard_error

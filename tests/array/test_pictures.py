@@ -1,0 +1,101 @@
+"""Pictures put together from the files of an array."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.handmade import cameras, grouped_manifest, light
+
+from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.array.manifest import Manifest, array_files
+from framearray_cli.array.manifest_toml import read_manifest, write_manifest
+from framearray_cli.array.pictures import Pictures, Relight
+from framearray_cli.base.errors import OutputError
+
+SIZE = (6, 4)
+
+
+@pytest.fixture
+def array(tmp_path: Path) -> Manifest:
+    manifest = replace(grouped_manifest(tmp_path), resolution=SIZE, cameras=cameras(2))
+    rng = np.random.default_rng(5)
+    for file in array_files(manifest):
+        write_image(file, rng.random((*SIZE[::-1], 3), np.float32), ImageFormat(half="never"))
+    write_manifest(tmp_path, manifest)
+    return manifest
+
+
+def read(manifest: Manifest, name: str) -> np.ndarray:
+    from framearray_cli.array.images.images import read_image
+
+    return read_image(manifest.directory / name).astype(np.float64)
+
+
+def test_a_manifest_with_groups_is_read_back(array: Manifest) -> None:
+    back = read_manifest(array.directory)
+    assert back == array
+    assert back.axes == {"light": 3, "lamps": 2}
+    assert (back.n_cameras, back.n_lights) == (2, 3)
+    assert len(list(array_files(back))) == 2 * (2 + 3 + 2)
+
+
+def test_groups_ambient_and_background_are_summed(array: Manifest) -> None:
+    factor, dim = np.array([0.5, 2.0, 1.0]), np.array([1.0, 0.0, 3.0])
+    made = Pictures(array).picture(1, (2, 1), Relight(groups={"lamps": tuple(factor)}, ambient=tuple(dim)))
+    i_a = factor * 0.1 + [0.2, 0.2, 0.3] + np.array([0.01, 0.02, 0.03])
+    expected = (
+        read(array, "room.lamps.c0001.l001.exr") * factor
+        + read(array, "room.sun.c0001.l002.exr")
+        + read(array, "room.ambient.c0001.exr") * i_a * dim
+        + read(array, "room.background.c0001.exr")
+    )
+    np.testing.assert_allclose(made, expected, rtol=1e-5)
+    night = Pictures(array).picture(1, (2, 1), Relight(groups={"background": (0.0, 0.5, 1.0)}))
+    day = Pictures(array).picture(1, (2, 1))
+    lost = read(array, "room.background.c0001.exr") + read(array, "room.ambient.c0001.exr") * [0.01, 0.02, 0.03]
+    np.testing.assert_allclose(day - night, lost * [1.0, 0.5, 0.0], atol=1e-5)
+
+
+def test_between_two_positions_pictures_are_blended(array: Manifest) -> None:
+    pictures = Pictures(array)
+    made = pictures.picture(0, (1.25, 0))
+    np.testing.assert_allclose(made, 0.75 * pictures.picture(0, (1, 0)) + 0.25 * pictures.picture(0, (2, 0)), rtol=1e-5)
+    names = [path.name for path in pictures.files(0, (1.25, 0))]
+    assert names == [
+        "room.lamps.c0000.l000.exr",
+        "room.sun.c0000.l001.exr",
+        "room.sun.c0000.l002.exr",
+        "room.ambient.c0000.exr",
+        "room.background.c0000.exr",
+    ]
+
+
+def test_unknown_groups_and_arrays_without_groups_are_named(array: Manifest) -> None:
+    with pytest.raises(OutputError, match=r"no group 'moon'; the array has lamps, sun, background"):
+        Pictures(array).picture(0, (0, 0), Relight(groups={"moon": (2.0, 1.0, 1.0)}))
+    plain = Manifest(
+        version="0",
+        name="room",
+        fingerprint="sha256:0",
+        images="room.c{camera:04d}.exr",
+        resolution=SIZE,
+        fps=24.0,
+        cameras=array.cameras,
+        lights=(light(0.1, 0.1, 0.1),),
+        directory=array.directory,
+    )
+    with pytest.raises(OutputError, match=r'render again with group = "\.\.\."'):
+        Pictures(plain).picture(0, (0,), Relight(ambient=(0.0, 0.0, 0.0)))
+    assert Pictures(plain).whole_file(1, (0.0,)) == array.directory / "room.c0001.exr"
+    assert Pictures(array).whole_file(1, (0.0, 0.0)) is None
+
+
+def test_a_missing_file_and_a_wrong_size_are_named(array: Manifest) -> None:
+    pictures = Pictures(array)
+    write_image(array.directory / "room.sun.c0000.l000.exr", np.zeros((4, 4, 3), np.float32), ImageFormat())
+    with pytest.raises(OutputError, match=r"room\.sun\.c0000\.l000\.exr: expected 6 x 4 pixels, got 4 x 4"):
+        pictures.picture(0, (0, 0))
+    (array.directory / "room.ambient.c0001.exr").unlink()
+    with pytest.raises(OutputError, match=r"room\.ambient\.c0001\.exr: no such file"):
+        pictures.picture(1, (0, 0))

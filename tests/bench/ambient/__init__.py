@@ -1,0 +1,1 @@
+"""The ambient estimate: its level and its pictures against path tracing."""

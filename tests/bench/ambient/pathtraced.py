@@ -1,0 +1,293 @@
+"""Path-traced pictures from Mitsuba 3, where it is installed: what a job would look like without obscurances.
+
+The same triangles, interpolated normals, textures, mirrors, lights and background, one camera and one light position,
+by Mitsuba's own `path` integrator. Beside it the part that the program does not approximate, light that comes straight
+from a source or the background, by mirrors or not: it shows that both programs see the same scene.
+"""
+
+import subprocess
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.core.results import Table
+from bench.speed.processes import asked
+from bench.speed.speed import tell
+from framearray_cli.base.arrays import Float32, Float64, Image
+from framearray_cli.engine.inputs.lights import DIRECTIONAL
+from framearray_cli.render.prepare import Prepared
+from framearray_cli.scene.scene import Scene
+
+from .scenes import Probe, probe_named, resized
+
+COMPILED, SCALAR = "llvm_ad_rgb", "scalar_rgb"  # variants of Mitsuba: by LLVM, and one path at a time
+SAMPLES, QUICK_SAMPLES = 1024, 32  # of a pixel, in all
+# Of small pictures along the camera path, whose mean alone counts.
+CAMERAS, SMALL, SMALL_SAMPLES = 12, (80, 60), 128
+PASSES = 16  # independent ones, whose spread tells the error
+ROULETTE = 16  # vertices before a path may end by chance; there is no other end
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Traced:
+    """Pictures of one probe, (PASSES, h, w, 3): all light, and that which comes straight from sources or background."""
+
+    total: Float32
+    light: Float32
+
+    def save(self, file: Path) -> None:
+        """Keep them, half by half, with what the spread of all passes says of the means.
+
+        The standard errors are of the mean over picture and channels.
+        """
+        halves = {name: _halves(getattr(self, name)) for name in ("total", "light")}
+        errors = {f"{name}_error": _error(getattr(self, name)) for name in ("total", "light")}
+        errors["indirect_error"] = _error(self.total - self.light)
+        np.savez(file, **halves, **errors)
+
+
+def _halves(passes: Float32) -> Float32:
+    found: Float32 = passes.reshape(2, -1, *passes.shape[1:]).mean(axis=1)
+    return found
+
+
+def _error(passes: Float32) -> float:
+    means = passes.reshape(len(passes), -1).mean(axis=1, dtype=np.float64)
+    return float(means.std(ddof=1) / np.sqrt(len(means)))
+
+
+def measure(what: str, name: str, quick: bool) -> Table:
+    """Do what `trace` or `trace_means` does to a probe; {"skipped": why} where that cannot be had.
+
+    In a process of its own: older LLVMs cannot compile Mitsuba's integrator, and end the process. Then the variant
+    without a compiler is tried, which takes several times as long.
+    """
+    options = ["--quick"] if quick else []
+    table: Table = {}
+    for variant in (COMPILED, SCALAR):
+        try:
+            table = asked(what, name, *options, "--mitsuba", variant)
+            break
+        except subprocess.CalledProcessError as error:
+            table = {"skipped": f"Mitsuba ended with status {error.returncode}"}
+    tell(f"{name}: " + (f"not traced: {table['skipped']}" if "skipped" in table else "traced"))
+    return table
+
+
+def trace(name: str, quick: bool, folder: Path, variant: str = COMPILED) -> Table:
+    """Trace the pictures of a probe into `folder` in this process.
+
+    Args:
+        variant: of Mitsuba, for its path tracer.
+    """
+    mi, why = _mitsuba(variant)
+    if why:
+        return {"skipped": why}
+    probe = probe_named(name)
+    prepared = probe.prepared()
+    why = unknown(prepared.scene)
+    if why:
+        return {"skipped": why}
+    samples = QUICK_SAMPLES if quick else SAMPLES
+    traced = pictures(mi, prepared, probe, samples, variant)
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / f"traced-{name}.npz"
+    traced.save(file)
+    return {"file": file.name, "version": mi.__version__, "samples": samples, "variant": variant}
+
+
+def _mitsuba(variant: str) -> tuple[Any, str]:
+    """Mitsuba, and why it is of no use, or ""."""
+    try:
+        import mitsuba as mi
+    except ImportError:
+        return None, "Mitsuba is not installed (pip install mitsuba)"
+    missing = {COMPILED, variant} - set(mi.variants())
+    return mi, f"this Mitsuba has no variant {', '.join(missing)}" if missing else ""
+
+
+def trace_means(name: str, quick: bool, variant: str = COMPILED) -> Table:
+    """Trace small pictures of some cameras of a path in this process; {"skipped": why} where that cannot be had.
+
+    Returns:
+        cameras; indirect: (n,) mean of their indirect light over pixels and channels; error: (n,) its standard error.
+    """
+    mi, why = _mitsuba(variant)
+    if why:
+        return {"skipped": why}
+    probe = probe_named(name)
+    prepared = resized(probe.prepared(), SMALL)
+    cameras = [int((i + 0.5) / CAMERAS * prepared.n_cameras) for i in range(2 if quick else CAMERAS)]
+    means, errors = [], []
+    for c in cameras:
+        found = pictures(mi, prepared, replace(probe, c=c), QUICK_SAMPLES if quick else SMALL_SAMPLES, variant)
+        indirect = found.total - found.light
+        means.append(float(indirect.mean(dtype=np.float64)))
+        errors.append(_error(indirect))
+    return {"cameras": cameras, "indirect": means, "error": errors}
+
+
+def unknown(scene: Scene) -> str:
+    """What of a scene is not carried over, or ""."""
+    if len(scene.colours):
+        return "corner colours are not carried over"
+    if (scene.alpha_texture >= 0).any() or (scene.alpha < scene.alpha_cutoff).any():
+        return "alpha masks are not carried over"
+    if (scene.specular_texture >= 0).any():
+        return "textured mirrors are not carried over"
+    return ""
+
+
+def pictures(mi: Any, prepared: Prepared, probe: Probe, samples: int, variant: str) -> Traced:
+    """Trace a probe with so many samples a pixel in all."""
+    each = max(samples // PASSES, 1)
+    mi.set_variant(COMPILED)
+    dark, sensor = scene_of(mi, prepared, probe, sky=False), sensor_of(mi, prepared, probe.c)
+    light = [_light(mi, dark, sensor, prepared, each, 1_000_000 + i) for i in range(PASSES)]
+    mi.set_variant(variant)
+    lit, sensor = scene_of(mi, prepared, probe, sky=True), sensor_of(mi, prepared, probe.c)
+    integrator = mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": ROULETTE})
+    total = []
+    for i in range(PASSES):
+        found = mi.render(lit, integrator=integrator, sensor=sensor, spp=each, seed=i + 1)
+        total.append(np.array(found, np.float32)[..., :3])
+    return Traced(total=np.stack(total), light=np.stack(light))
+
+
+def sensor_of(mi: Any, prepared: Prepared, c: int) -> Any:
+    """Eye c; a pixel's filter is its box."""
+    width, height = prepared.job.camera.resolution
+    matrix = prepared.eyes.world_from_camera[c]
+    look = mi.ScalarTransform4f().look_at(
+        origin=[0.0, 0.0, 0.0], target=(-matrix[:3, 2]).tolist(), up=matrix[:3, 1].tolist()
+    )
+    return mi.load_dict(
+        {
+            "type": "perspective",
+            "fov": prepared.eyes.fov_deg,
+            "fov_axis": "y",
+            "to_world": look,
+            "near_clip": 1e-3,
+            "film": {
+                "type": "hdrfilm",
+                "width": width,
+                "height": height,
+                "pixel_format": "rgb",
+                "component_format": "float32",
+                "rfilter": {"type": "box"},
+            },
+        }
+    )
+
+
+def scene_of(mi: Any, prepared: Prepared, probe: Probe, sky: bool) -> Any:
+    """The scene under the probe's light position, a mesh a material; the probe's eye is the origin.
+
+    Mitsuba starts rays 1500 units in the last place of the largest coordinate above a surface. About the middle of the
+    stairs that is 3 mm, which misses what the carpet's edge shades; about the eye it is a third of that.
+
+    Args:
+        sky: whether the background shines.
+    """
+    scene, eye = prepared.scene, prepared.eyes.position[probe.c]
+    table: dict[str, Any] = {"type": "scene"}
+    for m in np.unique(scene.material):
+        table[f"mesh{m}"] = _mesh(mi, scene, int(m), eye - scene.centre)
+    for s, source in enumerate(prepared.lights.sources):
+        power = {"type": "rgb", "value": source.intensity[probe.l].tolist()}
+        if prepared.light_arrays.kind[s] == DIRECTIONAL:
+            table[f"light{s}"] = {
+                "type": "directional", "direction": source.vector[probe.l].tolist(), "irradiance": power
+            }  # fmt: skip
+        else:
+            position = (source.vector[probe.l] - eye).tolist()
+            table[f"light{s}"] = {"type": "point", "position": position, "intensity": power}
+    background = prepared.job.scene.background
+    if sky and max(background) > 0:
+        table["sky"] = {"type": "constant", "radiance": {"type": "rgb", "value": list(background)}}
+    return mi.load_dict(table)
+
+
+def _mesh(mi: Any, scene: Scene, m: int, origin: Float64) -> Any:
+    """The triangles of a material, from an origin in the scene's coordinates."""
+    chosen = scene.material == m
+    n = int(chosen.sum())
+    smooth, textured = len(scene.normals) > 0, bool(scene.reflectivity_texture[m] >= 0)
+    properties = mi.Properties()
+    properties["bsdf"] = mi.load_dict(_bsdf(mi, scene, m))
+    mesh = mi.Mesh(
+        f"mesh{m}", vertex_count=3 * n, face_count=n, has_vertex_normals=smooth, has_vertex_texcoords=textured,
+        props=properties,
+    )  # fmt: skip
+    params = mi.traverse(mesh)
+    params["vertex_positions"] = (scene.corners[chosen] - origin).astype(np.float32).ravel()
+    params["faces"] = np.arange(3 * n, dtype=np.uint32)
+    if smooth:
+        params["vertex_normals"] = np.ascontiguousarray(scene.normals[chosen]).ravel()
+    if textured:
+        downwards = scene.uvs[chosen] * np.float32([1, -1]) + np.float32([0, 1])
+        params["vertex_texcoords"] = np.ascontiguousarray(downwards).ravel()
+    params.update()
+    return mesh
+
+
+def _bsdf(mi: Any, scene: Scene, m: int) -> dict[str, Any]:
+    """Diffuse and mirror part of a material, on both sides."""
+    diffuse, mirror = float(scene.reflectivity[m].max()), float(scene.specular[m].max())
+    share = mirror / (diffuse + mirror) if mirror else 0.0
+    parts: list[dict[str, Any]] = []
+    if share < 1:
+        parts.append({"type": "diffuse", "reflectance": _reflectance(mi, scene, m, 1 / (1 - share))})
+    if share > 0:
+        tint = {"type": "rgb", "value": (scene.specular[m] / share).tolist()}
+        parts.append({"type": "conductor", "material": "none", "specular_reflectance": tint})
+    both = {"type": "blendbsdf", "weight": share, "first": parts[0], "second": parts[-1]}
+    return {"type": "twosided", "bsdf": both if len(parts) == 2 else parts[0]}
+
+
+def _reflectance(mi: Any, scene: Scene, m: int, scale: float) -> dict[str, Any]:
+    factor = scene.reflectivity[m] * np.float32(scale)
+    texture = int(scene.reflectivity_texture[m])
+    if texture < 0:
+        return {"type": "rgb", "value": factor.tolist()}
+    first, width, height = scene.textures[texture]
+    code = scene.texels[first : first + width * height, :3].reshape(height, width, 3) / 255.0
+    linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
+    data = mi.TensorXf(np.ascontiguousarray(linear * factor, np.float32))
+    return {"type": "bitmap", "data": data, "raw": True, "filter_type": "bilinear", "wrap_mode": "repeat"}
+
+
+def _light(mi: Any, scene: Any, sensor: Any, prepared: Prepared, samples: int, seed: int) -> Image:
+    """Light straight from the sources and the background to what the eye sees, directly or by mirrors."""
+    import drjit as dr
+
+    width, height = prepared.job.camera.resolution
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(seed, width * height * samples)
+    pixel = dr.arange(mi.UInt32, width * height * samples) // samples
+    corner = mi.Point2f(mi.Float(pixel % width), mi.Float(pixel // width))
+    place = (corner + sampler.next_2d()) / mi.Point2f(width, height)
+    ray, _ = sensor.sample_ray(0.0, 0.0, place, mi.Point2f(0.5, 0.5))
+    context, background = mi.BSDFContext(), mi.Color3f(list(prepared.job.scene.background))
+    found, through, active = mi.Color3f(0), mi.Color3f(1), mi.Bool(True)
+    depth = prepared.job.specular.depth if prepared.scene.has_mirrors else 0
+    # no `minimum` and no roulette: older LLVMs cannot compile them
+    for bounce in range(depth + 1):
+        hit = scene.ray_intersect(ray, active)
+        found += dr.select(active & ~hit.is_valid(), through * background, 0)
+        active &= hit.is_valid()
+        bsdf = hit.bsdf(ray)
+        towards, arriving = scene.sample_emitter_direction(hit, sampler.next_2d(), True, active)
+        reflected = bsdf.eval(context, hit, hit.to_local(towards.d), active)
+        found += dr.select(active, through * reflected * arriving, 0)
+        if bounce < depth:
+            step, weight = bsdf.sample(context, hit, sampler.next_1d(), sampler.next_2d(), active)
+            active &= mi.has_flag(step.sampled_type, mi.BSDFFlags.DeltaReflection)
+            through *= weight
+            ray = hit.spawn_ray(hit.to_world(step.wo))
+    dr.eval(found)
+    sums = [dr.block_reduce(dr.ReduceOp.Add, channel, samples) for channel in (found.x, found.y, found.z)]
+    dr.eval(*sums)
+    return np.stack([np.array(channel, np.float32) for channel in sums], -1).reshape(height, width, 3) / samples

@@ -1,0 +1,141 @@
+"""The standard error that images report beside the error that they have: docs/measured/standard-error.md."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bench.core.cases import Case, Variant, job_named, opened, under, varied, with_resolution
+from bench.core.frames import frame
+from bench.core.markdown import grid, number, percent
+from bench.core.results import DOCS, Table
+from bench.speed.speed import tell
+from framearray_cli.engine.frames.passes import turns
+from framearray_cli.engine.frames.records import BY_SAMPLE
+from framearray_cli.engine.images.standard_error import square_mean, standard_error
+from framearray_cli.render.prepare import FEWEST_SPLIT
+from framearray_cli.report.metrics import rmse
+from framearray_cli.report.reference import HITS, PASSES, Reference, reference
+
+RESOLUTION = (160, 120)
+PLACES = (0.25, 0.6)  # of the camera path
+LIGHTS = (1 / 6, 1 / 2, 5 / 6)  # of the light path
+SEED = 303
+TRIED = tuple(
+    Variant(name=f"{weights}, n_r {n_r}, hits {hits:g}", n_r=n_r, hits=hits, balance=weights == "balance")
+    for n_r, weights, counts in (
+        (0, "average", (2, 8, 32, 224)),
+        (3, "average", (0.5, 1, 2, 8, 32)),
+        (3, "balance", (0.5, 1, 2, 8, 32)),
+    )
+    for hits in counts
+)
+
+PAGE = """
+# The error that images tell of themselves
+
+`[samples] halves = true` keeps the hits of every pixel apart in two halves, and what these differ by tells the
+standard error of every pixel without a reference (`framearray_cli/engine/images/standard_error.py`). Here it is
+held against the error that the images have: the root mean square over a picture of what is told, and the RMSE from
+a reference of {hits:,} hits a pixel, whose own error is taken off; both over the mean of the reference. {width} x
+{height} pixels, {cameras} cameras under {lights} light positions of each job. Written by `python -m bench told`,
+from the folder `tests`.
+
+![Told against true](../plots/standard-error.svg)
+
+{table}
+
+What is told is sampling error alone. The error that `average` makes where frames see a place differently is the same
+in both halves: with many hits, where noise is small, true errors of `average` stay above what is told. `balance` has no
+such error. With fewer than four hits in a frame, whole frames make the halves, and part of what they see differently is
+told as noise. The error of I_A, which all pixels share, is not in it; the manifest has it
+for every light position.
+"""
+
+
+def measure(name: str, folder: Path) -> list[Table]:
+    """For each setting, camera and light position: what is told, and what is true."""
+    rows: list[Table] = []
+    with opened(with_resolution(job_named(name, False), RESOLUTION)) as whole:
+        n_lights = whole.setup.lights.n_lights
+        l = [min(int(share * n_lights), n_lights - 1) for share in LIGHTS]
+        case = under(whole, l)
+        for place in PLACES:
+            c = round(place * case.setup.n_frames)
+            wanted = reference(whole, c, l, folder, PASSES)
+            for variant in TRIED:
+                rows += [{"job": name, "variant": variant.name, **row} for row in compare(case, variant, c, wanted)]
+                tell(f"{name}, camera {c}, {variant.name}: told {rows[-1]['told']:.2%}, true {rows[-1]['true']:.2%}")
+    return rows
+
+
+def compare(case: Case, variant: Variant, c: int, wanted: Reference) -> list[Table]:
+    """Each image of frame c made by a variant: what it tells, and how far it is from the reference."""
+    setup = varied(case, variant).setup
+    halves = BY_SAMPLE if variant.hits >= FEWEST_SPLIT or variant.n_r == 0 else turns(variant.hits)
+    made = frame(replace(case, setup=replace(setup, halves=halves)), c, SEED)
+    assert made.differences is not None
+    hits = made.hits.reshape(made.images.shape[1:3])
+    rows = []
+    for k, image in enumerate(made.images):
+        ambient = case.ambient.intensity[k]
+        right = wanted.image(k, ambient)
+        mean = float(right.mean(dtype=np.float64))
+        apart = rmse(wanted.half(0, k, ambient), wanted.half(1, k, ambient)) / 2  # of the reference itself
+        true = max(rmse(image, right) ** 2 - apart**2, 0.0) ** 0.5
+        told = square_mean(standard_error(made.differences[k], hits)) ** 0.5
+        rows.append({"camera": c, "light": k, "told": told / mean, "true": true / mean, "reference": apart / mean})
+    return rows
+
+
+def write(rows: Sequence[Table]) -> None:
+    """Write the page and its plot."""
+    draw(rows, DOCS.plots / "standard-error.svg")
+    table = []
+    for variant in TRIED:
+        cells = [variant.name]
+        for job in dict.fromkeys(row["job"] for row in rows):
+            some = [row for row in rows if row["job"] == job and row["variant"] == variant.name]
+            told, true = (float(np.sqrt(np.mean([row[key] ** 2 for row in some]))) for key in ("told", "true"))
+            cells += [percent(told), percent(true), number(told / true)]
+        table.append(cells)
+    head = ["setting"]
+    for job in dict.fromkeys(row["job"] for row in rows):
+        head += [f"{job}, told", "true", "ratio"]
+    text = PAGE.format(
+        hits=2 * PASSES * HITS, width=RESOLUTION[0], height=RESOLUTION[1], cameras=len(PLACES), lights=len(LIGHTS),
+        table=grid(head, table),
+    )  # fmt: skip
+    page = DOCS.pages / "standard-error.md"
+    page.write_text(text.strip("\n") + "\n", encoding="utf-8")
+    print(page)
+
+
+def draw(rows: Sequence[Table], file: Path) -> None:
+    """Told against true, a point an image."""
+    import matplotlib
+
+    matplotlib.use("svg")
+    matplotlib.rcParams.update({"svg.hashsalt": "framearray", "svg.fonttype": "none", "font.size": 9})
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(4.6, 4.2), layout="constrained")
+    try:
+        for weights, colour in (("average", "#c05621"), ("balance", "#2b6cb0")):
+            for reuse, marker in (("n_r 3", "o"), ("n_r 0", "x")):
+                some = [row for row in rows if row["variant"].startswith(weights) and reuse in row["variant"]]
+                if some:
+                    label = "no reuse" if marker == "x" else f"{weights}, n_r 3"
+                    axes.plot([r["true"] for r in some], [r["told"] for r in some], marker, color=colour,
+                              markersize=3.5, alpha=0.7, label=label)  # fmt: skip
+        ends = np.array([min(row["true"] for row in rows), max(row["true"] for row in rows)])
+        axes.plot(ends, ends, "-", color="#444", linewidth=0.8)
+        axes.fill_between(ends, 0.8 * ends, 1.2 * ends, color="#888", alpha=0.2, linewidth=0, label="within 20 %")
+        axes.set(xscale="log", yscale="log", xlabel="RMSE from the reference / mean", ylabel="told / mean")
+        axes.legend(fontsize=8)
+        axes.grid(alpha=0.3)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(file, metadata={"Date": None, "Creator": None})
+    finally:
+        pyplot.close(figure)

@@ -1,0 +1,154 @@
+"""Speed against error of the three jobs: `framearray report`, and from its tables docs/measured/report-*.md."""
+
+import shutil
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from bench.core.cases import job_named
+from bench.core.machine import describe
+from bench.core.markdown import grid, number, percent, times
+from bench.core.results import DOCS, RESULTS, Table, load, save
+from bench.speed.speed import tell
+from framearray_cli.report import ReportOptions, make_report, write_report
+from framearray_cli.report.crops import draw_crops
+
+PLOTS = ("error-and-time", "bias-and-noise", "by-offset", "flicker")
+QUALITY = 88  # of the crops' JPG
+
+PAGE = """
+# Speed against error: {name}
+
+What each setting of a job buys and costs: the report of `framearray report jobs/{name}.toml`, as
+`python -m bench report {name}` wrote it, from the folder `tests`. {cameras} cameras under {lights} light positions, at
+{width} x {height} pixels, against references of {reference_hits:,} hits a pixel, which are themselves off by
+{reference_noise}. RMSE over the mean of the reference; ms an image before writing, of all {n_lights} light positions.
+Machine: {machine}.
+
+{summary}
+
+![Error against time](../plots/report-{name}-error-and-time.svg)
+
+*Every setting that was tried; both axes logarithmic.*
+
+![Crops](../pictures/report-{name}.jpg)
+
+*{captions}.*
+
+{table}
+
+*Times faster*: than images from scratch with the same RMSE, which lie on the line through those that were measured,
+both axes logarithmic. *Flicker*: RMSE of the difference of neighbours along the camera and along the light path.
+In bold: on the front, where nothing that was tried is both quicker and more exact.
+
+{advice}
+
+![Bias and noise](../plots/report-{name}-bias-and-noise.svg)
+{more}
+"""
+
+
+def measure(name: str) -> None:
+    """Make the report of a job in out/bench, or what is missing of its references, and write its page."""
+    folder = RESULTS / f"report-{name}"
+    job = job_named(name, False)
+    report = make_report(job, folder, ReportOptions())
+    write_report(report)
+    save(
+        folder,
+        "about",
+        {"machine": describe(), "resolution": list(job.camera.resolution), "n_lights": job.light.frames},
+    )
+    save(folder, "captions", {"captions": [crop.caption for crop in draw_crops(report)]})
+    tell(f"{folder / 'index.html'}")
+
+
+def write(name: str) -> None:
+    """Write the page of a report that was made."""
+    folder = RESULTS / f"report-{name}"
+    about, kept = load(folder, "about"), load(folder, "captions")
+    if about is None or kept is None:
+        return
+    table = tomllib.loads((folder / "table.toml").read_text(encoding="utf-8"))
+    pictures([folder / f"crop-{i}.png" for i in range(len(kept["captions"]))], name)
+    plots = [plot for plot in PLOTS if (folder / f"{plot}.svg").is_file()]
+    for plot in plots:
+        shutil.copyfile(folder / f"{plot}.svg", DOCS.plots / f"report-{name}-{plot}.svg")
+    width, height = about["resolution"]
+    words = PAGE.strip().format(
+        name=name,
+        cameras=len(table["cameras"]),
+        lights=len(table["lights"]),
+        width=width,
+        height=height,
+        n_lights=about["n_lights"],
+        machine="{processor}, {cores} cores".format(**about["machine"]),
+        reference_hits=table["reference"]["hits"],
+        reference_noise=percent(table["reference"]["rmse"], 2),
+        summary=summary(table),
+        captions="; ".join(kept["captions"]),
+        table=rows(table),
+        advice=advice(table),
+        more="".join(f"\n![{plot}](../plots/report-{name}-{plot}.svg)\n" for plot in plots[2:]),
+    )
+    page = DOCS.pages / f"report-{name}.md"
+    page.write_text(words.rstrip() + "\n", encoding="utf-8")
+    tell(str(page))
+
+
+def summary(table: Table) -> str:
+    """The job's own settings in a sentence, and the best that was found against images from scratch."""
+    own = table["settings"][0]
+    alone = [row for row in table["settings"] if not row["one_light"]]
+    best = max(alone, key=lambda row: row.get("times_faster_than_scratch", 0.0))
+    gain, most = (times(one["times_faster_than_scratch"]) for one in (own, best))
+    return (
+        f"As the job says: {number(own['ms'])} ms an image with an error of {percent(own['rmse'])}. Images from "
+        f"scratch with that error take **{gain}** as long. The most that was found is {most}, `{best['name']}`: "
+        f"{number(best['ms'])} ms, {percent(best['rmse'])}."
+    )
+
+
+def rows(table: Table) -> str:
+    """What every setting costs and gives."""
+    head = ("", "ms", "RMSE", "bias", "noise", "FLIP", "flicker", "hits a pixel", "times faster")
+    return grid(head, [_row(row) for row in table["settings"]])
+
+
+def _row(row: dict[str, Any]) -> list[str]:
+    flicker = [percent(row[f"flicker_{axis}"], 2) for axis in ("camera", "light") if f"flicker_{axis}" in row]
+    name = f"**{row['name']}**" if row["on_the_front"] else row["name"]
+    faster = row.get("times_faster_than_scratch")
+    return [
+        name, number(row["ms"]), percent(row["rmse"]), percent(row["bias"], 2), percent(row["noise"], 2),
+        number(row["flip"]), ", ".join(flicker), number(row["accepted_hits"]), times(faster) if faster else "",
+    ]  # fmt: skip
+
+
+def advice(table: Table) -> str:
+    """The cheapest settings for an error, as lines of a job."""
+    found = []
+    for one in table["advice"]:
+        if "settings" not in one:
+            found.append(f"For an error of {percent(one['error'])}: nothing that was tried reaches it.")
+            continue
+        lines = "\n".join(one["lines"]) or "# as the job is"
+        found.append(
+            f"For an error of {percent(one['error'])} ({number(one['ms'])} ms, {percent(one['rmse'])}):\n\n"
+            f"```toml\n{lines}\n```"
+        )
+    return "\n\n".join(found)
+
+
+def pictures(files: list[Path], name: str) -> None:
+    """Put the crops of a report beside each other into docs/pictures."""
+    crops = []
+    for file in files:
+        with Image.open(file) as image:
+            crops.append(np.asarray(image.convert("RGB")))
+    gap = np.full((crops[0].shape[0], 6, 3), 255, np.uint8)
+    strip = np.concatenate([part for crop in crops for part in (crop, gap)][:-1], axis=1)
+    Image.fromarray(strip).save(DOCS.pictures / f"report-{name}.jpg", quality=QUALITY)

@@ -1,0 +1,1 @@
+"""The same images by other programs."""

@@ -1,0 +1,17 @@
+"""Other programs, each in a process of its own: where something does not fit, it may end the process."""
+
+import subprocess
+
+from bench.core.results import Table
+from bench.speed.processes import asked
+from bench.speed.speed import tell
+
+
+def measure(program: str, name: str, quick: bool) -> Table:
+    """What an image of a job costs in another program, or {"skipped": why}."""
+    try:
+        table = asked(program, name, *(["--quick"] if quick else []))
+    except subprocess.CalledProcessError as error:
+        table = {"skipped": f"it ended with status {error.returncode}"}
+    tell(f"{name}: {program}: " + (f"left out: {table['skipped']}" if "skipped" in table else f"{table['ms']:.0f} ms"))
+    return table

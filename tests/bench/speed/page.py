@@ -1,0 +1,43 @@
+"""Results -> docs/measured/speed.md. Nothing is measured here: the files in out/bench are enough for the page."""
+
+from pathlib import Path
+
+from bench.core import plots
+from bench.core.cases import JOBS
+from bench.core.results import Site, folder, load, site_for
+
+from . import parts as pages
+
+
+def write(quick: bool) -> None:
+    """Write the page and its plots from whatever was measured; quick results go beside themselves."""
+    page = site_for(quick).pages / "speed.md"
+    page.write_text(render(folder(quick), site_for(quick)), encoding="utf-8")
+    print(page)
+
+
+def render(results: Path, site: Site) -> str:
+    """The whole page; parts without results are left out."""
+    speed = {name: table for name in JOBS if (table := load(results, f"speed-{name}"))}
+    error = {name: table for name in JOBS if (table := load(results, f"error-{name}"))}
+    mitsuba = {name: table for name in JOBS if (table := load(results, f"mitsuba-{name}"))}
+    cycles = {name: table for name in JOBS if (table := load(results, f"cycles-{name}"))}
+    memory, startup, scaling = (load(results, name) for name in ("memory", "startup", "scaling"))
+    parts = [pages.HEAD]
+    if speed:
+        parts += pages.machine(
+            next(iter(speed.values())), [share for table in speed.values() for share in table["busy"]]
+        )
+        parts += [*pages.summary(speed, mitsuba), *pages.cost(speed), *pages.stages(speed), *pages.writing(speed)]
+    if mitsuba:
+        parts += pages.peers(speed, mitsuba, cycles)
+    if error:
+        parts += [*pages.errors(error, speed), *pages.containers(error)]
+    if memory:
+        parts += pages.memory(memory)
+    if startup:
+        parts += pages.startup(startup)
+    if scaling:
+        drawn = {sweep: site.link(file) for sweep, file in plots.draw(scaling, site.plots).items()}
+        parts += pages.scaling(scaling, drawn)
+    return "\n\n".join(part.strip("\n") for part in parts) + "\n"

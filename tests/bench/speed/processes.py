@@ -1,0 +1,114 @@
+"""Start-up time and peak memory: what only a process of its own can tell."""
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import tomli_w
+
+from bench.core.cases import JOBS, job_named
+from bench.core.machine import busy
+from bench.core.results import ROOT, Table
+from framearray_cli.job.read import job_table
+
+from .speed import tell
+
+REPEATS = 5
+PROGRAM = (sys.executable, "-m", "framearray_cli")
+# Traces one ray, and then everything before the first frame; says when each is done.
+FIRST_RAYS = """
+import sys
+from pathlib import Path
+from framearray_cli.jobfile import read_job
+from framearray_cli.prepare import open_embree, plan_work, prepare
+prepared = prepare(read_job(Path(sys.argv[1])))
+with open_embree(prepared) as embree:
+    from framearray_cli.embree.packets import HIT_ROWS, empty_packets, intersect
+    intersect(embree.tracer, empty_packets(1, HIT_ROWS), 1, True)
+    print("ray", flush=True)
+    plan_work(prepared, embree)
+    print("plan", flush=True)
+"""
+
+
+def environment(**changes: str) -> dict[str, str]:
+    """The environment of a process that runs the program of this checkout as a user would."""
+    kept = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+    return {**kept, "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'tests'}", **changes}
+
+
+def start_up(quick: bool) -> Table:
+    """Seconds until help is shown, a ray is traced, and a tiny job is done; with and without compiled kernels."""
+    repeats = 1 if quick else REPEATS
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        job = folder / "smoke.toml"
+        table = job_table(job_named("smoke", False))
+        table["output"]["directory"] = str(folder / "out")
+        job.write_text(tomli_w.dumps(table), encoding="utf-8")
+        cache = environment(NUMBA_CACHE_DIR=str(folder / "kernels"))
+        first_rays = (sys.executable, "-c", FIRST_RAYS, str(job))
+        render = (*PROGRAM, "render", str(job))
+        _seconds((*PROGRAM, "--help"), cache)  # so that bytecode and files are where they are on a machine in use
+        found: Table = {
+            "busy": busy(),
+            "help": _median([_seconds((*PROGRAM, "--help"), cache) for _ in range(repeats)]),
+        }
+        found["cold"] = _marks(first_rays, cache)
+        warm = [_marks(first_rays, cache) for _ in range(repeats)]
+        found["warm"] = {mark: _median([run[mark] for run in warm]) for mark in warm[0]}
+        fresh = environment(NUMBA_CACHE_DIR=str(folder / "fresh"))
+        found["cold"]["job"] = _seconds(render, fresh)
+        tell(f"start-up: cold {found['cold']['job']:.1f} s in all")
+        found["warm"]["job"] = _median([_seconds((*render, "--restart"), fresh) for _ in range(repeats)])
+    warmed = found["warm"]
+    tell(f"start-up: help {found['help']:.2f} s, first ray {warmed['ray']:.2f} s, job {warmed['job']:.2f} s")
+    return found
+
+
+def _median(values: Sequence[float]) -> float:
+    return statistics.median(values)
+
+
+def _seconds(command: Sequence[str], env: Mapping[str, str]) -> float:
+    started = time.perf_counter()
+    subprocess.run(command, env=env, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    return time.perf_counter() - started
+
+
+def _marks(command: Sequence[str], env: Mapping[str, str]) -> dict[str, float]:
+    """Seconds from the start until each line that the command prints."""
+    found: dict[str, float] = {}
+    started = time.perf_counter()
+    with subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            found[line.strip()] = time.perf_counter() - started
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command)
+    return found
+
+
+def asked(*arguments: str) -> Table:
+    """Run `python -m bench` with some arguments in a process of its own; returns the JSON that it prints."""
+    command = (sys.executable, "-m", "bench", *arguments)
+    done = subprocess.run(command, env=environment(), check=True, stdout=subprocess.PIPE, text=True, cwd=ROOT)
+    table: Table = json.loads(done.stdout.splitlines()[-1])
+    return table
+
+
+def memory(quick: bool, jobs: Sequence[str] = JOBS) -> Table:
+    """Peak memory of the steady state, bytes, by job and variant."""
+    found: Table = {}
+    for name in jobs:
+        found[name] = {}
+        for variant in ("frame array", "weights balance"):
+            found[name][variant] = asked("peak", name, "--variant", variant, *(["--quick"] if quick else []))
+            tell(f"{name}: {variant}: {found[name][variant]['peak'] / 2**30:.2f} GiB at most")
+    return found

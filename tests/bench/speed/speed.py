@@ -1,0 +1,85 @@
+"""Measures every variant of a job in turn, several times; each time at another place of the camera path."""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib.util import find_spec
+
+from bench.core.cases import VARIANTS, Case, Variant, job_named, opened, parts_of
+from bench.core.machine import describe, quiet
+from bench.core.markdown import total
+from bench.core.results import Table, median
+from bench.core.steady import start_of, steady_mean
+from framearray_cli.array.images.images import ImageFormat
+
+from .floor import record, replay
+
+# How images are written where a variant is timed with writing.
+FORMATS = {
+    "zip:1": ImageFormat(compression="zip:1", half="always"),
+    "none": ImageFormat(compression="none", half="always"),
+}
+WRITTEN = "none"  # as jobs write that say nothing
+RUNS = 3
+
+
+def places_of(runs: int) -> list[float]:
+    """Where on the path, 0 to 1, each run takes its cameras."""
+    return [(r + 1) / (runs + 1) for r in range(runs)]
+
+
+def measure(
+    name: str, quick: bool, runs: int = RUNS, patience: float = 0.0, variants: Sequence[Variant] = VARIANTS
+) -> Table:
+    """Measure a job: variant -> medians of its runs; variants without `frames` are left out.
+
+    Args:
+        patience: seconds to wait, before each measurement, for other programs to leave the cores alone.
+    """
+    timed = [v for v in variants if v.frames and not (v.denoise and find_spec("pyoidn") is None)]
+    found: dict[str, list[Table]] = {variant.name: [] for variant in timed}
+    shares: list[float] = []
+    with opened(job_named(name, quick)) as case:
+        for place in places_of(1 if quick else runs):
+            for variant in timed:
+                shares.append(quiet(patience))
+                table = measure_once(case, replace(variant, frames=2) if quick else variant, place)
+                found[variant.name].append(table)
+                tell(f"{name}: {variant.name}: {table['ms']:.2f} ms an image, others take {shares[-1]:.0%}")
+        setup, job = case.setup, case.prepared.job
+        about = {
+            "triangles": len(setup.surfaces.corners),
+            "resolution": list(job.camera.resolution),
+            "n_lights": setup.lights.n_lights,
+            "n_cameras": case.prepared.n_cameras,
+            "mirrors": bool(setup.depth),
+            "threads": case.threads,
+        }
+    return {
+        "machine": describe(),
+        "about": about,
+        "busy": shares,
+        "runs": {variant: tables for variant, tables in found.items()},
+        "median": {variant: median(tables) for variant, tables in found.items()},
+    }
+
+
+def measure_once(case: Case, variant: Variant, place: float) -> Table:
+    """Measure one variant at one place of the path, with its floor and with writing where it asks for them."""
+    parts = parts_of(case, variant)
+    names = FORMATS if variant.writes else {}
+    table, *written = steady_mean(parts, variant.frames, [None, *(FORMATS[name] for name in names)], place)
+    table["written"] = dict(zip(names, written, strict=True))
+    if variant.floor:
+        part = parts[len(parts) // 2]
+        first = start_of(part, variant.frames, place)
+        c = first + 2 * part.setup.n_r + 1 + variant.frames // 2
+        expected = total(table["rays"]) * part.setup.n_pixels * part.setup.lights.n_lights
+        table["floor"] = replay(record(part, c, expected), part.setup.tracer, part.threads, table["rays"])
+        table["floor_ratio"] = {clock: table[clock] / total(table["floor"][clock]) for clock in ("ms", "cpu_ms")}
+    return table
+
+
+def tell(text: str) -> None:
+    """Say what was measured, at once."""
+    print(text, file=sys.stderr, flush=True)

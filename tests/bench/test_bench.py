@@ -1,0 +1,168 @@
+"""The parts of tests/bench that compute or write without measuring: metrics, tables, resampled lights, pieces."""
+
+import numpy as np
+import pytest
+
+from bench.core.markdown import grid, number, percent
+from bench.core.results import DOCS, load, median, save, site_for, site_in
+from bench.core.steady import mean
+from bench.error import reports
+from bench.error.bias_page import at_most, at_time
+from bench.speed.floor import PIECE, _pieces
+from bench.speed.scaling import resampled
+from framearray_cli.engine.inputs.lights import DIRECTIONAL, POINT, LightArrays
+from framearray_cli.report.metrics import block_mean, errors, relmse, rmse, shadow_edges, squared_bias
+
+SETTINGS = [
+    {"name": "as the job says", "one_light": False, "ms": 5.0, "rmse": 0.1, "bias": 0.01, "noise": 0.09, "flip": 0.05,
+     "flicker_camera": 0.02, "accepted_hits": 13.0, "times_faster_than_scratch": 40.0, "on_the_front": True},
+    {"name": "hits 8", "one_light": False, "ms": 20.0, "rmse": 0.04, "bias": 0.0, "noise": 0.04, "flip": 0.02,
+     "flicker_camera": 0.01, "flicker_light": 0.03, "accepted_hits": 52.0, "times_faster_than_scratch": 55.0,
+     "on_the_front": False},
+    {"name": "from scratch, 14 hits", "one_light": True, "ms": 300.0, "rmse": 0.1, "bias": 0.0, "noise": 0.1,
+     "flip": 0.05, "accepted_hits": 14.0, "times_faster_than_scratch": 1.0, "on_the_front": False},
+]  # fmt: skip
+
+
+def test_a_report_as_a_page():
+    table = {"settings": SETTINGS, "advice": [
+        {"error": 0.1, "settings": "hits 8", "ms": 20.0, "rmse": 0.04, "lines": ["[samples]", "hits = 8"]},
+        {"error": 0.01},
+    ]}  # fmt: skip
+    text = reports.summary(table)
+    assert "5 ms an image with an error of 10 %" in text and "**40x**" in text and "55x, `hits 8`" in text
+    lines = reports.rows(table).splitlines()
+    assert lines[2].startswith("| **as the job says** | 5 | 10 % | 1 % | 9 % | 0.05 | 2 % | 13 | 40x |")
+    assert "| hits 8 | 20 | 4 % | 0 % | 4 % | 0.02 | 1 %, 3 % | 52 | 55x |" in lines
+    said = reports.advice(table)
+    assert "```toml\n[samples]\nhits = 8\n```" in said and "nothing that was tried reaches it" in said
+
+
+def flat(value: float, shape: tuple[int, int] = (40, 60)) -> np.ndarray:
+    return np.full((*shape, 3), value, np.float32)
+
+
+def test_rmse_and_relmse_of_constants():
+    assert rmse(flat(1.5), flat(1.0)) == pytest.approx(0.5)
+    assert relmse(flat(1.5), flat(1.0)) == pytest.approx(0.25 / 1.01)
+    assert relmse(flat(0.0), flat(0.0)) == 0
+
+
+def test_errors_are_relative_to_the_mean():
+    image, reference = flat(2.0), flat(2.0)
+    image[0, 0] = 5.0
+    edges = np.zeros((40, 60), bool)
+    edges[0, :2] = True
+    found = errors(image, reference, edges)
+    assert found.edge_max == pytest.approx(1.5)
+    assert found.edge_rmse == pytest.approx(1.5 / np.sqrt(2))
+    assert found.bias == pytest.approx(1.5 / 2400)
+    assert found.rmse == pytest.approx(1.5 / np.sqrt(2400))
+    assert errors(image, reference, ~edges & False).edge_max == 0
+
+
+def test_squared_bias_is_free_of_noise():
+    rng = np.random.default_rng(1)
+    noise = [rng.normal(0, 1, (200, 200, 3)).astype(np.float32) for _ in range(4)]
+    square, spread = squared_bias((1.3 + noise[0], 1.3 + noise[1]), (1 + noise[2], 1 + noise[3]))
+    assert abs(square - 0.09) < 4 * spread
+    # each pixel's product has a variance of 2 * 2 + 2 * 0.09 * 2, and there are 120,000 values
+    assert spread == pytest.approx(np.sqrt(4.36 / 120_000), rel=0.3)
+    square, spread = squared_bias((noise[0], noise[1]), (noise[2], noise[3]))
+    assert abs(square) < 4 * spread
+
+
+def test_errors_that_go_together_in_blocks_count_as_one():
+    rng = np.random.default_rng(2)
+    blocks = np.repeat(np.repeat(rng.normal(0, 1, (10, 10)), 20, 0), 20, 1)
+    assert block_mean(blocks)[1] == pytest.approx(0.1, rel=0.25)
+    assert block_mean(np.ones((5, 5)))[1] == np.inf
+
+
+def test_shadow_edges_are_where_irradiance_alone_jumps():
+    irradiance, depth = np.ones((20, 30), np.float32), np.full((20, 30), 4.0, np.float32)
+    normal = np.tile(np.array([0, 0, 1], np.float32), (20, 30, 1))
+    irradiance[:, :10] = 0  # a shadow
+    irradiance[:, 20:], normal[:, 20:] = 0, [1, 0, 0]  # a corner
+    edges = shadow_edges(irradiance, normal, depth)
+    assert set(np.flatnonzero(edges.any(0))) == {9, 10}
+    assert edges[1:-1, 9:11].all()
+    depth[:, 10:] = 5.0  # now it is the outline of something
+    assert not shadow_edges(irradiance, normal, depth).any()
+
+
+def test_tables():
+    assert grid(["a", "b"], [["1", "2"]]) == "| a | b |\n| --- | ---: |\n| 1 | 2 |"
+    shown = [number(value) for value in (0, 0.01234, 1.5, 12.345, 123.4, 1234.4, 1234567)]
+    assert shown == ["0", "0.0123", "1.5", "12.3", "123", "1,234", "1,234,567"]
+    assert [number(0.00001234), number(999.6), number(123.4, 2)] == ["0.0000123", "1,000", "123"]
+    assert percent(0.01234, 2) == "1.2 %"
+
+
+def test_median_and_mean_of_tables():
+    tables = [
+        {"ms": a, "stages": {"x": b}, "hits": [a, b], "images": 2} for a, b in ((1.0, 5.0), (3.0, 4.0), (2.0, 9.0))
+    ]
+    assert median(tables) == {"ms": 2.0, "stages": {"x": 5.0}, "hits": [2.0, 5.0], "images": 2}
+    assert mean(tables[:2]) == {"ms": 2.0, "stages": {"x": 4.5}, "hits": [2.0, 4.5], "images": 4}
+    assert median([{"a": 1.0}, {}, {"a": 3.0}]) == {"a": 1.0}
+
+
+def test_results_survive_the_disk(tmp_path):
+    save(tmp_path / "new", "x", {"a": [1.5, 2]})
+    assert load(tmp_path / "new", "x") == {"a": [1.5, 2]}
+    assert load(tmp_path, "x") is None
+
+
+def test_a_resampled_light_path_keeps_its_ends_and_directions_stay_unit():
+    path = np.linspace([1, 0, 0], [0, 0, 1], 4, dtype=np.float32).T  # (3, 4)
+    vector = np.stack([path, path / np.linalg.norm(path, axis=0)])
+    ones = np.ones((2, 1, 4), np.float32)
+    lights = LightArrays(
+        kind=np.array([POINT, DIRECTIONAL], np.int32),
+        vector=vector,
+        strength=ones,
+        lit=ones[:, 0],
+        colour=np.ones((4, 3), np.float32),
+    )
+    found = resampled(lights, np.linspace(0, 3, 7))
+    assert found.n_lights == 7
+    np.testing.assert_allclose(found.vector[:, :, ::2], vector, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(found.vector[1], axis=0), 1, atol=1e-6)
+    np.testing.assert_allclose(found.vector[0, :, 1], (path[:, 0] + path[:, 1]) / 2, atol=1e-6)
+
+
+def test_pieces_hold_one_kind_and_one_flag_each():
+    flags = np.array([0] * 3 + [2] * (PIECE + 5) + [1] * 4, np.uint8)
+    found = _pieces([(3, "native"), (3, "obscurance"), (PIECE + 8, "shadow"), (len(flags), "native")],
+                    ("native", "obscurance", "shadow"), flags)  # fmt: skip
+    assert found.tolist() == [
+        [0, 3, 0],
+        [3, PIECE + 3, 2],
+        [PIECE + 3, PIECE + 8, 2],
+        [PIECE + 8, PIECE + 12, 0],
+    ]
+    mixed = _pieces([(len(flags), "native")], ("native",), flags)
+    assert mixed.tolist() == [[0, 3, 0], [3, PIECE + 3, 0], [PIECE + 3, PIECE + 8, 0], [PIECE + 8, PIECE + 12, 0]]
+
+
+def test_an_error_at_another_time_lies_on_the_line_of_logarithms():
+    curve = [(4.0, 0.5), (1.0, 1.0), (16.0, 0.125)]
+    assert at_time(curve, 2.0, 1) == pytest.approx(0.5**0.5)
+    assert at_time(curve, 4.0, 1) == pytest.approx(0.5)
+    assert at_time(curve, 64.0, 1) == pytest.approx(0.125 / 4)  # as noise falls from the second to the third
+
+
+def test_a_bound_counts_noise_against_balance():
+    average = {"bias": 10.0, "error": 0.1}
+    assert at_most({"bias": -1.0, "error": 0.2}, average) == pytest.approx(0.06)
+    assert at_most({"bias": 0.5, "error": 0.2}, average) == pytest.approx(0.11)
+
+
+def test_pages_find_their_plots(tmp_path):
+    """A page of docs/ looks into the folder beside its own; a quick one beside itself."""
+    for site, link in ((DOCS, "../plots/bias.svg"), (site_in(tmp_path), "plots/bias.svg")):
+        assert site.link(site.plots / "bias.svg") == link
+        assert (site.pages / link).resolve() == site.plots / "bias.svg"
+    assert f"]({DOCS.link(DOCS.plots / 'bias.svg')})" in (DOCS.pages / "bias.md").read_text(encoding="utf-8")
+    assert site_for(False) == DOCS and site_for(True).pages.name == "quick"

@@ -1,0 +1,1 @@
+"""The page of `framearray view` in Chromium, under a clock."""

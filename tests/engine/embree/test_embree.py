@@ -1,0 +1,322 @@
+"""The door to Embree: packets and embreex's own API find the same hits."""
+
+import os
+import re
+import subprocess
+import sys
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+from embreex import rtcore_scene
+from support import instructionset, scenes, tiny
+
+from framearray_cli.base.errors import SceneError
+from framearray_cli.engine import embree
+from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.embree.packets import (
+    DIRECTION,
+    GEOMETRY,
+    HIT_ROWS,
+    MASKED,
+    MISS,
+    ORIGIN,
+    RAY_ROWS,
+    TFAR,
+    TRIANGLE,
+    U,
+    V,
+    aligned,
+    empty_packets,
+    intersect,
+    occlude,
+)
+from framearray_cli.engine.kernels.simd import LANES
+from framearray_cli.scene.files import Material
+from framearray_cli.scene.scene import Scene, load_scene
+
+CHUNK = 1 << 16
+# Embree divides by a reciprocal that it refines by one Newton step, an instruction set its own way; step and product
+# round to float32 and leave up to 4 units in the last place. A division would leave none: distances here are exact.
+RECIPROCAL = 2.0**-21
+
+
+def fill(packets: Any, origins: Any, dirs: Any, far: Any) -> None:
+    """Write rays (n, 3), (n, 3), (n,) into packets."""
+    flat = packets.transpose(0, 2, 1).reshape(-1, packets.shape[1])
+    flat[: len(origins), ORIGIN : ORIGIN + 3] = origins
+    flat[: len(origins), DIRECTION : DIRECTION + 3] = dirs
+    flat[: len(origins), TFAR] = far
+    packets[:] = flat.reshape(len(packets), LANES, -1).transpose(0, 2, 1)
+
+
+def first_hits(
+    scene: EmbreeScene, origins: Any, dirs: Any, far: Any = np.inf, coherent: bool = False, near: float = 0.0
+) -> Any:
+    """(n, 4) float64: triangle or -1, t, u, v of each ray."""
+    packets = empty_packets(-(-min(len(origins), CHUNK) // LANES), HIT_ROWS)
+    far, found = np.broadcast_to(far, len(origins)), []
+    for i in range(0, len(origins), CHUNK):
+        n = len(origins[i : i + CHUNK])
+        fill(packets, origins[i : i + CHUNK], dirs[i : i + CHUNK], far[i : i + CHUNK])
+        intersect(scene.tracer, packets, n, coherent, near)
+        rows = packets.transpose(0, 2, 1).reshape(-1, HIT_ROWS)[:n]
+        bits = np.ascontiguousarray(rows).view(np.int32)
+        triangle = bits[:, TRIANGLE] + scene.tracer.first_masked * (bits[:, GEOMETRY] == MASKED)
+        found.append(np.column_stack([triangle, rows[:, [TFAR, U, V]]]))
+    return np.concatenate(found)
+
+
+def blocked(scene: EmbreeScene, origins: Any, dirs: Any, far: Any, coherent: bool = False) -> Any:
+    """(n,) whether each ray meets anything before `far`."""
+    packets = empty_packets(-(-min(len(origins), CHUNK) // LANES), RAY_ROWS)
+    far, found = np.broadcast_to(far, len(origins)), []
+    for i in range(0, len(origins), CHUNK):
+        n = len(origins[i : i + CHUNK])
+        fill(packets, origins[i : i + CHUNK], dirs[i : i + CHUNK], far[i : i + CHUNK])
+        occlude(scene.tracer, packets, n, coherent)
+        found.append(packets[:, TFAR].reshape(-1)[:n] < 0)
+    return np.concatenate(found)
+
+
+def both(scene: Scene, *rays: Any, coherent: bool = False) -> tuple[Any, Any, Any, Any]:
+    """First hits and occlusion of the two engines; `coherent` is what the first is told of its packets."""
+    with EmbreeScene(scene, "packets") as a, EmbreeScene(scene, "embreex") as b:
+        assert (a.engine, b.engine) == ("packets", "embreex")
+        return first_hits(a, *rays, coherent), first_hits(b, *rays), blocked(a, *rays, coherent), blocked(b, *rays)
+
+
+def random_rays(scene: Scene, n: int, seed: int = 1) -> tuple[Any, Any, Any]:
+    """Rays from anywhere in the scene's box in all directions; half of them are endless."""
+    rng = np.random.default_rng(seed)
+    low, high = scene.corners.min(axis=(0, 1)), scene.corners.max(axis=(0, 1))
+    origins = (low + (high - low) * rng.random((n, 3))).astype(np.float32)
+    dirs = rng.normal(size=(n, 3)).astype(np.float32)
+    dirs /= np.linalg.norm(dirs, axis=1, keepdims=True)
+    far = np.where(rng.random(n) < 0.5, np.inf, rng.random(n) * float((high - low).max()) / 2)
+    return origins, dirs, far.astype(np.float32)
+
+
+def litter(n: int, seed: int = 3, **material: Any) -> Scene:
+    """n small triangles in a cube, with texture coordinates."""
+    rng = np.random.default_rng(seed)
+    corners = rng.random((n, 1, 3)) * 6 + rng.normal(size=(n, 3, 3)) * 0.2
+    uvs = rng.random((n, 3, 2)) * 3
+    texels = tiny.checks(16)
+    texels[..., 3] = rng.integers(0, 2, (16, 16)) * 255
+    return tiny.scene_of(corners, Material(name="Litter", **material), uvs=uvs, textures=(texels,))
+
+
+@pytest.fixture(scope="module")
+def large() -> Scene:
+    """A real scene where there is one, else litter."""
+    file = scenes.scenes_folder() / "modern_hall" / "modern_hall.glb"
+    scene = load_scene(file) if file.is_file() else litter(30_000, texture=0)
+    assert len(scene.corners) > 20_000 and scene.n_opaque == len(scene.corners)
+    return scene
+
+
+def test_every_hit_of_a_million_rays_is_the_same(large: Scene) -> None:
+    a, b, dark_a, dark_b = both(large, *random_rays(large, 1_000_000))
+    hit = a[:, 0] >= 0
+    assert 0.2 < hit.mean() < 0.98
+    np.testing.assert_array_equal(a[:, 0], b[:, 0])
+    np.testing.assert_array_equal(a[hit], b[hit])  # t, u and v to the last bit
+    np.testing.assert_array_equal(dark_a, dark_b)
+    np.testing.assert_array_equal(dark_a, hit)  # no mask: what blocks a ray is what it hits
+
+
+def test_hits_are_the_same_where_packets_are_told_to_be_coherent(large: Scene) -> None:
+    """Rays that are, as eye and shadow rays, and rays that are not."""
+    origins, dirs, far = random_rays(large, 200_000)
+    rng = np.random.default_rng(4)
+    bundled = np.repeat(dirs[: len(dirs) // LANES], LANES, axis=0) + rng.normal(size=(200_000, 3)) * 0.02
+    together = np.repeat(origins[: len(dirs) // LANES], LANES, axis=0), bundled.astype(np.float32), far
+    for rays in (together, (origins, dirs, far)):
+        a, b, dark_a, dark_b = both(large, *rays, coherent=True)
+        other = a[:, 0] != b[:, 0]
+        hit = (a[:, 0] >= 0) & ~other
+        np.testing.assert_array_equal(a[hit], b[hit])
+        np.testing.assert_array_equal(dark_a, dark_b)
+        # of triangles that lie on one another either may be found first; they are equally far, but for a digit
+        assert (a[other, 0] >= 0).all() and (b[other, 0] >= 0).all()
+        np.testing.assert_allclose(a[other, 1], b[other, 1], rtol=RECIPROCAL)
+        assert other.mean() < 1e-3
+
+
+def test_a_different_ray_would_be_seen(large: Scene) -> None:
+    """The comparison above can fail."""
+    origins, dirs, far = random_rays(large, 10_000)
+    with EmbreeScene(large) as scene:
+        a, b = first_hits(scene, origins, dirs, far), first_hits(scene, origins, np.nextafter(dirs, 2), far)
+    assert (a != b).any()
+
+
+def test_masked_triangles_are_cut_out_alike() -> None:
+    """embreex starts again behind each cut-out hit, so its distances are sums and may differ in their last digits."""
+    scene = litter(3_000, texture=0, alpha_texture=0, alpha_cutoff=0.5)
+    assert scene.n_opaque == 0
+    a, b, dark_a, dark_b = both(scene, *random_rays(scene, 6_000))
+    hit = a[:, 0] >= 0
+    assert 0.2 < hit.mean() < 0.9
+    # a point within rounding of a mask's edge or of the far end may go either way: 1 ray in 1000 is far more than that
+    other = a[:, 0] != b[:, 0]
+    assert other.sum() <= 6
+    assert (dark_a != dark_b).sum() <= 6
+    np.testing.assert_array_equal(dark_a, hit)
+    same = hit & ~other
+    # some layers, each with a step of 4e-7 of coordinates up to 6
+    np.testing.assert_allclose(a[same, 1], b[same, 1], rtol=0, atol=1e-5)
+    # barycentric coordinates lose what the distance loses, over triangles of about 0.3, some of them slim
+    assert np.quantile(abs(a[same, 2:] - b[same, 2:]), 0.99) < 1e-4
+    opaque = litter(3_000, texture=0)
+    solid = both(opaque, *random_rays(opaque, 6_000))[0]
+    assert (solid[:, 0] >= 0).sum() > 1.1 * hit.sum()  # something was cut out
+
+
+def test_masks_of_a_real_scene() -> None:
+    scene = load_scene(scenes.shared_scene("grey_white_room/grey_white_room.glb"))
+    masked = scene.corners[scene.n_opaque :]
+    assert len(masked)
+    rng = np.random.default_rng(5)
+    inside = masked.mean(axis=1)[rng.integers(0, len(masked), 4_000)]
+    origins = (inside + rng.normal(size=inside.shape) * 0.3).astype(np.float32)
+    a, b, dark_a, dark_b = both(scene, origins, (inside - origins).astype(np.float32), np.float32(np.inf))
+    assert (a[:, 0] >= scene.n_opaque).sum() > 100
+    assert (a[:, 0] != b[:, 0]).sum() <= 4
+    assert (dark_a != dark_b).sum() <= 4
+    same = (a[:, 0] == b[:, 0]) & (a[:, 0] >= 0)
+    np.testing.assert_allclose(a[same, 1], b[same, 1], rtol=1e-4)
+
+
+def test_opaque_and_masked_triangles_of_one_scene() -> None:
+    """A fence of two halves before a wall: the lower half of its texture is cut out."""
+    texels = np.full((2, 2, 4), 255, np.uint8)
+    texels[1, :, 3] = 0  # the bottom row
+    fence = tiny.quad((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0))
+    wall = tiny.quad((-9, -9, -1), (9, -9, -1), (9, 9, -1), (-9, 9, -1))
+    uvs = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]])
+    meshes = tiny.Meshes(
+        parts=(tiny.Part(material=0, corners=fence, uvs=uvs), tiny.Part(material=1, corners=wall)),
+        materials=(Material(name="Fence", alpha_texture=0, alpha_cutoff=0.5), Material(name="Wall")),
+        textures=(texels,),
+        dropped={},
+        notes=(),
+    )
+    scene = tiny.build_scene(meshes, {})
+    assert scene.n_opaque == 2
+    origins = np.array([[0.1, 0.5, 5], [0.1, -0.5, 5], [0.1, 5, 5]], np.float32) - scene.centre.astype(np.float32)
+    dirs = np.array([[0, 0, -1]] * 3, np.float32)
+    for engine in ("packets", "embreex"):
+        with EmbreeScene(scene, engine) as opened:
+            hits = first_hits(opened, origins, dirs)
+            assert (hits[:, 0] >= 2).tolist() == [True, False, False]  # fence, wall through the hole, wall
+            assert hits[:, 1] == pytest.approx([5, 6, 6], rel=1e-6)
+            assert blocked(opened, origins, dirs, 5.5).tolist() == [True, False, False]
+
+
+@pytest.mark.parametrize("engine", ["packets", "embreex"])
+def test_what_is_nearer_than_asked_for_is_passed_over(engine: Any) -> None:
+    """Three sheets one behind the other, the first of them where rays start."""
+    sheets = [tiny.quad((-1, -1, z), (1, -1, z), (1, 1, z), (-1, 1, z)) for z in (0.0, -1.0, -2.0)]
+    scene = tiny.scene_of(np.concatenate(sheets))
+    origins = np.tile(np.float32([0.2, 0.3, 1.0]), (20, 1))  # centred: the first sheet is at z = 1
+    dirs = np.tile(np.float32([0, 0, -1]), (20, 1))
+    with EmbreeScene(scene, engine) as opened:
+        for near, found in ((1e-5, 1), (0.999, 1), (1.001, 2)):
+            assert first_hits(opened, origins, dirs, near=near)[:, 1] == pytest.approx(np.full(20, found), rel=1e-6)
+        assert (first_hits(opened, origins, dirs, near=2.5)[:, 0] == MISS).all()
+        assert (first_hits(opened, origins, dirs, 1.5, near=1.2)[:, 0] == MISS).all()
+        # a later call of the same room for rays asks for nothing, and gets all
+        assert first_hits(opened, origins + np.float32([0, 0, 0.5]), dirs)[:, 1] == pytest.approx(0.5, rel=1e-6)
+
+
+@pytest.mark.parametrize("masked", [False, True])
+def test_both_engines_pass_over_the_same(masked: bool) -> None:
+    scene = litter(3_000, texture=0, **({"alpha_texture": 0, "alpha_cutoff": 0.5} if masked else {}))
+    origins, dirs, far = random_rays(scene, 4_000)
+    with EmbreeScene(scene, "packets") as a, EmbreeScene(scene, "embreex") as b:
+        one, other = (first_hits(engine, origins, dirs, far, near=0.7) for engine in (a, b))
+        usual = first_hits(a, origins, dirs, far)
+    assert (one[:, 0] != other[:, 0]).sum() <= 4  # where triangles meet at an edge, or a mask at a texel's
+    assert (one[one[:, 0] >= 0, 1] >= 0.7).all()
+    assert (usual[usual[:, 0] >= 0, 1] < 0.7).sum() > 100  # there was something to pass over
+    same = usual[:, 1] >= 0.7
+    np.testing.assert_array_equal(one[same], usual[same])
+
+
+@pytest.mark.parametrize("engine", ["packets", "embreex"])
+@pytest.mark.parametrize("n", [1, 15, 16, 17])
+def test_the_last_packet_may_be_partly_empty(engine: Any, n: int) -> None:
+    scene = tiny.scene_of(tiny.quad((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)))
+    origins = np.tile(np.float32([0.2, 0.3, 2]), (n, 1))
+    dirs = np.tile(np.float32([0, 0, -1]), (n, 1))
+    with EmbreeScene(scene, engine) as opened:
+        np.testing.assert_allclose(first_hits(opened, origins, dirs)[:, 1], 2, rtol=RECIPROCAL, atol=0)
+        assert blocked(opened, origins, dirs, 3.0).all()
+        assert not blocked(opened, origins, dirs, 1.5).any()
+        assert (first_hits(opened, origins, dirs, 1.5)[:, 0] == MISS).all()
+
+
+@pytest.mark.parametrize("engine", ["packets", "embreex"])
+def test_coincident_faces_and_grazing_rays_do_not_let_rays_through(engine: Any) -> None:
+    """Two boxes that share a face, met head on and at 0.1 degrees."""
+    scene = tiny.scene_of(np.concatenate([tiny.box((-1, -1, -1), (0, 1, 1)), tiny.box((0, -1, -1), (1, 1, 1))]))
+    rng = np.random.default_rng(2)
+    aims = np.column_stack([np.zeros(2000), rng.uniform(-0.9, 0.9, (2000, 2))])
+    grazing = np.array([np.sin(0.00175), 0.6, 0.8]) * 2.0
+    for way in (np.array([1.0, 0.0, 0.0]), grazing):
+        origins, dirs = (aims - 0.4 * way).astype(np.float32), np.tile(way.astype(np.float32), (2000, 1))
+        inside = (abs(origins) < 1).all(axis=1)
+        with EmbreeScene(scene, engine) as opened:
+            assert blocked(opened, origins[inside], dirs[inside], 10.0).all()
+
+
+def test_without_the_symbols_embreex_takes_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = tiny.scene_of(tiny.quad((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)))
+    monkeypatch.setattr(embree, "embree_library", lambda: None)
+    with EmbreeScene(scene) as opened:
+        assert opened.engine == "embreex"
+    with pytest.raises(SceneError, match="cannot be reached"):
+        EmbreeScene(scene, "packets")
+
+
+def test_packets_start_at_cache_lines() -> None:
+    assert all(aligned(n).ctypes.data % 64 == 0 for n in range(1, 200))
+    assert all(empty_packets(n, HIT_ROWS)[-1].ctypes.data % 64 == 0 for n in range(1, 20))
+
+
+AVX2 = "isa=avx2"
+NATIVE = """
+import instructionset, tiny
+from framearray_cli.embree.native import NativeScene
+scene = NativeScene(tiny.scene_of(tiny.box((0, 0, 0), (1, 1, 1))), instructionset.library())
+print(instructionset.has_packets_of_16(scene._device))
+"""
+
+
+def test_avx2_can_be_forced_in_a_process_of_its_own() -> None:
+    """As `make test-avx2` does; programs that tests start inherit it."""
+    environment = os.environ | {"FRAMEARRAY_EMBREE": AVX2, "PYTHONPATH": os.pathsep.join(sys.path)}
+    answer = subprocess.run([sys.executable, "-c", NATIVE], env=environment, capture_output=True, text=True, check=True)
+    assert answer.stdout == "False\n"
+
+
+@pytest.mark.skipif(instructionset.FORCED != AVX2, reason="run by `make test-avx2`")
+def test_forced_to_avx2_nothing_runs_with_avx512() -> None:
+    with EmbreeScene(tiny.scene_of(tiny.box((0, 0, 0), (1, 1, 1))), "packets") as opened:
+        assert not instructionset.has_packets_of_16(opened._built._device)
+    assert not instructionset.has_packets_of_16(instructionset.device_pointer(instructionset.forced_device()).value)
+    assert rtcore_scene.EmbreeScene is instructionset.forced_scene
+    limited = numba.njit(lower)
+    limited(np.ones(64, np.float32), np.zeros(64, np.float32))
+    (assembly,) = limited.inspect_asm().values()
+    assert "ymm" in assembly and not re.search(r"zmm|%k[0-7]", assembly)
+
+
+def lower(a: Any, b: Any) -> None:
+    """A loop that AVX-512 would write with masks."""
+    for i in range(len(a)):
+        if a[i] > b[i]:
+            a[i] = 3 * b[i]

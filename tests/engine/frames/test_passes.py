@@ -1,0 +1,100 @@
+"""How many native hits each frame gets, and which pixels get more."""
+
+import numpy as np
+import pytest
+from support import tiny
+
+from framearray_cli.engine.frames.passes import frame_hits, passes
+from framearray_cli.engine.hits.hits import empty_hits
+from framearray_cli.engine.hits.native import flag_mirrors, pixel_order
+
+PATHS = [(n_c, n_r) for n_c in (1, 2, 3, 4, 5, 7, 12, 24) for n_r in (0, 1, 2, 3, 5, 8, 30, 64)]
+
+
+@pytest.mark.parametrize(("n_c", "n_r"), PATHS)
+def test_every_window_has_enough_hits(n_c: int, n_r: int) -> None:
+    for hits in (1, 2, 5):
+        counts = frame_hits(n_c, n_r, hits)
+        windows = [counts[max(c - n_r, 0) : c + n_r + 1].sum() for c in range(n_c)]
+        assert counts.shape == (n_c,) and (counts >= hits).all()
+        assert min(windows) >= (2 * n_r + 1) * hits
+        assert counts.sum() == (n_c + 2 * n_r) * hits, "not one hit more than the frames that are missing"
+
+
+@pytest.mark.parametrize(("n_c", "n_r"), [(n_c, n_r) for n_c, n_r in PATHS if n_c > 4 * n_r])
+def test_windows_in_the_interior_have_exactly_that_many(n_c: int, n_r: int) -> None:
+    counts = frame_hits(n_c, n_r, 2)
+    for c in range(2 * n_r, n_c - 2 * n_r):
+        assert counts[c - n_r : c + n_r + 1].tolist() == [2] * (2 * n_r + 1)
+
+
+def test_the_first_frames_take_over_what_is_missing_before_them() -> None:
+    assert frame_hits(12, 3, 2).tolist() == [4, 4, 4, 2, 2, 2, 2, 2, 2, 4, 4, 4]
+    assert frame_hits(1, 3, 2).tolist() == [14]
+    assert frame_hits(4, 0, 2).tolist() == [2, 2, 2, 2]
+
+
+def test_both_ends_are_alike() -> None:
+    for n_c, n_r in PATHS:
+        np.testing.assert_array_equal(frame_hits(n_c, n_r, 3), frame_hits(n_c, n_r, 3)[::-1])
+
+
+@pytest.mark.parametrize(
+    ("pixel", "near"),
+    [
+        (9, [2, 3, 4, 8, 9, 10, 14, 15, 16]),  # column 3, row 1
+        (0, [0, 1, 6, 7]),
+        (5, [4, 5, 10, 11]),
+        (23, [16, 17, 22, 23]),
+    ],
+)
+def test_a_mirror_is_flagged_with_its_neighbours(pixel: int, near: list[int]) -> None:
+    hits, flags = empty_hits(24), np.zeros(24, np.uint8)
+    hits.pixel[:] = np.arange(24)[::-1]
+    hits.specular[:] = 0.0
+    hits.specular[23 - pixel, 1] = 0.5
+    flag_mirrors(hits, 24, 6, 4, flags)
+    assert np.flatnonzero(flags).tolist() == near
+    assert set(flags.tolist()) == {0, 1}
+
+
+def test_a_still_camera_has_the_hits_of_its_whole_window_and_no_reuse() -> None:
+    inputs = tiny.prepared(tiny.job(camera={"frames": 9}, reuse={"n_r": 3}))
+    assert inputs.still
+    with tiny.planned(inputs) as (setup, _):
+        assert setup.per_pixel.tolist() == [14]
+        assert (setup.n_r, setup.n_frames, setup.balance) == (0, 1, False)
+
+
+def test_features_that_a_scene_lacks_are_off() -> None:
+    with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}), tiny.room(mirrors=False))) as (setup, _):
+        assert setup.depth == 0 and setup.mirror_hits == 0 and not setup.background.any()
+    with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}, specular={"depth": 0}))) as (setup, _):
+        assert setup.depth == 0 and setup.mirror_hits == 0
+    with tiny.planned(tiny.prepared(tiny.job(reuse={"n_r": 2}))) as (setup, _):
+        assert setup.depth == 4 and setup.mirror_hits == 10
+
+
+@pytest.mark.parametrize(("hits", "m"), [(1 / 2, 2), (1 / 3, 3), (1 / 4, 4), (1 / 7, 7), (1 / 8, 8)])
+def test_a_fraction_visits_every_pixel_once_in_as_many_frames(hits: float, m: int) -> None:
+    order = pixel_order(21, 13)
+    found = [passes(order, 21, c, hits) for c in range(m)]
+    assert all(len(parts) == 1 and parts[0].per_pixel == 1 and parts[0].first_sample == 0 for parts in found)
+    np.testing.assert_array_equal(np.sort(np.concatenate([parts[0].pixels for parts in found])), np.arange(21 * 13))
+
+
+def test_whole_hits_come_first_and_then_the_fraction() -> None:
+    whole, part = passes(pixel_order(8, 8), 8, 0, 2.5)
+    assert (whole.per_pixel, whole.first_hit, whole.n, part.first_sample, part.first_hit) == (2, 0, 128, 2, 128)
+    assert part.n == 32
+    assert [p.n for p in passes(pixel_order(8, 8), 8, 0, 3.0)] == [192]
+
+
+def test_a_pixel_that_nobody_reaches_gets_a_hit() -> None:
+    """Sparse hits leave holes; they would be black."""
+    sky = {"background": [0.5, 0.5, 0.5]}
+    job = tiny.job(samples={"hits": 0.125}, camera=tiny.WALK, reuse={"n_r": 1}, scene=sky)
+    for frame in tiny.render_frames(tiny.prepared(job)).composed:
+        assert (frame.hits >= 1).all() and frame.hits.mean() < 1.5
+        # where alone an outer hit on a mirror's edge falls, nothing is seen: a pixel or two of 432
+        assert (frame.images.max(axis=(0, 3)) == 0).sum() <= 2

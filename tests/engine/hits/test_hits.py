@@ -1,0 +1,126 @@
+"""Native hits: which pixels, which streams, which order."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+from support.hits import native
+from support.oracle import Oracle
+
+from framearray_cli.engine.hits.hits import ESCAPED, SURFACE, Hits, empty_hits, record_hits
+from framearray_cli.engine.hits.native import Samples, extra_hits, pilot_hits, pixel_order
+from framearray_cli.engine.hits.rays import room_for_hits
+
+
+@pytest.mark.parametrize(("width", "height"), [(400, 300), (24, 18), (1, 1), (33, 5), (7, 40)])
+def test_every_pixel_once(width: int, height: int) -> None:
+    order = pixel_order(width, height)
+    np.testing.assert_array_equal(np.sort(order), np.arange(width * height))
+
+
+def test_packets_are_blocks_of_pixels() -> None:
+    """Coherent packets: 16 pixels in turn are a block of 4 x 4."""
+    order = pixel_order(64, 32).reshape(-1, 16)
+    for axis in (order % 64, order // 64):
+        assert (np.ptp(axis, axis=1) == 3).all()
+
+
+@pytest.mark.parametrize(("resolution", "per_pixel"), [([24, 18], 1), ([24, 18], 3), ([5, 7], 2), ([1, 1], 4)])
+def test_every_pixel_has_its_hits_inside_its_box(resolution: Any, per_pixel: int) -> None:
+    inputs = tiny.prepared(tiny.job(camera={"resolution": resolution}))
+    with tiny.planned(inputs) as (setup, _):
+        hits = native(setup, 0, per_pixel, batch=48)
+    assert (np.bincount(hits.pixel, minlength=setup.n_pixels) == per_pixel).all()
+    assert len(np.unique(hits.key)) == len(hits.key)
+    frame = np.stack([setup.cams.right[0], setup.cams.up[0], setup.cams.forward[0]])
+    a, b, forward = (hits.incoming @ frame.T).astype(np.float64).T
+    np.testing.assert_allclose(forward, 1, rtol=1e-6)
+    x = a * setup.cams.focal + resolution[0] / 2 - hits.pixel % resolution[0]
+    y = resolution[1] / 2 - b * setup.cams.focal - hits.pixel // resolution[0]
+    assert min(x.min(), y.min()) > -1e-4 and max(x.max(), y.max()) < 1 + 1e-4
+
+
+def test_batches_of_any_size_find_the_same_hits() -> None:
+    with tiny.planned(tiny.prepared(tiny.job(scene={"background": 1.0}))) as (setup, _):
+        one, other = native(setup, 0, 3), native(setup, 0, 3, batch=37)
+    surface = one.kind == SURFACE
+    assert surface.any() and not surface.all()
+    for name in ("kind", "key", "pixel", "position", "incoming", "reflectivity", "specular"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    for name in ("geometric", "shading", "offset"):
+        np.testing.assert_array_equal(getattr(one, name)[surface], getattr(other, name)[surface])
+
+
+def test_hits_are_those_of_the_twin() -> None:
+    inputs = tiny.prepared(tiny.job())
+    with tiny.planned(inputs) as (setup, ambient):
+        hits = native(setup, 0, 2)
+    twin = Oracle(inputs, ambient).native(0)
+    here = {key: i for i, key in enumerate(hits.key.tolist())}
+    order = [here[key] for key in twin.key]
+    np.testing.assert_array_equal(hits.kind[order] == SURFACE, twin.surface)
+    np.testing.assert_array_equal(hits.pixel[order], twin.pixel)
+    surface = np.flatnonzero(twin.surface)
+    order = [order[i] for i in surface]
+    # 2e-6: some tens of roundings of 2^-24, of a room that is 4 wide
+    for name in ("position", "geometric", "shading", "reflectivity", "specular"):
+        np.testing.assert_allclose(getattr(hits, name)[order], getattr(twin, name)[surface], rtol=0, atol=5e-6)
+    np.testing.assert_allclose(hits.offset[order], twin.lift[surface], rtol=1e-6)
+
+
+def test_normals_are_on_the_side_that_is_seen() -> None:
+    with tiny.planned(tiny.prepared(tiny.job())) as (setup, _):
+        hits = native(setup, 0, 2)
+    surface = hits.kind == SURFACE
+    way, geometric, shading = hits.incoming[surface], hits.geometric[surface], hits.shading[surface]
+    assert ((way * geometric).sum(axis=1) <= 0).all()
+    assert ((geometric * shading).sum(axis=1) >= 0).all()
+    assert (geometric != shading).any()
+
+
+def test_an_escaped_ray_is_a_unit_direction_and_reflects_nothing() -> None:
+    with tiny.planned(tiny.prepared(tiny.job())) as (setup, _):
+        hits = native(setup, 0, 2)
+    gone = hits.kind == ESCAPED
+    np.testing.assert_allclose(np.linalg.norm(hits.position[gone], axis=1), 1, rtol=3e-7)
+    assert not hits.reflectivity[gone].any() and not hits.specular[gone].any()
+
+
+def test_extra_hits_go_on_where_the_pixels_own_hits_end() -> None:
+    """Hits beyond the first two of some pixels are hits 2, 3 and 4 of a frame that has five of each."""
+    with tiny.planned(tiny.prepared(tiny.job())) as (setup, _):
+        all_hits = native(setup, 0, 5)
+        pixels = np.array([3, 100, 431], np.int32)
+        more, packets = empty_hits(9), room_for_hits(16).packets
+        samples = Samples(setup.seed, pixels, per_pixel=3, first=2)
+        extra_hits(setup.cams, 0, samples, 0, 9, setup.world, packets, more)
+        fewer = empty_hits(2)
+        extra_hits(setup.cams, 0, samples, 4, 2, setup.world, packets, fewer)
+    assert more.pixel.tolist() == [3] * 3 + [100] * 3 + [431] * 3
+    here = {key: i for i, key in enumerate(all_hits.key.tolist())}
+    order = [here[key] for key in more.key.tolist()]
+    np.testing.assert_array_equal(more.position, all_hits.position[order])
+    np.testing.assert_array_equal(fewer.position, more.position[4:6])
+    own = set(native_keys(all_hits, 3, 5)) - set(more.key.tolist())
+    assert len(own) == 2
+
+
+def native_keys(hits: Hits, pixel: int, n: int) -> list[int]:
+    keys: list[int] = hits.key[hits.pixel == pixel].tolist()
+    assert len(keys) == n
+    return keys
+
+
+def test_pilot_rays_pass_through_pixel_centres() -> None:
+    with tiny.planned(tiny.prepared(tiny.job())) as (setup, _):
+        hits, packets = empty_hits(432), room_for_hits(432).packets
+        pilot_hits(setup.cams, 0, setup.order, 0, 432, setup.world, packets, hits)
+        seen = empty_hits(432)
+        record_hits(setup.world, packets, 432, True, seen)
+    np.testing.assert_allclose(hits.specular, seen.specular, rtol=1e-6)
+    assert 0 < (hits.specular.max(axis=1) > 0).sum() < 432
+    frame = np.stack([setup.cams.right[0], setup.cams.up[0], setup.cams.forward[0]])
+    a, b, _ = (seen.incoming @ frame.T).astype(np.float64).T
+    np.testing.assert_allclose(a * setup.cams.focal + 12, hits.pixel % 24 + 0.5, atol=1e-4)
+    np.testing.assert_allclose(9 - b * setup.cams.focal, hits.pixel // 24 + 0.5, atol=1e-4)

@@ -1,0 +1,241 @@
+"""What a ray finds on a triangle: texels, colours, normals, points."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+from support.triangles import QUANTITIES, find_numbers
+
+from framearray_cli.base.colour import linear_from_srgb8
+from framearray_cli.engine.inputs.surfaces import (
+    OFFSET_ULPS,
+    ULP,
+    Surfaces,
+    is_cut_out,
+    nearest_texel_at,
+    surfaces,
+    texture_at,
+    total_at,
+)
+from framearray_cli.engine.kernels.kernel import kernel
+from framearray_cli.scene.files import Material
+
+QUAD = tiny.quad((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0))
+UVS = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float64)
+
+
+@kernel
+def look_up(s: Surfaces, uv: Any, out: Any) -> None:
+    for i in range(uv.shape[0]):
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = texture_at(s, 0, uv[i, 0], uv[i, 1])
+
+
+@kernel
+def pick(s: Surfaces, uv: Any, out: Any) -> None:
+    for i in range(uv.shape[0]):
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = nearest_texel_at(s, 0, uv[i, 0], uv[i, 1])
+
+
+@kernel
+def add_up(s: Surfaces, triangle: int, uv: Any, out: Any) -> None:
+    for i in range(uv.shape[0]):
+        out[i, 0], out[i, 1], out[i, 2] = total_at(s, triangle, uv[i, 0], uv[i, 1])
+
+
+@kernel
+def cut_out(s: Surfaces, triangle: int, uv: Any, out: Any) -> None:
+    for i in range(uv.shape[0]):
+        out[i] = is_cut_out(s, triangle, uv[i, 0], uv[i, 1])
+
+
+def textured(texels: Any) -> Surfaces:
+    return surfaces(tiny.scene_of(QUAD, Material(name="T", texture=0), uvs=UVS, textures=(texels,)))
+
+
+def looked_up(s: Surfaces, uv: Any) -> Any:
+    uv = np.asarray(uv, np.float32)
+    out = np.empty((len(uv), 4), np.float32)
+    look_up(s, uv, out)
+    return out
+
+
+def found(s: Surfaces, uv: Any = ((0.25, 0.25),), way: Any = (0, 0, -1), triangle: int = 0) -> Any:
+    """Quantities (n, 3) by name, at points (n, 2) of a triangle."""
+    points = np.ascontiguousarray(np.asarray(uv, np.float32).T)
+    n = points.shape[1]
+    ways = np.repeat(np.asarray(way, np.float32)[:, None], n, axis=1)
+    out = np.empty((len(QUANTITIES), 3, n), np.float32)
+    find_numbers(s, np.full(n, triangle, np.int32), points, ways, out)
+    return {name: part.T for name, part in zip(QUANTITIES, out, strict=True)}
+
+
+def centres(width: int, height: int) -> Any:
+    """Texture coordinates of all texel centres, (height, width, 2); row 0 is on top, v points up."""
+    u, v = np.meshgrid((np.arange(width) + 0.5) / width, 1 - (np.arange(height) + 0.5) / height)
+    return np.stack([u, v], axis=-1)
+
+
+@pytest.mark.parametrize(("width", "height"), [(8, 8), (5, 3), (1, 1), (1, 7)])
+def test_a_texel_centre_shows_the_texel(width: int, height: int) -> None:
+    texels = np.random.default_rng(1).integers(0, 256, (height, width, 4), dtype=np.uint8)
+    texels[0, 0] = (0, 255, 10, 255)
+    values = looked_up(textured(texels), centres(width, height).reshape(-1, 2)).reshape(height, width, 4)
+    # a centre is off by 2^-24 of the coordinate at most, so by 2^-24 * 8 texels of contrast 1
+    np.testing.assert_allclose(values[..., :3], linear_from_srgb8(texels[..., :3]), rtol=0, atol=2e-6)
+    np.testing.assert_allclose(values[..., 3], texels[..., 3] / 255, rtol=0, atol=2e-6)
+
+
+@pytest.mark.parametrize(("width", "height"), [(8, 8), (5, 3), (1, 1), (1, 7)])
+def test_the_nearest_texel_is_the_one_around_a_place_in_every_repetition(width: int, height: int) -> None:
+    rng = np.random.default_rng(4)
+    texels = rng.integers(0, 256, (height, width, 4), dtype=np.uint8)
+    s = textured(texels)
+    places = centres(width, height)
+    for shift in ((0, 0), (1, -2), (-3, 5)):
+        inside = rng.uniform(-0.49, 0.49, places.shape) / (width, height)
+        uv = (places + inside + shift).reshape(-1, 2).astype(np.float32)
+        out = np.empty((len(uv), 4), np.float32)
+        pick(s, uv, out)
+        expected = np.concatenate([linear_from_srgb8(texels[..., :3]), texels[..., 3:] / 255], axis=-1)
+        np.testing.assert_allclose(out, expected.reshape(-1, 4), rtol=3e-7, atol=0)
+
+
+def test_what_nearest_texels_average_to_is_what_blended_ones_do() -> None:
+    """Obscurance takes the nearest texel: each texel counts for its own area, as when it is blended."""
+    s = textured(tiny.checks(16))
+    places = ((np.arange(512) + 0.5) / 512).astype(np.float32)
+    uv = np.ascontiguousarray(np.stack(np.meshgrid(places, places), axis=-1).reshape(-1, 2))
+    nearest = np.empty((len(uv), 4), np.float32)
+    pick(s, uv, nearest)
+    blended = looked_up(s, uv)
+    np.testing.assert_allclose(nearest.mean(axis=0, dtype=float), blended.mean(axis=0, dtype=float), rtol=1e-5)
+    assert abs(nearest - blended).max() > 0.1
+
+
+def test_reflectivity_in_all_is_the_diffuse_and_the_mirror_part() -> None:
+    """At texel centres, where blending changes nothing."""
+    material = Material(name="T", reflectivity=(0.5, 0.4, 0.3), texture=0, specular=(0.2, 0.1, 0.4), specular_texture=0)
+    s = surfaces(tiny.scene_of(QUAD, material, uvs=UVS, textures=(tiny.checks(4),)))
+    uv = np.float32([[0.25, 0.125], [0.5, 0.125], [0.25, 0.375]])  # of the first triangle: (u + v, v) in the texture
+    total = np.empty((len(uv), 3), np.float32)
+    add_up(s, 0, uv, total)
+    parts = found(s, uv)
+    np.testing.assert_allclose(total, parts["diffuse"] + parts["mirror"], rtol=0, atol=2e-6)
+    assert (parts["mirror"] > 0.01).any()
+
+
+def test_textures_repeat_in_both_directions() -> None:
+    s = textured(tiny.checks(8))
+    uv = np.random.default_rng(2).random((200, 2)) * 0.98 + 0.01
+    for shift in ((1, 0), (0, 1), (-3, 2), (-1, -1)):
+        # at 3 the coordinate has lost two bits: 2^-22 * 8 texels
+        np.testing.assert_allclose(looked_up(s, uv + shift), looked_up(s, uv), rtol=0, atol=4e-6)
+
+
+def test_half_way_between_texels_is_their_mean_across_the_border_too() -> None:
+    texels = tiny.checks(4)
+    linear = linear_from_srgb8(texels[..., :3])
+    values = looked_up(textured(texels), [[0.5, 0.875], [0.0, 0.875], [1.0, 0.875], [0.125, 0.0], [0.0, 1.0]])[:, :3]
+    expected = [
+        (linear[0, 1] + linear[0, 2]) / 2,
+        (linear[0, 3] + linear[0, 0]) / 2,
+        (linear[0, 3] + linear[0, 0]) / 2,
+        (linear[3, 0] + linear[0, 0]) / 2,
+        linear[[0, 0, 3, 3], [0, 3, 0, 3]].mean(axis=0),
+    ]
+    np.testing.assert_allclose(values, expected, rtol=0, atol=2e-6)
+
+
+def test_v_points_up() -> None:
+    texels = np.zeros((2, 1, 4), np.uint8)
+    texels[0] = 255  # white on top
+    low, high = looked_up(textured(texels), [[0.5, 0.25], [0.5, 0.75]])
+    assert high[:3].tolist() == [1, 1, 1] and low[:3].tolist() == [0, 0, 0]
+
+
+def test_an_endless_coordinate_gives_some_texel() -> None:
+    values = looked_up(textured(tiny.checks(8)), [[np.inf, 0.5], [0.5, np.nan], [-np.inf, np.nan]])
+    assert np.isfinite(values).all()
+
+
+def test_texture_and_corner_colours_multiply_the_factor() -> None:
+    colours = np.array([[[1, 0, 0], [0, 1, 0], [0, 0, 1]], [[1, 1, 1]] * 3], np.float32)
+    texels = np.full((2, 2, 4), 188, np.uint8)
+    material = Material(name="T", reflectivity=(0.5, 1.0, 0.25), texture=0)
+    s = surfaces(tiny.scene_of(QUAD, material, uvs=UVS, colours=colours, textures=(texels,)))
+    grey = linear_from_srgb8(np.uint8([188]))[0]
+    values = found(s, [[0, 0], [1, 0], [0, 1], [0.25, 0.5]])["diffuse"]
+    weights = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.25, 0.25, 0.5]])
+    np.testing.assert_allclose(values, weights * (0.5, 1.0, 0.25) * grey, rtol=1e-6, atol=1e-7)
+    assert (found(s)["mirror"] == 0).all()
+
+
+def test_the_mirror_part_has_its_own_factor_and_texture() -> None:
+    texels = np.full((2, 2, 4), 255, np.uint8)
+    texels[..., 1] = 188
+    material = Material(name="M", reflectivity=(0.1, 0.1, 0.1), specular=(0.5, 0.5, 0.25), specular_texture=0)
+    values = found(surfaces(tiny.scene_of(QUAD, material, uvs=UVS, textures=(texels,))))
+    grey = linear_from_srgb8(np.uint8([188]))[0]
+    np.testing.assert_allclose(values["mirror"][0], [0.5, 0.5 * grey, 0.25], rtol=1e-6)
+    np.testing.assert_allclose(values["diffuse"][0], 0.1, rtol=1e-6)
+
+
+def test_the_alpha_mask_cuts_below_the_cutoff() -> None:
+    texels = np.full((1, 4, 4), 255, np.uint8)
+    texels[0, :, 3] = (0, 127, 128, 255)
+    uv = centres(4, 1).reshape(-1, 2)
+    result = np.empty(4, np.uint8)
+    for alpha, cutoff, expected in ((1.0, 0.5, [1, 1, 0, 0]), (0.5, 0.5, [1, 1, 1, 0]), (1.0, 0.2, [1, 0, 0, 0])):
+        material = Material(name="A", alpha=alpha, alpha_texture=0, alpha_cutoff=cutoff)
+        big = tiny.scene_of(
+            QUAD[:1], material, uvs=np.array([[[0, 0], [1, 0], [0, 1]]], np.float64), textures=(texels,)
+        )
+        cut_out(surfaces(big), 0, uv.astype(np.float32), result)
+        assert result.tolist() == expected
+
+
+def test_normals_are_on_the_viewers_side() -> None:
+    tilted = np.tile([0.0, 0.6, 0.8], (2, 3, 1))
+    s = surfaces(tiny.scene_of(QUAD, normals=tilted))
+    for way, sign in (((0, 0, -1), 1), ((0.9, 0, -0.1), 1), ((0, 0, 1), -1)):
+        values = found(s, way=way)
+        np.testing.assert_allclose(values["geometric"][0], [0, 0, sign], atol=1e-7)
+        np.testing.assert_allclose(values["shading"][0], [0, sign * 0.6, sign * 0.8], atol=1e-7)
+
+
+def test_interpolated_normals_have_length_one() -> None:
+    normals = np.random.default_rng(3).normal(size=(2, 3, 3)) * 0.3 + [0, 0, 1]
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    s = surfaces(tiny.scene_of(QUAD, normals=normals))
+    uv = np.random.default_rng(4).dirichlet((1, 1, 1), 100)[:, :2]
+    values = found(s, uv)["shading"]
+    np.testing.assert_allclose(np.linalg.norm(values, axis=1), 1, rtol=3e-7)
+    expected = np.column_stack([1 - uv.sum(axis=1), uv]) @ s.normals[0].astype(np.float64)
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    np.testing.assert_allclose(values, expected, atol=1e-6)
+
+
+def test_normals_that_cancel_leave_the_geometric_one() -> None:
+    scene = tiny.scene_of(QUAD[:1], normals=np.array([[[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0]]]))
+    values = found(surfaces(scene), [[0.5, 0.0]])
+    np.testing.assert_array_equal(values["shading"], values["geometric"])
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-4, 1.0, 1e4, 1e9])
+def test_points_and_normals_at_every_scale(size: float) -> None:
+    rng = np.random.default_rng(5)
+    scene = tiny.scene_of(rng.normal(size=(20, 3, 3)) * size)
+    s = surfaces(scene)
+    for triangle in range(20):
+        values = found(s, [[0.2, 0.3]], triangle=triangle)
+        a, b, c = scene.corners[triangle].astype(np.float64)
+        np.testing.assert_allclose(values["position"][0], 0.5 * a + 0.2 * b + 0.3 * c, rtol=0, atol=2e-7 * size)
+        normal = np.cross(b - a, c - a) / np.linalg.norm(np.cross(b - a, c - a))
+        np.testing.assert_allclose(values["geometric"][0], normal * np.sign(normal[2]), atol=1e-6)
+
+
+def test_the_offset_follows_the_largest_coordinate() -> None:
+    scene = tiny.room()
+    expected = OFFSET_ULPS * ULP * abs(scene.corners).max(axis=(1, 2))
+    np.testing.assert_allclose(surfaces(scene).offset, expected, rtol=1e-6)

@@ -1,0 +1,147 @@
+"""Mirrors: what they show, how deep, and that scenes without them do not pay."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+from support.hits import native
+
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.hits.hits import SURFACE, Hits, empty_hits
+from framearray_cli.engine.hits.rays import room_for_hits
+from framearray_cli.engine.terms.mirrors import count_mirrors, reflect
+from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.scene import Scene, build_scene
+
+TINT = np.float32([0.9, 0.8, 0.7])
+
+
+def behind_mirror() -> Scene:
+    """A mirror in the plane z = -1 that fills the view, and a coloured box and ball between it and the eye."""
+    corners, normals = tiny.ball((0.8, 0.2, 1.5), 0.5)
+    parts = (
+        Part(material=0, corners=tiny.quad((-9, -9, -1), (9, -9, -1), (9, 9, -1), (-9, 9, -1))),
+        Part(material=1, corners=tiny.box((-1.5, -0.5, 0.4), (-0.6, 0.6, 1.2), 0.4)),
+        Part(material=2, corners=corners, normals=normals),
+        Part(material=1, corners=tiny.box((-9, -9, 6), (9, 9, 9))),
+    )
+    materials = (
+        Material(name="Mirror", reflectivity=(0, 0, 0), specular=tuple(float(t) for t in TINT)),
+        Material(name="Box", reflectivity=(0.8, 0.3, 0.2)),
+        Material(name="Ball", reflectivity=(0.2, 0.4, 0.9)),
+    )
+    return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
+
+
+def work_of(scene: Scene, **changes: Any) -> Any:
+    keys = [{"frame": 0, "eye": [0.0, 0.1, 3.0], "target": [0.0, 0.1, -1.0]}]
+    return tiny.planned(tiny.prepared(tiny.job(camera={"keys": keys, "fov": 60.0}, **changes), scene))
+
+
+def reflected(setup: FrameSetup, hits: Hits, throughput: Any = None) -> tuple[Hits, Any, int]:
+    n = len(hits.kind)
+    out, through = empty_hits(n), np.empty((n, 3), np.float32)
+    throughput = np.ones((n, 3), np.float32) if throughput is None else throughput
+    packets = room_for_hits(n).packets
+    m = reflect(hits, n, throughput, setup.world, packets, out, through)
+    return Hits(*(array[:m] for array in out)), through[:m], m
+
+
+def test_a_mirror_shows_the_mirrored_scene() -> None:
+    """A ray to a point of the mirror goes on as a ray of the mirrored eye through the same point would."""
+    with work_of(behind_mirror()) as (setup, _):
+        hits = native(setup, 0, 2)
+        mirrors = (hits.specular > 0).any(axis=1)
+        assert 50 < mirrors.sum() == count_mirrors(hits, len(hits.kind))
+        seen, through, m = reflected(setup, hits)
+        assert m == mirrors.sum()
+        mirror = hits.position[mirrors].astype(np.float64)  # so that the roundings below are those of the program
+        flip = np.array([1, 1, -1])
+        eye = setup.cams.position[0] * flip + np.array([0, 0, 2 * mirror[:, 2].mean()])
+        way = mirror - eye
+        np.testing.assert_allclose(seen.incoming, hits.incoming[mirrors] * flip, atol=1e-6)
+        surface = seen.kind == SURFACE
+        assert surface.sum() > 50
+        # what the mirrored eye sees lies on the line from it through the mirror's point
+        line = way[surface] / np.linalg.norm(way[surface], axis=1, keepdims=True)
+        beyond = seen.position[surface] - eye
+        off = beyond - (beyond * line).sum(axis=1, keepdims=True) * line
+        assert abs(off).max() < 1e-5  # 2^-24 of coordinates up to 9, some roundings
+        assert ((beyond * line).sum(axis=1) > np.linalg.norm(way[surface], axis=1)).all()
+        assert len(np.unique(seen.reflectivity[surface], axis=0)) >= 2, "box and ball are both seen"
+    np.testing.assert_array_equal(through, np.tile(TINT, (m, 1)))
+    np.testing.assert_array_equal(seen.pixel, hits.pixel[mirrors])
+
+
+def test_throughput_multiplies() -> None:
+    with work_of(behind_mirror()) as (setup, _):
+        hits = native(setup, 0, 1)
+        before = np.random.default_rng(1).random((len(hits.kind), 3)).astype(np.float32)
+        _, through, _ = reflected(setup, hits, before)
+    np.testing.assert_allclose(through, before[(hits.specular > 0).any(axis=1)] * TINT, rtol=1e-7)
+
+
+def test_random_streams_move_on() -> None:
+    """Else a reflected hit would use the very directions of the hit before it."""
+    with work_of(behind_mirror()) as (setup, _):
+        hits = native(setup, 0, 3)
+        seen, _, m = reflected(setup, hits)
+    assert len(np.unique(np.concatenate([hits.key, seen.key]))) == len(hits.key) + m
+
+
+def corridor(depth: int) -> Any:
+    """Two mirrors that face each other; every path goes on to the depth of the job."""
+    plates = [tiny.quad((-99, -99, z), (99, -99, z), (99, 99, z), (-99, 99, z)) for z in (-1, 1)]
+    scene = tiny.scene_of(
+        np.concatenate(plates), Material(name="M", reflectivity=(0.0, 0.0, 0.0), specular=(0.5, 0.5, 0.5))
+    )
+    keys = [{"frame": 0, "eye": [0, 0, 0.5], "target": [0.01, 0.02, -1.0]}]
+    job = tiny.job(
+        camera={"keys": keys, "fov": 40.0}, specular={"depth": depth}, scene={"background": 1.0}, ambient={"paths": 64}
+    )
+    return tiny.render_frames(tiny.prepared(job, scene))
+
+
+@pytest.mark.parametrize("depth", [1, 2, 5])
+def test_paths_end_at_the_depth(depth: int) -> None:
+    rendered = corridor(depth)
+    assert rendered.rays["mirror"] == depth * 2 * 24 * 18
+    assert not rendered.images.any(), "nothing but mirrors: no light, whatever the depth"
+
+
+def test_a_mirror_shows_the_background() -> None:
+    """A mirror that sees nothing but sky is the sky, tinted; what is beside the mirror is the sky itself."""
+    plate = tiny.quad((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0))
+    scene = tiny.scene_of(plate, Material(name="M", reflectivity=(0.0, 0.0, 0.0), specular=(0.5, 0.25, 1.0)))
+    keys = [{"frame": 0, "eye": [0, 0, 3], "target": [0, 0, 0]}]
+    job = tiny.job(camera={"keys": keys, "fov": 60.0}, scene={"background": [2.0, 2.0, 3.0]}, samples={"hits": 4})
+    image = tiny.render_frames(tiny.prepared(job, scene)).images[0, 0]
+    np.testing.assert_allclose(image[9, 12], [1.0, 0.5, 3.0], rtol=1e-6)
+    np.testing.assert_allclose(image[0, 0], [2.0, 2.0, 3.0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("n_r", [0, 1, 2])
+def test_sparse_hits_show_a_mirror_once(n_r: int) -> None:
+    """A mirror's pixel that no hit of the frame reaches is shown by its own mirror hits, and not again by another."""
+    plate = tiny.quad((-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0))
+    scene = tiny.scene_of(plate, Material(name="M", reflectivity=(0.0, 0.0, 0.0), specular=(0.5, 0.25, 1.0)))
+    keys = [
+        {"frame": 0, "eye": [0, 0, 3], "target": [0, 0, 0]},
+        {"frame": 4, "eye": [0.1, 0, 3], "target": [0.1, 0, 0]},
+    ]
+    job = tiny.job(
+        camera={"frames": 5, "keys": keys, "fov": 60.0},
+        scene={"background": [2.0, 2.0, 3.0]},
+        samples={"hits": 0.125},
+        reuse={"n_r": n_r},
+    )
+    for image in tiny.render_frames(tiny.prepared(job, scene)).images[:, 0]:
+        np.testing.assert_allclose(image[8:11, 11:14], np.tile([1.0, 0.5, 3.0], (3, 3, 1)), rtol=1e-6)
+        np.testing.assert_allclose(image[0], np.tile([2.0, 2.0, 3.0], (24, 1)), rtol=1e-6)
+
+
+def test_without_mirrors_no_mirror_ray_is_traced() -> None:
+    for scene, depth in ((tiny.room(mirrors=False), 4), (tiny.room(), 0)):
+        rendered = tiny.render_frames(tiny.prepared(tiny.job(specular={"depth": depth, "hits": 9}), scene))
+        assert not {"mirror", "pilot", "mirror shadow", "mirror obscurance"} & rendered.rays.keys()

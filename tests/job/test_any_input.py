@@ -1,0 +1,259 @@
+"""Properties of what reads files: any content gives what the file is for, or one message of the right kind."""
+
+import json
+import tomllib
+from pathlib import Path
+from random import Random
+
+import pytest
+import tomli_w
+from fuzz import extremes, jobseeds, tables, texts
+from fuzz.pathfiles import SEGMENTS
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+from support.movies import array_of
+
+from framearray_cli.array.manifest_toml import read_manifest, to_toml
+from framearray_cli.array.names import check_pattern
+from framearray_cli.array.ranges import frames_text, parse_frames
+from framearray_cli.array.record import sealed, unsealed
+from framearray_cli.base.errors import JobError, OutputError
+from framearray_cli.base.forms.problems import problems_of
+from framearray_cli.base.forms.schema import file_schema
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import job_table, read_job
+from framearray_cli.job.schema import job_schema
+from framearray_cli.tools.movie.pathfile import MoviePath, load_movie_path
+from framearray_cli.tools.movie.timeline import MOST_FRAMES, timeline
+from framearray_cli.tools.places import indices, position_of, read_place
+
+SEEDS = jobseeds.tables("a.glb")
+SCHEMA = job_schema()
+ODD = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.just(10**400),
+    st.floats(),
+    st.text(max_size=9),
+    st.dates(),
+    st.times(),
+    st.datetimes(),
+    st.recursive(
+        st.just(0), lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=2)
+    ),
+)  # fmt: skip
+
+
+def quick(examples: int):
+    """So many examples, the same ones in every run; a folder serves them all."""
+    return settings(
+        max_examples=examples,
+        derandomize=True,
+        deadline=None,
+        database=None,
+        suppress_health_check=[HealthCheck.function_scoped_fixture],
+    )
+
+
+@pytest.mark.parametrize("seed", sorted(SEEDS))
+def test_the_seeds_are_jobs(seed):
+    job = Job.model_validate(SEEDS[seed])
+    assert Job.model_validate(job_table(job)) == job
+
+
+def test_the_seeds_have_every_table_of_the_schema():
+    said = {key for table in SEEDS.values() for key in table}
+    assert said == set(SCHEMA["properties"]) - {"denoise"}
+    assert {source["type"] for table in SEEDS.values() for source in table["light"]["sources"]} == {
+        "point", "directional", "sun",
+    }  # fmt: skip
+
+
+def toml_key(place):
+    """A place as messages begin with it."""
+    whole = ""
+    for step in place:
+        whole += f"[{step}]" if isinstance(step, int) else f".{step}" if whole else str(step)
+    return whole
+
+
+@quick(300)
+@given(data=st.data())
+def test_a_wrong_value_is_told_with_its_place(data):
+    """Any value at any place of any job: a job, or problems of which one is told at that place, above or below it."""
+    table = tomllib.loads(tomli_w.dumps(SEEDS[data.draw(st.sampled_from(sorted(SEEDS)))]))
+    place = data.draw(st.sampled_from(list(tables.places(table))))
+    value = data.draw(ODD)
+    before = tables.at(table, place)
+    tables.put(table, place, value)
+    try:
+        job = Job.model_validate(table)
+    except ValidationError as error:
+        found = problems_of(error, Job)
+        key = toml_key(place)
+        # what depends on the value, such as keys beyond `frames`, is told beside it, in the same table or its list
+        top = toml_key(place[:1])
+        assert found, (place, before, value)
+        assert any(problem.startswith((key, top)) or key.startswith(problem.split(":")[0]) for problem in found), found
+        for problem in found:
+            assert ": " in problem
+            assert len(problem) < 700
+            assert not any(word in problem.lower() for word in ("pydantic", "validat", "traceback"))
+    else:
+        assert Job.model_validate(job_table(job)) == job
+
+
+@quick(250)
+@given(seed=st.integers(0, 2**32))
+def test_any_job_file_is_a_job_or_refused(tmp_path, seed):
+    """The mutations of the fuzz run: of tables, of bytes, and to the ends of what is allowed."""
+    rng = Random(seed)
+    file = tmp_path / "job.toml"
+    match rng.randrange(3):
+        case 0:
+            data = tomli_w.dumps(tables.mutated(rng, rng.choice(list(SEEDS.values())), SCHEMA)[1])
+        case 1:
+            data = tomli_w.dumps(extremes.extreme(rng, SEEDS)[1])
+        case _:
+            whole = tomli_w.dumps(rng.choice(list(SEEDS.values()))).encode()
+            data = rng.choice(list(texts.TEXT.values()))(rng, whole)
+    file.write_bytes(data.encode("utf-8", "replace") if isinstance(data, str) else data)
+    try:
+        job = read_job(file)
+    except JobError as error:
+        assert error.problems
+        assert str(error).startswith(f"{file}: ")
+        assert len(str(error)) < 20_000
+    else:
+        assert job.file == file
+
+
+@quick(200)
+@given(seed=st.integers(0, 2**32))
+def test_any_path_file_is_a_movie_or_refused(tmp_path, seed):
+    rng = Random(seed)
+    file = tmp_path / "path.toml"
+    table = rng.choice(SEGMENTS)
+    if rng.random() < 0.7:
+        table = tables.mutated(rng, table, file_schema(MoviePath))[1]
+        file.write_bytes(tomli_w.dumps(table).encode("utf-8", "replace"))
+    else:
+        file.write_bytes(rng.choice(list(texts.TEXT.values()))(rng, tomli_w.dumps(table).encode()))
+    array = array_of(rng.choice((1, 3)), rng.choice((1, 4)))
+    try:
+        movie = load_movie_path(file)
+        if sum(segment.n_passes for segment in movie.segments) * 1000 < MOST_FRAMES:
+            line = timeline(file, movie, array)
+        else:
+            return
+    except JobError as error:
+        assert str(error).startswith(f"{file}: ")
+    else:
+        assert all(0 <= shot.c < array.n_cameras for shot in line.shots)
+        assert all(0 <= position <= array.n_lights - 1 for shot in line.shots for position in shot.positions)
+
+
+@quick(200)
+@given(seed=st.integers(0, 2**32))
+def test_any_manifest_is_read_or_refused(tmp_path, seed):
+    rng = Random(seed)
+    whole = to_toml(array_of(rng.choice((1, 3)), rng.choice((1, 2))))
+    if rng.random() < 0.6:
+        data = tomli_w.dumps(tables.mutated(rng, tomllib.loads(whole), {})[1]).encode("utf-8", "replace")
+    else:
+        data = rng.choice(list(texts.TEXT.values()))(rng, whole.encode())
+    file = tmp_path / "manifest.toml"
+    file.write_bytes(data)
+    try:
+        manifest = read_manifest(tmp_path)
+    except OutputError as error:
+        assert str(error).startswith(f"{file}: ")
+        assert len(str(error)) < 3000
+    else:
+        (tmp_path / "again").mkdir(exist_ok=True)
+        (tmp_path / "again" / "manifest.toml").write_text(to_toml(manifest), encoding="utf-8")
+        assert to_toml(read_manifest(tmp_path / "again")) == to_toml(manifest)
+
+
+PATTERN = st.lists(
+    st.sampled_from(
+        ["{camera}", "{light:03d}", "{camera:04d}", "{camera!r}", "{", "}", "{{", "..", "/", "\\", ":", "a.png", "\0"]
+    ),
+    max_size=7,
+).map("".join)  # fmt: skip
+
+
+@quick(300)
+@given(pattern=PATTERN)
+def test_a_file_pattern_stays_in_its_folder(tmp_path, pattern):
+    try:
+        check_pattern("images", pattern, {"camera": True, "light": True})
+    except ValueError as error:
+        assert str(error).startswith("images: ")
+        return
+    names = {tmp_path / pattern.format(camera=c, light=l) for c in range(2) for l in range(12)}
+    assert len(names) == 24
+    assert all(Path(*name.parts).resolve().is_relative_to(tmp_path.resolve()) for name in names)
+
+
+RANGE = st.text(st.sampled_from("0123456789-x:y, "), max_size=14) | st.text(max_size=5)
+
+
+@quick(300)
+@given(text=RANGE, n=st.integers(1, 3000))
+def test_a_range_gives_frames_that_there_are(text, n):
+    try:
+        frames = parse_frames(text, n)
+    except ValueError as error:
+        assert "expected" in str(error)
+        return
+    assert frames == tuple(sorted(set(frames)))
+    assert frames[0] >= 0
+    assert frames[-1] < n
+    assert parse_frames(frames_text(frames), n) == frames
+
+
+PLACE = st.text(st.sampled_from("0123456789-+.%e,firstla "), max_size=9) | st.text(max_size=5)
+
+
+@quick(300)
+@given(text=PLACE, n=st.integers(1, 100))
+def test_a_place_is_an_index_that_there_is(text, n):
+    try:
+        place = read_place(text)
+    except ValueError as error:
+        assert "expected an index" in str(error)
+    else:
+        assert isinstance(position_of(place, n), float)
+    try:
+        found = indices("--cameras", text, n)
+    except JobError as error:
+        assert str(error).startswith("--cameras: expected")
+    else:
+        assert found
+        assert all(0 <= index < n for index in found)
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=3),
+    max_leaves=8,
+)
+
+
+@quick(200)
+@given(
+    table=st.dictionaries(st.text(max_size=6).filter(lambda key: key != "check"), JSON, min_size=1, max_size=4),
+    at=st.integers(0, 10**6),
+    bit=st.integers(0, 7),
+)
+def test_a_sealed_line_is_what_it_was_or_nothing(table, at, bit):
+    line = sealed(table)
+    found = unsealed(line)
+    assert found == json.loads(json.dumps(table))
+    broken = bytearray(line)
+    broken[at % len(line)] ^= 1 << bit
+    assert unsealed(bytes(broken)) is None
+    assert unsealed(line[: at % len(line)]) is None

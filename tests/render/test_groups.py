@@ -1,0 +1,211 @@
+"""Light that is stored by group of sources: added up, it is what a render of all sources gives."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from support import tiny
+
+from framearray_cli.array.images.images import read_layers
+from framearray_cli.array.manifest import array_files
+from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.pictures import Pictures, Relight
+from framearray_cli.render.render import render
+from framearray_cli.scene.paths.planes import Plane
+
+SKY = [0.3, 0.4, 0.5]
+LAMP = {**tiny.TABLE["light"]["sources"][0], "group": "lamps", "axis": "lamps"}
+SUN = {
+    "type": "directional",
+    "group": "sun",
+    "keys": [
+        {"frame": 0, "direction": [-0.6, -1.0, -0.3], "irradiance": [3.0, 2.5, 1.5]},
+        {"frame": 1, "direction": [0.5, -1.0, -0.2], "irradiance": [2.0, 2.5, 3.5]},
+    ],
+}
+SOURCES = [LAMP, SUN, tiny.RED]  # RED is in no group: "main"
+CAMERA = {**tiny.WALK, "frames": 3, "keys": [tiny.WALK["keys"][0], {**tiny.WALK["keys"][1], "frame": 2}]}
+FACTORS = {"lamps": (0.5, 2.0, 1.0), "sun": (0.0, 0.0, 0.0), "main": (3.0, 3.0, 0.25)}
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tiny.save_glb(tiny.room_meshes(), tmp_path_factory.mktemp("scene") / "room.glb")
+
+
+def rendered(scene: Path, folder: Path, sources: Any, **changes: Any) -> Pictures:
+    """Pictures of a job; nothing of the light's frames but what the sources say."""
+    scene_table = {"file": str(scene), "background": changes.pop("background", SKY)}
+    output = {"directory": str(folder), "format": "exr", "half": changes.pop("half", "never")}
+    table = tiny.table(
+        **{"scene": scene_table, "camera": CAMERA, "output": output, "reuse": {"n_r": 1}}
+        | {"obscurance": {"outside": "background"}}
+        | changes
+    )
+    table["light"] = {"sources": sources}
+    table["ambient"] = changes.get("ambient", table["ambient"])
+    render(tiny.Job.model_validate(table))
+    return Pictures(read_manifest(folder))
+
+
+def at(source: Any, frame: int, factor: Any = (1.0, 1.0, 1.0)) -> dict[str, Any]:
+    """One key frame of a source as a source that stands still, without a group."""
+    power = "irradiance" if "irradiance" in source["keys"][0] else "intensity"
+    [key] = [key for key in source["keys"] if key["frame"] == frame]
+    lit = (np.array(key[power]) * factor).tolist()
+    return {"type": source["type"], "keys": [{**key, "frame": 0, power: lit}]}
+
+
+@pytest.fixture(scope="module")
+def grouped(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Pictures:
+    return rendered(scene, tmp_path_factory.mktemp("groups") / "out", SOURCES)
+
+
+def test_what_is_stored(grouped: Pictures) -> None:
+    manifest = grouped.manifest
+    assert manifest.axes == {"light": 2, "lamps": 3}
+    assert [(group.name, group.axis, len(group.lights)) for group in manifest.groups] == [
+        ("lamps", "lamps", 3),
+        ("sun", "light", 2),
+        ("main", "light", 2),
+    ]
+    names = {path.name for path in array_files(manifest)}
+    assert names == {path.name for path in manifest.directory.glob("*.exr")}
+    assert {"tiny.lamps.c0002.l001.exr", "tiny.main.c0000.l001.exr", "tiny.ambient.c0001.exr"} < names
+    assert len(names) == 3 * (3 + 2 + 2 + 2 + 1), "groups, R W and background, layers"
+    assert manifest.summary["images"] == 3 * 9
+
+
+@pytest.mark.parametrize("place", [(0, 0), (1, 0), (0, 2)])
+def test_a_pair_of_positions_is_what_a_render_of_it_gives(
+    scene: Path, tmp_path: Path, grouped: Pictures, place: tuple[int, int]
+) -> None:
+    """Two light axes serve their full product."""
+    sun, lamp = place
+    whole = rendered(scene, tmp_path, [at(LAMP, lamp), at(SUN, sun), at(tiny.RED, 0)])
+    for c in range(3):
+        right = whole.picture(c, (0,))
+        np.testing.assert_allclose(grouped.picture(c, place), right, rtol=2e-5, atol=2e-6)
+        other = grouped.picture(c, (1 - sun, lamp))
+        assert np.abs(other - right).max() > 0.01, "the comparison can fail"
+
+
+def test_changed_light_is_what_a_render_with_it_gives(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
+    changed = [at(LAMP, 2, FACTORS["lamps"]), at(SUN, 1, FACTORS["sun"]), at(tiny.RED, 0, FACTORS["main"])]
+    whole = rendered(scene, tmp_path, changed)
+    for c in range(3):
+        made = grouped.picture(c, (1, 2), Relight(groups=FACTORS))
+        np.testing.assert_allclose(made, whole.picture(c, (0,)), rtol=2e-5, atol=2e-6)
+
+
+def test_ambient_light_that_is_put_out(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
+    dark = rendered(scene, tmp_path, [at(LAMP, 0), at(SUN, 0), at(tiny.RED, 0)], ambient={"intensity": [0.0] * 3})
+    made = grouped.picture(1, (0, 0), Relight(ambient=(0.0, 0.0, 0.0)))
+    np.testing.assert_allclose(made, dark.picture(1, (0,)), rtol=2e-5, atol=2e-6)
+
+
+def test_half_floats_keep_half_precision(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
+    """Each of the files that are added is within half a step of 2^-11."""
+    halves = rendered(scene, tmp_path, SOURCES, half="auto")
+    for place in ((0, 0), (1, 2)):
+        made, exact = (
+            halves.picture(0, place, Relight(groups=FACTORS)),
+            grouped.picture(0, place, Relight(groups=FACTORS)),
+        )
+        np.testing.assert_allclose(made, exact, rtol=2**-11, atol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["eye", "fit"])
+def test_the_ambient_light_of_groups_adds_up(scene: Path, tmp_path: Path, method: str) -> None:
+    ambient = {"method": method, "paths": 512}
+    made = rendered(scene, tmp_path / "groups", SOURCES, ambient=ambient).manifest
+    whole = rendered(scene, tmp_path / "whole", [at(LAMP, 2), at(SUN, 1), at(tiny.RED, 0)], ambient=ambient).manifest
+    parts = [made.groups[0].lights[2], made.groups[1].lights[1], made.groups[2].lights[1]]
+    total = np.sum([part.ambient for part in parts], axis=0) + made.background_ambient
+    np.testing.assert_allclose(total, whole.lights[0].ambient, rtol=1e-5)
+    assert (np.array(made.background_ambient) > 0).all()
+
+
+def test_a_black_background_is_not_stored(scene: Path, tmp_path: Path) -> None:
+    made = rendered(scene, tmp_path, SOURCES, background=[0.0] * 3, obscurance={"outside": "average"})
+    assert made.manifest.background_images == ""
+    assert not list(tmp_path.glob("*background*"))
+    whole = rendered(
+        scene, tmp_path / "whole", [at(LAMP, 0), at(SUN, 0), at(tiny.RED, 0)], background=[0.0] * 3,
+        obscurance={"outside": "average"},
+    )  # fmt: skip
+    np.testing.assert_allclose(made.picture(1, (0, 0)), whole.picture(1, (0,)), rtol=2e-5, atol=2e-6)
+
+
+def test_blocks_of_light_positions_and_steps_give_the_same(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
+    """A memory limit cuts the positions of all groups into blocks, wherever that falls."""
+    import framearray_cli.render.render as module
+
+    cut = [range(0, 4), range(4, 8), range(8, 9)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "light_blocks", lambda *_, **__: cut)
+        made = rendered(scene, tmp_path / "blocks", SOURCES)
+    for file in array_files(made.manifest):
+        if "layers" not in file.name:
+            np.testing.assert_array_equal(made._read(file), grouped._read(grouped.manifest.directory / file.name))
+    stepped = rendered(scene, tmp_path / "steps", SOURCES, samples={"shadow_step": 2})
+    for name in ("tiny.lamps.c0001.l000.exr", "tiny.lamps.c0001.l002.exr", "tiny.sun.c0001.l001.exr"):
+        near, right = (p._read(p.manifest.directory / name) for p in (stepped, grouped))
+        assert np.mean(np.abs(near - right)) < 0.02 * np.mean(right), "ends of every axis are tested"
+
+
+def test_halves_tell_errors_of_groups(scene: Path, tmp_path: Path) -> None:
+    made = rendered(scene, tmp_path, SOURCES, half="auto", samples={"halves": True})
+    found = made.manifest.summary["standard_error"]
+    assert found["group"] in ("lamps", "sun", "main") and found["light"] < 3
+    assert {"error.R", "difference.G"} < set(read_layers(tmp_path / "tiny.sun.c0000.l001.exr"))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"output": {"format": "png"}}, 'expected "exr" or "tif", as groups'),
+        ({"ambient": {"method": "light"}}, 'expected "eye" or "fit"'),
+        ({"samples": {"error": 0.1}}, "expected none, as the mean radiance"),
+        ({"light": {"sources": [{**tiny.RED, "axis": "a"}]}}, "expected a `group` beside it"),
+        ({"light": {"sources": [{**tiny.RED, "group": "layers"}]}}, "has a meaning of its own"),
+        ({"light": {"sources": [{**tiny.RED, "group": "a b"}]}}, "at most 40 letters"),
+        ({"light": {"sources": [LAMP, {**tiny.RED, "group": "lamps"}]}}, r'expected "lamps", as at sources\[0\]'),
+        ({"light": {"sources": [LAMP], "axes": {"lamps": 2}}}, r"at most 1 \(frames = 2\), got 2"),
+        ({"light": {"sources": [LAMP], "axes": {"lamp": 4}}}, "expected a source with this axis"),
+        ({"light": {"sources": [LAMP], "frames": 4}}, "every source has an axis of its own"),
+    ],
+)
+def test_jobs_that_do_not_go_with_groups(changes: Any, message: str) -> None:
+    table = tiny.table(light={"sources": SOURCES})
+    del table["light"]["frames"]
+    for key, value in changes.items():
+        table[key] = value if key in ("light", "samples") else {**table.get(key, {}), **value}
+    with pytest.raises(ValidationError, match=message):
+        tiny.Job.model_validate(table)
+
+
+def test_notes_and_lines_tell_groups(scene: Path) -> None:
+    from dataclasses import replace as changed
+
+    from framearray_cli.engine.terms.ambient.estimate import Ambient
+    from framearray_cli.render.prepare import _named
+    from framearray_cli.scene.paths.paths import lights
+
+    job = tiny.Job.model_validate({**tiny.table(), "light": {"sources": SOURCES}})
+    found = lights(job)
+    assert found.planes == (Plane.LIGHT,) * 7 + (Plane.INDIRECT,)
+    error = np.zeros(8)
+    error[4] = 0.5
+    ambient = Ambient(
+        intensity=np.ones((8, 3), np.float32),
+        standard_error=error,
+        reflectivity=np.ones(3, np.float32),
+        paths=1,
+        rays=1,
+        notes=("ambient: standard error 50 % at light 4 after 1 walks",),
+    )
+    assert _named(ambient, found).notes == ("ambient: standard error 50 % at light 1 of sun after 1 walks",)
+    assert _named(ambient, changed(found, groups=())).notes == ambient.notes

@@ -1,0 +1,305 @@
+"""A render that goes on, or that is split: the same bytes as one that was not."""
+
+import random
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+from support.tiny import WALK
+
+import framearray_cli.render.render as rendering
+from framearray_cli.array.integrity import scan_output
+from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.ranges import frames_text, parse_frames
+from framearray_cli.array.record import damaged, read_records, record_files, sealed, unsealed
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.hashing import digest
+from framearray_cli.engine.terms.ambient import estimate as ambient
+from framearray_cli.job.job import Job
+from framearray_cli.render.progress import RenderEvents
+from framearray_cli.render.render import render
+
+N = 7
+CAMERA = {**WALK, "frames": N, "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": N - 1}]}
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tiny.save_glb(tiny.room_meshes(), tmp_path_factory.mktemp("scene") / "room.glb")
+
+
+def job(scene: Path, out: Path, **changes: Any) -> Job:
+    output = {"directory": str(out), "format": "exr"}
+    table = {"scene": {"file": str(scene)}, "camera": CAMERA, "output": output, "reuse": {"n_r": 2}, **changes}
+    return tiny.job(**table)
+
+
+def images(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.glob("*.exr")}
+
+
+@pytest.fixture(scope="module")
+def whole(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("whole")
+    render(job(scene, out))
+    return out
+
+
+class Counting(RenderEvents):
+    """Counts what is written, and stops after some images."""
+
+    def __init__(self, most: float = np.inf) -> None:
+        self.images, self._most = 0, most
+
+    def written(self, images: int) -> None:
+        self.images += images
+        if self.images > self._most:
+            raise OutputError("stopped by the test")
+
+
+def test_parts_in_any_order_are_the_whole(scene: Path, tmp_path: Path, whole: Path) -> None:
+    parts = [(0, 1), (2, 5), (3,), (4, 6)]
+    random.Random(3).shuffle(parts)
+    for k, part in enumerate(parts):
+        assert not (k and read_manifest(tmp_path).summary["finished"])
+        summary = render(job(scene, tmp_path), cameras=part)
+        assert summary.images == 3 * len(part)
+    assert images(tmp_path) == images(whole)
+    summary = read_manifest(tmp_path).summary
+    assert summary["finished"] is True and summary["images"] == 3 * N
+    assert summary["hits_per_pixel"] == pytest.approx(read_manifest(whole).summary["hits_per_pixel"], abs=2e-3)
+    assert sorted(file.stem for file in record_files(tmp_path)) == ["0-1", "2,5", "3", "4,6"]
+
+
+def test_a_stopped_render_goes_on(scene: Path, tmp_path: Path, whole: Path) -> None:
+    runs, written = 0, 0
+    while True:
+        runs += 1
+        counting = Counting(most=5)
+        try:
+            render(job(scene, tmp_path), counting)
+            break
+        except OutputError:
+            written += counting.images
+            assert read_manifest(tmp_path).summary["finished"] is False
+    assert runs > 2, "it was stopped"
+    assert images(tmp_path) == images(whole)
+    assert read_manifest(tmp_path).summary["images"] == 3 * N
+    counting = Counting()
+    summary = render(job(scene, tmp_path), counting)
+    assert (counting.images, summary.images, summary.there) == (0, 0, 3 * N)
+
+
+def test_blocks_of_lights_go_on(scene: Path, tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that was stopped in its second block, and goes on with another limit of memory."""
+    monkeypatch.setattr(rendering, "light_blocks", lambda *_, **__: [range(0, 1), range(1, 3)])
+    with pytest.raises(OutputError, match="stopped"):
+        render(job(scene, tmp_path), Counting(most=N + 5))
+    monkeypatch.setattr(rendering, "light_blocks", lambda *_, **__: [range(0, 2), range(2, 3)])
+    render(job(scene, tmp_path))
+    assert images(tmp_path) == images(whole)
+    assert read_manifest(tmp_path).summary["finished"] is True
+
+
+def test_torn_and_foreign_lines_do_not_count(scene: Path, tmp_path: Path, whole: Path) -> None:
+    render(job(scene, tmp_path), cameras=(0, 1, 2))
+    [file] = record_files(tmp_path)
+    lines = file.read_bytes().splitlines(keepends=True)
+    entries = [k for k, line in enumerate(lines) if b'"c":' in line]
+    for cut in (
+        b"",
+        b"{",
+        b'{"c":0}',
+        sealed({"c": 0}),
+        sealed({"c": 0, "lights": [0, 3], "files": [1], "hits": 0}),
+        b"\xff\xfe",
+        b"[" * 100000,
+        b"7",
+    ):
+        torn = [*lines[: entries[1]], cut + b"\n", *lines[entries[1] : entries[2]], lines[entries[2]][:-20]]
+        file.write_bytes(b"".join(torn))
+        assert scan_output(tmp_path, read_manifest(tmp_path).fingerprint).images == 3 * 2
+        assert read_records(tmp_path, "sha256:other").entries == ()
+    render(job(scene, tmp_path), cameras=(0, 1, 2))
+    render(job(scene, tmp_path))
+    assert images(tmp_path) == images(whole)
+
+
+def test_no_flipped_bit_of_a_record_is_believed(scene: Path, tmp_path: Path) -> None:
+    render(job(scene, tmp_path), cameras=(0, 1))
+    [file] = record_files(tmp_path)
+    fingerprint, data = read_manifest(tmp_path).fingerprint, file.read_bytes()
+    known = read_records(tmp_path, fingerprint).entries
+    assert len(known) == 2
+    rng = random.Random(5)
+    for place in rng.sample(range(len(data)), 200):
+        flipped = bytearray(data)
+        flipped[place] ^= 1 << rng.randrange(8)
+        file.write_bytes(flipped)
+        found = read_records(tmp_path, fingerprint).entries
+        assert set(map(repr, found)) <= set(map(repr, known))
+
+
+def test_a_part_reads_its_own_files_alone(scene: Path, tmp_path: Path, whole: Path) -> None:
+    """Else parts of a long path would read all of it, each of them."""
+    render(job(scene, tmp_path), cameras=(0, 1))
+    name = sorted(images(tmp_path))[0]
+    (tmp_path / name).write_bytes(b"")
+    assert render(job(scene, tmp_path), cameras=(3, 4)).there == 3 * 4
+    assert (tmp_path / name).read_bytes() == b""
+    render(job(scene, tmp_path))
+    assert images(tmp_path) == images(whole)
+
+
+def test_damage_is_found_and_mended(scene: Path, tmp_path: Path, whole: Path) -> None:
+    render(job(scene, tmp_path))
+    rng = random.Random(7)
+    names = rng.sample(sorted(images(tmp_path)), 6)
+    for k, name in enumerate(names):
+        data = bytearray((tmp_path / name).read_bytes())
+        if k == 0:
+            (tmp_path / name).unlink()
+            continue
+        if k == 1:
+            del data[-1]
+        else:
+            data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+        (tmp_path / name).write_bytes(data)
+    records = read_records(tmp_path, read_manifest(tmp_path).fingerprint)
+    checksums = records.checksums()
+    assert sorted(name for name, _ in damaged(tmp_path, checksums, checksums)) == sorted(names)
+    heard: list[int] = []
+
+    class Hears(Counting):
+        def scanning(self, files: int) -> None:
+            heard.append(files)
+
+        def scanned(self, on_disk: Any, wanted: int) -> None:
+            heard.append(len(on_disk.damaged))
+
+    render(job(scene, tmp_path), Hears())
+    assert heard == [len(images(whole)), 6]
+    assert images(tmp_path) == images(whole)
+    assert scan_output(tmp_path, read_manifest(tmp_path).fingerprint).damaged == ()
+
+
+def test_another_processor_is_told(scene: Path, tmp_path: Path) -> None:
+    render(job(scene, tmp_path), cameras=(0,))
+    [file] = record_files(tmp_path)
+    lines = file.read_bytes().splitlines()
+    head = next(k for k, line in enumerate(lines) if b"processor" in line)
+    lines[head] = sealed({**(unsealed(lines[head]) or {}), "processor": "another"})
+    file.write_bytes(b"\n".join(lines) + b"\n")
+    summary = render(job(scene, tmp_path))
+    assert any("several kinds of processor" in note and "another" in note for note in summary.notes)
+
+
+def test_notes_stay_where_only_the_manifest_was_missing(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A render that was killed after its last image and before it wrote the manifest."""
+    begun: list[Manifest] = []
+    keep = rendering.write_manifest
+    monkeypatch.setattr(rendering, "write_manifest", lambda folder, m: (begun.append(m), keep(folder, m)))
+    few = {"ambient": {"paths": None}, "light": {"sources": [{**tiny.SUN}]}}
+    monkeypatch.setattr(ambient, "TARGET_ERROR", 1e-9)
+    render(job(scene, tmp_path, **few))
+    whole = read_manifest(tmp_path).summary
+    assert any("set ambient.paths for more" in note for note in whole["notes"])
+    keep(tmp_path, begun[0])
+    assert render(job(scene, tmp_path, **few)).images == 0
+    assert read_manifest(tmp_path).summary["notes"] == whole["notes"]
+    assert read_manifest(tmp_path).summary["finished"] is True
+
+
+def test_a_camera_that_stands_still(scene: Path, tmp_path: Path) -> None:
+    still = {"camera": {**CAMERA, "keys": WALK["keys"][:1]}}
+    render(job(scene, tmp_path / "whole", **still))
+    render(job(scene, tmp_path / "parts", **still), cameras=(5, 6))
+    render(job(scene, tmp_path / "parts", **still))
+    assert images(tmp_path / "parts") == images(tmp_path / "whole")
+
+
+def test_a_digest_tells_any_flipped_bit(tmp_path: Path) -> None:
+    data = bytearray(np.random.default_rng(1).bytes(5000))
+    (tmp_path / "a").write_bytes(data)
+    known = digest(tmp_path / "a")
+    for place in range(0, 5000, 37):
+        data[place] ^= 1 << place % 8
+        (tmp_path / "a").write_bytes(data)
+        assert digest(tmp_path / "a") != known
+        data[place] ^= 1 << place % 8
+
+
+@pytest.mark.parametrize(
+    ("text", "frames"),
+    [
+        ("0-3", (0, 1, 2, 3)),
+        ("5", (5,)),
+        ("0-9x4", (0, 4, 8)),
+        ("0-9y4", (1, 2, 3, 5, 6, 7, 9)),
+        ("0-3:2", (0, 1, 2, 3)),
+        ("9-0x-4", (1, 5, 9)),
+        ("3-1", (1, 2, 3)),
+        ("8,0-2, 1", (0, 1, 2, 8)),
+        ("7-7", (7,)),
+    ],
+)
+def test_ranges(text: str, frames: tuple[int, ...]) -> None:
+    assert parse_frames(text, 10) == frames
+    assert parse_frames(frames_text(frames), 10) == frames
+
+
+@pytest.mark.parametrize(
+    "text", ["", "a", "3-1x1", "1-3x-1", "0-9x0", "0-9y1", "-1", "0-10", "10-0", "1..3", "1-2-3", "9" * 50]
+)
+def test_what_is_no_range(text: str) -> None:
+    with pytest.raises(ValueError, match="expected"):
+        parse_frames(text, 10)
+
+
+class Blocked(RenderEvents):
+    """Starts other runs from within one."""
+
+    def __init__(self, *others: Any) -> None:
+        self.found_others: list[str] = []
+        self._others = list(others)
+
+    def allotted(self, target: Any) -> None:
+        raise AssertionError("no target")
+
+    def planned(self, ambient: Any) -> None:
+        for other in self._others:
+            try:
+                other()
+                self.found_others.append("")
+            except OutputError as error:
+                self.found_others.append(str(error))
+
+
+def test_two_runs_in_one_folder(scene: Path, tmp_path: Path, whole: Path) -> None:
+    """Side by side on other cameras; not on the same ones, and neither is taken away from the other."""
+    whole_job = job(scene, tmp_path)
+    blocked = Blocked(
+        lambda: render(whole_job, cameras=(0, 1)),
+        lambda: render(whole_job, cameras=(3, 4)),
+        lambda: render(whole_job),
+        lambda: render(whole_job, cameras=(0,), restart=True),
+    )
+    render(whole_job, blocked, cameras=(2, 3))
+    assert blocked.found_others[0] == ""
+    for message in blocked.found_others[1:]:
+        assert "another run is rendering cameras 2-3 into this folder" in message
+    render(whole_job)
+    assert images(tmp_path) == images(whole)
+    assert not list((tmp_path / "records").glob("*.lock"))
+
+
+def test_a_lock_of_a_run_that_was_killed_stops_nobody(scene: Path, tmp_path: Path) -> None:
+    (tmp_path / "records").mkdir()
+    (tmp_path / "records" / "0-6.lock").write_text("")
+    assert render(job(scene, tmp_path), cameras=(1,)).images == 3
+    assert not list((tmp_path / "records").glob("*.lock"))

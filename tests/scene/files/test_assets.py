@@ -1,0 +1,273 @@
+"""Files that a scene names: read beside it, refused elsewhere, and never more than there is memory for."""
+
+import json
+import os
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.scenes import QUAD_UVS, Glb, png
+
+from framearray_cli.base.errors import SceneError
+from framearray_cli.scene.files import read_meshes, read_stage
+from framearray_cli.scene.files.assets import AssetError, Assets
+from framearray_cli.scene.files.limit import Limit
+
+IMAGE = png(np.full((2, 2, 3), 200, np.uint8))
+OBJ = "mtllib {}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl Paint\nf 1/1 2/2 3/3\n"
+# ways to name ../secret.png from the folder of a scene
+OUTSIDE = (
+    "../secret.png",
+    "..\\secret.png",
+    "a/../../secret.png",
+    "%2e%2e/secret.png",
+    "..%2fsecret.png",
+    "%2e%2e%5csecret.png",
+    '"../secret.png"',
+    "{root}/secret.png",
+    "file://{root}/secret.png",
+    "FILE:{root}/secret.png",
+    "link.png",
+    "library/secret.png",
+    "loop/../../secret.png",
+)
+ELSEWHERE = (
+    "C:\\pictures\\secret.png",
+    "c:/pictures/secret.png",
+    "\\\\server\\share\\secret.png",
+    "//server/share/secret.png",
+    "file://server/share/secret.png",
+    "https://example.com/secret.png",
+    "ftp://example.com/secret.png",
+    "smb://server/secret.png",
+    "/dev/zero",
+)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder for a scene: links in it lead out of it, and a picture beside it is not to be read."""
+    folder = tmp_path / "scene"
+    (folder / "tex").mkdir(parents=True)
+    (folder / "tex" / "a b.png").write_bytes(IMAGE)
+    (tmp_path / "secret.png").write_bytes(IMAGE)
+    (folder / "link.png").symlink_to(tmp_path / "secret.png")
+    (folder / "library").symlink_to(tmp_path)
+    (folder / "loop").symlink_to("loop")
+    return folder
+
+
+def obj(folder: Path, texture: str) -> Path:
+    """An OBJ whose material has a texture."""
+    (folder / "a.mtl").write_text(f"newmtl Paint\nKd 1 1 1\nmap_Kd {texture}\n")
+    file = folder / "a.obj"
+    file.write_text(OBJ.format("a.mtl"))
+    return file
+
+
+def gltf(folder: Path, uri: str | None = None, buffer: str | None = None) -> Path:
+    """A glTF with an image or a buffer elsewhere."""
+    glb = Glb()
+    glb.add("textures", {"source": glb.add("images", {"uri": uri or "tex/a b.png"})})
+    glb.node(glb.mesh(glb.material("Paint", {"baseColorTexture": {"index": 0}}), TEXCOORD_0=glb.accessor(QUAD_UVS)))
+    (folder / "a.bin").write_bytes(glb.blob)
+    glb.tree["buffers"] = [{"byteLength": len(glb.blob), "uri": buffer or "a.bin"}]
+    file = folder / "a.gltf"
+    file.write_text(json.dumps(glb.tree))
+    return file
+
+
+@pytest.mark.parametrize(
+    "name", ["tex/a b.png", "tex\\a b.png", "./tex/a%20b.png", '"tex/a b.png"', "../scene/tex/a b.png"]
+)
+def test_what_lies_beside_a_scene_is_read(folder: Path, name: str) -> None:
+    assert Assets(folder=folder).read(name) == IMAGE
+    (folder.parent / "way").symlink_to(folder)  # the folder itself may be a link
+    assert Assets(folder=folder.parent / "way").read(name.replace("../scene/", "")) == IMAGE
+
+
+@pytest.mark.parametrize(
+    "name", ["/home/somebody/a b.png", "D:\\textures\\a b.png", "../../tex/a b.png", "file:///x/a b.png"]
+)
+def test_a_file_of_that_name_beside_the_scene_is_taken_for_one_elsewhere(folder: Path, name: str) -> None:
+    (folder / "a b.png").write_bytes(b"beside")
+    assert Assets(folder=folder).read(name) == b"beside"
+
+
+@pytest.mark.parametrize("name", [*OUTSIDE, *ELSEWHERE])
+def test_what_lies_elsewhere_is_refused(folder: Path, name: str) -> None:
+    name = name.format(root=folder.parent)
+    with pytest.raises(AssetError, match="refused"):
+        Assets(folder=folder).read(name)
+    for file in (obj(folder, name), gltf(folder, uri=name)):
+        with pytest.raises(SceneError) as caught:
+            read_meshes(file)
+        assert str(caught.value).startswith(f"{file}: refused to read ")
+        assert "copy it beside the scene file, or name its folder in scene.folders" in str(caught.value)
+    with pytest.raises(SceneError, match="refused"):
+        read_meshes(gltf(folder, buffer=name))
+    with pytest.raises(SceneError, match="refused"):
+        read_stage(gltf(folder, buffer=name))
+
+
+@pytest.mark.parametrize("name", ["../secret.mtl", "/etc/passwd", "tex/../../secret.mtl"])
+def test_material_libraries_elsewhere_are_refused(folder: Path, name: str) -> None:
+    file = folder / "a.obj"
+    file.write_text(OBJ.format(name))
+    with pytest.raises(SceneError, match="refused to read"):
+        read_meshes(file)
+
+
+def test_the_texture_of_a_ply_elsewhere_is_refused(folder: Path) -> None:
+    file = folder / "a.ply"
+    head = "ply\nformat ascii 1.0\ncomment TextureFile ../secret.png\nelement vertex 3\n"
+    places = "property float x\nproperty float y\nproperty float z\n"
+    faces = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    file.write_text(f"{head}{places}{faces}0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    with pytest.raises(SceneError, match=r"refused to read \.\./secret\.png"):
+        read_meshes(file)
+    file.write_text(file.read_text().replace("../secret.png", "gone.png"))
+    assert "texture left out, gone.png: no such file beside the scene" in read_meshes(file).notes
+
+
+def test_every_file_that_is_refused_is_told_once(folder: Path) -> None:
+    file = obj(folder, "../secret.png")
+    (folder / "a.mtl").write_text("newmtl Paint\nmap_Kd ../secret.png\nmap_d ../other.png\n")
+    with pytest.raises(SceneError, match=r"t\.png, \.\./other\.png: they lie .* copy them .* their folders"):
+        read_meshes(file)
+
+
+def test_a_comment_behind_a_library_does_not_make_it_refused(folder: Path) -> None:
+    obj(folder, "tex/a b.png")
+    file = folder / "a.obj"
+    file.write_text(OBJ.format("C:\\models\\a.mtl # as exported"))
+    assert len(read_meshes(file).textures) == 1
+
+
+def test_folders_that_a_job_adds_are_read(folder: Path) -> None:
+    library = folder.parent
+    for name in ("../secret.png", "link.png", "library/secret.png", str(library / "secret.png"), "C:\\x\\secret.png"):
+        assert Assets(folder=folder, folders=(library,)).read(name) == IMAGE
+        assert len(read_meshes(obj(folder, name), [library]).textures) == 1
+    with pytest.raises(SceneError, match="refused"):
+        read_meshes(obj(folder, "/etc/passwd"), [library])
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_pipes_and_devices_are_not_waited_for(folder: Path) -> None:
+    os.mkfifo(folder / "pipe.png")
+    (folder / "device.png").symlink_to("/dev/zero")
+    assert "texture left out, pipe.png: no such file beside the scene" in read_meshes(obj(folder, "pipe.png")).notes
+    with pytest.raises(SceneError, match="refused"):
+        read_meshes(obj(folder, "device.png"))
+    os.mkfifo(folder / "pipe.glb")
+    for file in (folder / "pipe.glb", Path("/dev/zero")):
+        with pytest.raises(SceneError, match="got a pipe or a device"):
+            read_meshes(file)
+
+
+@pytest.mark.parametrize("name", ["a\0b.png", "x" * 5000, "\udcff.png", "a/" * 3000, "nul\n.png", "..", ".", "/", ""])
+def test_names_that_are_no_names(folder: Path, name: str) -> None:
+    with pytest.raises(AssetError) as caught:
+        Assets(folder=folder).read(name)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 400
+
+
+# --- images -------------------------------------------------------------------------------------------------------
+
+
+def huge_png(width: int, height: int, rows: int | None = None) -> bytes:
+    """A PNG of one colour, one bit a pixel; cut short after some rows."""
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = struct.pack(">IIBBBBB", width, height, 1, 0, 0, 0, 0)
+    rows_data = bytes((width + 7) // 8 + 1) * (height if rows is None else rows)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows_data)) + chunk(b"IEND", b"")
+
+
+def test_an_image_bomb_is_refused(folder: Path) -> None:
+    (folder / "bomb.png").write_bytes(huge_png(60_000, 60_000, rows=100))
+    with pytest.raises(SceneError, match=r"a\.obj: material Paint: Image size \(3600000000 pixels\)"):
+        read_meshes(obj(folder, "bomb.png"))
+
+
+def test_images_count_before_they_are_decoded(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / "large.png").write_bytes(huge_png(9_000, 9_000))
+    monkeypatch.setattr("framearray_cli.scene.files.textures.rgba", None)
+    with pytest.raises(SceneError, match=r"an image of 9000 x 9000 pixels 1\.8 GiB\), 1\.0 GiB may be used; make"):
+        read_meshes(obj(folder, "large.png"), memory=2**30)
+
+
+def test_textures_count_together(folder: Path) -> None:
+    texels = np.zeros((512, 512, 3), np.uint8)
+    lines = ["mtllib a.mtl", "v 0 0 0", "v 1 0 0", "v 0 1 0", "vt 0 0"]
+    with (folder / "a.mtl").open("w") as library:
+        for k in range(8):
+            texels[0, 0] = k
+            (folder / f"{k}.png").write_bytes(png(texels))
+            library.write(f"newmtl {k}\nmap_Kd {k}.png\n")
+            lines += [f"usemtl {k}", "f 1/1 2/1 3/1"]
+    file = folder / "many.obj"
+    file.write_text("\n".join(lines))
+    assert len(read_meshes(file, memory=64 * 2**20).textures) == 8
+    with pytest.raises(SceneError, match=r"\(files [\d.]+ MiB, .*textures 6\.0 MiB"):
+        read_meshes(file, memory=12 * 2**20)
+
+
+def test_one_image_under_many_names_is_decoded_once(folder: Path) -> None:
+    lines = ["mtllib a.mtl", "v 0 0 0", "v 1 0 0", "v 0 1 0", "vt 0 0"]
+    with (folder / "a.mtl").open("w") as library:
+        for k in range(5):
+            (folder / f"{k}.png").write_bytes(IMAGE)
+            library.write(f"newmtl {k}\nmap_Kd {k}.png\n")
+            lines += [f"usemtl {k}", "f 1/1 2/1 3/1"]
+    file = folder / "many.obj"
+    file.write_text("\n".join(lines))
+    meshes = read_meshes(file)
+    assert len(meshes.textures) == 1
+    assert {material.texture for material in meshes.materials} == {0}
+
+
+def encoded(kind: str) -> bytes:
+    """An image of a format."""
+    import io
+
+    from PIL import Image
+
+    data = io.BytesIO()
+    Image.new("RGB", (8, 8), (200, 100, 50)).save(data, format=kind)
+    return data.getvalue()
+
+
+@pytest.mark.parametrize("kind", ["PNG", "JPEG", "WEBP", "TGA", "BMP", "TIFF", "GIF", "PPM"])
+def test_images_that_scenes_come_with(folder: Path, kind: str) -> None:
+    (folder / "image.png").write_bytes(encoded(kind))  # whatever it is called
+    assert len(read_meshes(obj(folder, "image.png")).textures) == 1
+
+
+def test_images_that_other_programs_would_draw_are_not_read(folder: Path) -> None:
+    (folder / "image.png").write_bytes(encoded("EPS"))
+    assert (
+        "texture left out, material Paint: not an image that can be read; PNG and JPEG are"
+        in read_meshes(obj(folder, "image.png")).notes
+    )
+
+
+def test_a_jpeg_of_very_many_scans_is_left_out(folder: Path) -> None:
+    whole = encoded("JPEG")
+    (folder / "image.jpg").write_bytes(whole[:-2] + b"\xff\xda\x00\x08\x01\x01\x00\x00\x3f\x00" * 200 + whole[-2:])
+    assert "at most 100 scans, got 201" in "\n".join(read_meshes(obj(folder, "image.jpg")).notes)
+
+
+def test_what_was_lent_is_given_back() -> None:
+    limit = Limit(most=100)
+    with limit.lent("an image", 90):
+        pass
+    limit.take("textures", 100)
+    with pytest.raises(SceneError, match="0 MiB of memory or more"):
+        limit.take("textures", 1)

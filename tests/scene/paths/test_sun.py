@@ -1,0 +1,237 @@
+"""The sun: against published angles, in scenes, and what is said of a sun that cannot be had."""
+
+import builtins
+import math
+from collections.abc import Iterator
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+from support import tiny
+
+from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.pictures import Pictures
+from framearray_cli.base.errors import JobError, MissingExtraError
+from framearray_cli.engine.inputs.lights import light_arrays
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import job_table, read_job
+from framearray_cli.render.render import render
+from framearray_cli.scene.paths.paths import lights
+from framearray_cli.scene.paths.sun import daylight, sun_at, sun_between
+
+pytest.importorskip("pvlib", reason="the extra `sun` is not installed")
+
+WANTED = 0.1  # degrees
+# UTC, latitude, longitude, azimuth and zenith angle as published, degrees.
+NREL_REPORT = [("2003-10-17T19:30:30", 39.742476, -105.1786, 194.34024, 50.11162)]  # [Reda04], its worked example
+# Made by NREL's own program spa.c, with refraction; published as test data of the library solarpositioning.
+NREL_PROGRAM = [
+    ("2010-06-15T00:30:00", -36.840556, 174.74, 357.723597, 60.142480),  # Auckland, winter
+    ("2010-06-15T03:30:00", -36.840556, 174.74, 315.749511, 74.707383),
+    ("2010-12-15T03:30:00", -36.840556, 174.74, 274.070527, 43.612177),  # summer
+    ("2010-09-15T18:30:00", -36.840556, 174.74, 85.646656, 88.599396),  # just risen
+    ("2010-12-15T15:30:00", -15.793889, -47.882778, 215.325977, 9.278971),  # Brasilia, nearly overhead
+    ("2010-06-15T12:30:00", -15.793889, -47.882778, 46.250557, 55.629466),
+    ("2010-03-15T09:30:00", -15.793889, -47.882778, 91.385435, 86.910752),
+    ("2010-06-15T09:30:00", 78.22, 15.65, 155.483089, 55.833654),  # Longyearbyen, summer
+    ("2010-06-15T21:30:00", 78.22, 15.65, 339.394774, 77.579648),  # the midnight sun
+    ("2010-03-15T06:30:00", 1.283333, 103.833333, 259.794538, 19.383306),  # Singapore
+    ("2010-12-15T09:30:00", 1.283333, 103.833333, 244.624397, 69.986212),
+]
+# United States Naval Observatory, Berlin; printed to a tenth of a degree, with refraction.
+NAVAL_OBSERVATORY = [("2010-10-19T10:30:00", 52.5, 13.4, 174.1, 90 - 27.3)]
+
+BERLIN = {"latitude": 52.52, "longitude": 13.405, "timezone": "Europe/Berlin", "irradiance": 3.0}
+
+
+def job(frames: int | None = 5, scene: dict[str, Any] | None = None, **source: Any) -> Job:
+    sun = {"type": "sun", "date": "2026-06-21", "start": "06:00", "stop": "20:00"} | BERLIN | source
+    light: dict[str, Any] = {"sources": [{key: value for key, value in sun.items() if value is not None}]}
+    if frames:
+        light["frames"] = frames
+    return tiny.job(light=light, **({"scene": scene} if scene else {}))
+
+
+def problems(**changes: Any) -> str:
+    with pytest.raises((JobError, Exception)) as caught:
+        lights(job(**changes))
+    return str(caught.value)
+
+
+def angle(azimuth: float, other: float) -> float:
+    return abs((azimuth - other + 180) % 360 - 180)
+
+
+@pytest.mark.parametrize("case", NREL_REPORT + NREL_PROGRAM + NAVAL_OBSERVATORY)
+def test_the_sun_stands_where_it_was_published(case: tuple[str, float, float, float, float]) -> None:
+    when, latitude, longitude, azimuth, zenith = case
+    sun = sun_at([datetime.fromisoformat(f"{when}+00:00")], latitude, longitude)
+    assert abs(90 - float(sun.elevation_deg[0]) - zenith) < WANTED
+    # near the zenith an azimuth says little: what counts is the angle on the sky
+    assert angle(float(sun.azimuth_deg[0]), azimuth) * math.sin(math.radians(zenith)) < WANTED
+
+
+def test_true_elevations_would_fail() -> None:
+    """The published values of a low sun tell refraction from none, and an hour from another."""
+    when, latitude, longitude, azimuth, zenith = NREL_PROGRAM[3]
+    moment = datetime.fromisoformat(f"{when}+00:00")
+    refraction = 0.355  # degrees, at an elevation of 1.4 [Reda04, eq. 42]
+    sun = sun_at([moment, moment + timedelta(hours=1)], latitude, longitude)
+    assert abs(90 - (float(sun.elevation_deg[0]) - refraction) - zenith) > WANTED
+    assert angle(float(sun.azimuth_deg[1]), azimuth) > WANTED
+
+
+def test_positions_are_evenly_spaced_in_time_whatever_clocks_do() -> None:
+    place = (52.52, 13.405)
+    sun = sun_between("2026-03-29", "00:00:00", "12:00:00", "Europe/Berlin", place, 12)  # clocks jump from 2 to 3
+    steps = [b.timestamp() - a.timestamp() for a, b in zip(sun.times, sun.times[1:], strict=False)]
+    assert steps == pytest.approx([3600.0] * 11)
+    assert [f"{time:%H:%M %z}" for time in (sun.times[0], sun.times[-1])] == ["00:00 +0100", "12:00 +0200"]
+    assert [f"{time:%H:%M}" for time in sun_between("2026-06-21", "09:00:00", "10:00:00", 2, place, 1).times] == [
+        "09:00"
+    ]
+
+
+def test_an_offset_is_a_time_zone_too() -> None:
+    place = (52.52, 13.405)
+    by_name, by_hours = (
+        sun_between("2026-06-21", "09:00:00", "15:00:00", zone, place, 4) for zone in ("Europe/Berlin", 2.0)
+    )
+    np.testing.assert_array_equal(by_name.azimuth_deg, by_hours.azimuth_deg)
+
+
+@pytest.mark.parametrize(("up", "north"), [("y", None), ("z", None), ("y", [1.0, 0.0, 0.0]), ("z", [1.0, 2.0, 5.0])])
+def test_the_sun_of_a_scene_shines_from_its_azimuth_and_elevation(up: str, north: list[float] | None) -> None:
+    """Light comes from the azimuth, clockwise from north as seen from above, and from the elevation."""
+    path = lights(job(scene={"file": "tiny.glb", "up": up}, north=north)).sources[0]
+    up_axis = 1 if up == "y" else 2
+    for vector, note in zip(path.vector, path.notes, strict=True):
+        to_sun = -vector
+        assert np.linalg.norm(to_sun) == pytest.approx(1)
+        assert math.degrees(math.asin(to_sun[up_axis])) == pytest.approx(note["elevation"], abs=1e-3)
+        # a map: x to the east, y to the north, seen from above
+        east, north_part = {
+            ("y", None): (to_sun[0], -to_sun[2]),
+            ("z", None): (to_sun[0], to_sun[1]),
+            ("y", 1.0): (to_sun[2], to_sun[0]),
+            ("z", 1.0): ((2 * to_sun[0] - to_sun[1]) / math.sqrt(5), (to_sun[0] + 2 * to_sun[1]) / math.sqrt(5)),
+        }[up, north[0] if north else None]
+        assert angle(math.degrees(math.atan2(east, north_part)), note["azimuth"]) < 1e-3
+
+
+def test_the_sun_rises_in_the_east_and_is_highest_in_the_south() -> None:
+    path = lights(job(start="05:00", stop="21:00", frames=33)).sources[0]
+    morning, evening = -path.vector[0], -path.vector[-1]
+    highest = -path.vector[np.argmin(path.vector[:, 1])]
+    assert morning[0] > 0.5 and evening[0] < -0.5  # x is east
+    assert highest[2] > 0 and abs(highest[0]) < 0.1  # z is south
+
+
+def test_below_the_horizon_it_shines_nothing() -> None:
+    path = lights(job(start="00:00", stop="12:00", frames=13)).sources[0]
+    elevation = np.array([note["elevation"] for note in path.notes])
+    assert (elevation < 0).sum() == 5  # it rises at 4:46
+    np.testing.assert_array_equal(path.intensity, np.where(elevation > 0, 3.0, 0.0)[:, None] * np.ones(3))
+    arrays = light_arrays(lights(job(start="00:00", stop="12:00", frames=13)), np.zeros(3))
+    np.testing.assert_array_equal(arrays.lit[0], elevation > 0)
+
+
+def test_a_day_has_its_published_length() -> None:
+    """Almanacs say 04:43 to 21:33 for Berlin, from and to the upper rim of the disc.
+
+    Here it is the centre that shines, 0.267 degrees lower. The sun climbs 15 cos(latitude) sin(azimuth) = 6.9 degrees
+    an hour, so that is 2.3 minutes; whole minutes within that are 04:46 to 21:30.
+    """
+    assert daylight("2026-06-21", "Europe/Berlin", (52.52, 13.405)) == "04:46 to 21:30"
+    assert daylight("2026-12-21", 1, (78.22, 15.65)) == "never"
+    assert daylight("2026-06-21", 2, (78.22, 15.65)) == "00:00 to 23:59"
+
+
+def test_a_sun_that_is_down_all_the_time_is_refused_with_the_hours_of_the_day() -> None:
+    text = problems(start="22:30", stop="23:30")
+    assert "light.sources[0]: the sun is below the horizon from 22:30:00 to 23:30:00" in text
+    assert "on 2026-06-21 it is up from 04:46 to 21:30" in text
+    assert "does not rise on that day" in problems(latitude=80.0, date="2026-12-21")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"latitude": 91.0}, "latitude: expected a number from -90 to 90, got 91"),
+        ({"date": "2026-02-30"}, "date: expected a date that the calendar has"),
+        ({"date": "21.6.2026"}, "date: expected a date such as 2026-06-21"),
+        ({"date": "0026-06-21"}, "date: expected a year from 1000 to 3000, got 26"),
+        ({"start": "25:00"}, 'start: expected a time of day from "00:00" to "23:59", got "25:00"'),
+        ({"start": "20:00", "stop": "6:00"}, "stop: expected a time after the start, 20:00:00, got 06:00:00"),
+        ({"timezone": "Europe/Berln"}, 'timezone: unknown time zone "Europe/Berln"; did you mean "Europe/Berlin"?'),
+        ({"timezone": "../etc"}, 'unknown time zone "../etc"'),
+        ({"timezone": "Europe"}, 'unknown time zone "Europe"'),
+        ({"timezone": 15}, "timezone: expected a time zone such as"),
+        ({"timezone": None}, "timezone: missing"),
+        ({"frames": None}, "light.frames: missing; expected the number of positions of the sun"),
+        ({"north": [0.0, 2.0, 0.0]}, "north: expected a direction that is not up"),
+    ],
+)
+def test_messages(changes: dict[str, Any], said: str, tmp_path: Path) -> None:
+    sun = {"type": "sun", "date": "2026-06-21", "start": "06:00", "stop": "20:00"} | BERLIN | changes
+    frames = {"frames": sun.pop("frames")} if "frames" in sun else {"frames": 4}
+    light = {"sources": [{k: v for k, v in sun.items() if v is not None}]} | {k: v for k, v in frames.items() if v}
+    file = tmp_path / "job.toml"
+    file.write_text(tomli_w.dumps(tiny.table() | {"light": light}))
+    with pytest.raises(JobError) as caught:
+        lights(read_job(file))
+    assert said in str(caught.value)
+    assert len(caught.value.problems) == 1
+
+
+def test_toml_dates_and_times_mean_the_same_as_text(tmp_path: Path) -> None:
+    sun = {"type": "sun", "date": "D", "start": "S", "stop": "T"} | BERLIN
+    table = tiny.table(light={"frames": 5, "sources": [sun]})
+    written = tomli_w.dumps(table).replace('"D"', "2026-06-21").replace('"S"', "06:00:00").replace('"T"', "20:00:00")
+    file = tmp_path / "job.toml"
+    file.write_text(written)
+    read = read_job(file)
+    assert read.light == job().light
+    assert Job.model_validate(job_table(read)).light == read.light  # a round trip
+
+
+@pytest.fixture
+def no_pvlib(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    original = builtins.__import__
+
+    def missing(name: str, *more: Any, **also: Any) -> Any:
+        if name.partition(".")[0] == "pvlib":
+            raise ImportError(name)
+        return original(name, *more, **also)
+
+    monkeypatch.setattr(builtins, "__import__", missing)
+    yield
+
+
+@pytest.mark.usefixtures("no_pvlib")
+def test_without_the_library_it_is_named() -> None:
+    with pytest.raises(MissingExtraError, match=r'pip install "framearray\[sun\]"'):
+        lights(job())
+
+
+@pytest.mark.parametrize("group", [None, "sun"])
+def test_an_array_tells_where_the_sun_stood_and_is_dark_before_it_rises(group: str | None, tmp_path: Path) -> None:
+    tiny.save_glb(tiny.room_meshes(), tmp_path / "tiny.glb")
+    wanted = job(
+        3, scene={"file": str(tmp_path / "tiny.glb")}, start="02:00", stop="12:00", group=group, irradiance=6.0
+    )
+    output = wanted.output.model_copy(update={"directory": tmp_path / "out"})
+    render(wanted.model_copy(update={"output": output}))
+    manifest = read_manifest(tmp_path / "out")
+    noted = manifest.groups[0].lights if group else manifest.lights
+    sources = [light.sources[0] for light in noted]
+    assert [source["time"] for source in sources] == [f"2026-06-21T{hour:02}:00:00+02:00" for hour in (2, 7, 12)]
+    sun = sun_between("2026-06-21", "02:00:00", "12:00:00", "Europe/Berlin", (52.52, 13.405), 3)
+    np.testing.assert_allclose([source["azimuth"] for source in sources], sun.azimuth_deg, atol=1e-4)
+    np.testing.assert_allclose([source["elevation"] for source in sources], sun.elevation_deg, atol=1e-4)
+    pictures = [Pictures(manifest).picture(0, (l,)) for l in range(3)]
+    assert pictures[0].max() == 0  # the sky is black here
+    assert min(picture.max() for picture in pictures[1:]) > 0.1

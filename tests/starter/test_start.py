@@ -1,0 +1,287 @@
+"""`framearray init`: what it takes over from a file, what it chooses, and the job that it writes."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+from support.scenes import Glb
+from support.staged import LENS, QUARTER, animate, camera, light, shift, turn_y
+
+from framearray_cli.base.colour import srgb_from_linear
+from framearray_cli.base.errors import JobError, OutputError, SceneError
+from framearray_cli.base.forms.toml import load_toml
+from framearray_cli.cli.main import main
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import read_job
+from framearray_cli.scene.paths.paths import eyes, lights
+from framearray_cli.scene.scene import load_scene
+from framearray_cli.starter import Start, Wishes, init
+from framearray_cli.starter.expose import CLIPPED, LUMINANCE, ROOM, solved
+from framearray_cli.starter.model import table_of
+
+FEW = Wishes(frames=3, lights=2)
+
+
+def box(low: Any, high: Any, *, inwards: bool = False) -> Any:
+    """Corners (36, 3) of a box whose faces show outwards, or inwards."""
+    corners = tiny.box(low, high)
+    middle = (np.array(low) + high) / 2
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    out = (normal * (corners.mean(axis=1) - middle)).sum(axis=1) > 0
+    flip = out == inwards
+    corners[flip] = corners[flip][:, ::-1]
+    return corners.reshape(-1, 3)
+
+
+def add(glb: Glb, corners: Any, name: str, colour: Any) -> None:
+    material = glb.material(name, {"baseColorFactor": [*colour, 1.0]})
+    glb.node(glb.mesh(material, positions=corners.astype(np.float32), faces=None))
+
+
+def room(glb: Glb | None = None) -> Glb:
+    """A room of 5 x 2.5 x 4, modelled from inside, with a cupboard, a table top and a stool."""
+    glb = glb or Glb()
+    add(glb, box([-2.5, 0, -2], [2.5, 2.5, 2], inwards=True), "Wall", [0.7, 0.7, 0.6])
+    add(glb, box([-2.4, 0.01, -1.9], [-1.6, 2.0, -0.9]), "Cupboard", [0.5, 0.3, 0.2])
+    add(glb, box([0.2, 0.7, -0.8], [1.4, 0.75, 0.2]), 'Table "top"', [0.6, 0.5, 0.3])
+    add(glb, box([1.5, 0.01, 0.5], [1.9, 0.5, 0.9]), "Stool", [0.2, 0.3, 0.6])
+    return glb
+
+
+def thing(glb: Glb | None = None) -> Glb:
+    """Two boxes on each other, to be looked at."""
+    glb = glb or Glb()
+    add(glb, box([-1, 0, -0.5], [1, 1, 0.5]), "Low", [0.7, 0.5, 0.4])
+    add(glb, box([-0.3, 1.01, -0.3], [0.3, 2, 0.3]), "High", [0.3, 0.5, 0.7])
+    return glb
+
+
+def started(glb: Glb, folder: Path, wishes: Wishes = FEW) -> tuple[Start, Job]:
+    """What `init` chose, and the job that can be read from its file."""
+    scene, job_file = glb.save(folder / "scene.glb"), folder / "job.toml"
+    start = init(scene, job_file, wishes)
+    return start, read_job(job_file)
+
+
+def code_of(*arguments: str) -> int:
+    """How a command ends."""
+    with pytest.raises(SystemExit) as ended:
+        main(list(arguments))
+    return int(ended.value.code or 0)
+
+
+def test_the_text_says_what_was_chosen(tmp_path: Path) -> None:
+    start, job = started(room(), tmp_path)
+    expected = Job.model_validate(table_of(start) | {"output": {"directory": str(tmp_path / "out" / "scene")}})
+    for table in ("camera", "light", "obscurance", "scene", "name"):
+        assert getattr(job, table) == getattr(expected, table)
+    assert job.scene.file == tmp_path / "scene.glb"
+    assert job.output.directory == tmp_path / "out" / "scene"
+
+
+def test_every_key_has_a_comment_and_every_material_stands_there(tmp_path: Path) -> None:
+    started(room(), tmp_path)
+    lines = (tmp_path / "job.toml").read_text().splitlines()
+    bare = [line for line in lines if " = " in line and not line.startswith(("#", "  {")) and "#" not in line]
+    assert bare == []
+    # uncommented, the materials are what was read: the job stays valid, and the same picture
+    begin = lines.index('# [scene.materials."Wall"]')
+    for i in range(begin, begin + 8):
+        lines[i] = lines[i].removeprefix("# ")
+    (tmp_path / "job.toml").write_text("\n".join(lines))
+    found = read_job(tmp_path / "job.toml").scene.materials
+    assert list(found) == ["Wall", "Cupboard", 'Table "top"', "Stool"]
+    assert found["Stool"].reflectivity == pytest.approx((0.2, 0.3, 0.6), abs=5e-4)
+    load_scene(tmp_path / "scene.glb", found)
+
+
+def test_a_room_is_walked_through_by_an_eye_that_is_in_no_furniture(tmp_path: Path) -> None:
+    start, job = started(room(), tmp_path, Wishes(frames=9, lights=5))
+    assert start.inside and start.outside == "average"
+    assert start.range == pytest.approx(1.25, abs=0.1)  # half the height, but above tables it is lower
+    for points, clear in ((eyes(job).position, 0.3 / 2), (lights(job).sources[0].vector, 0.15)):
+        assert (np.abs(points) < [2.5 - clear, 9, 2 - clear]).all()
+        assert (points[:, 1] > clear).all() and (points[:, 1] < 2.5 - clear).all()
+        for low, high in (([-2.4, 0.0, -1.9], [-1.6, 2.0, -0.9]), ([0.2, 0.7, -0.8], [1.4, 0.75, 0.2])):
+            outside = np.maximum(np.array(low) - points, points - np.array(high)).max(axis=1)
+            assert (outside > clear / 2).all()
+    np.testing.assert_allclose(eyes(job).position[:, 1], eyes(job).position[0, 1], atol=0.2)
+    assert np.linalg.norm(np.diff(eyes(job).position[[0, -1]], axis=0)) > 0.3  # it goes somewhere
+
+
+def test_a_thing_is_whole_in_every_picture(tmp_path: Path) -> None:
+    start, job = started(thing(), tmp_path, Wishes(frames=7, lights=3))
+    assert not start.inside and start.outside == "background"
+    assert [source.type for source in job.light.sources] == ["directional"]
+    corners = load_scene(tmp_path / "scene.glb")
+    points = corners.corners.reshape(-1, 3) + corners.centre
+    width, height = job.camera.resolution
+    tall = math.tan(math.radians(job.camera.fov) / 2)
+    filled = []
+    for matrix in eyes(job).world_from_camera:
+        local = (points - matrix[:3, 3]) @ matrix[:3, :3]
+        x, y = local[:, 0] / -local[:, 2] / (tall * width / height), local[:, 1] / -local[:, 2] / tall
+        assert (local[:, 2] < 0).all() and np.abs([x, y]).max() < 0.95
+        filled.append(np.abs([x, y]).max())
+    assert max(filled) > 0.8  # and it fills the picture
+    assert (lights(job).sources[0].vector[:, 1] < -0.4).all()  # light comes from above
+
+
+def test_what_the_user_says_counts(tmp_path: Path) -> None:
+    start, job = started(room(), tmp_path, Wishes(frames=2, lights=1, inside=False))
+    assert not start.inside
+    assert (job.camera.frames, job.light.frames) == (2, 1)
+
+
+def test_a_room_whose_faces_are_turned_outwards_is_one_where_the_user_says_so(tmp_path: Path) -> None:
+    glb = Glb()
+    add(glb, box([-2.5, 0, -2], [2.5, 2.5, 2]), "Wall", [0.7, 0.7, 0.6])
+    (tmp_path / "first").mkdir()
+    start, _ = started(glb, tmp_path / "first", Wishes(frames=2, lights=2))
+    assert not start.inside
+    # closed from their fronts are the insides of furniture alone, then
+    add(glb, box([-2.4, 0.01, -1.9], [-1.6, 2.0, -0.9], inwards=True), "Cupboard", [0.5, 0.3, 0.2])
+    start, job = started(glb, tmp_path, Wishes(frames=2, lights=2, inside=True))
+    assert start.inside
+    for points in (eyes(job).position, lights(job).sources[0].vector):
+        assert (np.abs(points) < [2.5, 2.5, 2]).all()
+        outside = np.maximum(np.array([-2.4, 0.01, -1.9]) - points, points - np.array([-1.6, 2.0, -0.9])).max(axis=1)
+        assert (outside > 0).all()
+
+
+def test_nothing_is_closed_around_a_table_top(tmp_path: Path) -> None:
+    glb = Glb()
+    add(glb, box([-1, 0.7, -1], [1, 0.70001, 1])[:6], "Top", [0.6, 0.5, 0.3])
+    add(glb, tiny.quad((-2, 0, 2), (2, 0, 2), (2, 0, -2), (-2, 0, -2)).reshape(-1, 3), "Floor", [0.6, 0.5, 0.3])
+    with pytest.raises(SceneError, match="--inside: nothing in it looks like the inside of a room"):
+        started(glb, tmp_path, Wishes(frames=2, lights=1, inside=True))
+
+
+def test_an_animated_camera_comes_in_as_it_is(tmp_path: Path) -> None:
+    """Frame by frame the job's matrices are those of the hierarchy, here computed by hand: a turning arm."""
+    glb = room()
+    shot = camera(glb, translation=[0.0, 1.5, 1.0])
+    arm = glb.node(children=[shot])
+    animate(glb, arm, "rotation", [0.0, 0.5], [[0, 0, 0, 1], [0, QUARTER, 0, QUARTER]])
+    start, job = started(glb, tmp_path, Wishes(lights=1))
+    found = eyes(job)
+    assert found.n == 13  # half a second of 24 frames, and the last
+    assert found.fov_deg == pytest.approx(50, abs=1e-3)
+    assert tuple(job.camera.resolution) == (360, 240)
+    for frame, matrix in enumerate(found.world_from_camera):
+        expected = turn_y(math.pi / 2 * frame / 12) @ shift(0, 1.5, 1.0)
+        np.testing.assert_allclose(matrix, expected, atol=1e-4)
+    assert start.inside
+
+
+def test_fewer_frames_are_spread_over_the_same_time(tmp_path: Path) -> None:
+    glb = room()
+    shot = camera(glb, translation=[0.0, 1.5, 0.0])
+    glb.tree["scenes"][0]["nodes"].append(shot)
+    animate(glb, shot, "translation", [0.0, 4.0], [[-1, 1.5, 0], [1, 1.5, 0]])
+    _, job = started(glb, tmp_path, Wishes(frames=5, lights=1))
+    np.testing.assert_allclose(eyes(job).position[:, 0], [-1, -0.5, 0, 0.5, 1], atol=1e-6)
+
+
+def test_a_camera_is_chosen_by_its_name(tmp_path: Path) -> None:
+    glb = room()
+    for name, x in (("Left", -1.0), ("Right", 1.0)):
+        glb.node(name=name, camera=glb.add("cameras", dict(LENS)), translation=[x, 1.5, 1.5])
+    _, job = started(glb, tmp_path, Wishes(camera="Right", lights=1))
+    assert eyes(job).position[0].tolist() == [1.0, 1.5, 1.5]
+    text = (tmp_path / "job.toml").read_text()
+    assert '# the file also has the camera "Left": --camera "Left"' in text
+    with pytest.raises(JobError, match='got "Middle"; it has "Left", "Right"'):
+        init(tmp_path / "scene.glb", tmp_path / "other.toml", Wishes(camera="Middle"))
+
+
+def test_lights_of_the_file_keep_their_places_and_what_they_are_to_each_other(tmp_path: Path) -> None:
+    glb = room()
+    lamp = glb.node(name="Lamp", **light(glb, intensity=1000.0, color=[1.0, 0.5, 0.25]))
+    glb.node(name="Beam", translation=[-1.0, 2.0, 1.0], **light(glb, "spot", intensity=500.0))
+    down = {"rotation": [-QUARTER, 0.0, 0.0, QUARTER]}  # -z turned to -y
+    glb.node(name="Sun", **down, **light(glb, "directional", intensity=30.0))
+    glb.node(name="Off", **light(glb, intensity=0.0))
+    animate(glb, lamp, "translation", [0.0, 1.0], [[-1.5, 2, 1], [1.5, 2, 1]])
+    _, job = started(glb, tmp_path, Wishes(frames=2))
+    path = lights(job)
+    assert path.n == 25  # a second of 24 frames, and the last
+    moving, beam, sun = path.sources
+    assert [moving.kind, beam.kind, sun.kind] == ["point", "point", "directional"]
+    np.testing.assert_allclose(moving.vector[:, 0], np.linspace(-1.5, 1.5, 25), atol=1e-5)
+    np.testing.assert_allclose(beam.vector[0], [-1, 2, 1])
+    np.testing.assert_allclose(sun.vector[0], [0, -1, 0], atol=1e-6)
+    factor = moving.intensity[0, 0] / 1000
+    np.testing.assert_allclose(moving.intensity[0], np.array([1000, 500, 250]) * factor, rtol=0.01)
+    np.testing.assert_allclose(beam.intensity[0], 500 * factor, rtol=0.01)
+    np.testing.assert_allclose(sun.intensity[0], 30 * factor, rtol=0.01)
+    assert "a spot: here it shines to all sides" in (tmp_path / "job.toml").read_text()
+
+
+def test_lights_that_light_nothing_give_way_to_chosen_ones(tmp_path: Path) -> None:
+    glb = room()
+    glb.node(name="Outside", translation=[0.0, 50.0, 0.0], **light(glb, intensity=1000.0))
+    start, job = started(glb, tmp_path)
+    assert "The lights of the file light nothing that its pictures show, so others were chosen." in start.about
+    assert np.abs(lights(job).sources[0].vector).max() < 3
+
+
+@pytest.mark.parametrize("place", [[1e13, 0.0, 0.0], [1e300, 1e300, 1e300]])
+def test_lights_that_are_nowhere_are_one_error(tmp_path: Path, place: list[float]) -> None:
+    glb = room()
+    glb.node(name="Far", translation=place, **light(glb, intensity=1000.0))
+    with pytest.raises(SceneError, match=r"scene\.glb: its cameras or lights do not make a job: light") as caught:
+        started(glb, tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+def test_exposure_makes_the_mean_right_and_spares_highlights() -> None:
+    def mean(factor: float, lit: Any, dark: Any) -> float:
+        return float((srgb_from_linear(factor * lit + dark) @ LUMINANCE).mean())
+
+    rng = np.random.default_rng(1)
+    even, none = rng.uniform(0.4, 0.6, (1000, 3)), np.zeros((1000, 3))
+    assert mean(solved(even, none, ROOM), even, none) == pytest.approx(ROOM.mean, abs=1e-4)
+    assert mean(solved(1e-6 * even, none, ROOM), 1e-6 * even, none) == pytest.approx(ROOM.mean, abs=1e-4)
+    dark = np.full((1000, 3), 0.05)
+    assert mean(solved(even, dark, ROOM), even, dark) == pytest.approx(ROOM.mean, abs=1e-4)
+    harsh = np.where(np.arange(1000)[:, None] < 100, 30.0, 1.0) * even  # a tenth lies in the sun
+    clipped = ((solved(harsh, none, ROOM) * harsh).max(axis=1) > 1).mean()
+    assert 0.5 * CLIPPED < clipped <= CLIPPED or mean(solved(harsh, none, ROOM), harsh, none) < 0.301
+
+
+def test_a_file_that_is_there_stays(tmp_path: Path) -> None:
+    scene, job_file = room().save(tmp_path / "scene.glb"), tmp_path / "job.toml"
+    job_file.write_text("mine")
+    with pytest.raises(OutputError, match=r"job.toml: is there already; give another name with --output, or --force"):
+        init(scene, job_file, FEW)
+    assert job_file.read_text() == "mine"
+    init(scene, job_file, FEW, force=True)
+    assert load_toml(job_file)["name"] == "scene"
+
+
+def test_the_command_says_what_it_did(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    room().save(tmp_path / "my room (1).glb")
+    monkeypatch.chdir(tmp_path)
+    assert code_of("init", "my room (1).glb", "--frames", "2", "--lights", "3") == 0
+    said = capsys.readouterr().out
+    assert "so it is taken for a room" in said
+    assert "my room (1).toml: 2 eyes x 3 lights = 6 images" in said
+    assert read_job(tmp_path / "my room (1).toml").name == "my-room-1"
+    assert code_of("init", "none.glb") == 3
+    assert "none.glb: no such scene file" in capsys.readouterr().err
+    assert code_of("init", "my room (1).glb") == 4
+    assert code_of("init", "my room (1).glb", "--force", "--camera", "Shot") == 2
+    assert 'got "Shot"; it has no camera\n1 problem; nothing was written.' in capsys.readouterr().err
+
+
+def test_a_black_scene_is_told(tmp_path: Path) -> None:
+    glb = Glb()
+    add(glb, box([-1, 0, -1], [1, 1, 1]), "Coal", [0.0, 0.0, 0.0])
+    with pytest.raises(SceneError, match="no light reaches what the camera sees"):
+        started(glb, tmp_path)

@@ -1,0 +1,66 @@
+"""Arrays whose parts were handed out: whether they are the whole, and how often their parts were begun."""
+
+import tomllib
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from framearray_cli.array.record import record_files, unsealed
+from support import tiny
+
+N = 24
+WALK = tiny.WALK | {"frames": N, "resolution": [80, 60]}
+WALK["keys"] = [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": N - 1}]
+JOB: dict[str, Any] = {
+    "camera": WALK,
+    "output": {"format": "exr"},
+    "reuse": {"n_r": 2},
+    "ambient": {"paths": 64},
+    "samples": {"hits": 8},
+    "render": {"threads": 1},
+}
+# keys of the manifest's summary that tell how the work went, not what came of it
+EFFORT = {"seconds", "rays", "rays_per_pixel_image", "peak_memory"}
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """All files of the array but the manifest."""
+    return {file.name: file.read_bytes() for file in folder.glob("tiny.*")}
+
+
+def manifest(folder: Path) -> dict[str, Any]:
+    """All that a manifest says of the array."""
+    table = tomllib.loads((folder / "manifest.toml").read_text())
+    table["summary"] = {key: value for key, value in table["summary"].items() if key not in EFFORT}
+    del table["job"]["output"]["directory"]
+    return table
+
+
+def same(part: Path, whole: Path) -> bool:
+    """Whether two folders hold the same array, to the last bit; shows the first that differs if not."""
+    found, wanted = contents(part), contents(whole)
+    different = sorted(name for name in found.keys() | wanted.keys() if found.get(name) != wanted.get(name))
+    if different:
+        print(f"{len(different)} files differ, the first: {different[0]}")
+    return not different and bool(wanted) and manifest(part) == manifest(whole)
+
+
+def lines(folder: Path) -> list[tuple[str, dict[str, Any]]]:
+    """All lines of all records that are whole, each with the name of its record."""
+    return [
+        (file.stem, line)
+        for file in record_files(folder)
+        for line in map(unsealed, file.read_bytes().splitlines())
+        if line
+    ]
+
+
+def finished(folder: Path) -> Counter[tuple[int, ...]]:
+    """How often each camera under each block of lights was finished."""
+    return Counter((line["c"], *line["lights"]) for _, line in lines(folder) if "c" in line)
+
+
+def begun_again(folder: Path) -> dict[str, int]:
+    """How often chunks were begun again."""
+    times = Counter(name for name, line in lines(folder) if "fingerprint" in line)
+    return {name: n - 1 for name, n in times.items() if n > 1}

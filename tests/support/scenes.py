@@ -1,0 +1,143 @@
+"""Real scenes that lie beside the checkout (or where FRAMEARRAY_SCENES says), and small GLB files made on the spot."""
+
+import io
+import json
+import os
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from framearray_cli.scene.cleaning import has_area
+from framearray_cli.scene.scene import Scene
+from support import ROOT
+
+COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
+KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+
+QUAD = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], dtype=np.float32)
+QUAD_FACES = np.array([0, 1, 2, 0, 2, 3], dtype=np.uint16)
+# texture coordinates as glTF has them, v downwards: the corner (0, 0, 0) shows the image's lower left
+QUAD_UVS = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], dtype=np.float32)
+
+
+def scenes_folder() -> Path:
+    """The folder of real scenes."""
+    default = ROOT / "shared" / "scenes"
+    # as the program names files in messages: links on the way followed
+    return Path(os.environ.get("FRAMEARRAY_SCENES", default)).resolve()
+
+
+def shared_scene(name: str) -> Path:
+    """A file in the folder of real scenes; the test is skipped where there is none."""
+    file = scenes_folder() / name
+    if not file.is_file():
+        pytest.skip(f"no real scene {name}; set FRAMEARRAY_SCENES to the folder of scenes")
+    return file
+
+
+def png(texels: Any) -> bytes:
+    """Encode (height, width, 3 or 4) uint8 as PNG."""
+    from PIL import Image
+
+    data = io.BytesIO()
+    Image.fromarray(np.asarray(texels, dtype=np.uint8)).save(data, format="PNG")
+    return data.getvalue()
+
+
+class Glb:
+    """Builds a GLB: a scene of all nodes given to `node`."""
+
+    def __init__(self) -> None:
+        self.tree: dict[str, Any] = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}]}
+        self.blob = b""
+
+    def add(self, key: str, entry: dict[str, Any]) -> int:
+        self.tree.setdefault(key, []).append(entry)
+        return len(self.tree[key]) - 1
+
+    def view(self, data: bytes) -> int:
+        self.blob += b"\0" * (-len(self.blob) % 4)
+        view = {"buffer": 0, "byteOffset": len(self.blob), "byteLength": len(data)}
+        self.blob += data
+        return self.add("bufferViews", view)
+
+    def accessor(self, values: Any, **more: Any) -> int:
+        array = np.ascontiguousarray(values)
+        kind = KINDS[1 if array.ndim == 1 else array.shape[1]]
+        entry = {"bufferView": self.view(array.tobytes()), "componentType": COMPONENTS[array.dtype.name]}
+        return self.add("accessors", entry | {"count": len(array), "type": kind} | more)
+
+    def texture(self, image: bytes, **sampler: Any) -> int:
+        entry = {"source": self.add("images", {"bufferView": self.view(image), "mimeType": "image/png"})}
+        if sampler:
+            entry["sampler"] = self.add("samplers", sampler)
+        return self.add("textures", entry)
+
+    def material(self, name: str, pbr: dict[str, Any] | None = None, **more: Any) -> int:
+        base = {"metallicFactor": 0.0} | (pbr or {})
+        return self.add("materials", {"name": name, "pbrMetallicRoughness": base} | more)
+
+    def mesh(self, material: int | None = None, *, positions: Any = QUAD, faces: Any = QUAD_FACES, **more: Any) -> int:
+        """One primitive; keys of `more` in capitals are attributes, the others go into the primitive."""
+        attributes = {"POSITION": self.accessor(positions)}
+        attributes |= {key: value for key, value in more.items() if key.isupper()}
+        primitive = {"attributes": attributes} | {key: value for key, value in more.items() if not key.isupper()}
+        if faces is not None:
+            primitive["indices"] = self.accessor(faces)
+        if material is not None:
+            primitive["material"] = material
+        return self.add("meshes", {"primitives": [primitive]})
+
+    def node(self, mesh: int | None = None, **more: Any) -> int:
+        """A node below the scene's root."""
+        node = self.add("nodes", more if mesh is None else {"mesh": mesh} | more)
+        self.tree["scenes"][0]["nodes"].append(node)
+        return node
+
+    def save(self, file: Path) -> Path:
+        self.tree["buffers"] = [{"byteLength": len(self.blob)}]
+        text = json.dumps(self.tree).encode()
+        text += b" " * (-len(text) % 4)
+        blob = self.blob + b"\0" * (-len(self.blob) % 4)
+        chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(blob), 0x004E4942) + blob
+        file.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks)
+        return file
+
+
+def check_shapes(scene: Scene) -> None:
+    """What kernels rely on, whatever the file."""
+    n, m = len(scene.corners), len(scene.material_names)
+    assert scene.corners.shape == (n, 3, 3)
+    assert n == scene.report.triangles > 0
+    for array, width in ((scene.normals, 3), (scene.uvs, 2), (scene.colours, 3)):
+        assert array.shape in ((n, 3, width), (0, 3, width))
+        assert np.isfinite(array).all()
+        assert array.dtype == np.float32
+    if len(scene.normals):
+        np.testing.assert_allclose(np.linalg.norm(scene.normals.astype(np.float64), axis=-1), 1, atol=1e-6)
+    assert scene.corners.dtype == scene.reflectivity.dtype == scene.specular.dtype == np.float32
+    assert scene.material.dtype == scene.textures.dtype == scene.reflectivity_texture.dtype == np.int32
+    assert scene.centre.dtype == np.float64
+    assert np.isfinite(scene.corners).all()
+    assert has_area(scene.corners).all()
+    np.testing.assert_allclose(scene.corners.max(axis=(0, 1)), -scene.corners.min(axis=(0, 1)), rtol=1e-5, atol=1e-30)
+    assert scene.material.min() >= 0
+    assert scene.material.max() < m
+    assert scene.reflectivity.shape == scene.specular.shape == (m, 3)
+    assert ((scene.reflectivity >= 0) & (scene.reflectivity <= 1)).all()
+    assert (scene.reflectivity + scene.specular <= 1 + 1e-6).all()
+    for index in (scene.reflectivity_texture, scene.specular_texture, scene.alpha_texture):
+        assert index.shape == (m,)
+        assert index.max(initial=-1) < len(scene.textures)
+    used = [scene.reflectivity_texture, scene.specular_texture, scene.alpha_texture]
+    if max(int(index[scene.material].max()) for index in used) >= 0:
+        assert len(scene.uvs) == n
+    starts, widths, heights = scene.textures.T
+    assert np.array_equal(starts, np.cumsum(widths * heights) - widths * heights)
+    assert scene.texels.shape == (int((widths * heights).sum()), 4)
+    masked = scene.alpha_cutoff[scene.material] > 0
+    assert not masked[: scene.n_opaque].any()
+    assert masked[scene.n_opaque :].all()

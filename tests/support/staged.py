@@ -1,0 +1,45 @@
+"""Cameras, lights and their animations in GLB files that are made on the spot, and the matrices they should have."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from support.scenes import Glb
+
+LENS = {"type": "perspective", "perspective": {"yfov": math.radians(50), "aspectRatio": 1.5, "znear": 0.1}}
+QUARTER = math.sqrt(0.5)  # sine and cosine of an eighth of a turn: a quaternion of a quarter turn
+
+
+def camera(glb: Glb, **more: Any) -> int:
+    """A camera without a node of its own in the scene's list."""
+    return glb.add("nodes", {"camera": glb.add("cameras", dict(LENS)), "name": "Shot"} | more)
+
+
+def animate(glb: Glb, node: int, path: str, times: Any, values: Any, interpolation: str = "LINEAR") -> None:
+    sampler = {
+        "input": glb.accessor(np.array(times, np.float32)),
+        "output": glb.accessor(np.array(values, np.float32)),
+        "interpolation": interpolation,
+    }
+    channel = {"sampler": 0, "target": {"node": node, "path": path}}
+    glb.add("animations", {"samplers": [sampler], "channels": [channel]})
+
+
+def light(glb: Glb, kind: str = "point", **more: Any) -> dict[str, Any]:
+    """What a node says that carries a light."""
+    table = glb.tree.setdefault("extensions", {}).setdefault("KHR_lights_punctual", {"lights": []})
+    table["lights"].append({"type": kind} | more)
+    glb.tree["extensionsUsed"] = ["KHR_lights_punctual"]
+    return {"extensions": {"KHR_lights_punctual": {"light": len(table["lights"]) - 1}}}
+
+
+def turn_y(angle: float) -> Any:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, 0, s, 0], [0, 1, 0, 0], [-s, 0, c, 0], [0, 0, 0, 1]])
+
+
+def shift(x: float, y: float, z: float) -> Any:
+    matrix = np.eye(4)
+    matrix[:3, 3] = (x, y, z)
+    return matrix

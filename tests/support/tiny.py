@@ -1,0 +1,258 @@
+"""Tiny scenes and jobs for the tests of the engine: a room that has one of everything, in a few hundred triangles."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from framearray_cli.engine.embree import Engine
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.composed import Composed
+from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.loop import ready_frames
+from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.job.job import Job
+from framearray_cli.render.prepare import Prepared, open_embree, plan_work, prepared_from
+from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.paths.paths import eyes, lights
+from framearray_cli.scene.scene import Scene, build_scene
+from support.scenes import Glb, png
+
+PLAIN, FLOOR, PAINTED, SMOOTH, MIRROR, GLOSSY = range(6)
+MATERIALS = (
+    Material(name="Plain", reflectivity=(0.7, 0.6, 0.5)),
+    Material(name="Floor", reflectivity=(0.9, 0.8, 0.7), texture=0),
+    Material(name="Painted", reflectivity=(0.9, 0.9, 0.9)),
+    Material(name="Smooth", reflectivity=(0.2, 0.5, 0.8)),
+    Material(name="Mirror", reflectivity=(0.0, 0.0, 0.0), specular=(0.9, 0.8, 0.7)),
+    Material(name="Glossy", reflectivity=(0.3, 0.1, 0.1), specular=(0.4, 0.5, 0.6)),
+)
+
+
+def quad(a: Any, b: Any, c: Any, d: Any) -> Any:
+    """Two triangles, (2, 3, 3), of the corners in turn."""
+    return np.array([[a, b, c], [a, c, d]], np.float64)
+
+
+def box(low: Any, high: Any, turn: float = 0.0) -> Any:
+    """Twelve triangles; turned about the vertical axis through its middle, radians."""
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
+    low, high = np.array(low), np.array(high)
+    middle, half = (low + high) / 2, (high - low) / 2
+    c, s = np.cos(turn), np.sin(turn)
+    corner = middle + (signs * half) @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+    faces = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    return np.concatenate([quad(*(corner[i] for i in face)) for face in faces])
+
+
+def ball(middle: Any, radius: float, n: int = 6) -> tuple[Any, Any]:
+    """A sphere of 2 n x n patches with smooth normals: corners and normals, (triangles, 3, 3); no frame of it is
+    nearly flat along z, where the hemisphere's frame jumps."""
+    around, up = np.meshgrid(np.linspace(0, 2 * np.pi, 2 * n + 1), np.linspace(0.1, np.pi - 0.1, n + 1))
+    normal = np.stack([np.sin(up) * np.cos(around), np.cos(up), np.sin(up) * np.sin(around)], axis=-1)
+    quads = [
+        quad(normal[j, i], normal[j + 1, i], normal[j + 1, i + 1], normal[j, i + 1])
+        for j in range(n)
+        for i in range(2 * n)
+    ]
+    normals = np.concatenate(quads)
+    return np.array(middle) + radius * normals, normals
+
+
+def checks(size: int = 8, seed: int = 1) -> Any:
+    """(size, size, 4) texels, every one its own colour."""
+    texels = np.random.default_rng(seed).integers(30, 255, (size, size, 4), dtype=np.uint8)
+    texels[..., 3] = 255
+    return texels
+
+
+def room_meshes(*, mirrors: bool = True, textured: bool = True, at: Any = (0.0, 0.0, 0.0), size: float = 1.0) -> Meshes:
+    """A room of 4 x 2.5 x 4 with an open window and a hole in the roof, a floor with a texture, a wall with corner
+    colours, a smooth ball, a turned box, a mirror, and glossy panels across and beside it.
+
+    Args:
+        at: where the middle of the floor is.
+        size: what all lengths are multiplied with.
+    """
+    x, z, h = 2.0, 2.0, 2.5
+    floor = quad((-x, 0, z), (x, 0, z), (x, 0, -z), (-x, 0, -z))
+    uv = np.array([[[0, 0], [1.5, 0], [1.5, 2.25]], [[0, 0], [1.5, 2.25], [0, 2.25]]]) - 0.4
+    back = quad((-x, 0, -z), (x, 0, -z), (x, h, -z), (-x, h, -z))
+    paint = np.array([[[1, 0.2, 0.2], [0.2, 1, 0.2], [0.2, 0.2, 1]], [[1, 0.2, 0.2], [0.2, 0.2, 1], [1, 1, 0.2]]])
+    walls = [
+        quad((-x, 0, z), (-x, 0, -z), (-x, h, -z), (-x, h, z)),
+        quad((x, 0, -z), (x, 0, z), (x, 0.8, z), (x, 0.8, -z)),  # above it the window
+        quad((x, 2.1, -z), (x, 2.1, z), (x, h, z), (x, h, -z)),
+        quad((-x, 0, z), (-x, h, z), (x, h, z), (x, 0, z)),
+        quad((-x, h, z), (-x, h, -z), (0.4, h, -z), (0.4, h, z)),  # beside it the hole in the roof
+        box((0.5, 0, -1.0), (1.1, 0.9, -0.4), 0.5),
+    ]
+    corners, normals = ball((-0.6, 0.5, -0.7), 0.45)
+    parts = [
+        Part(material=PLAIN, corners=np.concatenate(walls)),
+        Part(material=FLOOR if textured else PLAIN, corners=floor, uvs=uv if textured else None),
+        Part(material=PAINTED, corners=back, colours=paint.astype(np.float32)),
+        Part(material=SMOOTH, corners=corners, normals=normals),
+    ]
+    if mirrors:
+        left = quad((-1.9, 0.3, 1.0), (-1.9, 0.3, -1.5), (-1.9, 2, -1.5), (-1.9, 2, 1))
+        right = quad((1.9, 0.1, -1.8), (1.9, 0.1, 1.8), (1.9, 1.4, 1.8), (1.9, 1.4, -1.8))
+        behind = quad((-1.8, 0.8, -1.95), (-0.6, 0.8, -1.95), (-0.6, 2.2, -1.95), (-1.8, 2.2, -1.95))
+        parts.append(Part(material=MIRROR, corners=left))
+        parts.append(Part(material=GLOSSY, corners=np.concatenate([right, behind])))
+    moved = tuple(
+        Part(
+            material=p.material,
+            corners=size * p.corners + np.array(at),
+            normals=p.normals,
+            uvs=p.uvs,
+            colours=p.colours,
+        )
+        for p in parts
+    )
+    textures = (checks(),) if textured else ()
+    materials = MATERIALS if mirrors else MATERIALS[:MIRROR]
+    return Meshes(parts=moved, materials=materials, textures=textures, dropped={}, notes=())
+
+
+def room(**options: Any) -> Scene:
+    """`room_meshes` as a scene."""
+    return build_scene(room_meshes(**options), {})
+
+
+def scene_of(
+    corners: Any,
+    material: Material | None = None,
+    *,
+    textures: Sequence[Any] = (),
+    notes: Sequence[str] = (),
+    **more: Any,
+) -> Scene:
+    """A scene of one material; `more` are arrays of `Part`."""
+    part = Part(material=0, corners=np.asarray(corners, np.float64), **more)
+    material = material or Material(name="Only")
+    meshes = Meshes(parts=(part,), materials=(material,), textures=tuple(textures), dropped={}, notes=tuple(notes))
+    return build_scene(meshes, {})
+
+
+def save_glb(meshes: Meshes, file: Path) -> Path:
+    """Write meshes as a GLB; a specular material becomes a smooth metal."""
+    glb = Glb()
+    textures = [glb.texture(png(texels)) for texels in meshes.textures]
+    for part in meshes.parts:
+        m = meshes.materials[part.material]
+        metal = max(m.specular) > 0
+        pbr: dict[str, Any] = {"baseColorFactor": [*(m.specular if metal else m.reflectivity), 1.0]}
+        pbr |= {"metallicFactor": float(metal), "roughnessFactor": 0.0 if metal else 1.0}
+        more: dict[str, Any] = {}
+        if part.normals is not None:
+            more["NORMAL"] = glb.accessor(part.normals.reshape(-1, 3).astype(np.float32))
+        if part.uvs is not None:
+            uvs = part.uvs.reshape(-1, 2) * [1, -1] + [0, 1]  # v of glTF points down
+            more["TEXCOORD_0"] = glb.accessor(uvs.astype(np.float32))
+            pbr["baseColorTexture"] = {"index": textures[m.texture]}
+        if part.colours is not None:
+            more["COLOR_0"] = glb.accessor(part.colours.reshape(-1, 3).astype(np.float32))
+        positions = part.corners.reshape(-1, 3).astype(np.float32)
+        faces = np.arange(len(positions), dtype=np.uint16)
+        glb.node(glb.mesh(glb.material(m.name, pbr), positions=positions, faces=faces, **more))
+    return glb.save(file)
+
+
+TABLE: dict[str, Any] = {
+    "name": "tiny",
+    "seed": 5,
+    "scene": {"file": "tiny.glb"},
+    "camera": {
+        "resolution": [24, 18],
+        "fov": 75.0,
+        "frames": 1,
+        "keys": [
+            {"frame": 0, "eye": [0.2, 1.3, 1.7], "target": [-0.1, 0.9, -1.0]},
+        ],
+    },
+    "light": {
+        "frames": 3,
+        "sources": [
+            {
+                "type": "point",
+                "keys": [
+                    {"frame": 0, "position": [-0.9, 2.2, 0.3], "intensity": [8.0, 8.0, 6.0]},
+                    {"frame": 2, "position": [0.7, 1.9, 0.6], "intensity": [6.0, 7.0, 8.0]},
+                ],
+            }
+        ],
+    },
+    "samples": {"hits": 2, "obscurance": 5},
+    "reuse": {"n_r": 0},
+    "obscurance": {"range": 1.5},
+    "ambient": {"paths": 512},
+    "render": {"threads": 2},
+}
+WALK = {
+    "frames": 6,
+    "keys": [
+        {"frame": 0, "eye": [0.2, 1.3, 1.7], "target": [-0.1, 0.9, -1.0]},
+        {"frame": 5, "eye": [0.5, 1.45, 1.2], "target": [0.1, 0.8, -1.0]},
+    ],
+}
+SUN = {"type": "directional", "keys": [{"frame": 0, "direction": [-0.6, -1.0, -0.3], "irradiance": [3.0, 2.5, 1.5]}]}
+RED = {"type": "point", "keys": [{"frame": 0, "position": [1.2, 1.0, 0.2], "intensity": [4.0, 0.5, 0.0]}]}
+
+
+def table(**changes: Mapping[str, Any]) -> dict[str, Any]:
+    """The table of a tiny job with some keys of its tables changed."""
+    result = {key: dict(value) if isinstance(value, dict) else value for key, value in TABLE.items()}
+    for key, value in changes.items():
+        result[key] = {**result.get(key, {}), **value} if isinstance(value, Mapping) else value
+    return result
+
+
+def job(**changes: Any) -> Job:
+    """A tiny job; `job(camera=WALK, reuse={"n_r": 2})` changes single keys of those tables."""
+    return Job.model_validate(table(**changes))
+
+
+def prepared(job: Job, scene: Scene | None = None) -> Prepared:
+    """What `prepare` gives, with a scene that is in no file."""
+    return prepared_from(job, scene or room(), eyes(job), lights(job))
+
+
+@contextmanager
+def planned(inputs: Prepared, engine: Engine = "auto") -> Iterator[tuple[FrameSetup, Ambient]]:
+    """Embree open, ambient light known."""
+    with open_embree(inputs, engine) as embree:
+        yield plan_work(inputs, embree)
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """All frames that were found and composed, one for a camera that stands still."""
+
+    composed: list[Composed]
+    ambient: Ambient
+    rays: dict[str, int]
+
+    @property
+    def images(self) -> Any:
+        """(n_frames, n_lights, height, width, 3)."""
+        return np.stack([frame.images for frame in self.composed])
+
+
+def frames_of(setup: FrameSetup, ambient: Ambient, pool: TracePool) -> list[Composed]:
+    """All frames, composed, without files."""
+    window = Window(setup, ambient, pool)
+    shape = (len(setup.kept), setup.cams.height, setup.cams.width, 3)
+    wanted = range(setup.n_frames)
+    return [window.compose(j, np.empty(shape, np.float32)) for j in ready_frames(window, setup, wanted, pool)]
+
+
+def render_frames(inputs: Prepared, threads: int = 1, engine: Engine = "auto") -> Rendered:
+    """All frames of a job."""
+    with planned(inputs, engine) as (setup, ambient), TracePool(setup, threads) as pool:
+        composed = frames_of(setup, ambient, pool)
+        return Rendered(composed, ambient, dict(pool.rays()))

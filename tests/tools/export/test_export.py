@@ -1,0 +1,344 @@
+"""Frame arrays for nerfstudio and Cinema, and the folder that they are written into."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.boxarrays import HIGH, LOW, colour_at, grouped_manifest, light, plain_manifest, write_array, write_groups
+
+from framearray_cli.array.images.images import ImageFormat, read_image
+from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.manifest import Manifest, image_path
+from framearray_cli.array.pictures import Pictures
+from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
+from framearray_cli.base.errors import JobError, OutputError
+from framearray_cli.tools.export import KINDS, export
+
+
+@pytest.fixture
+def array(tmp_path: Path) -> Manifest:
+    return write_array(plain_manifest(tmp_path / "out"))
+
+
+def off_the_box(points: np.ndarray) -> np.ndarray:
+    """Distance of points (n, 3) to the nearest plane of a side of the box, if they lie within it."""
+    to_planes = np.minimum(np.abs(points - LOW), np.abs(points - HIGH)).min(-1)
+    outside = np.maximum(np.maximum(LOW - points, points - HIGH), 0).max(-1)
+    return np.maximum(to_planes * (outside <= 1e-3), outside)
+
+
+# nerfstudio
+
+
+def rays_of(table: dict[str, Any], frame: dict[str, Any], axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eye and rays (h, w, 3) of depth 1 through the middle of each pixel, as the published format has them:
+    x right, y up, looking along -z; `axes` are factors of these three, to try others."""
+    both = table | frame
+    x, y = np.meshgrid(np.arange(both["w"]) + 0.5, np.arange(both["h"]) + 0.5)
+    local = [(x - both["cx"]) / both["fl_x"], (both["cy"] - y) / both["fl_y"], np.full_like(x, -1.0)]
+    pose = np.array(both["transform_matrix"])
+    return pose[:3, 3], np.stack(local, -1) * axes @ pose[:3, :3].T
+
+
+def worst_of(folder: Path, axes: tuple[float, ...] = (1.0, 1.0, 1.0)) -> tuple[float, float]:
+    """Over all frames: the largest distance of a pixel's point to the box, and the largest error of its colour."""
+    table = json.loads((folder / "transforms.json").read_text(encoding="utf-8"))
+    off, wrong = 0.0, 0.0
+    for frame in table["frames"]:
+        eye, rays = rays_of(table, frame, np.array(axes))
+        depth = np.load(folder / frame["depth_file_path"]) * 1e-3
+        points = eye + depth[..., None] * rays
+        off = max(off, float(off_the_box(points).max()))
+        shown = linear_from_srgb8(read_codes(folder / frame["file_path"]))
+        expected = colour_at(points) * 0.8 ** frame["light"]
+        wrong = max(wrong, float(np.abs(shown - expected).max()))
+    return off, wrong
+
+
+def test_rays_of_transforms_json_meet_the_scene_at_its_depths(array: Manifest, tmp_path: Path) -> None:
+    result = export(array.directory, tmp_path / "ns", "nerfstudio", light="all")
+    assert (result.n_cameras, result.n_places, result.notes) == (4, 3, ())
+    off, wrong = worst_of(tmp_path / "ns")
+    assert off < 1e-5  # depths are float32, up to 6
+    assert wrong < 0.5 * 0.0092  # half a code where a code is widest in linear light: at white
+
+
+@pytest.mark.parametrize("axes", [(-1, 1, 1), (1, -1, 1), (1, 1, -1), (1, -1, -1)])
+def test_a_flipped_axis_is_seen(array: Manifest, tmp_path: Path, axes: tuple[float, ...]) -> None:
+    export(array.directory, tmp_path / "ns", "nerfstudio")
+    off, wrong = worst_of(tmp_path / "ns", axes)
+    assert off > 0.1 and wrong > 0.1
+
+
+def test_transforms_json_says_what_nerfstudio_asks(array: Manifest, tmp_path: Path) -> None:
+    export(array.directory, tmp_path / "ns", "nerfstudio")
+    table = json.loads((tmp_path / "ns/transforms.json").read_text(encoding="utf-8"))
+    assert (table["camera_model"], table["w"], table["h"], table["cx"], table["cy"]) == ("OPENCV", 60, 40, 30.0, 20.0)
+    focal = 20 / np.tan(np.radians(30))
+    assert table["fl_x"] == table["fl_y"] == pytest.approx(focal, rel=1e-14)
+    assert table["camera_angle_x"] == pytest.approx(2 * np.arctan(30 / focal), rel=1e-14)
+    names = [frame["file_path"] for frame in table["frames"]]
+    assert names == sorted(names) == [f"images/c{c:04d}_l001.png" for c in range(4)]  # the middle light position
+    for c, frame in enumerate(table["frames"]):
+        assert (frame["camera"], frame["light"]) == (c, 1)
+        np.testing.assert_array_equal(frame["transform_matrix"], array.cameras[c].matrix)
+        assert frame["pl_pos"] == [0.1, 2.0, -0.5]
+        assert frame["pl_intensity"] == [9.0, 7.0, 6.0]
+        assert frame["depth_file_path"] == f"depths/c{c:04d}.npy"
+
+
+@pytest.mark.parametrize("lights", [[light(0, 2)], [light(0, kind="directional")], [light(0, 0)]])
+def test_only_a_single_point_is_told_as_one(tmp_path: Path, lights: list) -> None:
+    array = write_array(plain_manifest(tmp_path / "out", lights=lights))
+    export(array.directory, tmp_path / "ns", "nerfstudio")
+    frame = json.loads((tmp_path / "ns/transforms.json").read_text(encoding="utf-8"))["frames"][0]
+    assert "pl_pos" not in frame and "pl_intensity" not in frame
+
+
+def test_each_frame_has_its_own_lens_where_they_differ(tmp_path: Path) -> None:
+    array = write_array(plain_manifest(tmp_path / "out", fov=(60.0, 60.0, 45.0, 60.0)))
+    export(array.directory, tmp_path / "ns", "nerfstudio")
+    table = json.loads((tmp_path / "ns/transforms.json").read_text(encoding="utf-8"))
+    assert "fl_x" not in table
+    assert len({frame["fl_x"] for frame in table["frames"]}) == 2
+    assert worst_of(tmp_path / "ns")[0] < 1e-5
+
+
+def test_points_lie_on_the_scene(array: Manifest, tmp_path: Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    result = export(array.directory, tmp_path / "ns", "nerfstudio", points=900)
+    cloud = trimesh.load(tmp_path / "ns/points.ply")
+    assert len(cloud.vertices) == result.n_points
+    assert 450 < result.n_points <= 900
+    assert off_the_box(np.array(cloud.vertices)).max() < 1e-5
+    expected = srgb8_from_linear(colour_at(np.array(cloud.vertices)) * 0.8)
+    assert np.abs(expected.astype(int) - np.array(cloud.colors)[:, :3]).max() <= 1
+
+
+@pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")  # that reader leaves an image open
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_reader_that_is_not_ours_reads_transforms_json(array: Manifest, tmp_path: Path) -> None:
+    module = pytest.importorskip("nerfbaselines.datasets.nerfstudio", reason="nerfbaselines is not installed")
+    export(array.directory, tmp_path / "ns", "nerfstudio")
+    found = {}
+    for split in ("train", "test"):
+        read = module.load_nerfstudio_dataset(tmp_path / "ns", split)
+        found |= dict(zip(read["image_paths"], read["cameras"].poses, strict=True))
+        for lens in read["cameras"].intrinsics:
+            np.testing.assert_allclose(lens, [20 * 3**0.5, 20 * 3**0.5, 30, 20], rtol=1e-6)
+    assert len(found) == 4
+    for c, name in enumerate(sorted(found)):
+        ours = array.cameras[c].matrix[:3]
+        np.testing.assert_allclose(found[name], ours * [1, -1, -1, 1], atol=1e-6)  # theirs: y down, z forward
+        assert Path(name).is_file()
+
+
+# Cinema
+
+
+def problems_of(folder: Path) -> list[str]:
+    """What is wrong with a database by specification D."""
+    with (folder / "data.csv").open(newline="", encoding="utf-8") as file:
+        head, *rows = list(csv.reader(file))
+    found = [] if rows else ["no rows"]
+    found += ["names"] if len(set(head)) < len(head) or not all(head) else []
+    files = [k for k, name in enumerate(head) if name.startswith("FILE")]
+    found += ["files are not last"] if files != list(range(len(head) - len(files), len(head))) else []
+    found += ["cells"] if any(len(row) != len(head) for row in rows) else []
+    for k, name in enumerate(head):
+        kinds = {_kind(row[k]) for row in rows if k < len(row) and row[k]}
+        found += [f"types of {name}"] if len(kinds) > 1 else []
+    return found + ["a file is missing" for row in rows for k in files if not (folder / row[k]).is_file()]
+
+
+def _kind(cell: str) -> type:
+    for kind in (int, float):
+        try:
+            kind(cell)
+            return kind
+        except ValueError:
+            pass
+    return str
+
+
+def rows_of(folder: Path) -> list[dict[str, str]]:
+    with (folder / "data.csv").open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_cinema_database_has_a_row_for_each_picture(array: Manifest, tmp_path: Path) -> None:
+    result = export(array.directory, tmp_path / "box", "cinema")
+    assert result.target == tmp_path / "box.cdb"
+    assert problems_of(result.target) == []
+    rows = rows_of(result.target)
+    assert [(int(row["camera"]), int(row["light"])) for row in rows] == [(c, l) for c in range(4) for l in range(3)]
+    for row in rows:
+        c, l = int(row["camera"]), int(row["light"])
+        matrix = array.cameras[c].matrix
+        assert [float(row[f"eye_{letter}"]) for letter in "xyz"] == matrix[:3, 3].tolist()
+        assert [float(row[f"view_{letter}"]) for letter in "xyz"] == (-matrix[:3, 2]).tolist()
+        assert [float(row[f"source_position_{letter}"]) for letter in "xyz"] == [0.1 * l, 2.0, -0.5]
+        assert (row["source_type"], row["fov"]) == ("point", "60.0")
+        expected = read_codes(image_path(array, c, l))
+        np.testing.assert_array_equal(read_codes(result.target / row["FILE"]), expected)
+
+
+def test_faults_of_a_cinema_database_are_seen(array: Manifest, tmp_path: Path) -> None:
+    folder = export(array.directory, tmp_path / "box.cdb", "cinema").target
+    text = (folder / "data.csv").read_text(encoding="utf-8")
+    for old, new, fault in (
+        ("camera,", "light,", "names"),
+        ("point", "1.0", "types of source_type"),
+        ("60.0,", "60.0,1,", "cells"),
+        ("images/c0003_l002.png", "images/none.png", "a file is missing"),
+        (",FILE", ",FILE,more", "files are not last"),
+    ):
+        (folder / "data.csv").write_text(text.replace(old, new, 1), encoding="utf-8")
+        assert fault in problems_of(folder)
+
+
+def test_a_reader_that_is_not_ours_reads_the_cinema_database(array: Manifest, tmp_path: Path) -> None:
+    module = pytest.importorskip("cinemasci.cdb", reason="cinemasci is not installed")
+    folder = export(array.directory, tmp_path / "box.cdb", "cinema").target
+    database = module.cdb(str(folder))
+    assert database.read_data_from_file()
+    database.set_extract_parameter_names(["FILE"])
+    assert database.getParameterValues("light") == {0.0, 1.0, 2.0}
+    (file,) = database.get_extracts({"camera": "2", "light": "1"})
+    np.testing.assert_array_equal(read_codes(Path(file)), read_codes(image_path(array, 2, 1)))
+
+
+def test_groups_are_summed_and_have_their_own_columns(tmp_path: Path) -> None:
+    array = write_groups(grouped_manifest(tmp_path / "out"))
+    result = export(array.directory, tmp_path / "a", "cinema", image_format=ImageFormat(format="exr"))
+    assert problems_of(result.target) == []
+    rows = rows_of(result.target)
+    assert len(rows) == 4 * 3 * 2
+    pictures = Pictures(array)
+    for row in rows:
+        c, l, k = int(row["camera"]), int(row["light"]), int(row["light_lamps"])
+        assert row["FILE"] == f"images/c{c:04d}_l{l:03d}_lamps{k:03d}.exr"
+        expected = pictures.picture(c, (l, k))
+        np.testing.assert_allclose(read_image(result.target / row["FILE"]), expected, rtol=1e-3)
+        assert (row["source0_type"], row["source1_type"]) == ("point", "directional")
+        assert float(row["source1_direction_z"]) == pytest.approx(0.1 * l)
+    result = export(array.directory, tmp_path / "b", "nerfstudio", at=["lamps=0"])
+    frame = json.loads((result.target / "transforms.json").read_text(encoding="utf-8"))["frames"][0]
+    assert (frame["light"], frame["light_lamps"], "pl_pos" in frame) == (1, 0, False)
+    np.testing.assert_array_equal(
+        read_codes(result.target / frame["file_path"]), srgb8_from_linear(pictures.picture(0, (1, 0)))
+    )
+
+
+# the folder
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*"))
+
+
+def test_pictures_are_links_where_they_are_the_same(array: Manifest, tmp_path: Path) -> None:
+    source = image_path(array, 0, 1).stat().st_ino
+    file = "images/c0000_l001.png"
+    linked = export(array.directory, tmp_path / "a", "colmap").target / file
+    copied = export(array.directory, tmp_path / "b", "colmap", copy=True).target / file
+    brighter = ImageFormat(format="png", exposure=1.0)
+    shown = export(array.directory, tmp_path / "c", "colmap", image_format=brighter).target / file
+    assert (linked.stat().st_ino == source, copied.stat().st_ino == source) == (True, False)
+    np.testing.assert_array_equal(read_codes(copied), read_codes(linked))
+    np.testing.assert_array_equal(read_codes(shown), srgb8_from_linear(2 * read_image(linked)))
+    jpeg = export(array.directory, tmp_path / "d", "cinema", image_format=ImageFormat(format="jpg")).target
+    assert len(list((jpeg / "images").glob("*.jpg"))) == 12
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_earlier_export_is_replaced_only_by_force(array: Manifest, tmp_path: Path, kind: Any) -> None:
+    target = tmp_path / "x.cdb"
+    export(array.directory, target, kind, cameras="all")
+    before = names(target)
+    with pytest.raises(OutputError, match=r"x\.cdb: an earlier export is there; .* give --force"):
+        export(array.directory, target, kind, cameras="0")
+    assert names(target) == before
+    export(array.directory, target, kind, cameras="0,last", force=True)
+    assert len(list((target / "images").iterdir())) == (6 if kind == "cinema" else 2)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "x.cdb"]
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_folders_and_files_of_others_are_left_alone(array: Manifest, tmp_path: Path, force: bool) -> None:
+    before = names(array.directory)
+    with pytest.raises(OutputError, match=r"holds other files, and no transforms\.json of an earlier export"):
+        export(array.directory, array.directory, "nerfstudio", force=force)
+    assert names(array.directory) == before
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(OutputError, match="a file of that name is there"):
+        export(array.directory, tmp_path / "file", "nerfstudio", force=force)
+    (tmp_path / "empty").mkdir()
+    export(array.directory, tmp_path / "empty", "nerfstudio", force=force)
+
+
+def test_after_an_error_nothing_is_left_and_the_old_export_stays(array: Manifest, tmp_path: Path) -> None:
+    target = tmp_path / "x"
+    export(array.directory, target, "nerfstudio", copy=True)
+    before = names(target)
+    image_path(array, 3, 1).write_bytes(image_path(array, 3, 1).read_bytes()[:200])
+    for force, place in ((True, target), (False, tmp_path / "new")):
+        with pytest.raises(OutputError, match=r"box\.c0003\.l001\.png"):
+            export(array.directory, place, "nerfstudio", force=force)
+    assert names(target) == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "x"]
+
+
+def test_layers_that_are_missing_are_told(array: Manifest, tmp_path: Path) -> None:
+    (array.directory / "box.layers.c0002.exr").unlink()
+    with pytest.raises(OutputError, match=r"box\.layers\.c0002\.exr: no such file"):
+        export(array.directory, tmp_path / "x", "nerfstudio")
+    bare = write_array(plain_manifest(tmp_path / "bare", layers=False))
+    result = export(bare.directory, tmp_path / "y", "nerfstudio")
+    assert result.notes == ("no points and no depth: the array was rendered without layers (output.layers)",)
+    table = json.loads((tmp_path / "y/transforms.json").read_text(encoding="utf-8"))
+    assert "ply_file_path" not in table and "depth_file_path" not in table["frames"][0]
+    assert export(bare.directory, tmp_path / "z", "cinema").notes == ()
+
+
+def test_folders_without_a_name_are_refused(array: Manifest, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(array.directory)
+    for target in (Path("."), Path("..")):
+        with pytest.raises(OutputError, match="expected the name of a folder to be made"):
+            export(array.directory, target, "cinema")
+
+
+def test_no_points_and_one_camera_are_fine(array: Manifest, tmp_path: Path) -> None:
+    result = export(array.directory, tmp_path / "a", "nerfstudio", points=0)
+    assert (result.n_points, result.notes) == (0, ())
+    result = export(array.directory, tmp_path / "b", "nerfstudio", cameras="2", points=200)
+    assert 100 < result.n_points <= 200
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"light": "3"}, "--light: expected 0 to 2"),
+        ({"cameras": "9"}, "--cameras: expected 0 to 3"),
+        ({"at": ["lamps=0"]}, "--at: expected AXIS=PLACES"),
+    ],
+)
+def test_places_that_are_not_there_are_told(array: Manifest, tmp_path: Path, options: dict, message: str) -> None:
+    with pytest.raises(JobError, match=message):
+        export(array.directory, tmp_path / "x", "colmap", **options)
+    assert not (tmp_path / "x").exists()
+
+
+def test_poses_that_are_no_motion_are_refused(tmp_path: Path) -> None:
+    manifest = plain_manifest(tmp_path / "out")
+    bad = manifest.cameras[0].matrix * [2, 2, 2, 1]
+    rows = tuple(tuple(row) for row in bad.tolist())
+    cameras = (type(manifest.cameras[0])(world_from_camera=rows, fov=60.0), *manifest.cameras[1:])
+    broken = type(manifest)(**{f: getattr(manifest, f) for f in manifest.__dataclass_fields__} | {"cameras": cameras})
+    write_array(broken)
+    for kind in KINDS:
+        with pytest.raises(OutputError, match=r"cameras\[0\]\.world_from_camera: expected a rigid motion"):
+            export(broken.directory, tmp_path / "x", kind)

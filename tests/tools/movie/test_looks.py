@@ -1,0 +1,170 @@
+"""How radiance looks on a screen: exposure, display transforms, labels."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.movies import decoded, grouped, path_file, plain
+
+from framearray_cli.array.images.png import read_codes
+from framearray_cli.base.colour import srgb8_from_linear
+from framearray_cli.base.errors import JobError
+from framearray_cli.tools.movie.assemble import assemble
+from framearray_cli.tools.movie.display import SRGB, find_view
+from framearray_cli.tools.movie.label import burn
+from framearray_cli.tools.movie.look import Look, place_text, shown
+from framearray_cli.tools.movie.timeline import Shot
+
+GREYS = np.repeat(np.float32([0, 0.02, 0.18, 0.5, 1, 2, 4, 10, 100, 1000])[None, :, None], 3, axis=2)
+CONFIG = """ocio_profile_version: 2
+roles:
+  default: lin
+  scene_linear: lin
+displays:
+  Screen:
+    - !<View> {name: Half, colorspace: half}
+    - !<View> {name: Same, colorspace: lin}
+colorspaces:
+  - !<ColorSpace>
+    name: lin
+    aliases: [SPACES]
+  - !<ColorSpace>
+    name: half
+    from_scene_reference: !<MatrixTransform> {matrix: [0.5, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 1]}
+"""
+
+
+def image(seed: int = 0) -> Any:
+    return np.random.default_rng(seed).random((12, 16, 3), np.float32) * 1.5
+
+
+def test_srgb_is_what_png_files_hold() -> None:
+    np.testing.assert_array_equal(shown(image(), Look(), ""), srgb8_from_linear(image()))
+    assert shown(GREYS, Look(), "", 16).dtype == np.uint16
+    fine = shown(image(), Look(), "", 16) / 257
+    assert np.abs(fine - shown(image(), Look(), "").astype(float)).max() < 0.55
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+def test_exposure_doubles_radiance(bits: Any) -> None:
+    np.testing.assert_array_equal(shown(image(), Look(exposure=-1.0), "", bits), shown(image() / 2, Look(), "", bits))
+
+
+def test_aces_rolls_off() -> None:
+    """White stays below 1, the order of greys is kept, highlights that sRGB clips differ; black is black."""
+    codes = find_view("aces").encode(GREYS)[0, :, 0]
+    plain_codes = SRGB.encode(GREYS)[0, :, 0]
+    assert codes[0] == pytest.approx(0, abs=1e-3)
+    assert codes[4] < 0.75 and plain_codes[4] > 0.9999  # radiance 1
+    assert (np.diff(codes) > 0).all() and codes[-1] <= 1
+    assert (np.diff(plain_codes[4:]) < 1e-6).all()
+    assert np.abs(codes - plain_codes)[1:6].max() > 0.1
+
+
+def test_aces_is_that_of_opencolorio() -> None:
+    """ACES 2.0 shows middle grey at 10 of 100 nits, which the sRGB curve codes as 0.349."""
+    grey = find_view("aces").encode(np.full((1, 1, 3), 0.18, np.float32))
+    np.testing.assert_allclose(grey, 1.055 * 0.1 ** (1 / 2.4) - 0.055, atol=2e-3)
+
+
+def test_the_table_is_as_good_as_the_transform_for_8_bits() -> None:
+    """In believable colours the error is below rounding to codes, 12^-1/2 = 0.29; single ones are off by up to 3."""
+    rng = np.random.default_rng(3)
+    view = find_view("aces")
+    bright = np.exp(rng.normal(-1.5, 1.5, (60, 80, 1))).astype(np.float32)
+    tint = rng.uniform(0.15, 1.0, (60, 80, 3)).astype(np.float32)
+    error = 255 * (view.quick(bright * tint) - view.encode(bright * tint))
+    assert np.sqrt((error**2).mean()) < 12**-0.5
+    assert np.abs(error).max() < 3
+    greys = 255 * (view.quick(GREYS) - view.encode(GREYS))
+    assert np.abs(greys).max() < 0.5
+    beyond = np.float32([[[-1.0, 2000.0, 0.0]]])
+    np.testing.assert_allclose(view.quick(beyond), view.quick(np.clip(beyond, 0, 1024)), atol=1e-6)
+    other = 255 * (view.quick(GREYS * 1.05) - view.encode(GREYS))  # a twentieth brighter would be seen
+    assert np.abs(other).max() > 2
+
+
+def test_a_movie_shows_the_view(tmp_path: Path) -> None:
+    plain(tmp_path / "out", 1, 1, picture=lambda c, l: np.full((16, 16, 3), 1.0, np.float32))
+    path = path_file(tmp_path, "[[segments]]\nframes = 1\n")
+    for name, low, high in (("aces", 175, 185), ("srgb", 253, 255)):
+        assemble(tmp_path / "out", path, tmp_path / f"{name}.mp4", look=Look(view=find_view(name)))
+        assert low <= decoded(tmp_path / f"{name}.mp4").frames[0].mean() <= high
+
+
+def test_views_of_a_configuration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = tmp_path / "studio.ocio"
+    config.write_text(CONFIG.replace("SPACES", "lin_rec709"), encoding="utf-8")
+    monkeypatch.setenv("OCIO", str(config))
+    for name in ("Half", "Screen/Half"):
+        np.testing.assert_allclose(find_view(name).encode(image()), np.clip(image() / 2, 0, 1), atol=1e-6)
+    np.testing.assert_allclose(find_view("Same").encode(image()), np.clip(image(), 0, 1), atol=1e-6)
+    assert find_view("aces").encode(GREYS)[0, 4, 0] == pytest.approx(0.707, abs=0.01)  # from the one built in
+    with pytest.raises(JobError, match=r"expected srgb, aces or a view of .*Screen/Half; Screen/Same.*, got \"Film\""):
+        find_view("Film")
+
+
+def test_what_a_configuration_lacks_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = tmp_path / "studio.ocio"
+    config.write_text(CONFIG.replace("SPACES", "other"), encoding="utf-8")
+    monkeypatch.setenv("OCIO", str(config))
+    with pytest.raises(JobError, match=r'no colour space "Linear Rec\.709'):
+        find_view("Half")
+    monkeypatch.setenv("OCIO", str(tmp_path / "none.ocio"))
+    with pytest.raises(JobError, match=r"--view: \$OCIO: .*none\.ocio: cannot be read"):
+        find_view("Half")
+
+
+def test_views_that_come_along(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("OCIO", raising=False)
+    white = find_view("Un-tone-mapped").encode(np.ones((1, 1, 3), np.float32))
+    np.testing.assert_allclose(white, 1.0, atol=1e-4)
+    with pytest.raises(
+        JobError, match=r"--view: expected srgb, aces or a view of ocio://default \(sRGB - Display/ACES"
+    ):
+        find_view("filmic")
+
+
+# labels
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_a_label_is_readable_and_only_in_its_corner(kind: Any) -> None:
+    most = np.iinfo(kind).max
+    grey = np.full((240, 320, 3), most // 2, kind)
+    codes = burn(grey, "c 12  l 3")
+    changed = np.argwhere((codes != grey).any(axis=2))
+    assert changed[:, 0].min() > 240 * 0.85 and changed[:, 1].max() < 320 * 0.4
+    corner = codes[-21:, :95]
+    assert corner.max() > 0.95 * most and corner.min() < 0.2 * most  # white letters on a dark ground
+    assert 0.03 < (corner[..., 0] > 0.6 * most).mean() < 0.5
+    assert (grey == most // 2).all()
+
+
+def test_labels_differ_and_fit_into_the_smallest_picture() -> None:
+    grey = np.full((48, 96, 3), 100, np.uint8)
+    texts = [f"c {c}  l {l}" for c in (0, 1, 12) for l in (0, 1, 3.25)]
+    assert len({burn(grey, text).tobytes() for text in texts}) == len(texts)
+    assert burn(np.zeros((4, 5, 3), np.uint8), "c 0  l 0").shape == (4, 5, 3)
+
+
+def test_labels_say_the_place(tmp_path: Path) -> None:
+    array, lamp = plain(tmp_path / "a", 2, 2), grouped(tmp_path / "b")
+    assert place_text(array, Shot(12, (3,))) == "c 12  l 3"
+    assert place_text(array, Shot(12, (3.256,))) == "c 12  l 3.26"
+    assert place_text(lamp, Shot(1, (3.0, 0.5))) == "c 1  light 3  lamp 0.5"
+
+
+def test_every_frame_has_its_own_label(tmp_path: Path) -> None:
+    picture = np.full((96, 192, 3), 0.2, np.float32)
+    array = plain(tmp_path / "out", 3, 2, picture=lambda c, l: picture)
+    path = path_file(tmp_path, "[[segments]]\nframes = 3\ncamera = [0, 2]\nlight = 1\n")
+    assemble(array.directory, path, tmp_path / "f.#.png", look=Look(label=True))
+    assemble(array.directory, path, tmp_path / "m.mov", look=Look(label=True))
+    frames = decoded(tmp_path / "m.mov").frames
+    for c in range(3):
+        truth = [burn(srgb8_from_linear(picture), f"c {k}  l 1") for k in range(3)]
+        np.testing.assert_array_equal(read_codes(tmp_path / f"f.{c}.png"), truth[c])
+        apart = [np.abs(frames[c].astype(float) - label).mean() for label in truth]
+        assert int(np.argmin(apart)) == c

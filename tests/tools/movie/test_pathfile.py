@@ -1,0 +1,203 @@
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from support import ROOT
+from support.movies import array_of
+
+from framearray_cli.array.manifest import Manifest
+from framearray_cli.base.errors import JobError
+from framearray_cli.tools.movie.pathfile import load_movie_path, movie_fps
+from framearray_cli.tools.movie.timeline import timeline
+
+JOBS = ROOT / "jobs"
+
+
+def pairs_of(file: Path, manifest: Manifest) -> list[tuple[int, int]]:
+    return [(shot.c, *shot.positions) for shot in timeline(file, load_movie_path(file), manifest).shots]
+
+
+def frames_of(tmp_path: Path, text: str, n_cameras: int = 10, n_lights: int = 5) -> list[tuple[int, int]]:
+    file = tmp_path / "path.toml"
+    file.write_text(text, encoding="utf-8")
+    return pairs_of(file, array_of(n_cameras, n_lights))
+
+
+def problems_of(tmp_path: Path, text: str, n_cameras: int = 10, n_lights: int = 5) -> list[str]:
+    with pytest.raises(JobError) as caught:
+        frames_of(tmp_path, text, n_cameras, n_lights)
+    assert all(line.startswith(f"{tmp_path / 'path.toml'}: ") for line in str(caught.value).splitlines())
+    return list(caught.value.problems)
+
+
+def segments(*lines: str) -> str:
+    return "".join(f"[[segments]]\n{line}\n" for line in lines)
+
+
+def test_a_span_shows_both_ends(tmp_path: Path) -> None:
+    frames = frames_of(tmp_path, segments("frames = 10\ncamera = [0, -1]\nlight = 2"))
+    assert frames == [(c, 2) for c in range(10)]
+    frames = frames_of(tmp_path, segments("frames = 5\ncamera = [9, 0]\nlight = [0, 4]"))
+    assert frames == [(9, 0), (7, 1), (5, 2), (2, 3), (0, 4)]  # 6.75, 4.5, 2.25: the nearest, halves up
+
+
+@pytest.mark.parametrize(
+    ("place", "index"), [("0", 0), ("-1", 9), ("-10", 0), ('"first"', 0), ('"last"', 9), ('"50%"', 5), ('"33.4 %"', 3)]
+)
+def test_places(tmp_path: Path, place: str, index: int) -> None:
+    assert frames_of(tmp_path, segments(f"frames = 2\ncamera = {place}")) == [(index, 0)] * 2
+
+
+def test_slow_spans_repeat_images_evenly(tmp_path: Path) -> None:
+    frames = frames_of(tmp_path, segments("frames = 9\nlight = [0, 4]"))
+    assert [l for _, l in frames] == [0, 1, 1, 2, 2, 3, 3, 4, 4]
+    counts = [
+        [c for c, _ in frames_of(tmp_path, segments("frames = 500\ncamera = [0, 9]"))].count(c) for c in range(10)
+    ]
+    assert sum(counts) == 500
+    assert max(counts[1:-1]) - min(counts[1:-1]) <= 1
+
+
+def test_a_join_is_shown_once(tmp_path: Path) -> None:
+    cut_in_two = frames_of(tmp_path, segments("frames = 5\ncamera = [0, 4]", "frames = 5\ncamera = [4, 9]"))
+    assert cut_in_two == [(c, 0) for c in range(10)]
+    same_by_percent = frames_of(
+        tmp_path, segments('frames = 5\ncamera = [0, "44%"]', 'frames = 5\ncamera = ["44%", 9]')
+    )
+    assert same_by_percent == cut_in_two
+
+
+def test_a_cut_shows_both_ends(tmp_path: Path) -> None:
+    frames = frames_of(tmp_path, segments("frames = 3\ncamera = [0, 2]", "frames = 3\ncamera = [5, 7]"))
+    assert [c for c, _ in frames] == [0, 1, 2, 5, 6, 7]
+
+
+def test_what_is_left_out_stays_where_it_was(tmp_path: Path) -> None:
+    frames = frames_of(
+        tmp_path, segments("frames = 3\nlight = [0, 2]", "frames = 2\ncamera = [0, 2]", "frames = 2\nlight = 4")
+    )
+    assert frames == [(0, 0), (0, 1), (0, 2), (1, 2), (2, 2), (2, 4), (2, 4)]
+
+
+def test_one_frame_shows_the_first_end(tmp_path: Path) -> None:
+    frames = frames_of(tmp_path, segments("frames = 1\ncamera = [2, 5]", "frames = 2"))
+    assert frames == [(2, 0)] * 3
+
+
+def test_seconds_count_frames_of_the_rate(tmp_path: Path) -> None:
+    assert len(frames_of(tmp_path, segments("seconds = 2"))) == 48
+    assert len(frames_of(tmp_path, "fps = 12.5\n" + segments("seconds = 2.0", "seconds = 0.001"))) == 26
+
+
+def test_the_rate_is_the_arrays_unless_given(tmp_path: Path) -> None:
+    file = tmp_path / "path.toml"
+    file.write_text(segments("frames = 1"), encoding="utf-8")
+    assert movie_fps(load_movie_path(file), array_of(1, 1, fps=23.976)) == Fraction(24000, 1001)
+    file.write_text("fps = 30\n" + segments("frames = 1"), encoding="utf-8")
+    assert movie_fps(load_movie_path(file), array_of(1, 1)) == 30
+
+
+def test_an_array_of_one_image(tmp_path: Path) -> None:
+    text = segments('frames = 3\ncamera = ["first", "last"]\nlight = [-1, 0]')
+    assert frames_of(tmp_path, text, 1, 1) == [(0, 0)] * 3
+
+
+@pytest.mark.parametrize("size", [(192, 48), (24, 8), (2, 3), (1, 1)])
+def test_the_papers_first_movie_fits_any_array(size: tuple[int, int]) -> None:
+    file = JOBS / "first-movie.toml"
+    frames = pairs_of(file, array_of(*size))
+    last_c, last_l = size[0] - 1, size[1] - 1
+    assert len(frames) == 240
+    assert frames[0] == (0, 0)
+    assert frames[47] == (0, last_l)
+    assert {c for c, _ in frames[:48]} == {0}
+    assert {l for _, l in frames[48:96]} == {last_l}
+    assert frames[-1] == (last_c, 0)
+    assert {c for c, _ in frames} == set(range(size[0]))
+    assert all(0 <= b[0] - a[0] <= 1 and abs(b[1] - a[1]) <= 1 for a, b in pairwise(frames))
+
+
+@pytest.mark.parametrize("size", [(192, 48), (24, 8), (2, 3), (1, 1)])
+def test_the_example_of_easing_fits_any_array(size: tuple[int, int]) -> None:
+    """3 s and a hold, two halves of a walk and a hold, four swings, the walk backwards: 16.5 s."""
+    file = JOBS / "easing-movie.toml"
+    shots = timeline(file, load_movie_path(file), array_of(*size)).shots
+    assert len(shots) == 396
+    light = [shot.positions[0] for shot in shots]
+    assert light[71:84] == [size[1] - 1] * 13  # the end of the light's way, held for half a second
+    assert [light[203 + 36 * k] / max(1, size[1] - 1) for k in range(5)] == [0.5, 1, 0.5, 1, 0.5] or size[1] == 1
+    assert (shots[203].c, shots[348].c, shots[-1].c) == (size[0] - 1, size[0] - 1, 0)
+    assert any(x != int(x) for x in light[:72]) == (size[1] > 1)
+    assert all(x == int(x) for x in light[348:])
+
+
+def test_indices_outside_of_the_array_are_all_named(tmp_path: Path) -> None:
+    text = segments("frames = 2\ncamera = [0, 10]\nlight = -6", "frames = 2\nlight = [5, 2]")
+    assert problems_of(tmp_path, text) == [
+        "segments[0].camera: expected one of 10 cameras (0 to 9, or -10 to -1), got 10",
+        "segments[0].light: expected one of 5 lights (0 to 4, or -5 to -1), got -6",
+        "segments[1].light: expected one of 5 lights (0 to 4, or -5 to -1), got 5",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", ["segments: "]),
+        ("segments = []", ["segments: "]),
+        ("segment = 1", ["segment: ", "segments: "]),
+        (segments("frame = 3"), ["segments[0].frame: "]),
+        (segments("camera = 1"), ["segments[0]: "]),
+        (segments("frames = 3\nseconds = 1"), ["segments[0]: "]),
+        (segments("frames = 0"), ["segments[0].frames: "]),
+        (segments("frames = 2.5"), ["segments[0].frames: "]),
+        (segments('frames = "2"'), ["segments[0].frames: "]),
+        (segments("frames = true"), ["segments[0].frames: "]),
+        (segments("seconds = -1"), ["segments[0].seconds: "]),
+        (segments("seconds = inf"), ["segments[0].seconds: "]),
+        (segments("frames = 2\ncamera = []"), ["segments[0].camera: "]),
+        (segments("frames = 2\ncamera = nan"), ["segments[0].camera: "]),
+        (segments("frames = 2\ncamera = [0, inf]"), ["segments[0].camera[1]: "]),
+        (segments("frames = 2\ncamera = [0, true]"), ["segments[0].camera[1]: "]),
+        (segments('frames = 2\nlight = "101%"'), ["segments[0].light: "]),
+        (segments('frames = 2\nlight = "-5%"'), ["segments[0].light: "]),
+        (
+            segments('frames = 2\nlight = "end"', "frames = 2\nlihgt = 1"),
+            ["segments[0].light: ", "segments[1].lihgt: "],
+        ),
+        ("fps = 0\n" + segments("frames = 2"), ["fps: "]),
+        ("fps = 'film'\n" + segments("frames = 2"), ["fps: "]),
+    ],
+)
+def test_all_problems_are_named_with_their_place(tmp_path: Path, text: str, expected: list[str]) -> None:
+    problems = problems_of(tmp_path, text)
+    assert len(problems) == len(expected)
+    for problem, start in zip(sorted(problems), sorted(expected), strict=True):
+        assert problem.startswith(start), problem
+        assert "\n" not in problem
+
+
+def test_messages_help(tmp_path: Path) -> None:
+    [unknown] = problems_of(tmp_path, segments("frames = 2\nlihgt = 1"))
+    assert unknown == 'segments[0].lihgt: unknown key; did you mean "light"?'
+    [place] = problems_of(tmp_path, segments('frames = 2\nlight = "end"'))
+    assert place == 'segments[0].light: expected an index, "first", "last" or a percentage such as "50%", got "end"'
+    [length] = problems_of(tmp_path, segments("camera = 1"))
+    assert length == "segments[0]: expected either frames or seconds, got neither"
+    [missing] = problems_of(tmp_path, "")
+    assert missing == "segments: missing; expected a list of tables"
+
+
+def test_a_missing_file_is_a_job_error(tmp_path: Path) -> None:
+    with pytest.raises(JobError, match="no such file"):
+        load_movie_path(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize("place", ["camera", "light"])
+def test_a_place_beyond_all_numbers_is_told(tmp_path: Path, place: str) -> None:
+    [found] = problems_of(tmp_path, segments(f"frames = 2\n{place} = [0, {10**400}]"))
+    assert found == (
+        f'segments[0].{place}[1]: expected an index, "first", "last" or a percentage such as "50%", '
+        "got a number beyond 64 bits"
+    )

@@ -1,0 +1,34 @@
+"""One browser and two served arrays for all tests of the page."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from support import chromium, handmade
+
+from framearray_cli.tools.view.run import open_tiles, prepare_all, serving
+from framearray_cli.tools.view.server import PageServer
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    with chromium.browser() as running:
+        yield running
+
+
+@pytest.fixture(scope="session")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
+    """Seven cameras, five lights, layers."""
+    manifest = handmade.plain(tmp_path_factory.mktemp("plain"))
+    with serving(open_tiles(manifest.directory, None, 2)) as server:
+        yield server
+
+
+@pytest.fixture(scope="session")
+def grouped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
+    """Groups of sources with two light axes."""
+    manifest = handmade.grouped(tmp_path_factory.mktemp("grouped"))
+    tiles = open_tiles(manifest.directory, None, 2)
+    prepare_all(tiles, 2, lambda n: None)
+    with serving(tiles) as server:
+        yield server

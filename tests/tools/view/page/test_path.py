@@ -1,0 +1,107 @@
+"""Paths: drawn by pointer and keys, played, saved as a file that `assemble` takes."""
+
+import tomllib
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.chromium import shown
+from typer.testing import CliRunner
+
+from framearray_cli.array.images.images import read_image
+from framearray_cli.array.manifest import image_path
+from framearray_cli.cli.main import app
+
+takes_curves = pytest.mark.skipif(
+    find_spec("framearray_cli.tools.movie") is None, reason="assemble does not take lists of places"
+)
+
+
+def saved(page, folder: Path) -> Path:
+    with page.page.expect_download() as download:
+        page.page.click("#save-path")
+    file = folder / download.value.suggested_filename
+    download.value.save_as(file)
+    return file
+
+
+def test_a_drawn_path_is_played(browser, plain):
+    with shown(browser, plain.url) as page:
+        page.all_loaded()
+        page.page.click("#draw")
+        page.drag([(0, 0), (3, 2), (6, 0)], steps=10)
+        page.page.click("#draw")
+        page.page.locator("#seconds").fill("4")  # slow: a screen that lags leaves places out
+        page.page.locator("#seconds").press("Enter")
+        before = len(page.get("framearray.steps"))
+        page.page.click("#play-path")
+        page.wait("framearray.player.what === null")
+        played = [(step["c"], step["l"]) for step in page.get("framearray.steps")[before:]]
+        cameras = [c for c, _ in played]
+        assert played[0] == (0, 0) and played[-1] == (6, 0)
+        assert cameras == sorted(cameras) and set(cameras) == set(range(7))
+        assert max(l for _, l in played) == 2
+        page.page.click("#clear-path")
+        assert page.page.locator("#play-path").is_disabled()
+        page.check(plain.url)
+
+
+def test_a_saved_path_holds_what_was_drawn(browser, plain, tmp_path):
+    with shown(browser, plain.url) as page:
+        page.page.keyboard.press("d")
+        page.drag([(1, 1), (5, 3)], steps=20)
+        page.page.click("#pad", position={"x": 2, "y": 2})  # straight to the first camera and light
+        page.page.locator("#seconds").fill("4")
+        page.page.locator("#seconds").press("Enter")
+        path = tomllib.loads(saved(page, tmp_path).read_text())
+        page.check(plain.url)
+    stroke, straight = path["segments"]
+    assert path["fps"] == 24.0 and path["positions"] == "nearest"
+    assert sum(segment["seconds"] for segment in path["segments"]) == pytest.approx(4.0, abs=2e-3)
+    assert len(stroke["camera"]) == len(stroke["light"]) >= 2
+    np.testing.assert_allclose([stroke["camera"][0], stroke["camera"][-1]], [1, 5], atol=0.1)
+    np.testing.assert_allclose([stroke["light"][0], stroke["light"][-1]], [1, 3], atol=0.1)
+    # The pointer went straight from (1, 1) to (5, 3).
+    np.testing.assert_allclose(np.array(stroke["light"]) - 1, (np.array(stroke["camera"]) - 1) / 2, atol=0.1)
+    assert straight["camera"] == [stroke["camera"][-1], 0] and straight["light"] == [stroke["light"][-1], 0]
+
+
+@takes_curves
+def test_assemble_takes_a_saved_path(browser, plain, tmp_path):
+    with shown(browser, plain.url) as page:
+        keyboard = page.page.keyboard
+        for key in ("d", "Enter", "End", "Enter", "PageDown", "Enter"):  # a place at each corner but the last
+            keyboard.press(key)
+        file = saved(page, tmp_path)
+        page.check(plain.url)
+    manifest = plain.tiles.manifest
+    target = tmp_path / "frames" / "frame.####.exr"
+    told = CliRunner().invoke(app, ["assemble", str(manifest.directory), str(file), "-o", str(target)])
+    assert told.exit_code == 0, told.output
+    frames = sorted(target.parent.glob("*.exr"))
+    assert len(frames) == 48
+    for frame, place in ((frames[0], (0, 0)), (frames[23], (6, 0)), (frames[-1], (6, 4))):
+        np.testing.assert_array_equal(read_image(frame), read_image(image_path(manifest, *place)))
+
+
+@takes_curves
+def test_assemble_takes_the_light_of_groups(browser, grouped, tmp_path):
+    with shown(browser, f"{grouped.url}#axis.lamps=1") as page:
+        page.page.locator("#group-lamps").fill("2.5")
+        page.page.locator("#ambient-color").fill("#ff8800")
+        for key in ("d", "Enter", "End", "Enter"):
+            page.page.focus("#pad")
+            page.page.keyboard.press(key)
+        file = saved(page, tmp_path)
+        pixels = page.pixels()
+        page.check(grouped.url)
+    assert tomllib.loads(file.read_text())["segments"][0]["axes"] == {"lamps": 1}
+    manifest = grouped.tiles.manifest
+    target = tmp_path / "frames" / "frame.####.png"
+    told = CliRunner().invoke(app, ["assemble", str(manifest.directory), str(file), "-o", str(target)])
+    assert told.exit_code == 0, told.output
+    from framearray_cli.array.images.png import read_codes
+
+    last = read_codes(sorted(target.parent.glob("*.png"))[-1])
+    assert np.abs(last - pixels.astype(float)).mean() < 1.0

@@ -1,0 +1,233 @@
+"""Tiles of the page: their coding, what is made when, the server, and the command."""
+
+import http.client
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from support import ROOT, handmade
+
+from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.manifest import image_path, layers_path
+from framearray_cli.base.colour import srgb8_from_linear
+from framearray_cli.base.errors import OutputError
+from framearray_cli.tools.view.coding import MOST_WHITE, Coding, coding_for, data_coding, decode, encode
+from framearray_cli.tools.view.index import sheet_layout
+from framearray_cli.tools.view.run import open_tiles, prepare_all, serving
+
+
+@pytest.mark.parametrize("white", [1.0, 4.0, MOST_WHITE])
+def test_every_code_comes_back(white):
+    codes = np.arange(256, dtype=np.uint8)
+    for coding in (Coding(scale=0.3, white=white), Coding(scale=0.0, low=-1.0, high=3.0)):
+        np.testing.assert_array_equal(encode(decode(codes, coding), coding), codes)
+
+
+def test_with_white_at_1_codes_are_plain_srgb():
+    values = np.linspace(-0.1, 1.5, 1000, dtype=np.float32)
+    np.testing.assert_array_equal(encode(values, Coding()), srgb8_from_linear(values))
+
+
+def test_values_survive_up_to_white():
+    coding = coding_for(20.0)
+    values = np.geomspace(0.01, 20, 500, dtype=np.float32)
+    back = decode(encode(values, coding), coding)
+    step = decode(encode(values, coding) + np.uint8(1), coding) - back
+    assert (np.abs(back - values) <= step).all(), "less than the step to the next code"
+    assert encode(np.float32([1e9, np.inf, np.nan, -1]), coding).tolist() == [255, 255, 0, 0]
+    assert coding_for(0.0) == coding_for(float("inf")) == Coding()
+    assert coding_for(1e-3).scale == 2.0**-9 and coding_for(1e9).white == MOST_WHITE
+    assert [data_coding(x).high for x in (30.0, 14.366, 0.0123, 0.0)] == [30.0, 15.0, 0.013, 1.0]
+
+
+@pytest.mark.parametrize(("size", "n"), [((400, 300), 48), ((64, 48), 1), ((1920, 1080), 500), ((7, 5), 3)])
+def test_sheets_hold_all_positions_once(size, n):
+    layout = sheet_layout(size, n)
+    height, width = layout.sheet(n)
+    assert height * width <= 1 << 22
+    taken = np.zeros((height, width), int)
+    for l in range(n):
+        taken[layout.part(l)] += 1
+    assert taken.max() == 1 and taken.sum() == n * layout.width * layout.height
+    values = np.random.default_rng(1).random((size[1], size[0], 3), np.float32)
+    small = layout.reduced(values)
+    assert small.shape == (layout.height, layout.width, 3)
+    np.testing.assert_allclose(small[0, 0], values[: layout.factor, : layout.factor].mean((0, 1)), rtol=1e-4)
+
+
+def test_tiles_hold_the_images(tmp_path):
+    handmade.plain(tmp_path)
+    tiles = open_tiles(tmp_path, None, 2)
+    seen = []
+    assert prepare_all(tiles, 2, seen.append) == []
+    assert sum(seen) == tiles.n_pictures == 7 * 5 + 7 * 6
+    coding = tiles.streams[0].coding
+    assert coding.white > 6
+    for c, l in ((0, 0), (6, 4)):
+        exact = encode(handmade.soft(c, l, 6.0), coding).astype(float)
+        full = read_codes(tiles.place("light", c, l))
+        small = read_codes(tiles.place("light", c, None))[tiles.layout.part(l)]
+        assert np.abs(full - exact).mean() < 1.0 < np.abs(full - np.roll(exact, 3, axis=1)).mean()
+        assert np.abs(small - exact).mean() < 1.5, "small pictures of this size are not smaller"
+    index = json.loads((tmp_path / ".view" / "index.json").read_text())
+    assert index["axes"] == [{"name": "light", "n": 5}] and len(index["streams"]) == 7
+
+
+def test_only_what_is_missing_or_new_is_made(tmp_path):
+    manifest = handmade.plain(tmp_path, n_c=3, n_l=2, layers=False)
+
+    def times():
+        prepare_all(open_tiles(tmp_path, None, 1), 1, lambda n: None)
+        return {path.relative_to(tmp_path): path.stat().st_ctime_ns for path in tmp_path.rglob("*.jpg")}
+
+    first = times()
+    assert len(first) == 3 * 2 + 3
+    assert times() == first
+    (tmp_path / ".view" / "tiles" / "light" / "c0000.l001.jpg").unlink()
+    write_image(image_path(manifest, 2, 1), handmade.soft(9, 9), ImageFormat(half="never"))
+    changed = {path.name for path, time_ns in times().items() if first[path] != time_ns}
+    assert changed == {"c0000.l001.jpg", "c0000.jpg", "c0002.l001.jpg", "c0002.jpg"}
+
+
+def test_other_codings_make_all_anew(tmp_path):
+    manifest = handmade.plain(tmp_path, n_c=2, n_l=2, layers=False)
+    prepare_all(open_tiles(tmp_path, None, 1), 1, lambda n: None)
+    write_image(image_path(manifest, 0, 0), handmade.soft(0, 0, 12.0), ImageFormat(half="never"))
+    assert open_tiles(tmp_path, None, 1).streams[0].coding.white > 12
+    assert not list(tmp_path.rglob("*.jpg"))
+
+
+def test_images_that_are_missing_or_damaged_are_told(tmp_path):
+    manifest = handmade.plain(tmp_path, n_c=2, n_l=3, layers=False)
+    image_path(manifest, 0, 1).unlink()
+    image_path(manifest, 1, 0).write_bytes(b"no picture")
+    tiles = open_tiles(tmp_path, None, 2)
+    problems = sorted(map(str, prepare_all(tiles, 2, lambda n: None)))
+    assert len(problems) == 2 and "c0000.l001.exr" in problems[0] and "c0001.l000.exr" in problems[1]
+    assert tiles.tile("light", 0, None).is_file(), "the others are there"
+    with pytest.raises(OutputError, match=r"c0000\.l001\.exr"):
+        tiles.tile("light", 0, 1)
+
+
+def test_a_damaged_file_of_layers_is_told(tmp_path):
+    manifest = handmade.plain(tmp_path, n_c=2, n_l=1)
+    layers_path(manifest, 0).write_bytes(b"no layers")
+    tiles = open_tiles(tmp_path, None, 1)
+    assert [stream.key for stream in tiles.streams][1:3] == ["obscurance", "indirect"]
+    problems = prepare_all(tiles, 1, lambda n: None)
+    assert len(problems) == 6 and all("room.layers.c0000.exr" in str(problem) for problem in problems)
+
+
+@pytest.fixture
+def server(tmp_path):
+    handmade.plain(tmp_path, n_c=2, n_l=2, layers=False)
+    (tmp_path / "secret.txt").write_text("secret")
+    with serving(open_tiles(tmp_path, None, 1)) as running:
+        yield running
+
+
+def ask(server, path, method="GET", **headers):
+    connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=10)
+    connection.request(method, path, headers=headers)
+    answer = connection.getresponse()
+    body = answer.read()
+    connection.close()
+    return answer, body
+
+
+def test_the_server_makes_tiles_that_are_asked_for(server):
+    answer, body = ask(server, "/tiles/light/c0001.l000.jpg")
+    assert (answer.status, answer.headers["Content-Type"], body[:2]) == (200, "image/jpeg", b"\xff\xd8")
+    again, nothing = ask(
+        server, "/tiles/light/c0001.l000.jpg", **{"If-Modified-Since": answer.headers["Last-Modified"]}
+    )
+    assert (again.status, nothing) == (304, b"")
+    assert ask(server, "/tiles/light/c0000.jpg?x=1")[0].status == 200
+    head, nothing = ask(server, "/", "HEAD")
+    assert (head.status, nothing) == (200, b"") and int(head.headers["Content-Length"]) > 1000
+    assert ask(server, "/main.js")[0].headers["Content-Type"].startswith("text/javascript")
+    assert json.loads(ask(server, "/index.json")[1])["n_cameras"] == 2
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/secret.txt", "/../secret.txt", "/tiles/../../secret.txt", "/tiles/light/../../../secret.txt",
+        "/%2e%2e/secret.txt", "//etc/passwd", "/manifest.toml", "/tiles/", "/tiles/light/", "/tiles/none/c0000.jpg",
+        "/tiles/light/c0002.jpg", "/tiles/light/c0000.l002.jpg", "/tiles/light/c0000000000001.jpg", "/..\\secret.txt",
+        "/__init__.py", "/page/main.js",
+    ],
+)  # fmt: skip
+def test_the_server_gives_nothing_else(server, path):
+    answer, body = ask(server, path)
+    assert answer.status == 404 and b"secret\n" not in body and body != b"secret"
+
+
+def test_the_server_answers_to_its_own_names_alone(server):
+    assert ask(server, "/", Host=f"localhost:{server.server_port}")[0].status == 200
+    for name in ("example.org", f"example.org:{server.server_port}", "127.0.0.1.example.org"):
+        assert ask(server, "/index.json", Host=name)[0].status == 421
+    assert ask(server, "/", "POST")[0].status == 501
+
+
+def test_a_port_that_is_taken_is_told(server, tmp_path):
+    with (
+        pytest.raises(OutputError, match=rf"port {server.server_port}: cannot be used"),
+        serving(server.tiles, server.server_port),
+    ):
+        pass
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is sent by a signal")
+def test_the_command_serves_until_ctrl_c(tmp_path):
+    handmade.plain(tmp_path, n_c=2, n_l=2)
+    command = [sys.executable, "-m", "framearray_cli", "view", str(tmp_path), "--no-browser"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+    try:
+        url = process.stdout.readline().split()[0]
+        assert url.startswith("http://127.0.0.1:")
+        assert "all pictures are prepared" in process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=10)
+        assert (process.returncode, said) == (0, "")
+    finally:
+        process.kill()
+    assert len(list((tmp_path / ".view").rglob("*.jpg"))) == 4 + 2 + 2 * 6 * 2
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_what_was_prepared_stays_after_an_interruption(tmp_path):
+    handmade.plain(tmp_path, n_c=6, n_l=2, layers=False)
+    tiles = open_tiles(tmp_path, None, 1)
+
+    class Enough(BaseException):
+        pass
+
+    def stop(n):
+        raise Enough
+
+    with pytest.raises(Enough):
+        prepare_all(tiles, 1, stop)
+    made = len(list(tmp_path.rglob("*.jpg")))
+    assert 3 <= made < 18
+    started = time.time_ns()
+    prepare_all(open_tiles(tmp_path, None, 1), 1, lambda n: None)
+    kept = [path for path in tmp_path.rglob("*.jpg") if path.stat().st_ctime_ns < started]
+    assert len(list(tmp_path.rglob("*.jpg"))) == 18 and len(kept) >= 3
+
+
+def test_the_page_is_in_the_package():
+    from framearray_cli.tools.view.page import content_type, page_files
+
+    page = page_files()
+    assert {"index.html", "main.js", "style.css", "icon.svg"} <= set(page)
+    assert all(content_type(name) for name in page)
+    foreign = [name for name, data in page.items() if b"http://" in data.replace(b"http://www.w3.org/2000/svg", b"")]
+    assert not foreign, "the page asks nobody else"
