@@ -122,7 +122,7 @@ LightPlace: TypeAlias = tuple[int, ...]
 
 ALL, MIDDLE = "all", "50%"
 _PLACE = r"[+-]?\d{1,9}|first|last|[\d.]+ ?%"  # whole indices alone: nothing is blended here
-_WANTED = '"all", or indices, "first", "last" or percentages with commas between them'
+_WANTED_INDICES = '"all", or indices, "first", "last" or percentages with commas between them'
 
 
 def indices(option: str, text: str, n: int) -> tuple[int, ...]:
@@ -144,7 +144,7 @@ def indices(option: str, text: str, n: int) -> tuple[int, ...]:
     for place in text.split(","):
         index = _index(place.strip(), n)
         if index is None:
-            raise JobError(option, [f"expected {_WANTED}, got {shown(text)}"])
+            raise JobError(option, [f"expected {_WANTED_INDICES}, got {shown(text)}"])
         if not 0 <= index < n:
             raise JobError(option, [f"expected 0 to {n - 1}, or -{n} to -1, got {place.strip()}"])
         found[index] = None

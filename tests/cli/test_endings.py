@@ -70,14 +70,14 @@ def test_an_error_that_a_signal_led_to_counts_as_the_signal() -> None:
 @pytest.mark.parametrize(
     ("arguments", "function"),
     [
-        ("assemble out --walk -o m.mp4", "movie.assemble.assemble"),
-        ("export out -f colmap -o x", "export.export"),
-        ("init scene.glb", "start.init"),
-        ("sheet out -o s.png", "sheet.make_sheet"),
-        ("verify out", "verify.verify"),
-        ("view out", "view.run.open_tiles"),
-        ("render job.toml", "jobfile.read_job"),
-        ("openjd job.toml", "jobfile.read_job"),
+        ("assemble out --walk -o m.mp4", "tools.movie.assemble.assemble"),
+        ("export out -f colmap -o x", "tools.export.export"),
+        ("init scene.glb", "starter.init"),
+        ("sheet out -o s.png", "tools.sheet.make_sheet"),
+        ("verify out", "array.integrity.verify"),
+        ("view out", "tools.view.run.open_tiles"),
+        ("render job.toml", "job.read.read_job"),
+        ("openjd job.toml", "job.read.read_job"),
     ],
 )
 def test_commands_as_typed(capsys, monkeypatch, arguments: str, function: str) -> None:

@@ -20,10 +20,11 @@ LARGE = {"camera": tiny.WALK | {"resolution": [240, 180]}, "light": {"frames": 2
 # Renders without asking what is free: what becomes of the same job then.
 BLIND = """
 import sys
-from framearray_cli import auto, memory, render
-from framearray_cli.jobfile import read_job
+from framearray_cli.job.read import read_job
+from framearray_cli.render import memory, render
+from framearray_cli.render.automatic import choose
 from pathlib import Path
-for module in (auto, render):
+for module in (choose, render):
     module.require_memory = lambda *_: None
 memory.free_memory = lambda: 2**40
 render.render(read_job(Path(sys.argv[1])))

@@ -35,7 +35,7 @@ def test_one_function_of_the_package_finds_frames() -> None:
 
 
 def test_the_loop_is_short_enough_to_be_quoted() -> None:
-    tree = ast.parse((PACKAGE / "loop.py").read_text())
+    tree = ast.parse((PACKAGE / "engine" / "loop.py").read_text())
     loop = next(node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == "ready_frames")
     assert loop.end_lineno is not None and loop.end_lineno - loop.lineno < 24
 

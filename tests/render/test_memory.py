@@ -13,8 +13,8 @@ RENDER = """
 import sys
 from pathlib import Path
 sys.path[:0] = [{tests!r}]
-import tiny
-from framearray_cli.render import render
+from support import tiny
+from framearray_cli.render.render import render
 keys = [{{"frame": 0, "eye": [0.2, 1.3, 1.7], "target": [-0.1, 0.9, -1.0]}},
         {{"frame": {frames} - 1, "eye": [0.5, 1.45, 1.2], "target": [0.1, 0.8, -1.0]}}]
 job = tiny.job(

@@ -33,7 +33,8 @@ def outer():
 
 @pytest.mark.skipif(sys.platform == "win32", reason="each compiles its own there")
 @pytest.mark.parametrize(
-    ("first", "patience", "compilations"), [("import inturn; inturn.compile_in_turn(); ", 2, 1), ("", 60, 2)]
+    ("first", "patience", "compilations"),
+    [("from support import inturn; inturn.compile_in_turn(); ", 2, 1), ("", 60, 2)],
 )
 def test_two_processes_compile_a_kernel_once(first: str, patience: int, compilations: int, tmp_path: Path) -> None:
     """A kernel that calls one of the same file; without taking turns it is compiled twice."""

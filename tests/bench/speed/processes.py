@@ -25,11 +25,11 @@ PROGRAM = (sys.executable, "-m", "framearray_cli")
 FIRST_RAYS = """
 import sys
 from pathlib import Path
-from framearray_cli.jobfile import read_job
-from framearray_cli.prepare import open_embree, plan_work, prepare
+from framearray_cli.job.read import read_job
+from framearray_cli.render.prepare import open_embree, plan_work, prepare
 prepared = prepare(read_job(Path(sys.argv[1])))
 with open_embree(prepared) as embree:
-    from framearray_cli.embree.packets import HIT_ROWS, empty_packets, intersect
+    from framearray_cli.engine.embree.packets import HIT_ROWS, empty_packets, intersect
     intersect(embree.tracer, empty_packets(1, HIT_ROWS), 1, True)
     print("ray", flush=True)
     plan_work(prepared, embree)

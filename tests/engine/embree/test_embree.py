@@ -289,8 +289,8 @@ def test_packets_start_at_cache_lines() -> None:
 
 AVX2 = "isa=avx2"
 NATIVE = """
-import instructionset, tiny
-from framearray_cli.embree.native import NativeScene
+from support import instructionset, tiny
+from framearray_cli.engine.embree.native import NativeScene
 scene = NativeScene(tiny.scene_of(tiny.box((0, 0, 0), (1, 1, 1))), instructionset.library())
 print(instructionset.has_packets_of_16(scene._device))
 """

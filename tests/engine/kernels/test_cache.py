@@ -91,7 +91,7 @@ for file in sorted(package.rglob("*.py")):
 assert len(imported) > 10, imported
 home = pathlib.Path(sys.argv[2])
 print(state() == before, any(home.iterdir()))
-from framearray_cli.eyehits import pixel_order
+from framearray_cli.engine.hits.native import pixel_order
 pixel_order(4, 4)
 print(state() == before, len(list(home.rglob("*.nbi"))))
 """
