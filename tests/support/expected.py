@@ -18,7 +18,7 @@ def bounds(tiles: Tiles, c: int, parts: list[Part], exposure: float = 0.0) -> tu
     for step in (-1, 1):
         total = np.zeros((*tiles.manifest.resolution[::-1], 3))
         for key, l, factor in parts:
-            codes = read_codes(tiles.tile(key, c, l)).astype(np.int16) + step
+            codes = read_codes(tiles.ensure_tile(key, c, l)).astype(np.int16) + step
             total += decode(np.clip(codes, 0, 255).astype(np.uint8), coding[key]) * np.array(factor)
         # half a code where the browser rounds
         ends.append(255 * srgb_from_linear(total * 2.0**exposure) + 0.5 * step)

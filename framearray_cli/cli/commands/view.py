@@ -37,7 +37,7 @@ def view(
     quiet: Quiet = False,
 ) -> None:
     """Walk through a frame array in the browser."""
-    from framearray_cli.tools.view.run import open_tiles, show, write_page
+    from framearray_cli.tools.view.run import open_tiles, show_page, write_page
 
     workers = threads or available_cores()
     tiles = open_tiles(array, place(cache, "--cache") if cache is not None else None, workers)
@@ -57,7 +57,7 @@ def view(
             screen.say([*_problem_lines(problems), f"all pictures are prepared, in {tiles.folder}"])
 
         try:
-            show(
+            show_page(
                 tiles,
                 port=port,
                 browser=browser,

@@ -1,9 +1,9 @@
-"""How the page's pictures keep radiance in 8 bits, with room above white for the exposure slider.
+"""The 8-bit coding of radiance in the page's pictures, with room above white for the exposure slider.
 
     y = x (1 + x / w^2) / (1 + x),   x = radiance / scale,   code = 255 sRGB(y)       ([Reinhard02] eq. 4)
 
-y is 1 where x = w, so w is the brightest x that survives. Dark values keep their sRGB codes (dy/dx = 1 at 0), 1 is at
-code 188 for large w, and w = 1 is the plain sRGB curve.
+y = 1 at x = w, so w is the brightest x that survives. Dark values keep their sRGB codes (dy/dx = 1 at 0), x = 1 has
+code 188 for large w, and w = 1 gives the plain sRGB curve.
 """
 
 import math
@@ -17,18 +17,18 @@ from numpy.typing import NDArray
 from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.colour import linear_from_srgb8, srgb_from_linear
 
-# Beyond it a step of the code is more than a tenth of the value, and a lamp seen directly is white at any exposure.
+# Beyond it one code step exceeds a tenth of the value, and a lamp seen directly is white at any exposure.
 MOST_WHITE = 64.0
-# White over the largest value of the pictures that were looked at; others may be brighter.
-MARGIN = 2.0
+# White over the largest sampled value; other pictures may be brighter.
+WHITE_MARGIN = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coding:
-    """How one kind of picture is coded.
+    """The coding of one kind of picture.
 
     Attributes:
-        scale: radiance that counts as x = 1; 0: no radiance, but data coded evenly from `low` to `high`.
+        scale: radiance at x = 1; 0: not radiance, but data, coded linearly from `low` to `high`.
         white: the largest x, w.
         low, high: range of data.
     """
@@ -39,22 +39,22 @@ class Coding:
     high: float = 1.0
 
 
-PLAIN = Coding()
+PLAIN_CODING = Coding()
 
 
 def coding_for(largest: float) -> Coding:
-    """Choose the coding of radiance up to a largest value; dark pictures use all codes too.
+    """Choose the coding of radiance up to a largest value; dark pictures use all codes as well.
 
-    It goes in powers of two, so that an array which is rendered again, a little brighter, keeps its tiles.
+    Scale and white are powers of two, so that an array keeps its tiles when rendered again a little brighter.
     """
     if not 0 < largest < np.inf:
-        return PLAIN
+        return PLAIN_CODING
     scale = min(1.0, _power_of_two(largest))
-    return Coding(scale=scale, white=min(_power_of_two(MARGIN * largest / scale), MOST_WHITE))
+    return Coding(scale=scale, white=min(_power_of_two(WHITE_MARGIN * largest / scale), MOST_WHITE))
 
 
 def data_coding(largest: float) -> Coding:
-    """Choose the coding of data from 0 to a largest value, which is rounded up to two figures."""
+    """Choose the coding of data from 0 to a largest value, rounded up to two digits."""
     if not 0 < largest < np.inf:
         return Coding(scale=0.0)
     step = 10.0 ** (math.floor(math.log10(largest)) - 1)
@@ -62,12 +62,12 @@ def data_coding(largest: float) -> Coding:
 
 
 def _power_of_two(value: float) -> float:
-    """The least power of two that is not below a value."""
+    """Return the least power of two that is not below a value."""
     return float(2.0 ** math.ceil(math.log2(value)))
 
 
 def encode(values: Float32, coding: Coding) -> Bytes:
-    """Code values of any shape; what lies outside of the range is cut to it, NaN becomes 0."""
+    """Encode values of any shape; values outside the range are clipped to it, NaN becomes 0."""
     if not coding.scale:
         span = max(coding.high - coding.low, float(np.finfo(np.float32).tiny))
         shares = np.nan_to_num((values - coding.low) / span, nan=0.0)
@@ -79,7 +79,7 @@ def encode(values: Float32, coding: Coding) -> Bytes:
 
 
 def decode(codes: Bytes, coding: Coding) -> Float32:
-    """Give the values of codes, as the page's shader does: the inverse of `encode`, to half a code."""
+    """Decode as the page's shader does: the inverse of `encode`, to half a code."""
     if not coding.scale:
         return np.asarray(coding.low + (coding.high - coding.low) * codes.astype(np.float32) / 255, np.float32)
     y = linear_from_srgb8(codes)
@@ -89,7 +89,7 @@ def decode(codes: Bytes, coding: Coding) -> Float32:
 
 @lru_cache(maxsize=64)
 def _code_of_half(white: float) -> Bytes:
-    """Tabulate the code of each of the 65536 halves; the rounding to half moves a code by at most 0.06."""
+    """Tabulate the codes of all 65536 half floats; rounding to half moves a code by at most 0.06."""
     halves = np.arange(65536, dtype=np.uint16).view(np.float16).astype(np.float64)
     x = np.clip(np.nan_to_num(halves, nan=0.0, posinf=white), 0, white)
     codes: NDArray[Any] = np.rint(255 * srgb_from_linear(x * (1 + x / white**2) / (1 + x)))

@@ -1,4 +1,4 @@
-"""The page and its tiles as a folder of plain files, for any web server."""
+"""Export the page and its tiles as a folder of plain files, for any web server."""
 
 import os
 import shutil
@@ -8,34 +8,34 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, whole_folder
 
 from .page import page_files
-from .tiles import INDEX, TILES, Tiles
+from .tiles import INDEX_FILE, TILES_FOLDER, Tiles
 
 
 def check_target(target: Path) -> None:
-    """Refuse a folder that holds anything but an earlier export.
+    """Refuse a folder that holds anything but an earlier export of the page.
 
     Raises:
-        OutputError: it does.
+        OutputError: the folder holds other files, or cannot be read.
     """
-    ours = {INDEX, TILES, *page_files()}
+    ours = {INDEX_FILE, TILES_FOLDER, *page_files()}
     try:
         found = sorted(entry.name for entry in target.iterdir()) if os.path.exists(target) else []
     except OSError as error:
         raise OutputError(f"{target}: cannot be read as a folder: {reason(error)}") from error
     strangers = [name for name in found if name not in ours]
-    if strangers or (found and INDEX not in found):
+    if strangers or (found and INDEX_FILE not in found):
         name = (strangers or found)[0]
         raise OutputError(f"{target}: holds other files, {name!r} for one; choose a new or empty folder")
 
 
-def export(tiles: Tiles, target: Path) -> int:
+def export_page(tiles: Tiles, target: Path) -> int:
     """Write the page with all tiles; the folder appears whole or not at all, in place of an earlier export.
 
     Args:
-        tiles: all of them prepared.
+        tiles: all prepared.
 
     Returns:
-        Bytes written.
+        The number of bytes written.
 
     Raises:
         OutputError: the target holds other files, or cannot be written.
@@ -44,13 +44,13 @@ def export(tiles: Tiles, target: Path) -> int:
     with whole_folder(target, replace=True) as part:
         for name, data in page_files().items():
             (part / name).write_bytes(data)
-        shutil.copyfile(tiles.folder / INDEX, part / INDEX)
-        _copy_tiles(tiles.folder / TILES, part / TILES)
+        shutil.copyfile(tiles.folder / INDEX_FILE, part / INDEX_FILE)
+        _copy_tiles(tiles.folder / TILES_FOLDER, part / TILES_FOLDER)
     return sum(file.stat().st_size for file in target.rglob("*") if file.is_file())
 
 
 def _copy_tiles(source: Path, target: Path) -> None:
-    """Copy all tiles; `shutil.copytree` would try every file of thousands on a full disk."""
+    """Copy all tiles. On a full disk `shutil.copytree` would try each of thousands of files."""
     for folder, _, names in os.walk(source):
         there = target / Path(folder).relative_to(source)
         there.mkdir()

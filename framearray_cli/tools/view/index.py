@@ -1,4 +1,4 @@
-"""What the page must know of an array: `index.json`, and how the small pictures lie in a sheet."""
+"""What the page needs to know of an array: `index.json`, and the layout of small pictures in a sheet."""
 
 import math
 from collections.abc import Sequence
@@ -13,19 +13,19 @@ from framearray_cli.base.arrays import Float32, is_number
 
 from .streams import LAYERS, Stream
 
-FORMAT = 1  # of the index and the tiles; another number makes them all anew
-SMALL_PIXELS = 100 * 75  # of a small picture, about: a quarter of 400 x 300 each way
+INDEX_FORMAT = 1  # of the index and the tiles; a new number discards those that exist
+SMALL_PIXELS = 100 * 75  # of a small picture, about: a quarter of 400 x 300 per side
 SHEET_PIXELS = 1 << 21  # of a sheet at most: 8 MiB when decoded
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SheetLayout:
-    """Small pictures in rows.
+    """A grid of small pictures.
 
     Attributes:
-        factor: pixels of a full picture to one of a small one, each way.
+        factor: pixels of a full picture per pixel of a small one, along each side.
         width, height: of a small picture, pixels.
-        columns: small pictures in a row.
+        columns: small pictures per row.
     """
 
     factor: int
@@ -34,18 +34,18 @@ class SheetLayout:
     columns: int
 
     def sheet(self, n: int) -> tuple[int, int]:
-        """Height and width of a sheet of n small pictures."""
+        """Return height and width of a sheet of n small pictures."""
         columns = min(n, self.columns)
         return -(-n // columns) * self.height, columns * self.width
 
     def part(self, l: int) -> tuple[slice, slice]:
-        """Rows and columns of the small picture of position l."""
+        """Return rows and columns of the small picture of light l."""
         row, column = divmod(l, self.columns)
         top, left = row * self.height, column * self.width
         return slice(top, top + self.height), slice(left, left + self.width)
 
-    def reduced(self, values: Float32) -> Float32:
-        """Average blocks of factor x factor pixels; smaller ones at the right and lower edge."""
+    def reduce(self, values: Float32) -> Float32:
+        """Average blocks of factor x factor pixels; those at the right and lower edge may be smaller."""
         for axis in (0, 1):
             starts = np.arange(0, values.shape[axis], self.factor)
             counts = np.diff(np.append(starts, values.shape[axis])).astype(np.float32)
@@ -55,7 +55,7 @@ class SheetLayout:
 
 
 def sheet_layout(resolution: tuple[int, int], n: int) -> SheetLayout:
-    """Choose the size of small pictures: about SMALL_PIXELS, less where n of them would not fit in a sheet."""
+    """Choose the size of small pictures: about SMALL_PIXELS, or less so that n of them fit in a sheet."""
     width, height = resolution
     wanted = min(SMALL_PIXELS, max(1, SHEET_PIXELS // n))
     factor = max(1, round(math.sqrt(width * height / wanted)))
@@ -65,9 +65,9 @@ def sheet_layout(resolution: tuple[int, int], n: int) -> SheetLayout:
 
 
 def index_table(manifest: Manifest, streams: Sequence[Stream], layout: SheetLayout) -> dict[str, Any]:
-    """What `index.json` holds."""
+    """Return the content of `index.json`."""
     return {
-        "format": FORMAT,
+        "format": INDEX_FORMAT,
         "fingerprint": manifest.fingerprint,
         "name": manifest.name,
         "resolution": list(manifest.resolution),
@@ -83,7 +83,7 @@ def index_table(manifest: Manifest, streams: Sequence[Stream], layout: SheetLayo
 
 
 def _exposure(manifest: Manifest) -> float:
-    """Stops that the job brightens PNG and JPEG by; those images have it in them, others show it on the page."""
+    """Return the job's exposure, stops; 0 if the images are PNG or JPEG, which contain it already."""
     output = manifest.job.get("output", {})
     linear = manifest.groups or format_name(manifest.images) not in FOR_SCREENS
     value = output.get("exposure", 0.0) if isinstance(output, dict) and linear else 0.0

@@ -1,4 +1,4 @@
-"""Shows an array in the browser, or exports the page: the only file that wires tiles, server and export."""
+"""Show an array in the browser, or export the page."""
 
 import os
 import threading
@@ -13,11 +13,11 @@ from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import make_folder
 
-from .export import check_target, export
+from .export import check_target, export_page
 from .server import PageServer
 from .tiles import Tiles
 
-FOLDER = ".view"  # of the tiles, beside the images
+CACHE_FOLDER = ".view"  # of the tiles, beside the images
 
 
 def open_tiles(out: Path, cache: Path | None, threads: int) -> Tiles:
@@ -26,13 +26,14 @@ def open_tiles(out: Path, cache: Path | None, threads: int) -> Tiles:
     Args:
         out: output folder of a render, or its manifest.
         cache: folder of the tiles; None: beside the images.
+        threads: that read images at once.
 
     Raises:
-        OutputError: the manifest cannot be read, or the folder not written to.
+        OutputError: the manifest cannot be read, or the folder cannot be written to.
     """
     manifest = read_manifest(out)
     require_writer("jpg")
-    folder = manifest.directory / FOLDER if cache is None else cache
+    folder = manifest.directory / CACHE_FOLDER if cache is None else cache
     try:
         make_folder(folder)
         return Tiles(manifest, folder, threads)
@@ -43,7 +44,7 @@ def open_tiles(out: Path, cache: Path | None, threads: int) -> Tiles:
 
 
 @contextmanager
-def serving(tiles: Tiles, port: int = 0) -> Iterator[PageServer]:
+def open_server(tiles: Tiles, port: int = 0) -> Iterator[PageServer]:
     """Serve the page while the context lasts."""
     with PageServer(tiles, port) as server:
         thread = threading.Thread(target=server.serve_forever, args=(0.1,), daemon=True)
@@ -55,7 +56,7 @@ def serving(tiles: Tiles, port: int = 0) -> Iterator[PageServer]:
             thread.join()
 
 
-def show(
+def show_page(
     tiles: Tiles,
     *,
     port: int,
@@ -65,14 +66,14 @@ def show(
     progress: Callable[[int], None],
     prepared: Callable[[list[OutputError]], None],
 ) -> None:
-    """Serve the page until the process is asked to end; the tiles are made meanwhile.
+    """Serve the page until the process is asked to end; prepare the tiles meanwhile.
 
     Args:
         opened: called with the address.
-        progress: called with the number of pictures that became ready.
-        prepared: called once all are, with what is wrong with images.
+        progress: called with the number of pictures just prepared.
+        prepared: called once all are, with the errors of missing or damaged images.
     """
-    with serving(tiles, port) as server:
+    with open_server(tiles, port) as server:
         opened(server.url)
         if browser:
             webbrowser.open(server.url)
@@ -83,37 +84,37 @@ def show(
 def write_page(
     tiles: Tiles, target: Path, *, threads: int, progress: Callable[[int], None]
 ) -> tuple[int, list[OutputError]]:
-    """Export the page.
+    """Prepare all tiles, and export the page.
 
     Returns:
-        Bytes written, and what is wrong with images.
+        The number of bytes written, and the errors of missing or damaged images.
 
     Raises:
         OutputError: the target holds other files or cannot be written.
     """
-    target = Path(os.path.realpath(target))  # "." has no name to put another beside
+    target = Path(os.path.realpath(target))  # "." has no name for a folder beside it
     check_target(target)
     problems = prepare_all(tiles, threads, progress)
-    return export(tiles, target), problems
+    return export_page(tiles, target), problems
 
 
 def prepare_all(tiles: Tiles, threads: int, progress: Callable[[int], None]) -> list[OutputError]:
-    """Make every tile that is missing or out of date; what is made stays when this is interrupted.
+    """Make every tile that is missing or out of date; an interrupt keeps the finished ones.
 
     Args:
-        progress: called with the number of pictures that became ready.
+        progress: called with the number of pictures just prepared.
 
     Returns:
-        What is wrong with images that are missing or damaged.
+        The errors of missing or damaged images.
 
     Raises:
         OutputError: a tile cannot be written.
     """
     problems: list[OutputError] = []
-    # All streams of a camera go to one thread, in turn: its layers are in one file, which is read once.
+    # One thread prepares all streams of a camera: its layers are in one file, which is so read once.
     with ThreadPoolExecutor(threads, thread_name_prefix="tiles") as pool:
         try:
-            tasks = [pool.submit(_camera, tiles, c, progress) for c in range(tiles.manifest.n_cameras)]
+            tasks = [pool.submit(_prepare_camera, tiles, c, progress) for c in range(tiles.manifest.n_cameras)]
             for task in as_completed(tasks):
                 problems += task.result()
         except BaseException:
@@ -123,7 +124,7 @@ def prepare_all(tiles: Tiles, threads: int, progress: Callable[[int], None]) -> 
     return problems
 
 
-def _camera(tiles: Tiles, c: int, progress: Callable[[int], None]) -> list[OutputError]:
+def _prepare_camera(tiles: Tiles, c: int, progress: Callable[[int], None]) -> list[OutputError]:
     problems = []
     for stream in tiles.streams:
         if tiles.stopping.is_set():

@@ -1,6 +1,6 @@
-"""Serves the page and the tiles of one array to browsers on this machine, and nothing else.
+"""Serve the page and the tiles of one array to browsers on this machine, and nothing else.
 
-A request never becomes a file name: it is looked up among the page's files, or read as key, camera and position.
+A request never becomes a file name: it names one of the page's files, or is parsed as key, camera and light.
 """
 
 import re
@@ -14,16 +14,16 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 
 from .page import content_type, page_files
-from .tiles import INDEX, Tiles
+from .tiles import INDEX_FILE, Tiles
 
 HOST = "127.0.0.1"
 TILE = re.compile(r"/tiles/([\w-]+)/c(\d{4,9})(?:\.l(\d{3,9}))?\.jpg", re.ASCII)
-# Names that this machine calls itself. Others could be those of a page elsewhere that points its own name here.
+# Names of this machine. Under another name a page from elsewhere may be asking, whose domain points here.
 HOSTS = ("127.0.0.1", "localhost")
 
 
 class PageServer(ThreadingHTTPServer):
-    """Answers requests, each connection in a thread of its own, until it is shut down."""
+    """Answer requests, each connection in its own thread, until shut down."""
 
     daemon_threads = True
     request_queue_size = 64  # browsers open several connections at once
@@ -32,10 +32,10 @@ class PageServer(ThreadingHTTPServer):
         """Listen.
 
         Args:
-            port: 0 takes one that is free.
+            port: 0 takes a free one.
 
         Raises:
-            OutputError: the port is taken.
+            OutputError: the port cannot be used.
         """
         self.tiles, self.page = tiles, page_files()
         try:
@@ -49,14 +49,14 @@ class PageServer(ThreadingHTTPServer):
         return f"http://{HOST}:{self.server_port}/"
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing: a browser that leaves closes its connections in the middle of answers."""
+        """Report nothing: a browser that leaves closes its connections in the middle of answers."""
 
 
 class _Handler(BaseHTTPRequestHandler):
     server: PageServer
-    protocol_version = "HTTP/1.1"  # connections are kept: a drag asks for hundreds of files
-    disable_nagle_algorithm = True  # else the end of an answer waits 40 ms for an acknowledgement
-    wbufsize = -1  # head and body leave together
+    protocol_version = "HTTP/1.1"  # keeps connections open: a drag requests hundreds of files
+    disable_nagle_algorithm = True  # or else the end of an answer waits 40 ms for an acknowledgement
+    wbufsize = -1  # sends head and body together
 
     def do_GET(self) -> None:
         self._answer(body=True)
@@ -71,30 +71,31 @@ class _Handler(BaseHTTPRequestHandler):
             return
         path = urlsplit(self.path).path
         try:
-            data, kind, time_s = self._found(path)
+            data, kind, time_s = self._find(path)
         except (OutputError, OSError) as error:
             self._send(HTTPStatus.NOT_FOUND, f"{error}\n".encode(errors="replace"), "text/plain", body=body)
             return
-        if time_s is not None and self._known(time_s):
+        if time_s is not None and self._is_current(time_s):
             self._send(HTTPStatus.NOT_MODIFIED, b"", kind, time_s, body=False)
         else:
             self._send(HTTPStatus.OK, data, kind, time_s, body=body)
 
-    def _found(self, path: str) -> tuple[bytes, str, int | None]:
-        """Content, its type, and its time in whole seconds, of tiles alone."""
+    def _find(self, path: str) -> tuple[bytes, str, int | None]:
+        """Return content, its type, and, for tiles only, its time in whole seconds."""
         tiles = self.server.tiles
         if match := TILE.fullmatch(path):
             key, c, l = match.groups()
-            file = tiles.tile(key, int(c), None if l is None else int(l))
+            file = tiles.ensure_tile(key, int(c), None if l is None else int(l))
             return file.read_bytes(), "image/jpeg", int(file.stat().st_mtime)
-        if path == f"/{INDEX}":
-            return (tiles.folder / INDEX).read_bytes(), "application/json", None
+        if path == f"/{INDEX_FILE}":
+            return (tiles.folder / INDEX_FILE).read_bytes(), "application/json", None
         name = path.removeprefix("/") or "index.html"
         if name not in self.server.page:
             raise OutputError(f"{path}: no such file")
         return self.server.page[name], content_type(name), None
 
-    def _known(self, time_s: int) -> bool:
+    def _is_current(self, time_s: int) -> bool:
+        """Return whether the browser has the version of that time."""
         since = self.headers.get("If-Modified-Since", "")
         try:
             return int(parsedate_to_datetime(since).timestamp()) == time_s
@@ -106,7 +107,7 @@ class _Handler(BaseHTTPRequestHandler):
     ) -> None:
         self.send_response(status)
         self.send_header("Content-Type", kind)
-        self.send_header("Cache-Control", "no-cache")  # ask again: the array may have been rendered anew
+        self.send_header("Cache-Control", "no-cache")  # ask each time: the array may have been rendered again
         self.send_header("X-Content-Type-Options", "nosniff")
         if time_s is not None:
             self.send_header("Last-Modified", formatdate(time_s, usegmt=True))
@@ -117,4 +118,4 @@ class _Handler(BaseHTTPRequestHandler):
             self.wfile.write(data)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Say nothing: the terminal shows how far the tiles are."""
+        """Report nothing: the terminal shows the progress of the tiles."""

@@ -1,4 +1,4 @@
-"""What the page shows: streams of pictures of one kind, each with a picture for a camera and a place along its axis."""
+"""Streams of pictures that the page shows: one kind of picture each, by camera and by light along one axis."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -13,15 +13,15 @@ from framearray_cli.array.names import file_name
 from framearray_cli.base.arrays import Float32, Image
 from framearray_cli.base.errors import OutputError
 
-from .coding import PLAIN, Coding, coding_for, data_coding
+from .coding import PLAIN_CODING, Coding, coding_for, data_coding
 
 Role = Literal["image", "group", "ambient", "background", "layer"]
 ReadLayers = Callable[[Path], dict[str, Float32]]
 
-# Pictures that the coding is chosen from, spread over the array: 3 to 8 ms each, before the page opens.
+# Pictures sampled over the array to choose the coding: 3 to 8 ms each, before the page opens.
 SAMPLES = 24
-LAYER_SAMPLES = 6  # files of layers are larger: 20 ms each
-# Layers by their name in the file: name on the page, channels, and whether exposure applies to them.
+LAYER_SAMPLES = 6  # layer files are larger: 20 ms each
+# Layers by name in the file: name on the page, channels, and whether exposure applies.
 LAYERS = {
     "obscurance": ("Obscurance", "RGB", True),
     "indirect": ("Indirect", "RGB", True),
@@ -37,12 +37,12 @@ class Stream:
     """Pictures of one kind.
 
     Attributes:
-        key: its folder, and its name in the index.
-        role: what it is to the picture on the screen.
+        key: name of its folder, and in the index.
+        role: its part in the picture on the screen.
         label: its name on the page.
-        axis: of light positions; "" where the light changes nothing.
-        n: positions along it, 1 without an axis.
-        group: of sources, of role "group" alone.
+        axis: of light positions; "" if the light changes nothing.
+        n: indices along the axis; 1 without an axis.
+        group: of sources, only for the role "group".
         coding: of its values.
     """
 
@@ -52,11 +52,11 @@ class Stream:
     axis: str = ""
     n: int = 1
     group: ManifestGroup | None = None
-    coding: Coding = PLAIN
+    coding: Coding = PLAIN_CODING
 
 
 def streams_of(manifest: Manifest) -> list[Stream]:
-    """All streams of an array, without their codings; layers only where the first file of them has them."""
+    """List the streams of images of an array, without codings."""
     axes = manifest.axes
     found = []
     if manifest.groups:
@@ -73,7 +73,7 @@ def streams_of(manifest: Manifest) -> list[Stream]:
 
 
 def layer_streams(channels: dict[str, Float32]) -> list[Stream]:
-    """Streams of the layers that a file has."""
+    """List the streams of the layers in a file."""
     return [
         Stream(key=name, role="layer", label=label)
         for name, (label, letters, _) in LAYERS.items()
@@ -82,7 +82,7 @@ def layer_streams(channels: dict[str, Float32]) -> list[Stream]:
 
 
 def source_file(manifest: Manifest, stream: Stream, c: int, l: int) -> Path:
-    """The file of the array that a picture comes from."""
+    """Return the array's file of a picture."""
     if stream.role in ("image", "group"):
         return image_path(manifest, c, l, stream.group)
     if stream.role == "layer":
@@ -106,7 +106,7 @@ def read_values(manifest: Manifest, stream: Stream, c: int, l: int, read_layers:
             raise OutputError(f"{path}: expected the channels {', '.join(names)}, found no {missing[0]}")
         values = np.stack([channels[name] for name in names], axis=-1)
         if stream.key == "depth" and not stream.coding.scale:
-            values = np.where(values > 0, values, stream.coding.high)  # nothing is hit: as far as can be
+            values = np.where(values > 0, values, stream.coding.high)  # nothing is hit: as far as the coding goes
     else:
         values = read_image(path)
     width, height = manifest.resolution
@@ -116,32 +116,32 @@ def read_values(manifest: Manifest, stream: Stream, c: int, l: int, read_layers:
 
 
 def choose_coding(manifest: Manifest, stream: Stream, read_layers: ReadLayers) -> Coding:
-    """Choose how a stream is coded, from a few pictures of it that are there."""
+    """Choose the coding of a stream from a sample of those of its pictures that exist."""
     if stream.key == "normal" and stream.role == "layer":
         return Coding(scale=0.0, low=-1.0, high=1.0)
     if _is_clipped(manifest, stream):
-        return PLAIN
-    largest = max((float(values.max()) for values in _some(manifest, stream, read_layers)), default=0.0)
+        return PLAIN_CODING
+    largest = max((float(values.max()) for values in _sample_values(manifest, stream, read_layers)), default=0.0)
     if stream.role == "layer" and not LAYERS[stream.key][2]:
         return data_coding(largest)
     return coding_for(largest)
 
 
-def _some(manifest: Manifest, stream: Stream, read_layers: ReadLayers) -> Iterator[Image]:
-    """A few pictures of a stream, spread over both axes."""
+def _sample_values(manifest: Manifest, stream: Stream, read_layers: ReadLayers) -> Iterator[Image]:
+    """Read a few pictures of a stream, spread over cameras and lights."""
     total = manifest.n_cameras * stream.n
-    # Even steps could meet the same few lights again and again; those of the golden ratio do not.
+    # Steps of the golden ratio: even steps could meet the same few lights again and again.
     count = LAYER_SAMPLES if stream.role == "layer" else SAMPLES
-    places = {int(total * ((k * 0.6180339887498949) % 1)) for k in range(min(count, total))}
-    for place in sorted(places):
+    numbers = {int(total * ((k * 0.6180339887498949) % 1)) for k in range(min(count, total))}
+    for number in sorted(numbers):
         try:
-            yield read_values(manifest, stream, *divmod(place, stream.n), read_layers)
-        except OutputError:  # not rendered yet, or damaged; told when it is prepared
+            yield read_values(manifest, stream, *divmod(number, stream.n), read_layers)
+        except OutputError:  # not rendered yet, or damaged; `Tiles.prepare` reports it
             continue
 
 
 def _is_clipped(manifest: Manifest, stream: Stream) -> bool:
-    """Whether the array itself keeps nothing beyond 1."""
+    """Return whether the array's images clip radiance at 1."""
     return stream.role != "layer" and format_name(source_file(manifest, stream, 0, 0)) in FOR_SCREENS
 
 

@@ -1,11 +1,11 @@
 """The page's pictures: JPEG tiles of the array's images, made once and kept in a folder.
 
-    index.json                what the page must know of the array
-    tiles/KEY/c0012.jpg       sheet: all positions of camera 12 in small, row after row
+    index.json                what the page needs to know of the array
+    tiles/KEY/c0012.jpg       sheet: small pictures of camera 12 under all lights, row by row
     tiles/KEY/c0012.l003.jpg  one picture, full size
 
-A tile has the file time of the image it was made from (a sheet that of its newest), so what was rendered again is
-made again, and nothing else.
+A tile has the file time of its image, a sheet that of its newest image. So only tiles of images that were rendered
+again are made again.
 """
 
 import json
@@ -33,49 +33,49 @@ from .coding import Coding, encode
 from .index import index_table, sheet_layout
 from .streams import Stream, choose_coding, layer_streams, read_values, source_file, streams_of
 
-INDEX = "index.json"
-TILES = "tiles"
-# 4:4:4. At 90 files are a quarter larger, for an error of 3.3 codes in place of 4.1 in a noisy picture.
+INDEX_FILE = "index.json"
+TILES_FOLDER = "tiles"
+# 4:4:4. At 90 files are a quarter larger, and the error in a noisy picture is 3.3 codes instead of 4.1.
 QUALITY = 85
-KEPT_LAYER_FILES = 6  # a file holds all layers of a camera; codings are chosen from as many
+KEPT_LAYER_FILES = 6  # a file holds all layers of a camera; codings are chosen from the same number of files
 
 
 class Tiles:
-    """The tiles of one array, in a folder; makes those that are missing or out of date. Threads may share it.
+    """The tiles of one array in a folder; missing and outdated ones are made on demand. Threads may share it.
 
     Attributes:
         manifest: of the array.
         folder: of index and tiles.
-        streams: what there is, with its coding.
+        streams: of the array, with their codings.
     """
 
     def __init__(self, manifest: Manifest, folder: Path, threads: int = 1) -> None:
-        """Choose the codings, drop tiles of other codings, and write the index.
+        """Choose the codings, delete tiles of other codings, and write the index.
 
         Raises:
             OutputError: the folder cannot be written to.
         """
         self.manifest, self.folder = manifest, folder
         self._read_layers = lru_cache(KEPT_LAYER_FILES)(read_layers)
-        self.streams = self._coded(threads)
+        self.streams = self._with_codings(threads)
         self.layout = sheet_layout(manifest.resolution, max(stream.n for stream in self.streams))
         self._by_key = {stream.key: stream for stream in self.streams}
         self._locks = {(stream.key, c): threading.Lock() for stream in self.streams for c in range(manifest.n_cameras)}
         self._slots = threading.BoundedSemaphore(threads)
         self.stopping = threading.Event()
         table = index_table(manifest, self.streams, self.layout)
-        if _written(folder / INDEX) != table:
-            _remove(folder / TILES)
-            write_bytes(folder / INDEX, json.dumps(table, indent=1).encode())
+        if _read_index(folder / INDEX_FILE) != table:
+            _remove(folder / TILES_FOLDER)
+            write_bytes(folder / INDEX_FILE, json.dumps(table, indent=1).encode())
 
-    def _coded(self, threads: int) -> list[Stream]:
+    def _with_codings(self, threads: int) -> list[Stream]:
         manifest = self.manifest
         found = streams_of(manifest)
         for c in range(manifest.n_cameras if manifest.layers else 0):
             with suppress(OutputError):  # not rendered yet, or damaged
                 found += layer_streams(self._read_layers(layers_path(manifest, c)))
                 break
-        # Layers one after the other: they are in the same files.
+        # One task for all layers: they are in the same files.
         pictures = [stream for stream in found if stream.role != "layer"]
         layers = [stream for stream in found if stream.role == "layer"]
         with ThreadPoolExecutor(threads) as pool:
@@ -88,24 +88,24 @@ class Tiles:
 
     @property
     def n_pictures(self) -> int:
-        """Full-size tiles in all."""
+        """The number of full-size tiles."""
         return self.manifest.n_cameras * sum(stream.n for stream in self.streams)
 
-    def place(self, key: str, c: int, l: int | None) -> Path:
-        """Where a tile lies, or a sheet if l is None."""
+    def tile_path(self, key: str, c: int, l: int | None) -> Path:
+        """Return the path of a tile, or of a sheet if l is None."""
         name = f"c{c:04d}.jpg" if l is None else f"c{c:04d}.l{l:03d}.jpg"
-        return self.folder / TILES / key / name
+        return self.folder / TILES_FOLDER / key / name
 
-    def tile(self, key: str, c: int, l: int | None) -> Path:
-        """A tile, or a sheet, that is up to date; made now if need be.
+    def ensure_tile(self, key: str, c: int, l: int | None) -> Path:
+        """Return the path of a tile, or of a sheet if l is None; make it if it is missing or out of date.
 
         Raises:
-            OutputError: there is none of that key and place, or its image is missing or damaged.
+            OutputError: the array has no such tile, or its image is missing or damaged.
         """
         stream = self._by_key.get(key)
         if stream is None or not 0 <= c < self.manifest.n_cameras or not 0 <= (l or 0) < stream.n:
             raise OutputError(f"{self.folder}: no tile {key}, camera {c}, position {l}")
-        path = self.place(key, c, l)
+        path = self.tile_path(key, c, l)
         if l is not None:
             time_ns = self._time(stream, c, l)
             if not _is_fresh(path, time_ns):
@@ -121,14 +121,14 @@ class Tiles:
         """Make all tiles of one stream and camera that are not up to date.
 
         Returns:
-            What is wrong with images that are missing or damaged; their place in the sheet is black.
+            The errors of missing or damaged images; their places in the sheet are black.
         """
         with self._locks[stream.key, c]:
             problems: list[OutputError] = []
-            times = [self._found_time(stream, c, l, problems) for l in range(stream.n)]
+            times = [self._time_or_problem(stream, c, l, problems) for l in range(stream.n)]
             newest = max(times)
-            fulls = [_is_fresh(self.place(stream.key, c, l), time) for l, time in enumerate(times) if time]
-            if not newest or (all(fulls) and _is_fresh(self.place(stream.key, c, None), newest)):
+            fulls = [_is_fresh(self.tile_path(stream.key, c, l), time) for l, time in enumerate(times) if time]
+            if not newest or (all(fulls) and _is_fresh(self.tile_path(stream.key, c, None), newest)):
                 return problems
             sheet = np.zeros((*self.layout.sheet(stream.n), 3), np.uint8)
             for l, time_ns in enumerate(times):
@@ -141,20 +141,20 @@ class Tiles:
                 except OutputError as problem:
                     problems.append(problem)
                     continue
-                path = self.place(stream.key, c, l)
+                path = self.tile_path(stream.key, c, l)
                 if not _is_fresh(path, time_ns):
                     _write_tile(path, encode(values, stream.coding), time_ns)
-                sheet[self.layout.part(l)] = encode(self.layout.reduced(values), stream.coding)
-            _write_tile(self.place(stream.key, c, None), sheet, newest)
+                sheet[self.layout.part(l)] = encode(self.layout.reduce(values), stream.coding)
+            _write_tile(self.tile_path(stream.key, c, None), sheet, newest)
             return problems
 
     def _write_full(self, stream: Stream, c: int, l: int, time_ns: int) -> None:
         values = read_values(self.manifest, stream, c, l, self._read_layers)
-        _write_tile(self.place(stream.key, c, l), encode(values, stream.coding), time_ns)
+        _write_tile(self.tile_path(stream.key, c, l), encode(values, stream.coding), time_ns)
 
     def _sheet_is_fresh(self, stream: Stream, c: int) -> bool:
-        times = [self._found_time(stream, c, l, []) for l in range(stream.n)]
-        return any(times) and _is_fresh(self.place(stream.key, c, None), max(times))
+        times = [self._time_or_problem(stream, c, l, []) for l in range(stream.n)]
+        return any(times) and _is_fresh(self.tile_path(stream.key, c, None), max(times))
 
     def _time(self, stream: Stream, c: int, l: int) -> int:
         path = source_file(self.manifest, stream, c, l)
@@ -163,8 +163,8 @@ class Tiles:
         except OSError as error:
             raise OutputError(f"{path}: cannot be read: {reason(error)}") from error
 
-    def _found_time(self, stream: Stream, c: int, l: int, problems: list[OutputError]) -> int:
-        """File time of an image; 0, and a problem more, where there is none."""
+    def _time_or_problem(self, stream: Stream, c: int, l: int, problems: list[OutputError]) -> int:
+        """Return the file time of an image; if it is missing, 0, and add a problem."""
         try:
             return self._time(stream, c, l)
         except OutputError as problem:
@@ -187,8 +187,8 @@ def _is_fresh(path: Path, time_ns: int) -> bool:
         return False
 
 
-def _written(path: Path) -> Any:
-    """The index of an earlier run; None if there is none that can be read."""
+def _read_index(path: Path) -> Any:
+    """Read the index of an earlier run; None if it is missing or damaged."""
     try:
         return json.loads(path.read_bytes())
     except (OSError, ValueError):

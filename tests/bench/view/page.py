@@ -23,8 +23,8 @@ from bench.core.results import ROOT
 from framearray_cli.array.images.images import ImageFormat, write_image
 from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestLight, image_path, matrix_rows
 from framearray_cli.array.manifest_toml import write_manifest
-from framearray_cli.tools.view.run import open_tiles, prepare_all, serving
-from framearray_cli.tools.view.tiles import TILES, Tiles
+from framearray_cli.tools.view.run import open_server, open_tiles, prepare_all
+from framearray_cli.tools.view.tiles import TILES_FOLDER, Tiles
 
 N_C, N_L, SIZE = 192, 48, (400, 300)
 OPENINGS = 5  # of the page, for the time to the first picture
@@ -90,7 +90,7 @@ def _all(out: Path, patience: float) -> Iterator[list[str]]:
         assert not problems, problems[0]
         yield [*_one(f"preparing {tiles.n_pictures:,} pictures, {THREADS} threads, s", f"{seconds:.0f}"), share()]
         for kind, pattern in (("pictures", "*.l*.jpg"), ("sheets", "c????.jpg")):
-            size = sum(file.stat().st_size for file in (tiles.folder / TILES).rglob(pattern))
+            size = sum(file.stat().st_size for file in (tiles.folder / TILES_FOLDER).rglob(pattern))
             yield [*_one(f"{kind} on the disk, MB", f"{size / 1e6:.0f}"), ""]
         yield from _shown(tiles, patience)
 
@@ -126,7 +126,7 @@ def _shown(tiles: Tiles, patience: float) -> Iterator[list[str]]:
 
 @contextmanager
 def _opened(chromium: Any, tiles: Tiles) -> Iterator[Shown]:
-    with serving(tiles) as server, shown(chromium, server.url) as page:
+    with open_server(tiles) as server, shown(chromium, server.url) as page:
         yield page
 
 

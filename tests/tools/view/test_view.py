@@ -1,4 +1,4 @@
-"""Tiles of the page: their coding, what is made when, the server, and the command."""
+"""Tiles of the page: their coding, when they are made, the server, and the command."""
 
 import http.client
 import json
@@ -19,7 +19,7 @@ from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import OutputError
 from framearray_cli.tools.view.coding import MOST_WHITE, Coding, coding_for, data_coding, decode, encode
 from framearray_cli.tools.view.index import sheet_layout
-from framearray_cli.tools.view.run import open_tiles, prepare_all, serving
+from framearray_cli.tools.view.run import open_server, open_tiles, prepare_all
 
 
 @pytest.mark.parametrize("white", [1.0, 4.0, MOST_WHITE])
@@ -56,7 +56,7 @@ def test_sheets_hold_all_positions_once(size, n):
         taken[layout.part(l)] += 1
     assert taken.max() == 1 and taken.sum() == n * layout.width * layout.height
     values = np.random.default_rng(1).random((size[1], size[0], 3), np.float32)
-    small = layout.reduced(values)
+    small = layout.reduce(values)
     assert small.shape == (layout.height, layout.width, 3)
     np.testing.assert_allclose(small[0, 0], values[: layout.factor, : layout.factor].mean((0, 1)), rtol=1e-4)
 
@@ -71,8 +71,8 @@ def test_tiles_hold_the_images(tmp_path):
     assert coding.white > 6
     for c, l in ((0, 0), (6, 4)):
         exact = encode(handmade.soft(c, l, 6.0), coding).astype(float)
-        full = read_codes(tiles.place("light", c, l))
-        small = read_codes(tiles.place("light", c, None))[tiles.layout.part(l)]
+        full = read_codes(tiles.tile_path("light", c, l))
+        small = read_codes(tiles.tile_path("light", c, None))[tiles.layout.part(l)]
         assert np.abs(full - exact).mean() < 1.0 < np.abs(full - np.roll(exact, 3, axis=1)).mean()
         assert np.abs(small - exact).mean() < 1.5, "small pictures of this size are not smaller"
     index = json.loads((tmp_path / ".view" / "index.json").read_text())
@@ -95,7 +95,7 @@ def test_only_what_is_missing_or_new_is_made(tmp_path):
     assert changed == {"c0000.l001.jpg", "c0000.jpg", "c0002.l001.jpg", "c0002.jpg"}
 
 
-def test_other_codings_make_all_anew(tmp_path):
+def test_other_codings_discard_all_tiles(tmp_path):
     manifest = handmade.plain(tmp_path, n_c=2, n_l=2, layers=False)
     prepare_all(open_tiles(tmp_path, None, 1), 1, lambda n: None)
     write_image(image_path(manifest, 0, 0), handmade.soft(0, 0, 12.0), ImageFormat(half="never"))
@@ -103,19 +103,19 @@ def test_other_codings_make_all_anew(tmp_path):
     assert not list(tmp_path.rglob("*.jpg"))
 
 
-def test_images_that_are_missing_or_damaged_are_told(tmp_path):
+def test_missing_and_damaged_images_are_reported(tmp_path):
     manifest = handmade.plain(tmp_path, n_c=2, n_l=3, layers=False)
     image_path(manifest, 0, 1).unlink()
     image_path(manifest, 1, 0).write_bytes(b"no picture")
     tiles = open_tiles(tmp_path, None, 2)
     problems = sorted(map(str, prepare_all(tiles, 2, lambda n: None)))
     assert len(problems) == 2 and "c0000.l001.exr" in problems[0] and "c0001.l000.exr" in problems[1]
-    assert tiles.tile("light", 0, None).is_file(), "the others are there"
+    assert tiles.ensure_tile("light", 0, None).is_file(), "the others are there"
     with pytest.raises(OutputError, match=r"c0000\.l001\.exr"):
-        tiles.tile("light", 0, 1)
+        tiles.ensure_tile("light", 0, 1)
 
 
-def test_a_damaged_file_of_layers_is_told(tmp_path):
+def test_a_damaged_layer_file_is_reported(tmp_path):
     manifest = handmade.plain(tmp_path, n_c=2, n_l=1)
     layers_path(manifest, 0).write_bytes(b"no layers")
     tiles = open_tiles(tmp_path, None, 1)
@@ -128,7 +128,7 @@ def test_a_damaged_file_of_layers_is_told(tmp_path):
 def server(tmp_path):
     handmade.plain(tmp_path, n_c=2, n_l=2, layers=False)
     (tmp_path / "secret.txt").write_text("secret")
-    with serving(open_tiles(tmp_path, None, 1)) as running:
+    with open_server(open_tiles(tmp_path, None, 1)) as running:
         yield running
 
 
@@ -169,17 +169,17 @@ def test_the_server_gives_nothing_else(server, path):
     assert answer.status == 404 and b"secret\n" not in body and body != b"secret"
 
 
-def test_the_server_answers_to_its_own_names_alone(server):
+def test_the_server_answers_only_to_its_own_names(server):
     assert ask(server, "/", Host=f"localhost:{server.server_port}")[0].status == 200
     for name in ("example.org", f"example.org:{server.server_port}", "127.0.0.1.example.org"):
         assert ask(server, "/index.json", Host=name)[0].status == 421
     assert ask(server, "/", "POST")[0].status == 501
 
 
-def test_a_port_that_is_taken_is_told(server, tmp_path):
+def test_a_taken_port_is_reported(server, tmp_path):
     with (
         pytest.raises(OutputError, match=rf"port {server.server_port}: cannot be used"),
-        serving(server.tiles, server.server_port),
+        open_server(server.tiles, server.server_port),
     ):
         pass
 
@@ -230,4 +230,4 @@ def test_the_page_is_in_the_package():
     assert {"index.html", "main.js", "style.css", "icon.svg"} <= set(page)
     assert all(content_type(name) for name in page)
     foreign = [name for name, data in page.items() if b"http://" in data.replace(b"http://www.w3.org/2000/svg", b"")]
-    assert not foreign, "the page asks nobody else"
+    assert not foreign, "the page requests nothing from elsewhere"

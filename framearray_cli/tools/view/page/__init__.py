@@ -1,4 +1,4 @@
-"""The files of the page itself: HTML, CSS and JavaScript, part of the package."""
+"""The files of the page: HTML, CSS and JavaScript, which are part of the package."""
 
 from importlib.resources import files
 from pathlib import PurePosixPath
@@ -12,11 +12,11 @@ TYPES = {
 
 
 def page_files() -> dict[str, bytes]:
-    """Name -> content."""
+    """Read all files: name -> content."""
     entries = [entry for entry in files(__package__).iterdir() if PurePosixPath(entry.name).suffix in TYPES]
     return {entry.name: entry.read_bytes() for entry in entries}
 
 
 def content_type(name: str) -> str:
-    """What a browser is told that a file is."""
+    """Return the media type of a file."""
     return TYPES[PurePosixPath(name).suffix]

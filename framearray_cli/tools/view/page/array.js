@@ -1,4 +1,4 @@
-// What index.json says of a frame array: its axes, where its tiles are, and what a picture is the sum of.
+// A frame array as index.json describes it: its axes, the URLs of its tiles, and the terms of a picture.
 
 export const WHITE = [1, 1, 1];
 
@@ -16,7 +16,7 @@ export class FrameArray {
     this.others = index.axes.slice(1);
     this.layers = index.streams.filter((stream) => stream.role === "layer");
     this.groups = index.streams.filter((stream) => stream.role === "group");
-    // Names of all that can be lit anew: the groups, and what comes from the background.
+    // Names of all light that can be changed: the groups, and the background.
     this.tinted = this.groups.map((group) => group.label);
     if (index.streams.some((stream) => stream.role === "background")) this.tinted.push("background");
   }
@@ -37,8 +37,8 @@ export class FrameArray {
     return 4 * columns * this.small.width * Math.ceil(stream.n / columns) * this.small.height;
   }
 
-  // Where the small picture of position l lies in its sheet: left, top, width, height as shares of the sheet.
-  // Its last column and row may stand for less than `factor` pixels, so the picture ends before them.
+  // Where the small picture of light l lies in its sheet: left, top, width, height as shares of the sheet.
+  // Its last column and row may cover less than `factor` pixels, so the picture may end before they do.
   smallPart(stream, l) {
     const columns = Math.min(stream.n, this.small.columns);
     const rows = Math.ceil(stream.n / columns);
@@ -47,7 +47,7 @@ export class FrameArray {
     return [(l % columns) / columns, Math.floor(l / columns) / rows, share[0] / columns, share[1] / rows];
   }
 
-  // The streams whose sum is the picture at a view, each with its position and RGB factor: pictures.py's equation
+  // The streams whose sum is the picture of a view, each with its light index and RGB factor, as in pictures.py:
   //     picture = sum of factor_g (direct_g + a I_A,g R W) over groups g, the background among them.
   parts(view) {
     if (view.show !== "picture") {
@@ -77,7 +77,7 @@ export class FrameArray {
   }
 }
 
-// RGB factor of an intensity and a colour such as "#ffcc88", which is sRGB.
+// RGB factor of an intensity and an sRGB colour such as "#ffcc88".
 export function tint({ intensity, color }) {
   return linearColor(color).map((value) => intensity * value);
 }
@@ -95,7 +95,7 @@ export function srgb(value) {
   return x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055;
 }
 
-// Radiance of a code from 0 to 1; coding.py explains the curve.
+// Radiance of a code, which is 0 to 1; coding.py explains the curve.
 export function decode(code, { scale, white }) {
   const y = linear(code);
   return (scale * 2 * y) / (1 - y + Math.sqrt((1 - y) ** 2 + (4 * y) / white ** 2));

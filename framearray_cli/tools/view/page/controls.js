@@ -1,11 +1,11 @@
-// Sliders and buttons: what the array has decides which there are. They change the view and call `changed`.
+// Sliders and buttons for what the array has. They change the view and call `changed`.
 
 const MOST_INTENSITY = 4;
 
 export class Controls {
   constructor(array, view, changed) {
     this.array = array;
-    this.update = []; // functions that show a view
+    this.update = []; // functions that set a control to a view
     this.layers(changed);
     this.exposure(changed);
     this.axes(changed);
@@ -33,11 +33,11 @@ export class Controls {
 
   exposure(changed) {
     const input = document.getElementById("exposure");
-    const told = document.getElementById("exposure-told");
+    const output = document.getElementById("exposure-value");
     input.addEventListener("input", () => changed((view) => (view.exposure = Number(input.value))));
     this.update.push((view) => {
       input.value = view.exposure;
-      told.value = (view.exposure > 0 ? "+" : "") + view.exposure.toFixed(1).replace("-", "\u2212");
+      output.value = (view.exposure > 0 ? "+" : "") + view.exposure.toFixed(1).replace("-", "\u2212");
       input.setAttribute("aria-valuetext", `${view.exposure} stops`);
     });
   }
@@ -46,11 +46,11 @@ export class Controls {
     const box = document.getElementById("axes");
     if (this.array.others.length) box.append(element("h2", {}, "More lights"));
     for (const { name, n } of this.array.others) {
-      const { input, told, holder } = slider(name, { min: 0, max: n - 1, step: 1, id: `axis-${name}` });
+      const { input, output, holder } = slider(name, { min: 0, max: n - 1, step: 1, id: `axis-${name}` });
       input.addEventListener("input", () => changed((view) => (view.places[name] = Number(input.value))));
       this.update.push((view) => {
         input.value = view.places[name];
-        told.value = `${view.places[name] + 1} / ${n}`;
+        output.value = `${view.places[name] + 1} / ${n}`;
         input.setAttribute("aria-valuetext", `position ${view.places[name] + 1} of ${n}`);
       });
       box.append(holder);
@@ -67,7 +67,7 @@ export class Controls {
   }
 
   tint(box, name, id, changed, of) {
-    const { input, told, holder } = slider(name, { min: 0, max: MOST_INTENSITY, step: 0.05, id });
+    const { input, output, holder } = slider(name, { min: 0, max: MOST_INTENSITY, step: 0.05, id });
     const color = element("input", { type: "color", id: `${id}-color`, "aria-label": `${name}, colour` });
     holder.classList.add("coloured");
     const row = element("div", { class: "slider coloured" }, ...holder.children, color);
@@ -78,7 +78,7 @@ export class Controls {
     this.update.push((view) => {
       input.value = of(view).intensity;
       color.value = of(view).color;
-      told.value = of(view).intensity.toFixed(2);
+      output.value = of(view).intensity.toFixed(2);
     });
     box.append(row);
   }
@@ -86,14 +86,14 @@ export class Controls {
 
 function slider(name, attributes) {
   const input = element("input", { type: "range", ...attributes });
-  const told = element("output", {});
-  const holder = element("label", { class: "slider" }, element("span", { title: name }, name), input, told);
-  return { input, told, holder };
+  const output = element("output", {});
+  const holder = element("label", { class: "slider" }, element("span", { title: name }, name), input, output);
+  return { input, output, holder };
 }
 
 export function element(tag, attributes, ...children) {
-  const made = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  made.append(...children);
-  return made;
+  const node = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
+  node.append(...children);
+  return node;
 }

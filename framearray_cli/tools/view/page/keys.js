@@ -1,7 +1,7 @@
-// Keys, wherever the focus is, unless it is on something that needs them itself.
+// Keyboard control, except for keys that the focused element needs itself.
 
-const FAST = 10; // steps with Shift
-const STOPS = 0.5;
+const FAST = 10; // steps per key with Shift
+const STOPS = 0.5; // of exposure per key
 
 export function addKeys(page) {
   const { array } = page;

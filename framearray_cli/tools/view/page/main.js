@@ -1,8 +1,9 @@
-// The page: wires array, store, picture, pad, path and controls; one loop draws what changed.
+// The page: connects array, store, picture, pad, path and controls; one loop redraws what changed.
 
 import { loadArray } from "./array.js";
 import { Controls } from "./controls.js";
 import { addKeys } from "./keys.js";
+import { loadOrder } from "./loadorder.js";
 import { ColourMap } from "./map.js";
 import { Pad } from "./pad.js";
 import { addPathButtons } from "./pathbuttons.js";
@@ -11,13 +12,11 @@ import { Picture } from "./picture.js";
 import { Player } from "./player.js";
 import { memoryBudget, Store } from "./store.js";
 import { firstView, fromHash, toHash } from "./view.js";
-import { wishes } from "./wishes.js";
 
-const HASH_DELAY = 300; // ms after the last change; browsers refuse more than some hundred addresses a minute
+const HASH_DELAY = 300; // ms after the last change; browsers refuse more than some hundred addresses per minute
 const STILL_AFTER = 250; // ms without a change: the movement is over
-
-const CALM_AFTER = 60; // ms without a change: pictures around the place are loaded too
-const RETRY_AFTER = 5000; // ms, where there is no picture
+const CALM_AFTER = 60; // ms without a change: load pictures around the place as well
+const RETRY_AFTER = 5000; // ms, if there is no picture
 
 const byId = (id) => document.getElementById(id);
 
@@ -26,8 +25,8 @@ class Page {
     this.array = array;
     this.view = fromHash(array, location.hash);
     this.store = new Store(memoryBudget(), (url) => this.arrived(url));
-    this.store.want(wishes(array, this.view, [0, 0], false));
-    this.picture = new Picture(byId("picture"), array.resolution); // 0.2 s without a graphics card, while tiles load
+    this.store.want(loadOrder(array, this.view, [0, 0], false));
+    this.picture = new Picture(byId("picture"), array.resolution); // takes 0.2 s without a graphics card, while tiles load
     this.map = new ColourMap(array);
     this.sheets = new Map(); // url of a sheet -> [stream, c]
     for (const stream of array.streams) {
@@ -36,17 +35,17 @@ class Page {
     this.path = new Path();
     this.isDrawing = false;
     this.velocity = [0, 0];
-    this.steps = []; // of the last places: { c, l, first, full }, ms until shown small and full
+    this.steps = []; // the last places: { c, l, first, full }, ms until drawn at all, and in full size
     this.player = new Player(array, () => this.level > 0, (change) => this.change(change), (what) => this.ended(what));
     this.controls = new Controls(array, this.view, (change) => this.change(change));
     this.pad = new Pad(byId("pad"), array, this.map, (place, phase, event) => this.pointer(place, phase, event));
     this.pad.onresize = () => this.dirty();
-    this.level = 0; // of what is on the screen for the view: 0 another place, 1 small, 2 full size
+    this.level = 0; // what the screen shows: 0 another view, 1 this view in small, 2 this view in full size
     addPathButtons(this);
     addKeys(this);
     this.addButtons();
-    this.say();
-    this.asked(performance.now());
+    this.showNumbers();
+    this.viewChanged(performance.now());
     requestAnimationFrame((now) => this.frame(now));
   }
 
@@ -54,33 +53,33 @@ class Page {
     return this.view.places[this.array.main.name];
   }
 
-  // Change the view; what is shown follows with the next frame of the screen.
+  // Change the view; the next frame of the screen shows it.
   change(change, time = performance.now()) {
     const { c } = this.view, { l } = this;
     change(this.view);
     this.velocity = time - this.changedAt < STILL_AFTER ? [this.view.c - c, this.l - l] : [0, 0];
-    this.asked(time);
-    this.say();
+    this.viewChanged(time);
+    this.showNumbers();
     clearTimeout(this.hashTimer);
     this.hashTimer = setTimeout(() => history.replaceState(null, "", toHash(this.array, this.view)), HASH_DELAY);
   }
 
-  asked(time) {
+  viewChanged(time) {
     this.changedAt = time;
     this.level = 0;
     this.steps.push({ c: this.view.c, l: this.l, show: this.view.show, at: time, first: null, full: null });
     if (this.steps.length > 4000) this.steps.shift();
-    this.wish(false);
+    this.loadTiles(false);
     clearTimeout(this.calmTimer);
-    this.calmTimer = setTimeout(() => this.wish(true), CALM_AFTER);
+    this.calmTimer = setTimeout(() => this.loadTiles(true), CALM_AFTER);
     const look = groundLook(this.array, this.view);
     if (look !== this.look) this.map.changed = true;
     this.look = look;
     this.dirty();
   }
 
-  wish(calm) {
-    this.store.want(wishes(this.array, this.view, this.velocity, calm));
+  loadTiles(calm) {
+    this.store.want(loadOrder(this.array, this.view, this.velocity, calm));
   }
 
   dirty() {
@@ -106,7 +105,7 @@ class Page {
     byId("memory").value = `${Math.round((this.store.bytes + this.picture.bytes) / 2 ** 20)} MiB`;
   }
 
-  // Draw the view from what is there: full tiles, else small ones, else what was drawn before stays.
+  // Draw the view from full tiles, or else small ones; without either the last drawing stays.
   drawPicture() {
     const { array, store, view } = this;
     let level = 2;
@@ -119,7 +118,7 @@ class Page {
       level = Math.min(level, small ? 1 : 0);
       return { ...part, url: sheet, bitmap: small, part: array.smallPart(part.stream, part.l) };
     });
-    this.tell(parts);
+    this.showProblem(parts);
     if (!level) return;
     this.picture.draw(parts, view.exposure + array.exposure);
     if (this.measures) this.picture.pixels(1); // waits for the drawing
@@ -131,25 +130,25 @@ class Page {
     if (level === 2) step.full ??= ms;
   }
 
-  // Say what is wrong, if anything is.
-  tell(parts) {
+  // Show why there is no picture, if there is none.
+  showProblem(parts) {
     const full = parts.map((part) => this.array.fullUrl(part.stream, this.view.c, part.l));
     const wrong = full.map((url) => this.store.missing.get(url)).find((text) => text);
     byId("note").hidden = !wrong;
     byId("note").textContent = wrong ? `No picture here. ${wrong}` : "";
-    if (wrong) this.retry ??= setTimeout(() => this.askAgain(), RETRY_AFTER);
+    if (wrong) this.retry ??= setTimeout(() => this.retryMissing(), RETRY_AFTER);
   }
 
-  // A render may have gone on, or the server have come back.
-  askAgain() {
+  // A render may have continued, or the server may be back.
+  retryMissing() {
     this.retry = undefined;
     this.store.forgetMissing();
-    this.wish(true);
+    this.loadTiles(true);
     this.dirty();
   }
 
-  // Show the view's numbers and set the controls.
-  say() {
+  // Show the numbers of the view, and set the controls to it.
+  showNumbers() {
     const { array, view } = this;
     const text = `camera ${view.c + 1} / ${array.nCameras}, ${array.main.name} ${this.l + 1} / ${array.main.n}`;
     byId("where").textContent = text;
@@ -210,18 +209,18 @@ class Page {
   async copyLink() {
     const link = new URL(toHash(this.array, this.view), location.href).href;
     history.replaceState(null, "", link);
-    let told = "Copied";
+    let outcome = "Copied";
     try {
       await navigator.clipboard.writeText(link);
     } catch {
-      told = "In the address bar"; // no clipboard without https, or without leave
+      outcome = "In the address bar"; // no clipboard without https, or without permission
     }
-    byId("link").textContent = told;
+    byId("link").textContent = outcome;
     setTimeout(() => (byId("link").textContent = "Copy link"), 1500);
   }
 }
 
-// What the pad's ground depends on: all of the view but the place on the pad.
+// All that the pad's background depends on: the view without the place on the pad.
 function groundLook(array, view) {
   const others = array.others.map((axis) => view.places[axis.name]);
   return JSON.stringify([view.show, view.exposure, view.tints, view.ambient, others]);

@@ -1,4 +1,4 @@
-// Mean colour of every picture, from the sheets as they arrive: the pad's ground.
+// Mean colour of every picture, from the sheets as they arrive: the pad's background.
 
 import { decode, srgb } from "./array.js";
 
@@ -14,7 +14,7 @@ export class ColourMap {
     this.changed = true;
   }
 
-  // Take the means of a sheet: it is drawn with one pixel a picture.
+  // Add the means of a sheet, drawn with one pixel per picture.
   add(stream, c, sheet) {
     const means = this.means.get(stream.key);
     if (!Number.isNaN(means[3 * c * stream.n])) return;
@@ -35,8 +35,8 @@ export class ColourMap {
     this.changed = true;
   }
 
-  // Colours as the view shows them, on a canvas with a pixel for each camera and light; transparent where unknown.
-  drawn(view) {
+  // Draw the colours of a view, one pixel per camera and light, transparent where unknown; return the canvas.
+  draw(view) {
     const { array } = this;
     const { width, height } = this.canvas;
     const shown = new ImageData(width, height);

@@ -1,7 +1,7 @@
-// The pad: cameras from left to right, lights from top to bottom; the pointer moves the place, or draws a path.
+// The pad: cameras from left to right, lights from top to bottom. The pointer moves the place, or draws a path.
 
 export class Pad {
-  // moved(place, event): the pointer is at { c, l }, which need not be whole; phase: "down", "move" or "up".
+  // moved(place, phase, event): place is { c, l }, which need not be whole; phase is "down", "move" or "up".
   constructor(canvas, array, map, moved) {
     this.canvas = canvas;
     this.context = canvas.getContext("2d");
@@ -44,10 +44,10 @@ export class Pad {
     this.onresize?.();
   }
 
-  // strokes: [{ camera: [...], light: [...] }] of a path; ground: whether the colours may have changed.
+  // strokes: [{ camera: [...], light: [...] }] of a path; groundChanged: whether the colours may have changed.
   draw(view, strokes, groundChanged) {
     const { context, canvas, array } = this;
-    if (groundChanged) this.ground = this.map.drawn(view);
+    if (groundChanged) this.ground = this.map.draw(view);
     context.clearRect(0, 0, canvas.width, canvas.height);
     context.imageSmoothingEnabled = false;
     context.drawImage(this.ground, 0, 0, canvas.width, canvas.height);
@@ -86,7 +86,7 @@ export class Pad {
   }
 }
 
-// A share of a side -> a place on an axis of n; the outer halves of the end cells belong to the ends.
+// A share of the pad's side -> a place on an axis of n; the outer halves of the end cells belong to the ends.
 function along(share, n) {
   return Math.min(n - 1, Math.max(0, share * n - 0.5));
 }

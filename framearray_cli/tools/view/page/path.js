@@ -1,11 +1,11 @@
-// A path over the pad: segments with places at even times. Drawn, played, and saved for `framearray assemble`.
+// A path over the pad: segments with places at even times; it is drawn, played, and saved for `framearray assemble`.
 
 import { isTinted, round } from "./view.js";
 import { linearColor } from "./array.js";
 
-const STRAIGHT = 1; // seconds of a move to a place that was clicked
-const PLACES_A_SECOND = 8; // of a drawn stroke: a hand hardly turns faster
-const MOST_PLACES = 400; // in a segment
+const STRAIGHT = 1; // seconds of the move to a clicked place
+const PLACES_PER_SECOND = 8; // of a drawn stroke: a hand hardly turns faster
+const MOST_PLACES = 400; // per segment
 const SHORTEST = 0.1; // seconds
 
 export class Path {
@@ -27,7 +27,7 @@ export class Path {
     return this.segments.length === 0 && this.start === null;
   }
 
-  // What the pad draws.
+  // The lines that the pad draws.
   get strokes() {
     if (this.segments.length || !this.start) return this.segments;
     return [{ camera: [this.start.c], light: [this.start.l] }];
@@ -45,11 +45,11 @@ export class Path {
     else this.segments.push({ seconds: STRAIGHT, camera: [from.c, place.c], light: [from.l, place.l], places: { ...places } });
   }
 
-  // Add what was drawn by hand. samples: [{ s, c, l }], s in seconds.
+  // Add a stroke drawn by hand. samples: [{ s, c, l }], s in seconds.
   addStroke(samples, places) {
     const seconds = Math.max(SHORTEST, samples.at(-1).s - samples[0].s);
-    // at least as many places as were seen: a quick stroke keeps its corners
-    const count = Math.min(MOST_PLACES, Math.max(2, samples.length, Math.round(seconds * PLACES_A_SECOND) + 1));
+    // at least one place per sample: a quick stroke keeps its corners
+    const count = Math.min(MOST_PLACES, Math.max(2, samples.length, Math.round(seconds * PLACES_PER_SECOND) + 1));
     const camera = [], light = [];
     for (let k = 0, i = 0; k < count; k++) {
       const s = samples[0].s + ((samples.at(-1).s - samples[0].s) * k) / (count - 1);
@@ -62,7 +62,7 @@ export class Path {
     this.segments.push({ seconds, camera, light, places: { ...places } });
   }
 
-  // Make the whole path so long; its parts keep their shares.
+  // Give the whole path a length in seconds; its segments keep their shares.
   stretch(seconds) {
     const by = seconds / this.seconds;
     for (const segment of this.segments) segment.seconds *= by;
@@ -82,7 +82,7 @@ export class Path {
     return null;
   }
 
-  // The path file, see docs/guide/movies.md.
+  // Return the path file, see docs/guide/movies.md.
   toToml(array, view) {
     const lines = [
       "# Drawn on the pad of `framearray view`. Make a movie of it:",

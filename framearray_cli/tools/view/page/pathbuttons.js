@@ -1,17 +1,17 @@
-// Buttons of the path: draw, play, clear, save; and what a pointer draws on the pad.
+// Buttons of the path: draw, play, clear, save; and the strokes of a pointer on the pad.
 
-const CLICK = 4; // pixels that the pointer may move in a click
+const CLICK = 4; // pixels that the pointer may move during a click
 
 export function addPathButtons(page) {
   const byId = (id) => document.getElementById(id);
   let samples = [];
   let from = [0, 0];
 
-  const told = () => {
+  const showLength = () => {
     const { path } = page;
     const count = path.segments.length;
-    const is = count ? `${count} segment${count > 1 ? "s" : ""}` : "1 place";
-    byId("path-told").value = is;
+    const length = count ? `${count} segment${count > 1 ? "s" : ""}` : "1 place";
+    byId("path-length").value = length;
     byId("path-row").hidden = path.isEmpty;
     for (const id of ["play-path", "save-path", "seconds"]) byId(id).disabled = !count;
     byId("clear-path").disabled = path.isEmpty;
@@ -38,12 +38,12 @@ export function addPathButtons(page) {
     if (far || samples.some((one) => Math.hypot(one.c - sample.c, one.l - sample.l) > 0.5)) {
       page.path.addStroke(samples, page.view.places);
     } else page.path.addPlace({ c: Math.round(place.c), l: Math.round(place.l) }, page.view.places);
-    told();
+    showLength();
   };
 
   page.addHere = () => {
     page.path.addPlace({ c: page.view.c, l: page.l }, page.view.places);
-    told();
+    showLength();
   };
 
   byId("draw").addEventListener("click", () => page.setDrawing(!page.isDrawing));
@@ -51,12 +51,12 @@ export function addPathButtons(page) {
   byId("clear-path").addEventListener("click", () => {
     page.player.stop();
     page.path.clear();
-    told();
+    showLength();
   });
   byId("seconds").addEventListener("change", (event) => {
     const seconds = Number(event.target.value);
     if (seconds >= 0.1 && seconds <= 10000) page.path.stretch(seconds);
-    told();
+    showLength();
   });
   byId("save-path").addEventListener("click", () => {
     const text = page.path.toToml(page.array, page.view);

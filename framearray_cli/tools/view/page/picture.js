@@ -1,6 +1,6 @@
-// Draws a picture: the sum of coded tiles times factors, exposed and shown in sRGB, in one pass of WebGL 2.
+// Draws a picture in one pass of WebGL 2: the sum of decoded tiles times factors, with exposure, in sRGB.
 
-const KEPT_TEXTURES = 24; // beside the decoded tiles; a few steps back and forth upload nothing
+const KEPT_TEXTURES = 24; // beside the decoded tiles, so that a few steps back and forth upload nothing
 
 const VERTEX = `#version 300 es
 out vec2 at;
@@ -24,7 +24,7 @@ vec3 srgb(vec3 x) {
   x = clamp(x, 0.0, 1.0);
   return mix(12.92 * x, 1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055, greaterThan(x, vec3(0.0031308)));
 }
-// Between the texel centres of one small picture: its neighbours in the sheet must not shine in.
+// Sample one small picture between its own texel centres, so that its neighbours in the sheet do not bleed in.
 vec3 code(sampler2D image, vec4 part) {
   vec2 inset = 0.5 / vec2(textureSize(image, 0));
   vec2 low = part.xy + inset, high = max(part.xy + part.zw - inset, part.xy + inset);
@@ -75,7 +75,7 @@ export class Picture {
   // parts: [{ stream, factor, url, bitmap, part: [left, top, width, height] }]
   draw(parts, exposure) {
     const { gl } = this;
-    if (parts.length > this.most) throw new Error(`This device adds up ${this.most} pictures, not ${parts.length}.`);
+    if (parts.length > this.most) throw new Error(`This device adds at most ${this.most} pictures, not ${parts.length}.`);
     const program = this.program(parts);
     gl.useProgram(program);
     parts.forEach((one, i) => {
@@ -92,7 +92,7 @@ export class Picture {
     this.forget(parts.length);
   }
 
-  // The picture as drawn: RGBA, row 0 at the top. Waits until it is drawn.
+  // Return the drawn picture: RGBA, row 0 at the top. Waits for the drawing.
   pixels(rows = this.gl.drawingBufferHeight) {
     const { gl } = this;
     const width = gl.drawingBufferWidth, height = gl.drawingBufferHeight;
@@ -131,7 +131,7 @@ export class Picture {
     }
   }
 
-  // One program for each number of parts, and one for each kind of data.
+  // Return the program: there is one per number of parts, and one per kind of data.
   program(parts) {
     const { stream } = parts[0];
     const kind = stream.scale ? parts.length : stream.key;

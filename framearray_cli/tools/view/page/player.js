@@ -1,7 +1,7 @@
-// Plays along an axis, there and back, or along the path. It waits for pictures that are not loaded.
+// Plays along an axis, back and forth, or along the path. It waits for pictures that are still loading.
 
 export class Player {
-  // isReady(): whether what is asked for is on the screen; go(change): asks for another view.
+  // isReady(): whether the screen shows the view; go(change): changes the view; stopped(what): reports the end.
   constructor(array, isReady, go, stopped) {
     Object.assign(this, { array, isReady, go, stopped });
     this.what = null; // "camera", "light", "path" or null
@@ -65,7 +65,7 @@ export class Player {
   }
 }
 
-// Walk a signed number of steps over 0 to n - 1, turning round at the ends.
+// Walk a signed number of steps over 0 to n - 1, turning at the ends.
 export function bounce(from, steps, n) {
   const period = 2 * (n - 1);
   const phase = steps < 0 ? period - from : from; // on the way back the phase counts down from the end

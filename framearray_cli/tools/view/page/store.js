@@ -1,19 +1,19 @@
-// Loads tiles, the most wanted first, and keeps decoded ones within a budget of bytes.
+// Loads tiles in order of priority, and keeps decoded ones within a budget of bytes.
 
-const PARALLEL = 6; // connections that a browser opens to one server
-const PARALLEL_LATER = 4; // of them for what is not urgent, so that a drag never waits for all six
+const PARALLEL = 6; // connections that browsers open to one server
+const PARALLEL_LATER = 4; // of them for tiles that are not urgent, so that a drag never waits for all six
 const URGENT = 6; // items at the head of the list
-// Part of the budget that a list of wishes may fill: the rest is for what was shown just now.
+// Share of the budget that one list may fill; the rest keeps what was shown just before.
 const SHARE = 0.8;
 
 export class Store {
   constructor(budget, loaded) {
     this.budget = budget;
-    this.loaded = loaded; // called with a url when it is there, or known to be missing
+    this.loaded = loaded; // called with a url once it is loaded, or known to be missing
     this.bytes = 0;
-    this.most = 0; // bytes at their most
+    this.most = 0; // the largest `bytes` so far
     this.entries = new Map(); // url -> { bitmap, bytes }; the least recently used first
-    this.missing = new Map(); // url -> what the server said
+    this.missing = new Map(); // url -> answer of the server
     this.inFlight = new Map(); // url -> AbortController
     this.wanted = [];
   }
@@ -21,7 +21,7 @@ export class Store {
   get(url) {
     const entry = this.entries.get(url);
     if (!entry) return null;
-    this.entries.delete(url); // to the end of the map: used last
+    this.entries.delete(url); // to the end of the map, as the last one used
     this.entries.set(url, entry);
     return entry.bitmap;
   }
@@ -30,7 +30,7 @@ export class Store {
     return this.entries.has(url);
   }
 
-  // Load these, in this order; what was asked for before and is not among them is given up.
+  // Load these in this order; cancel all other loads.
   want(list) {
     let bytes = 0;
     const seen = new Set();
@@ -42,7 +42,7 @@ export class Store {
       seen.add(item.url);
       this.wanted.push(item);
     }
-    // What is wanted counts as used, the most wanted last: what makes room for the rest of it is not wanted.
+    // Mark these as used, the first of the list last, so that only others make room for those still to load.
     for (let i = this.wanted.length - 1; i >= 0; i--) this.get(this.wanted[i].url);
     for (const [url, controller] of this.inFlight) if (!seen.has(url)) controller.abort();
     this.next = 0;
@@ -66,7 +66,7 @@ export class Store {
       if (!answer.ok) {
         this.missing.set(url, (await answer.text()).trim() || answer.statusText);
       } else {
-        // Codes as they are in the file: the shader knows what they mean.
+        // Keep the codes of the file; the shader decodes them.
         const options = { premultiplyAlpha: "none", colorSpaceConversion: "none" };
         this.add(url, await createImageBitmap(await answer.blob(), options));
       }
@@ -95,13 +95,13 @@ export class Store {
     this.most = Math.max(this.most, this.bytes);
   }
 
-  // Ask again for what was missing; a render may have gone on.
+  // Request missing tiles again; a render may have continued.
   forgetMissing() {
     this.missing.clear();
   }
 }
 
-// Bytes of decoded pictures: less on phones, and whatever ?memory=MIB in the address says.
+// Bytes for decoded pictures: fewer on phones; ?memory=MIB in the address overrides both.
 export function memoryBudget() {
   const asked = Number(new URLSearchParams(location.search).get("memory"));
   if (asked > 0) return asked * 2 ** 20;

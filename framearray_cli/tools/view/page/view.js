@@ -1,4 +1,4 @@
-// Where the page stands: place, layer, exposure, colours. It is written into the address and read from it.
+// The state of the page: place, layer, exposure, colours. It is written to the address and read from it.
 
 const PLAIN = { intensity: 1, color: "#ffffff" };
 
@@ -24,7 +24,7 @@ export function toHash(array, view) {
   return `#${words}`;
 }
 
-// What does not fit the array is left as it is in a first view.
+// Values that do not fit the array stay as in a first view.
 export function fromHash(array, hash) {
   const view = firstView(array);
   const words = new URLSearchParams(hash.replace(/^#/, ""));

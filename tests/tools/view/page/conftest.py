@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from support import chromium, handmade
 
-from framearray_cli.tools.view.run import open_tiles, prepare_all, serving
+from framearray_cli.tools.view.run import open_server, open_tiles, prepare_all
 from framearray_cli.tools.view.server import PageServer
 
 
@@ -20,7 +20,7 @@ def browser() -> Iterator[Any]:
 def plain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
     """Seven cameras, five lights, layers."""
     manifest = handmade.plain(tmp_path_factory.mktemp("plain"))
-    with serving(open_tiles(manifest.directory, None, 2)) as server:
+    with open_server(open_tiles(manifest.directory, None, 2)) as server:
         yield server
 
 
@@ -30,5 +30,5 @@ def grouped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
     manifest = handmade.grouped(tmp_path_factory.mktemp("grouped"))
     tiles = open_tiles(manifest.directory, None, 2)
     prepare_all(tiles, 2, lambda n: None)
-    with serving(tiles) as server:
+    with open_server(tiles) as server:
         yield server

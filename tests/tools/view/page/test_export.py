@@ -1,4 +1,4 @@
-"""The page as files: another server shows it, from a folder of its own."""
+"""The page as files, served by another server from a sub-folder."""
 
 import threading
 from functools import partial
@@ -36,7 +36,7 @@ def test_an_export_works_from_a_sub_folder(browser, served, tmp_path):
     n_bytes, problems = write_page(tiles, tmp_path / "some where" / "page", threads=2, progress=lambda n: None)
     assert problems == [] and n_bytes > 10_000
     for source in manifest.directory.glob("room.*"):
-        source.unlink()  # the page stands for itself
+        source.unlink()  # the page does not need the array
     url = f"{served}some%20where/page/"
     with shown(browser, f"{url}#camera=2&light=1") as page:
         low, high = bounds_of_copy(tiles, tmp_path / "some where" / "page")
@@ -50,7 +50,7 @@ def test_an_export_works_from_a_sub_folder(browser, served, tmp_path):
 
 def bounds_of_copy(tiles, folder):
     copy = type("Copy", (), {"manifest": tiles.manifest, "streams": tiles.streams})()
-    copy.tile = lambda key, c, l: folder / "tiles" / key / f"c{c:04d}.l{l:03d}.jpg"
+    copy.ensure_tile = lambda key, c, l: folder / "tiles" / key / f"c{c:04d}.l{l:03d}.jpg"
     return bounds(copy, 2, [("light", 1, (1.0, 1.0, 1.0))])
 
 

@@ -1,4 +1,4 @@
-"""The page in a browser: what is shown where, by pointer, keys and touch; links, layers, exposure, groups."""
+"""The page in a browser: pictures by pointer, keys and touch; links, layers, exposure, groups."""
 
 import numpy as np
 import pytest
@@ -11,13 +11,13 @@ from framearray_cli.array.images.images import write_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.array.pictures import Pictures, Relight, ambient_at
 from framearray_cli.base.colour import linear_from_srgb, srgb8_from_linear
-from framearray_cli.tools.view.run import open_tiles, serving
+from framearray_cli.tools.view.run import open_server, open_tiles
 
 ONE = (1.0, 1.0, 1.0)
 
 
 def nearest_place(pixels, exposure=0.0):
-    """The (c, l) whose image is most like what is shown."""
+    """The (c, l) whose image is most like the screen."""
     places = [(c, l) for c in range(N_C) for l in range(N_L)]
     errors = [
         np.abs(srgb8_from_linear(soft(c, l, 6.0) * 2.0**exposure) - pixels.astype(float)).mean() for c, l in places
@@ -55,14 +55,14 @@ def test_pixels_are_those_of_the_image_at_an_exposure(browser, plain, exposure):
 
 
 def test_bright_light_survives_for_the_exposure(browser, plain):
-    """Values of 6 are white at first, and are told from 3 when it is three stops darker."""
+    """Values of 3 and 6 are both white at first, and differ three stops darker."""
     with shown(browser, f"{plain.url}#camera=2&light=2&exposure=-3") as page:
         truth = srgb8_from_linear(soft(2, 2, 6.0) / 8).astype(float)
         assert truth.max() > 200
         assert np.sqrt(np.mean((page.pixels() - truth) ** 2)) < 3.0
 
 
-def test_keys_alone_reach_everything(browser, plain):
+def test_keys_reach_everything(browser, plain):
     with shown(browser, plain.url) as page:
         press = page.page.keyboard.press
         for key in ("ArrowRight", "ArrowRight", "ArrowRight", "ArrowLeft", "ArrowDown"):
@@ -170,7 +170,7 @@ def test_layers(browser, plain):
         page.check(plain.url)
 
 
-def test_groups_are_lit_anew_as_by_pictures(browser, grouped):
+def test_light_of_groups_changes_as_in_pictures(browser, grouped):
     manifest = grouped.tiles.manifest
     lamps = 0.5 * linear_from_srgb(np.array([0xFF, 0xCC, 0x88]) / 255)
     with shown(browser, f"{grouped.url}#camera=2&light=1&axis.lamps=1") as page:
@@ -193,7 +193,7 @@ def test_groups_are_lit_anew_as_by_pictures(browser, grouped):
         assert np.abs(right - shown_.astype(float)).mean() < 1.0 < np.abs(wrong - shown_.astype(float)).mean()
 
 
-def test_play_goes_there_and_back(browser, plain):
+def test_play_goes_back_and_forth(browser, plain):
     with shown(browser, plain.url) as page:
         page.all_loaded()
         page.page.click("#play-camera")
@@ -206,11 +206,11 @@ def test_play_goes_there_and_back(browser, plain):
         page.page.keyboard.press("l")
         page.wait("framearray.l === 3")
         page.page.keyboard.press("l")
-        assert page.place[0] == place[0], "camera and light play by themselves"
+        assert page.place[0] == place[0], "camera and light play independently"
         page.check(plain.url)
 
 
-def test_turning_round_at_the_ends(browser, plain):
+def test_playing_turns_at_the_ends(browser, plain):
     with shown(browser, plain.url) as page:
         walk = """import("./player.js").then(({ bounce }) => {
             let at = 0, direction = 1;
@@ -236,10 +236,10 @@ def test_memory_stays_within_its_budget(browser, plain):
         page.check(plain.url)
 
 
-def test_a_missing_image_is_told(browser, tmp_path):
+def test_a_missing_image_is_reported(browser, tmp_path):
     manifest = handmade.plain(tmp_path, n_c=3, n_l=2, layers=False)
     image_path(manifest, 1, 0).unlink()
-    with serving(open_tiles(tmp_path, None, 1)) as server, shown(browser, server.url) as page:
+    with open_server(open_tiles(tmp_path, None, 1)) as server, shown(browser, server.url) as page:
         page.page.keyboard.press("ArrowRight")
         page.wait("!document.getElementById('note').hidden")
         assert "c0001.l000.exr" in page.get("document.getElementById('note').textContent")
@@ -249,5 +249,5 @@ def test_a_missing_image_is_told(browser, tmp_path):
         page.page.keyboard.press("ArrowLeft")
         page.wait("!document.getElementById('note').hidden")
         write_image(image_path(manifest, 1, 0), handmade.soft(1, 0, 6.0), handmade.FLOAT)
-        assert nearest_place(page.pixels()) == (1, 0), "rendered meanwhile, it comes by itself"
+        assert nearest_place(page.pixels()) == (1, 0), "rendered meanwhile, it appears without a reload"
         assert all("404" in error for error in page.errors), page.errors

@@ -1,4 +1,4 @@
-"""Paths: drawn by pointer and keys, played, saved as a file that `assemble` takes."""
+"""Paths: drawn by pointer and keys, played, and saved as a file for `assemble`."""
 
 import tomllib
 from importlib.util import find_spec
@@ -77,8 +77,8 @@ def test_assemble_takes_a_saved_path(browser, plain, tmp_path):
         page.check(plain.url)
     manifest = plain.tiles.manifest
     target = tmp_path / "frames" / "frame.####.exr"
-    told = CliRunner().invoke(app, ["assemble", str(manifest.directory), str(file), "-o", str(target)])
-    assert told.exit_code == 0, told.output
+    result = CliRunner().invoke(app, ["assemble", str(manifest.directory), str(file), "-o", str(target)])
+    assert result.exit_code == 0, result.output
     frames = sorted(target.parent.glob("*.exr"))
     assert len(frames) == 48
     for frame, place in ((frames[0], (0, 0)), (frames[23], (6, 0)), (frames[-1], (6, 4))):
@@ -99,8 +99,8 @@ def test_assemble_takes_the_light_of_groups(browser, grouped, tmp_path):
     assert tomllib.loads(file.read_text())["segments"][0]["axes"] == {"lamps": 1}
     manifest = grouped.tiles.manifest
     target = tmp_path / "frames" / "frame.####.png"
-    told = CliRunner().invoke(app, ["assemble", str(manifest.directory), str(file), "-o", str(target)])
-    assert told.exit_code == 0, told.output
+    result = CliRunner().invoke(app, ["assemble", str(manifest.directory), str(file), "-o", str(target)])
+    assert result.exit_code == 0, result.output
     from framearray_cli.array.images.png import read_codes
 
     last = read_codes(sorted(target.parent.glob("*.png"))[-1])

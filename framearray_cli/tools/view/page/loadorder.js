@@ -1,12 +1,12 @@
-// Which tiles to load, the most wanted first: what is shown, what comes next, then sheets and pictures around it.
+// The order in which to load tiles: those on the screen, those that come next, then sheets and pictures around them.
 
-const AHEAD = 8; // steps of a movement that are looked ahead
-const RING = 6; // full pictures around the place, each way
+const AHEAD = 8; // steps that a movement is extrapolated
+const RING = 6; // full pictures around the place, in each direction
 
-// view: the place; velocity: [cameras, lights] a step; calm: nothing has changed for a moment, else pictures around the
-// place wait, as they would take the processor from what is shown. Returns [{ url, bytes, needed }].
-// What is needed is loaded even where the budget is too small for it.
-export function wishes(array, view, velocity, calm) {
+// view: gives the place; velocity: [cameras, lights] per step; calm: whether the view has stayed for a moment. Pictures
+// around the place wait until then, as decoding them would delay the picture on the screen.
+// Returns [{ url, bytes, needed }]; a needed tile is loaded even if it exceeds the budget.
+export function loadOrder(array, view, velocity, calm) {
   const [dc, dl] = velocity;
   const moving = dc !== 0 || dl !== 0;
   const streams = array.parts(view).map((part) => part.stream);
@@ -34,7 +34,7 @@ export function wishes(array, view, velocity, calm) {
   full(0, 0);
   sheet(view.c);
   if (moving) {
-    const near = Math.abs(dc) <= 2 && Math.abs(dl) <= 2; // faster than that full pictures are not seen
+    const near = Math.abs(dc) <= 2 && Math.abs(dl) <= 2; // faster movements skip the full pictures
     for (let k = 1; k <= AHEAD; k++) {
       if (near) full(Math.round(k * dc), Math.round(k * dl));
       sheet(view.c + Math.round(k * dc));
