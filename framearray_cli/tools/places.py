@@ -1,49 +1,37 @@
-"""Places on an axis of an array as people write them, and positions along a span of places.
+"""Places along an axis of an array, as people write them.
 
-Notation: a position is an index along an axis that need not be whole; n is the number of indices on the axis.
+Notation: a place is what somebody writes: an index (negative: from the end; 3.25 is a quarter of the way from 3 to 4),
+"first", "last", or a percentage of the way from first to last. A position is where a place lies: an index that need not
+be whole. n is the number of indices on the axis.
 """
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import product
 from typing import Annotated, Any, TypeAlias
 
 from pydantic import PlainValidator, WithJsonSchema
 
-from framearray_cli.array.manifest import MAIN_AXIS, Manifest
+from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.arrays import is_number
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.table import fail
 from framearray_cli.base.forms.words import shown
 
-# An index (negative: from the end; 3.25 is a quarter of the way from 3 to 4), "first", "last", or a percentage of the
-# way from first to last.
 IndexPlace: TypeAlias = int | float | str
+LightIndices: TypeAlias = tuple[int, ...]  # one index per light axis, in the order of `Manifest.axes`
 
+ALL, MIDDLE = "all", "50%"
 _WANTED = 'expected an index, "first", "last" or a percentage such as "50%"'
+_WANTED_LIST = '"all", or indices, "first", "last" or percentages with commas between them'
+_WHOLE_INDEX = r"[+-]?\d{1,9}"
 _PLACE_SCHEMA: dict[str, Any] = {
     "anyOf": [{"type": "number"}, {"type": "string", "pattern": r"^(first|last|\d{1,3}(\.\d{1,9})? ?%)$"}]
 }
 
 
-def _span(value: object) -> tuple[IndexPlace, ...]:
-    """Check a span; one place alone is a span that stays there."""
-    many = isinstance(value, list | tuple)
-    places: Any = value if many else [value]
-    if not places:
-        fail([((), "expected a place, or a list of places, got an empty list")])
-    bad = [((k,), f"{_WANTED}, got {shown(place)}") for k, place in enumerate(places) if not _is_place(place)]
-    if bad:
-        fail(bad if many else [((), bad[0][1])])
-    return tuple(places)
-
-
-Span: TypeAlias = Annotated[
-    tuple[IndexPlace, ...],
-    PlainValidator(_span),
-    WithJsonSchema({"anyOf": [*_PLACE_SCHEMA["anyOf"], {"type": "array", "items": _PLACE_SCHEMA, "minItems": 1}]}),
-]
+# one place
 
 
 def read_place(text: str) -> IndexPlace:
@@ -63,13 +51,60 @@ def read_place(text: str) -> IndexPlace:
     return int(number) if number == int(number) else number
 
 
-def positions(key: str, span: Sequence[IndexPlace], n: int, noun: str, problems: list[str]) -> tuple[float, ...]:
+def percent(text: str) -> float | None:
+    """Read "50%" or "12.5 %"; return None for anything else and for percentages above 100."""
+    found = re.fullmatch(r"(\d{1,3}(?:\.\d{1,9})?) ?%", text)
+    value = float(found[1]) if found else None
+    return value if value is not None and value <= 100 else None
+
+
+def position_of(place: IndexPlace, n: int) -> float:
+    """Find the position of a place on an axis of n indices; it may lie outside the axis."""
+    if isinstance(place, int | float):
+        return float(place + n if place < 0 else place)
+    return (n - 1) * ({"first": 0.0, "last": 100.0}.get(place, percent(place)) or 0.0) / 100
+
+
+def nearest_index(position: float) -> int:
+    """Find the index nearest to a position; halves go up."""
+    return math.floor(position + 0.5)
+
+
+def _is_place(value: object) -> bool:
+    if isinstance(value, str):
+        return value in ("first", "last") or percent(value) is not None
+    return is_number(value)
+
+
+# spans of places
+
+
+def _check_span(value: object) -> tuple[IndexPlace, ...]:
+    """Check a span; a single place is a span that stays there."""
+    many = isinstance(value, list | tuple)
+    places: Any = value if many else [value]
+    if not places:
+        fail([((), "expected a place, or a list of places, got an empty list")])
+    bad = [((k,), f"{_WANTED}, got {shown(place)}") for k, place in enumerate(places) if not _is_place(place)]
+    if bad:
+        fail(bad if many else [((), bad[0][1])])
+    return tuple(places)
+
+
+Span: TypeAlias = Annotated[
+    tuple[IndexPlace, ...],
+    PlainValidator(_check_span),
+    WithJsonSchema({"anyOf": [*_PLACE_SCHEMA["anyOf"], {"type": "array", "items": _PLACE_SCHEMA, "minItems": 1}]}),
+]
+
+
+def resolve_span(key: str, span: Sequence[IndexPlace], n: int, noun: str, problems: list[str]) -> tuple[float, ...]:
     """Find the positions of a span's places on an axis of n indices.
 
     Args:
         key: where the span stands, for messages.
-        noun: of the indices, "cameras".
-        problems: what lies outside of the axis is added.
+        noun: for the indices in messages, such as "cameras".
+        problems: receives a line for each place outside the axis.
     """
     found = []
     for place in span:
@@ -84,8 +119,8 @@ def positions(key: str, span: Sequence[IndexPlace], n: int, noun: str, problems:
     return tuple(found)
 
 
-def along(span: Sequence[float], u: float) -> float:
-    """Find the position u of the way along a span whose places lie at even steps of u; places themselves are exact."""
+def interpolate_span(span: Sequence[float], u: float) -> float:
+    """Interpolate linearly between positions at even steps of u from 0 to 1, where the result is exact."""
     last = len(span) - 1
     if u == 1 or not last:
         return span[-1]
@@ -93,127 +128,77 @@ def along(span: Sequence[float], u: float) -> float:
     return span[k] + (span[k + 1] - span[k]) * (u * last - k)
 
 
-def nearest(position: float) -> int:
-    """Find the nearest index; halves go up."""
-    return math.floor(position + 0.5)
+# sets of indices
 
 
-def percent(text: str) -> float | None:
-    """Read "50%" or "12.5 %"; None for anything else and for what is not within 0 and 100."""
-    found = re.fullmatch(r"(\d{1,3}(?:\.\d{1,9})?) ?%", text)
-    value = float(found[1]) if found else None
-    return value if value is not None and value <= 100 else None
-
-
-def _is_place(value: object) -> bool:
-    if isinstance(value, str):
-        return value in ("first", "last") or percent(value) is not None
-    return is_number(value)
-
-
-def position_of(place: IndexPlace, n: int) -> float:
-    """Resolve a place on an axis of n indices; the result may lie outside."""
-    if isinstance(place, int | float):
-        return float(place + n if place < 0 else place)
-    return (n - 1) * ({"first": 0.0, "last": 100.0}.get(place, percent(place)) or 0.0) / 100
-
-
-LightPlace: TypeAlias = tuple[int, ...]
-
-ALL, MIDDLE = "all", "50%"
-_PLACE = r"[+-]?\d{1,9}|first|last|[\d.]+ ?%"  # whole indices alone: nothing is blended here
-_WANTED_INDICES = '"all", or indices, "first", "last" or percentages with commas between them'
-
-
-def indices(option: str, text: str, n: int) -> tuple[int, ...]:
+def read_indices(option: str, text: str, n: int) -> tuple[int, ...]:
     """Read "all", or places with commas between them: "0,3,-1", "first", "last", "50%" (the nearest index).
 
+    Indices must be whole: nothing is blended here.
+
     Args:
-        option: what the text was given as, for messages.
+        option: that the text was given to, for messages.
         n: indices on the axis.
 
     Returns:
-        The indices, in the order given, none twice.
+        The indices in the order given, without repetition.
 
     Raises:
-        JobError: it is none of these, or lies outside of the axis.
+        JobError: the text is none of these, or a place lies outside the axis.
     """
     if text.strip() == ALL:
         return tuple(range(n))
     found: dict[int, None] = {}
-    for place in text.split(","):
-        index = _index(place.strip(), n)
-        if index is None:
-            raise JobError(option, [f"expected {_WANTED_INDICES}, got {shown(text)}"])
+    for place in (part.strip() for part in text.split(",")):
+        if not (re.fullmatch(_WHOLE_INDEX, place) or _is_place(place)):
+            raise JobError(option, [f"expected {_WANTED_LIST}, got {shown(text)}"])
+        index = nearest_index(position_of(read_place(place), n))
         if not 0 <= index < n:
-            raise JobError(option, [f"expected 0 to {n - 1}, or -{n} to -1, got {place.strip()}"])
+            raise JobError(option, [f"expected 0 to {n - 1}, or -{n} to -1, got {place}"])
         found[index] = None
     return tuple(found)
 
 
-def light_places(manifest: Manifest, light: str | None, at: Sequence[str], default: str) -> list[LightPlace]:
-    """Read the light positions along every axis, and combine them.
+def read_light_indices(manifest: Manifest, light: str | None, at: Sequence[str], default: str) -> list[LightIndices]:
+    """Read places along every light axis, and combine them.
 
     Args:
         light: places along the first axis; None: `default`.
-        at: "AXIS=PLACES" for others, or for the first.
-        default: places along the axes of which nothing is said.
+        at: "AXIS=PLACES" for other axes, or for the first.
+        default: places along the axes that neither names.
 
     Raises:
-        JobError: a place or an axis is not known, or one is told twice.
+        JobError: a place or an axis is unknown, or an axis is given twice.
     """
     axes = manifest.axes
-    told = _told(axes, at)
+    given = _places_by_axis(manifest, at)
     first = next(iter(axes))
     if light is not None:
-        if first in told:
+        if first in given:
             raise JobError("--light", [f"expected either this or --at {first}=..., got both"])
-        told[first] = ("--light", light)
-    chosen = [indices(*told.get(axis, (f"--at {axis}", default)), n) for axis, n in axes.items()]
+        given[first] = ("--light", light)
+    chosen = [read_indices(*given.get(axis, (f"--at {axis}", default)), n) for axis, n in axes.items()]
     return list(product(*chosen))
 
 
-def spread_with_ends(n: int, most: int) -> tuple[int, ...]:
-    """At most so many of n indices, evenly, the first and the last among them; the middle one if there is one."""
+def _places_by_axis(manifest: Manifest, at: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Read "AXIS=PLACES": axis -> the option for messages, and the places."""
+    axes = manifest.axes
+    given: dict[str, tuple[str, str]] = {}
+    for text in at:
+        axis, equals, places = text.partition("=")
+        if not equals or axis not in axes or axis in given:
+            known = ", ".join(f"{name} (0 to {n - 1})" for name, n in axes.items())
+            problem = "twice the same axis" if axis in given else shown(text)
+            raise JobError("--at", [f"expected AXIS=PLACES with one of the axes {known}, got {problem}"])
+        given[axis] = (f"--at {axis}", places)
+    return given
+
+
+def evenly_spaced(n: int, most: int) -> tuple[int, ...]:
+    """Choose at most `most` of n indices, evenly spaced from first to last; the middle one if `most` is 1."""
     if n <= most:
         return tuple(range(n))
     if most == 1:
         return ((n - 1) // 2,)
     return tuple(round(k * (n - 1) / (most - 1)) for k in range(most))
-
-
-def plain_names(axes: Mapping[str, int]) -> dict[str, str]:
-    """Names of axes for keys and columns, of letters, digits and _: "light" for the main one, "light_..." for others.
-
-    No two are the same.
-    """
-    names: dict[str, str] = {}
-    for axis in axes:
-        name = MAIN_AXIS if axis == MAIN_AXIS else f"light_{re.sub(r'[^0-9A-Za-z]+', '_', axis).strip('_')}"
-        while name in names.values():
-            name += "_"
-        names[axis] = name
-    return names
-
-
-def _told(axes: Mapping[str, int], at: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Axis -> the option and its places."""
-    told: dict[str, tuple[str, str]] = {}
-    for text in at:
-        axis, equals, places = text.partition("=")
-        if not equals or axis not in axes or axis in told:
-            known = ", ".join(f"{name} (0 to {n - 1})" for name, n in axes.items())
-            problem = "twice the same axis" if axis in told else shown(text)
-            raise JobError("--at", [f"expected AXIS=PLACES with one of the axes {known}, got {problem}"])
-        told[axis] = (f"--at {axis}", places)
-    return told
-
-
-def _index(place: str, n: int) -> int | None:
-    """The index that a place means, which may lie outside; None if it means nothing."""
-    if not re.fullmatch(_PLACE, place):
-        return None
-    try:
-        return nearest(position_of(read_place(place), n))
-    except ValueError:  # more than 100 %
-        return None

@@ -25,8 +25,8 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.job.schema import job_schema
 from framearray_cli.tools.movie.pathfile import MoviePath, load_movie_path
-from framearray_cli.tools.movie.timeline import MOST_FRAMES, timeline
-from framearray_cli.tools.places import indices, position_of, read_place
+from framearray_cli.tools.movie.timeline import MOST_FRAMES, make_timeline
+from framearray_cli.tools.places import position_of, read_indices, read_place
 
 SEEDS = jobseeds.tables("a.glb")
 SCHEMA = job_schema()
@@ -145,7 +145,7 @@ def test_any_path_file_is_a_movie_or_refused(tmp_path, seed):
     try:
         movie = load_movie_path(file)
         if sum(segment.n_passes for segment in movie.segments) * 1000 < MOST_FRAMES:
-            line = timeline(file, movie, array)
+            line = make_timeline(file, movie, array)
         else:
             return
     except JobError as error:
@@ -228,7 +228,7 @@ def test_a_place_is_an_index_that_there_is(text, n):
     else:
         assert isinstance(position_of(place, n), float)
     try:
-        found = indices("--cameras", text, n)
+        found = read_indices("--cameras", text, n)
     except JobError as error:
         assert str(error).startswith("--cameras: expected")
     else:

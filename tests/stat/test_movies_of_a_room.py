@@ -17,7 +17,7 @@ from framearray_cli.job.read import read_job
 from framearray_cli.render.render import render
 from framearray_cli.tools.movie.assemble import assemble
 from framearray_cli.tools.movie.pathfile import load_movie_path
-from framearray_cli.tools.movie.timeline import timeline
+from framearray_cli.tools.movie.timeline import make_timeline
 
 pytest.importorskip("av")
 
@@ -46,7 +46,7 @@ def check_movies(array: Manifest, folder: Path, containers: tuple[str, ...]) -> 
 
     for text in KINDS.values():
         path = path_file(folder, f"[[segments]]\nframes = 26\n{text.format(at=2)}\n")
-        shots = timeline(path, load_movie_path(path), array).shots
+        shots = make_timeline(path, load_movie_path(path), array).shots
         for suffix in containers:
             result = assemble(array.directory, path, folder / f"m{suffix}")
             movie = decoded(folder / f"m{suffix}")

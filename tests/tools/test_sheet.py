@@ -57,7 +57,7 @@ def test_a_sheet_shows_every_image_in_its_place(array: Manifest, tmp_path: Path,
     target = tmp_path / f"sheet{suffix}"
     seen: list[tuple[int, int]] = []
     made = make_sheet(array.directory, target, progress=lambda done, total: seen.append((done, total)))
-    assert (made.cameras, made.places) == ((0, 1, 2, 3), (0, 1, 2))
+    assert (made.cameras, made.lights) == ((0, 1, 2, 3), (0, 1, 2))
     assert seen == [(k, 12) for k in range(1, 13)]
     codes = read_codes(target)
     assert (codes.shape[1], codes.shape[0]) == made.size
@@ -68,13 +68,13 @@ def test_a_sheet_shows_every_image_in_its_place(array: Manifest, tmp_path: Path,
             difference = np.abs(tile.astype(int) - read_codes(image_path(array, c, l)))
             assert difference.mean() <= (0 if suffix == ".png" else 3)  # JPEG blurs the border to the grey
             other = np.abs(tile.astype(int) - read_codes(image_path(array, (c + 1) % 4, l)))
-            assert other.mean() > 10, "another image would be told apart"
+            assert other.mean() > 10, "another image would fail"
     assert not list(tmp_path.glob(".*"))
 
 
-def test_images_are_made_smaller_in_linear_light(array: Manifest, tmp_path: Path) -> None:
+def test_images_shrink_in_linear_light(array: Manifest, tmp_path: Path) -> None:
     made = make_sheet(array.directory, tmp_path / "s.png", columns=2, rows=2, width=180)
-    assert (made.cameras, made.places) == ((0, 3), (0, 2))
+    assert (made.cameras, made.lights) == ((0, 3), (0, 2))
     assert made.size[0] <= 180
     plain = make_sheet(array.directory, tmp_path / "s.exr", columns=2, rows=2, width=60)
     assert plain.size == (60, 40)
@@ -84,13 +84,13 @@ def test_images_are_made_smaller_in_linear_light(array: Manifest, tmp_path: Path
     )
 
 
-def test_exposure_brightens_what_is_shown(array: Manifest, tmp_path: Path) -> None:
+def test_exposure_brightens_images(array: Manifest, tmp_path: Path) -> None:
     make_sheet(array.directory, tmp_path / "s.png", exposure=-2.0)
     expected = srgb8_from_linear(read_image(image_path(array, 0, 0)) / 4)
     assert np.abs(blocks(read_codes(tmp_path / "s.png"), array.resolution)[0][0].astype(int) - expected).max() <= 1
 
 
-def test_labels_are_drawn_and_counts_told(array: Manifest, tmp_path: Path) -> None:
+def test_labels_and_counts_are_drawn(array: Manifest, tmp_path: Path) -> None:
     make_sheet(array.directory, tmp_path / "s.png")
     codes = read_codes(tmp_path / "s.png")
     written = (codes != BACKGROUND).any(-1)
@@ -100,14 +100,14 @@ def test_labels_are_drawn_and_counts_told(array: Manifest, tmp_path: Path) -> No
     assert not written[:15].any() and not written[-20:].any() and not written[:, :15].any(), "margins"
 
 
-def test_groups_are_summed_and_another_axis_may_stand_at_the_side(tmp_path: Path) -> None:
+def test_groups_are_summed_and_another_axis_may_be_at_the_side(tmp_path: Path) -> None:
     array = write_groups(grouped_manifest(tmp_path / "out"))
     made = make_sheet(array.directory, tmp_path / "s.exr", at=["lamps=0"], rows=3)
-    assert made.places == (0, 1, 2)
+    assert made.lights == (0, 1, 2)
     image = read_image(tmp_path / "s.exr")
     np.testing.assert_allclose(image[40:80, :60], Pictures(array).picture(0, (1, 0)), rtol=2e-3)
     made = make_sheet(array.directory, tmp_path / "t.exr", side="lamps", at=["light=2"])
-    assert made.places == (0, 1)
+    assert made.lights == (0, 1)
     np.testing.assert_allclose(
         read_image(tmp_path / "t.exr")[40:80, 60:120], Pictures(array).picture(1, (2, 1)), rtol=2e-3
     )
@@ -123,7 +123,7 @@ def test_groups_are_summed_and_another_axis_may_stand_at_the_side(tmp_path: Path
         ({"width": 100}, "--width: 100 pixels are too few for 4 columns; try fewer --columns"),
     ],
 )
-def test_what_cannot_be_drawn_is_told(array: Manifest, tmp_path: Path, options: dict, message: str) -> None:
+def test_what_cannot_be_drawn_is_reported(array: Manifest, tmp_path: Path, options: dict, message: str) -> None:
     with pytest.raises(JobError, match=message):
         make_sheet(array.directory, tmp_path / "s.png", **options)
     assert not (tmp_path / "s.png").exists()
@@ -132,7 +132,7 @@ def test_what_cannot_be_drawn_is_told(array: Manifest, tmp_path: Path, options: 
 def test_files_that_cannot_be_written_or_read_are_named(array: Manifest, tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"sheet\.gif: expected a \.png, \.jpg, \.exr or \.tif"):
         make_sheet(array.directory, tmp_path / "sheet.gif")
-    with pytest.raises(OutputError, match=r"exposure changes PNG and JPEG alone; \.exr keeps the radiance"):
+    with pytest.raises(OutputError, match=r"exposure changes only PNG and JPEG; \.exr keeps the radiance"):
         make_sheet(array.directory, tmp_path / "sheet.exr", exposure=1.0)
     image_path(array, 2, 1).unlink()
     with pytest.raises(OutputError, match=r"box\.c0002\.l001\.png: .*"):

@@ -70,9 +70,9 @@ def assemble(
     from framearray_cli.tools.movie.assemble import assemble as run
     from framearray_cli.tools.movie.display import find_view
     from framearray_cli.tools.movie.look import Look
-    from framearray_cli.tools.movie.sweep import Kind, Sweep
+    from framearray_cli.tools.movie.sweep import Sweep, SweepKind
 
-    choices: dict[Kind, bool] = {"walk": walk, "light": light, "diagonal": diagonal}
+    choices: dict[SweepKind, bool] = {"walk": walk, "light": light, "diagonal": diagonal}
     kinds = [kind for kind, wanted in choices.items() if wanted]
     _check(path_file, kinds, at, seconds)
     with Screen(out, quiet=quiet) as screen:

@@ -42,10 +42,10 @@ def export(
 ) -> None:  # fmt: skip
     """Hand a frame array to other tools: images with cameras, lights, depth and points."""
     from framearray_cli.array.images.images import FOR_SCREENS, ImageFormat
-    from framearray_cli.tools.export import export as run
+    from framearray_cli.tools.export import export_array as run
 
     if exposure and image_format not in FOR_SCREENS:
-        raise typer.BadParameter("changes PNG and JPEG alone", param_hint="--exposure")
+        raise typer.BadParameter("changes only PNG and JPEG", param_hint="--exposure")
     with Screen(out, quiet=quiet) as screen:
 
         def progress(done: int, total: int) -> None:
@@ -59,6 +59,6 @@ def export(
             force=force, progress=progress,
         )  # fmt: skip
     if not quiet:
-        lights = f"{made.n_places} light position{'s' if made.n_places > 1 else ''}"
+        lights = f"{made.n_lights} light position{'s' if made.n_lights > 1 else ''}"
         points_too = f", {made.n_points:,} points" if kind != "cinema" else ""
         say(out, [f"{made.target}: {made.n_cameras} cameras, {lights}{points_too}", *made.notes])

@@ -47,5 +47,5 @@ def sheet(
             at=at or (), progress=progress,
         )  # fmt: skip
     if not quiet:
-        shown = f"{len(made.cameras)} cameras, {len(made.places)} light positions"
+        shown = f"{len(made.cameras)} cameras, {len(made.lights)} light positions"
         say(out, [f"{made.target}: {shown}, {made.size[0]} x {made.size[1]} pixels"])

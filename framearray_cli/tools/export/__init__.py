@@ -1,5 +1,5 @@
-"""A frame array for other tools: nerfstudio, COLMAP, Cinema."""
+"""Export a frame array to other tools: nerfstudio, COLMAP, Cinema."""
 
-from .write import KINDS, POINTS, ExportResult, Kind, export
+from .write import EXPORT_KINDS, MOST_POINTS, ExportKind, ExportResult, export_array
 
-__all__ = ["KINDS", "POINTS", "ExportResult", "Kind", "export"]
+__all__ = ["EXPORT_KINDS", "MOST_POINTS", "ExportKind", "ExportResult", "export_array"]

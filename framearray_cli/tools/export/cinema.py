@@ -1,7 +1,7 @@
-"""A Cinema database, specification D ("Dietrich"): a folder NAME.cdb with `data.csv`, one row a picture.
+"""A Cinema database, specification D ("Dietrich"): a folder NAME.cdb with `data.csv`, one row per picture.
 
-The first row names the columns; those that name files come last and begin with FILE. A cell may be empty; all others
-of a column are of one type.
+The first row names the columns. Columns of file names come last, and their names begin with FILE. A cell may be empty;
+the other cells of a column have one type.
 """
 
 import csv
@@ -12,11 +12,10 @@ from typing import Any
 
 from framearray_cli.base.files import write_bytes
 
-from ..places import plain_names
-from .selection import ExportedFrame, Selection, rigid_pose, sources_at
+from .selection import ExportedFrame, Selection, axis_keys, rigid_pose, sources_at
 
-FILE = MARK = "data.csv"
-SUFFIX = ".cdb"
+TABLE_FILE = "data.csv"
+DATABASE_SUFFIX = ".cdb"
 
 
 def write_table(folder: Path, selection: Selection, files: Mapping[str, str]) -> None:
@@ -27,7 +26,7 @@ def write_table(folder: Path, selection: Selection, files: Mapping[str, str]) ->
         files: name of a frame -> its file, relative to the folder.
 
     Raises:
-        OutputError: a camera is no rigid motion, or the file cannot be written.
+        OutputError: the pose of a camera is no rigid motion, or the file cannot be written.
     """
     rows = [_row(selection, frame) | {"FILE": files[frame.name]} for frame in selection.frames]
     columns = [column for column in dict.fromkeys(name for row in rows for name in row) if column != "FILE"]
@@ -35,18 +34,17 @@ def write_table(folder: Path, selection: Selection, files: Mapping[str, str]) ->
     writer = csv.DictWriter(buffer, [*columns, "FILE"], restval="", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    write_bytes(folder / FILE, buffer.getvalue().encode())
+    write_bytes(folder / TABLE_FILE, buffer.getvalue().encode())
 
 
 def _row(selection: Selection, frame: ExportedFrame) -> dict[str, Any]:
-    """Parameters of one picture; whole numbers are indices, all others floats."""
+    """Return the parameters of one picture: indices are integers, all other numbers floats."""
     manifest = selection.manifest
     pose = rigid_pose(manifest, frame.c)
     row: dict[str, Any] = {"camera": frame.c}
-    names = plain_names(manifest.axes)
-    row |= {names[axis]: l for axis, l in zip(manifest.axes, frame.place, strict=True)}
+    row |= dict(zip(axis_keys(manifest.axes).values(), frame.lights, strict=True))
     row |= _vector("eye", pose[:3, 3]) | _vector("view", -pose[:3, 2]) | {"fov": float(manifest.cameras[frame.c].fov)}
-    sources = sources_at(manifest, frame.place)
+    sources = sources_at(manifest, frame.lights)
     for k, source in enumerate(sources):
         name = "source" if len(sources) == 1 else f"source{k}"
         row[f"{name}_type"] = source["type"]

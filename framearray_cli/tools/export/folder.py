@@ -13,15 +13,15 @@ from framearray_cli.base.errors import OutputError
 from .selection import ExportedFrame
 
 
-def earlier_export(target: Path, mark: str, *, force: bool) -> bool:
-    """Return whether an earlier export is there, to be replaced.
+def find_earlier_export(target: Path, mark: str, *, force: bool) -> bool:
+    """Return whether the target holds an earlier export, which the new one may replace.
 
     Args:
-        target: must not exist, or be empty; with `force` it may hold an earlier export.
-        mark: a file that every such export has, so that `force` removes nothing else.
+        target: must be missing or empty; with `force` it may hold an earlier export.
+        mark: a file that every export of this kind has, so that `force` removes nothing else.
 
     Raises:
-        OutputError: something else is there.
+        OutputError: the target holds anything else.
     """
     if os.path.lexists(target) and (os.path.islink(target) or not os.path.isdir(target)):
         raise OutputError(f"{target}: a file of that name is there; choose another name")
@@ -34,23 +34,23 @@ def earlier_export(target: Path, mark: str, *, force: bool) -> bool:
     return True
 
 
-def place_picture(
+def put_picture(
     pictures: Pictures, frame: ExportedFrame, target: Path, image_format: ImageFormat, *, copy: bool
 ) -> None:
-    """Put one picture into a folder: a link to the array's own file where that is the very picture, else written.
+    """Put one picture into a folder: link the array's own file where it is that picture, else write a new one.
 
     Args:
         pictures: of the array.
-        target: the file; a link to it is made where the disk allows one, unless a copy is wanted.
-        image_format: what is wanted.
-        copy: never a link.
+        target: the file to make.
+        image_format: of the file.
+        copy: copy the array's own file instead of linking it; a file is also copied where the disk has no links.
 
     Raises:
         OutputError: a file of the array is missing or damaged, or the target cannot be written.
     """
     manifest = pictures.manifest
-    image = pictures.picture(frame.c, frame.place)  # also where it is linked: a damaged one must not slip in
-    source = pictures.whole_file(frame.c, frame.place)
+    image = pictures.picture(frame.c, frame.lights)  # read even if it is linked: a damaged one must not slip in
+    source = pictures.whole_file(frame.c, frame.lights)
     if source is not None and not image_format.exposure and format_name(source) == image_format.format:
         with suppress(OSError):
             if not copy:
@@ -65,7 +65,7 @@ def place_picture(
         resolution=manifest.resolution,
         fps=manifest.fps,
         c=frame.c,
-        l=frame.place[0],
+        l=frame.lights[0],
         software=f"framearray {manifest.version}",
     )
     write_image(target, image, image_format, attributes)

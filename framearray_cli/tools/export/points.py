@@ -1,6 +1,6 @@
-"""Points of the scene from the depth layers, each with the cameras that see it.
+"""A point cloud of the scene from the depth layers, with the cameras that see each point.
 
-Notation: u = 1 / depth. Along a plane u is linear in the image, so u bends where surfaces end, and only there.
+Notation: u = 1 / depth. On a plane u is linear in image position, so u bends only where surfaces end or curve.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,24 +14,24 @@ from framearray_cli.array.manifest import Manifest, layers_path
 from framearray_cli.base.arrays import Bytes, Float32, Float64
 from framearray_cli.base.errors import OutputError
 
-from ..places import spread_with_ends
+from ..places import evenly_spaced
 from .selection import focal_length, rigid_pose
 
-SOURCES = 16  # cameras that points are taken from, evenly along the path; more add the same surfaces again
-# A pixel counts as smooth where u bends by less than this share of itself; two hits in a pixel, each somewhere in it,
-# already bend u by a quarter of its slope.
+SOURCES = 16  # cameras that points are taken from, evenly along the path; more would add the same surfaces
+# A pixel counts as smooth where u bends by at most this share of itself. With two random hits per pixel u bends by a
+# quarter of its slope already.
 BEND = 0.02
-# A camera sees a point where depths agree to this, plus what u changes across one pixel.
+# A camera sees a point if 1 / depth agrees to this share, plus the change of u across one pixel.
 AGREE = 0.005
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sight:
-    """What one camera sees of the points.
+class Observations:
+    """The points that one camera sees.
 
     Attributes:
-        points: (n,) index of each point that is seen, ascending.
-        position: (n, 2) where, pixels from the upper left corner; the first pixel's middle is (0.5, 0.5).
+        points: (n,) their indices, ascending.
+        position: (n, 2) where it sees them, pixels from the upper left corner; the first pixel's middle is (0.5, 0.5).
     """
 
     points: NDArray[np.int64]
@@ -39,22 +39,22 @@ class Sight:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cloud:
-    """Points and who sees them.
+class PointCloud:
+    """Points, and the cameras that see them.
 
     Attributes:
         position: (n, 3), world.
         codes: (n, 3) sRGB.
-        seen: by camera.
+        observations: by camera.
     """
 
     position: Float64
     codes: Bytes
-    seen: Mapping[int, Sight]
+    observations: Mapping[int, Observations]
 
 
 def read_depth(manifest: Manifest, c: int) -> Float32:
-    """Depth along the optical axis, scene units, (h, w); 0 where nothing is.
+    """Read the depth along the optical axis, scene units, (h, w); 0 where nothing is.
 
     Raises:
         OutputError: the layers are missing or damaged, or hold no depth.
@@ -67,16 +67,16 @@ def read_depth(manifest: Manifest, c: int) -> Float32:
     return depth
 
 
-def find_points(manifest: Manifest, cameras: Sequence[int], shown: Mapping[int, Bytes], wanted: int) -> Cloud:
-    """Take pixels of some cameras into the world, and keep what another camera sees where it should be.
+def find_points(manifest: Manifest, cameras: Sequence[int], colours: Mapping[int, Bytes], wanted: int) -> PointCloud:
+    """Unproject pixels of some cameras, and keep the points that another camera sees as well.
 
     Args:
-        cameras: those that are handed over.
-        shown: sRGB codes of the pictures of `source_cameras`, (h, w, 3).
-        wanted: points, at most.
+        cameras: that are exported.
+        colours: sRGB codes (h, w, 3) of the pictures of `source_cameras`.
+        wanted: the number of points, at most.
 
     Returns:
-        Points that at least two cameras see, or one if there is only one.
+        The points that at least two cameras see, or one camera if there is only one.
 
     Raises:
         OutputError: layers are missing or damaged.
@@ -86,28 +86,28 @@ def find_points(manifest: Manifest, cameras: Sequence[int], shown: Mapping[int, 
     for k, c in enumerate(sources):
         n = wanted * (k + 1) // len(sources) - wanted * k // len(sources)
         depth = read_depth(manifest, c)
-        rows, columns = _picked(smooth(depth), n, c)
+        rows, columns = _pick_pixels(smooth_pixels(depth), n, c)
         middle = np.stack([columns, rows], -1).astype(np.float64) + 0.5
-        found.append(unproject(manifest, c, middle, depth[rows, columns]))
-        codes.append(shown[c][rows, columns])
+        found.append(unproject_points(manifest, c, middle, depth[rows, columns]))
+        codes.append(colours[c][rows, columns])
     position = np.concatenate(found)
-    seen = {c: _sight(manifest, c, position) for c in cameras}
-    times = np.zeros(len(position), np.int64)
-    for sight in seen.values():
-        times[sight.points] += 1
-    kept = times >= min(2, len(cameras))
-    new = np.cumsum(kept) - 1  # index among those that are kept
-    sights = {c: _renumbered(sight, kept, new) for c, sight in seen.items()}
-    return Cloud(position=position[kept], codes=np.concatenate(codes)[kept], seen=sights)
+    seen = {c: _observe(manifest, c, position) for c in cameras}
+    n_seeing = np.zeros(len(position), np.int64)
+    for observations in seen.values():
+        n_seeing[observations.points] += 1
+    kept = n_seeing >= min(2, len(cameras))
+    new = np.cumsum(kept) - 1  # index among the kept points
+    renumbered = {c: _renumber(observations, kept, new) for c, observations in seen.items()}
+    return PointCloud(position=position[kept], codes=np.concatenate(codes)[kept], observations=renumbered)
 
 
 def source_cameras(cameras: Sequence[int]) -> list[int]:
-    """The cameras that points are taken from."""
-    return [cameras[k] for k in spread_with_ends(len(cameras), SOURCES)]
+    """Choose the cameras that points are taken from."""
+    return [cameras[k] for k in evenly_spaced(len(cameras), SOURCES)]
 
 
-def unproject(manifest: Manifest, c: int, position: Float64, depth: Float32) -> Float64:
-    """World points at image positions (n, 2), pixels, and depths (n,): (n, 3)."""
+def unproject_points(manifest: Manifest, c: int, position: Float64, depth: Float32) -> Float64:
+    """Find the world points (n, 3) at image positions (n, 2), pixels, and depths (n,)."""
     pose, focal = rigid_pose(manifest, c), focal_length(manifest, c)
     width, height = manifest.resolution
     z = depth.astype(np.float64)
@@ -116,8 +116,8 @@ def unproject(manifest: Manifest, c: int, position: Float64, depth: Float32) -> 
     return np.asarray(np.stack([x, y, -z], -1) @ pose[:3, :3].T + pose[:3, 3])
 
 
-def project(manifest: Manifest, c: int, points: Float64) -> tuple[Float64, Float64]:
-    """Image positions (n, 2), pixels, and depths (n,) of world points; a position means nothing at depth 0 or less."""
+def project_points(manifest: Manifest, c: int, points: Float64) -> tuple[Float64, Float64]:
+    """Find image positions (n, 2), pixels, and depths (n,) of world points; at depth 0 or less positions are void."""
     pose, focal = rigid_pose(manifest, c), focal_length(manifest, c)
     width, height = manifest.resolution
     x, y, back = ((points - pose[:3, 3]) @ pose[:3, :3]).T
@@ -125,8 +125,8 @@ def project(manifest: Manifest, c: int, points: Float64) -> tuple[Float64, Float
     return np.stack([width / 2 + focal * x / ahead, height / 2 - focal * y / ahead], -1), -back
 
 
-def smooth(depth: Float32) -> NDArray[np.bool_]:
-    """Pixels (h, w) on a surface that goes on on all sides; none at the border."""
+def smooth_pixels(depth: Float32) -> NDArray[np.bool_]:
+    """Find the pixels (h, w) whose surface continues on all sides; none at the border."""
     u = _inverse(depth)
     middle = u[1:-1, 1:-1]
     flat = np.zeros(depth.shape, bool)
@@ -142,8 +142,8 @@ def _inverse(depth: Float32) -> Float64:
     return np.where(depth > 0, 1 / np.where(depth > 0, depth, 1).astype(np.float64), 0.0)
 
 
-def _picked(usable: NDArray[np.bool_], n: int, c: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Rows and columns of n pixels at most; the same ones for each export of a camera."""
+def _pick_pixels(usable: NDArray[np.bool_], n: int, c: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pick at most n pixels, the same in each export of a camera; return their rows and columns."""
     pixels = np.flatnonzero(usable)
     if len(pixels) > n:
         pixels = np.sort(np.random.default_rng(c).choice(pixels, n, replace=False))
@@ -151,13 +151,13 @@ def _picked(usable: NDArray[np.bool_], n: int, c: int) -> tuple[NDArray[np.int64
     return rows, columns
 
 
-def _sight(manifest: Manifest, c: int, points: Float64) -> Sight:
-    """Which points camera c sees: those that lie where its own depths say, on a smooth surface."""
+def _observe(manifest: Manifest, c: int, points: Float64) -> Observations:
+    """Find the points that camera c sees: those that agree with its own depths, on a smooth surface."""
     depth = read_depth(manifest, c)
-    flat, u = smooth(depth), _inverse(depth)
-    position, away = project(manifest, c, points)
+    flat, u = smooth_pixels(depth), _inverse(depth)
+    position, away = project_points(manifest, c, points)
     height, width = depth.shape
-    # the four pixels whose middles lie around each point, all of them inside the image
+    # the four pixels whose middles surround each point, if all are inside the image
     corner = np.floor(position - 0.5)
     inside = (away > 0) & (corner >= 0).all(-1) & (corner[:, 0] < width - 1) & (corner[:, 1] < height - 1)
     index = np.flatnonzero(inside)
@@ -169,9 +169,9 @@ def _sight(manifest: Manifest, c: int, points: Float64) -> Sight:
     change = four.max(0) - four.min(0)
     agrees = np.abs(1 / away[index] - there) <= AGREE * there + change
     seen = index[usable.all(0) & agrees]
-    return Sight(points=seen, position=position[seen])
+    return Observations(points=seen, position=position[seen])
 
 
-def _renumbered(sight: Sight, kept: NDArray[np.bool_], new: NDArray[np.int64]) -> Sight:
-    own = kept[sight.points]
-    return Sight(points=new[sight.points[own]], position=sight.position[own])
+def _renumber(observations: Observations, kept: NDArray[np.bool_], new: NDArray[np.int64]) -> Observations:
+    own = kept[observations.points]
+    return Observations(points=new[observations.points[own]], position=observations.position[own])

@@ -1,7 +1,8 @@
-"""What is handed over: which cameras under which light, as a list of frames, and what is known of each."""
+"""What is exported: which cameras under which light positions, as a list of frames, and the data of each frame."""
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,70 +12,81 @@ from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import OutputError
 
-from ..places import LightPlace, plain_names
+from ..places import LightIndices
 
-# A matrix counts as rigid where its columns are unit and at right angles to within this; written as float32 they are.
+# A matrix counts as rigid if its columns are orthonormal to within this; matrices written as float32 are.
 RIGID = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExportedFrame:
-    """One picture that is handed over.
+    """One picture of an export.
 
     Attributes:
         c: camera.
-        place: of the light, one index for each axis.
-        name: of its file, without a suffix; names sort by camera, then by place.
+        lights: one index per light axis.
+        name: of its file, without a suffix; names sort by camera, then by light.
     """
 
     c: int
-    place: LightPlace
+    lights: LightIndices
     name: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Selection:
-    """Cameras and light places; every camera comes under every place."""
+    """Cameras and light positions; every camera comes with every light position."""
 
     manifest: Manifest
     cameras: tuple[int, ...]
-    places: tuple[LightPlace, ...]
+    lights: tuple[LightIndices, ...]
 
     @property
     def frames(self) -> list[ExportedFrame]:
-        """All frames, place by place for each camera."""
+        """All frames, camera by camera."""
         name = self._name
-        return [ExportedFrame(c=c, place=place, name=name(c, place)) for c in self.cameras for place in self.places]
+        return [ExportedFrame(c=c, lights=lights, name=name(c, lights)) for c in self.cameras for lights in self.lights]
 
     def camera_name(self, c: int) -> str:
-        """Name of a camera's files."""
+        """Name the files of a camera."""
         return f"c{c:0{max(4, len(str(self.manifest.n_cameras - 1)))}d}"
 
-    def _name(self, c: int, place: LightPlace) -> str:
-        """Without dots: some readers take all behind the first dot for the suffix."""
+    def _name(self, c: int, lights: LightIndices) -> str:
+        """Name a picture, without dots: some readers take all behind the first dot for the suffix."""
         axes = self.manifest.axes
-        names = plain_names(axes).items()
+        names = axis_keys(axes).items()
         short = {axis: "l" if axis == MAIN_AXIS else name.removeprefix("light_") for axis, name in names}
         digits = (max(3, len(str(n - 1))) for n in axes.values())
-        parts = [f"{short[axis]}{l:0{d}d}" for axis, l, d in zip(axes, place, digits, strict=True)]
+        parts = [f"{short[axis]}{l:0{d}d}" for axis, l, d in zip(axes, lights, digits, strict=True)]
         return "_".join([self.camera_name(c), *parts])
 
 
-def sources_at(manifest: Manifest, place: LightPlace) -> list[dict[str, Any]]:
-    """All sources that shine at a light place."""
+def axis_keys(axes: Mapping[str, int]) -> dict[str, str]:
+    """Map axes to keys of letters, digits and _, all different: "light" for the main one, "light_..." for others."""
+    keys: dict[str, str] = {}
+    for axis in axes:
+        key = MAIN_AXIS if axis == MAIN_AXIS else f"light_{re.sub(r'[^0-9A-Za-z]+', '_', axis).strip('_')}"
+        while key in keys.values():
+            key += "_"
+        keys[axis] = key
+    return keys
+
+
+def sources_at(manifest: Manifest, lights: LightIndices) -> list[dict[str, Any]]:
+    """List all sources that shine at a light position."""
     if not manifest.groups:
-        return list(manifest.lights[place[0]].sources)
-    at = dict(zip(manifest.axes, place, strict=True))
+        return list(manifest.lights[lights[0]].sources)
+    at = dict(zip(manifest.axes, lights, strict=True))
     return [source for group in manifest.groups for source in group.lights[at[group.axis]].sources]
 
 
 def focal_length(manifest: Manifest, c: int) -> float:
-    """Of camera c, pixels; pixels are square, and the optical axis meets the middle of the image."""
+    """Return the focal length of camera c in pixels; they are square, and the optical axis meets the image's middle."""
     return 0.5 * manifest.resolution[1] / math.tan(math.radians(manifest.cameras[c].fov) / 2)
 
 
 def rigid_pose(manifest: Manifest, c: int) -> Float64:
-    """`world_from_camera` of camera c, (4, 4).
+    """Return `world_from_camera` of camera c, (4, 4).
 
     Raises:
         OutputError: it scales or mirrors, which no format here can hold.
@@ -86,6 +98,6 @@ def rigid_pose(manifest: Manifest, c: int) -> Float64:
     return matrix
 
 
-def numbers(values: Sequence[float] | Float64) -> list[float]:
-    """Plain floats, which are written so that they read back exactly."""
+def plain_floats(values: Sequence[float] | Float64) -> list[float]:
+    """Convert to plain floats, whose text reads back exactly."""
     return [float(value) for value in values]

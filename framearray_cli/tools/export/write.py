@@ -1,6 +1,6 @@
-"""A frame array -> a folder that other tools read; from the manifest alone."""
+"""Write a frame array as a folder that other tools read; all input is the manifest and the images it names."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
@@ -14,124 +14,158 @@ from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import whole_folder
 
-from ..places import ALL, MIDDLE, indices, light_places
+from ..places import ALL, MIDDLE, read_indices, read_light_indices
+from ..progress import Progress
 from . import cinema, colmap, nerfstudio
-from .folder import earlier_export, place_picture
-from .points import Cloud, find_points, source_cameras
+from .folder import find_earlier_export, put_picture
+from .points import PointCloud, find_points, source_cameras
 from .selection import Selection
 
-Kind: TypeAlias = Literal["nerfstudio", "colmap", "cinema"]
-Progress: TypeAlias = Callable[[int, int], None]  # pictures done, pictures in all
+ExportKind: TypeAlias = Literal["nerfstudio", "colmap", "cinema"]
 
-KINDS: tuple[Kind, ...] = ("nerfstudio", "colmap", "cinema")
-POINTS = 10_000  # COLMAP writes a text of some 25 bytes for each point in each image
-_MARKS = {"nerfstudio": nerfstudio.MARK, "colmap": colmap.MARK, "cinema": cinema.MARK}
+EXPORT_KINDS: tuple[ExportKind, ...] = ("nerfstudio", "colmap", "cinema")
+MOST_POINTS = 10_000  # a COLMAP model has some 25 bytes per point and image
+_MARK_FILES = {"nerfstudio": nerfstudio.TRANSFORMS_FILE, "colmap": colmap.IMAGES_FILE, "cinema": cinema.TABLE_FILE}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExportResult:
-    """What was made.
+    """What an export holds.
 
     Attributes:
         target: the folder.
-        n_cameras, n_places: cameras, and light places of each.
-        n_points: in the cloud of points.
-        notes: what a user should know.
+        n_cameras, n_lights: exported cameras, and light positions of each.
+        n_points: in the point cloud.
+        notes: for the user.
     """
 
     target: Path
     n_cameras: int
-    n_places: int
+    n_lights: int
     n_points: int
     notes: tuple[str, ...]
 
 
-def export(
+def export_array(
     out: Path,
     target: Path,
-    kind: Kind,
+    kind: ExportKind,
     *,
     cameras: str = ALL,
     light: str | None = None,
     at: Sequence[str] = (),
     image_format: ImageFormat | None = None,
-    points: int = POINTS,
+    points: int = MOST_POINTS,
     copy: bool = False,
     force: bool = False,
     progress: Progress | None = None,
 ) -> ExportResult:
-    """Write a folder for another tool; it appears whole or not at all.
+    """Export a frame array to another tool, as a folder that appears whole or not at all.
 
     Args:
         out: output folder of a render, or its manifest.
-        target: the folder; for cinema it gets the suffix .cdb.
-        kind: nerfstudio, colmap or cinema.
-        cameras: places along the camera path, see `places.indices`.
-        light: places along the first axis of light positions; None: all for cinema, the middle one for the others.
-        at: "AXIS=PLACES" for the other axes; without, as for `light`.
+        target: the folder; cinema adds the suffix .cdb.
+        kind: one of EXPORT_KINDS.
+        cameras: places along the camera path, see `places.read_indices`.
+        light: places along the first light axis; None: all for cinema, the middle one for the others.
+        at: "AXIS=PLACES" for the other axes; the default is as for `light`.
         image_format: of the pictures; None: PNG.
-        points: at most, in the cloud of points.
-        copy: copy pictures of the array where they could be linked.
+        points: the number of points in the point cloud, at most.
+        copy: copy pictures of the array that could be linked.
         force: replace an earlier export.
         progress: called after each picture.
 
     Raises:
-        JobError: a place or an axis is not known.
+        JobError: a place or an axis is unknown.
         OutputError: a file of the array is missing or damaged, or the target is in use or cannot be written.
     """
     manifest = read_manifest(out)
     selection = Selection(
         manifest=manifest,
-        cameras=tuple(sorted(indices("--cameras", cameras, manifest.n_cameras))),
-        places=tuple(sorted(light_places(manifest, light, at, ALL if kind == "cinema" else MIDDLE))),
+        cameras=tuple(sorted(read_indices("--cameras", cameras, manifest.n_cameras))),
+        lights=tuple(sorted(read_light_indices(manifest, light, at, ALL if kind == "cinema" else MIDDLE))),
     )
-    if kind not in KINDS:
-        raise JobError("--format", [f"expected {', '.join(KINDS)}, got {kind!r}"])
-    if target.name in ("", ".."):
-        raise OutputError(f"{target}: expected the name of a folder to be made")
-    wanted = image_format or ImageFormat(format="png")
-    if kind == "cinema" and target.suffix != cinema.SUFFIX:
-        target = target.with_name(f"{target.name}{cinema.SUFFIX}")
-    require_writer(wanted.format)
-    pictures, frames = Pictures(manifest), selection.frames
-    replace = earlier_export(target, _MARKS[kind], force=force)
+    if kind not in EXPORT_KINDS:
+        raise JobError("--format", [f"expected {', '.join(EXPORT_KINDS)}, got {kind!r}"])
+    target = _full_name(target, kind)
+    image_format = image_format or ImageFormat(format="png")
+    require_writer(image_format.format)
+    pictures = Pictures(manifest)
+    replace = find_earlier_export(target, _MARK_FILES[kind], force=force)
     with whole_folder(target, replace=replace) as folder:
-        (folder / "images").mkdir()
-        files = {frame.name: f"{frame.name}.{wanted.format}" for frame in frames}
-        for done, frame in enumerate(frames, start=1):
-            place_picture(pictures, frame, folder / "images" / files[frame.name], wanted, copy=copy)
-            if progress:
-                progress(done, len(frames))
-        cloud = _cloud(pictures, selection, wanted.exposure, points) if kind != "cinema" and manifest.layers else None
-        inside = {name: f"images/{file}" for name, file in files.items()}
-        if kind == "nerfstudio":
-            nerfstudio.write_transforms(folder, selection, inside, cloud=cloud, exposure=wanted.exposure)
-        elif kind == "colmap":
-            colmap.write_model(folder, selection, files, cloud or _NOTHING)
-        else:
-            cinema.write_table(folder, selection, inside)
+        files = _write_pictures(pictures, selection, folder / "images", image_format, copy=copy, progress=progress)
+        has_cloud = kind != "cinema" and bool(manifest.layers)
+        cloud = _make_cloud(pictures, selection, image_format.exposure, points) if has_cloud else None
+        _write_tables(folder, kind, selection, files, cloud, image_format.exposure)
     n_points = len(cloud.position) if cloud else 0
     return ExportResult(
         target=target,
         n_cameras=len(selection.cameras),
-        n_places=len(selection.places),
+        n_lights=len(selection.lights),
         n_points=n_points,
         notes=_notes(kind, bool(manifest.layers), n_points, points),
     )
 
 
-_NOTHING = Cloud(position=np.empty((0, 3)), codes=np.empty((0, 3), np.uint8), seen={})
+def _full_name(target: Path, kind: ExportKind) -> Path:
+    """Add the suffix of a Cinema database where it is missing."""
+    if target.name in ("", ".."):
+        raise OutputError(f"{target}: expected the name of a folder to be made")
+    if kind == "cinema" and target.suffix != cinema.DATABASE_SUFFIX:
+        return target.with_name(f"{target.name}{cinema.DATABASE_SUFFIX}")
+    return target
 
 
-def _cloud(pictures: Pictures, selection: Selection, exposure: float, wanted: int) -> Cloud:
-    """Points with the colours of the first light place."""
-    place = selection.places[0]
+def _write_pictures(
+    pictures: Pictures,
+    selection: Selection,
+    folder: Path,
+    image_format: ImageFormat,
+    *,
+    copy: bool,
+    progress: Progress | None,
+) -> dict[str, str]:
+    """Fill a new folder with the pictures; return name of a frame -> its file in the folder."""
+    folder.mkdir()
+    frames = selection.frames
+    files = {frame.name: f"{frame.name}.{image_format.format}" for frame in frames}
+    for done, frame in enumerate(frames, start=1):
+        put_picture(pictures, frame, folder / files[frame.name], image_format, copy=copy)
+        if progress:
+            progress(done, len(frames))
+    return files
+
+
+def _write_tables(
+    folder: Path,
+    kind: ExportKind,
+    selection: Selection,
+    files: Mapping[str, str],
+    cloud: PointCloud | None,
+    exposure: float,
+) -> None:
+    """Write what describes the pictures: the files that tools of this kind read first."""
+    from_folder = {name: f"images/{file}" for name, file in files.items()}
+    if kind == "nerfstudio":
+        nerfstudio.write_transforms(folder, selection, from_folder, cloud=cloud, exposure=exposure)
+    elif kind == "colmap":
+        colmap.write_model(folder, selection, files, cloud or _NO_POINTS)
+    else:
+        cinema.write_table(folder, selection, from_folder)
+
+
+_NO_POINTS = PointCloud(position=np.empty((0, 3)), codes=np.empty((0, 3), np.uint8), observations={})
+
+
+def _make_cloud(pictures: Pictures, selection: Selection, exposure: float, wanted: int) -> PointCloud:
+    """Find points, with the colours that they have under the first light position."""
+    lights = selection.lights[0]
     bright = np.float32(2.0**exposure)
-    shown = {c: srgb8_from_linear(pictures.picture(c, place) * bright) for c in source_cameras(selection.cameras)}
-    return find_points(selection.manifest, selection.cameras, shown, wanted)
+    colours = {c: srgb8_from_linear(pictures.picture(c, lights) * bright) for c in source_cameras(selection.cameras)}
+    return find_points(selection.manifest, selection.cameras, colours, wanted)
 
 
-def _notes(kind: Kind, layers: bool, n_points: int, wanted: int) -> tuple[str, ...]:
+def _notes(kind: ExportKind, layers: bool, n_points: int, wanted: int) -> tuple[str, ...]:
     if kind == "cinema" or not wanted:
         return ()
     if not layers:

@@ -1,1 +1,1 @@
-"""Movies and image sequences out of a frame array: paths through it, changed light, and what is written."""
+"""Movies and image sequences out of a frame array: paths through it, changed light, and the files."""

@@ -1,6 +1,6 @@
-"""Write GIF and WebP animations: Pillow codes each picture, and they are strung together here.
+"""Write GIF and WebP animations: Pillow encodes each picture, this module joins them.
 
-Pillow's own animations melt equal neighbours into one and keep all pictures in memory. Here every frame stays a frame.
+Pillow's own animations merge equal neighbours and keep all pictures in memory; here every frame is written as one.
 Formats: GIF89a, and Google's "WebP Container Specification".
 """
 
@@ -19,8 +19,8 @@ from framearray_cli.base.arrays import Bytes
 from framearray_cli.base.errors import MissingExtraError, OutputError
 from framearray_cli.base.files import whole_file
 
-GIF_UNITS, WEBP_UNITS = 100, 1000  # of time, a second
-GIF_FASTEST = 50  # frames a second; browsers show what is faster ten times as slowly as they should
+GIF_UNITS, WEBP_UNITS = 100, 1000  # of time, per second
+GIF_FASTEST = 50  # frames per second; browsers play faster animations at a tenth of their rate
 WEBP_LARGEST = 16383  # pixels
 WEBP_LONGEST = 2**24 - 1  # ms of one frame
 WEBP_OPTIONS = {"quality": 90, "method": 4}  # method: 0 fast to 6 small
@@ -29,13 +29,13 @@ ANIMATIONS = (".gif", ".webp")
 
 
 def delays(n: int, fps: Fraction, units: int) -> list[int]:
-    """Spread n frames over whole units of time, so that none is off by more than half a unit, nor the whole length."""
+    """Return the lengths of n frames in whole units of time; each frame ends within half a unit of its exact time."""
     ends = [round(k * units / fps) for k in range(n + 1)]
     return [end - start for start, end in pairwise(ends)]
 
 
 def require_animation(suffix: str) -> None:
-    """Make sure that a kind of animation can be made here.
+    """Check that Pillow can write a kind of animation.
 
     Args:
         suffix: one of ANIMATIONS.
@@ -51,69 +51,69 @@ def require_animation(suffix: str) -> None:
         )
 
 
-class _Kind(Protocol):
-    """One format."""
+class _Format(Protocol):
+    """How frames become a file of one format."""
 
     def begin(self, file: BinaryIO, width: int, height: int) -> None: ...
-    def coded(self, codes: Bytes) -> bytes: ...
+    def encode(self, codes: Bytes) -> bytes: ...
     def add(self, file: BinaryIO, coded: bytes, delay: int) -> None: ...
     def end(self, file: BinaryIO) -> None: ...
 
 
 class AnimationWriter:
-    """An animation that is being written; made by `open_animation`."""
+    """An open animation; `open_animation` makes it."""
 
-    __slots__ = ("_coded", "_codes", "_delays", "_file", "_kind")
+    __slots__ = ("_coded", "_codes", "_delays", "_file", "_format")
 
-    def __init__(self, file: BinaryIO, kind: _Kind, delays: Iterator[int]) -> None:
-        self._file, self._kind, self._delays = file, kind, delays
+    def __init__(self, file: BinaryIO, form: _Format, delays: Iterator[int]) -> None:
+        self._file, self._format, self._delays = file, form, delays
         self._codes: NDArray[Any] | None = None
         self._coded = b""
 
     def add(self, codes: NDArray[Any]) -> None:
-        """Add one picture: (h, w, 3) uint8 that stays as it is; given again, it is not coded again."""
+        """Add one picture: (h, w, 3) uint8, which must not change; the same array twice in a row is encoded once."""
         if codes is not self._codes:
-            self._codes, self._coded = codes, self._kind.coded(codes)
-        self._kind.add(self._file, self._coded, next(self._delays))
+            self._codes, self._coded = codes, self._format.encode(codes)
+        self._format.add(self._file, self._coded, next(self._delays))
 
 
 @contextmanager
 def open_animation(target: Path, width: int, height: int, fps: Fraction, n_frames: int) -> Iterator[AnimationWriter]:
-    """Open an animation that plays for ever; it appears under its name once it is whole.
+    """Open an animation that loops for ever; it appears under its name once it is whole.
 
     Args:
         target: its suffix, one of ANIMATIONS, decides the format.
 
     Raises:
-        OutputError: it cannot be written, or the format cannot hold it.
+        OutputError: the system refuses to write, or the format cannot hold the animation.
     """
     gif = target.suffix.lower() == ".gif"
-    kind: _Kind = _Gif() if gif else _WebP()
-    spread = delays(n_frames, fps, GIF_UNITS if gif else WEBP_UNITS)
+    form: _Format = _Gif() if gif else _WebP()
+    lengths = delays(n_frames, fps, GIF_UNITS if gif else WEBP_UNITS)
     if gif and fps > GIF_FASTEST:
         raise OutputError(
-            f"{target}: expected at most {GIF_FASTEST} frames a second, got {float(fps):g}: viewers play faster GIFs "
+            f"{target}: expected at most {GIF_FASTEST} frames per second, got {float(fps):g}: viewers play faster GIFs "
             "too slowly; choose another rate or .webp"
         )
-    if not gif and (max(width, height) > WEBP_LARGEST or max(spread) > WEBP_LONGEST):
+    if not gif and (max(width, height) > WEBP_LARGEST or max(lengths) > WEBP_LONGEST):
         raise OutputError(
-            f"{target}: WebP holds up to {WEBP_LARGEST} pixels a side, and {WEBP_LONGEST} ms a frame; choose another "
-            "format"
+            f"{target}: WebP holds up to {WEBP_LARGEST} pixels per side, and {WEBP_LONGEST} ms per frame; choose "
+            "another format"
         )
     with whole_file(target) as part, part.open("wb") as file:
-        kind.begin(file, width, height)
-        yield AnimationWriter(file, kind, iter(spread))
-        kind.end(file)
+        form.begin(file, width, height)
+        yield AnimationWriter(file, form, iter(lengths))
+        form.end(file)
 
 
 class _Gif:
     """GIF89a: each frame has its own 256 colours, dithered."""
 
     def begin(self, file: BinaryIO, width: int, height: int) -> None:
-        file.write(b"GIF89a" + struct.pack("<HHBBB", width, height, 0x70, 0, 0))  # 0x70: 8 bits a colour, no table
+        file.write(b"GIF89a" + struct.pack("<HHBBB", width, height, 0x70, 0, 0))  # 0x70: 8 bits per channel, no table
         file.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")  # plays for ever
 
-    def coded(self, codes: Bytes) -> bytes:
+    def encode(self, codes: Bytes) -> bytes:
         import PIL.Image
 
         picture = PIL.Image.fromarray(codes)
@@ -125,7 +125,7 @@ class _Gif:
         return image[:9] + bytes([0x80 | bits]) + table + image[10:]  # 0x80: a table of its own
 
     def add(self, file: BinaryIO, coded: bytes, delay: int) -> None:
-        file.write(b"\x21\xf9\x04\x04" + struct.pack("<HBB", delay, 0, 0))  # 0x04: stays until the next one covers it
+        file.write(b"\x21\xf9\x04\x04" + struct.pack("<HBB", delay, 0, 0))  # 0x04: stays until the next frame covers it
         file.write(coded)
 
     def end(self, file: BinaryIO) -> None:
@@ -133,15 +133,15 @@ class _Gif:
 
 
 def _gif_parts(data: bytes) -> tuple[bytes, bytes]:
-    """Take a GIF of one picture apart: its colour table, and its image from the descriptor on, without the trailer."""
+    """Split a GIF of one picture: its colour table, and its image from the descriptor to the trailer, without that."""
     start = 13 + 3 * 2 ** ((data[10] & 7) + 1)
-    table, place = data[13:start], start
-    while data[place] == 0x21:  # extensions: a comment, a delay
-        place += 2
-        while data[place]:
-            place += data[place] + 1
-        place += 1
-    return table, data[place:-1]
+    table, position = data[13:start], start
+    while data[position] == 0x21:  # extensions: a comment, a delay
+        position += 2
+        while data[position]:
+            position += data[position] + 1
+        position += 1
+    return table, data[position:-1]
 
 
 class _WebP:
@@ -153,15 +153,15 @@ class _WebP:
         file.write(b"ANIM" + struct.pack("<IIH", 6, 0, 0))  # black behind; plays for ever
         self._size = _int24(width - 1) + _int24(height - 1)
 
-    def coded(self, codes: Bytes) -> bytes:
+    def encode(self, codes: Bytes) -> bytes:
         import PIL.Image
 
         buffer = io.BytesIO()
         PIL.Image.fromarray(codes).save(buffer, "WEBP", **WEBP_OPTIONS)
-        return buffer.getvalue()[12:]  # the chunk "VP8 " alone
+        return buffer.getvalue()[12:]  # only the chunk "VP8 "
 
     def add(self, file: BinaryIO, coded: bytes, delay: int) -> None:
-        head = _int24(0) * 2 + self._size + _int24(delay) + b"\x02"  # at 0, 0; 0x02: covers what was there
+        head = _int24(0) * 2 + self._size + _int24(delay) + b"\x02"  # at 0, 0; 0x02: replaces the frame before
         file.write(b"ANMF" + struct.pack("<I", len(head) + len(coded)) + head + coded)
 
     def end(self, file: BinaryIO) -> None:

@@ -1,12 +1,12 @@
-"""A path through a frame array -> a movie, or a numbered image sequence; from the manifest alone."""
+"""Assemble a movie, or a numbered image sequence, along a path; all input is the manifest and the images it names."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
@@ -19,28 +19,27 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import folder_for
 from framearray_cli.base.forms.table import changed
 
+from ..progress import Progress
 from .animation import ANIMATIONS, open_animation, require_animation
 from .label import SMALLEST, typeface
-from .look import Look, place_text, shown
+from .look import Look, screen_codes, shot_label
 from .pathfile import Mode, MoviePath, load_movie_path
 from .sequence import check_look, sequence_pattern, write_sequence
-from .sweep import Sweep, swept
-from .timeline import Shot, Timeline, timeline
+from .sweep import Sweep, sweep_path
+from .timeline import Shot, Timeline, make_timeline
 from .video import VIDEOS, open_video, require_encoder
-
-Progress: TypeAlias = Callable[[int, int], None]  # frames done, frames in all
 
 MOVIES = (*VIDEOS, *ANIMATIONS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AssembleResult:
-    """What was made.
+    """What a movie or sequence holds.
 
     Attributes:
         target: the movie, or the folder of the sequence.
         n_frames: frames in it.
-        n_images: different places of the array among them.
+        n_images: the number of different places in the array among them.
         fps: frames per second.
     """
 
@@ -51,7 +50,7 @@ class AssembleResult:
 
     @property
     def time_s(self) -> Fraction:
-        """How long it plays, seconds."""
+        """Playing time, seconds."""
         return self.n_frames / self.fps
 
 
@@ -65,27 +64,27 @@ def assemble(
     positions: Mode | None = None,
     progress: Progress | None = None,
 ) -> AssembleResult:
-    """Cut a movie or an image sequence out of a frame array; it appears whole or not at all.
+    """Assemble a movie or an image sequence from a frame array; it appears whole or not at all.
 
     Args:
         out: output folder of a render, or its manifest.
-        path: TOML file of segments, see docs/guide/movies.md; or one movement.
-        target: "x.mp4" or another of MOVIES; "x.####.png" (also .exr, .tif, .jpg) with as many digits as "#"; a name
-            without suffix is a folder, filled with "frame.####" in the array's own format.
-        look: how movies, PNG and JPEG are shown.
-        fps: frames per second, in place of the path's or the array's.
-        positions: "nearest" or "blend", in place of what the top of the path says.
+        path: TOML file of segments, see docs/guide/movies.md; or a sweep.
+        target: "x.mp4" or another of MOVIES; "x.####.png" (also .exr, .tif, .jpg), where each "#" is a digit; a name
+            without suffix is a folder for "frame.####" in the array's own format.
+        look: of movies, PNG and JPEG.
+        fps: frames per second; None: those of the path or the array.
+        positions: "nearest" or "blend"; None: as the path says at its top.
         progress: called after each frame.
 
     Raises:
-        JobError: the path is broken or asks for what the array has not.
+        JobError: the path is broken, or asks for places that the array lacks.
         OutputError: an image is missing or damaged, or the target cannot be written.
-        MissingExtraError: a movie is asked for and PyAV is not installed, or an encoder or typeface is missing.
+        MissingExtraError: a movie needs PyAV, which is not installed, or an encoder or typeface is missing.
     """
     manifest = read_manifest(out)
-    movie = swept(path, manifest) if isinstance(path, Sweep) else load_movie_path(path)
-    movie = _with(movie, fps, positions)
-    line = timeline(f"--{path.kind}" if isinstance(path, Sweep) else path, movie, manifest)
+    movie = sweep_path(path, manifest) if isinstance(path, Sweep) else load_movie_path(path)
+    movie = _override(movie, fps, positions)
+    line = make_timeline(f"--{path.kind}" if isinstance(path, Sweep) else path, movie, manifest)
     pictures = Pictures(manifest)
     if look.label:
         typeface(SMALLEST)
@@ -108,8 +107,8 @@ def assemble(
     return AssembleResult(target=target, n_frames=len(line.shots), n_images=n_images, fps=line.fps)
 
 
-def _with(movie: MoviePath, fps: float | None, positions: Mode | None) -> MoviePath:
-    """Replace what the command line says in another way."""
+def _override(movie: MoviePath, fps: float | None, positions: Mode | None) -> MoviePath:
+    """Put options of the command line in place of the path's values."""
     updates = {"fps": fps, "positions": positions}
     return changed(movie, **{key: value for key, value in updates.items() if value is not None})
 
@@ -119,7 +118,7 @@ def _own_suffix(manifest: Manifest) -> str:
 
 
 def _check_images(pictures: Pictures, line: Timeline) -> None:
-    """Look at every image before the first is used: one that is missing or cut short is named at once."""
+    """Check every image before using the first, so that a missing or truncated one is reported at once."""
     wanted: dict[Path, Shot] = {}
     for shot in dict.fromkeys(line.shots):
         wanted.update(dict.fromkeys(pictures.files(shot.c, shot.positions), shot))
@@ -142,19 +141,19 @@ class _Writer(Protocol):
 
 def _write_movie(pictures: Pictures, line: Timeline, target: Path, look: Look, report: Progress) -> None:
     bits = VIDEOS[target.suffix.lower()].bits if target.suffix.lower() in VIDEOS else 8
-    with folder_for(target.parent), _opened(pictures.manifest, line, target) as movie:
+    with folder_for(target.parent), _open_movie(pictures.manifest, line, target) as movie:
         last: tuple[Shot, Relight, NDArray[Any]] | None = None
         for k, (shot, relight) in enumerate(zip(line.shots, line.relights, strict=True)):
-            if last is None or last[:2] != (shot, relight):  # a held picture is made once
+            if last is None or last[:2] != (shot, relight):  # a held picture is composed once
                 image = pictures.picture(shot.c, shot.positions, relight)
-                last = (shot, relight, shown(image, look, place_text(pictures.manifest, shot), bits))
+                last = (shot, relight, screen_codes(image, look, shot_label(pictures.manifest, shot), bits))
             movie.add(last[2])
             report(k + 1, len(line.shots))
 
 
 @contextmanager
-def _opened(manifest: Manifest, line: Timeline, target: Path) -> Iterator[_Writer]:
-    """Open a movie of either kind."""
+def _open_movie(manifest: Manifest, line: Timeline, target: Path) -> Iterator[_Writer]:
+    """Open a video or an animation."""
     width, height = manifest.resolution
     if target.suffix.lower() in VIDEOS:
         with open_video(target, width, height, line.fps) as video:

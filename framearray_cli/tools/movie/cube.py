@@ -1,4 +1,4 @@
-"""A display transform as a table of colours: as good as the transform for 8-bit codes, and ten times as fast."""
+"""Display transforms as colour tables: as good as the transform for 8-bit codes, and ten times as fast."""
 
 from collections.abc import Callable
 from functools import cache
@@ -11,18 +11,18 @@ from framearray_cli.base.arrays import Float32, Image
 
 Encode: TypeAlias = Callable[[Image], Float32]
 
-# Nodes along each of red, green and blue, spaced evenly in log(1 + x / KNEE) from 0 to BRIGHTEST. 97 nodes halve the
-# error, and take three times as long to fill.
+# Nodes along each of red, green and blue, spaced evenly in log(1 + x / KNEE) from 0 to BRIGHTEST. 97 nodes
+# would halve the error, and take three times as long to fill.
 NODES = 65
 KNEE = 0.02
-BRIGHTEST = 1024.0  # radiance; ACES shows what is beyond as white
+BRIGHTEST = 1024.0  # radiance; ACES shows anything brighter as white
 _SPAN = float(np.log1p(BRIGHTEST / KNEE))
 
 
-def tabled(encode: Encode) -> Encode:
-    """Make a quick version of a transform: (h, w, 3) radiance -> the same shape, interpolated linearly between nodes.
+def tabulate(encode: Encode) -> Encode:
+    """Make a fast version of a transform of (h, w, 3) radiance, interpolated linearly between nodes.
 
-    The table is filled at the first use, 1.8 s for ACES 2.0.
+    The first use fills the table: 1.8 s for ACES 2.0.
     """
 
     @cache
@@ -31,11 +31,11 @@ def tabled(encode: Encode) -> Encode:
         colours = np.stack(np.meshgrid(nodes, nodes, nodes, indexing="ij"), axis=-1)
         return encode(colours.reshape(NODES * NODES, NODES, 3)).reshape(-1, 3)
 
-    return lambda image: _interpolated(table(), image)
+    return lambda image: _interpolate(table(), image)
 
 
-def _interpolated(table: Float32, image: Image) -> Float32:
-    """Weigh the eight nodes around each colour."""
+def _interpolate(table: Float32, image: Image) -> Float32:
+    """Sum the eight nodes around each colour, by weight."""
     steps = np.log1p(np.clip(image.reshape(-1, 3), 0, BRIGHTEST) / np.float32(KNEE)) * np.float32((NODES - 1) / _SPAN)
     low = np.minimum(steps.astype(np.int32), NODES - 2)
     share: NDArray[Any] = (steps - low).astype(np.float32)

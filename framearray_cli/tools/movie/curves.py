@@ -1,4 +1,4 @@
-"""Light that changes over a movie: intensity and colour of groups and of the ambient light, as constants or curves."""
+"""Light that changes over a movie: intensity and colour of groups and of ambient light, as constants or curves."""
 
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
@@ -15,29 +15,29 @@ from framearray_cli.base.forms.words import shown
 
 from ..places import percent
 
-STRONGEST = 1e6  # times the light that was rendered; halves overflow before that
-LONGEST_S = 1e6  # seconds; later key frames are typing errors
+STRONGEST = 1e6  # times the rendered light; half floats overflow before that
+LONGEST_S = 1e6  # seconds; a later key frame is a typing error
 
 
 @dataclass(frozen=True, slots=True)
 class LightCurve:
-    """Key frames: (time, RGB) each, where a time is in seconds or "50%" of the movie; one alone is a constant."""
+    """Key frames (time, RGB); a time is in seconds or "50%" of the movie; a single key frame is a constant."""
 
     keys: tuple[tuple[float | str, Float3], ...]
 
 
-def _curve(grey_alone: bool) -> Callable[[object], LightCurve]:
-    """Make a check for one value or a list of key frames.
+def _curve(grey_only: bool) -> Callable[[object], LightCurve]:
+    """Make the check of a value or a list of key frames.
 
     Args:
-        grey_alone: a value is one number; else it may be three.
+        grey_only: a value is one number; else it may be three.
     """
 
     def check(value: object) -> LightCurve:
         if not (isinstance(value, list) and any(isinstance(item, dict) for item in value)):
-            return LightCurve(((0.0, _value(value, grey_alone, ())),))
+            return LightCurve(((0.0, _value(value, grey_only, ())),))
         problems: list[tuple[Place, str]] = []
-        keys = [_key(item, grey_alone, k, problems) for k, item in enumerate(value)]
+        keys = [_key(item, grey_only, k, problems) for k, item in enumerate(value)]
         if problems:
             fail(problems)
         return LightCurve(tuple(keys))
@@ -45,7 +45,7 @@ def _curve(grey_alone: bool) -> Callable[[object], LightCurve]:
     return check
 
 
-def _key(item: object, grey_alone: bool, k: int, problems: list[tuple[Place, str]]) -> tuple[float | str, Float3]:
+def _key(item: object, grey_only: bool, k: int, problems: list[tuple[Place, str]]) -> tuple[float | str, Float3]:
     """Check one key frame."""
     if not isinstance(item, dict):
         problems.append(((k,), f"expected a table with time and value, got {shown(item)}"))
@@ -58,10 +58,10 @@ def _key(item: object, grey_alone: bool, k: int, problems: list[tuple[Place, str
         problems.append(((k, "time"), f'expected seconds, or a percentage such as "50%", {_found(item, "time")}'))
         time = 0.0
     if "value" not in item:
-        problems.append(((k, "value"), f"missing; expected {_wanted(grey_alone)}"))
+        problems.append(((k, "value"), f"missing; expected {_wanted(grey_only)}"))
     else:
         try:
-            value = _value(item["value"], grey_alone, (k, "value"))
+            value = _value(item["value"], grey_only, (k, "value"))
         except ValidationError as error:
             problems += [(detail["loc"], detail["msg"]) for detail in error.errors()]
     return time if isinstance(time, str) else float(time), value
@@ -77,24 +77,24 @@ def _found(item: Mapping[str, object], key: str) -> str:
     return f"got {shown(item[key])}" if key in item else "got none"
 
 
-def _wanted(grey_alone: bool) -> str:
-    return f"a number {'' if grey_alone else 'or 3 numbers '}from 0 to {STRONGEST:.0f}"
+def _wanted(grey_only: bool) -> str:
+    return f"a number {'' if grey_only else 'or 3 numbers '}from 0 to {STRONGEST:.0f}"
 
 
-def _value(value: object, grey_alone: bool, place: Place) -> Float3:
+def _value(value: object, grey_only: bool, place: Place) -> Float3:
     """Check one number, or three."""
-    numbers = [value] * 3 if not isinstance(value, list) else [] if grey_alone else value
+    numbers = [value] * 3 if not isinstance(value, list) else [] if grey_only else value
     good = [isinstance(x, int | float) and not isinstance(x, bool) and 0 <= x <= STRONGEST for x in numbers]
     if len(numbers) != 3 or not all(good):
-        fail([(place, f"expected {_wanted(grey_alone)}, got {shown(value)}")])
+        fail([(place, f"expected {_wanted(grey_only)}, got {shown(value)}")])
     r, g, b = (float(x) for x in numbers)  # type: ignore[arg-type]  # checked above
     return r, g, b
 
 
-def _schema(grey_alone: bool) -> WithJsonSchema:
+def _schema(grey_only: bool) -> WithJsonSchema:
     number = {"type": "number", "minimum": 0, "maximum": STRONGEST}
     vector = {"type": "array", "items": number, "minItems": 3, "maxItems": 3}
-    value: dict[str, Any] = number if grey_alone else {"anyOf": [number, vector]}
+    value: dict[str, Any] = number if grey_only else {"anyOf": [number, vector]}
     time = {"anyOf": [{"type": "number", "minimum": 0}, {"type": "string"}]}
     key = {"type": "object", "properties": {"time": time, "value": value}, "required": ["time", "value"]}
     return WithJsonSchema({"anyOf": [value, {"type": "array", "items": key, "minItems": 1}]})
@@ -107,7 +107,7 @@ _ONE = LightCurve(((0.0, (1.0, 1.0, 1.0)),))
 
 
 class LightChange(Table):
-    """What the light of a group, or the ambient light, is multiplied with: intensity times colour."""
+    """The factor of the light of a group, or of ambient light: intensity times colour."""
 
     intensity: Intensity = Field(default=_ONE, description="Factor; 0 turns the light off.")
     color: Colour = Field(default=_ONE, description="Factor of red, green and blue, or one for all.")
@@ -119,12 +119,12 @@ def relights(
     times: Sequence[float],
     problems: list[str],
 ) -> list[Relight]:
-    """Find the light of each frame.
+    """Return the light of each frame.
 
     Args:
-        groups: by name.
-        times: of the frames, seconds, from 0; 100% is the last of them.
-        problems: key frames that are not in order are added.
+        groups: changes by name of the group.
+        times: of the frames, seconds, from 0; the last is 100%.
+        problems: receives a line for each key frame out of order.
     """
     if not times or not (groups or ambient):
         return [AS_RENDERED] * len(times)
@@ -137,21 +137,21 @@ def relights(
 
 
 def _factors(key: str, change: LightChange, times: Sequence[float], problems: list[str]) -> list[Float3]:
-    """Multiply intensity and colour at each time."""
+    """Return intensity times colour at each time."""
     intensity = _timed(f"{key}.intensity", change.intensity, times[-1], problems)
     color = _timed(f"{key}.color", change.color, times[-1], problems)
     found = []
     for time in times:
-        r, g, b = (float(x * y) for x, y in zip(at(intensity, time), at(color, time), strict=True))
+        r, g, b = (float(x * y) for x, y in zip(value_at(intensity, time), value_at(color, time), strict=True))
         found.append((r, g, b))
     return found
 
 
-Timed: TypeAlias = tuple[list[float], list[Float3]]  # times in seconds, in order, and values
+TimedValues: TypeAlias = tuple[list[float], list[Float3]]  # times in seconds, in order, and values
 
 
-def _timed(key: str, curve: LightCurve, end: float, problems: list[str]) -> Timed:
-    """Turn times into seconds; a key frame before the one above it is a problem."""
+def _timed(key: str, curve: LightCurve, end: float, problems: list[str]) -> TimedValues:
+    """Convert times to seconds; a key frame before its predecessor is a problem."""
     seconds = [end * (percent(time) or 0.0) / 100 if isinstance(time, str) else time for time, _ in curve.keys]
     for k, (before, time) in enumerate(pairwise(seconds), start=1):
         if time < before:
@@ -159,8 +159,8 @@ def _timed(key: str, curve: LightCurve, end: float, problems: list[str]) -> Time
     return seconds, [value for _, value in curve.keys]
 
 
-def at(curve: Timed, time: float) -> Float3:
-    """Find the value at a time: linear between key frames, held outside; of two at one time the later one."""
+def value_at(curve: TimedValues, time: float) -> Float3:
+    """Evaluate a curve: linear between key frames, constant outside; of two at one time the later one counts."""
     times, values = curve
     k = bisect_right(times, time)
     if k in (0, len(times)):

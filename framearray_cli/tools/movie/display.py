@@ -1,6 +1,6 @@
 """How linear radiance looks on a screen: the sRGB curve, ACES, or a view of an OpenColorIO configuration.
 
-The door to OpenColorIO, which OpenImageIO brings along.
+The only module that uses OpenColorIO, which comes with OpenImageIO.
 """
 
 import os
@@ -15,11 +15,11 @@ from framearray_cli.base.colour import srgb_from_linear
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.words import shown
 
-from .cube import Encode, tabled
+from .cube import Encode, tabulate
 
-BUILT_IN = "ocio://default"  # the configuration that OpenColorIO carries: ACES 2.0
+BUILT_IN = "ocio://default"  # the configuration inside OpenColorIO: ACES 2.0
 ACES = ("sRGB - Display", "ACES 2.0 - SDR 100 nits (Rec.709)")
-# What configurations call linear light with Rec. 709 primaries: OpenColorIO's own, ACES 1.2 and Blender, Filmic.
+# Names of linear light with Rec. 709 primaries in configurations: OpenColorIO's own, ACES 1.2 and Blender, Filmic.
 LINEAR_REC709 = (
     "Linear Rec.709 (sRGB)",
     "lin_rec709",
@@ -33,12 +33,12 @@ MOST_NAMES = 12  # in a message
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A way from radiance to a screen.
+    """A transform from radiance to a screen.
 
     Attributes:
-        name: as it was asked for.
-        encode: linear radiance, (h, w, 3), to values of the screen, the same shape, 0 to 1.
-        quick: the same, near enough for 8 bits.
+        name: as the user gave it.
+        encode: linear radiance (h, w, 3) -> values of the screen, 0 to 1, of the same shape.
+        quick: the same, accurate enough for 8 bits.
     """
 
     name: str
@@ -57,7 +57,7 @@ SRGB = View("srgb", srgb_from_linear, srgb_from_linear)
 def find_view(name: str) -> View:
     """Find a view by name: "srgb", "aces", or "VIEW" or "DISPLAY/VIEW" of the configuration that $OCIO names.
 
-    Without $OCIO names are those of the configuration that OpenColorIO carries; "aces" is always from there.
+    Without $OCIO, names refer to the configuration inside OpenColorIO; "aces" always does.
 
     Raises:
         JobError: there is no such view, or $OCIO names no configuration.
@@ -90,7 +90,7 @@ def _config(place: str) -> Any:
 
 @cache  # its table takes long to fill
 def _ocio_view(name: str, place: str, display: str, view: str) -> View:
-    """Make a view, and try it once: a transform may name files that are missing."""
+    """Make a view, and try it once, as a transform may name files that are missing."""
     config = _config(place)
     spaces = set(config.getColorSpaceNames())
     found = [space for space in (config.resolve(known) for known in LINEAR_REC709) if space in spaces]
@@ -98,16 +98,16 @@ def _ocio_view(name: str, place: str, display: str, view: str) -> View:
         raise JobError("--view", [f'{place}: no colour space "{LINEAR_REC709[0]}"; expected one, as images have that'])
     encode = partial(_through_ocio, place=place, display=display, view=view, space=found[0])
     encode(np.zeros((1, 1, 3), np.float32))
-    return View(name, encode, tabled(encode))
+    return View(name, encode, tabulate(encode))
 
 
 def _through_ocio(image: Image, *, place: str, display: str, view: str, space: str) -> Float32:
-    """Apply a display transform; (h, w, 3) -> the same shape, clipped to 0 to 1."""
+    """Apply a display transform; the result has the shape of the image, and is clipped to 0 to 1."""
     import OpenImageIO as oiio
 
     buffer = oiio.ImageBuf(np.ascontiguousarray(image, np.float32))
     result = oiio.ImageBufAlgo.ociodisplay(buffer, display, view, space, colorconfig=place)
     if result.has_error:
         raise JobError("--view", [f"{place}: {display}/{view}: {result.geterror().strip().splitlines()[0]}"])
-    shown: Float32 = np.clip(np.asarray(result.get_pixels(oiio.FLOAT), np.float32), 0, 1)
-    return shown
+    values: Float32 = np.clip(np.asarray(result.get_pixels(oiio.FLOAT), np.float32), 0, 1)
+    return values

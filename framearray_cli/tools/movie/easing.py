@@ -1,15 +1,15 @@
-"""How a movement starts and ends: the share of the way that is done after a share t of the time."""
+"""Easing: the share of a movement's way after a share t of its time."""
 
 from typing import Literal, TypeAlias
 
 Ease: TypeAlias = Literal["linear", "in", "out", "in-out"]
 
 
-def eased(t: float, ease: Ease) -> float:
-    """Find the share of the way at time t; 0 at 0, 1 at 1, never backwards.
+def eased_share(t: float, ease: Ease) -> float:
+    """Return the share of the way at time t: 0 at 0, 1 at 1, never falling.
 
-    "in" starts from rest and speeds up evenly, "out" slows down evenly to rest, "in-out" does both (the cubic
-    3 t^2 - 2 t^3), "linear" is even.
+    "in" accelerates evenly from rest, "out" brakes evenly to rest, "in-out" does both (the cubic 3 t^2 - 2 t^3),
+    "linear" keeps its speed.
 
     Args:
         t: share of the time, 0 to 1.

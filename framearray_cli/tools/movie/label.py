@@ -1,4 +1,4 @@
-"""A text burnt into the lower left corner of a picture, in Pillow's own font."""
+"""Labels: text in the lower left corner of a picture, in Pillow's own typeface."""
 
 from functools import cache, lru_cache
 from typing import Any
@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.extras import extra
 
-LINES_A_PICTURE = 18  # heights of the text in that of the picture
+LINES_PER_PICTURE = 18  # heights of the text per height of the picture
 SMALLEST = 10  # pixels; smaller letters cannot be read
-SHADE = 0.35  # of the picture's own brightness behind the text
+SHADE = 0.35  # share of the picture's brightness left behind the text
 
 
 def burn(codes: NDArray[Any], text: str) -> NDArray[Any]:
@@ -21,9 +21,9 @@ def burn(codes: NDArray[Any], text: str) -> NDArray[Any]:
         codes: (h, w, 3) uint8 or uint16.
 
     Returns:
-        A copy with white letters on a darkened ground; what does not fit into the picture is cut off.
+        A copy with white letters on darkened ground; text beyond the picture is cut off.
     """
-    letters = _letters(text, max(SMALLEST, codes.shape[0] // LINES_A_PICTURE))[: codes.shape[0], : codes.shape[1]]
+    letters = _letters(text, max(SMALLEST, codes.shape[0] // LINES_PER_PICTURE))[: codes.shape[0], : codes.shape[1]]
     height, width = letters.shape
     white = np.iinfo(codes.dtype).max
     ground = codes[-height:, :width] * np.float32(SHADE)
@@ -35,7 +35,7 @@ def burn(codes: NDArray[Any], text: str) -> NDArray[Any]:
 
 @cache
 def typeface(size: int) -> Any:
-    """Pillow's own typeface, the same everywhere; it has Latin letters alone.
+    """Return Pillow's own typeface, the same on every machine; it has only Latin letters.
 
     Args:
         size: of the letters, pixels.

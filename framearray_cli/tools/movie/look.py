@@ -1,4 +1,4 @@
-"""How pictures are shown: exposure, view, label; radiance -> codes of 8 or 16 bits."""
+"""Turn radiance into codes of 8 or 16 bits: exposure, view, label."""
 
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -22,7 +22,7 @@ class Look:
     Attributes:
         exposure: stops added.
         view: from radiance to a screen.
-        label: whether the place in the array is written into each picture.
+        label: whether each picture names its place in the array.
     """
 
     exposure: float = 0.0
@@ -31,17 +31,17 @@ class Look:
 
     @property
     def changes(self) -> list[str]:
-        """The options by which it differs from the plain one."""
+        """The options that change pictures."""
         parts = {"exposure": bool(self.exposure), "view": not self.view.is_srgb, "label": self.label}
         return [name for name, changed in parts.items() if changed]
 
 
-def shown(image: Image, look: Look, text: str, bits: Literal[8, 16] = 8) -> NDArray[Any]:
-    """Find the codes that a screen is sent.
+def screen_codes(image: Image, look: Look, text: str, bits: Literal[8, 16] = 8) -> NDArray[Any]:
+    """Compute the codes of a picture for a screen.
 
     Args:
         image: (h, w, 3), linear radiance.
-        text: of the label, where the look has one.
+        text: of the label, if the look has one.
 
     Returns:
         (h, w, 3) uint8 or uint16.
@@ -50,13 +50,13 @@ def shown(image: Image, look: Look, text: str, bits: Literal[8, 16] = 8) -> NDAr
     if bits == 8 and look.view.is_srgb:
         codes: NDArray[Any] = srgb8_from_linear(exposed)
     else:
-        encode, most, kind = (look.view.quick, 255, np.uint8) if bits == 8 else (look.view.encode, 65535, np.uint16)
-        codes = np.rint(encode(exposed).astype(np.float64) * most).astype(kind)
+        encode, most, dtype = (look.view.quick, 255, np.uint8) if bits == 8 else (look.view.encode, 65535, np.uint16)
+        codes = np.rint(encode(exposed).astype(np.float64) * most).astype(dtype)
     return burn(codes, text) if look.label else codes
 
 
-def place_text(manifest: Manifest, shot: Shot) -> str:
-    """Say what a frame shows: "c 12  l 3", or "c 12  light 3.25  lamps 1" where there are several light axes."""
+def shot_label(manifest: Manifest, shot: Shot) -> str:
+    """Word what a frame shows: "c 12  l 3", or "c 12  light 3.25  lamps 1" if there are several light axes."""
     axes = list(manifest.axes)
     names = ["l"] if axes == [MAIN_AXIS] else axes
     places = [f"{name} {round(position, 2):g}" for name, position in zip(names, shot.positions, strict=True)]

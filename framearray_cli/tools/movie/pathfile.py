@@ -1,4 +1,4 @@
-"""The file that tells a movie's path through a frame array: TOML, segments, light; see docs/guide/movies.md."""
+"""The TOML file of a movie's path through a frame array: segments, light; see docs/guide/movies.md."""
 
 from fractions import Fraction
 from pathlib import Path
@@ -17,7 +17,7 @@ from ..places import Span
 from .curves import LightChange
 from .easing import Ease
 
-MOST_FRAMES = 1_000_000  # eleven hours at 24 frames a second; more is a typing error
+MOST_FRAMES = 1_000_000  # eleven hours at 24 frames per second; more is a typing error
 MOST_LOOPS = 10_000
 
 Mode: TypeAlias = Literal["nearest", "blend"]
@@ -56,7 +56,7 @@ class Segment(Table):
 
     @property
     def n_passes(self) -> int:
-        """How often it is played."""
+        """The number of passes through the segment."""
         return self.loops if self.loops is not None else 2 if self.back_and_forth else 1
 
     def n_frames(self, fps: Fraction) -> int:
@@ -64,12 +64,12 @@ class Segment(Table):
         return self.frames if self.frames is not None else max(1, round(Fraction(self.seconds or 0) * fps))
 
     def n_held(self, fps: Fraction) -> int:
-        """Count the frames that the last picture stays."""
+        """Count the frames for which the last picture is held."""
         return round(Fraction(self.hold) * fps)
 
 
 class MoviePath(Table):
-    """What a path file holds."""
+    """A path file."""
 
     fps: float | None = Field(
         default=None, ge=LEAST_FPS, le=MOST_FPS, description="Frames per second; left out: those of the frame array."
@@ -91,7 +91,7 @@ def load_movie_path(file: Path) -> MoviePath:
     """Read a path file.
 
     Raises:
-        JobError: the file is missing or broken; every problem is named.
+        JobError: the file is missing or broken; the message names every problem.
     """
     try:
         return MoviePath.model_validate(load_toml(file))
@@ -100,5 +100,5 @@ def load_movie_path(file: Path) -> MoviePath:
 
 
 def movie_fps(movie: MoviePath, manifest: Manifest) -> Fraction:
-    """Choose the frame rate: that of the path file, else that of the frame array."""
+    """Return the frame rate of the path file, or else of the frame array."""
     return frame_rate(movie.fps if movie.fps is not None else manifest.fps)

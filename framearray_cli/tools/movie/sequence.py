@@ -1,9 +1,9 @@
-"""Write a numbered image sequence, whole or not at all; images that stay as they are become hard links."""
+"""Write a numbered image sequence; images that need no change become hard links."""
 
 import os
 import re
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
@@ -26,12 +26,13 @@ from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import folder_for, reason, temporary_folder
 
-from .look import Look, place_text, shown
+from ..progress import Progress
+from .look import Look, screen_codes, shot_label
 from .timeline import Shot, Timeline
 
 
 def sequence_pattern(target: Path, own_suffix: str, movies: Sequence[str]) -> Path:
-    """Find the pattern of a sequence: a path whose name has one run of "#".
+    """Return the pattern of a sequence: a path whose name has one run of "#".
 
     Args:
         target: as the user gave it.
@@ -39,7 +40,7 @@ def sequence_pattern(target: Path, own_suffix: str, movies: Sequence[str]) -> Pa
         movies: suffixes of movies, for the message.
 
     Raises:
-        OutputError: it is no pattern.
+        OutputError: the target is no pattern.
     """
     if not target.suffix or os.path.isdir(target):
         return target / f"frame.####{own_suffix}"
@@ -52,24 +53,22 @@ def sequence_pattern(target: Path, own_suffix: str, movies: Sequence[str]) -> Pa
 
 
 def check_look(pattern: Path, look: Look) -> None:
-    """Refuse to change radiance.
+    """Refuse a look for a format that keeps radiance.
 
     Raises:
-        OutputError: a look was asked for, and the format keeps radiance.
+        OutputError: the look changes pictures, and the format keeps radiance.
     """
     if look.changes and format_name(pattern) not in FOR_SCREENS:
         raise OutputError(
-            f"{pattern}: {look.changes[0]} changes movies, PNG and JPEG alone; {pattern.suffix} keeps the radiance"
+            f"{pattern}: {look.changes[0]} changes only movies, PNG and JPEG; {pattern.suffix} keeps the radiance"
         )
 
 
-def write_sequence(
-    pictures: Pictures, line: Timeline, pattern: Path, look: Look, report: Callable[[int, int], None]
-) -> None:
-    """Write all frames into a folder beside the place, then move them there.
+def write_sequence(pictures: Pictures, line: Timeline, pattern: Path, look: Look, report: Progress) -> None:
+    """Write all frames into a temporary folder inside the target folder, then move them out of it.
 
     Raises:
-        OutputError: they cannot be written, or an earlier sequence lies there that is longer.
+        OutputError: the system refuses to write, or a longer earlier sequence is in the target folder.
     """
     before, digits, after = re.split("(#+)", pattern.name)
     names = [f"{before}{k:0{len(digits)}d}{after}" for k in range(len(line.shots))]
@@ -78,8 +77,8 @@ def write_sequence(
         with folder_for(pattern.parent), temporary_folder(pattern.parent, before) as part:
             last: tuple[Shot, Relight, Path] | None = None
             for k, (name, shot, relight) in enumerate(zip(names, line.shots, line.relights, strict=True)):
-                if last is not None and last[:2] == (shot, relight):  # a held picture is made once
-                    link(last[2], part / name)
+                if last is not None and last[:2] == (shot, relight):  # a held picture is composed once
+                    link_or_copy(last[2], part / name)
                 else:
                     _write_frame(pictures, shot, relight, part / name, line.fps, look)
                     last = (shot, relight, part / name)
@@ -90,7 +89,7 @@ def write_sequence(
 
 
 def _check_leftovers(folder: Path, before: str, after: str, names: set[str]) -> None:
-    """Refuse to leave frames of an earlier, longer sequence behind the last one of this."""
+    """Refuse a folder where frames of an earlier, longer sequence would follow the last frame of this one."""
     number = re.compile(re.escape(before) + r"\d+" + re.escape(after))
     entries = sorted(entry.name for entry in folder.iterdir()) if os.path.isdir(folder) else []
     left = [name for name in entries if number.fullmatch(name) and name not in names]
@@ -102,7 +101,11 @@ def _check_leftovers(folder: Path, before: str, after: str, names: set[str]) -> 
 
 
 def _move(names: Sequence[str], part: Path, folder: Path) -> None:
-    """Move all frames; an interrupt meanwhile is obeyed when that is done, a few milliseconds later."""
+    """Move all frames; an interrupt takes effect once all are moved, a few milliseconds later.
+
+    The folder may hold other files, so no single rename can replace it. If the system refuses to move a frame, those
+    moved before stay.
+    """
     try:
         for name in names:
             (part / name).replace(folder / name)
@@ -110,13 +113,13 @@ def _move(names: Sequence[str], part: Path, folder: Path) -> None:
         raise
     except BaseException:
         for name in names:
-            with suppress(FileNotFoundError):  # was moved before
+            with suppress(FileNotFoundError):  # moved before the interrupt
                 (part / name).replace(folder / name)
         raise
 
 
-def link(source: Path, target: Path) -> None:
-    """Give a file a second name; where the file system cannot do that, copy it."""
+def link_or_copy(source: Path, target: Path) -> None:
+    """Give a file a second name, or copy it where the file system cannot link it."""
     try:
         target.hardlink_to(source)
     except (OSError, NotImplementedError):  # another disk, FAT, too many links
@@ -124,24 +127,24 @@ def link(source: Path, target: Path) -> None:
 
 
 def _write_frame(pictures: Pictures, shot: Shot, relight: Relight, target: Path, fps: Fraction, look: Look) -> None:
-    """Link one image, or compose and convert it where the format, the light or the look differs."""
+    """Link one image, or compose and convert it if format, light or look differ."""
     source = pictures.whole_file(shot.c, shot.positions, relight)
     if source is not None and format_name(source) == format_name(target) and not look.changes:
         read_image(source)  # a damaged image must not slip into the sequence
-        link(source.resolve(), target)
+        link_or_copy(source.resolve(), target)
         return
     image = pictures.picture(shot.c, shot.positions, relight)
     extension: Extension = format_name(target)  # type: ignore[assignment]  # checked by sequence_pattern
     attributes = _attributes(pictures.manifest, shot, fps)
     if format_name(target) in FOR_SCREENS:
-        codes = shown(image, look, place_text(pictures.manifest, shot))
+        codes = screen_codes(image, look, shot_label(pictures.manifest, shot))
         write_codes(target, codes, ImageFormat(format=extension), attributes)
     else:
         write_image(target, np.ascontiguousarray(image), ImageFormat(format=extension), attributes)
 
 
 def _attributes(manifest: Manifest, shot: Shot, fps: Fraction) -> dict[str, Attribute]:
-    """What the file of a frame says about itself."""
+    """Return the attributes of a frame's file."""
     camera = manifest.cameras[shot.c]
     whole = len(shot.positions) == 1 and shot.positions[0] == int(shot.positions[0])
     attributes = frame_attributes(
@@ -153,4 +156,4 @@ def _attributes(manifest: Manifest, shot: Shot, fps: Fraction) -> dict[str, Attr
         l=int(shot.positions[0]) if whole else None,
         software=f"framearray {manifest.version}",
     )
-    return attributes if whole else attributes | {"framearray:place": place_text(manifest, shot)}
+    return attributes if whole else attributes | {"framearray:place": shot_label(manifest, shot)}

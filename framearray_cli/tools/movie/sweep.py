@@ -1,4 +1,4 @@
-"""Movies without a path file: the eye walks, the light moves, or both, once from first to last."""
+"""Movies without a path file: the camera, the light, or both move once from first to last."""
 
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
@@ -7,10 +7,10 @@ from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.words import shown
 
-from ..places import IndexPlace, positions, read_place
+from ..places import IndexPlace, read_place, resolve_span
 from .pathfile import MoviePath, Segment
 
-Kind: TypeAlias = Literal["walk", "light", "diagonal"]
+SweepKind: TypeAlias = Literal["walk", "light", "diagonal"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,25 +19,25 @@ class Sweep:
 
     Attributes:
         kind: what moves: "walk" the camera, "light" the light along all its axes, "diagonal" both.
-        at: where stays what does not move: places as in a path file; "AXIS=PLACE" is for one light axis alone.
-        seconds: how long it takes; None: as many frames as there are images on the way.
+        at: where the rest stays: places as in a path file; "AXIS=PLACE" applies to one light axis only.
+        seconds: length; None: one frame per image on the way.
     """
 
-    kind: Kind
+    kind: SweepKind
     at: tuple[str, ...] = ()
     seconds: float | None = None
 
 
-def swept(sweep: Sweep, manifest: Manifest) -> MoviePath:
-    """Write a movement as a path.
+def sweep_path(sweep: Sweep, manifest: Manifest) -> MoviePath:
+    """Make the path of a sweep.
 
     Raises:
-        JobError: `at` is no place, or lies outside of the array.
+        JobError: `at` is no place, or lies outside the array.
     """
     moves: tuple[IndexPlace, ...] = ("first", "last")
     sizes = {"camera": manifest.n_cameras, **manifest.axes}
     staying = {"walk": list(manifest.axes), "light": ["camera"], "diagonal": []}[sweep.kind]
-    spans = dict.fromkeys(sizes, moves) | _stays(sweep, {name: sizes[name] for name in staying})
+    spans = dict.fromkeys(sizes, moves) | _read_stays(sweep, {name: sizes[name] for name in staying})
     n_frames = max(n for name, n in sizes.items() if name not in staying)
     segment = Segment(
         frames=n_frames if sweep.seconds is None else None,
@@ -49,17 +49,15 @@ def swept(sweep: Sweep, manifest: Manifest) -> MoviePath:
     return MoviePath(segments=(segment,))
 
 
-def _stays(sweep: Sweep, sizes: dict[str, int]) -> dict[str, tuple[IndexPlace, ...]]:
-    """Read where each axis stays, and look whether it has that place.
+def _read_stays(sweep: Sweep, sizes: dict[str, int]) -> dict[str, tuple[IndexPlace, ...]]:
+    """Read where each axis stays, and check that it has that place.
 
     Args:
-        sizes: of the axes that stay, by name.
+        sizes: the number of indices of each axis that stays, by name.
     """
     stays: dict[str, IndexPlace] = dict.fromkeys(sizes, "first")
     problems: list[str] = []
-    for text in sorted(
-        sweep.at, key=lambda text: "=" in text
-    ):  # what is said of one axis goes over what is said of all
+    for text in sorted(sweep.at, key=lambda text: "=" in text):  # a place for one axis overrides one for all
         name, equals, place = text.rpartition("=")
         if equals and name not in sizes:
             problems.append(f"expected PLACE, or AXIS=PLACE with one of {', '.join(sizes)}, got {shown(text)}")
@@ -69,10 +67,9 @@ def _stays(sweep: Sweep, sizes: dict[str, int]) -> dict[str, tuple[IndexPlace, .
         except ValueError as error:
             problems.append(str(error))
     for name, n in sizes.items():
+        noun = f"{name}s" if name in ("camera", MAIN_AXIS) else f"places of {name}"
         found: list[str] = []
-        positions(
-            "--at", (stays[name],), n, f"{name}s" if name in ("camera", MAIN_AXIS) else f"places of {name}", found
-        )
+        resolve_span("--at", (stays[name],), n, noun, found)
         problems += [problem.removeprefix("--at: ") for problem in found]
     if problems:
         raise JobError("--at", problems)

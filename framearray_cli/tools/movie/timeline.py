@@ -1,4 +1,4 @@
-"""A movie path and an array -> what each frame shows: eye, light positions, and how bright the light is."""
+"""Find what each frame of a movie shows: eye, light positions, and changes of the light."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,23 +10,23 @@ from framearray_cli.array.pictures import Relight
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.schema import dotted
 
-from ..places import IndexPlace, along, nearest, positions
+from ..places import IndexPlace, interpolate_span, nearest_index, resolve_span
 from .curves import relights
-from .easing import eased
+from .easing import eased_share
 from .pathfile import MOST_FRAMES, MoviePath, Segment, movie_fps
 
-# Blended positions are rounded to a millionth of a step: far less than a picture can show, and then the same place
-# reached in two ways is the same.
+# Blended positions are rounded to a millionth of an index, which no picture can show: so a place that is reached in two
+# ways has one position.
 DECIMALS = 6
 
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """What of the array a frame shows.
+    """The place in the array that a frame shows.
 
     Attributes:
         c: camera index.
-        positions: one for each light axis, in the order of `Manifest.axes`; fractional ones are blended.
+        positions: one per light axis, in the order of `Manifest.axes`; fractional ones are blended.
     """
 
     c: int
@@ -38,8 +38,8 @@ class Timeline:
     """All frames of a movie.
 
     Attributes:
-        shots: of each frame.
-        relights: of each frame.
+        shots: place of each frame.
+        relights: light of each frame.
         fps: frames per second.
     """
 
@@ -48,20 +48,19 @@ class Timeline:
     fps: Fraction
 
 
-def timeline(source: Path | str, movie: MoviePath, manifest: Manifest) -> Timeline:
+def make_timeline(source: Path | str, movie: MoviePath, manifest: Manifest) -> Timeline:
     """Find what each frame shows.
 
-    A pass through a segment shows both ends of its spans. Where it goes on from exactly where the one before ended, it
-    does not show that picture again: steps are then 1/n of the way instead of 1/(n - 1), and a movement cut in two runs
-    on evenly.
+    A pass through a segment shows both ends of its spans. A pass that starts exactly where the one before ended does
+    not repeat that picture: its steps are 1/n of the way instead of 1/(n - 1), so a movement cut in two keeps its pace.
 
     Args:
-        source: the path file, or what else messages should start with.
-        movie: what it holds.
+        source: the path file, or another beginning of messages.
+        movie: the path.
         manifest: of the frame array.
 
     Raises:
-        JobError: the path asks for what the array has not; every such place is named.
+        JobError: the path asks for places that the array lacks; the message names all of them.
     """
     fps = movie_fps(movie, manifest)
     problems = _light_problems(movie, manifest)
@@ -75,8 +74,8 @@ def timeline(source: Path | str, movie: MoviePath, manifest: Manifest) -> Timeli
         blends = (segment.positions or movie.positions) == "blend"
         for p in range(segment.n_passes):
             backwards = segment.reverse != (segment.back_and_forth and p % 2 == 1)
-            goes_on = shots[-1:] == [_shot(_at(spans, 0.0, segment, backwards), blends)]
-            for t in _steps(segment.n_frames(fps), goes_on):
+            is_continued = shots[-1:] == [_shot(_at(spans, 0.0, segment, backwards), blends)]
+            for t in _steps(segment.n_frames(fps), is_continued):
                 now = _at(spans, t, segment, backwards)
                 shots.append(_shot(now, blends))
         shots += shots[-1:] * segment.n_held(fps)
@@ -89,7 +88,7 @@ def timeline(source: Path | str, movie: MoviePath, manifest: Manifest) -> Timeli
 def _spans(
     key: str, segment: Segment, manifest: Manifest, now: list[float], problems: list[str]
 ) -> list[tuple[float, ...]]:
-    """Resolve the spans of a segment: camera, then each light axis."""
+    """Resolve the spans of a segment: camera first, then each light axis."""
     axes = manifest.axes
     found: list[tuple[float, ...]] = [(here,) for here in now]
     given: dict[str, Sequence[IndexPlace] | None] = {"camera": segment.camera, MAIN_AXIS: segment.light, **segment.axes}
@@ -98,7 +97,7 @@ def _spans(
             place, noun = (
                 (name, f"{name}s") if name in ("camera", MAIN_AXIS) else (f"axes.{dotted(name)}", f"places of {name}")
             )
-            found[k] = positions(f"{key}.{place}", span, n, noun, problems)
+            found[k] = resolve_span(f"{key}.{place}", span, n, noun, problems)
     for name, span in given.items():
         if span is not None:
             place = MAIN_AXIS if name == MAIN_AXIS else f"axes.{dotted(name)}"
@@ -107,7 +106,7 @@ def _spans(
 
 
 def _light_problems(movie: MoviePath, manifest: Manifest) -> list[str]:
-    """What is asked of the light that the array cannot give."""
+    """List changes of the light that the array cannot show."""
     if not manifest.groups:
         keys = [f"groups.{dotted(name)}" for name in movie.groups] + (["ambient"] if movie.ambient else [])
         return [
@@ -124,19 +123,19 @@ def _light_problems(movie: MoviePath, manifest: Manifest) -> list[str]:
 
 
 def _at(spans: list[tuple[float, ...]], t: float, segment: Segment, backwards: bool) -> list[float]:
-    """Find the positions at a share t of the time of a pass."""
-    u = eased(1 - t if backwards else t, segment.ease)
-    return [along(span, u) for span in spans]
+    """Return the positions at a share t of the time of a pass."""
+    u = eased_share(1 - t if backwards else t, segment.ease)
+    return [interpolate_span(span, u) for span in spans]
 
 
 def _shot(now: list[float], blends: bool) -> Shot:
-    """Find what is shown at a position: the nearest eye, and the nearest light or a blend."""
-    lights = (round(x, DECIMALS) if blends else nearest(x) for x in now[1:])
-    return Shot(nearest(now[0]), tuple(lights))
+    """Return the shot at these positions: the nearest eye, and the nearest light or a blend."""
+    lights = (round(x, DECIMALS) if blends else nearest_index(x) for x in now[1:])
+    return Shot(nearest_index(now[0]), tuple(lights))
 
 
-def _steps(n: int, goes_on: bool) -> list[float]:
-    """Space n frames evenly over [0, 1]: the last is 1; the first is 0, or one step on where 0 was shown before."""
-    if goes_on:
+def _steps(n: int, is_continued: bool) -> list[float]:
+    """Space n frames evenly over [0, 1]: the last is 1; the first is 0, or one step further if 0 was shown before."""
+    if is_continued:
         return [(k + 1) / n for k in range(n)]
     return [k / (n - 1) for k in range(n)] if n > 1 else [0.0]

@@ -1,4 +1,4 @@
-"""Encode pictures as a movie: the only door to PyAV, which is the optional extra `movie`."""
+"""Encode pictures as a movie. Only this module uses PyAV, the optional extra `movie`."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -20,12 +20,12 @@ from .yuv import planes_422_10
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Container:
-    """How one kind of movie file is made.
+    """How to write one kind of movie file.
 
     Attributes:
-        format: the container's name, since a temporary file has no suffix of its own.
+        format: name of the container, as the temporary file has another suffix.
         codec: the encoder.
-        pixels: the pixel format, in FFmpeg's words.
+        pixels: FFmpeg's name of the pixel format.
         stream: options of the encoder.
         file: options of the container.
     """
@@ -38,18 +38,18 @@ class Container:
 
     @property
     def bits(self) -> Literal[8, 16]:
-        """Bits of the codes that it is fed with."""
+        """Bits of the codes that the writer takes."""
         return 8 if self.pixels == "yuv420p" else 16
 
 
-# crf is the quality, lower is better. faststart puts the index first, so that a browser plays while it loads.
+# crf: quality, lower is better. faststart: the index comes first, so that a browser plays while it loads.
 _H264 = {"crf": "16", "preset": "medium"}
 _FAST_START = {"movflags": "+faststart"}
 VIDEOS = {
     ".mp4": Container(format="mp4", codec="libx264", stream=_H264, file=_FAST_START),
     ".mkv": Container(format="matroska", codec="libx264", stream=_H264, file={}),
     ".webm": Container(format="webm", codec="libvpx-vp9", stream={"crf": "20", "b": "0", "row-mt": "1"}, file={}),
-    # "apl0" is what cutting programs expect of a ProRes stream's maker.
+    # Editing programs expect the vendor "apl0" in a ProRes stream.
     ".mov": Container(
         format="mov",
         codec="prores_ks",
@@ -59,7 +59,7 @@ VIDEOS = {
     ),
 }
 
-_BT709 = 1  # the number that H.264, VP9 and ProRes give to the primaries, curve and matrix of Rec. 709
+_BT709 = 1  # the number in H.264, VP9 and ProRes of the primaries, curve and matrix of Rec. 709
 
 
 def require_av() -> ModuleType:
@@ -75,13 +75,13 @@ def require_av() -> ModuleType:
 
 
 def require_encoder(suffix: str) -> None:
-    """Make sure that a kind of movie can be made here; PyAV may be built without an encoder.
+    """Check that PyAV can write a kind of movie; it may be built without an encoder.
 
     Args:
         suffix: one of VIDEOS.
 
     Raises:
-        MissingExtraError: it cannot.
+        MissingExtraError: PyAV lacks the encoder or the container.
     """
     if _can_make(suffix):
         return
@@ -104,7 +104,7 @@ def _can_make(suffix: str) -> bool:
 
 
 class VideoWriter:
-    """A movie that is being encoded; made by `open_video`."""
+    """An open movie; `open_video` makes it."""
 
     __slots__ = ("_container", "_n", "_stream")
 
@@ -114,15 +114,15 @@ class VideoWriter:
         self._n = 0
 
     def add(self, codes: NDArray[Any]) -> None:
-        """Add one picture: (h, w, 3) codes of the movie's size, uint8 or uint16 as its container takes them."""
-        frame = self._frame_of(codes)
+        """Add one picture: (h, w, 3) codes of the movie's size, uint8 or uint16 according to `Container.bits`."""
+        frame = self._convert(codes)
         frame.pts = self._n
         frame.time_base = 1 / self._stream.codec_context.framerate
         self._n += 1
         self._container.mux(self._stream.encode(frame))
 
-    def _frame_of(self, codes: NDArray[Any]) -> Any:
-        """Convert a picture to the stream's pixels; odd sizes grow by one row or column."""
+    def _convert(self, codes: NDArray[Any]) -> Any:
+        """Convert a picture to the stream's pixel format; odd sizes grow by one row or column."""
         av = require_av()
         context = self._stream.codec_context
         more = (context.height - codes.shape[0], context.width - codes.shape[1])
@@ -137,21 +137,21 @@ class VideoWriter:
             rows = np.zeros((plane.height, plane.line_size // 2), "<u2")
             rows[:, : values.shape[1]] = values
             plane.update(rows.tobytes())
-        # ProRes writes into each picture what that says of itself, whatever the stream says.
+        # ProRes takes colour attributes from each picture, not from the stream.
         frame.colorspace = _BT709
-        with suppress(AttributeError):  # older PyAV cannot say these two
+        with suppress(AttributeError):  # older PyAV lacks these two
             frame.color_primaries = frame.color_trc = _BT709
         return frame
 
     def finish(self) -> None:
-        """Write what the encoder still holds, and the index."""
+        """Write the frames that the encoder still holds, and the index."""
         self._container.mux(self._stream.encode(None))
         self._container.close()
 
 
 @contextmanager
 def open_video(target: Path, width: int, height: int, fps: Fraction) -> Iterator[VideoWriter]:
-    """Open a movie that appears under its name once it is whole; on any failure nothing is left.
+    """Open a movie; it appears under its name once it is whole, and leaves nothing after a failure.
 
     Args:
         target: its suffix, one of VIDEOS, decides the format.
@@ -172,7 +172,7 @@ def open_video(target: Path, width: int, height: int, fps: Fraction) -> Iterator
             raise OutputError(f"{target}: cannot be written: {error.strerror}") from error
         try:
             stream = container.add_stream(kind.codec, rate=fps, options=kind.stream)
-            # A chroma sample belongs to two columns, in yuv420p to two rows, too.
+            # A chroma sample covers two columns, in yuv420p also two rows.
             stream.width = width + width % 2
             stream.height = height + (height % 2 if kind.pixels == "yuv420p" else 0)
             stream.pix_fmt = kind.pixels
@@ -184,7 +184,7 @@ def open_video(target: Path, width: int, height: int, fps: Fraction) -> Iterator
             yield writer
             writer.finish()
         except BaseException as error:
-            with suppress(av.FFmpegError):  # closing writes, too
+            with suppress(av.FFmpegError):  # closing writes as well
                 container.close()
             if isinstance(error, av.FFmpegError):
                 raise OutputError(f"{target}: cannot be written: {error.strerror}") from error

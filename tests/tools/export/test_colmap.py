@@ -12,9 +12,9 @@ from support.boxarrays import HIGH, LOW, RESOLUTION, colour_at, look_at, plain_m
 
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.colour import srgb8_from_linear
-from framearray_cli.tools.export import export
+from framearray_cli.tools.export import export_array
 from framearray_cli.tools.export.colmap import camera_from_world, quaternion
-from framearray_cli.tools.export.points import smooth
+from framearray_cli.tools.export.points import smooth_pixels
 
 FAR = (4e6, -2e5, 7e5)
 
@@ -29,7 +29,7 @@ class Model:
 
 
 def read(folder: Path) -> Model:
-    """Read a text model by what the published format says, knowing nothing of the writer."""
+    """Read a text model by the published format, independently of the writer."""
 
     def lines(name: str) -> list[list[str]]:
         text = (folder / name).read_text(encoding="utf-8")
@@ -55,7 +55,7 @@ def turned(q: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def falls(model: Model, image: int, points: np.ndarray) -> np.ndarray:
-    """Where points fall in an image, by the model: x right, y down, z along the view."""
+    """Project points into an image by the model: x right, y down, z along the view."""
     q, shift, camera, _, _ = model.images[image]
     x, y, z = (turned(q, points) + shift).T
     fx, fy, cx, cy = np.array(model.cameras[camera][3:], float)
@@ -63,7 +63,7 @@ def falls(model: Model, image: int, points: np.ndarray) -> np.ndarray:
 
 
 def falls_by_manifest(manifest: Manifest, c: int, points: np.ndarray, flip: int | None = None) -> np.ndarray:
-    """Where points fall by docs/guide/manifest.md alone; `flip` turns an axis of the camera round."""
+    """Project points by docs/guide/manifest.md only; `flip` reverses an axis of the camera."""
     matrix = manifest.cameras[c].matrix
     if flip is not None:
         matrix[:3, flip] *= -1
@@ -84,7 +84,7 @@ def known_points() -> np.ndarray:
 
 
 def test_world_points_fall_where_the_manifest_says(array: Manifest, tmp_path: Path) -> None:
-    model = read(export(array.directory, tmp_path / "x", "colmap").target / "sparse/0")
+    model = read(export_array(array.directory, tmp_path / "x", "colmap").target / "sparse/0")
     assert [image[3] for image in model.images.values()] == [f"c{c:04d}_l001.png" for c in range(4)]
     assert len(model.cameras) == 2
     for c in range(4):
@@ -96,7 +96,7 @@ def test_world_points_fall_where_the_manifest_says(array: Manifest, tmp_path: Pa
 
 
 def test_points_are_where_the_scene_is_and_tracks_agree_both_ways(array: Manifest, tmp_path: Path) -> None:
-    result = export(array.directory, tmp_path / "x", "colmap", points=1200)
+    result = export_array(array.directory, tmp_path / "x", "colmap", points=1200)
     model = read(result.target / "sparse/0")
     assert len(model.points) == result.n_points
     assert 600 < result.n_points <= 1200
@@ -114,8 +114,8 @@ def test_points_are_where_the_scene_is_and_tracks_agree_both_ways(array: Manifes
         np.testing.assert_allclose(found[4][:, :2], falls(model, image, points), atol=1e-4)
 
 
-def test_who_sees_a_point_is_who_has_nothing_in_front_of_it(tmp_path: Path) -> None:
-    """A panel stands in front of one eye; what it hides is in no track of that eye, and what it does not hide is."""
+def test_a_camera_sees_the_points_that_nothing_hides(tmp_path: Path) -> None:
+    """A panel in front of one eye removes from the tracks of that eye what it hides, and nothing else."""
     array = write_array(plain_manifest(tmp_path / "out"))
     depth, _ = see(array, 0)
     from framearray_cli.array.images.images import write_layers
@@ -124,7 +124,7 @@ def test_who_sees_a_point_is_who_has_nothing_in_front_of_it(tmp_path: Path) -> N
     panel = np.zeros(depth.shape, bool)
     panel[10:30, 20:40] = True
     write_layers(layers_path(array, 0), {"depth.Z": np.where(panel, 0.7, depth).astype(np.float32)})
-    model = read(export(array.directory, tmp_path / "x", "colmap", points=4000).target / "sparse/0")
+    model = read(export_array(array.directory, tmp_path / "x", "colmap", points=4000).target / "sparse/0")
     position = np.array([point[0] for point in model.points.values()])
     off = np.minimum(np.abs(position - LOW), np.abs(position - HIGH)).min(-1)
     walls = off < 1e-4
@@ -134,7 +134,7 @@ def test_who_sees_a_point_is_who_has_nothing_in_front_of_it(tmp_path: Path) -> N
     clear = ((where > [3, 3]) & (where < [17, 37])).all(-1) & walls
     sees = np.array([1 in point[2][:, 0] for point in model.points.values()])
     assert np.count_nonzero(inside) > 50 and not sees[inside].any()
-    corners = smooth(depth.astype(np.float32))
+    corners = smooth_pixels(depth.astype(np.float32))
     flat = corners[tuple(where[clear].astype(int).T[::-1])]
     assert np.count_nonzero(flat) > 50 and sees[clear][flat].mean() > 0.9
 
@@ -142,32 +142,34 @@ def test_who_sees_a_point_is_who_has_nothing_in_front_of_it(tmp_path: Path) -> N
 def test_pixels_that_mix_surfaces_are_not_smooth() -> None:
     y, x = np.mgrid[:20, :30]
     plane = (1 / (0.2 + 0.004 * x + 0.002 * y)).astype(np.float32)
-    assert smooth(plane)[1:-1, 1:-1].all() and not smooth(plane)[0].any()
+    assert smooth_pixels(plane)[1:-1, 1:-1].all() and not smooth_pixels(plane)[0].any()
     cut = np.where(x < 12, plane, 1.2 * plane).astype(np.float32)
-    assert np.flatnonzero(~smooth(cut)[1:-1].all(0)).tolist() == [0, 11, 12, 29]
+    assert np.flatnonzero(~smooth_pixels(cut)[1:-1].all(0)).tolist() == [0, 11, 12, 29]
     hole = plane.copy()
     hole[5, 7] = 0
-    assert not smooth(hole)[5, 6:9].any() and not smooth(hole)[4:7, 7].any() and smooth(hole)[4, 6]
+    assert not smooth_pixels(hole)[5, 6:9].any() and not smooth_pixels(hole)[4:7, 7].any() and smooth_pixels(hole)[4, 6]
 
 
 def test_the_same_export_gives_the_same_files(array: Manifest, tmp_path: Path) -> None:
-    folders = [export(array.directory, tmp_path / name, "colmap", points=300).target for name in ("a", "b")]
+    folders = [export_array(array.directory, tmp_path / name, "colmap", points=300).target for name in ("a", "b")]
     for name in ("cameras", "images", "points3D"):
         texts = [(folder / f"sparse/0/{name}.txt").read_bytes() for folder in folders]
         assert texts[0] == texts[1]
 
 
 def test_every_light_position_of_a_pose_is_an_image(array: Manifest, tmp_path: Path) -> None:
-    model = read(export(array.directory, tmp_path / "x", "colmap", light="0,2", cameras="0,3").target / "sparse/0")
+    model = read(
+        export_array(array.directory, tmp_path / "x", "colmap", light="0,2", cameras="0,3").target / "sparse/0"
+    )
     assert [image[3] for image in model.images.values()] == [f"c{c:04d}_l{l:03d}.png" for c in (0, 3) for l in (0, 2)]
     for point in model.points.values():
         images = set(point[2][:, 0].tolist())
         assert (1 in images) == (2 in images) and (3 in images) == (4 in images)
 
 
-def test_an_array_without_layers_gives_cameras_alone(tmp_path: Path) -> None:
+def test_an_array_without_layers_gives_only_cameras(tmp_path: Path) -> None:
     array = write_array(plain_manifest(tmp_path / "out", layers=False))
-    result = export(array.directory, tmp_path / "x", "colmap")
+    result = export_array(array.directory, tmp_path / "x", "colmap")
     assert result.notes == ("no points and no depth: the array was rendered without layers (output.layers)",)
     model = read(result.target / "sparse/0")
     assert (len(model.images), len(model.points)) == (4, 0)
@@ -203,7 +205,7 @@ def reconstruction(folder: Path) -> Any:
 
 
 def errors_of(model: Any) -> np.ndarray:
-    """Distance of each point in each image of its track from where pycolmap projects it, pixels."""
+    """Distance between each listed point of a track and its projection by pycolmap, pixels."""
     found = []
     for point in model.points3D.values():
         for element in point.track.elements:
@@ -215,7 +217,7 @@ def errors_of(model: Any) -> np.ndarray:
 @pytest.mark.parametrize("at", [(0.0, 0.0, 0.0), FAR])
 def test_pycolmap_finds_the_points_in_their_images(tmp_path: Path, at: tuple[float, ...]) -> None:
     array = write_array(plain_manifest(tmp_path / "out", fov=(60.0, 60.0, 45.0, 60.0), at=at), at)
-    result = export(array.directory, tmp_path / "x", "colmap", points=1000)
+    result = export_array(array.directory, tmp_path / "x", "colmap", points=1000)
     model = reconstruction(result.target)
     assert (model.num_images(), model.num_points3D(), model.num_cameras()) == (4, result.n_points, 2)
     assert model.compute_mean_track_length() > 2
@@ -232,16 +234,16 @@ def test_pycolmap_finds_the_points_in_their_images(tmp_path: Path, at: tuple[flo
 
 @pytest.mark.parametrize("flip", [0, 1, 2])
 def test_pycolmap_sees_a_flipped_axis(tmp_path: Path, flip: int) -> None:
-    """Points and images of one array under the cameras of another, an axis of which points the other way."""
+    """Points and images of one array with cameras that have one axis reversed."""
     folder = write_array(plain_manifest(tmp_path / "out")).directory
-    target = export(folder, tmp_path / "x", "colmap", points=300).target / "sparse/0"
+    target = export_array(folder, tmp_path / "x", "colmap", points=300).target / "sparse/0"
     lines = (target / "images.txt").read_text(encoding="utf-8").splitlines()
     for k, line in enumerate(lines):
         if line.endswith(".png"):
             parts = line.split()
             values = np.array(parts[1:8], float)
             rows = turned(values[:4], np.eye(3)).T
-            rows[[flip, (flip + 1) % 3]] *= -1  # two rows: one alone would be no rotation
+            rows[[flip, (flip + 1) % 3]] *= -1  # two rows: reversing one would give no rotation
             shift = values[4:] * np.where(np.isin(np.arange(3), [flip, (flip + 1) % 3]), -1, 1)
             parts[1:8] = [repr(float(value)) for value in (*quaternion(rows), *shift)]
             lines[k] = " ".join(parts)

@@ -1,4 +1,4 @@
-"""Frame arrays for nerfstudio and Cinema, and the folder that they are written into."""
+"""Exports to nerfstudio and Cinema, and the folder of an export."""
 
 import csv
 import json
@@ -15,7 +15,8 @@ from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.tools.export import KINDS, export
+from framearray_cli.tools.export import EXPORT_KINDS, export_array
+from framearray_cli.tools.export.selection import axis_keys
 
 
 @pytest.fixture
@@ -24,7 +25,7 @@ def array(tmp_path: Path) -> Manifest:
 
 
 def off_the_box(points: np.ndarray) -> np.ndarray:
-    """Distance of points (n, 3) to the nearest plane of a side of the box, if they lie within it."""
+    """Distance of points (n, 3) inside the box to its nearest side."""
     to_planes = np.minimum(np.abs(points - LOW), np.abs(points - HIGH)).min(-1)
     outside = np.maximum(np.maximum(LOW - points, points - HIGH), 0).max(-1)
     return np.maximum(to_planes * (outside <= 1e-3), outside)
@@ -59,8 +60,8 @@ def worst_of(folder: Path, axes: tuple[float, ...] = (1.0, 1.0, 1.0)) -> tuple[f
 
 
 def test_rays_of_transforms_json_meet_the_scene_at_its_depths(array: Manifest, tmp_path: Path) -> None:
-    result = export(array.directory, tmp_path / "ns", "nerfstudio", light="all")
-    assert (result.n_cameras, result.n_places, result.notes) == (4, 3, ())
+    result = export_array(array.directory, tmp_path / "ns", "nerfstudio", light="all")
+    assert (result.n_cameras, result.n_lights, result.notes) == (4, 3, ())
     off, wrong = worst_of(tmp_path / "ns")
     assert off < 1e-5  # depths are float32, up to 6
     assert wrong < 0.5 * 0.0092  # half a code where a code is widest in linear light: at white
@@ -68,13 +69,13 @@ def test_rays_of_transforms_json_meet_the_scene_at_its_depths(array: Manifest, t
 
 @pytest.mark.parametrize("axes", [(-1, 1, 1), (1, -1, 1), (1, 1, -1), (1, -1, -1)])
 def test_a_flipped_axis_is_seen(array: Manifest, tmp_path: Path, axes: tuple[float, ...]) -> None:
-    export(array.directory, tmp_path / "ns", "nerfstudio")
+    export_array(array.directory, tmp_path / "ns", "nerfstudio")
     off, wrong = worst_of(tmp_path / "ns", axes)
     assert off > 0.1 and wrong > 0.1
 
 
-def test_transforms_json_says_what_nerfstudio_asks(array: Manifest, tmp_path: Path) -> None:
-    export(array.directory, tmp_path / "ns", "nerfstudio")
+def test_transforms_json_has_what_nerfstudio_needs(array: Manifest, tmp_path: Path) -> None:
+    export_array(array.directory, tmp_path / "ns", "nerfstudio")
     table = json.loads((tmp_path / "ns/transforms.json").read_text(encoding="utf-8"))
     assert (table["camera_model"], table["w"], table["h"], table["cx"], table["cy"]) == ("OPENCV", 60, 40, 30.0, 20.0)
     focal = 20 / np.tan(np.radians(30))
@@ -91,16 +92,16 @@ def test_transforms_json_says_what_nerfstudio_asks(array: Manifest, tmp_path: Pa
 
 
 @pytest.mark.parametrize("lights", [[light(0, 2)], [light(0, kind="directional")], [light(0, 0)]])
-def test_only_a_single_point_is_told_as_one(tmp_path: Path, lights: list) -> None:
+def test_only_a_single_point_source_has_keys_of_its_own(tmp_path: Path, lights: list) -> None:
     array = write_array(plain_manifest(tmp_path / "out", lights=lights))
-    export(array.directory, tmp_path / "ns", "nerfstudio")
+    export_array(array.directory, tmp_path / "ns", "nerfstudio")
     frame = json.loads((tmp_path / "ns/transforms.json").read_text(encoding="utf-8"))["frames"][0]
     assert "pl_pos" not in frame and "pl_intensity" not in frame
 
 
 def test_each_frame_has_its_own_lens_where_they_differ(tmp_path: Path) -> None:
     array = write_array(plain_manifest(tmp_path / "out", fov=(60.0, 60.0, 45.0, 60.0)))
-    export(array.directory, tmp_path / "ns", "nerfstudio")
+    export_array(array.directory, tmp_path / "ns", "nerfstudio")
     table = json.loads((tmp_path / "ns/transforms.json").read_text(encoding="utf-8"))
     assert "fl_x" not in table
     assert len({frame["fl_x"] for frame in table["frames"]}) == 2
@@ -109,7 +110,7 @@ def test_each_frame_has_its_own_lens_where_they_differ(tmp_path: Path) -> None:
 
 def test_points_lie_on_the_scene(array: Manifest, tmp_path: Path) -> None:
     trimesh = pytest.importorskip("trimesh")
-    result = export(array.directory, tmp_path / "ns", "nerfstudio", points=900)
+    result = export_array(array.directory, tmp_path / "ns", "nerfstudio", points=900)
     cloud = trimesh.load(tmp_path / "ns/points.ply")
     assert len(cloud.vertices) == result.n_points
     assert 450 < result.n_points <= 900
@@ -118,11 +119,11 @@ def test_points_lie_on_the_scene(array: Manifest, tmp_path: Path) -> None:
     assert np.abs(expected.astype(int) - np.array(cloud.colors)[:, :3]).max() <= 1
 
 
-@pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")  # that reader leaves an image open
+@pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")  # nerfbaselines leaves an image open
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-def test_a_reader_that_is_not_ours_reads_transforms_json(array: Manifest, tmp_path: Path) -> None:
+def test_nerfbaselines_reads_transforms_json(array: Manifest, tmp_path: Path) -> None:
     module = pytest.importorskip("nerfbaselines.datasets.nerfstudio", reason="nerfbaselines is not installed")
-    export(array.directory, tmp_path / "ns", "nerfstudio")
+    export_array(array.directory, tmp_path / "ns", "nerfstudio")
     found = {}
     for split in ("train", "test"):
         read = module.load_nerfstudio_dataset(tmp_path / "ns", split)
@@ -140,7 +141,7 @@ def test_a_reader_that_is_not_ours_reads_transforms_json(array: Manifest, tmp_pa
 
 
 def problems_of(folder: Path) -> list[str]:
-    """What is wrong with a database by specification D."""
+    """List the faults of a database by specification D."""
     with (folder / "data.csv").open(newline="", encoding="utf-8") as file:
         head, *rows = list(csv.reader(file))
     found = [] if rows else ["no rows"]
@@ -170,7 +171,7 @@ def rows_of(folder: Path) -> list[dict[str, str]]:
 
 
 def test_a_cinema_database_has_a_row_for_each_picture(array: Manifest, tmp_path: Path) -> None:
-    result = export(array.directory, tmp_path / "box", "cinema")
+    result = export_array(array.directory, tmp_path / "box", "cinema")
     assert result.target == tmp_path / "box.cdb"
     assert problems_of(result.target) == []
     rows = rows_of(result.target)
@@ -187,7 +188,7 @@ def test_a_cinema_database_has_a_row_for_each_picture(array: Manifest, tmp_path:
 
 
 def test_faults_of_a_cinema_database_are_seen(array: Manifest, tmp_path: Path) -> None:
-    folder = export(array.directory, tmp_path / "box.cdb", "cinema").target
+    folder = export_array(array.directory, tmp_path / "box.cdb", "cinema").target
     text = (folder / "data.csv").read_text(encoding="utf-8")
     for old, new, fault in (
         ("camera,", "light,", "names"),
@@ -200,9 +201,9 @@ def test_faults_of_a_cinema_database_are_seen(array: Manifest, tmp_path: Path) -
         assert fault in problems_of(folder)
 
 
-def test_a_reader_that_is_not_ours_reads_the_cinema_database(array: Manifest, tmp_path: Path) -> None:
+def test_cinemasci_reads_the_cinema_database(array: Manifest, tmp_path: Path) -> None:
     module = pytest.importorskip("cinemasci.cdb", reason="cinemasci is not installed")
-    folder = export(array.directory, tmp_path / "box.cdb", "cinema").target
+    folder = export_array(array.directory, tmp_path / "box.cdb", "cinema").target
     database = module.cdb(str(folder))
     assert database.read_data_from_file()
     database.set_extract_parameter_names(["FILE"])
@@ -213,7 +214,7 @@ def test_a_reader_that_is_not_ours_reads_the_cinema_database(array: Manifest, tm
 
 def test_groups_are_summed_and_have_their_own_columns(tmp_path: Path) -> None:
     array = write_groups(grouped_manifest(tmp_path / "out"))
-    result = export(array.directory, tmp_path / "a", "cinema", image_format=ImageFormat(format="exr"))
+    result = export_array(array.directory, tmp_path / "a", "cinema", image_format=ImageFormat(format="exr"))
     assert problems_of(result.target) == []
     rows = rows_of(result.target)
     assert len(rows) == 4 * 3 * 2
@@ -225,12 +226,18 @@ def test_groups_are_summed_and_have_their_own_columns(tmp_path: Path) -> None:
         np.testing.assert_allclose(read_image(result.target / row["FILE"]), expected, rtol=1e-3)
         assert (row["source0_type"], row["source1_type"]) == ("point", "directional")
         assert float(row["source1_direction_z"]) == pytest.approx(0.1 * l)
-    result = export(array.directory, tmp_path / "b", "nerfstudio", at=["lamps=0"])
+    result = export_array(array.directory, tmp_path / "b", "nerfstudio", at=["lamps=0"])
     frame = json.loads((result.target / "transforms.json").read_text(encoding="utf-8"))["frames"][0]
     assert (frame["light"], frame["light_lamps"], "pl_pos" in frame) == (1, 0, False)
     np.testing.assert_array_equal(
         read_codes(result.target / frame["file_path"]), srgb8_from_linear(pictures.picture(0, (1, 0)))
     )
+
+
+def test_keys_of_axes_are_plain_and_differ() -> None:
+    assert axis_keys({"light": 2, "lamps": 3}) == {"light": "light", "lamps": "light_lamps"}
+    names = axis_keys({"light": 2, "a b": 3, "a/b": 2, "ö": 1})
+    assert names == {"light": "light", "a b": "light_a_b", "a/b": "light_a_b_", "ö": "light_"}
 
 
 # the folder
@@ -243,78 +250,78 @@ def names(folder: Path) -> list[str]:
 def test_pictures_are_links_where_they_are_the_same(array: Manifest, tmp_path: Path) -> None:
     source = image_path(array, 0, 1).stat().st_ino
     file = "images/c0000_l001.png"
-    linked = export(array.directory, tmp_path / "a", "colmap").target / file
-    copied = export(array.directory, tmp_path / "b", "colmap", copy=True).target / file
+    linked = export_array(array.directory, tmp_path / "a", "colmap").target / file
+    copied = export_array(array.directory, tmp_path / "b", "colmap", copy=True).target / file
     brighter = ImageFormat(format="png", exposure=1.0)
-    shown = export(array.directory, tmp_path / "c", "colmap", image_format=brighter).target / file
+    shown = export_array(array.directory, tmp_path / "c", "colmap", image_format=brighter).target / file
     assert (linked.stat().st_ino == source, copied.stat().st_ino == source) == (True, False)
     np.testing.assert_array_equal(read_codes(copied), read_codes(linked))
     np.testing.assert_array_equal(read_codes(shown), srgb8_from_linear(2 * read_image(linked)))
-    jpeg = export(array.directory, tmp_path / "d", "cinema", image_format=ImageFormat(format="jpg")).target
+    jpeg = export_array(array.directory, tmp_path / "d", "cinema", image_format=ImageFormat(format="jpg")).target
     assert len(list((jpeg / "images").glob("*.jpg"))) == 12
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EXPORT_KINDS)
 def test_an_earlier_export_is_replaced_only_by_force(array: Manifest, tmp_path: Path, kind: Any) -> None:
     target = tmp_path / "x.cdb"
-    export(array.directory, target, kind, cameras="all")
+    export_array(array.directory, target, kind, cameras="all")
     before = names(target)
     with pytest.raises(OutputError, match=r"x\.cdb: an earlier export is there; .* give --force"):
-        export(array.directory, target, kind, cameras="0")
+        export_array(array.directory, target, kind, cameras="0")
     assert names(target) == before
-    export(array.directory, target, kind, cameras="0,last", force=True)
+    export_array(array.directory, target, kind, cameras="0,last", force=True)
     assert len(list((target / "images").iterdir())) == (6 if kind == "cinema" else 2)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "x.cdb"]
 
 
 @pytest.mark.parametrize("force", [False, True])
-def test_folders_and_files_of_others_are_left_alone(array: Manifest, tmp_path: Path, force: bool) -> None:
+def test_other_folders_and_files_are_kept(array: Manifest, tmp_path: Path, force: bool) -> None:
     before = names(array.directory)
     with pytest.raises(OutputError, match=r"holds other files, and no transforms\.json of an earlier export"):
-        export(array.directory, array.directory, "nerfstudio", force=force)
+        export_array(array.directory, array.directory, "nerfstudio", force=force)
     assert names(array.directory) == before
     (tmp_path / "file").write_text("mine")
     with pytest.raises(OutputError, match="a file of that name is there"):
-        export(array.directory, tmp_path / "file", "nerfstudio", force=force)
+        export_array(array.directory, tmp_path / "file", "nerfstudio", force=force)
     (tmp_path / "empty").mkdir()
-    export(array.directory, tmp_path / "empty", "nerfstudio", force=force)
+    export_array(array.directory, tmp_path / "empty", "nerfstudio", force=force)
 
 
-def test_after_an_error_nothing_is_left_and_the_old_export_stays(array: Manifest, tmp_path: Path) -> None:
+def test_an_error_leaves_nothing_but_the_old_export(array: Manifest, tmp_path: Path) -> None:
     target = tmp_path / "x"
-    export(array.directory, target, "nerfstudio", copy=True)
+    export_array(array.directory, target, "nerfstudio", copy=True)
     before = names(target)
     image_path(array, 3, 1).write_bytes(image_path(array, 3, 1).read_bytes()[:200])
     for force, place in ((True, target), (False, tmp_path / "new")):
         with pytest.raises(OutputError, match=r"box\.c0003\.l001\.png"):
-            export(array.directory, place, "nerfstudio", force=force)
+            export_array(array.directory, place, "nerfstudio", force=force)
     assert names(target) == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "x"]
 
 
-def test_layers_that_are_missing_are_told(array: Manifest, tmp_path: Path) -> None:
+def test_missing_layers_are_reported(array: Manifest, tmp_path: Path) -> None:
     (array.directory / "box.layers.c0002.exr").unlink()
     with pytest.raises(OutputError, match=r"box\.layers\.c0002\.exr: no such file"):
-        export(array.directory, tmp_path / "x", "nerfstudio")
+        export_array(array.directory, tmp_path / "x", "nerfstudio")
     bare = write_array(plain_manifest(tmp_path / "bare", layers=False))
-    result = export(bare.directory, tmp_path / "y", "nerfstudio")
+    result = export_array(bare.directory, tmp_path / "y", "nerfstudio")
     assert result.notes == ("no points and no depth: the array was rendered without layers (output.layers)",)
     table = json.loads((tmp_path / "y/transforms.json").read_text(encoding="utf-8"))
     assert "ply_file_path" not in table and "depth_file_path" not in table["frames"][0]
-    assert export(bare.directory, tmp_path / "z", "cinema").notes == ()
+    assert export_array(bare.directory, tmp_path / "z", "cinema").notes == ()
 
 
 def test_folders_without_a_name_are_refused(array: Manifest, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(array.directory)
     for target in (Path("."), Path("..")):
         with pytest.raises(OutputError, match="expected the name of a folder to be made"):
-            export(array.directory, target, "cinema")
+            export_array(array.directory, target, "cinema")
 
 
 def test_no_points_and_one_camera_are_fine(array: Manifest, tmp_path: Path) -> None:
-    result = export(array.directory, tmp_path / "a", "nerfstudio", points=0)
+    result = export_array(array.directory, tmp_path / "a", "nerfstudio", points=0)
     assert (result.n_points, result.notes) == (0, ())
-    result = export(array.directory, tmp_path / "b", "nerfstudio", cameras="2", points=200)
+    result = export_array(array.directory, tmp_path / "b", "nerfstudio", cameras="2", points=200)
     assert 100 < result.n_points <= 200
 
 
@@ -326,9 +333,9 @@ def test_no_points_and_one_camera_are_fine(array: Manifest, tmp_path: Path) -> N
         ({"at": ["lamps=0"]}, "--at: expected AXIS=PLACES"),
     ],
 )
-def test_places_that_are_not_there_are_told(array: Manifest, tmp_path: Path, options: dict, message: str) -> None:
+def test_places_outside_the_array_are_reported(array: Manifest, tmp_path: Path, options: dict, message: str) -> None:
     with pytest.raises(JobError, match=message):
-        export(array.directory, tmp_path / "x", "colmap", **options)
+        export_array(array.directory, tmp_path / "x", "colmap", **options)
     assert not (tmp_path / "x").exists()
 
 
@@ -339,6 +346,6 @@ def test_poses_that_are_no_motion_are_refused(tmp_path: Path) -> None:
     cameras = (type(manifest.cameras[0])(world_from_camera=rows, fov=60.0), *manifest.cameras[1:])
     broken = type(manifest)(**{f: getattr(manifest, f) for f in manifest.__dataclass_fields__} | {"cameras": cameras})
     write_array(broken)
-    for kind in KINDS:
+    for kind in EXPORT_KINDS:
         with pytest.raises(OutputError, match=r"cameras\[0\]\.world_from_camera: expected a rigid motion"):
-            export(broken.directory, tmp_path / "x", kind)
+            export_array(broken.directory, tmp_path / "x", kind)

@@ -29,7 +29,7 @@ ROWS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 
 
 
 def picture(c: int, l: int, width: int = 64, height: int = 48) -> np.ndarray:
-    """A smooth picture whose left half tells c (red) and whose right half tells l (green)."""
+    """A smooth picture whose left half encodes c (red) and whose right half encodes l (green)."""
     image = np.full((height, width, 3), 0.05, np.float32)
     image[:, : width // 2, 0] = 0.1 + 0.8 * c / (N_CAMERAS - 1)
     image[:, width // 2 :, 1] = 0.1 + 0.8 * l / (N_LIGHTS - 1)
@@ -80,14 +80,14 @@ FRAMES = [(0, 0), (0, 1), (0, 2), (0, 3), (1, 3), (2, 3), (3, 3), (4, 3), (1, 2)
 
 @dataclass(frozen=True)
 class Stream:
-    """What a movie says of itself; read while it is open, for afterwards its memory is freed."""
+    """The attributes of a movie, read while it is open: closing frees their memory."""
 
     average_rate: Fraction
     codec_context: SimpleNamespace
 
 
 def decoded(movie: Path) -> tuple[list[np.ndarray], Stream]:
-    """Decode all pictures with the matrix that the file names, and what the stream says."""
+    """Decode all pictures with the matrix that the file names; return them and the stream's attributes."""
     with av.open(str(movie)) as container:
         stream = container.streams.video[0]
         frames = []
@@ -99,12 +99,12 @@ def decoded(movie: Path) -> tuple[list[np.ndarray], Stream]:
             frames.append(rgb.to_ndarray())
         context = stream.codec_context
         names = ("color_primaries", "color_trc", "colorspace", "color_range", "pix_fmt", "width", "height", "name")
-        told = SimpleNamespace(**{name: getattr(context, name) for name in names})
-        return frames, Stream(stream.average_rate, told)
+        attributes = SimpleNamespace(**{name: getattr(context, name) for name in names})
+        return frames, Stream(stream.average_rate, attributes)
 
 
 def shows(codes: np.ndarray) -> tuple[int, int]:
-    """Read c and l back out of a picture: the nearest of what it could be."""
+    """Decode c and l from a picture: the nearest pair."""
     width = codes.shape[1]
     red = codes[4:-4, 4 : width // 2 - 4, 0].mean()
     green = codes[4:-4, width // 2 + 4 : -4, 1].mean()
@@ -190,7 +190,7 @@ def test_movies_need_the_extra(out: Path, path_file: Path, tmp_path: Path, monke
     assert not (tmp_path / "movie.mp4").exists()
 
 
-# what goes wrong
+# errors
 
 
 @pytest.mark.parametrize("target", ["movie.mp4", "frame.####.png", "frame.####.jpg"])
@@ -316,11 +316,11 @@ def test_exposure_changes_a_sequence_of_the_same_format(out: Path, path_file: Pa
     assemble(out, path_file, tmp_path / "shot.####.png", look=Look(exposure=-1))
     linear = read_image(out / "tiny.c0000.l000.png")
     np.testing.assert_array_equal(read_codes(tmp_path / "shot.0000.png"), srgb8_from_linear(linear / 2))
-    with pytest.raises(OutputError, match="exposure changes movies, PNG and JPEG alone"):
+    with pytest.raises(OutputError, match="exposure changes only movies, PNG and JPEG"):
         assemble(out, path_file, tmp_path / "shot.####.exr", look=Look(exposure=1))
 
 
-def test_a_sequence_replaces_its_own_files_alone(out: Path, path_file: Path, tmp_path: Path) -> None:
+def test_a_sequence_replaces_only_its_own_files(out: Path, path_file: Path, tmp_path: Path) -> None:
     (tmp_path / "cut").mkdir()
     (tmp_path / "cut" / "shot.0002.png").write_bytes(b"earlier")
     (tmp_path / "cut" / "notes.txt").write_bytes(b"mine")

@@ -1,4 +1,4 @@
-"""Movies of every container, decoded again: rate, number of frames, and what each of them shows."""
+"""Movies in every container, decoded again: rate, number of frames, and the content of each frame."""
 
 import sys
 from fractions import Fraction
@@ -52,7 +52,7 @@ def movies(array: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, D
 
 
 def errors(frame: Any) -> dict[tuple[int, int], float]:
-    """How far a frame is from each image of the array, codes RMS."""
+    """Difference between a frame and each image of the array, codes RMS."""
     size = frame.shape[1], frame.shape[0]
     return {(c, l): rms(frame, srgb8_from_linear(barred(c, l, *size))) for c in range(5) for l in range(4)}
 
@@ -69,7 +69,7 @@ def test_every_frame_shows_its_image_and_no_other(movies: dict[str, Decoded], su
 
 
 def test_the_comparison_can_fail(movies: dict[str, Decoded]) -> None:
-    """Every image is nearer to its own frame than to that of a neighbour, by more than codecs are off."""
+    """Every image is nearer to its own frame than to that of a neighbour, by more than the error of codecs."""
     codes = {(c, l): srgb8_from_linear(barred(c, l)) for c in range(5) for l in range(4)}
     apart = min(rms(a, b) for p, a in codes.items() for q, b in codes.items() if p != q)
     assert apart > 20
@@ -96,7 +96,7 @@ def test_rates_of_videos_are_exact(array: Path, tmp_path: Path, suffix: str, fps
     movie = decoded(tmp_path / f"m{suffix}")
     assert (len(movie.frames), result.fps) == (13, rate)
     assert movie.rate is not None
-    if suffix in (".mkv", ".webm"):  # hold the length of a frame in nanoseconds, and its time in milliseconds
+    if suffix in (".mkv", ".webm"):  # store the length of each frame in nanoseconds, and its time in milliseconds
         assert movie.rate == rate or (fps == 59.94 and abs(1 / movie.rate - 1 / rate) <= Fraction(1, 10**9))
         assert all(abs(time - k / rate) <= Fraction(1, 2000) for k, time in enumerate(movie.times))
     else:
@@ -145,7 +145,7 @@ def test_ffmpeg_reads_our_gif_as_pillow_does(movies: dict[str, Decoded], array: 
 
 def test_a_gif_that_viewers_would_slow_down_is_refused(array: Path, tmp_path: Path) -> None:
     path = path_file(tmp_path, "fps = 60\n[[segments]]\nframes = 3\n")
-    with pytest.raises(OutputError, match=r"m\.gif: expected at most 50 frames a second, got 60"):
+    with pytest.raises(OutputError, match=r"m\.gif: expected at most 50 frames per second, got 60"):
         assemble(array, path, tmp_path / "m.gif")
     assert [file.name for file in tmp_path.iterdir()] == ["path.toml"]
 
@@ -166,7 +166,7 @@ def test_odd_sizes(tmp_path: Path, suffix: str) -> None:
 
 
 def shallow(c: int, l: int) -> Any:
-    """Linear radiance that rises by less than a code of 8 bits every few columns."""
+    """Linear radiance that rises by less than an 8-bit code every few columns."""
     x = np.linspace(0.10, 0.13, 256, dtype=np.float32)
     return np.broadcast_to(x[None, :, None], (32, 256, 3)) * np.float32([1.0, 0.9, 0.8])
 
@@ -184,10 +184,10 @@ def test_prores_holds_ten_bits_of_the_radiance(tmp_path: Path) -> None:
     fine, coarse = decoded(tmp_path / "m.mov"), decoded(tmp_path / "m.mp4")
     assert (fine.pixels, coarse.pixels) == ("yuv422p10le", "yuv420p")
     truth = luma_10(shallow(0, 0))
-    eight = srgb8_from_linear(shallow(0, 0)).astype(np.float64) / 255  # what the mp4 was fed with
+    eight = srgb8_from_linear(shallow(0, 0)).astype(np.float64) / 255  # the input of the mp4
     fed = 64 + 876 * (eight @ [0.2126, 0.7152, 0.0722])
     error = rms(fine.luma[0], truth)
-    assert error < rms(fed, truth)  # nearer than 8-bit codes are before any codec
+    assert error < rms(fed, truth)  # smaller than that of 8-bit codes before any codec
     assert error < rms(4.0 * coarse.luma[0], truth) / 2
     assert len(np.unique(fine.luma[0])) > 2 * len(np.unique(coarse.luma[0]))
 

@@ -1,4 +1,4 @@
-"""Light that changes over a movie: curves by hand, and pictures of the movie against pictures composed by hand."""
+"""Light that changes over a movie: curves, and pictures of the movie, against those computed here."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -18,9 +18,9 @@ from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.read import read_job
 from framearray_cli.tools.movie.assemble import assemble
-from framearray_cli.tools.movie.curves import at, relights
+from framearray_cli.tools.movie.curves import relights, value_at
 from framearray_cli.tools.movie.pathfile import MoviePath, load_movie_path
-from framearray_cli.tools.movie.timeline import timeline
+from framearray_cli.tools.movie.timeline import make_timeline
 
 JOBS = ROOT / "jobs"
 GREY = (1.0, 1.0, 1.0)
@@ -46,14 +46,14 @@ def lit(times: list[float], **changes: Any) -> list[Relight]:
 def test_a_curve_is_linear_between_key_frames_and_held_outside(keys: list[tuple[float, float]], time: float) -> None:
     keys = sorted({round(t, 2): v for t, v in keys}.items())
     times, values = [t for t, _ in keys], [v for _, v in keys]
-    found = at((times, [(v, v / 2, 0.0) for v in values]), time)
+    found = value_at((times, [(v, v / 2, 0.0) for v in values]), time)
     expected = np.interp(time, times, values)
     np.testing.assert_allclose(found, (expected, expected / 2, 0), rtol=1e-12, atol=1e-12)
 
 
 def test_two_key_frames_at_one_time_are_a_jump() -> None:
     curve = ([0.0, 1.0, 1.0, 2.0], [GREY, GREY, (3.0, 3.0, 3.0), GREY])
-    assert [at(curve, time)[0] for time in (0.5, 0.999999, 1.0, 1.5, 2.0)] == pytest.approx([1, 1, 3, 2, 1])
+    assert [value_at(curve, time)[0] for time in (0.5, 0.999999, 1.0, 1.5, 2.0)] == pytest.approx([1, 1, 3, 2, 1])
 
 
 def test_percentages_reach_from_the_first_frame_to_the_last() -> None:
@@ -69,8 +69,8 @@ def test_percentages_reach_from_the_first_frame_to_the_last() -> None:
     assert lit([0.0, 1.0]) == [AS_RENDERED] * 2
 
 
-def test_every_frame_is_lit_as_pictures_are_by_hand(array: Manifest, tmp_path: Path) -> None:
-    """Sums of the array's files in double precision, half a unit of the halves that they are written as apart."""
+def test_every_frame_has_the_light_of_its_time(array: Manifest, tmp_path: Path) -> None:
+    """Expected: sums of the array's files in double precision, to half a unit of the half floats in the frames."""
     text = """
 positions = "blend"
 [[segments]]
@@ -98,7 +98,7 @@ intensity = [{ time = 0, value = 1 }, { time = "50%", value = 0 }, { time = "100
                 i_a += factor * share * np.array(group.lights[l].ambient)
         made += abs(1 - 2 * t) * i_a * read[f"ambient.c{c:04d}.exr"]
         shown = read_image(tmp_path / f"f.{k}.exr")
-        # half a unit in the last place of a half, and positions rounded to a millionth
+        # half a unit in the last place of a half float, and positions rounded to a millionth
         np.testing.assert_allclose(shown, made, rtol=2**-11 + 5e-6, atol=1e-6)
         assert np.abs(shown - made).max() < 0.1 * np.abs(shown - Pictures(array).picture(c, (round(3 * t), 0))).max()
 
@@ -113,7 +113,7 @@ def test_codes_of_frames_are_those_of_the_pictures(array: Manifest, tmp_path: Pa
         np.testing.assert_array_equal(read_codes(tmp_path / f"f.{l}.png"), srgb8_from_linear(picture))
 
 
-def test_wrong_light_is_told_before_anything_is_written(array: Manifest, tmp_path: Path) -> None:
+def test_wrong_light_is_reported_before_anything_is_written(array: Manifest, tmp_path: Path) -> None:
     text = "[[segments]]\nframes = 3\nlight = 4\n[groups.moon]\nintensity = 2\n"
     text += "[groups.sun]\nintensity = [{ time = '50%', value = 1 }, { time = 0.02, value = 0 }]\n"
     with pytest.raises(JobError) as caught:
@@ -158,7 +158,7 @@ def test_messages(tmp_path: Path, text: str, problem: str) -> None:
 
 def test_the_example_with_light_fits_an_array_with_its_groups(array: Manifest) -> None:
     file = JOBS / "relight-movie.toml"
-    line = timeline(file, load_movie_path(file), array)
+    line = make_timeline(file, load_movie_path(file), array)
     assert (len(line.shots), line.shots[0].positions, line.shots[-1].positions) == (240, (0.0, 0.0), (3.0, 2.0))
     assert line.relights[0].groups == {"sun": GREY, "lamp": (0.0, 0.0, 0.0), "background": GREY}
     assert line.relights[-1].groups["sun"] == (0.0, 0.0, 0.0)

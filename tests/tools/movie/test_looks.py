@@ -13,7 +13,7 @@ from framearray_cli.base.errors import JobError
 from framearray_cli.tools.movie.assemble import assemble
 from framearray_cli.tools.movie.display import SRGB, find_view
 from framearray_cli.tools.movie.label import burn
-from framearray_cli.tools.movie.look import Look, place_text, shown
+from framearray_cli.tools.movie.look import Look, screen_codes, shot_label
 from framearray_cli.tools.movie.timeline import Shot
 
 GREYS = np.repeat(np.float32([0, 0.02, 0.18, 0.5, 1, 2, 4, 10, 100, 1000])[None, :, None], 3, axis=2)
@@ -40,19 +40,21 @@ def image(seed: int = 0) -> Any:
 
 
 def test_srgb_is_what_png_files_hold() -> None:
-    np.testing.assert_array_equal(shown(image(), Look(), ""), srgb8_from_linear(image()))
-    assert shown(GREYS, Look(), "", 16).dtype == np.uint16
-    fine = shown(image(), Look(), "", 16) / 257
-    assert np.abs(fine - shown(image(), Look(), "").astype(float)).max() < 0.55
+    np.testing.assert_array_equal(screen_codes(image(), Look(), ""), srgb8_from_linear(image()))
+    assert screen_codes(GREYS, Look(), "", 16).dtype == np.uint16
+    fine = screen_codes(image(), Look(), "", 16) / 257
+    assert np.abs(fine - screen_codes(image(), Look(), "").astype(float)).max() < 0.55
 
 
 @pytest.mark.parametrize("bits", [8, 16])
 def test_exposure_doubles_radiance(bits: Any) -> None:
-    np.testing.assert_array_equal(shown(image(), Look(exposure=-1.0), "", bits), shown(image() / 2, Look(), "", bits))
+    np.testing.assert_array_equal(
+        screen_codes(image(), Look(exposure=-1.0), "", bits), screen_codes(image() / 2, Look(), "", bits)
+    )
 
 
 def test_aces_rolls_off() -> None:
-    """White stays below 1, the order of greys is kept, highlights that sRGB clips differ; black is black."""
+    """White stays below 1, greys keep their order, highlights that sRGB clips differ; black is black."""
     codes = find_view("aces").encode(GREYS)[0, :, 0]
     plain_codes = SRGB.encode(GREYS)[0, :, 0]
     assert codes[0] == pytest.approx(0, abs=1e-3)
@@ -69,7 +71,7 @@ def test_aces_is_that_of_opencolorio() -> None:
 
 
 def test_the_table_is_as_good_as_the_transform_for_8_bits() -> None:
-    """In believable colours the error is below rounding to codes, 12^-1/2 = 0.29; single ones are off by up to 3."""
+    """In plausible colours the RMS error is below that of rounding, 12^-1/2 = 0.29 codes; the largest is below 3."""
     rng = np.random.default_rng(3)
     view = find_view("aces")
     bright = np.exp(rng.normal(-1.5, 1.5, (60, 80, 1))).astype(np.float32)
@@ -81,7 +83,7 @@ def test_the_table_is_as_good_as_the_transform_for_8_bits() -> None:
     assert np.abs(greys).max() < 0.5
     beyond = np.float32([[[-1.0, 2000.0, 0.0]]])
     np.testing.assert_allclose(view.quick(beyond), view.quick(np.clip(beyond, 0, 1024)), atol=1e-6)
-    other = 255 * (view.quick(GREYS * 1.05) - view.encode(GREYS))  # a twentieth brighter would be seen
+    other = 255 * (view.quick(GREYS * 1.05) - view.encode(GREYS))  # the comparison sees a twentieth of brightness
     assert np.abs(other).max() > 2
 
 
@@ -105,7 +107,7 @@ def test_views_of_a_configuration(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         find_view("Film")
 
 
-def test_what_a_configuration_lacks_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_configuration_lacks_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     config = tmp_path / "studio.ocio"
     config.write_text(CONFIG.replace("SPACES", "other"), encoding="utf-8")
     monkeypatch.setenv("OCIO", str(config))
@@ -116,7 +118,7 @@ def test_what_a_configuration_lacks_is_told(tmp_path: Path, monkeypatch: pytest.
         find_view("Half")
 
 
-def test_views_that_come_along(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_views_of_the_configuration_inside_opencolorio(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("OCIO", raising=False)
     white = find_view("Un-tone-mapped").encode(np.ones((1, 1, 3), np.float32))
     np.testing.assert_allclose(white, 1.0, atol=1e-4)
@@ -151,9 +153,9 @@ def test_labels_differ_and_fit_into_the_smallest_picture() -> None:
 
 def test_labels_say_the_place(tmp_path: Path) -> None:
     array, lamp = plain(tmp_path / "a", 2, 2), grouped(tmp_path / "b")
-    assert place_text(array, Shot(12, (3,))) == "c 12  l 3"
-    assert place_text(array, Shot(12, (3.256,))) == "c 12  l 3.26"
-    assert place_text(lamp, Shot(1, (3.0, 0.5))) == "c 1  light 3  lamp 0.5"
+    assert shot_label(array, Shot(12, (3,))) == "c 12  l 3"
+    assert shot_label(array, Shot(12, (3.256,))) == "c 12  l 3.26"
+    assert shot_label(lamp, Shot(1, (3.0, 0.5))) == "c 1  light 3  lamp 0.5"
 
 
 def test_every_frame_has_its_own_label(tmp_path: Path) -> None:

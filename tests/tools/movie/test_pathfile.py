@@ -9,13 +9,13 @@ from support.movies import array_of
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.errors import JobError
 from framearray_cli.tools.movie.pathfile import load_movie_path, movie_fps
-from framearray_cli.tools.movie.timeline import timeline
+from framearray_cli.tools.movie.timeline import make_timeline
 
 JOBS = ROOT / "jobs"
 
 
 def pairs_of(file: Path, manifest: Manifest) -> list[tuple[int, int]]:
-    return [(shot.c, *shot.positions) for shot in timeline(file, load_movie_path(file), manifest).shots]
+    return [(shot.c, *shot.positions) for shot in make_timeline(file, load_movie_path(file), manifest).shots]
 
 
 def frames_of(tmp_path: Path, text: str, n_cameras: int = 10, n_lights: int = 5) -> list[tuple[int, int]]:
@@ -122,17 +122,17 @@ def test_the_papers_first_movie_fits_any_array(size: tuple[int, int]) -> None:
 def test_the_example_of_easing_fits_any_array(size: tuple[int, int]) -> None:
     """3 s and a hold, two halves of a walk and a hold, four swings, the walk backwards: 16.5 s."""
     file = JOBS / "easing-movie.toml"
-    shots = timeline(file, load_movie_path(file), array_of(*size)).shots
+    shots = make_timeline(file, load_movie_path(file), array_of(*size)).shots
     assert len(shots) == 396
     light = [shot.positions[0] for shot in shots]
-    assert light[71:84] == [size[1] - 1] * 13  # the end of the light's way, held for half a second
+    assert light[71:84] == [size[1] - 1] * 13  # the light at its end, held for half a second
     assert [light[203 + 36 * k] / max(1, size[1] - 1) for k in range(5)] == [0.5, 1, 0.5, 1, 0.5] or size[1] == 1
     assert (shots[203].c, shots[348].c, shots[-1].c) == (size[0] - 1, size[0] - 1, 0)
     assert any(x != int(x) for x in light[:72]) == (size[1] > 1)
     assert all(x == int(x) for x in light[348:])
 
 
-def test_indices_outside_of_the_array_are_all_named(tmp_path: Path) -> None:
+def test_all_indices_outside_the_array_are_named(tmp_path: Path) -> None:
     text = segments("frames = 2\ncamera = [0, 10]\nlight = -6", "frames = 2\nlight = [5, 2]")
     assert problems_of(tmp_path, text) == [
         "segments[0].camera: expected one of 10 cameras (0 to 9, or -10 to -1), got 10",
@@ -195,7 +195,7 @@ def test_a_missing_file_is_a_job_error(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("place", ["camera", "light"])
-def test_a_place_beyond_all_numbers_is_told(tmp_path: Path, place: str) -> None:
+def test_a_place_beyond_all_numbers_is_reported(tmp_path: Path, place: str) -> None:
     [found] = problems_of(tmp_path, segments(f"frames = 2\n{place} = [0, {10**400}]"))
     assert found == (
         f'segments[0].{place}[1]: expected an index, "first", "last" or a percentage such as "50%", '

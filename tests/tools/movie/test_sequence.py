@@ -1,4 +1,4 @@
-"""Image sequences: links, copies and conversions; what is left after a failure."""
+"""Image sequences: links, copies and conversions; the folder after a failure."""
 
 import errno
 import os
@@ -32,7 +32,7 @@ def array(tmp_path: Path) -> Manifest:
 
 
 @pytest.mark.parametrize("extension", ["exr", "png"])
-def test_what_stays_as_it_is_is_linked(tmp_path: Path, extension: str) -> None:
+def test_unchanged_images_are_linked(tmp_path: Path, extension: str) -> None:
     array = plain(tmp_path / "out", extension=extension)
     assemble(array.directory, path_file(tmp_path, WALK), tmp_path / "cut" / f"f.###.{extension}")
     for k, c in enumerate(EYES):
@@ -55,8 +55,8 @@ def test_where_links_are_not_possible_images_are_copied(
         assert made.read_bytes() == own.read_bytes()
 
 
-def test_written_again_the_array_stays_whole(array: Manifest, tmp_path: Path) -> None:
-    """The second time a link takes the place of a link to the same file, or of one to another."""
+def test_writing_a_sequence_twice_keeps_the_array(array: Manifest, tmp_path: Path) -> None:
+    """The second time a link replaces a link to the same file, or to another."""
     path = path_file(tmp_path, WALK)
     before = {file.name: file.read_bytes() for file in array.directory.iterdir()}
     assemble(array.directory, path, tmp_path / "f.###.exr")
@@ -76,7 +76,7 @@ def test_a_held_picture_is_converted_once(array: Manifest, tmp_path: Path, monke
     np.testing.assert_array_equal(read_codes(tmp_path / "f.1.png"), read_codes(tmp_path / "f.2.png"))
 
 
-def test_blended_exr_frames_are_linear_and_say_where_they_are(array: Manifest, tmp_path: Path) -> None:
+def test_blended_exr_frames_are_linear_and_name_their_place(array: Manifest, tmp_path: Path) -> None:
     import OpenImageIO
 
     text = 'positions = "blend"\n[[segments]]\nframes = 5\ncamera = 1\nlight = [0, 1]\n'
@@ -104,20 +104,16 @@ def test_an_array_with_groups_is_composed_in_its_own_format(tmp_path: Path) -> N
 @pytest.mark.parametrize("look", [Look(exposure=1), Look(label=True)])
 @pytest.mark.parametrize("extension", ["exr", "tif"])
 def test_radiance_is_not_changed(array: Manifest, tmp_path: Path, look: Look, extension: str) -> None:
-    with pytest.raises(
-        OutputError, match=rf"{look.changes[0]} changes movies, PNG and JPEG alone; \.{extension} keeps"
-    ):
+    with pytest.raises(OutputError, match=rf"{look.changes[0]} changes only movies, PNG and JPEG; \.{extension} keeps"):
         assemble(array.directory, path_file(tmp_path, WALK), tmp_path / f"f.#.{extension}", look=look)
 
 
-# what is wrong with images
+# broken images
 
 
 @pytest.mark.parametrize("extension", ["exr", "tif", "png", "jpg"])
 @pytest.mark.parametrize("target", ["m.mp4", "m.gif", "f.##.png", "f.##.exr"])
-def test_an_image_that_was_cut_short_is_named_before_anything_is_made(
-    tmp_path: Path, extension: str, target: str
-) -> None:
+def test_a_truncated_image_is_named_before_anything_is_written(tmp_path: Path, extension: str, target: str) -> None:
     array = plain(tmp_path / "out", extension=extension)
     path, seen = path_file(tmp_path, WALK), []
     for c in (2, 4):
@@ -131,14 +127,14 @@ def test_an_image_that_was_cut_short_is_named_before_anything_is_made(
     assert (tmp_path / "m.mp4").read_bytes() == b"an earlier movie"
 
 
-def test_damage_inside_of_an_image_is_found_when_it_is_read(tmp_path: Path) -> None:
+def test_damage_inside_an_image_is_found_when_it_is_read(tmp_path: Path) -> None:
     array = plain(tmp_path / "out")
     file = image_path(array, 3, 1)
     write_image(file, barred(3, 1), ImageFormat(compression="zip"))
     data = bytearray(file.read_bytes())
     data[len(data) // 2 : len(data) // 2 + 200] = bytes(200)
     file.write_bytes(data)
-    check_image(file, array.resolution)  # whole, as far as a quick look tells
+    check_image(file, array.resolution)  # whole to a quick check
     for target in ("m.mp4", "m.webp", "f.##.png", "deep/er/f.##.jpg", "deep/m.gif"):
         with pytest.raises(OutputError, match=r"c0003\.l001\.exr: "):
             assemble(array.directory, path_file(tmp_path, WALK), tmp_path / target)
@@ -146,16 +142,16 @@ def test_damage_inside_of_an_image_is_found_when_it_is_read(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("extension", ["exr", "tif", "png", "jpg"])
-def test_a_quick_look(tmp_path: Path, extension: Any) -> None:
+def test_the_quick_check_of_images(tmp_path: Path, extension: Any) -> None:
     file = tmp_path / f"a.{extension}"
     write_image(file, np.full((12, 16, 3), 0.5, np.float32), ImageFormat(format=extension))
     check_image(file, (16, 12))
     with pytest.raises(OutputError, match=r"expected 12 x 16 pixels, got 16 x 12"):
         check_image(file, (12, 16))
-    if extension in ("png", "jpg"):  # bytes of other programs behind the end
+    if extension in ("png", "jpg"):  # other programs append bytes
         file.write_bytes(file.read_bytes() + b"more")
         check_image(file, (16, 12))
-    if extension == "png":  # Pillow decodes such an image without a word
+    if extension == "png":  # Pillow decodes such an image without an error
         data = bytearray(file.read_bytes())
         data[data.index(b"IDAT") + 20] ^= 1
         file.write_bytes(data)
@@ -185,7 +181,7 @@ def test_an_interrupt_leaves_nothing(array: Manifest, tmp_path: Path, target: st
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out", "path.toml"]
 
 
-def test_an_interrupt_while_frames_are_moved_waits_until_all_are(
+def test_an_interrupt_while_frames_are_moved_waits_for_all(
     array: Manifest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     moved: list[str] = []

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestGroup, ManifestLight
 from framearray_cli.array.names import file_patterns
 from framearray_cli.base.errors import JobError
-from framearray_cli.tools.movie.easing import eased
+from framearray_cli.tools.movie.easing import eased_share
 from framearray_cli.tools.movie.pathfile import MoviePath, Segment
-from framearray_cli.tools.movie.sweep import Sweep, swept
-from framearray_cli.tools.movie.timeline import Shot, timeline
-from framearray_cli.tools.places import along, read_place
+from framearray_cli.tools.movie.sweep import Sweep, sweep_path
+from framearray_cli.tools.movie.timeline import Shot, make_timeline
+from framearray_cli.tools.places import interpolate_span, read_place
 
 N_C, N_L, N_LAMPS = 20, 9, 5
 LIGHT = ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=())
@@ -54,7 +54,7 @@ SEGMENTS = st.fixed_dictionaries(
 
 def shots(*segments: dict[str, Any], manifest: Manifest = PLAIN, **more: Any) -> list[Shot]:
     movie = MoviePath.model_validate({"segments": list(segments), **more})
-    return list(timeline("path", movie, manifest).shots)
+    return list(make_timeline("path", movie, manifest).shots)
 
 
 def problems(manifest: Manifest, *segments: dict[str, Any], **more: Any) -> list[str]:
@@ -65,27 +65,27 @@ def problems(manifest: Manifest, *segments: dict[str, Any], **more: Any) -> list
 
 @given(ease=EASES, t=st.floats(0, 1))
 def test_easing_goes_from_0_to_1_and_never_back(ease: Any, t: float) -> None:
-    assert (eased(0.0, ease), eased(1.0, ease)) == (0.0, 1.0)
-    assert 0 <= eased(t, ease) <= 1
-    assert eased(t, ease) <= eased(min(1.0, t + 0.01), ease) + 1e-12
-    assert eased(1 - t, "out") == pytest.approx(1 - eased(t, "in"))
-    assert eased(1 - t, "in-out") == pytest.approx(1 - eased(t, "in-out"), abs=1e-12)
+    assert (eased_share(0.0, ease), eased_share(1.0, ease)) == (0.0, 1.0)
+    assert 0 <= eased_share(t, ease) <= 1
+    assert eased_share(t, ease) <= eased_share(min(1.0, t + 0.01), ease) + 1e-12
+    assert eased_share(1 - t, "out") == pytest.approx(1 - eased_share(t, "in"))
+    assert eased_share(1 - t, "in-out") == pytest.approx(1 - eased_share(t, "in-out"), abs=1e-12)
 
 
 @pytest.mark.parametrize(("ease", "start", "end"), [("in", 0, 2), ("out", 2, 0), ("in-out", 0, 0), ("linear", 1, 1)])
 def test_speed_at_both_ends(ease: Any, start: float, end: float) -> None:
     h = 1e-6
-    assert eased(h, ease) / h == pytest.approx(start, abs=1e-5)
-    assert (1 - eased(1 - h, ease)) / h == pytest.approx(end, abs=1e-5)
+    assert eased_share(h, ease) / h == pytest.approx(start, abs=1e-5)
+    assert (1 - eased_share(1 - h, ease)) / h == pytest.approx(end, abs=1e-5)
 
 
 @given(span=st.lists(st.floats(0, 100), min_size=1, max_size=6), u=st.floats(0, 1))
 def test_places_of_a_span_are_met_at_even_times(span: list[float], u: float) -> None:
     last = len(span) - 1
     for k, place in enumerate(span):
-        assert along(span, k / last if last else 0.0) == pytest.approx(place, abs=1e-9)
-    assert along(span, 1.0) == span[-1]
-    assert min(span) - 1e-9 <= along(span, u) <= max(span) + 1e-9
+        assert interpolate_span(span, k / last if last else 0.0) == pytest.approx(place, abs=1e-9)
+    assert interpolate_span(span, 1.0) == span[-1]
+    assert min(span) - 1e-9 <= interpolate_span(span, u) <= max(span) + 1e-9
 
 
 @given(segment=SEGMENTS)
@@ -110,9 +110,9 @@ def test_back_and_forth_is_every_second_one_reversed(segment: dict[str, Any], lo
     assert shots({**segment, "loops": loops, "back_and_forth": True}) == shots(*written)
 
 
-def test_back_and_forth_alone_is_there_and_back() -> None:
+def test_back_and_forth_without_loops_is_two_passes() -> None:
     frames = shots({"frames": 4, "camera": [0, 3], "back_and_forth": True})
-    assert [shot.c for shot in frames] == [0, 1, 2, 3, 2, 2, 1, 0]  # the turn is shown once: four steps over three
+    assert [shot.c for shot in frames] == [0, 1, 2, 3, 2, 2, 1, 0]  # the turn is shown once, then four steps back
 
 
 @given(segment=SEGMENTS, hold=st.floats(0, 3), loops=st.integers(1, 3))
@@ -130,8 +130,8 @@ def test_the_number_of_frames_is_the_one_asked_for(segments: list[dict[str, Any]
 
 
 @given(cut=st.integers(1, 11), mode=st.sampled_from(["nearest", "blend"]))
-def test_a_movement_cut_in_two_runs_on_evenly(cut: int, mode: str) -> None:
-    """13 frames from 0 to 12, a camera a frame, cut at one of them."""
+def test_a_movement_cut_in_two_keeps_its_pace(cut: int, mode: str) -> None:
+    """13 frames from 0 to 12, one camera per frame, cut at one of them."""
     whole = shots({"frames": 13, "camera": [0, 12], "light": [0, 6]}, positions=mode)
     halves = shots(
         {"frames": cut + 1, "camera": [0, cut], "light": [0, cut / 2]},
@@ -143,7 +143,7 @@ def test_a_movement_cut_in_two_runs_on_evenly(cut: int, mode: str) -> None:
 
 @given(segment=SEGMENTS)
 def test_frames_move_by_no_more_than_their_speed(segment: dict[str, Any]) -> None:
-    """The steepest of an easing is 2; the longest leg of a span is the whole axis."""
+    """The steepest slope of an easing is 2; the longest leg of a span is the whole axis."""
     found = shots({**segment, "positions": "blend"})
     legs = max(1, len(segment["light"]) - 1)
     fastest = 2 * legs * (N_L - 1) / (segment["frames"] - 1)
@@ -180,7 +180,7 @@ def test_further_axes() -> None:
     assert [shot.positions for shot in found] == [(0, 4), (2, 3), (4, 2), (4, 2), (4, 2)]
 
 
-def test_axes_and_places_that_an_array_has_not_are_all_named() -> None:
+def test_all_axes_and_places_that_an_array_lacks_are_named() -> None:
     assert problems(GROUPED, {"frames": 2, "axes": {"lmaps": 1, "lamps": [0, 5]}}, {"frames": 1, "light": 9}) == [
         "segments[0].axes.lamps: expected one of 5 places of lamps (0 to 4, or -5 to -1), got 5",
         "segments[0].axes.lmaps: no such light axis; the array has light, lamps",
@@ -201,7 +201,7 @@ def test_too_many_frames_are_refused_before_they_are_listed() -> None:
 
 
 def swept_shots(kind: Any, manifest: Manifest = PLAIN, **more: Any) -> list[Shot]:
-    return list(timeline(kind, swept(Sweep(kind=kind, **more), manifest), manifest).shots)
+    return list(make_timeline(kind, sweep_path(Sweep(kind=kind, **more), manifest), manifest).shots)
 
 
 def test_movements_show_every_image_on_their_way_once() -> None:
