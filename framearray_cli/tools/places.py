@@ -22,7 +22,7 @@ from framearray_cli.base.forms.words import shown
 IndexPlace: TypeAlias = int | float | str
 LightIndices: TypeAlias = tuple[int, ...]  # one index per light axis, in the order of `Manifest.axes`
 
-ALL, MIDDLE = "all", "50%"
+ALL_PLACES, MIDDLE_PLACE = "all", "50%"
 _WANTED = 'expected an index, "first", "last" or a percentage such as "50%"'
 _WANTED_LIST = '"all", or indices, "first", "last" or percentages with commas between them'
 _WHOLE_INDEX = r"[+-]?\d{1,9}"
@@ -146,7 +146,7 @@ def read_indices(option: str, text: str, n: int) -> tuple[int, ...]:
     Raises:
         JobError: the text is none of these, or a place lies outside the axis.
     """
-    if text.strip() == ALL:
+    if text.strip() == ALL_PLACES:
         return tuple(range(n))
     found: dict[int, None] = {}
     for place in (part.strip() for part in text.split(",")):

@@ -26,15 +26,15 @@ from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.words import shown
 
 from .movie.label import typeface
-from .places import MIDDLE, LightIndices, evenly_spaced, read_light_indices
+from .places import MIDDLE_PLACE, LightIndices, evenly_spaced, read_light_indices
 from .progress import Progress
 
-COLUMNS, ROWS = 12, 8  # for an array of 192 x 48: 200 pixels per tile, on a sheet that fits a screen
+MOST_COLUMNS, MOST_ROWS = 12, 8  # for an array of 192 x 48: 200 pixels per tile, on a sheet that fits a screen
 WIDTH = 2400  # pixels
 LEAST_TILE = 8  # pixels; smaller ones show nothing
 
 # sRGB codes, all neutral: a dark grey that neither dazzles nor tints the images on it.
-BACKGROUND, HEADING, LABEL = 38, 225, 160
+SHEET_GREY, HEADING, LABEL = 38, 225, 160
 GAP, MARGIN = 4, 24  # pixels
 HEAD_TEXT, LABEL_TEXT = 22, 15  # height of the letters' boxes, pixels
 
@@ -60,8 +60,8 @@ def make_sheet(
     out: Path,
     target: Path,
     *,
-    columns: int = COLUMNS,
-    rows: int = ROWS,
+    columns: int = MOST_COLUMNS,
+    rows: int = MOST_ROWS,
     width: int = WIDTH,
     exposure: float = 0.0,
     side: str | None = None,
@@ -147,7 +147,7 @@ def _read_fixed_lights(manifest: Manifest, axis: str, at: Sequence[str]) -> Ligh
         raise JobError("--side", [f"expected one of the axes {', '.join(manifest.axes)}, got {shown(axis)}"])
     if any(text.partition("=")[0] == axis for text in at):
         raise JobError("--at", [f"expected other axes than {axis}, all of which is shown"])
-    found = read_light_indices(manifest, None, at, MIDDLE)
+    found = read_light_indices(manifest, None, at, MIDDLE_PLACE)
     if len(found) != 1:
         raise JobError("--at", ["expected one place for each axis, got several"])
     return found[0]
@@ -213,7 +213,7 @@ def _draw_sheet(
     head_width = 2 * MARGIN + HEAD_TEXT + int(_length(heads[0], HEAD_TEXT) + _length(heads[1])) + 1
     sheet_width = max(left + n_columns * step_x - GAP + MARGIN, min(head_width, width))
     height = top + n_rows * step_y - GAP + MARGIN
-    sheet = np.full((height, sheet_width, 3), BACKGROUND, np.uint8)
+    sheet = np.full((height, sheet_width, 3), SHEET_GREY, np.uint8)
     for j in range(n_rows):
         for i in range(n_columns):
             x, y = left + i * step_x, top + j * step_y

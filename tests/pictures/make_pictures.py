@@ -23,7 +23,7 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import eyes, lights
-from framearray_cli.tools.movie.assemble import assemble
+from framearray_cli.tools.movie.assemble import assemble_movie
 from framearray_cli.tools.movie.look import Look
 from framearray_cli.tools.sheet import make_sheet
 
@@ -142,7 +142,7 @@ def evening(folder: Path) -> Path:
 
 def relit(width: int, rendered: Path, folder: Path) -> Image.Image:
     """Every thirtieth frame of jobs/relight-movie.toml."""
-    assemble(rendered, ROOT / "jobs" / "relight-movie.toml", folder / "f.###.png", look=Look(label=True))
+    assemble_movie(rendered, ROOT / "jobs" / "relight-movie.toml", folder / "f.###.png", look=Look(label=True))
     frames = [Image.open(folder / f"f.{k:03d}.png") for k in range(15, 240, 30)]
     size = width, round(frames[0].height * width / frames[0].width)
     small = [frame.resize(size, Image.Resampling.LANCZOS) for frame in frames]

@@ -15,7 +15,7 @@ from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.render.render import render
-from framearray_cli.tools.movie.assemble import assemble
+from framearray_cli.tools.movie.assemble import assemble_movie
 from framearray_cli.tools.movie.pathfile import load_movie_path
 from framearray_cli.tools.movie.timeline import make_timeline
 
@@ -48,7 +48,7 @@ def check_movies(array: Manifest, folder: Path, containers: tuple[str, ...]) -> 
         path = path_file(folder, f"[[segments]]\nframes = 26\n{text.format(at=2)}\n")
         shots = make_timeline(path, load_movie_path(path), array).shots
         for suffix in containers:
-            result = assemble(array.directory, path, folder / f"m{suffix}")
+            result = assemble_movie(array.directory, path, folder / f"m{suffix}")
             movie = decoded(folder / f"m{suffix}")
             assert (len(movie.frames), result.n_frames) == (26, 26)
             assert movie.rate in (None, 24)
@@ -111,7 +111,7 @@ def test_a_movie_lit_by_curves_is_a_render_with_those_intensities(tmp_path: Path
     """Frame k has eye k, lamp k, and sun and lamp as bright as the curves say; the render has them at light index k."""
     grouped = room(tmp_path / "groups", [LAMP, SUN])
     assert grouped.axes == {"light": 1, "lamp": 3}
-    assemble(grouped.directory, path_file(tmp_path, CURVES), tmp_path / "f.#.exr")
+    assemble_movie(grouped.directory, path_file(tmp_path, CURVES), tmp_path / "f.#.exr")
     sources = []
     for group, power in (("lamp", "intensity"), ("sun", "irradiance")):
         lights = next(found.lights for found in grouped.groups if found.name == group)

@@ -14,7 +14,7 @@ from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.tools.sheet import BACKGROUND, GAP, area_mean, make_sheet
+from framearray_cli.tools.sheet import GAP, SHEET_GREY, area_mean, make_sheet
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def test_the_mean_of_areas_is_a_plain_mean_where_pixels_fit() -> None:
 def blocks(codes: np.ndarray, tile: tuple[int, int]) -> list[list[np.ndarray]]:
     """Cut a sheet at its background into images: rows of columns."""
     # Letters stand above and to the left; the images end at the margins of the right and the bottom.
-    covered = (np.abs(codes.astype(int) - BACKGROUND) > 12).any(-1)
+    covered = (np.abs(codes.astype(int) - SHEET_GREY) > 12).any(-1)
     bottom, right = np.flatnonzero(covered.any(1))[-1] + 1, np.flatnonzero(covered.any(0))[-1] + 1
     found = []
     for y in range(bottom - tile[1], 70, -tile[1] - GAP):
@@ -93,7 +93,7 @@ def test_exposure_brightens_images(array: Manifest, tmp_path: Path) -> None:
 def test_labels_and_counts_are_drawn(array: Manifest, tmp_path: Path) -> None:
     make_sheet(array.directory, tmp_path / "s.png")
     codes = read_codes(tmp_path / "s.png")
-    written = (codes != BACKGROUND).any(-1)
+    written = (codes != SHEET_GREY).any(-1)
     assert written[:50].any(), "the head line"
     assert written[55:75].any(), "cameras along the top"
     assert written[85:, 20:70].any(), "lights along the side"

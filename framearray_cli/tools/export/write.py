@@ -14,7 +14,7 @@ from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import whole_folder
 
-from ..places import ALL, MIDDLE, read_indices, read_light_indices
+from ..places import ALL_PLACES, MIDDLE_PLACE, read_indices, read_light_indices
 from ..progress import Progress
 from . import cinema, colmap, nerfstudio
 from .folder import find_earlier_export, put_picture
@@ -51,7 +51,7 @@ def export_array(
     target: Path,
     kind: ExportKind,
     *,
-    cameras: str = ALL,
+    cameras: str = ALL_PLACES,
     light: str | None = None,
     at: Sequence[str] = (),
     image_format: ImageFormat | None = None,
@@ -83,7 +83,7 @@ def export_array(
     selection = Selection(
         manifest=manifest,
         cameras=tuple(sorted(read_indices("--cameras", cameras, manifest.n_cameras))),
-        lights=tuple(sorted(read_light_indices(manifest, light, at, ALL if kind == "cinema" else MIDDLE))),
+        lights=tuple(sorted(read_light_indices(manifest, light, at, ALL_PLACES if kind == "cinema" else MIDDLE_PLACE))),
     )
     if kind not in EXPORT_KINDS:
         raise JobError("--format", [f"expected {', '.join(EXPORT_KINDS)}, got {kind!r}"])

@@ -54,7 +54,7 @@ class AssembleResult:
         return self.n_frames / self.fps
 
 
-def assemble(
+def assemble_movie(
     out: Path,
     path: Path | Sweep,
     target: Path,

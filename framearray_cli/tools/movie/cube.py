@@ -11,12 +11,12 @@ from framearray_cli.base.arrays import Float32, Image
 
 Encode: TypeAlias = Callable[[Image], Float32]
 
-# Nodes along each of red, green and blue, spaced evenly in log(1 + x / KNEE) from 0 to BRIGHTEST. 97 nodes
+# Nodes along each of red, green and blue, spaced evenly in log(1 + x / KNEE) from 0 to LAST_NODE. 97 nodes
 # would halve the error, and take three times as long to fill.
 NODES = 65
 KNEE = 0.02
-BRIGHTEST = 1024.0  # radiance; ACES shows anything brighter as white
-_SPAN = float(np.log1p(BRIGHTEST / KNEE))
+LAST_NODE = 1024.0  # radiance; ACES shows anything brighter as white
+_SPAN = float(np.log1p(LAST_NODE / KNEE))
 
 
 def tabulate(encode: Encode) -> Encode:
@@ -36,7 +36,7 @@ def tabulate(encode: Encode) -> Encode:
 
 def _interpolate(table: Float32, image: Image) -> Float32:
     """Sum the eight nodes around each colour, by weight."""
-    steps = np.log1p(np.clip(image.reshape(-1, 3), 0, BRIGHTEST) / np.float32(KNEE)) * np.float32((NODES - 1) / _SPAN)
+    steps = np.log1p(np.clip(image.reshape(-1, 3), 0, LAST_NODE) / np.float32(KNEE)) * np.float32((NODES - 1) / _SPAN)
     low = np.minimum(steps.astype(np.int32), NODES - 2)
     share: NDArray[Any] = (steps - low).astype(np.float32)
     first = (low[:, 0] * NODES + low[:, 1]) * NODES + low[:, 2]

@@ -18,7 +18,7 @@ from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.names import file_patterns
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, MissingExtraError, OutputError
-from framearray_cli.tools.movie.assemble import assemble
+from framearray_cli.tools.movie.assemble import assemble_movie
 from framearray_cli.tools.movie.look import Look
 
 av = pytest.importorskip("av")
@@ -120,7 +120,7 @@ def shows(codes: np.ndarray) -> tuple[int, int]:
 def test_every_frame_of_a_movie_shows_its_image(out: Path, path_file: Path, tmp_path: Path, suffix: str) -> None:
     target = tmp_path / f"movie{suffix}"
     seen: list[tuple[int, int]] = []
-    result = assemble(out, path_file, target, progress=lambda done, total: seen.append((done, total)))
+    result = assemble_movie(out, path_file, target, progress=lambda done, total: seen.append((done, total)))
     frames, stream = decoded(target)
     assert [shows(frame) for frame in frames] == FRAMES
     assert stream.average_rate == 24
@@ -132,7 +132,7 @@ def test_every_frame_of_a_movie_shows_its_image(out: Path, path_file: Path, tmp_
 
 def test_colours_are_those_of_the_images(out: Path, path_file: Path, tmp_path: Path) -> None:
     """The matrix of Rec. 601 in a file that says Rec. 709 would shift red and green by up to 20 codes."""
-    assemble(out, path_file, tmp_path / "movie.mp4")
+    assemble_movie(out, path_file, tmp_path / "movie.mp4")
     frames, stream = decoded(tmp_path / "movie.mp4")
     for (c, l), frame in zip(FRAMES, frames, strict=True):
         difference = frame.astype(int) - srgb8_from_linear(picture(c, l))
@@ -144,7 +144,7 @@ def test_colours_are_those_of_the_images(out: Path, path_file: Path, tmp_path: P
 
 
 def test_the_index_comes_first(out: Path, path_file: Path, tmp_path: Path) -> None:
-    assemble(out, path_file, tmp_path / "movie.mp4")
+    assemble_movie(out, path_file, tmp_path / "movie.mp4")
     data = (tmp_path / "movie.mp4").read_bytes()
     assert 0 < data.index(b"moov") < data.index(b"mdat")
 
@@ -152,7 +152,7 @@ def test_the_index_comes_first(out: Path, path_file: Path, tmp_path: Path) -> No
 @pytest.mark.parametrize(("fps", "rate"), [(23.976, "24000/1001"), (12.5, "25/2"), (60, "60")])
 def test_rates_are_exact(out: Path, path_file: Path, tmp_path: Path, fps: float, rate: str) -> None:
     path_file.write_text(f"fps = {fps}\n" + path_file.read_text(encoding="utf-8"), encoding="utf-8")
-    assemble(out, path_file, tmp_path / "movie.mp4")
+    assemble_movie(out, path_file, tmp_path / "movie.mp4")
     frames, stream = decoded(tmp_path / "movie.mp4")
     assert len(frames) == 11
     assert stream.average_rate == Fraction(rate)
@@ -160,7 +160,7 @@ def test_rates_are_exact(out: Path, path_file: Path, tmp_path: Path, fps: float,
 
 def test_odd_sizes_are_padded(path_file: Path, tmp_path: Path) -> None:
     make_array(tmp_path / "out", width=63, height=47)
-    assemble(tmp_path / "out", path_file, tmp_path / "movie.mp4")
+    assemble_movie(tmp_path / "out", path_file, tmp_path / "movie.mp4")
     frames, _ = decoded(tmp_path / "movie.mp4")
     assert frames[0].shape == (48, 64, 3)
     assert [shows(frame) for frame in frames] == FRAMES
@@ -169,7 +169,7 @@ def test_odd_sizes_are_padded(path_file: Path, tmp_path: Path) -> None:
 
 def test_exposure_brightens_a_movie(path_file: Path, tmp_path: Path) -> None:
     make_array(tmp_path / "out", "exr")
-    assemble(tmp_path / "out", path_file, tmp_path / "dark.mp4", look=Look(exposure=-2))
+    assemble_movie(tmp_path / "out", path_file, tmp_path / "dark.mp4", look=Look(exposure=-2))
     frames, _ = decoded(tmp_path / "dark.mp4")
     expected = srgb8_from_linear(picture(4, 3) / 4)
     assert np.abs(frames[7][4:-4, 4:28].mean(axis=(0, 1)) - expected[0, 0]).max() < 2.5
@@ -185,8 +185,8 @@ def test_movies_need_the_extra(out: Path, path_file: Path, tmp_path: Path, monke
 
     monkeypatch.setattr(builtins, "__import__", without_av)
     with pytest.raises(MissingExtraError, match=r'pip install "framearray\[movie\]"'):
-        assemble(out, path_file, tmp_path / "movie.mp4")
-    assemble(out, path_file, tmp_path / "frame.###.png")  # pictures do not need it
+        assemble_movie(out, path_file, tmp_path / "movie.mp4")
+    assemble_movie(out, path_file, tmp_path / "frame.###.png")  # pictures do not need it
     assert not (tmp_path / "movie.mp4").exists()
 
 
@@ -202,7 +202,7 @@ def test_missing_images_are_found_before_anything_is_written(
     (out / "tiny.c0004.l000.png").unlink()  # not on the path
     started: list[int] = []
     with pytest.raises(OutputError, match=r"c0002\.l003\.png: no such file \(camera 2, light 3\); 2 of the 11 images"):
-        assemble(out, path_file, tmp_path / target, progress=lambda done, total: started.append(done))
+        assemble_movie(out, path_file, tmp_path / target, progress=lambda done, total: started.append(done))
     assert not started
     assert sorted(p.name for p in tmp_path.iterdir()) == ["out", "path.toml"]
 
@@ -213,7 +213,7 @@ def test_a_damaged_image_is_named_and_nothing_is_left(out: Path, path_file: Path
     damaged.write_bytes(damaged.read_bytes()[:-30])
     (tmp_path / "movie.mp4").write_bytes(b"an earlier movie")
     with pytest.raises(OutputError, match=r"c0003\.l003\.png: "):
-        assemble(out, path_file, tmp_path / target)
+        assemble_movie(out, path_file, tmp_path / target)
     assert (tmp_path / "movie.mp4").read_bytes() == b"an earlier movie"
     assert [p for p in tmp_path.rglob("*") if "part" in p.name or "frame" in p.name] == []
 
@@ -221,7 +221,7 @@ def test_a_damaged_image_is_named_and_nothing_is_left(out: Path, path_file: Path
 def test_an_image_of_another_size_is_named(out: Path, path_file: Path, tmp_path: Path) -> None:
     write_image(out / "tiny.c0002.l003.png", picture(0, 0, 32, 48), ImageFormat(format="png"))
     with pytest.raises(OutputError, match=r"c0002\.l003\.png: expected 64 x 48 pixels, got 32 x 48"):
-        assemble(out, path_file, tmp_path / "movie.mp4")
+        assemble_movie(out, path_file, tmp_path / "movie.mp4")
 
 
 @pytest.mark.parametrize("target", ["movie.mp4", "frame.####.png"])
@@ -231,7 +231,7 @@ def test_an_interrupt_leaves_nothing(out: Path, path_file: Path, tmp_path: Path,
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        assemble(out, path_file, tmp_path / target, progress=interrupt)
+        assemble_movie(out, path_file, tmp_path / target, progress=interrupt)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["out", "path.toml"]
 
 
@@ -243,7 +243,7 @@ def test_a_full_disk_is_an_error_and_leaves_nothing(path_file: Path, tmp_path: P
     resource.setrlimit(resource.RLIMIT_FSIZE, (300, hard))
     try:
         with pytest.raises(OutputError, match="cannot be written"):
-            assemble(tmp_path / "out", path_file, tmp_path / target)
+            assemble_movie(tmp_path / "out", path_file, tmp_path / target)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
         signal.signal(signal.SIGXFSZ, before)
@@ -260,25 +260,25 @@ def test_a_full_disk_is_an_error_and_leaves_nothing(path_file: Path, tmp_path: P
 )
 def test_other_targets_are_refused(out: Path, path_file: Path, tmp_path: Path, target: str, message: str) -> None:
     with pytest.raises(OutputError, match=message):
-        assemble(out, path_file, tmp_path / target)
+        assemble_movie(out, path_file, tmp_path / target)
 
 
 def test_a_path_outside_of_the_array_is_a_job_error(out: Path, path_file: Path, tmp_path: Path) -> None:
     path_file.write_text("[[segments]]\nframes = 2\ncamera = 5\n", encoding="utf-8")
     with pytest.raises(JobError, match=r"path\.toml: segments\[0\]\.camera: expected one of 5 cameras"):
-        assemble(out, path_file, tmp_path / "movie.mp4")
+        assemble_movie(out, path_file, tmp_path / "movie.mp4")
 
 
 def test_a_folder_without_a_manifest_is_an_error(path_file: Path, tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"manifest\.toml: no such file"):
-        assemble(tmp_path, path_file, tmp_path / "movie.mp4")
+        assemble_movie(tmp_path, path_file, tmp_path / "movie.mp4")
 
 
 # sequences
 
 
 def test_a_sequence_of_the_same_format_is_copied(out: Path, path_file: Path, tmp_path: Path) -> None:
-    result = assemble(out, path_file, tmp_path / "cut" / "shot.###.png")
+    result = assemble_movie(out, path_file, tmp_path / "cut" / "shot.###.png")
     names = sorted(p.name for p in (tmp_path / "cut").iterdir())
     assert names == [f"shot.{k:03d}.png" for k in range(11)]
     for name, (c, l) in zip(names, FRAMES, strict=True):
@@ -289,14 +289,14 @@ def test_a_sequence_of_the_same_format_is_copied(out: Path, path_file: Path, tmp
 @pytest.mark.parametrize("name", ["folder", "folder/", "there"])
 def test_a_folder_is_filled_in_the_arrays_format(out: Path, path_file: Path, tmp_path: Path, name: str) -> None:
     (tmp_path / "there").mkdir()
-    assemble(out, path_file, tmp_path / name)
+    assemble_movie(out, path_file, tmp_path / name)
     assert sorted(p.name for p in (tmp_path / name).iterdir()) == [f"frame.{k:04d}.png" for k in range(11)]
 
 
 @pytest.mark.parametrize("extension", ["png", "jpg", "tif"])
 def test_a_sequence_is_converted(path_file: Path, tmp_path: Path, extension: str) -> None:
     make_array(tmp_path / "out", "exr")
-    assemble(tmp_path / "out", path_file, tmp_path / f"shot.####.{extension}")
+    assemble_movie(tmp_path / "out", path_file, tmp_path / f"shot.####.{extension}")
     for k, (c, l) in enumerate(FRAMES):
         codes = srgb8_from_linear(read_image(tmp_path / f"shot.{k:04d}.{extension}")).astype(int)
         error = np.abs(codes - srgb8_from_linear(read_image(tmp_path / "out" / f"tiny.c{c:04d}.l{l:03d}.exr")))
@@ -306,33 +306,33 @@ def test_a_sequence_is_converted(path_file: Path, tmp_path: Path, extension: str
 def test_converted_exr_frames_carry_the_camera(out: Path, path_file: Path, tmp_path: Path) -> None:
     import OpenImageIO
 
-    assemble(out, path_file, tmp_path / "shot.####.exr")
+    assemble_movie(out, path_file, tmp_path / "shot.####.exr")
     spec = OpenImageIO.ImageInput.open(str(tmp_path / "shot.0005.exr")).spec()
     assert (spec["framearray:camera"], spec["framearray:light"]) == FRAMES[5]
     assert spec["framesPerSecond"] == (24, 1)
 
 
 def test_exposure_changes_a_sequence_of_the_same_format(out: Path, path_file: Path, tmp_path: Path) -> None:
-    assemble(out, path_file, tmp_path / "shot.####.png", look=Look(exposure=-1))
+    assemble_movie(out, path_file, tmp_path / "shot.####.png", look=Look(exposure=-1))
     linear = read_image(out / "tiny.c0000.l000.png")
     np.testing.assert_array_equal(read_codes(tmp_path / "shot.0000.png"), srgb8_from_linear(linear / 2))
     with pytest.raises(OutputError, match="exposure changes only movies, PNG and JPEG"):
-        assemble(out, path_file, tmp_path / "shot.####.exr", look=Look(exposure=1))
+        assemble_movie(out, path_file, tmp_path / "shot.####.exr", look=Look(exposure=1))
 
 
 def test_a_sequence_replaces_only_its_own_files(out: Path, path_file: Path, tmp_path: Path) -> None:
     (tmp_path / "cut").mkdir()
     (tmp_path / "cut" / "shot.0002.png").write_bytes(b"earlier")
     (tmp_path / "cut" / "notes.txt").write_bytes(b"mine")
-    assemble(out, path_file, tmp_path / "cut" / "shot.####.png")
+    assemble_movie(out, path_file, tmp_path / "cut" / "shot.####.png")
     assert (tmp_path / "cut" / "notes.txt").read_bytes() == b"mine"
     read_image(tmp_path / "cut" / "shot.0002.png")
     shutil.copyfile(tmp_path / "cut" / "shot.0000.png", tmp_path / "cut" / "shot.0011.png")
     with pytest.raises(OutputError, match=r"shot\.0011\.png: belongs to an earlier sequence, with 1 files"):
-        assemble(out, path_file, tmp_path / "cut" / "shot.####.png")
+        assemble_movie(out, path_file, tmp_path / "cut" / "shot.####.png")
 
 
 def test_more_frames_than_digits(out: Path, path_file: Path, tmp_path: Path) -> None:
-    assemble(out, path_file, tmp_path / "cut" / "#.png")
+    assemble_movie(out, path_file, tmp_path / "cut" / "#.png")
     assert len(list((tmp_path / "cut").iterdir())) == 11
     assert (tmp_path / "cut" / "10.png").is_file()

@@ -12,7 +12,7 @@ from support.movies import Decoded, barred, decoded, path_file, plain, rms
 from framearray_cli.base.colour import srgb8_from_linear, srgb_from_linear
 from framearray_cli.base.errors import MissingExtraError, OutputError
 from framearray_cli.tools.movie.animation import delays
-from framearray_cli.tools.movie.assemble import assemble
+from framearray_cli.tools.movie.assemble import assemble_movie
 from framearray_cli.tools.movie.yuv import planes_422_10
 
 pytest.importorskip("av")
@@ -46,7 +46,7 @@ def movies(array: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, D
     folder = tmp_path_factory.mktemp("movies")
     path = path_file(folder, PATH)
     for suffix in CONTAINERS:
-        result = assemble(array, path, folder / f"m{suffix}")
+        result = assemble_movie(array, path, folder / f"m{suffix}")
         assert (result.n_frames, result.n_images, result.fps) == (17, 12, 24)
     return {suffix: decoded(folder / f"m{suffix}") for suffix in CONTAINERS}
 
@@ -92,7 +92,7 @@ def test_the_comparison_can_fail(movies: dict[str, Decoded]) -> None:
 )
 def test_rates_of_videos_are_exact(array: Path, tmp_path: Path, suffix: str, fps: float, rate: Fraction) -> None:
     path = path_file(tmp_path, f"fps = {fps}\n[[segments]]\nframes = 13\ncamera = [0, 4]\n")
-    result = assemble(array, path, tmp_path / f"m{suffix}")
+    result = assemble_movie(array, path, tmp_path / f"m{suffix}")
     movie = decoded(tmp_path / f"m{suffix}")
     assert (len(movie.frames), result.fps) == (13, rate)
     assert movie.rate is not None
@@ -110,7 +110,7 @@ def test_animations_are_as_long_as_they_should_be(
     array: Path, tmp_path: Path, suffix: str, unit: Fraction, fps: float
 ) -> None:
     path = path_file(tmp_path, f"fps = {fps}\n[[segments]]\nframes = 25\ncamera = [0, 4]\nhold = 0.5\n")
-    result = assemble(array, path, tmp_path / f"m{suffix}")
+    result = assemble_movie(array, path, tmp_path / f"m{suffix}")
     movie = decoded(tmp_path / f"m{suffix}")
     assert len(movie.frames) == result.n_frames == 25 + round(result.fps / 2)
     assert movie.length is not None and abs(movie.length - result.time_s) <= unit / 2
@@ -127,15 +127,15 @@ def test_animations_and_sequences_need_no_pyav(array: Path, tmp_path: Path, monk
     monkeypatch.setitem(sys.modules, "av", None)
     path = path_file(tmp_path, "[[segments]]\nframes = 2\n")
     for name in ("m.gif", "m.webp", "f.#.png"):
-        assert assemble(array, path, tmp_path / name).n_frames == 2
+        assert assemble_movie(array, path, tmp_path / name).n_frames == 2
     with pytest.raises(MissingExtraError, match=r"framearray\[movie\]"):
-        assemble(array, path, tmp_path / "m.mov")
+        assemble_movie(array, path, tmp_path / "m.mov")
 
 
 def test_ffmpeg_reads_our_gif_as_pillow_does(movies: dict[str, Decoded], array: Path, tmp_path: Path) -> None:
     import av
 
-    assemble(array, path_file(tmp_path, PATH), tmp_path / "m.gif")
+    assemble_movie(array, path_file(tmp_path, PATH), tmp_path / "m.gif")
     with av.open(str(tmp_path / "m.gif")) as container:
         frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
     assert len(frames) == len(SHOWN)
@@ -146,14 +146,14 @@ def test_ffmpeg_reads_our_gif_as_pillow_does(movies: dict[str, Decoded], array: 
 def test_a_gif_that_viewers_would_slow_down_is_refused(array: Path, tmp_path: Path) -> None:
     path = path_file(tmp_path, "fps = 60\n[[segments]]\nframes = 3\n")
     with pytest.raises(OutputError, match=r"m\.gif: expected at most 50 frames per second, got 60"):
-        assemble(array, path, tmp_path / "m.gif")
+        assemble_movie(array, path, tmp_path / "m.gif")
     assert [file.name for file in tmp_path.iterdir()] == ["path.toml"]
 
 
 @pytest.mark.parametrize("suffix", CONTAINERS)
 def test_odd_sizes(tmp_path: Path, suffix: str) -> None:
     plain(tmp_path / "out", 2, 1, picture=lambda c, l: barred(c, l, 33, 21))
-    assemble(
+    assemble_movie(
         tmp_path / "out", path_file(tmp_path, "[[segments]]\nframes = 2\ncamera = [0, 1]\n"), tmp_path / f"m{suffix}"
     )
     for c, frame in enumerate(decoded(tmp_path / f"m{suffix}").frames):
@@ -180,7 +180,7 @@ def test_prores_holds_ten_bits_of_the_radiance(tmp_path: Path) -> None:
     plain(tmp_path / "out", 1, 1, picture=shallow)
     path = path_file(tmp_path, "[[segments]]\nframes = 3\n")
     for name in ("m.mov", "m.mp4"):
-        assemble(tmp_path / "out", path, tmp_path / name)
+        assemble_movie(tmp_path / "out", path, tmp_path / name)
     fine, coarse = decoded(tmp_path / "m.mov"), decoded(tmp_path / "m.mp4")
     assert (fine.pixels, coarse.pixels) == ("yuv422p10le", "yuv420p")
     truth = luma_10(shallow(0, 0))

@@ -17,7 +17,7 @@ from framearray_cli.array.manifest import BACKGROUND, Manifest
 from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.read import read_job
-from framearray_cli.tools.movie.assemble import assemble
+from framearray_cli.tools.movie.assemble import assemble_movie
 from framearray_cli.tools.movie.curves import relights, value_at
 from framearray_cli.tools.movie.pathfile import MoviePath, load_movie_path
 from framearray_cli.tools.movie.timeline import make_timeline
@@ -84,7 +84,7 @@ color = [1.0, 0.6, 0.2]
 [ambient]
 intensity = [{ time = 0, value = 1 }, { time = "50%", value = 0 }, { time = "100%", value = 1 }]
 """
-    assemble(array.directory, path_file(tmp_path, text), tmp_path / "f.#.exr")
+    assemble_movie(array.directory, path_file(tmp_path, text), tmp_path / "f.#.exr")
     read = {file.name: read_image(file).astype(np.float64) for file in array.directory.glob("*.exr")}
     for k in range(7):
         c, t = (0 if k < 3 else 1), k / 6
@@ -107,7 +107,7 @@ def test_codes_of_frames_are_those_of_the_pictures(array: Manifest, tmp_path: Pa
     from framearray_cli.base.colour import srgb8_from_linear
 
     path = path_file(tmp_path, "[[segments]]\nframes = 4\nlight = [0, 3]\n[groups.sun]\nintensity = 0.5\n")
-    assemble(array.directory, path, tmp_path / "f.#.png")
+    assemble_movie(array.directory, path, tmp_path / "f.#.png")
     for l in range(4):
         picture = Pictures(array).picture(0, (l, 0), Relight(groups={"sun": (0.5, 0.5, 0.5)}))
         np.testing.assert_array_equal(read_codes(tmp_path / f"f.{l}.png"), srgb8_from_linear(picture))
@@ -117,7 +117,7 @@ def test_wrong_light_is_reported_before_anything_is_written(array: Manifest, tmp
     text = "[[segments]]\nframes = 3\nlight = 4\n[groups.moon]\nintensity = 2\n"
     text += "[groups.sun]\nintensity = [{ time = '50%', value = 1 }, { time = 0.02, value = 0 }]\n"
     with pytest.raises(JobError) as caught:
-        assemble(array.directory, path_file(tmp_path, text), tmp_path / "m.mp4")
+        assemble_movie(array.directory, path_file(tmp_path, text), tmp_path / "m.mp4")
     assert list(caught.value.problems) == [
         "groups.moon: no such group; the array has lamp, sun, background",
         "segments[0].light: expected one of 4 lights (0 to 3, or -4 to -1), got 4",
@@ -126,7 +126,7 @@ def test_wrong_light_is_reported_before_anything_is_written(array: Manifest, tmp
     plain(tmp_path / "plain", 2, 2)
     text = "[[segments]]\nframes = 3\n[groups.sun]\nintensity = 2\n[ambient]\nintensity = 2\n"
     with pytest.raises(JobError) as caught:
-        assemble(tmp_path / "plain", path_file(tmp_path, text), tmp_path / "m.mp4")
+        assemble_movie(tmp_path / "plain", path_file(tmp_path, text), tmp_path / "m.mp4")
     reason = "this array stores its light all together, so that it cannot be changed; render again with "
     reason += 'group = "..." in [[light.sources]]'
     assert list(caught.value.problems) == [f"groups.sun: {reason}", f"ambient: {reason}"]

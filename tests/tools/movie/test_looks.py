@@ -10,7 +10,7 @@ from support.movies import decoded, grouped, path_file, plain
 from framearray_cli.array.images.png import read_codes
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError
-from framearray_cli.tools.movie.assemble import assemble
+from framearray_cli.tools.movie.assemble import assemble_movie
 from framearray_cli.tools.movie.display import SRGB, find_view
 from framearray_cli.tools.movie.label import burn
 from framearray_cli.tools.movie.look import Look, screen_codes, shot_label
@@ -91,7 +91,7 @@ def test_a_movie_shows_the_view(tmp_path: Path) -> None:
     plain(tmp_path / "out", 1, 1, picture=lambda c, l: np.full((16, 16, 3), 1.0, np.float32))
     path = path_file(tmp_path, "[[segments]]\nframes = 1\n")
     for name, low, high in (("aces", 175, 185), ("srgb", 253, 255)):
-        assemble(tmp_path / "out", path, tmp_path / f"{name}.mp4", look=Look(view=find_view(name)))
+        assemble_movie(tmp_path / "out", path, tmp_path / f"{name}.mp4", look=Look(view=find_view(name)))
         assert low <= decoded(tmp_path / f"{name}.mp4").frames[0].mean() <= high
 
 
@@ -162,8 +162,8 @@ def test_every_frame_has_its_own_label(tmp_path: Path) -> None:
     picture = np.full((96, 192, 3), 0.2, np.float32)
     array = plain(tmp_path / "out", 3, 2, picture=lambda c, l: picture)
     path = path_file(tmp_path, "[[segments]]\nframes = 3\ncamera = [0, 2]\nlight = 1\n")
-    assemble(array.directory, path, tmp_path / "f.#.png", look=Look(label=True))
-    assemble(array.directory, path, tmp_path / "m.mov", look=Look(label=True))
+    assemble_movie(array.directory, path, tmp_path / "f.#.png", look=Look(label=True))
+    assemble_movie(array.directory, path, tmp_path / "m.mov", look=Look(label=True))
     frames = decoded(tmp_path / "m.mov").frames
     for c in range(3):
         truth = [burn(srgb8_from_linear(picture), f"c {k}  l 1") for k in range(3)]

@@ -19,7 +19,7 @@ from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import OutputError
 from framearray_cli.tools.movie import sequence
-from framearray_cli.tools.movie.assemble import assemble
+from framearray_cli.tools.movie.assemble import assemble_movie
 from framearray_cli.tools.movie.look import Look
 
 WALK = "[[segments]]\nframes = 9\ncamera = [0, 4]\nlight = 1\n"
@@ -34,7 +34,7 @@ def array(tmp_path: Path) -> Manifest:
 @pytest.mark.parametrize("extension", ["exr", "png"])
 def test_unchanged_images_are_linked(tmp_path: Path, extension: str) -> None:
     array = plain(tmp_path / "out", extension=extension)
-    assemble(array.directory, path_file(tmp_path, WALK), tmp_path / "cut" / f"f.###.{extension}")
+    assemble_movie(array.directory, path_file(tmp_path, WALK), tmp_path / "cut" / f"f.###.{extension}")
     for k, c in enumerate(EYES):
         made, own = tmp_path / "cut" / f"f.{k:03d}.{extension}", image_path(array, c, 1)
         assert made.stat().st_ino == own.stat().st_ino
@@ -48,7 +48,7 @@ def test_where_links_are_not_possible_images_are_copied(
         raise OSError(errno.EXDEV, "Invalid cross-device link")
 
     monkeypatch.setattr(os, "link", refuse)
-    assemble(array.directory, path_file(tmp_path, WALK), tmp_path / "f.###.exr")
+    assemble_movie(array.directory, path_file(tmp_path, WALK), tmp_path / "f.###.exr")
     for k, c in enumerate(EYES):
         made, own = tmp_path / f"f.{k:03d}.exr", image_path(array, c, 1)
         assert made.stat().st_ino != own.stat().st_ino
@@ -59,9 +59,9 @@ def test_writing_a_sequence_twice_keeps_the_array(array: Manifest, tmp_path: Pat
     """The second time a link replaces a link to the same file, or to another."""
     path = path_file(tmp_path, WALK)
     before = {file.name: file.read_bytes() for file in array.directory.iterdir()}
-    assemble(array.directory, path, tmp_path / "f.###.exr")
-    assemble(array.directory, path, tmp_path / "f.###.exr")
-    assemble(array.directory, path_file(tmp_path, WALK.replace("light = 1", "light = 2")), tmp_path / "f.###.exr")
+    assemble_movie(array.directory, path, tmp_path / "f.###.exr")
+    assemble_movie(array.directory, path, tmp_path / "f.###.exr")
+    assemble_movie(array.directory, path_file(tmp_path, WALK.replace("light = 1", "light = 2")), tmp_path / "f.###.exr")
     assert {file.name: file.read_bytes() for file in array.directory.iterdir()} == before
     assert (tmp_path / "f.000.exr").stat().st_ino == image_path(array, 0, 2).stat().st_ino
     assert not [file for file in tmp_path.iterdir() if file.name.endswith(".part")]
@@ -71,7 +71,7 @@ def test_a_held_picture_is_converted_once(array: Manifest, tmp_path: Path, monke
     made: list[str] = []
     write = sequence.write_codes
     monkeypatch.setattr(sequence, "write_codes", lambda path, *rest: (made.append(path.name), write(path, *rest)))
-    assemble(array.directory, path_file(tmp_path, WALK), tmp_path / "f.#.png")
+    assemble_movie(array.directory, path_file(tmp_path, WALK), tmp_path / "f.#.png")
     assert made == [f"f.{k}.png" for k in (0, 1, 3, 5, 7)]
     np.testing.assert_array_equal(read_codes(tmp_path / "f.1.png"), read_codes(tmp_path / "f.2.png"))
 
@@ -80,7 +80,7 @@ def test_blended_exr_frames_are_linear_and_name_their_place(array: Manifest, tmp
     import OpenImageIO
 
     text = 'positions = "blend"\n[[segments]]\nframes = 5\ncamera = 1\nlight = [0, 1]\n'
-    assemble(array.directory, path_file(tmp_path, text), tmp_path / "f.#.exr")
+    assemble_movie(array.directory, path_file(tmp_path, text), tmp_path / "f.#.exr")
     a, b = read_image(image_path(array, 1, 0)), read_image(image_path(array, 1, 1))
     for k in range(5):
         np.testing.assert_allclose(read_image(tmp_path / f"f.{k}.exr"), a + (b - a) * (k / 4), rtol=2**-10, atol=1e-6)
@@ -92,7 +92,7 @@ def test_blended_exr_frames_are_linear_and_name_their_place(array: Manifest, tmp
 
 def test_an_array_with_groups_is_composed_in_its_own_format(tmp_path: Path) -> None:
     array = grouped(tmp_path / "out")
-    result = assemble(
+    result = assemble_movie(
         array.directory, path_file(tmp_path, "[[segments]]\nframes = 4\nlight = [0, 3]\n"), tmp_path / "cut"
     )
     assert result.n_images == 4
@@ -105,7 +105,7 @@ def test_an_array_with_groups_is_composed_in_its_own_format(tmp_path: Path) -> N
 @pytest.mark.parametrize("extension", ["exr", "tif"])
 def test_radiance_is_not_changed(array: Manifest, tmp_path: Path, look: Look, extension: str) -> None:
     with pytest.raises(OutputError, match=rf"{look.changes[0]} changes only movies, PNG and JPEG; \.{extension} keeps"):
-        assemble(array.directory, path_file(tmp_path, WALK), tmp_path / f"f.#.{extension}", look=look)
+        assemble_movie(array.directory, path_file(tmp_path, WALK), tmp_path / f"f.#.{extension}", look=look)
 
 
 # broken images
@@ -121,7 +121,7 @@ def test_a_truncated_image_is_named_before_anything_is_written(tmp_path: Path, e
         file.write_bytes(file.read_bytes()[: 2 * file.stat().st_size // 3])
     (tmp_path / "m.mp4").write_bytes(b"an earlier movie")
     with pytest.raises(OutputError, match=rf"c0002\.l001\.{extension}: "):
-        assemble(array.directory, path, tmp_path / target, progress=lambda done, total: seen.append(done))
+        assemble_movie(array.directory, path, tmp_path / target, progress=lambda done, total: seen.append(done))
     assert not seen
     assert sorted(file.name for file in tmp_path.iterdir()) == ["m.mp4", "out", "path.toml"]
     assert (tmp_path / "m.mp4").read_bytes() == b"an earlier movie"
@@ -137,7 +137,7 @@ def test_damage_inside_an_image_is_found_when_it_is_read(tmp_path: Path) -> None
     check_image(file, array.resolution)  # whole to a quick check
     for target in ("m.mp4", "m.webp", "f.##.png", "deep/er/f.##.jpg", "deep/m.gif"):
         with pytest.raises(OutputError, match=r"c0003\.l001\.exr: "):
-            assemble(array.directory, path_file(tmp_path, WALK), tmp_path / target)
+            assemble_movie(array.directory, path_file(tmp_path, WALK), tmp_path / target)
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out", "path.toml"]
 
 
@@ -177,7 +177,7 @@ def test_an_interrupt_leaves_nothing(array: Manifest, tmp_path: Path, target: st
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        assemble(array.directory, path_file(tmp_path, WALK), tmp_path / target, progress=interrupt)
+        assemble_movie(array.directory, path_file(tmp_path, WALK), tmp_path / target, progress=interrupt)
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out", "path.toml"]
 
 
@@ -195,7 +195,7 @@ def test_an_interrupt_while_frames_are_moved_waits_for_all(
 
     monkeypatch.setattr(Path, "replace", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        assemble(array.directory, path_file(tmp_path, WALK), tmp_path / "f.###.png")
+        assemble_movie(array.directory, path_file(tmp_path, WALK), tmp_path / "f.###.png")
     names = [f"f.{k:03d}.png" for k in range(9)]
     assert sorted(entry.name for entry in tmp_path.iterdir()) == [*names, "out", "path.toml"]
 
