@@ -13,7 +13,7 @@ from typing import Any
 from framearray_cli import __version__
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import make_folder, reason
-from framearray_cli.base.forms.schema import dotted
+from framearray_cli.base.forms.schema import toml_key
 
 from .manifest import FILE_NAME, Manifest, array_files
 from .manifest_toml import read_manifest
@@ -122,10 +122,10 @@ def _changes(old: Mapping[str, Any], new: Mapping[str, Any], place: str = "") ->
     for key in dict.fromkeys((*old, *new)):
         a, b = old.get(key), new.get(key)
         if isinstance(a, Mapping) and isinstance(b, Mapping):
-            found += _changes(a, b, f"{place}{dotted(key)}.")
+            found += _changes(a, b, f"{place}{toml_key(key)}.")
         elif a != b:
             both = f": {_short(a)} there, {_short(b)} now"
-            found.append(f"{place}{dotted(key)}{both if len(both) < LONGEST_SHOWN else ''}")
+            found.append(f"{place}{toml_key(key)}{both if len(both) < LONGEST_SHOWN else ''}")
     return found
 
 

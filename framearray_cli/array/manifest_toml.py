@@ -10,8 +10,9 @@ import numpy as np
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, require_file, write_bytes
-from framearray_cli.base.forms.text import inline, numbers
-from framearray_cli.base.forms.words import long_key, shown
+from framearray_cli.base.forms.text import inline, inline_floats
+from framearray_cli.base.forms.toml import long_key_problem
+from framearray_cli.base.forms.words import shown
 
 from .manifest import FILE_NAME, Manifest, ManifestCamera, ManifestGroup, ManifestLight
 
@@ -45,7 +46,7 @@ def read_manifest(place: Path) -> Manifest:
     require_file(path)
     try:
         text = path.read_bytes().decode()
-        if problem := long_key(text):
+        if problem := long_key_problem(text):
             raise OutputError(f"{path}: {problem}")
         table = tomllib.loads(text)
     except FileNotFoundError as error:
@@ -79,7 +80,7 @@ def to_toml(manifest: Manifest) -> str:
     text = ["# A frame array; docs/guide/manifest.md explains the keys.\n", tomli_w.dumps(plain(head | tables))]
     # Written by hand, because a matrix on one line is easier to read than on the 22 lines of tomli_w.
     for c, camera in enumerate(manifest.cameras):
-        rows = ", ".join(numbers(row) for row in camera.world_from_camera)
+        rows = ", ".join(inline_floats(row) for row in camera.world_from_camera)
         text.append(f"\n[[cameras]]  # {c}\nworld_from_camera = [{rows}]\nfov = {float(camera.fov)!r}\n")
     text.extend(_light_lines("lights", manifest.lights))
     for group in manifest.groups:
@@ -93,8 +94,8 @@ def _light_lines(key: str, lights: Sequence[ManifestLight]) -> list[str]:
     """Write a block a light index."""
     text = []
     for l, light in enumerate(lights):
-        text.append(f"\n[[{key}]]  # {l}\nambient = {numbers(light.ambient)}\n")
-        text.append(f"ambient_error = {numbers(light.ambient_error)}\nsources = [\n")
+        text.append(f"\n[[{key}]]  # {l}\nambient = {inline_floats(light.ambient)}\n")
+        text.append(f"ambient_error = {inline_floats(light.ambient_error)}\nsources = [\n")
         text.extend(f"    {inline(plain(source))},\n" for source in light.sources)
         text.append("]\n")
     return text

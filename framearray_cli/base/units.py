@@ -1,15 +1,16 @@
-"""Frame rates, times and numbers of bytes: how they are computed, and how messages show them."""
+"""Bounds of values, and frame rates, times and numbers of bytes as messages show them."""
 
 from fractions import Fraction
 
 MIB, GIB = 2**20, 2**30
-# Bounds of jobs, path files and options alike; what is beyond them is a typing error.
+# Bounds in job files, path files and options; values beyond them are typing errors.
+FARTHEST = 1e12  # scene units; squares and cubes of it still fit in float32 (3e38)
 LEAST_FPS, MOST_FPS = 0.01, 1000  # frames per second
-MOST_SECONDS = 40_000.0  # of a movie, or a part of it
-MOST_STOPS = 64  # of exposure, either way
+MOST_SECONDS = 40_000.0  # of a movie or of one segment
+MOST_STOPS = 64  # of exposure, up or down
 MOST_THREADS = 1024
 
-# A rate that people write as 23.976, 29.97 or 59.94 means 24, 30 or 60 times 1000 / 1001.
+# 23.976, 29.97 and 59.94 stand for 24, 30 and 60 times 1000 / 1001.
 _NTSC = tuple(Fraction(n * 1000, 1001) for n in (24, 30, 48, 60, 120))
 
 
@@ -30,7 +31,7 @@ def frame_rate(fps: float | Fraction) -> Fraction:
 
 
 def duration(seconds: float) -> str:
-    """A time in the two units that matter: "3 h 05 min", "2 min 07 s", "12.3 s"."""
+    """A time in one or two units: "3 h 05 min", "2 min 07 s", "12.3 s"."""
     if seconds < 60:
         return f"{seconds:.1f} s"
     minutes, rest = divmod(round(seconds), 60)
@@ -40,7 +41,7 @@ def duration(seconds: float) -> str:
 
 
 def size(n_bytes: float) -> str:
-    """A number of bytes in the unit that suits: "1.3 GiB"."""
+    """A number of bytes in the unit that fits: "1.3 GiB"."""
     for unit in ("bytes", "KiB", "MiB"):
         if n_bytes < 1024:
             return f"{n_bytes:.0f} {unit}" if unit == "bytes" else f"{n_bytes:.1f} {unit}"
@@ -49,12 +50,12 @@ def size(n_bytes: float) -> str:
 
 
 def gibibytes(n_bytes: int) -> str:
-    """A number of bytes in GiB, small ones with one more digit: "1.3 GiB", "0.42 GiB"."""
+    """A number of bytes in GiB, with two decimals below 1 GiB: "1.3 GiB", "0.42 GiB"."""
     return f"{n_bytes / GIB:.{1 if n_bytes >= GIB else 2}f} GiB"
 
 
 def amount(n_bytes: int) -> str:
-    """A number of bytes in GiB, or in MiB where it is below 0.1 GiB: "1.3 GiB", "12.0 MiB"."""
+    """A number of bytes in GiB, or in MiB below 0.1 GiB: "1.3 GiB", "12.0 MiB"."""
     if n_bytes >= 0.1 * GIB:
         return f"{n_bytes / GIB:,.1f} GiB"
     return f"{max(n_bytes, 0) / MIB:.1f} MiB"

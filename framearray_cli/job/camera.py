@@ -2,7 +2,7 @@
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from framearray_cli.base.forms.table import Float3, Table, computed, fail, fill
+from framearray_cli.base.forms.table import Float3, Table, default_text, fail, fill
 from framearray_cli.base.forms.words import shown
 
 from .keys import MOST_EYES, key_problems, late_keys
@@ -18,7 +18,7 @@ class CameraKey(Table):
     up: Direction | None = Field(
         default=None,
         description="Direction that is up in the picture. Given at every key or at none.",
-        json_schema_extra=computed("the scene's up axis"),
+        json_schema_extra=default_text("the scene's up axis"),
     )
 
     @field_validator("target")
@@ -39,12 +39,12 @@ class CameraTable(Table):
         ge=1,
         le=MOST_EYES,
         description="Number of eyes, N_c.",
-        json_schema_extra=computed("the last key's frame + 1, or the eyes in `file`"),
+        json_schema_extra=default_text("the last key's frame + 1, or the eyes in `file`"),
     )
     file: FileName | None = Field(
         default=None,
         description="CSV or JSON file with one eye per frame, instead of `keys`.",
-        json_schema_extra=computed("none"),
+        json_schema_extra=default_text("none"),
     )
     keys: tuple[CameraKey, ...] = Field(
         default=(),
@@ -52,7 +52,7 @@ class CameraTable(Table):
         validate_default=True,
         description="Positions of the eye at some frames; between them it moves smoothly, before the first and after "
         "the last it stands still. One key: a fixed camera.",
-        json_schema_extra={**computed("the eyes in `file`"), "minItems": 1},
+        json_schema_extra={**default_text("the eyes in `file`"), "minItems": 1},
     )
 
     @field_validator("keys")

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from framearray_cli.base.forms.schema import Schema, Section, file_schema, sections, words
+from framearray_cli.base.forms.schema import Schema, Section, allowed_values, file_schema, sections
 from framearray_cli.base.forms.text import inline
 
 from .job import Job
@@ -114,7 +114,7 @@ def _rows(root: Schema, section: Section) -> Iterator[str]:
     """Describe each key of a table that holds a value."""
     required = section.schema.get("required", ())
     for key, node in section.keys.items():
-        values = words(root, node)
+        values = allowed_values(root, node)
         if values == "a table":
             continue
         default = "required" if key in required else node.get("x-default") or f"`{inline(node['default'])}`"

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 from pydantic import ValidationError
 
 from framearray_cli.base.files import read_at_most
-from framearray_cli.base.forms.problems import cut, problems_of
+from framearray_cli.base.forms.problems import append_count, problems_of
 
 from .camera import CameraKey
 from .keys import MOST_EYES
@@ -68,7 +68,7 @@ def _row_problems(rows: list[PlacedRow]) -> list[str]:
             n += error.error_count()
             if len(problems) < MOST_PROBLEMS:
                 problems += [f"{place}: {problem}" for problem in problems_of(error, CameraKey)]
-    return cut(problems[:MOST_PROBLEMS], n)
+    return append_count(problems[:MOST_PROBLEMS], n)
 
 
 def _read_text(path: Path) -> str:

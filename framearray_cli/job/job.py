@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
-from framearray_cli.base.forms.table import Float3, Place, Table, computed, fail, fill
+from framearray_cli.base.forms.table import Float3, Place, Table, default_text, fail, fill
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_STOPS, MOST_THREADS
 
@@ -40,13 +40,13 @@ class MaterialTable(Table):
         default=None,
         description="Diffuse reflectivity, linear, Rec. 709. Replaces the material's colour, "
         "texture and vertex colours.",
-        json_schema_extra=computed("as in the scene"),
+        json_schema_extra=default_text("as in the scene"),
     )
     specular: Reflectivity | None = Field(
         default=None,
         description="Mirror reflectivity, linear. Above 0 the material reflects like a mirror. "
         "Diffuse plus mirror reflectivity is at most 1 in each channel.",
-        json_schema_extra=computed("as in the scene"),
+        json_schema_extra=default_text("as in the scene"),
     )
 
     @field_validator("specular")
@@ -66,7 +66,7 @@ class SceneTable(Table):
     up: Literal["y", "z"] = Field(
         default="y",
         description="Axis that points up. It is the up direction of cameras without `up`; the model is not turned.",
-        json_schema_extra=computed('"z" for STL, PLY and 3MF, else "y"'),
+        json_schema_extra=default_text('"z" for STL, PLY and 3MF, else "y"'),
     )
     background: Emission = Field(
         default=(0.0, 0.0, 0.0),
@@ -97,7 +97,7 @@ class OutputTable(Table):
     directory: FileName = Field(
         default=Path(),
         description="Folder for images and manifest.",
-        json_schema_extra=computed('"../out/" and the job\'s name'),
+        json_schema_extra=default_text('"../out/" and the job\'s name'),
     )
     format: Literal["exr", "png", "tif", "jpg"] = Field(
         default="exr",
@@ -140,14 +140,14 @@ class RenderTable(Table):
         default=None,
         description='Maximum memory of the program, such as "8 GiB". A job that needs more is rendered in blocks of '
         "light positions, one after the other; the images are the same, the time is longer.",
-        json_schema_extra=computed("two thirds of what is free"),
+        json_schema_extra=default_text("two thirds of what is free"),
     )
     threads: int | None = Field(
         default=None,
         ge=1,
         le=MOST_THREADS,
         description="Number of threads that render.",
-        json_schema_extra=computed("one for each core"),
+        json_schema_extra=default_text("one for each core"),
     )
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
-from framearray_cli.base.forms.table import Place, Table, computed, fail, fill
+from framearray_cli.base.forms.table import Place, Table, default_text, fail, fill
 from framearray_cli.base.forms.words import shown
 
 from .keys import MOST_EYES, key_problems, late_keys
@@ -44,7 +44,7 @@ class PointKey(Table):
     color: Emission | None = Field(
         default=None,
         description="Multiplies `intensity` by channel. Given at every key of a source or at none.",
-        json_schema_extra=computed("1"),
+        json_schema_extra=default_text("1"),
     )
 
 
@@ -59,7 +59,7 @@ class DirectionalKey(Table):
     color: Emission | None = Field(
         default=None,
         description="Multiplies `irradiance` by channel. Given at every key of a source or at none.",
-        json_schema_extra=computed("1"),
+        json_schema_extra=default_text("1"),
     )
 
 
@@ -78,13 +78,13 @@ class _Source(Table):
         description="Name of a group. If any source has one, the program stores the light of every group separately, "
         "so that its strength and colour can change in the finished array; sources without a group are the group "
         f'"{REST_GROUP}".',
-        json_schema_extra=computed("none"),
+        json_schema_extra=default_text("none"),
     )
     axis: GroupName | None = Field(
         default=None,
         description="Name of a light axis of its own, for all sources of the group: N_c x (N_1 + N_2) images then "
         "serve N_c x N_1 x N_2 pictures. Key frames count along it.",
-        json_schema_extra=computed("that of all other sources"),
+        json_schema_extra=default_text("that of all other sources"),
     )
 
 
@@ -127,7 +127,7 @@ class SunSource(_Source):
     north: Direction | None = Field(
         default=None,
         description="Direction in the scene that points north; its component along the up axis does not count.",
-        json_schema_extra=computed("-z in a scene with y up, y in one with z up, so that east is x"),
+        json_schema_extra=default_text("-z in a scene with y up, y in one with z up, so that east is x"),
     )
     irradiance: Emission = Field(
         description="Irradiance of a surface that faces the sun, W/m2; one number means white. Clear air lets about "
@@ -187,12 +187,15 @@ class LightTable(Table):
         ge=1,
         le=MOST_EYES,
         description="Number of light positions, N_l.",
-        json_schema_extra=computed("the last key's frame + 1"),
+        json_schema_extra=default_text("the last key's frame + 1"),
     )
     axes: dict[GroupName, Annotated[int, Field(ge=1, le=MOST_EYES)]] = Field(
         default={},
         description="Number of light positions along further axes, by name: { lamps = 12 }.",
-        json_schema_extra={**computed("the last key's frame + 1 of each"), "x-words": "names with whole numbers"},
+        json_schema_extra={
+            **default_text("the last key's frame + 1 of each"),
+            "x-words": "names with whole numbers",
+        },
     )
     sources: tuple[LightSource, ...] = Field(
         strict=False, min_length=1, description="One or more sources; all of them shine together at each light index."

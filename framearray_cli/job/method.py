@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from framearray_cli.base.forms.table import Table, computed, fail
+from framearray_cli.base.forms.table import Table, default_text, fail
 from framearray_cli.base.forms.words import shown
 
 from .values import MOST_HITS, Emission, HitCount, Window
@@ -45,7 +45,7 @@ class SamplesTable(Table):
         description="Instead of `hits`: the wanted error of every image, that is, the root mean square of the standard "
         "errors of its pixels, over the mean radiance of the array. A pilot settles the number of native hits for each "
         "place of each frame; noisy places that few frames see get most. What mirrors show does not count.",
-        json_schema_extra=computed("`hits` says how many samples there are"),
+        json_schema_extra=default_text("`hits` says how many samples there are"),
     )
     most_hits: int = Field(
         default=32, ge=1, le=1024, description="With `error`: maximum number of native hits per pixel and frame."
@@ -126,7 +126,7 @@ class AmbientTable(Table):
     intensity: Emission | None = Field(
         default=None,
         description="Fixes I_A for every light position, as a radiance, W/(m2 sr), instead of `method` and `paths`.",
-        json_schema_extra=computed("measured"),
+        json_schema_extra=default_text("measured"),
     )
     method: Literal["eye", "light", "fit"] = Field(
         default="eye",
@@ -139,7 +139,7 @@ class AmbientTable(Table):
         ge=1,
         le=2**24,
         description='Number of walks ("eye", "fit") or particles ("light") per light position.',
-        json_schema_extra=computed("as many as a standard error of 1 % needs"),
+        json_schema_extra=default_text("as many as a standard error of 1 % needs"),
     )
 
     @field_validator("method", "paths")
@@ -159,7 +159,7 @@ class SpecularTable(Table):
         ge=1,
         le=MOST_HITS,
         description="Native hits per pixel that sees a mirror; what a mirror shows is never reused.",
-        json_schema_extra=computed(
+        json_schema_extra=default_text(
             '(2 n_r + 1) times `samples.hits`; 7 times with n_r = "auto", 14 with hits = "auto"'
         ),
     )

@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import PlainValidator, ValidationInfo, WithJsonSchema
 
 from framearray_cli.base.forms.table import Float3, fail
-from framearray_cli.base.forms.words import FARTHEST, between, shown
+from framearray_cli.base.forms.words import range_text, shown
+from framearray_cli.base.units import FARTHEST
 
 Auto: TypeAlias = Literal["auto"]  # chosen from the camera path, see auto.py
 
@@ -27,7 +28,7 @@ def _number_problem(value: object, low: float, high: float, whole: bool) -> str 
     if right_type and low <= value <= high:  # type: ignore[operator]
         return None
     beyond = right_type and (value < -FARTHEST or value > FARTHEST)  # type: ignore[operator]
-    wanted = f"from {low:g} to {high:g}" if beyond else between(low, high)
+    wanted = f"from {low:g} to {high:g}" if beyond else range_text(low, high)
     kind = "a whole number" if whole else "a number"
     return f"expected {kind} {wanted}".rstrip() + f", got {shown(value)}"
 

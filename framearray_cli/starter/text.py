@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from framearray_cli.base.forms.text import inline, numbers, quoted
+from framearray_cli.base.forms.text import inline, inline_floats, quoted
 
 from .model import Camera, LightKeys, MaterialNote, Start, source_keys
 
@@ -34,7 +34,7 @@ def to_text(start: Start, job_file: Path) -> str:
             "[scene]",
             _line("file", quoted(scene_name(start.file, job_file)), "relative to this file"),
             _line("up", quoted(start.up), "the axis that points up"),
-            _line("background", numbers(start.background), "radiance of what lies outside: the sky"),
+            _line("background", inline_floats(start.background), "radiance of what lies outside: the sky"),
             *_materials(start.materials),
             "",
             *_camera(start.camera),
@@ -130,9 +130,9 @@ def _materials(materials: Sequence[MaterialNote]) -> list[str]:
     for material in materials:
         lines.append(f"# [scene.materials.{quoted(material.name)}]")
         more = f"  # {material.more}, which these numbers replace" if material.more else ""
-        lines.append(f"# reflectivity = {numbers(material.reflectivity)}{more}")
+        lines.append(f"# reflectivity = {inline_floats(material.reflectivity)}{more}")
         if max(material.specular) > 0:
-            lines.append(f"# specular = {numbers(material.specular)}")
+            lines.append(f"# specular = {inline_floats(material.specular)}")
     return lines
 
 

@@ -50,7 +50,7 @@ def test_any_text_can_be_quoted(text: str) -> None:
 
 @given(some.lists(some.floats(allow_nan=False)))
 def test_numbers_come_back_as_floats(values: list[float]) -> None:
-    found = tomllib.loads(f"x = {tomltext.numbers(values)}")["x"]
+    found = tomllib.loads(f"x = {tomltext.inline_floats(values)}")["x"]
     assert found == values and all(isinstance(value, float) for value in found)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from random import Random
 from typing import Any, TypeAlias
 
-from framearray_cli.base.forms.schema import Schema, find, resolved, variants
+from framearray_cli.base.forms.schema import Schema, find, follow_reference, variants
 from framearray_cli.base.forms.table import Place
 
 from . import values
@@ -153,7 +153,7 @@ def more_keys(rng: Random, table: Table, root: Schema) -> str:
     """A table gets a key that it may have and had not."""
     homes = [(), *(p for p in places(table) if isinstance(at(table, p), dict))]
     place = rng.choice(homes)
-    node = resolved(root, schema_at(root, table, place))
+    node = follow_reference(root, schema_at(root, table, place))
     if kinds := variants(root, node):
         node = kinds.get(str(at(table, place).get("type")), {})
     properties = node.get("properties", {})

@@ -4,7 +4,7 @@ import datetime
 from random import Random
 from typing import Any
 
-from framearray_cli.base.forms.schema import Schema, resolved, variants
+from framearray_cli.base.forms.schema import Schema, follow_reference, variants
 
 NUMBERS: tuple[Any, ...] = (
     0, 1, -1, 2, 7, 255, 65535, 65536, 2**31 - 1, 2**31, -(2**31), 2**32, 2**53 + 1, 2**63 - 1, 2**63, -(2**63), 2**64,
@@ -76,7 +76,7 @@ def number(rng: Random, node: Schema) -> Any:
 
 def allowed(rng: Random, root: Schema, node: Schema) -> Any:
     """A value of the kind that a schema wants, often at the end of what it allows."""
-    node = resolved(root, node)
+    node = follow_reference(root, node)
     if kinds := variants(root, node):
         name, chosen = rng.choice(list(kinds.items()))
         return {**allowed(rng, root, chosen), "type": name}

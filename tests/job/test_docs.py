@@ -5,7 +5,7 @@ import tomllib
 
 from support import ROOT
 
-from framearray_cli.base.forms.schema import file_schema, find, sections, words
+from framearray_cli.base.forms.schema import allowed_values, file_schema, find, sections
 from framearray_cli.job.docs import EXAMPLE, reference, schema_text
 from framearray_cli.job.job import Job
 
@@ -27,8 +27,8 @@ def test_the_example_is_a_job():
 def test_words_of_schemas_other_files_may_use():
     place = {"anyOf": [{"type": "integer"}, {"type": "string"}]}
     span = {"anyOf": [*place["anyOf"], {"type": "array", "items": place, "minItems": 2, "maxItems": 2}]}
-    assert words({}, span) == "a whole number, a text or 2 values"
-    assert words({}, {}) == "another value"
+    assert allowed_values({}, span) == "a whole number, a text or 2 values"
+    assert allowed_values({}, {}) == "another value"
     assert find(span, (1,)) == ("[1]", place)
     assert find({}, ("a b", "c", 3)) == ('"a b".c[3]', {})
 

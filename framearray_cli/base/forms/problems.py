@@ -1,4 +1,4 @@
-"""What is wrong with a file, in plain words, each problem with its place: `camera.fov: expected ..., got ...`."""
+"""Problems of a file in plain words, each with its place: `camera.fov: expected ..., got ...`."""
 
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
@@ -7,12 +7,13 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from .schema import Schema, dotted, either, file_schema, find, sections, variants, words
-from .words import FARTHEST, shown
+from ..units import FARTHEST
+from .schema import Schema, allowed_values, file_schema, find, join_options, sections, toml_key, variants
+from .words import shown
 
-MOST_PROBLEMS = 50  # of a file; more would scroll away what matters
+MOST_PROBLEMS = 50  # reported per file; more would scroll the first ones away
 
-# Words from other programs, for keys whose spelling is too far from ours to be found as a typing error.
+# Names from other programs that are spelled too differently from ours to count as typing errors.
 SYNONYMS = {
     "intensity": ("irradiance",),
     "irradiance": ("intensity",),
@@ -42,33 +43,33 @@ def problems_of(error: ValidationError, model: type[BaseModel], most: int = MOST
     """Translate the problems that pydantic found in a table of type `model`, in the order of the file's keys.
 
     Args:
-        most: that are told; the rest, which a wrong file may have by the hundred thousand, are counted.
+        most: number of problems to report; the others, of which a wrong file may have 100,000, are only counted.
     """
     root = file_schema(model)
     found = [details for details in error.errors(include_url=False) if not _is_echo(details)]
-    return cut([_problem(root, details) for details in found[:most]], len(found))
+    return append_count([_problem(root, details) for details in found[:most]], len(found))
 
 
-def cut(told: Sequence[str], n: int) -> list[str]:
-    """The problems that are told, and how many more there are of n."""
-    return [*told, f"and {n - len(told)} more problems"] if n > len(told) else list(told)
+def append_count(reported: Sequence[str], n: int) -> list[str]:
+    """Append the number of problems, of n, that are not reported."""
+    return [*reported, f"and {n - len(reported)} more problems"] if n > len(reported) else list(reported)
 
 
 def _is_echo(details: ErrorDetails) -> bool:
-    """Whether a list is called too short only because its wrong items, which have their own problems, do not count."""
+    """Whether pydantic calls a list too short only because it does not count wrong items, which it reports as well."""
     return details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]
 
 
 def _problem(root: Schema, details: ErrorDetails) -> str:
-    """Say one problem: its place, what was expected, what was found."""
+    """Write one problem: its place, what was expected, what was found."""
     place, kind, found = details["loc"], details["type"], details["input"]
     context: dict[str, Any] = details.get("ctx", {})
     path, node = find(root, place)
     match kind:
-        case "job":  # a rule of our own, with its own words
+        case "job":  # a rule of our own, with its own text
             text = context["text"]
         case "missing":
-            text = f"missing; expected {words(root, node)}"
+            text = f"missing; expected {allowed_values(root, node)}"
         case "extra_forbidden":
             text = _unknown_key(root, place)
         case "union_tag_not_found" if isinstance(found, dict):
@@ -76,39 +77,40 @@ def _problem(root: Schema, details: ErrorDetails) -> str:
         case "union_tag_invalid":
             path, text = f"{path}.type", f"expected {_kinds(root, node)}, got {shown(found.get('type'))}"
         case "too_short":
-            text = f"expected {words(root, node)}, at least {context['min_length']}, got {context['actual_length']}"
+            least, n = context["min_length"], context["actual_length"]
+            text = f"expected {allowed_values(root, node)}, at least {least}, got {n}"
         case "less_than_equal" if context["le"] >= FARTHEST:
             text = f"expected at most {context['le']:g}, got {shown(found)}"
         case "invalid_key":
             text = f"expected a key that is a text, got {shown(found)}"
         case _:
-            text = f"expected {words(root, node)}, got {shown(found)}"
+            text = f"expected {allowed_values(root, node)}, got {shown(found)}"
     return f"{path}: {text}" if path else text
 
 
 def _kinds(root: Schema, node: Schema) -> str:
     """List the values of the `type` key of a table."""
-    return either([f'"{kind}"' for kind in variants(root, node)])
+    return join_options([f'"{kind}"' for kind in variants(root, node)])
 
 
 def _unknown_key(root: Schema, place: tuple[int | str, ...]) -> str:
-    """Name the key of the same table that was probably meant, or else the table where such a key belongs."""
+    """Suggest a key of the same table, or else the table where such a key belongs."""
     key = str(place[-1])
     known = find(root, place[:-1])[1].get("properties", {})
-    if meant := _nearest(key, known):
+    if meant := _guess_key(key, known):
         return f'unknown key; did you mean "{meant}"?'
     homes: dict[str, list[str]] = {}
     for section in sections(root):
         for name in section.keys:
             homes.setdefault(name, []).append(f"in [{section.place}]" if section.place else "at the top of the file")
-    if meant := _nearest(key, homes):
+    if meant := _guess_key(key, homes):
         places = " or ".join(dict.fromkeys(homes[meant])).replace(" or in ", " or ")
         return f'unknown key here; "{meant}" belongs {places}'
-    return f"unknown key; known here: {', '.join(dotted(name) for name in known)}"
+    return f"unknown key; known here: {', '.join(toml_key(name) for name in known)}"
 
 
-def _nearest(key: str, known: Iterable[str]) -> str | None:
-    """Find the known key that was probably meant."""
+def _guess_key(key: str, known: Iterable[str]) -> str | None:
+    """Find the known key that the author probably meant."""
     names = {name.lower(): name for name in known}
     lower = key.lower().replace("-", "_")[:50]
     for other in (lower, *SYNONYMS.get(lower, ())):

@@ -1,4 +1,4 @@
-"""JSON Schema of a file format, and the same schema in words: for messages and for the reference page."""
+"""JSON Schema of a file format, and the same schema in words for messages and the reference page."""
 
 import json
 import re
@@ -10,25 +10,25 @@ from typing import Any, TypeAlias
 from pydantic import BaseModel
 
 from .table import Place
-from .words import between, number
+from .words import bound_text, range_text
 
 Schema: TypeAlias = dict[str, Any]
 
 LONGEST_KEY = 100  # characters of a key in a message
 
 
-@cache  # a file of eyes may have a problem in each of its rows
+@cache  # a file of eyes may have a problem in every row
 def file_schema(model: type[BaseModel]) -> Schema:
-    """Make the schema of what a file may hold: TOML has no null, so no key may be null. Not to be changed.
+    """Make the schema of a file. TOML has no null, so no key may be null.
 
-    The keyword `x-default` tells in words a default that depends on other keys.
+    The keyword `x-default` describes a default that depends on other keys. Callers share the result: do not change it.
     """
     schema: Schema = _without_null(model.model_json_schema())
     return schema
 
 
 def _without_null(node: Any) -> Any:
-    """Remove the null options, and defaults that are null or told in words."""
+    """Remove null options, and defaults that are null or described in words."""
     if isinstance(node, list):
         return [_without_null(item) for item in node]
     if not isinstance(node, dict):
@@ -44,8 +44,8 @@ def _without_null(node: Any) -> Any:
     return node
 
 
-def resolved(root: Schema, node: Schema) -> Schema:
-    """Follow a reference; what stands beside it wins."""
+def follow_reference(root: Schema, node: Schema) -> Schema:
+    """Follow a reference; keywords beside it win."""
     while "$ref" in node:
         target = root["$defs"][node["$ref"].rsplit("/", 1)[1]]
         node = {**target, **{key: value for key, value in node.items() if key != "$ref"}}
@@ -53,9 +53,9 @@ def resolved(root: Schema, node: Schema) -> Schema:
 
 
 def variants(root: Schema, node: Schema) -> dict[str, Schema]:
-    """List the kinds of a table that a `type` key tells apart; empty for every other table."""
+    """List the kinds of a table that has a `type` key; empty for every other table."""
     kinds = {ref: kind for kind, ref in node.get("discriminator", {}).get("mapping", {}).items()}
-    return {kinds[option["$ref"]]: resolved(root, option) for option in node.get("oneOf", ()) if kinds}
+    return {kinds[option["$ref"]]: follow_reference(root, option) for option in node.get("oneOf", ()) if kinds}
 
 
 def find(root: Schema, place: Place) -> tuple[str, Schema]:
@@ -65,38 +65,38 @@ def find(root: Schema, place: Place) -> tuple[str, Schema]:
     """
     path, node = "", root
     for step in place:
-        node = resolved(root, node)
-        if step in (kinds := variants(root, node)):  # names the kind of table, is no key of the file
+        node = follow_reference(root, node)
+        if step in (kinds := variants(root, node)):  # the kind of a table, not a key of the file
             node = kinds[str(step)]
         elif isinstance(step, int):
             path += f"[{step}]"
             node = next((option["items"] for option in (node, *node.get("anyOf", ())) if "items" in option), {})
         else:
-            path += ("." if path else "") + dotted(step)
+            path += ("." if path else "") + toml_key(step)
             extra = node.get("additionalProperties") or {}
             node = node.get("properties", {}).get(step, extra)
-    return path, resolved(root, node)
+    return path, follow_reference(root, node)
 
 
-def dotted(key: str) -> str:
-    """Write a key as TOML does: bare where that is possible, else quoted; a long one is shortened."""
+def toml_key(key: str) -> str:
+    """Write a key as TOML does, bare if possible, else quoted; shorten a long one."""
     if len(key) > LONGEST_KEY:
         key = f"{key[:LONGEST_KEY]}..."
     return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else json.dumps(key, ensure_ascii=False)
 
 
-def words(root: Schema, node: Schema) -> str:
-    """Say which values a schema allows: "a whole number from 1 to 65535", "3 numbers", "a table"."""
-    node = resolved(root, node)
+def allowed_values(root: Schema, node: Schema) -> str:
+    """Describe the values that a schema allows: "a whole number from 1 to 65535", "3 numbers", "a table"."""
+    node = follow_reference(root, node)
     if "x-words" in node:
         return str(node["x-words"])
     if choices := node.get("enum", [node["const"]] if "const" in node else list(variants(root, node))):
-        return "a table" if "oneOf" in node else either([f'"{choice}"' for choice in choices])
+        return "a table" if "oneOf" in node else join_options([f'"{choice}"' for choice in choices])
     if "anyOf" in node:
         first, *others = node["anyOf"]
-        if others and others[0].get("items") == first:  # grey or RGB: the bounds are said once
+        if others and others[0].get("items") == first:  # grey or RGB: give the bounds once
             return f"a number or {others[0]['minItems']} numbers {_range(first)}".rstrip()
-        return either([words(root, option) for option in node["anyOf"]])
+        return join_options([allowed_values(root, option) for option in node["anyOf"]])
     match node.get("type"):
         case "integer":
             return f"a whole number {_range(node)}".rstrip()
@@ -118,22 +118,22 @@ def words(root: Schema, node: Schema) -> str:
 
 
 def _range(node: Schema) -> str:
-    """Say the bounds of a number."""
+    """Write the bounds of a number."""
     low = node.get("minimum", float("-inf"))
     high = node.get("maximum", node["exclusiveMaximum"] - 1 if "exclusiveMaximum" in node else float("inf"))
     if "exclusiveMinimum" in node:
-        return f"above {number(node['exclusiveMinimum'])}"
-    return between(low, high)
+        return f"above {bound_text(node['exclusiveMinimum'])}"
+    return range_text(low, high)
 
 
-def either(options: list[str]) -> str:
-    """Join options as a sentence does."""
+def join_options(options: list[str]) -> str:
+    """Join options: "a, b or c"."""
     return options[0] if len(options) == 1 else f"{', '.join(options[:-1])} or {options[-1]}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """One table of a file: its place, such as `light.sources[].keys[]`, the kind its `type` names, and its schema."""
+    """One table of a file: its place, such as `light.sources[].keys[]`, its kind (the value of `type`), its schema."""
 
     place: str
     kind: str | None
@@ -141,13 +141,13 @@ class Section:
 
     @property
     def keys(self) -> dict[str, Schema]:
-        """Schema of each key that holds a value or a list."""
+        """Schema of each key."""
         return dict(self.schema.get("properties", {}))
 
 
 def sections(root: Schema, node: Schema | None = None, place: str = "", kind: str | None = None) -> Iterator[Section]:
     """List all tables of a file, each before the tables it holds."""
-    node = resolved(root, node if node is not None else root)
+    node = follow_reference(root, node if node is not None else root)
     for name, variant in variants(root, node).items():
         yield from sections(root, variant, place, name)
     if "properties" in node:

@@ -1,7 +1,4 @@
-"""What a job file is made of: points, directions, colours, sizes, file names, and the base of its tables.
-
-Each kind checks itself and says in plain words what it expected and what it found.
-"""
+"""Base of the tables of job files and movie path files, and how their validators report problems."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -10,12 +7,12 @@ from typing import Annotated, Any, NoReturn, TypeAlias, TypeVar
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-Place: TypeAlias = tuple[int | str, ...]  # keys and list positions from the value at hand down to the problem
+Place: TypeAlias = tuple[int | str, ...]  # keys and list positions, from a value down to its problem
 Float3: TypeAlias = tuple[float, float, float]
 
 
 def fail(problems: Sequence[tuple[Place, str]]) -> NoReturn:
-    """Raise every problem of one value at once, each at its own place below that value."""
+    """Raise every problem of one value at once, each with its place below that value."""
     details = [
         InitErrorDetails(type=PydanticCustomError("job", "{text}", {"text": text}), loc=place, input=None)
         for place, text in problems
@@ -33,15 +30,15 @@ _Table = TypeVar("_Table", bound=Table)
 
 
 def fill(table: Table, key: str, value: object) -> None:
-    """Set what the file left out; only while a table is being made."""
+    """Set a key that the file leaves out; only for validators, as tables are frozen."""
     object.__setattr__(table, key, value)
 
 
 def changed(table: _Table, **values: object) -> _Table:
-    """Copy a table with other values, each checked as one of a file is; `model_copy` takes any name and any value.
+    """Copy a table with other values, each checked as if it came from a file; `model_copy` checks nothing.
 
-    Only single values are checked: a report measures settings that do not go together in a file. A value that is a
-    table has been checked already; its own rules on what goes together would refuse such settings.
+    Rules between keys do not apply: a report measures combinations of settings that no file may have. A value that is
+    a table was checked when it was made.
 
     Raises:
         ValidationError: a key has no such value.
@@ -64,6 +61,6 @@ def _value_check(kind: type[Table], key: str) -> TypeAdapter[Any]:
     return TypeAdapter(checked)
 
 
-def computed(text: str) -> dict[str, Any]:
-    """Describe a default that depends on other keys; it replaces the stored default in schema and docs."""
+def default_text(text: str) -> dict[str, Any]:
+    """Describe a default that depends on other keys, in place of the stored default in schema and docs."""
     return {"x-default": text}

@@ -1,4 +1,4 @@
-"""Values as a TOML file has them, on one line each."""
+"""Values as TOML text, on one line each."""
 
 import json
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from typing import Any
 
 
 def inline(value: Any) -> str:
-    """Write a plain value: a table and a list on one line too."""
+    """Write a plain value; tables and lists on one line as well."""
     import tomli_w
 
     if isinstance(value, dict):
@@ -16,17 +16,17 @@ def inline(value: Any) -> str:
     return tomli_w.dumps({"x": value}).removeprefix("x = ").rstrip("\n")
 
 
-def numbers(values: Sequence[float]) -> str:
-    """Write numbers as floats; `repr` gives the shortest text that reads back as the same float."""
+def inline_floats(values: Sequence[float]) -> str:
+    """Write a list of floats; `repr` gives the shortest text that reads back as the same float."""
     return f"[{', '.join(repr(float(value)) for value in values)}]"
 
 
 def quoted(text: str) -> str:
-    """Write any text; control characters are escaped, and halves of characters, which TOML cannot hold, replaced."""
+    """Write any text: escape control characters, and replace lone surrogates, which TOML cannot hold."""
     whole = text.encode("utf-8", "replace").decode("utf-8")
     return json.dumps(whole, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def brief(value: bool | str | float) -> str:
-    """Write a setting, a number with up to six digits."""
+    """Write a setting; a number with at most six digits."""
     return json.dumps(value) if isinstance(value, bool | str) else f"{value:g}"

@@ -1,14 +1,30 @@
-"""TOML text -> Job, or one JobError with every problem; and Job -> plain tables."""
+"""TOML file -> plain tables, or one JobError."""
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
 
 from ..errors import JobError
 from ..files import read_at_most
-from .words import long_key
 
-LARGEST_FILE = 4 * 1024 * 1024  # bytes; a hand-written job is a thousand times smaller, so more is the wrong file
+LARGEST_FILE = 4 * 1024 * 1024  # bytes; a job is a thousand times smaller; anything larger is the wrong file
+
+# Python's TOML reader takes time and memory in proportion to the square of this number.
+MOST_PARTS = 6  # keys with dots between them; no file of ours has more than 4
+
+_KEY = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
+
+_LONG_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*+{_KEY}(?:[ \t]*+\.[ \t]*+{_KEY}){{{MOST_PARTS}}}", re.MULTILINE)
+
+
+def long_key_problem(text: str) -> str | None:
+    """Describe the first key of a TOML text that has too many parts, if there is one."""
+    found = _LONG_KEY.search(text)
+    if not found:
+        return None
+    line = text.count("\n", 0, found.start()) + 1
+    return f"line {line}: expected at most {MOST_PARTS} keys with dots between them, got more"
 
 
 def load_toml(path: Path) -> dict[str, Any]:
@@ -19,7 +35,7 @@ def load_toml(path: Path) -> dict[str, Any]:
     """
     data = _read_bytes(path)
     text = _decode(path, data)
-    if problem := long_key(text):
+    if problem := long_key_problem(text):
         raise JobError(path, [problem])
     try:
         return tomllib.loads(text)
@@ -27,12 +43,12 @@ def load_toml(path: Path) -> dict[str, Any]:
         raise JobError(path, [f"not valid TOML: {error}"]) from error
     except RecursionError as error:
         raise JobError(path, ["tables or lists are nested too deeply"]) from error
-    except ValueError as error:  # a number of more digits than Python reads
+    except ValueError as error:  # a number with more digits than Python reads
         raise JobError(path, ["a number has too many digits"]) from error
 
 
 def _read_bytes(path: Path) -> bytes:
-    """Read a whole file whose size is checked first."""
+    """Read a whole file, up to the largest that is accepted."""
     try:
         if path.is_dir():
             raise JobError(path, ["expected a TOML file, got a folder"])
@@ -48,7 +64,7 @@ def _read_bytes(path: Path) -> bytes:
 
 
 def _decode(path: Path, data: bytes) -> str:
-    """Decode UTF-8, with or without the mark that Windows editors put first."""
+    """Decode UTF-8, with or without the byte order mark of Windows editors."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise JobError(path, ["expected UTF-8 text, got UTF-16; save the file as UTF-8"])
     if b"\0" in data:

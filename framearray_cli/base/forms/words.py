@@ -1,15 +1,14 @@
-"""Values and keys of a file, as messages show them."""
+"""Values and bounds, as messages show them."""
 
 import json
-import re
 
-FARTHEST = 1e12  # scene units; squares and cubes of it still fit in float32 (3e38)
+from ..units import FARTHEST
 
 LONGEST_SHOWN = 40  # characters of a found value in a message
 
 
 def shown(value: object) -> str:
-    """Describe a found value as it would stand in a TOML file, shortened."""
+    """Write a value as a TOML file has it, shortened."""
     if isinstance(value, dict):
         return "a table"
     if isinstance(value, list | tuple):
@@ -28,30 +27,13 @@ def shown(value: object) -> str:
     return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 4] + "..." + text[-1]
 
 
-# The reader of TOML takes time and memory by the square of this number.
-MOST_PARTS = 6  # keys with dots between them; no file has more than 4
-
-_KEY = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
-
-_LONG_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*+{_KEY}(?:[ \t]*+\.[ \t]*+{_KEY}){{{MOST_PARTS}}}", re.MULTILINE)
-
-
-def long_key(text: str) -> str | None:
-    """What is wrong with a TOML text whose keys have too many parts, or None."""
-    found = _LONG_KEY.search(text)
-    if not found:
-        return None
-    line = text.count("\n", 0, found.start()) + 1
-    return f"line {line}: expected at most {MOST_PARTS} keys with dots between them, got more"
-
-
-def between(low: float, high: float) -> str:
-    """Say a range of numbers, "from 0 to 1"; bounds that only protect the arithmetic are left out."""
+def range_text(low: float, high: float) -> str:
+    """Write a range of numbers, "from 0 to 1", without bounds that only protect the arithmetic."""
     if high >= FARTHEST:
-        return "" if low <= -FARTHEST else f"of at least {number(low)}"
-    return f"from {number(low)} to {number(high)}"
+        return "" if low <= -FARTHEST else f"of at least {bound_text(low)}"
+    return f"from {bound_text(low)} to {bound_text(high)}"
 
 
-def number(value: float) -> str:
-    """Write a bound: whole numbers in full where they are short."""
+def bound_text(value: float) -> str:
+    """Write a bound: a whole number in full, unless it is long."""
     return str(int(value)) if value == int(value) and abs(value) < FARTHEST else f"{value:g}"

@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypeAlias
 from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
 
 from framearray_cli.array.pictures import AS_RENDERED, Relight
-from framearray_cli.base.forms.schema import dotted
+from framearray_cli.base.forms.schema import toml_key
 from framearray_cli.base.forms.table import Float3, Place, Table, fail
 from framearray_cli.base.forms.words import shown
 
@@ -128,7 +128,7 @@ def relights(
     """
     if not times or not (groups or ambient):
         return [AS_RENDERED] * len(times)
-    by_group = {name: _factors(f"groups.{dotted(name)}", change, times, problems) for name, change in groups.items()}
+    by_group = {name: _factors(f"groups.{toml_key(name)}", change, times, problems) for name, change in groups.items()}
     of_ambient = _factors("ambient", ambient or LightChange(), times, problems)
     return [
         Relight(groups={name: factors[k] for name, factors in by_group.items()}, ambient=of_ambient[k])

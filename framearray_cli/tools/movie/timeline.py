@@ -8,7 +8,7 @@ from pathlib import Path
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.array.pictures import Relight
 from framearray_cli.base.errors import JobError
-from framearray_cli.base.forms.schema import dotted
+from framearray_cli.base.forms.schema import toml_key
 
 from ..places import IndexPlace, interpolate_span, nearest_index, resolve_span
 from .curves import relights
@@ -95,12 +95,12 @@ def _spans(
     for k, (name, n) in enumerate({"camera": manifest.n_cameras, **axes}.items()):
         if (span := given.pop(name, None)) is not None:
             place, noun = (
-                (name, f"{name}s") if name in ("camera", MAIN_AXIS) else (f"axes.{dotted(name)}", f"places of {name}")
+                (name, f"{name}s") if name in ("camera", MAIN_AXIS) else (f"axes.{toml_key(name)}", f"places of {name}")
             )
             found[k] = resolve_span(f"{key}.{place}", span, n, noun, problems)
     for name, span in given.items():
         if span is not None:
-            place = MAIN_AXIS if name == MAIN_AXIS else f"axes.{dotted(name)}"
+            place = MAIN_AXIS if name == MAIN_AXIS else f"axes.{toml_key(name)}"
             problems.append(f"{key}.{place}: no such light axis; the array has {', '.join(axes)}")
     return found
 
@@ -108,7 +108,7 @@ def _spans(
 def _light_problems(movie: MoviePath, manifest: Manifest) -> list[str]:
     """List changes of the light that the array cannot show."""
     if not manifest.groups:
-        keys = [f"groups.{dotted(name)}" for name in movie.groups] + (["ambient"] if movie.ambient else [])
+        keys = [f"groups.{toml_key(name)}" for name in movie.groups] + (["ambient"] if movie.ambient else [])
         return [
             f"{key}: this array stores its light all together, so that it cannot be changed; render again with "
             'group = "..." in [[light.sources]]'
@@ -116,7 +116,7 @@ def _light_problems(movie: MoviePath, manifest: Manifest) -> list[str]:
         ]
     known = manifest.group_names
     return [
-        f"groups.{dotted(name)}: no such group; the array has {', '.join(known)}"
+        f"groups.{toml_key(name)}: no such group; the array has {', '.join(known)}"
         for name in movie.groups
         if name not in known
     ]
