@@ -1,4 +1,4 @@
-"""Where the command `framearray` starts; `python -m framearray_cli` is the same."""
+"""Entry point of the command `framearray`, and of `python -m framearray_cli`."""
 
 import gc
 import os
@@ -10,8 +10,8 @@ from contextlib import suppress
 def main() -> None:
     """Load the command line and run it; Ctrl-C while it loads ends the process without a traceback.
 
-    Loaded modules are some hundred thousand objects that all stay. Looking through them for garbage again and again
-    while they load, and taking them apart one by one when all is done, would take half a second.
+    Loaded modules hold some hundred thousand objects, all of them until the end. It would take half a second to search
+    them for garbage while they load and to free them one by one at the end.
     """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     gc.set_threshold(100_000, 50, 50)
@@ -27,7 +27,7 @@ def main() -> None:
 
 
 def _leave(exit_code: int) -> None:
-    """End the process at once; the files that it wrote are closed."""
+    """End the process at once; all its files are closed by now."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):
             stream.flush()

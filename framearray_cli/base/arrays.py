@@ -1,6 +1,6 @@
 """Names for array shapes, used in every signature.
 
-numpy's types carry the dtype; the shape stands in the alias's name and comment.
+numpy's types carry the dtype; each alias adds the shape and the meaning, in its name and comment.
 """
 
 import math
@@ -20,14 +20,14 @@ Keys: TypeAlias = NDArray[np.uint64]  # random streams
 
 LINE = 64  # bytes of a cache line
 
-# What kernels pass by value: Python's float where it does not matter, float32 where it is to stay that.
+# What kernels pass by value: float32 where it must not widen, else Python's float.
 Real: TypeAlias = float | np.float32
 Triple: TypeAlias = tuple[Real, Real, Real]
 
 Points: TypeAlias = Float32  # (n, 3), scene units, centred
 WorldPoints: TypeAlias = Float64  # (n, 3), scene units, in the scene file's own coordinates
 Directions: TypeAlias = Float32  # (n, 3), unit length
-Corners: TypeAlias = Float32  # (n_triangles, 3, 3), one point a corner
+Corners: TypeAlias = Float32  # (n_triangles, 3, 3), one point per corner
 CornerUvs: TypeAlias = Float32  # (n_triangles, 3, 2), v upwards
 Rgb: TypeAlias = Float32  # (n, 3), linear, Rec. 709 primaries
 Image: TypeAlias = Float32  # (height, width, 3), linear radiance, row 0 at the top
@@ -35,20 +35,20 @@ Images: TypeAlias = NDArray[np.float32] | NDArray[np.float16]  # (n_lights, heig
 
 
 def is_number(value: object) -> bool:
-    """Whether a value from a file is a number that float64 holds: not NaN, infinite or a whole number beyond."""
+    """Whether a value from a file is a finite number that float64 can hold."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return abs(value) <= sys.float_info.max
 
 
 def with_room(shape: tuple[int, ...], dtype: Any, fill: float | None = None) -> Any:
-    """An array that starts at a cache line.
+    """Allocate an array that starts at a cache line, with room behind it.
 
-    Behind it there is room for what a kernel reads beyond its end, 16 numbers at a time, and ignores.
+    Kernels read 16 numbers at a time, so they read beyond the end; they ignore what they find there.
 
     Args:
-        fill: the array and the room behind it are filled with it; None: their contents are arbitrary. Where a kernel
-            computes with what it ignores, that matters: processors take a hundred times as long for denormal numbers.
+        fill: value of the array and of the room behind it; None leaves both uninitialized. Where a kernel computes
+            with numbers that it then ignores, give a value: denormal numbers take a processor 100 times as long.
     """
     size, item = math.prod(shape), np.dtype(dtype).itemsize
     block = np.empty(size + 16 + LINE // item, dtype)
@@ -58,9 +58,9 @@ def with_room(shape: tuple[int, ...], dtype: Any, fill: float | None = None) -> 
 
 
 def reshaped(array: Any, shape: tuple[int, ...]) -> Any:
-    """The memory of an array made by `with_room` as one of another shape, or None where that does not fit.
+    """Reuse the memory of an array from `with_room` for another shape; None if the shape does not fit.
 
-    What fits is not larger, nor so much smaller that more than a quarter would be wasted.
+    A shape fits if it needs no more memory than the array has, and no less than four fifths of it.
     """
     size, block = math.prod(shape), array.base
     needed = size + 16 + LINE // block.itemsize

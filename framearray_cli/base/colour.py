@@ -1,4 +1,4 @@
-"""sRGB and linear light (IEC 61966-2-1), both with Rec. 709 primaries: only the curve differs."""
+"""sRGB and linear light (IEC 61966-2-1), both with Rec. 709 primaries; only the curve differs."""
 
 from functools import cache
 from typing import Any
@@ -40,8 +40,8 @@ def linear_from_srgb(encoded: NDArray[Any]) -> NDArray[Any]:
 def srgb8_from_linear(linear: NDArray[Any]) -> Bytes:
     """Encode linear values as 8-bit sRGB codes, clipped to 0 to 255.
 
-    The value is rounded to half precision, and its 16 bits index a table of all halves. That rounding moves the
-    code by at most 0.04, so a code is within 0.54 of the exact value; it is the nearest code for any half.
+    A table holds the code of every half: a value is rounded to half precision, and its 16 bits are the index. The
+    rounding moves the code by at most 0.04, so a code is within 0.54 of the exact value; of a half it is the nearest.
 
     Args:
         linear: any shape, no NaN.
@@ -49,7 +49,7 @@ def srgb8_from_linear(linear: NDArray[Any]) -> Bytes:
     Returns:
         The same shape, uint8.
     """
-    with np.errstate(over="ignore"):  # beyond 65504 a half is infinite, which the table clips to 255
+    with np.errstate(over="ignore"):  # values above 65504 become infinite, which the table clips to 255
         half = np.asarray(linear).astype(np.float16)
     return np.take(_code_of_half(), half.view(np.uint16))
 
@@ -61,7 +61,7 @@ def linear_from_srgb8(codes: Bytes) -> Float32:
 
 @cache
 def _code_of_half() -> Bytes:
-    """Tabulate the 8-bit code of each of the 65536 halves; NaN gives 0."""
+    """Tabulate the 8-bit code of each of the 65536 halves; the code of NaN is 0."""
     halves = np.arange(65536, dtype=np.uint16).view(np.float16)
     linear = np.nan_to_num(halves.astype(np.float64), nan=0.0, posinf=1.0, neginf=0.0)
     codes: NDArray[Any] = np.rint(srgb_from_linear(linear) * 255)

@@ -1,7 +1,7 @@
-"""All errors the user can meet, each with the exit code of the command that meets it.
+"""All errors that a user can see, each with the exit code of a command that it ends.
 
-A message says: file, place in it, what was expected, what was found, what to do if that is not plain.
-Only `cli.py` turns an error into an exit.
+A message names the file, the place in it, what was expected, what was found, and the remedy if that is not obvious.
+Only `cli/main.py` turns an error into an exit.
 """
 
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 class FrameArrayError(Exception):
-    """Base of every error that is the input's or the machine's fault, not ours."""
+    """Base of all errors that the input or the machine causes, not a bug."""
 
     exit_code = 1
 
@@ -20,7 +20,7 @@ class JobError(FrameArrayError):
     exit_code = 2
 
     def __init__(self, file: Path | str, problems: Sequence[str]) -> None:
-        """Hold every problem of one file; each reads `key.path: expected ..., got ...`."""
+        """Take every problem of one file; each reads `key.path: expected ..., got ...`."""
         self.file = file
         self.problems = tuple(problems)
         super().__init__("\n".join(f"{file}: {problem}" for problem in self.problems))
@@ -39,28 +39,28 @@ class OutputError(FrameArrayError):
 
 
 class CheckError(FrameArrayError):
-    """A check that was asked for and failed."""
+    """A check that the user asked for failed."""
 
     exit_code = 5
 
 
 class LimitError(FrameArrayError):
-    """The system lets this process have less than it needs: memory, address space, threads."""
+    """The system gives this process less than it needs: memory, address space or threads."""
 
     exit_code = 2
 
 
 class MissingExtraError(FrameArrayError):
-    """An optional package is needed and not installed; the message names the extra."""
+    """An optional library is needed and not installed; the message names the extra."""
 
     exit_code = 2
 
 
 class BusyError(OutputError):
-    """Another run works on the same cameras of a folder."""
+    """Another run is rendering the same cameras into the same folder."""
 
 
 class WorkerError(FrameArrayError):
-    """Workers that cannot render, or that were lost with what they had not finished."""
+    """Workers cannot render, or were lost with unfinished work."""
 
     exit_code = 4

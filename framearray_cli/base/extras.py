@@ -1,4 +1,4 @@
-"""Libraries that may be absent: what a user reads where one is needed."""
+"""Optional libraries: the error where one is needed and missing."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,15 +8,15 @@ from .errors import MissingExtraError
 
 @contextmanager
 def extra(need: str, install: str, *, reason: bool = False) -> Iterator[None]:
-    """Turn an import that fails into an error that says how to install what is missing.
+    """Turn a failed import into an error that says how to install the library.
 
     Args:
         need: what needs the library: "movies need PyAV".
-        install: what `pip install` takes.
-        reason: repeat what Python says; a library may be there and still not load.
+        install: argument of `pip install`.
+        reason: include Python's own message; an installed library may still fail to load.
 
     Raises:
-        MissingExtraError: the import inside failed.
+        MissingExtraError: an import in the block failed.
     """
     try:
         yield
@@ -27,5 +27,5 @@ def extra(need: str, install: str, *, reason: bool = False) -> Iterator[None]:
 
 
 def not_installed(need: str, install: str) -> MissingExtraError:
-    """The error of a library that is not there."""
+    """Make the error of a library that is not installed."""
     return MissingExtraError(f"{need}, which is not installed; install it with: pip install {install}")

@@ -1,4 +1,4 @@
-"""Files and folders that appear whole or not at all: written beside the target, then renamed."""
+"""Files and folders that appear whole or not at all: written beside their target, then renamed."""
 
 import errno
 import os
@@ -10,17 +10,17 @@ from pathlib import Path
 
 from .errors import OutputError
 
-HEAD = 2**16  # bytes of a file beside its pixels, at most
+MOST_HEADER = 2**16  # bytes of an image file beside its pixels, at most
 REMEDIES = {errno.EMFILE: "`ulimit -n 1024` lets this program open more"}
 
 
 @contextmanager
 def whole_file(target: Path) -> Iterator[Path]:
-    """Yield a path to write to; on success it takes the place of `target`, on any failure it is removed.
+    """Yield a path to write to; on success rename it to `target`, on any failure remove it.
 
-    The temporary file lies beside the target, so that the rename stays inside one file system. Its name starts
-    with a dot and ends in `.part`; it differs for each call, so several threads and programs may write at once.
-    Missing folders are made. An interrupt (Ctrl-C) counts as a failure.
+    The temporary file lies beside the target, so that the rename stays within one file system. Its name starts with a
+    dot, ends in `.part` and differs for each call, so several threads and programs may write at once. Missing folders
+    are made. An interrupt (Ctrl-C) counts as a failure.
 
     Raises:
         OutputError: the system refused to write; the message names `target` and the reason.
@@ -40,12 +40,12 @@ def whole_file(target: Path) -> Iterator[Path]:
 
 @contextmanager
 def whole_folder(target: Path, *, replace: bool) -> Iterator[Path]:
-    """Yield a folder to write into; on success it takes the place of `target`, on any failure it is removed.
+    """Yield a folder to write into; on success rename it to `target`, on any failure remove it.
 
-    The folder that is there already stays until then, and comes back if the last step fails or is interrupted.
+    A folder that exists there stays until then, and comes back if the last step fails or is interrupted.
 
     Args:
-        replace: put the new folder in place of one that holds files; else only an empty one gives way.
+        replace: replace a folder that holds files; else only an empty one.
 
     Raises:
         OutputError: the system refused to write; the message names `target` and the reason.
@@ -61,7 +61,7 @@ def whole_folder(target: Path, *, replace: bool) -> Iterator[Path]:
 
 @contextmanager
 def temporary_folder(parent: Path, stem: str) -> Iterator[Path]:
-    """Make a hidden folder, and remove it with all that is in it, whatever happens."""
+    """Make a hidden folder, and remove it with its contents at the end of the block."""
     part = parent / f".{stem}{secrets.token_hex(4)}.part"
     try:
         part.mkdir()
@@ -71,7 +71,7 @@ def temporary_folder(parent: Path, stem: str) -> Iterator[Path]:
 
 
 def _swap(part: Path, target: Path, *, replace: bool) -> None:
-    """Rename a finished folder to its target, and remove the one that was there; or leave that one where it was."""
+    """Rename a finished folder to its target and remove the old one; on failure put the old one back."""
     aside = part.with_suffix(".old")
     try:
         if os.path.isdir(target):
@@ -81,7 +81,7 @@ def _swap(part: Path, target: Path, *, replace: bool) -> None:
         part.rename(target)
         shutil.rmtree(aside, ignore_errors=True)
     except BaseException:
-        if os.path.isdir(part):  # it did not take its place
+        if os.path.isdir(part):  # not renamed
             with suppress(OSError):
                 aside.rename(target)
         else:
@@ -90,7 +90,7 @@ def _swap(part: Path, target: Path, *, replace: bool) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and those above it, where they are missing.
+    """Make a folder and all missing folders above it.
 
     Raises:
         OutputError: the system refused, or a file is in the way.
@@ -105,7 +105,7 @@ def make_folder(folder: Path) -> None:
 
 @contextmanager
 def folder_for(folder: Path) -> Iterator[None]:
-    """Make a folder and those above it for what is done inside; on any failure remove those that were made.
+    """Make a folder and all missing folders above it for a block; if the block fails, remove those that it made.
 
     Raises:
         OutputError: as `make_folder`.
@@ -128,17 +128,17 @@ def write_bytes(target: Path, data: bytes | memoryview) -> None:
 
 
 def require_file(path: Path, remedy: str = "") -> None:
-    """Refuse what is there and is no file: a pipe would be waited for, and a device may have no end.
+    """Refuse a path that exists and is no file: reading a pipe may wait forever, and a device may have no end.
 
     Raises:
-        OutputError: it is a folder, a pipe or a device; the message ends in the remedy.
+        OutputError: the path is a folder, a pipe or a device; the message ends with the remedy.
     """
     if os.path.exists(path) and not os.path.isfile(path):
         raise OutputError(f"{path}: expected a file, got a folder or a device{remedy}")
 
 
 def read_at_most(path: Path, most: int) -> bytes | None:
-    """Read a whole file; None where it holds more bytes than that.
+    """Read a whole file; None if it holds more than `most` bytes.
 
     Raises:
         OSError: it cannot be read.
@@ -150,23 +150,23 @@ def read_at_most(path: Path, most: int) -> bytes | None:
 
 
 def refusal(part: Path, n_bytes: int) -> str:
-    """Why the system does not let a library write, found by writing as much over what it left; "" if that succeeds.
+    """Find out why a library could not write a file, by writing as many bytes in its place; "" if that succeeds.
 
-    Libraries tell that writing failed, and seldom why: a full disk, a quota.
+    Libraries report that writing failed, but seldom why: a full disk, a quota.
 
     Args:
-        part: a file that is of no more use.
-        n_bytes: of its pixels.
+        part: the file that the library left; it is overwritten.
+        n_bytes: size of its pixels.
     """
     try:
         with part.open("wb") as file:
-            file.write(bytes(n_bytes + HEAD))
+            file.write(bytes(n_bytes + MOST_HEADER))
     except OSError as error:
         return reason(error)
     return ""
 
 
 def reason(error: OSError) -> str:
-    """Say what the system said, without the path that the caller's message starts with, and what to do against it."""
-    said = error.strerror or str(error) or type(error).__name__
-    return f"{said}; {REMEDIES[error.errno]}" if error.errno in REMEDIES else said
+    """The system's message, without the path, which the caller's message starts with; and the remedy, if known."""
+    message = error.strerror or str(error) or type(error).__name__
+    return f"{message}; {REMEDIES[error.errno]}" if error.errno in REMEDIES else message

@@ -1,22 +1,22 @@
-"""Fingerprints of what went into a render, and checksums of files and lines: equal bytes, equal text."""
+"""Fingerprints of the input of a render, and checksums of files and lines."""
 
 import hashlib
 from pathlib import Path
 
 
 def fingerprint(*parts: bytes | memoryview) -> str:
-    """Hash the job and the scene: "sha256:" and 64 hexadecimal digits.
+    """Hash parts of a job and a scene: "sha256:" and 64 hexadecimal digits.
 
-    Each part counts with its length, so that moving bytes from one part to the next changes the result.
+    Each part is hashed on its own first, so moving bytes from one part to the next changes the result.
     """
     total = hashlib.sha256()
     for part in parts:
-        total.update(hashlib.sha256(part).digest())  # all of one length, so no part runs into the next
+        total.update(hashlib.sha256(part).digest())
     return f"sha256:{total.hexdigest()}"
 
 
 def digest(path: Path) -> tuple[int, str]:
-    """Size and checksum of a file: XXH3, 128 bits, which notices damage and is as fast as memory.
+    """Size and checksum of a file: XXH3 of 128 bits, which detects damage and runs at the speed of memory.
 
     Raises:
         OSError: it cannot be read.

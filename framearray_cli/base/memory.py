@@ -1,6 +1,4 @@
-"""What the system lets this process have: memory and cores of its control group, which is a container's, and address
-space.
-"""
+"""What the system gives this process: memory and cores of its control group (that of a container), address space."""
 
 import os
 import sys
@@ -14,39 +12,39 @@ import psutil
 from .errors import LimitError
 
 ROOT, OWN, STATUS = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup"), Path("/proc/self/status")
-# What compiled libraries map and fill beside the job, measured on 2 cores: a render with 4 threads reaches 1.45 GiB and
-# 0.38 GiB, a movie 0.43 and 0.16. A library that gets less may end the process without a word.
-RENDERS = {"RLIMIT_AS": 3 * 2**29, "RLIMIT_DATA": 2**29}
-READS = {"RLIMIT_AS": 2**29, "RLIMIT_DATA": 2**28}
-# For each further core: the linear algebra of numpy and that of scipy keep a buffer of 40 MiB.
-CORE, MEASURED_CORES, MOST_CORES = 80 * 2**20, 2, 64
+# Address space and data that compiled libraries take beside the job. Measured on 2 cores: a render with 4 threads takes
+# 1.45 GiB and 0.38 GiB, a movie 0.43 GiB and 0.16 GiB. With less, a library may abort the process without a message.
+RENDER_NEEDS = {"RLIMIT_AS": 3 * 2**29, "RLIMIT_DATA": 2**29}
+READ_NEEDS = {"RLIMIT_AS": 2**29, "RLIMIT_DATA": 2**28}
+# The linear algebra of numpy and that of scipy each keep a buffer of 40 MiB per core beyond those measured.
+BYTES_PER_CORE, MEASURED_CORES, MOST_CORES = 80 * 2**20, 2, 64
 ULIMIT = {"RLIMIT_AS": "-v", "RLIMIT_DATA": "-d"}
 _USED = {"RLIMIT_AS": "VmSize:", "RLIMIT_DATA": "VmData:"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Files:
-    """Names of a control group's files, and of the key of cached files that are given up for programs."""
+class _GroupFiles:
+    """Names of a control group's files, and of the key for cached files, which the system drops for programs."""
 
     limit: str
     used: str
     cached: str
 
 
-_FILES = {
-    1: _Files(limit="memory.limit_in_bytes", used="memory.usage_in_bytes", cached="total_inactive_file"),
-    2: _Files(limit="memory.max", used="memory.current", cached="inactive_file"),
+_GROUP_FILES = {
+    1: _GroupFiles(limit="memory.limit_in_bytes", used="memory.usage_in_bytes", cached="total_inactive_file"),
+    2: _GroupFiles(limit="memory.max", used="memory.current", cached="inactive_file"),
 }
 
 
 def available_cores(root: Path = ROOT, own: Path = OWN) -> int:
-    """Cores that this process may use: those that it may run on, or fewer where a control group has a quota of time.
+    """Number of cores that this process may use: its affinity, or less where a control group has a quota.
 
-    A quota of two and a half cores counts as three.
+    A quota is rounded up: 2.5 cores count as 3.
 
     Args:
-        root: where the groups are mounted.
-        own: the file that names those of this process.
+        root: folder where the groups are mounted.
+        own: file that names the groups of this process.
     """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     quotas = (_quota(folder, version) for folder, version in _groups("cpu", root, own))
@@ -54,7 +52,7 @@ def available_cores(root: Path = ROOT, own: Path = OWN) -> int:
 
 
 def _quota(folder: Path, version: int) -> int | None:
-    """Cores that a group may keep busy, rounded up; None without a limit."""
+    """Number of cores that a group may keep busy, rounded up; None without a limit."""
     try:
         if version == 2:
             time, period = (folder / "cpu.max").read_text().split()
@@ -63,26 +61,24 @@ def _quota(folder: Path, version: int) -> int | None:
         cores = -(-int(time) // int(period))
     except (OSError, ValueError, ZeroDivisionError):  # no such group; "max"
         return None
-    return cores if cores > 0 else None  # -1 is version 1's way to say that there is no limit
+    return cores if cores > 0 else None  # in version 1, -1 stands for no limit
 
 
 def group_memory(root: Path = ROOT, own: Path = OWN) -> int | None:
-    """Bytes that the control groups of this process, and those above them, still let it have; None without a limit.
+    """Bytes that the control groups of this process, and those above them, still allow; None without a limit.
 
     Swap does not count. Systems without control groups have no limit.
 
     Args:
-        root: where the groups are mounted.
-        own: the file that names those of this process.
+        root: folder where the groups are mounted.
+        own: file that names the groups of this process.
     """
-    left = [
-        room for folder, version in _groups("memory", root, own) if (room := _room(folder, _FILES[version])) is not None
-    ]
-    return min(left, default=None)
+    left = (_group_room(folder, version) for folder, version in _groups("memory", root, own))
+    return min((room for room in left if room is not None), default=None)
 
 
 def _groups(controller: str, root: Path, own: Path) -> Iterator[tuple[Path, int]]:
-    """The groups that limit memory or cpu, from the innermost outwards, each with the version of its files."""
+    """Find the groups of this process, from the innermost outwards, each with the version of its files."""
     try:
         lines = own.read_text().splitlines()
     except OSError:
@@ -95,13 +91,15 @@ def _groups(controller: str, root: Path, own: Path) -> Iterator[tuple[Path, int]
             base, version = root / controller, 1
         else:
             continue
-        inner = base / place.lstrip("/")  # in a container its names may be those outside: what is not there is left out
+        inner = base / place.lstrip("/")  # in a container perhaps the host's name: missing folders are skipped later
         for folder in (inner, *inner.parents):
             if folder == base or base in folder.parents:
                 yield folder, version
 
 
-def _room(folder: Path, files: _Files) -> int | None:
+def _group_room(folder: Path, version: int) -> int | None:
+    """Bytes that one group still allows, with cached files counted as free; None without a limit."""
+    files = _GROUP_FILES[version]
     try:
         limit = int((folder / files.limit).read_text())
         used = int((folder / files.used).read_text())
@@ -121,17 +119,17 @@ def address_space() -> int | None:
 
 
 def require_address_space(needs: dict[str, int]) -> None:
-    """Refuse to begin where libraries would end the process half way, without a word.
+    """Fail early where a library would otherwise abort the process without a message.
 
     Args:
-        needs: name of a limit -> bytes that the program takes on a machine of 2 cores.
+        needs: name of a limit -> bytes that the program takes on a machine with 2 cores.
 
     Raises:
-        LimitError: a limit is below that.
+        LimitError: a limit is too low.
     """
-    cores = min(os.cpu_count() or 1, MOST_CORES)  # all: the libraries look at no quota
+    cores = min(os.cpu_count() or 1, MOST_CORES)  # all cores: the libraries ignore quotas
     for name, limit in _limits().items():
-        needed = needs[name] + max(cores - MEASURED_CORES, 0) * CORE
+        needed = needs[name] + max(cores - MEASURED_CORES, 0) * BYTES_PER_CORE
         if limit < needed:
             flag = ULIMIT[name]
             raise LimitError(
@@ -141,7 +139,7 @@ def require_address_space(needs: dict[str, int]) -> None:
 
 
 def _limits() -> dict[str, int]:
-    """Limits of this process that are set, bytes."""
+    """Limits that are set for this process, bytes."""
     try:
         import resource
     except ImportError:  # Windows
@@ -151,7 +149,7 @@ def _limits() -> dict[str, int]:
 
 
 def _used(name: str) -> int:
-    """Bytes that this process has of what a limit is for; 0 where the system does not say."""
+    """Bytes that this process uses of what a limit applies to; 0 where the system does not report it."""
     with suppress(OSError):
         for line in STATUS.read_text().splitlines():
             if line.startswith(_USED[name]):
@@ -163,7 +161,7 @@ def peak_memory() -> int:
     """Largest resident size of this process so far, bytes."""
     if sys.platform == "win32":
         return int(psutil.Process().memory_info().peak_wset)
-    if sys.platform == "linux":  # what getrusage tells includes the process that started this one
+    if sys.platform == "linux":  # getrusage includes the process that started this one
         for line in Path("/proc/self/status").read_text().splitlines():
             if line.startswith("VmHWM:"):
                 return int(line.split()[1]) * 1024
@@ -174,14 +172,11 @@ def peak_memory() -> int:
 
 
 def free_memory() -> int:
-    """Bytes that this process can still get: what the machine has, swap included, or less where a limit says so.
-
-    Limits are those of a container or of `ulimit`; see limits.py.
-    """
+    """Bytes that this process can still get: free memory and swap, or less where a container or `ulimit` limits it."""
     machine = int(psutil.virtual_memory().available + psutil.swap_memory().free)
     return min([machine, *(left for left in (group_memory(), address_space()) if left is not None)])
 
 
 def resident_memory() -> int:
-    """Bytes that this process holds now: the program, the scene, and Embree's tree once it is built."""
+    """Bytes that this process holds now: the program, the scene, and Embree's tree if it is built."""
     return int(psutil.Process().memory_info().rss)

@@ -1,4 +1,4 @@
-"""The signals that end the program, as an exception."""
+"""Signals that end the program, as an exception."""
 
 import signal
 
@@ -8,23 +8,23 @@ class Stopped(BaseException):
 
     def __init__(self, signum: int) -> None:
         super().__init__(signum)
-        # what shells expect of a program that a signal ended
+        # the exit code that shells expect after a signal
         self.exit_code = 128 + signum
         self.word = "interrupted" if signum == signal.SIGINT else "terminated"
 
 
 def stopped_by(error: BaseException | None) -> Stopped | None:
-    """The signal that an exception goes back to, if any.
+    """The signal that caused an exception, if any.
 
-    Python's own locks may fail when a signal interrupts them at the wrong moment ("cannot release un-acquired lock");
-    the error that they raise then comes while `Stopped` is handled.
+    A signal at the wrong moment can make one of Python's own locks fail ("cannot release un-acquired lock"); its error
+    then has `Stopped` as its context.
     """
     while error is not None and not isinstance(error, Stopped):
         error = error.__context__
     return error
 
 
-def forget() -> None:
-    """Raise no `Stopped` again for a signal that was heard."""
+def cancel_alarm() -> None:
+    """Cancel the timer that would raise `Stopped` again for a signal that has been handled."""
     if hasattr(signal, "setitimer"):
         signal.setitimer(signal.ITIMER_REAL, 0)

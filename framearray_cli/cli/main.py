@@ -11,8 +11,8 @@ import typer
 
 from framearray_cli import __version__
 from framearray_cli.base.errors import FrameArrayError, JobError, OutputError
-from framearray_cli.base.memory import READS, RENDERS, require_address_space
-from framearray_cli.base.signals import Stopped, forget, stopped_by
+from framearray_cli.base.memory import READ_NEEDS, RENDER_NEEDS, require_address_space
+from framearray_cli.base.signals import Stopped, cancel_alarm, stopped_by
 
 from .commands.assemble import assemble
 from .commands.check import check
@@ -60,7 +60,7 @@ def _options(
 ) -> None:
     context.ensure_object(list).append(context.invoked_subcommand)
     if context.invoked_subcommand != "schema":
-        require_address_space(RENDERS if context.invoked_subcommand in RENDERING else READS)
+        require_address_space(RENDER_NEEDS if context.invoked_subcommand in RENDERING else READ_NEEDS)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -95,7 +95,7 @@ def ending(error: BaseException, command: str) -> tuple[list[str], int]:
         )
         return [f"not enough memory; {less}", *notes], OUT_OF_MEMORY
     if stopped := stopped_by(error):
-        forget()
+        cancel_alarm()
         return [stopped.word, *notes], stopped.exit_code
     if NO_THREADS in str(error):
         limits = "`ulimit -u`, `ulimit -v` or a container's limit"

@@ -1,4 +1,4 @@
-"""What a user reads where a library is missing."""
+"""The error where an optional library is missing."""
 
 import pytest
 

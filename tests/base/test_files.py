@@ -1,4 +1,4 @@
-"""Folders that appear whole or not at all: what is left when the last steps fail or are interrupted."""
+"""Folders that appear whole or not at all: what remains if the last steps fail or are interrupted."""
 
 import os
 from collections.abc import Callable
@@ -45,11 +45,11 @@ WRITERS = [page, nerfstudio, one_file]
 
 
 def fail_at(monkeypatch: pytest.MonkeyPatch, wanted: int, failure: BaseException, *, done: bool) -> None:
-    """Make a rename of folders fail.
+    """Make one rename of a folder fail.
 
     Args:
-        wanted: counted from 1.
-        done: let the system rename, and fail then: what a signal does.
+        wanted: number of the rename, from 1.
+        done: rename first and fail then, as a signal does.
     """
     count = 0
 
@@ -101,7 +101,7 @@ def test_the_old_folder_comes_back(
 
 @pytest.mark.parametrize("writer", WRITERS)
 @pytest.mark.parametrize("there", [True, False])
-def test_an_interrupt_after_the_last_rename_leaves_the_new_folder_alone(
+def test_an_interrupt_after_the_last_rename_keeps_the_new_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, writer: Any, there: bool
 ) -> None:
     target, write = tmp_path / "x", writer(tmp_path)
@@ -130,7 +130,7 @@ def test_a_failure_while_the_folder_is_written_leaves_nothing(
 
 
 def test_only_an_empty_folder_gives_way_unless_replaced(tmp_path: Path) -> None:
-    """Also where somebody put a file into it meanwhile."""
+    """Also where another program put a file into it meanwhile."""
     (tmp_path / "x").mkdir()
     with pytest.raises(OutputError, match="x: cannot be written: "), whole_folder(tmp_path / "x", replace=False):
         (tmp_path / "x" / "mine").write_text("mine")

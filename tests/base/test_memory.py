@@ -1,4 +1,4 @@
-"""Limits of the system: made-up control groups of both versions, and real limits of address space."""
+"""Limits of the system: invented control groups of both versions, and real limits of address space."""
 
 import subprocess
 import sys
@@ -6,14 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from framearray_cli.base import memory as limits
-from framearray_cli.base import memory as usage
+from framearray_cli.base import memory
 from framearray_cli.base.errors import LimitError
 from framearray_cli.base.memory import available_cores, group_memory, require_address_space
 
 resource = pytest.importorskip("resource")
 
-HUGE = 9223372036854771712  # how version 1 writes "no limit"
+HUGE = 9223372036854771712  # "no limit" in version 1
 
 
 def group(folder: Path, limit: object, used: int, cached: int, *, version: int) -> None:
@@ -40,7 +39,7 @@ def test_the_tightest_of_nested_groups_counts(tmp_path):
     group(tmp_path / "pods/job", 320, 300, 10, version=2)
     assert group_memory(tmp_path, own(tmp_path, "0::/pods/job")) == 30
     group(tmp_path / "pods/job", 250, 300, 10, version=2)
-    assert group_memory(tmp_path, own(tmp_path, "0::/pods/job")) == 0, "over its limit for a moment"
+    assert group_memory(tmp_path, own(tmp_path, "0::/pods/job")) == 0, "it may exceed its limit for a moment"
 
 
 def test_in_a_container_the_group_is_the_root(tmp_path):
@@ -50,7 +49,7 @@ def test_in_a_container_the_group_is_the_root(tmp_path):
 
 
 def test_groups_of_version_1(tmp_path):
-    """Beside others; and in a container, where the name is that outside."""
+    """Among groups of other controllers; and in a container, whose group has the name that it has on the host."""
     group(tmp_path / "memory", HUGE, 10**9, 0, version=1)
     group(tmp_path / "memory/docker/abc", 1000, 600, 100, version=1)
     lines = ("9:name=systemd:/x", "5:cpu,memory:/docker/abc", "3:cpuset:/", "0::/")
@@ -60,7 +59,7 @@ def test_groups_of_version_1(tmp_path):
 
 
 def quota(folder: Path, *values: object) -> None:
-    """Write what a group may use: one value as in version 2, two as in version 1."""
+    """Write a quota: one value as in version 2, two as in version 1."""
     folder.mkdir(parents=True, exist_ok=True)
     names = ("cpu.max",) if len(values) == 1 else ("cpu.cfs_quota_us", "cpu.cfs_period_us")
     for name, value in zip(names, values, strict=True):
@@ -69,7 +68,7 @@ def quota(folder: Path, *values: object) -> None:
 
 @pytest.fixture
 def many_cores(monkeypatch):
-    monkeypatch.setattr(limits.os, "sched_getaffinity", lambda process: set(range(16)), raising=False)
+    monkeypatch.setattr(memory.os, "sched_getaffinity", lambda process: set(range(16)), raising=False)
 
 
 @pytest.mark.parametrize(
@@ -115,13 +114,13 @@ def test_quotas_of_version_1(tmp_path, many_cores):
 
 def test_cores_without_a_quota(tmp_path, monkeypatch, many_cores):
     assert available_cores(tmp_path, tmp_path / "missing") == 16
-    monkeypatch.delattr(limits.os, "sched_getaffinity")
+    monkeypatch.delattr(memory.os, "sched_getaffinity")
     for count, cores in ((8, 8), (None, 1)):
-        monkeypatch.setattr(limits.os, "cpu_count", lambda count=count: count)
+        monkeypatch.setattr(memory.os, "cpu_count", lambda count=count: count)
         assert available_cores(tmp_path, tmp_path / "missing") == cores
 
 
-def test_render_view_and_verify_use_the_cores_that_there_are(tmp_path, monkeypatch):
+def test_view_and_verify_use_the_available_cores(tmp_path, monkeypatch):
     from framearray_cli.array import integrity as verifying
     from framearray_cli.cli.commands import verify, view
     from framearray_cli.tools.view import run as viewing
@@ -148,16 +147,16 @@ def test_without_limits(tmp_path):
     assert group_memory(tmp_path, own(tmp_path, "3:cpuset:/")) is None
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="limits of the address space elsewhere are not kept")
-def test_free_memory_without_any_limit_is_the_machine_s(monkeypatch):
-    monkeypatch.setattr(usage, "group_memory", lambda: None)
-    monkeypatch.setattr(usage, "address_space", lambda: None)
-    assert usage.free_memory() > 2**20
-    monkeypatch.setattr(usage, "group_memory", lambda: 5)
-    assert usage.free_memory() == 5
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not enforce limits of address space")
+def test_free_memory_without_a_limit_is_that_of_the_machine(monkeypatch):
+    monkeypatch.setattr(memory, "group_memory", lambda: None)
+    monkeypatch.setattr(memory, "address_space", lambda: None)
+    assert memory.free_memory() > 2**20
+    monkeypatch.setattr(memory, "group_memory", lambda: 5)
+    assert memory.free_memory() == 5
 
 
-def test_free_memory_is_what_the_address_space_has_left():
+def test_free_memory_is_what_the_limit_of_address_space_leaves():
     code = (
         "import resource; from framearray_cli.base.memory import free_memory; a = free_memory();"
         "resource.setrlimit(resource.RLIMIT_AS, (3 << 30,) * 2); b = free_memory();"
@@ -170,18 +169,18 @@ def test_free_memory_is_what_the_address_space_has_left():
 
 
 @pytest.mark.parametrize(("name", "flag"), [("RLIMIT_AS", "-v"), ("RLIMIT_DATA", "-d")])
-def test_too_little_address_space_is_told_beforehand(name, flag, monkeypatch):
-    monkeypatch.setattr(limits.os, "cpu_count", lambda: 2)
-    monkeypatch.setattr(limits, "_limits", lambda: {name: 2**28 + 1})
+def test_too_little_address_space_is_reported_beforehand(name, flag, monkeypatch):
+    monkeypatch.setattr(memory.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(memory, "_limits", lambda: {name: 2**28 + 1})
     with pytest.raises(LimitError, match=rf"^`ulimit {flag}` lets this program have 0.25 GiB; it needs") as error:
         require_address_space({"RLIMIT_AS": 2**29, "RLIMIT_DATA": 2**29})
     assert error.value.exit_code == 2
     require_address_space({name: 2**28})
-    monkeypatch.setattr(limits.os, "cpu_count", lambda: 4)
+    monkeypatch.setattr(memory.os, "cpu_count", lambda: 4)
     with pytest.raises(LimitError, match=r"0\.41 GiB"):  # a quarter, and 2 * 80 MiB
         require_address_space({name: 2**28})
 
 
-def test_no_limit_is_infinite():
-    soft = {name: resource.getrlimit(getattr(resource, name))[0] for name in limits.ULIMIT}
-    assert set(limits._limits()) == {name for name, value in soft.items() if value != resource.RLIM_INFINITY}
+def test_infinite_limits_are_no_limits():
+    soft = {name: resource.getrlimit(getattr(resource, name))[0] for name in memory.ULIMIT}
+    assert set(memory._limits()) == {name for name, value in soft.items() if value != resource.RLIM_INFINITY}

@@ -1,4 +1,4 @@
-"""How messages show amounts, and how values stand in a TOML file."""
+"""Amounts in messages, and values as TOML text."""
 
 import math
 import tomllib
@@ -25,7 +25,7 @@ def test_bytes(n_bytes: int, texts: tuple[str, ...]) -> None:
     assert (size(n_bytes), gibibytes(n_bytes), amount(n_bytes)) == texts
 
 
-def test_less_than_nothing_is_nothing() -> None:
+def test_a_negative_amount_is_zero() -> None:
     assert amount(-5) == "0.0 MiB"
 
 
@@ -43,7 +43,7 @@ def test_values_come_back(value: object) -> None:
 
 @given(some.text(some.characters(exclude_categories=())))
 def test_any_text_can_be_quoted(text: str) -> None:
-    """Also halves of characters, as names of files may hold; they become question marks."""
+    """Also lone surrogates, which file names may hold; they become question marks."""
     found = tomllib.loads(f"x = {tomltext.quoted(text)}")["x"]
     assert found == text.encode("utf-8", "replace").decode()
 

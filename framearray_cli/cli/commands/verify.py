@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from framearray_cli.base.errors import CheckError
-from framearray_cli.base.memory import RENDERS, available_cores, require_address_space
+from framearray_cli.base.memory import RENDER_NEEDS, available_cores, require_address_space
 
 from ..options import Quiet, Threads, with_threads
 from ..screen import Screen, out, say
@@ -46,7 +46,7 @@ def verify(
 
     from .render import render_shown
 
-    require_address_space(RENDERS)
+    require_address_space(RENDER_NEEDS)
     if not quiet:
         say(out, lines)
     folder = found.manifest.directory

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from framearray_cli.base.memory import available_cores
-from framearray_cli.base.signals import Stopped, forget
+from framearray_cli.base.signals import Stopped, cancel_alarm
 from framearray_cli.base.units import MOST_THREADS, size
 
 from ..options import Quiet, place
@@ -67,7 +67,7 @@ def view(
                 prepared=prepared,
             )
         except Stopped:  # the way to end it
-            forget()
+            cancel_alarm()
 
 
 def _problem_lines(problems: list["OutputError"]) -> list[str]:

@@ -16,7 +16,7 @@ from framearray_cli.base.files import reason
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.hashing import digest
 from framearray_cli.base.memory import free_memory
-from framearray_cli.base.signals import forget
+from framearray_cli.base.signals import cancel_alarm
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table
 
@@ -87,7 +87,7 @@ def render_in_parts(
         try:
             queue.render_all()
         except BaseException:
-            forget()  # a signal that was heard must not break off what follows
+            cancel_alarm()  # a signal that was heard must not break off what follows
             queue.stop()
             with suppress(OutputError):  # report the first error, not one from here
                 summary = _summarize(session, queue, time.perf_counter() - started)
