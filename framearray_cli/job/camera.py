@@ -1,11 +1,11 @@
-"""The camera's table of a job."""
+"""`[camera]`: the path of the eye."""
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from framearray_cli.base.forms.table import Float3, Table, default_text, fail, fill
 from framearray_cli.base.forms.words import shown
 
-from .keys import MOST_EYES, key_problems, late_keys
+from .keys import MOST_EYES, key_problems, late_key_problems
 from .values import Direction, FileName, Point, Size
 
 
@@ -63,7 +63,7 @@ class CameraTable(Table):
             fail([((), "expected either `keys` or `file`, got both")])
         if not keys and not has_file and "file" in info.data:
             fail([((), "expected a list of at least 1 table, got none; give `keys` or `file`")])
-        if problems := key_problems(keys, "up", "up") + late_keys(keys, info.data.get("frames", 0)):
+        if problems := key_problems(keys, "up", "up") + late_key_problems(keys, info.data.get("frames", 0)):
             fail(problems)
         return keys
 

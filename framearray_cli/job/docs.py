@@ -71,7 +71,7 @@ The first eye is that of frame 0, the next that of frame 1, and so on.
 """
 
 
-def reference() -> str:
+def reference_page() -> str:
     """Write the reference page, in Markdown."""
     root = file_schema(Job)
     return "\n".join([INTRODUCTION, *(_section(root, section) for section in sections(root))])
@@ -83,7 +83,7 @@ def schema_text() -> str:
 
 
 def _section(root: Schema, section: Section) -> str:
-    """Describe one table: heading, meaning, and a row for each key that is no table itself."""
+    """Describe one table: a heading, its meaning, and a row for each key that is not a table."""
     rows = list(_rows(root, section))
     if not rows:
         return ""
@@ -94,7 +94,7 @@ def _section(root: Schema, section: Section) -> str:
 
 
 def _heading(section: Section) -> str:
-    """Write a table's place as it stands in a file."""
+    """Write the heading of a table: its place in a file."""
     kind = f', `type = "{section.kind}"`' if section.kind else ""
     place = section.place
     if not place:
@@ -124,7 +124,7 @@ def _rows(root: Schema, section: Section) -> Iterator[str]:
 
 def main(folder: Path) -> None:
     """Write both files into a folder."""
-    (folder / "job-file.md").write_text(reference(), encoding="utf-8", newline="\n")
+    (folder / "job-file.md").write_text(reference_page(), encoding="utf-8", newline="\n")
     (folder / "job.schema.json").write_text(schema_text(), encoding="utf-8", newline="\n")
 
 

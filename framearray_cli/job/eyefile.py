@@ -1,8 +1,8 @@
-"""`camera.file`: a CSV or JSON file with one eye a frame -> camera keys.
+"""`camera.file`: a CSV or JSON file with one eye per frame -> camera keys.
 
-CSV: a first row that names the columns eye_x, eye_y, eye_z, target_x, target_y, target_z and, if wanted,
-up_x, up_y, up_z, in any order; then one row a frame. JSON: a list with one `{"eye": [...], "target": [...]}`
-a frame, with `"up"` if wanted.
+CSV: the first row names the columns eye_x, eye_y, eye_z, target_x, target_y, target_z and, optionally, up_x, up_y,
+up_z, in any order; one row per frame follows. JSON: a list with one `{"eye": [...], "target": [...]}` per frame,
+optionally with `"up"`.
 """
 
 import csv
@@ -18,23 +18,23 @@ from framearray_cli.base.forms.problems import append_count, problems_of
 from .camera import CameraKey
 from .keys import MOST_EYES
 
-LARGEST_FILE = 64 * 1024 * 1024  # bytes; MOST_EYES rows of nine long numbers are 20 MB
-MOST_PROBLEMS = 10  # a column that is wrong is wrong in every row
+LARGEST_EYE_FILE = 64 * 1024 * 1024  # bytes; MOST_EYES rows of nine long numbers are 20 MB
+MOST_ROW_PROBLEMS = 10  # a column that is wrong is wrong in every row
 
-EYE = ("eye_x", "eye_y", "eye_z")
-TARGET = ("target_x", "target_y", "target_z")
-UP = ("up_x", "up_y", "up_z")
+EYE_COLUMNS = ("eye_x", "eye_y", "eye_z")
+TARGET_COLUMNS = ("target_x", "target_y", "target_z")
+UP_COLUMNS = ("up_x", "up_y", "up_z")
 
 
-PlacedRow: TypeAlias = tuple[str, dict[str, Any]]  # where a reader of the file finds it, and a camera key's table
+PlacedRow: TypeAlias = tuple[str, dict[str, Any]]  # "row 3" or "entry 3", and a camera key's table
 
 
 class EyeFileError(Exception):
-    """A file of eyes that cannot be used; the arguments are its problems, each with its row."""
+    """An unusable file of eyes; the arguments are its problems, each with its row."""
 
 
 def read_eyes(path: Path) -> list[dict[str, Any]]:
-    """Read a file of eyes into key tables, frame 0, 1, 2 and so on.
+    """Read a file of eyes as key tables for frames 0, 1, 2 and so on.
 
     Raises:
         EyeFileError: the file is missing, is neither CSV nor JSON, or has rows that are no eyes.
@@ -55,7 +55,7 @@ def read_eyes(path: Path) -> list[dict[str, Any]]:
 
 
 def _row_problems(rows: list[PlacedRow]) -> list[str]:
-    """Check each row by itself, and that all of them give the same values."""
+    """Check each row, and that either all of them give `up` or none."""
     problems: list[str] = []
     n = 0
     for frame, (place, row) in enumerate(rows):
@@ -66,21 +66,21 @@ def _row_problems(rows: list[PlacedRow]) -> list[str]:
             CameraKey.model_validate({"frame": frame, **row})
         except ValidationError as error:
             n += error.error_count()
-            if len(problems) < MOST_PROBLEMS:
+            if len(problems) < MOST_ROW_PROBLEMS:
                 problems += [f"{place}: {problem}" for problem in problems_of(error, CameraKey)]
-    return append_count(problems[:MOST_PROBLEMS], n)
+    return append_count(problems[:MOST_ROW_PROBLEMS], n)
 
 
 def _read_text(path: Path) -> str:
-    """Read a whole UTF-8 file whose size is checked first."""
+    """Read a whole UTF-8 file, up to the largest that is accepted."""
     try:
-        data = read_at_most(path, LARGEST_FILE)
+        data = read_at_most(path, LARGEST_EYE_FILE)
     except FileNotFoundError:
         raise EyeFileError("no such file") from None
     except OSError as error:
         raise EyeFileError(f"cannot be read: {error.strerror}") from error
     if data is None:
-        raise EyeFileError(f"expected at most {LARGEST_FILE >> 20} MB, got a bigger file")
+        raise EyeFileError(f"expected at most {LARGEST_EYE_FILE >> 20} MB, got a bigger file")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -88,15 +88,15 @@ def _read_text(path: Path) -> str:
 
 
 def _csv_rows(text: str) -> list[PlacedRow]:
-    """Read the named columns of a CSV file; a cell that is no number is left for the check of its row."""
+    """Read the named columns of a CSV file; a cell that is no number stays text, which the check of its row reports."""
     try:
         reader = csv.reader(text.splitlines(), strict=True)
         lines = [(f"row {reader.line_num}", line) for line in reader if line]
     except csv.Error as error:
         raise EyeFileError(f"not valid CSV: {error}") from error
     header = [name.strip().lower() for name in lines[0][1]] if lines else []
-    with_up = any(name in header for name in UP)
-    wanted = EYE + TARGET + (UP if with_up else ())
+    with_up = any(name in header for name in UP_COLUMNS)
+    wanted = EYE_COLUMNS + TARGET_COLUMNS + (UP_COLUMNS if with_up else ())
     if sorted(header) != sorted(wanted):
         raise EyeFileError(
             f"row 1: expected the column names {', '.join(wanted)}, got {', '.join(header)[:200] or 'none'}"
@@ -105,14 +105,14 @@ def _csv_rows(text: str) -> list[PlacedRow]:
     for place, line in lines[1:]:
         if len(line) != len(header):
             raise EyeFileError(f"{place}: expected {len(header)} cells, got {len(line)}")
-        cells = dict(zip(header, map(_number, line), strict=True))
-        row = {"eye": [cells[name] for name in EYE], "target": [cells[name] for name in TARGET]}
-        rows.append((place, {**row, "up": [cells[name] for name in UP]} if with_up else row))
+        cells = dict(zip(header, map(_cell_value, line), strict=True))
+        row = {"eye": [cells[name] for name in EYE_COLUMNS], "target": [cells[name] for name in TARGET_COLUMNS]}
+        rows.append((place, {**row, "up": [cells[name] for name in UP_COLUMNS]} if with_up else row))
     return rows
 
 
-def _number(cell: str) -> float | str:
-    """Read one cell."""
+def _cell_value(cell: str) -> float | str:
+    """Read one cell: a number, or else its text."""
     try:
         return float(cell)
     except ValueError:

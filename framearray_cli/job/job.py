@@ -1,13 +1,13 @@
-"""Job and its tables: what a job file may say. Each key is typed, bounded and described once, here or in `jobkeys.py`.
+"""Job, and those of its tables that have no module of their own. Each key is typed, bounded and described once.
 
 Attributes follow the keys of the file: `job.camera.keys[0].eye` is `keys = [{ eye = ... }]` under `[camera]`.
-What a file leaves out is filled in while the job is read, so that a Job has no open ends.
+Validation fills in what a file leaves out, so that a Job is complete.
 """
 
 import math
 import re
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
@@ -27,9 +27,9 @@ from .method import (
     SamplesTable,
     SpecularTable,
 )
-from .values import MOST_HITS, Bytes, Emission, FileName, Reflectivity, absolute
+from .values import MOST_HITS, Auto, Emission, FileName, MemorySize, Reflectivity, absolute
 
-Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; every other format is taken as y up
+Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; in every other format y is up
 NAME = "[A-Za-z0-9_][A-Za-z0-9._-]{0,99}"  # what can start a file name on every system
 
 
@@ -136,7 +136,7 @@ class OutputTable(Table):
 class RenderTable(Table):
     """How the machine is used; no image depends on it."""
 
-    memory: Bytes | None = Field(
+    memory: MemorySize | None = Field(
         default=None,
         description='Maximum memory of the program, such as "8 GiB". A job that needs more is rendered in blocks of '
         "light positions, one after the other; the images are the same, the time is longer.",
@@ -152,11 +152,21 @@ class RenderTable(Table):
 
 
 def _file_stem(name: str) -> str:
-    """Check that a name can start file names on every system."""
+    """Check that a name can start a file name on every system."""
     if not re.fullmatch(NAME, name):
         wanted = 'at most 100 letters, digits, ".", "_" or "-", the first a letter, digit or "_"'
         fail([((), f"expected {wanted}, got {shown(name)}")])
     return name
+
+
+_Number = TypeVar("_Number", int, float)
+
+
+def _resolved(key: str, value: _Number | Auto) -> _Number:
+    """A number of the job file, or the one that has replaced "auto"."""
+    if isinstance(value, str):
+        raise ValueError(f'{key} is "auto": call resolve_auto() before what depends on it')
+    return value
 
 
 class Job(Table):
@@ -183,54 +193,62 @@ class Job(Table):
 
     @property
     def file(self) -> Path | None:
-        """The job file this was read from, for messages."""
+        """The job file that this was read from, for messages."""
         return self._file
 
     @property
     def n_r(self) -> int:
-        """N_r: `reuse.n_r`, after a choice where that is "auto" (`auto.resolve_auto`)."""
-        assert self.reuse.n_r != "auto"
-        return self.reuse.n_r
+        """N_r: `reuse.n_r` as a number.
+
+        Raises:
+            ValueError: it is "auto"; `resolve_auto` replaces that by a number.
+        """
+        return _resolved("reuse.n_r", self.reuse.n_r)
 
     @property
     def hits(self) -> float:
-        """Native hits of a pixel in a frame: `samples.hits`, after a choice where that is "auto"."""
-        assert self.samples.hits != "auto"
-        return self.samples.hits
+        """Native hits per pixel and frame: `samples.hits` as a number.
+
+        Raises:
+            ValueError: it is "auto"; `resolve_auto` replaces that by a number.
+        """
+        return _resolved("samples.hits", self.samples.hits)
 
     @property
-    def rests_on(self) -> float:
-        """Hits that a pixel is to rest on, were all of its window accepted: (2 N_r + 1) times `samples.hits`."""
-        n_r, hits = self.reuse.n_r, self.samples.hits
-        if hits == "auto":
+    def _window_frames(self) -> int:
+        """Number of frames in a full window, 2 N_r + 1; with the default N_r for "auto"."""
+        n_r = DEFAULT_N_R if self.reuse.n_r == "auto" else self.reuse.n_r
+        return 2 * n_r + 1
+
+    @property
+    def _window_hits(self) -> float:
+        """Native hits of a pixel in a full window; those of the defaults where `samples.hits` is "auto"."""
+        if self.samples.hits == "auto":
             return (2 * DEFAULT_N_R + 1) * DEFAULT_HITS
-        return (2 * (DEFAULT_N_R if n_r == "auto" else n_r) + 1) * hits
+        return self._window_frames * self.samples.hits
 
     def __eq__(self, other: object) -> bool:
-        """Two jobs are equal if they say the same, whatever file they come from."""
+        """Two jobs are equal if they have the same keys and values; their files do not count."""
         return isinstance(other, Job) and self.__dict__ == other.__dict__
 
     @model_validator(mode="after")
     def _fill_defaults(self, info: ValidationInfo) -> "Job":
-        if self.rests_on > MOST_HITS and self.samples.hits != "auto":
-            hits = self.samples.hits
-            frames = round(self.rests_on / hits)
-            fail([(("samples", "hits"), f"expected at most {MOST_HITS // frames} with this n_r, got {hits:g}")])
-        n_r = DEFAULT_N_R if self.reuse.n_r == "auto" else self.reuse.n_r
-        if self.samples.error is not None and (2 * n_r + 1) * self.samples.most_hits > MOST_HITS:
-            most, found = MOST_HITS // (2 * n_r + 1), self.samples.most_hits
-            fail([(("samples", "most_hits"), f"expected at most {most} with this n_r, got {found}")])
+        most = MOST_HITS // self._window_frames
+        if self._window_hits > MOST_HITS and self.samples.hits != "auto":
+            fail([(("samples", "hits"), f"expected at most {most} with this n_r, got {self.samples.hits:g}")])
+        if self.samples.error is not None and self.samples.most_hits > most:
+            fail([(("samples", "most_hits"), f"expected at most {most} with this n_r, got {self.samples.most_hits}")])
         if self.samples.halves and self.output.format != "exr":
             fail(
                 [(("samples", "halves"), 'expected output.format = "exr": no other format has room for more channels')]
             )
         self._check_groups()
-        if self.samples.halves and self.rests_on < 2:
+        if self.samples.halves and self._window_hits < 2:
             fail([(("samples", "halves"), "expected at least two hits for each pixel of an image")])
         job_file = (info.context or {}).get("job_file")
         self._file = job_file
         if "hits" not in self.specular.model_fields_set:
-            hits = min(math.ceil(self.rests_on), MOST_HITS)
+            hits = min(math.ceil(self._window_hits), MOST_HITS)
             fill(self, "specular", self.specular.model_copy(update={"hits": hits}))
         if "directory" not in self.output.model_fields_set:
             directory = absolute(Path("..") / "out" / self.name, job_file)
@@ -238,7 +256,7 @@ class Job(Table):
         return self
 
     def _check_groups(self) -> None:
-        """Refuse what does not go with light that is stored by group."""
+        """Refuse settings that light stored by group does not allow."""
         if not self.light.groups:
             return
         problems: list[tuple[Place, str]] = []

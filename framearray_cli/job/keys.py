@@ -1,4 +1,4 @@
-"""Key frames: what holds for the keys of cameras and of light sources alike."""
+"""Key frames: rules for the keys of cameras and of light sources."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -7,7 +7,7 @@ from typing import Protocol
 
 from framearray_cli.base.forms.table import Float3, Place
 
-MOST_EYES = 100_000  # an hour at 24 frames a second; more is a typing error
+MOST_EYES = 100_000  # an hour at 24 frames per second; more is a typing error
 
 
 class KeyFrame(Protocol):
@@ -18,7 +18,7 @@ class KeyFrame(Protocol):
 
 
 def key_problems(keys: Sequence[KeyFrame], directions: str, optional: str) -> list[tuple[Place, str]]:
-    """Check keys against each other: their order, what they leave out, and directions that turn half a circle."""
+    """Check keys against each other: their order, a value that only some of them give, turns by half a circle."""
     problems: list[tuple[Place, str]] = []
     for i, (before, key) in enumerate(pairwise(keys), start=1):
         if key.frame <= before.frame:
@@ -36,11 +36,11 @@ def key_problems(keys: Sequence[KeyFrame], directions: str, optional: str) -> li
 
 
 def _opposite(a: Float3, b: Float3) -> bool:
-    """Whether two directions are so close to opposite that no shortest way leads from one to the other."""
+    """Whether two directions are so close to opposite that there is no shortest turn between them."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] <= -hypot(*a) * hypot(*b) * (1 - 1e-8)  # 1e-8: within 0.01 degrees
 
 
-def late_keys(keys: Sequence[KeyFrame], frames: int) -> list[tuple[Place, str]]:
-    """Check that no key lies beyond the last frame; `frames` 0 means that the keys decide."""
+def late_key_problems(keys: Sequence[KeyFrame], frames: int) -> list[tuple[Place, str]]:
+    """Check that no key lies beyond the last frame; with `frames` = 0 the last key is the last frame."""
     late = [(i, key.frame) for i, key in enumerate(keys) if frames and key.frame >= frames]
     return [((i, "frame"), f"expected at most {frames - 1} (frames = {frames}), got {frame}") for i, frame in late]

@@ -1,4 +1,4 @@
-"""The tables of a job that hold key frames: the camera and the light sources."""
+"""`[light]`: the light sources, and the groups and axes that they belong to."""
 
 import re
 from collections.abc import Sequence
@@ -9,12 +9,12 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator, mod
 from framearray_cli.base.forms.table import Place, Table, default_text, fail, fill
 from framearray_cli.base.forms.words import shown
 
-from .keys import MOST_EYES, key_problems, late_keys
+from .keys import MOST_EYES, key_problems, late_key_problems
 from .times import Clock, Date, Zone
 from .values import Direction, Emission, Point
 
-MAIN_AXIS = "light"  # of sources that name no axis
-REST_GROUP = "main"  # sources that name no group, where others do
+MAIN_AXIS = "light"  # axis of the sources that name none
+REST_GROUP = "main"  # group of the sources that name none, where others do
 
 
 _GROUP_NAME = "[A-Za-z0-9_][A-Za-z0-9_-]{0,39}"
@@ -22,7 +22,7 @@ _TAKEN = ("ambient", "background", "layers", MAIN_AXIS)  # parts of file names, 
 
 
 def _group_name(name: str) -> str:
-    """Check the name of a group or an axis, which becomes a part of file names."""
+    """Check the name of a group or an axis, which becomes part of file names."""
     if not re.fullmatch(_GROUP_NAME, name):
         fail([((), f'expected at most 40 letters, digits, "_" or "-", got {shown(name)}')])
     if name in _TAKEN:
@@ -151,12 +151,12 @@ LightSource: TypeAlias = Annotated[PointSource | DirectionalSource | SunSource, 
 
 
 class SourceGroup(NamedTuple):
-    """Sources whose light is stored by itself.
+    """Sources whose light the program stores separately.
 
     Attributes:
-        axis: MAIN_AXIS, or the group's own.
-        n: light positions along that axis.
-        sources: their places in `light.sources`.
+        axis: MAIN_AXIS, or an axis of the group's own.
+        n: number of light positions along that axis.
+        sources: their indices in `light.sources`.
     """
 
     name: str
@@ -166,7 +166,7 @@ class SourceGroup(NamedTuple):
 
 
 def _group_problems(sources: Sequence[LightSource]) -> list[tuple[Place, str]]:
-    """Check that the sources of a group move along one axis, and that whatever has an axis has a group."""
+    """Check that the sources of a group share one axis, and that a source with an axis has a group."""
     problems: list[tuple[Place, str]] = []
     axes: dict[str, tuple[int, str | None]] = {}
     for i, source in enumerate(sources):
@@ -208,7 +208,7 @@ class LightTable(Table):
         late = [
             ((i, "keys", *place), text)
             for i, s in enumerate(sources)
-            for place, text in late_keys(s.keys, axes.get(s.axis, 0) if s.axis else frames)
+            for place, text in late_key_problems(s.keys, axes.get(s.axis, 0) if s.axis else frames)
         ]
         if problems := late + _group_problems(sources):
             fail(problems)
@@ -230,14 +230,14 @@ class LightTable(Table):
                 fail([(place, "missing; expected the number of positions of the sun, which has no key frames")])
         if "frames" not in self.model_fields_set:
             fill(self, "frames", last.get(MAIN_AXIS, 0) + 1)
-        elif MAIN_AXIS not in last and self.frames != 1:  # 1 is what a job says that was written with all defaults
+        elif MAIN_AXIS not in last and self.frames != 1:  # a job written with all its defaults says 1
             fail([(("frames",), "expected none, as every source has an axis of its own; give `axes`")])
         fill(self, "axes", {axis: self.axes.get(axis, n + 1) for axis, n in last.items() if axis != MAIN_AXIS})
         return self
 
     @property
     def groups(self) -> tuple[SourceGroup, ...]:
-        """The groups, in the order of their first sources; none if no source names one."""
+        """The groups, in the order of their first sources; empty if no source names one."""
         if not any(source.group for source in self.sources):
             return ()
         found: dict[str, list[int]] = {}

@@ -1,4 +1,4 @@
-"""The tables of a job that say how pictures are made: samples, reuse, and the terms of their light."""
+"""How images are made: `[samples]`, `[reuse]`, `[denoise]`, and a table for each term of their light."""
 
 import math
 from typing import Literal
@@ -8,9 +8,9 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from framearray_cli.base.forms.table import Table, default_text, fail
 from framearray_cli.base.forms.words import shown
 
-from .values import MOST_HITS, Emission, HitCount, Window
+from .values import MOST_HITS, Emission, HalfWindow, HitCount
 
-DEFAULT_N_R, DEFAULT_HITS = 3, 2  # those of [FA]; what is chosen for "auto" is to be as exact
+DEFAULT_N_R, DEFAULT_HITS = 3, 2  # those of [FA]; settings chosen for "auto" must be as exact
 
 
 class SamplesTable(Table):
@@ -68,7 +68,7 @@ class SamplesTable(Table):
 class ReuseTable(Table):
     """How far the samples of one eye serve its neighbours."""
 
-    n_r: Window = Field(
+    n_r: HalfWindow = Field(
         default=DEFAULT_N_R,
         description="Number of frames before and of frames after that share their hits, N_r. 0: no reuse. "
         '"auto": chosen from the camera path, likewise; if `hits` is given, for the error that n_r = 3 has with it.',

@@ -16,10 +16,10 @@ from .values import absolute
 
 
 def read_job(path: Path) -> Job:
-    """Read a job file; names of files in it start at its folder.
+    """Read a job file; file names in it are relative to its folder.
 
     Raises:
-        JobError: the file cannot be read, or has problems; all of them are told at once.
+        JobError: the file cannot be read or has problems; the error lists all of them.
     """
     table = load_toml(path)
     job_file = path.absolute()
@@ -34,22 +34,22 @@ def read_job(path: Path) -> Job:
 
 
 def job_table(job: Job) -> dict[str, Any]:
-    """Write a job as plain tables, complete, with absolute file names; reading them gives an equal job."""
-    table: dict[str, Any] = _plain(job.model_dump(exclude_none=True))
-    if job.ambient.intensity is not None:  # it stands instead of the other two
+    """Write a job as complete plain tables with absolute file names; reading them gives an equal job."""
+    table: dict[str, Any] = _toml_value(job.model_dump(exclude_none=True))
+    if job.ambient.intensity is not None:  # excludes `method` and `paths`
         table["ambient"] = {"intensity": table["ambient"]["intensity"]}
-    del table["samples"]["most_hits" if job.samples.error is None else "hits"]  # of these two ways, the other is taken
+    del table["samples"]["most_hits" if job.samples.error is None else "hits"]  # a job has either
     return table
 
 
 def job_of_table(table: dict[str, Any], file: Path, directory: Path) -> Job:
-    """The job that `job_table` wrote, with its images in a folder of its own.
+    """Read the job that `job_table` wrote, and direct its output to another folder.
 
     Args:
-        file: where the table stands, for messages.
+        file: the file that holds the table, for messages.
 
     Raises:
-        JobError: the table is no job, of this program at least.
+        JobError: the table is no job of this version.
     """
     try:
         job = Job.model_validate(table | {"output": table.get("output", {}) | {"directory": str(directory)}})
@@ -58,20 +58,20 @@ def job_of_table(table: dict[str, Any], file: Path, directory: Path) -> Job:
     return job
 
 
-def _plain(value: Any) -> Any:
+def _toml_value(value: Any) -> Any:
     """Turn tuples into lists and paths into text."""
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: _toml_value(item) for key, item in value.items()}
     if isinstance(value, tuple):
-        return [_plain(item) for item in value]
+        return [_toml_value(item) for item in value]
     return str(value) if isinstance(value, Path) else value
 
 
 def _with_eyes(table: dict[str, Any], job_file: Path) -> tuple[dict[str, Any], list[str]]:
-    """Replace `camera.file` by the keys it holds, so that a job is complete without it."""
+    """Replace `camera.file` by its keys, so that the job is complete without the file."""
     camera = table.get("camera")
     if not isinstance(camera, dict) or not isinstance(camera.get("file"), str) or "keys" in camera:
-        return table, []  # nothing to replace, or a problem that the check of the whole job tells
+        return table, []  # nothing to replace, or a problem that the validation of the job reports
     name = camera["file"]
     if not name.strip() or "\0" in name:
         return table, []

@@ -16,7 +16,7 @@ def job_schema() -> Schema:
 
 
 def _published(node: Any) -> Any:
-    """Turn our own keywords into descriptions that every editor shows."""
+    """Turn keywords of our own into descriptions, which every editor shows."""
     if isinstance(node, list):
         return [_published(item) for item in node]
     if not isinstance(node, dict):

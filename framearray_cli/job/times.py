@@ -1,4 +1,4 @@
-"""Dates, times of day and time zones of a job file: kept as plain text, so that a job stays plain tables."""
+"""Dates, times of day and time zones in a job, kept as plain text so that a job stays plain tables."""
 
 import datetime
 import re
@@ -12,7 +12,7 @@ from framearray_cli.base.forms.table import fail
 from framearray_cli.base.forms.words import shown
 
 MOST_OFFSET = 14.0  # hours; no place on Earth is farther from UTC
-YEARS = (1000, 3000)  # farther away nobody knows how the Earth turns to a second, and its calendar was another
+YEARS = (1000, 3000)  # earlier the calendar was another; later the rotation of the Earth is not known to a second
 
 
 def _date(value: object) -> str:
@@ -42,22 +42,22 @@ def _clock(value: object) -> str:
 
 
 def _zone(value: object) -> str | float:
-    """Check a time zone: a name of the IANA, or hours ahead of UTC."""
+    """Check a time zone: an IANA name, or hours ahead of UTC."""
     if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= MOST_OFFSET:
         return float(value)
     if isinstance(value, str) and value.strip():
         try:
             return ZoneInfo(value.strip()).key
-        except (KeyError, ValueError, OSError):  # unknown, not a relative path, or a folder of the data
+        except (KeyError, ValueError, OSError):  # unknown, an absolute path, or a folder of the database
             _unknown_zone(value)
     text = f'expected a time zone such as "Europe/Berlin", or hours from -{MOST_OFFSET:g} to {MOST_OFFSET:g}'
     fail([((), f"{text}, got {shown(value)}")])
 
 
 def _unknown_zone(value: str) -> None:
-    """Tell what is wrong with a name, and which was probably meant."""
+    """Report an unknown name, and the one that was probably meant."""
     known = available_timezones()
-    if not known:  # Windows has no such data of its own
+    if not known:  # Windows has no time zone database
         fail([((), "this machine has no list of time zones; pip install tzdata, or give the hours ahead of UTC")])
     by_city = {name.rpartition("/")[2].lower(): name for name in sorted(known)}
     city = value.strip().rpartition("/")[2].lower().replace(" ", "_")
@@ -74,7 +74,7 @@ def zone_of(value: str | float) -> datetime.tzinfo:
 
 
 def moment(date: str, clock: str, zone: datetime.tzinfo) -> datetime.datetime:
-    """The moment at which clocks of a zone show a checked date and time."""
+    """The moment at which clocks in a zone show a checked date and time."""
     day, time = datetime.date.fromisoformat(date), datetime.time.fromisoformat(clock)
     return datetime.datetime.combine(day, time, tzinfo=zone)
 

@@ -1,4 +1,4 @@
-"""Kinds of values that tables of a job hold, each with its check and its schema."""
+"""Types of values in a job, each with its check and its schema."""
 
 import math
 import os
@@ -13,17 +13,17 @@ from framearray_cli.base.forms.table import Float3, fail
 from framearray_cli.base.forms.words import range_text, shown
 from framearray_cli.base.units import FARTHEST
 
-Auto: TypeAlias = Literal["auto"]  # chosen from the camera path, see auto.py
+Auto: TypeAlias = Literal["auto"]  # see render/automatic/choose.py
 
-BRIGHTEST = 1e20  # W/sr, W/m2 or radiance; times any reflectivity and over any squared distance it stays finite
+MOST_EMISSION = 1e20  # W/sr, W/m2 or radiance; stays finite after any reflectivity and squared distance
 
-SHORTEST = 1e-12  # scene units; a shorter direction is taken for zero
+SHORTEST = 1e-12  # scene units; shorter directions count as zero
 
-LONGEST_NAME = 1000  # characters of a file name with its folders; systems take 1024, some 4096
+LONGEST_PATH = 1000  # characters of a file name with its folders; systems take 1024, some 4096
 
 
 def _number_problem(value: object, low: float, high: float, whole: bool) -> str | None:
-    """Say what is wrong with one number, or nothing."""
+    """Describe what is wrong with one number, if anything."""
     right_type = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
     if right_type and low <= value <= high:  # type: ignore[operator]
         return None
@@ -67,11 +67,11 @@ def _direction(value: object) -> tuple[Any, ...]:
 
 
 def _file_name(value: object, info: ValidationInfo) -> Path:
-    """Make a path absolute; a relative one starts at the folder of the job file."""
+    """Check a file name and make it absolute."""
     if not isinstance(value, str | Path) or not str(value).strip() or "\0" in str(value):
         fail([((), f"expected a file name, got {shown(value)}")])
-    if len(str(value)) > LONGEST_NAME:
-        fail([((), f"expected a file name of at most {LONGEST_NAME} characters, got one of {len(str(value))}")])
+    if len(str(value)) > LONGEST_PATH:
+        fail([((), f"expected a file name of at most {LONGEST_PATH} characters, got one of {len(str(value))}")])
     job_file = (info.context or {}).get("job_file")
     return absolute(Path(value), job_file)
 
@@ -79,8 +79,8 @@ def _file_name(value: object, info: ValidationInfo) -> Path:
 def absolute(path: Path, job_file: Path | None) -> Path:
     """Resolve a path against the folder of the job file, or the working directory.
 
-    Links on the way are followed, so that `..` means what the file system means; a link at the end
-    stays, because a scene's textures lie beside its name.
+    Links among its folders are followed, so that `..` means what it means to the file system. A link at the end stays:
+    the textures of a scene lie beside the link, not beside its target.
     """
     whole = (Path(job_file).parent if job_file else Path.cwd()) / path
     if path.name in ("", ".."):
@@ -101,7 +101,7 @@ _UNITS = {
 }
 
 
-def _bytes(value: object) -> int:
+def _memory_size(value: object) -> int:
     """Check an amount of memory: a number of bytes, or text such as "8 GiB"."""
     if isinstance(value, int) and not isinstance(value, bool) and value > 0:
         return value
@@ -113,13 +113,13 @@ def _bytes(value: object) -> int:
     fail([((), f'expected an amount of memory such as "8 GiB" or "500 MB", got {shown(value)}')])
 
 
-MOST_HITS = 65000  # hits of one pixel in one frame; random streams tell 2^16 apart
+MOST_HITS = 65000  # per pixel and frame; random streams distinguish 2^16
 
-SHARES = (1 / 2, 1 / 3, 1 / 4, 1 / 5, 1 / 6, 1 / 7, 1 / 8)  # of pixels that may get a hit in a frame
+SHARES = (1 / 2, 1 / 3, 1 / 4, 1 / 5, 1 / 6, 1 / 7, 1 / 8)  # of pixels that get a hit in one frame
 
 
 def _hits(value: object) -> float | Auto:
-    """Check a number of hits a pixel: a whole number, a unit fraction down to 1/8, or "auto"."""
+    """Check a number of hits per pixel: a whole number, a unit fraction down to 1/8, or "auto"."""
     if value == "auto":
         return "auto"
     if isinstance(value, int | float) and not isinstance(value, bool):
@@ -131,16 +131,16 @@ def _hits(value: object) -> float | Auto:
     fail([((), f'expected a whole number from 1 to {MOST_HITS}, 1/2, 1/3, ... 1/8 or "auto", got {shown(value)}')])
 
 
-LONGEST_WINDOW = 64  # frames to either side; more would not fit into memory
+MOST_N_R = 64  # more would not fit into memory
 
 
-def _window(value: object) -> int | Auto:
+def _half_window(value: object) -> int | Auto:
     """Check N_r, or "auto"."""
     if value == "auto":
         return "auto"
-    if isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= LONGEST_WINDOW:
+    if isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= MOST_N_R:
         return value
-    fail([((), f'expected a whole number from 0 to {LONGEST_WINDOW} or "auto", got {shown(value)}')])
+    fail([((), f'expected a whole number from 0 to {MOST_N_R} or "auto", got {shown(value)}')])
 
 
 def _vector_schema(count: int, *, grey: bool = False, whole: bool = False, **bounds: float) -> WithJsonSchema:
@@ -155,7 +155,7 @@ Point: TypeAlias = Annotated[Float3, PlainValidator(_vector(3, -FARTHEST, FARTHE
 Direction: TypeAlias = Annotated[Float3, PlainValidator(_direction), _vector_schema(3)]
 
 Emission: TypeAlias = Annotated[
-    Float3, PlainValidator(_vector(3, 0.0, BRIGHTEST, grey=True)), _vector_schema(3, grey=True, minimum=0)
+    Float3, PlainValidator(_vector(3, 0.0, MOST_EMISSION, grey=True)), _vector_schema(3, grey=True, minimum=0)
 ]
 
 Reflectivity: TypeAlias = Annotated[
@@ -181,15 +181,15 @@ HitCount: TypeAlias = Annotated[
     ),
 ]
 
-Window: TypeAlias = Annotated[
+HalfWindow: TypeAlias = Annotated[
     int | Auto,
-    PlainValidator(_window),
-    WithJsonSchema({"anyOf": [{"type": "integer", "minimum": 0, "maximum": LONGEST_WINDOW}, {"const": "auto"}]}),
+    PlainValidator(_half_window),
+    WithJsonSchema({"anyOf": [{"type": "integer", "minimum": 0, "maximum": MOST_N_R}, {"const": "auto"}]}),
 ]
 
-Bytes: TypeAlias = Annotated[
+MemorySize: TypeAlias = Annotated[
     int,
-    PlainValidator(_bytes),
+    PlainValidator(_memory_size),
     WithJsonSchema(
         {"anyOf": [{"type": "string"}, {"type": "integer", "minimum": 1}], "x-words": 'text such as "8 GiB"'}
     ),

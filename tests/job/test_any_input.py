@@ -1,4 +1,4 @@
-"""Properties of what reads files: any content gives what the file is for, or one message of the right kind."""
+"""Properties of all readers of files: any content gives a valid result, or one error of the right kind."""
 
 import json
 import tomllib
@@ -47,7 +47,7 @@ ODD = st.one_of(
 
 
 def quick(examples: int):
-    """So many examples, the same ones in every run; a folder serves them all."""
+    """Settings for that many examples, the same in every run, in one folder."""
     return settings(
         max_examples=examples,
         derandomize=True,
@@ -64,15 +64,15 @@ def test_the_seeds_are_jobs(seed):
 
 
 def test_the_seeds_have_every_table_of_the_schema():
-    said = {key for table in SEEDS.values() for key in table}
-    assert said == set(SCHEMA["properties"]) - {"denoise"}
+    keys = {key for table in SEEDS.values() for key in table}
+    assert keys == set(SCHEMA["properties"]) - {"denoise"}
     assert {source["type"] for table in SEEDS.values() for source in table["light"]["sources"]} == {
         "point", "directional", "sun",
     }  # fmt: skip
 
 
 def toml_key(place):
-    """A place as messages begin with it."""
+    """Write a place as messages do."""
     whole = ""
     for step in place:
         whole += f"[{step}]" if isinstance(step, int) else f".{step}" if whole else str(step)
@@ -81,8 +81,8 @@ def toml_key(place):
 
 @quick(300)
 @given(data=st.data())
-def test_a_wrong_value_is_told_with_its_place(data):
-    """Any value at any place of any job: a job, or problems of which one is told at that place, above or below it."""
+def test_a_wrong_value_is_reported_with_its_place(data):
+    """Any value at any place of any job gives a job, or problems, one of them at that place, above or below it."""
     table = tomllib.loads(tomli_w.dumps(SEEDS[data.draw(st.sampled_from(sorted(SEEDS)))]))
     place = data.draw(st.sampled_from(list(tables.places(table))))
     value = data.draw(ODD)
@@ -93,7 +93,7 @@ def test_a_wrong_value_is_told_with_its_place(data):
     except ValidationError as error:
         found = problems_of(error, Job)
         key = toml_key(place)
-        # what depends on the value, such as keys beyond `frames`, is told beside it, in the same table or its list
+        # problems that follow from the value, such as keys beyond `frames`, are reported in the same table or its list
         top = toml_key(place[:1])
         assert found, (place, before, value)
         assert any(problem.startswith((key, top)) or key.startswith(problem.split(":")[0]) for problem in found), found
@@ -108,7 +108,7 @@ def test_a_wrong_value_is_told_with_its_place(data):
 @quick(250)
 @given(seed=st.integers(0, 2**32))
 def test_any_job_file_is_a_job_or_refused(tmp_path, seed):
-    """The mutations of the fuzz run: of tables, of bytes, and to the ends of what is allowed."""
+    """The mutations of the fuzz run: of tables, of bytes, and to the bounds of values."""
     rng = Random(seed)
     file = tmp_path / "job.toml"
     match rng.randrange(3):
@@ -203,7 +203,7 @@ RANGE = st.text(st.sampled_from("0123456789-x:y, "), max_size=14) | st.text(max_
 
 @quick(300)
 @given(text=RANGE, n=st.integers(1, 3000))
-def test_a_range_gives_frames_that_there_are(text, n):
+def test_a_range_gives_frames_that_exist(text, n):
     try:
         frames = parse_frames(text, n)
     except ValueError as error:
@@ -220,7 +220,7 @@ PLACE = st.text(st.sampled_from("0123456789-+.%e,firstla "), max_size=9) | st.te
 
 @quick(300)
 @given(text=PLACE, n=st.integers(1, 100))
-def test_a_place_is_an_index_that_there_is(text, n):
+def test_a_place_is_an_index_that_exists(text, n):
     try:
         place = read_place(text)
     except ValueError as error:
@@ -249,7 +249,7 @@ JSON = st.recursive(
     at=st.integers(0, 10**6),
     bit=st.integers(0, 7),
 )
-def test_a_sealed_line_is_what_it_was_or_nothing(table, at, bit):
+def test_a_sealed_line_reads_back_or_is_refused(table, at, bit):
     line = sealed(table)
     found = unsealed(line)
     assert found == json.loads(json.dumps(table))

@@ -6,7 +6,7 @@ import tomllib
 from support import ROOT
 
 from framearray_cli.base.forms.schema import allowed_values, file_schema, find, sections
-from framearray_cli.job.docs import EXAMPLE, reference, schema_text
+from framearray_cli.job.docs import EXAMPLE, reference_page, schema_text
 from framearray_cli.job.job import Job
 
 GUIDE = ROOT / "docs" / "guide"
@@ -14,17 +14,17 @@ REMEDY = "out of date: run `python -m framearray_cli.job.docs docs/guide/`"
 
 
 def test_published_files_are_up_to_date():
-    assert (GUIDE / "job-file.md").read_text(encoding="utf-8") == reference(), REMEDY
+    assert (GUIDE / "job-file.md").read_text(encoding="utf-8") == reference_page(), REMEDY
     assert (GUIDE / "job.schema.json").read_text(encoding="utf-8") == schema_text(), REMEDY
 
 
 def test_the_example_is_a_job():
     job = Job.model_validate(tomllib.loads(EXAMPLE))
     assert (job.camera.frames, job.light.frames) == (96, 48)
-    assert EXAMPLE in reference()
+    assert EXAMPLE in reference_page()
 
 
-def test_words_of_schemas_other_files_may_use():
+def test_schemas_that_only_other_files_use():
     place = {"anyOf": [{"type": "integer"}, {"type": "string"}]}
     span = {"anyOf": [*place["anyOf"], {"type": "array", "items": place, "minItems": 2, "maxItems": 2}]}
     assert allowed_values({}, span) == "a whole number, a text or 2 values"
@@ -42,7 +42,7 @@ def test_every_key_is_described():
 
 
 def test_every_key_has_its_row():
-    page = reference()
+    page = reference_page()
     for section in sections(file_schema(Job)):
         for key, node in section.keys.items():
             if "$ref" not in node and key != "materials":

@@ -1,4 +1,4 @@
-"""The job of the design's job file section, its defaults, and the rules that tie keys to each other."""
+"""A whole job, its defaults, and rules between keys."""
 
 import copy
 import tomllib
@@ -45,8 +45,8 @@ keys = [
 ]
 
 [samples]
-hits = 2                          # native hits a pixel a frame
-obscurance = 5                    # obscurance rays a hit
+hits = 2                          # native hits per pixel and frame
+obscurance = 5                    # obscurance rays per hit
 
 [reuse]
 n_r = 3
@@ -59,7 +59,7 @@ outside = "average"               # or "background"
 
 [ambient]
 method = "eye"                    # or "light"
-paths = 1024                      # walks, or particles a light position
+paths = 1024                      # walks, or particles, per light position
 
 [specular]
 depth = 4
@@ -240,7 +240,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("place", "value", "message"), WRONG, ids=[f"{place}={value}" for place, value, _ in WRONG])
-def test_wrong_value_is_told(table, place, value, message):
+def test_a_wrong_value_is_reported(table, place, value, message):
     assert problems(replaced(table, place, value)) == [message]
 
 
@@ -273,7 +273,7 @@ UNKNOWN = [
 
 
 @pytest.mark.parametrize(("place", "message"), UNKNOWN)
-def test_unknown_key_is_told_with_the_nearest_known(table, place, message):
+def test_an_unknown_key_is_reported_with_a_suggestion(table, place, message):
     assert problems(replaced(table, place, 1)) == [message]
 
 
@@ -288,7 +288,7 @@ def test_directional_source_with_the_keys_of_a_point(table):
     ]
 
 
-def test_an_empty_file_tells_what_a_job_needs():
+def test_an_empty_file_lists_what_a_job_needs():
     assert problems({}) == [
         "name: missing; expected a name",
         "scene: missing; expected a table",
@@ -298,7 +298,7 @@ def test_an_empty_file_tells_what_a_job_needs():
     ]
 
 
-# What JSON Schema cannot say: rules between keys, numbers that JSON lacks, and 300.0, which is an integer there.
+# What JSON Schema cannot express: rules between keys, numbers that JSON lacks, and 300.0, which is an integer there.
 NOT_IN_SCHEMA = [
     "scene.materials.Chrome.specular=[0.1, 0.95, 0.1]",
     "camera.resolution=[400, 300.0]",
@@ -327,11 +327,11 @@ def test_schema_accepts_what_the_job_accepts_and_refuses_the_rest(table):
         assert not validator.is_valid(replaced(table, place, 1)), place
 
 
-def test_what_is_chosen_later_is_not_read_before(table):
+def test_auto_has_no_number_before_it_is_resolved(table):
     table["reuse"]["n_r"] = table["samples"]["hits"] = "auto"
     job = read(table)
-    for name in ("n_r", "hits"):
-        with pytest.raises(AssertionError):
+    for name, key in (("n_r", "reuse.n_r"), ("hits", "samples.hits")):
+        with pytest.raises(ValueError, match=f'^{key} is "auto": call resolve_auto'):
             getattr(job, name)
     numbers = read({**table, "reuse": {}, "samples": {"hits": 0.333}})
     assert (numbers.n_r, numbers.hits) == (3, 1 / 3)
@@ -370,6 +370,6 @@ def test_a_table_of_another_kind_is_refused():
 
 
 def test_a_changed_table_may_hold_what_no_file_may():
-    """A render whose hits a pilot allots has hits beside the wanted error."""
+    """Where a pilot allots the hits, a job has hits beside the wanted error."""
     job = Job.model_validate(tomllib.loads(EXAMPLE) | {"samples": {"error": 0.1}})
     assert changed(job, samples=changed(job.samples, hits=3.0)).samples.hits == 3.0

@@ -1,4 +1,4 @@
-"""The project's own jobs and scenes: what they promise, and that their generators still make them."""
+"""The project's own jobs and scenes: their properties, and that their generators reproduce them."""
 
 import importlib
 import math
@@ -27,8 +27,8 @@ SCENES = (*ROOMS, "furnace")
 WALKS = ("smoke", "kitchen-sun", *(f"{room}{size}" for room in ROOMS for size in ("", "-small")))
 FURNACES = ("furnace-20", "furnace-50", "furnace-80")
 CLEARANCE = 0.15  # metres between an eye and the nearest surface
-LAMP_CLEARANCE = 0.25  # a lamp nearer to a surface than this would burn a white spot into it
-STEP, TURN_DEG = 0.12, 4.0  # between neighbouring eyes, so that they share most of what they see
+LAMP_CLEARANCE = 0.25  # metres; a nearer lamp would burn a white spot into a surface
+STEP, TURN_DEG = 0.12, 4.0  # metres, degrees between neighbouring eyes, so that they share most of what they see
 ROUNDING = 3e-5  # metres; points are rounded to 1e-5 m when they are written
 
 
@@ -96,7 +96,7 @@ def test_a_generator_makes_the_same_file_each_time(
     for file in files:
         make(name, file)
     assert files[0].read_bytes() == files[1].read_bytes()
-    # sines and coded pictures differ between machines in their last bits: the committed file is compared by value
+    # the last bits of sines and coded pictures depend on the machine: compare the committed file by value
     made, committed = load_scene(files[0]), scene(name)
     assert made.material_names == committed.material_names
     np.testing.assert_array_equal(made.material, committed.material)
@@ -114,7 +114,7 @@ def test_one_command_makes_a_scene(tmp_path: Path) -> None:
     assert file.read_bytes()[:4] == b"glTF"
 
 
-def test_scenes_have_a_folder_of_their_own() -> None:
+def test_the_folder_of_scenes_holds_only_scenes() -> None:
     assert {file.name for file in (JOBS / "scenes").iterdir() if file.is_file()} == {f"{name}.glb" for name in SCENES}
 
 
@@ -158,7 +158,7 @@ def test_eyes_walk_smoothly_and_keep_clear_of_every_surface(name: str) -> None:
     turn = np.degrees(np.arccos(np.clip((look_dir[1:] * look_dir[:-1]).sum(axis=1), -1, 1)))
     assert turn.max() < TURN_DEG
     room = load_room(name)
-    every = 3  # a step of three eyes is far shorter than the clearance they turn out to have
+    every = 3  # three steps are far shorter than the clearance that the eyes have
     assert min(distance(eye, room) for eye in path.position[::every]) > CLEARANCE + STEP
 
 

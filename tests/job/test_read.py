@@ -1,4 +1,4 @@
-"""Reading job files: what is not a job file, all problems at once, file names, files of eyes, the round trip."""
+"""Reading job files: unusable files, all problems at once, file names, files of eyes, the round trip."""
 
 import json
 import re
@@ -62,26 +62,26 @@ BROKEN = [
 
 
 @pytest.mark.parametrize(("data", "message"), BROKEN, ids=[message[:40] for _, message in BROKEN])
-def test_what_is_no_toml_file_is_told(tmp_path, data, message):
+def test_an_unusable_file_is_reported(tmp_path, data, message):
     path = tmp_path / "job.toml"
     path.write_bytes(data)
     assert problems(path) == [message]
 
 
-def test_missing_file_and_folder_are_told(tmp_path):
+def test_missing_file_and_folder_are_reported(tmp_path):
     assert problems(tmp_path / "none.toml") == ["no such file"]
     assert problems(tmp_path) == ["expected a TOML file, got a folder"]
     assert problems(tmp_path / "job.toml" / "x") == ["no such file"]
     assert problems(Path("a\0b")) == ["cannot be read: embedded null byte"]
 
 
-def test_mark_of_windows_editors_is_read(tmp_path):
+def test_the_byte_order_mark_of_windows_editors_is_skipped(tmp_path):
     path = tmp_path / "job.toml"
     path.write_bytes(b"\xef\xbb\xbfa = 1\r\n")
     assert load_toml(path) == {"a": 1}
 
 
-def test_all_problems_are_told_at_once_in_the_order_of_the_keys(tmp_path):
+def test_all_problems_are_reported_at_once_in_the_order_of_the_keys(tmp_path):
     path = write(
         tmp_path, 'fov = "wide"\nframes = 5\nkeys = [{ frame = 7, eye = [0, 0, 5], target = [0, 0, 0], fov = 3 }]'
     )
@@ -95,7 +95,7 @@ def test_all_problems_are_told_at_once_in_the_order_of_the_keys(tmp_path):
     ]
 
 
-def test_rules_between_keys_are_told_beside_other_problems(tmp_path):
+def test_rules_between_keys_are_reported_beside_other_problems(tmp_path):
     path = write(tmp_path, f"fov = 0\nframes = 5\n{KEYS.replace('frame = 0', 'frame = 7')}")
     assert problems(path) == [
         "camera.fov: expected a number from 0.001 to 179.9, got 0",
@@ -103,7 +103,7 @@ def test_rules_between_keys_are_told_beside_other_problems(tmp_path):
     ]
 
 
-def test_a_flood_of_problems_is_cut(tmp_path):
+def test_a_long_list_of_problems_is_shortened(tmp_path):
     path = write(tmp_path, KEYS + "\n" + "\n".join(f"zz{i} = 1" for i in range(80)))
     found = problems(path)
     assert len(found) == 51
@@ -121,19 +121,19 @@ def test_dots_within_a_text_are_no_keys(tmp_path):
 @pytest.mark.parametrize(
     "more", ["k{} = 1\n", "[k{}]\n", "[scene.materials.k{}]\nx = 1\n", "[[light.sources]]\nx{} = 1\n"]
 )
-def test_a_hundred_thousand_problems_are_not_all_put_into_words(tmp_path, more, monkeypatch):
-    told = []
+def test_a_hundred_thousand_problems_are_only_counted(tmp_path, more, monkeypatch):
+    written = []
     whole = framearray_cli.base.forms.problems._problem
     monkeypatch.setattr(
-        framearray_cli.base.forms.problems, "_problem", lambda *given: told.append(given) or whole(*given)
+        framearray_cli.base.forms.problems, "_problem", lambda *given: written.append(given) or whole(*given)
     )
     path = write(tmp_path)
     path.write_text(path.read_text() + "".join(more.format(k) for k in range(5000)))
     assert re.fullmatch(r"and \d{4,5} more problems", problems(path)[-1])
-    assert len(told) == 50
+    assert len(written) == 50
 
 
-def test_a_long_key_is_told_shortly(tmp_path):
+def test_a_long_key_is_shortened(tmp_path):
     [found] = problems(write(tmp_path, KEYS + "\n" + "x" * 100_000 + " = 1"))
     assert found.startswith('camera."' + "x" * 100 + '...": unknown key;')
 
@@ -149,14 +149,14 @@ def test_a_long_key_is_told_shortly(tmp_path):
         ("-1" + "0" * 400, "a number beyond 64 bits"),
     ],
 )
-def test_no_number_of_hits_is_too_large_to_be_told(tmp_path, hits, shown):
+def test_no_number_of_hits_is_too_large_to_be_reported(tmp_path, hits, shown):
     path = write(tmp_path)
     path.write_text(f"{path.read_text()}[samples]\nhits = {hits}\n")
     [found] = problems(path)
     assert found == f'samples.hits: expected a whole number from 1 to 65000, 1/2, 1/3, ... 1/8 or "auto", got {shown}'
 
 
-def test_file_names_start_at_the_job_file(tmp_path, monkeypatch):
+def test_file_names_are_relative_to_the_job_file(tmp_path, monkeypatch):
     (tmp_path / "jobs").mkdir()
     write(tmp_path / "jobs")
     monkeypatch.chdir(tmp_path)
@@ -221,12 +221,12 @@ BAD_EYES = [
 
 
 @pytest.mark.parametrize(("name", "text", "message"), BAD_EYES)
-def test_what_is_no_file_of_eyes_is_told_with_its_row(tmp_path, name, text, message):
+def test_an_unusable_file_of_eyes_is_reported_with_its_row(tmp_path, name, text, message):
     path = eyes_of(tmp_path, name, text)
     assert problems(path) == [f'camera.file: "{name}": {message}']
 
 
-def test_a_missing_file_of_eyes_is_told_beside_other_problems(tmp_path):
+def test_a_missing_file_of_eyes_is_reported_beside_other_problems(tmp_path):
     path = write(tmp_path, 'file = "gone.csv"\nfov = 0')
     assert problems(path) == [
         "camera.fov: expected a number from 0.001 to 179.9, got 0",
@@ -239,7 +239,7 @@ def test_frames_must_be_the_number_of_eyes(tmp_path):
     assert problems(path) == ['camera.frames: expected 2, the number of eyes in "eyes.csv", got 3']
 
 
-def test_a_wrong_column_is_told_only_a_few_times(tmp_path):
+def test_a_wrong_column_is_reported_only_a_few_times(tmp_path):
     found = problems(eyes_of(tmp_path, "eyes.csv", HEADER + "x,0,0,0,0,1\n" * 100))
     assert len(found) == 11
     assert found[-1] == 'camera.file: "eyes.csv": and 90 more problems'
@@ -302,8 +302,8 @@ tables = ["scene", "camera", "light", "samples", "ambient", "output", "sources",
 
 @settings(max_examples=300, deadline=None)
 @given(data=st.data())
-def test_no_content_gives_anything_but_a_job_or_a_job_error(data):
-    """Put rubbish anywhere into a good job: every way it fails has words, and none of them are pydantic's."""
+def test_any_content_gives_a_job_or_a_job_error(data):
+    """Put rubbish anywhere into a good job: every failure has a message of our own, none of pydantic's."""
     from pydantic import ValidationError
 
     from framearray_cli.base.forms.problems import problems_of
