@@ -29,7 +29,7 @@ def icosphere(subdivisions: int) -> Mesh:
         )
         < 0
     )
-    faces = np.where(inwards[:, None], faces, faces[:, ::-1])  # the inside is what is seen
+    faces = np.where(inwards[:, None], faces, faces[:, ::-1])  # visible from the inside
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     for _ in range(subdivisions):
         points, faces = _halve(points, faces)

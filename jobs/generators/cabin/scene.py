@@ -111,7 +111,7 @@ def looking_glass(x0: float, x1: float, y0: float, y1: float) -> Part:
 
 
 def galley() -> Part:
-    """The wall of ovens, boxes and trolleys that is seen through the doorway."""
+    """The wall of ovens, boxes and trolleys visible through the doorway."""
     back = NOSE + 0.45
     part: Part = [
         ("Bulkhead", between((-1.9, -0.1, NOSE - 0.1), (1.9, 2.4, NOSE))),
@@ -129,7 +129,7 @@ def galley() -> Part:
 
 
 def rows(rng: np.random.Generator) -> list[tuple[Part, list[np.ndarray]]]:
-    """The variants of a row of three seats with the places they stand in, right and left of the aisle."""
+    """Variants of a row of three seats with their places, right and left of the aisle."""
     variants = [row(rng, v) for v in range(4)]
     places: list[list[np.ndarray]] = [[] for _ in variants]
     for i in range(N_ROWS):

@@ -49,7 +49,7 @@ def antimacassar(width: float) -> Mesh:
 
 
 def seat_rear(rng: np.random.Generator, tray_down: bool) -> Part:
-    """What the passenger behind sees: screen, tray, pocket with papers; in the frame of the seat's back."""
+    """The rear of a seat: screen, tray, pocket with papers; in the frame of the seat's back."""
     z = 0.0825
     part: Part = [
         ("Trim", move(box(0.27, 0.175, 0.018, 0.007), 0, 0.475, z - 0.008)),

@@ -21,7 +21,7 @@ def wall_x(y: Array) -> Array:
 
 
 def window_panel(width: float, low: float, high: float, shade: float) -> Part:
-    """A panel of the right wall with an oval window, z from 0 to width; `shade`: how far the blind is down, 0 to 1."""
+    """A panel of the right wall with an oval window, z from 0 to width; `shade` of it, 0 to 1, covered by the blind."""
     n, centre = 24, 1.075
     half = np.array([0.115, 0.165])
     angle = (np.arange(n + 1) + 0.5) * 2 * np.pi / n

@@ -1,1 +1,1 @@
-"""What several scenes share: shapes, textures, furniture, plants, and the GLB writer."""
+"""Shared by all scenes: shapes, textures, furniture, plants, and the GLB writer."""

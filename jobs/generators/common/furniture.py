@@ -1,4 +1,4 @@
-"""Table, chairs, lamps, windows and what hangs on walls; each function returns a part around the origin."""
+"""Table, chairs, lamps, windows, pictures and clocks; each function returns a part around the origin."""
 
 import numpy as np
 

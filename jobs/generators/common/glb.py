@@ -32,11 +32,11 @@ class Material:
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Model:
-    """What a generator collects: materials, and parts with the places they stand in.
+    """The scene that a generator collects: materials, and parts with their places.
 
     Attributes:
-        normals: whether the file gets vertex normals; without them every triangle is flat.
-        decimals: points are rounded to that many, so that the last bits of sin and cos leave no trace in a file.
+        normals: write vertex normals; without them every triangle is flat.
+        decimals: of points, few enough that the last bits of sin and cos do not change a file.
     """
 
     materials: dict[str, Material]
@@ -45,11 +45,11 @@ class Model:
     placed: list[tuple[str, Part, list[Array]]] = field(default_factory=list)
 
     def add(self, name: str, part: Part, places: Iterable[Array] | None = None) -> None:
-        """Add a part, once where it is or once for each (4, 4) matrix of `places`."""
+        """Add a part, once where it is or once per (4, 4) matrix of `places`."""
         self.placed.append((name, part, [np.eye(4)] if places is None else list(places)))
 
     def triangles(self) -> int:
-        """How many triangles a renderer meets, instances counted."""
+        """Number of triangles, with instances."""
         return sum(len(places) * sum(len(mesh.faces) for _, mesh in part) for _, part, places in self.placed)
 
 
@@ -60,7 +60,7 @@ def place(x: float = 0.0, y: float = 0.0, z: float = 0.0, turn_y: float = 0.0, s
 
 
 def write(model: Model, file: Path) -> None:
-    """Write the model as binary glTF: one mesh a part, one primitive a material, one node a place."""
+    """Write the model as binary glTF: one mesh per part, one primitive per material, one node per place."""
     names = list(model.materials)
     out = _Buffers()
     meshes: list[dict[str, Any]] = []
@@ -109,7 +109,7 @@ def write(model: Model, file: Path) -> None:
 
 
 class _Buffers:
-    """The one binary chunk of a file, with the tables that say what lies where."""
+    """The binary chunk of a file, and the tables that describe its parts."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -166,7 +166,7 @@ def _material_table(materials: dict[str, Material]) -> list[dict[str, Any]]:
 def _primitive(
     meshes: Sequence[Mesh], smooth: bool, textured: bool, metres: float
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
-    """Points, normals, texture coordinates (all a vertex) and faces of several meshes of one material."""
+    """Points, normals, texture coordinates (all per vertex) and faces of several meshes of one material."""
     corners = np.vstack([mesh.points[mesh.faces].reshape(-1, 3) for mesh in meshes])
     owner = np.repeat(np.arange(len(meshes)), [3 * len(mesh.faces) for mesh in meshes])
     cos_crease = np.repeat(np.cos(np.radians([mesh.crease_deg for mesh in meshes])), [3 * len(m.faces) for m in meshes])
@@ -178,7 +178,7 @@ def _primitive(
         uvs = np.round(np.vstack([_corner_uvs(mesh) for mesh in meshes]) / metres, 5) + 0.0
     table = np.hstack([corners, normals, uvs])
     vertices, index = np.unique(table, axis=0, return_inverse=True)
-    first = np.full(len(vertices), len(table))  # keep the order of first use: kind to caches and to reading
+    first = np.full(len(vertices), len(table))  # keep the order of first use, which is good for caches and for readers
     np.minimum.at(first, index.ravel(), np.arange(len(table)))
     order = np.argsort(first)
     rank = np.empty_like(order)
@@ -189,7 +189,7 @@ def _primitive(
 
 
 def _rounded(mesh: Mesh, decimals: int) -> Mesh:
-    """The mesh with rounded points, without the triangles that lose their area by it."""
+    """The mesh with rounded points, without triangles that lose their area in rounding."""
     points = np.round(mesh.points, decimals) + 0.0
     p = points[mesh.faces]
     area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
@@ -197,7 +197,7 @@ def _rounded(mesh: Mesh, decimals: int) -> Mesh:
 
 
 def _corner_normals(corners: Array, owner: NDArray[np.int64], cos_crease: Array) -> Array:
-    """Unit normal a corner: area-weighted mean of the faces around its point that turn by less than the crease."""
+    """Unit normal per corner: area-weighted mean of the faces around its point that turn by less than the crease."""
     p = corners.reshape(-1, 3, 3)
     area_vec = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     length = np.linalg.norm(area_vec, axis=1, keepdims=True)
@@ -218,7 +218,7 @@ def _corner_normals(corners: Array, owner: NDArray[np.int64], cos_crease: Array)
 
 
 def _corner_uvs(mesh: Mesh) -> Array:
-    """Texture coordinates a corner in metres: the mesh's own, or the two axes that each face spans best."""
+    """Texture coordinates per corner in metres: the mesh's own, or the two axes that each face spans best."""
     if mesh.uvs is not None:
         return mesh.uvs[mesh.faces].reshape(-1, 2)
     p = mesh.points[mesh.faces]

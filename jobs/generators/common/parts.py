@@ -11,7 +11,7 @@ def moved(part: Part, x: float = 0.0, y: float = 0.0, z: float = 0.0, turn_y: fl
 
 
 def reflected(part: Part) -> Part:
-    """The part seen in a mirror at x = 0."""
+    """The part mirrored at x = 0."""
     return [(material, mirror_x(mesh)) for material, mesh in part]
 
 

@@ -45,12 +45,12 @@ def turn(mesh: Mesh, axis: str, angle_deg: float) -> Mesh:
 
 
 def scale(mesh: Mesh, x: float, y: float | None = None, z: float | None = None) -> Mesh:
-    """Scale by x, y, z, or by x alone where y and z are left out; factors are positive."""
+    """Scale by x, y, z, or uniformly by x without y and z; factors are positive."""
     return replace(mesh, points=mesh.points * np.array([x, x if y is None else y, x if z is None else z]))
 
 
 def mirror_x(mesh: Mesh) -> Mesh:
-    """The mesh seen in a mirror at x = 0, its faces still turned outwards."""
+    """The mesh mirrored at x = 0, its faces still turned outwards."""
     return replace(mesh, points=mesh.points * np.array([-1.0, 1.0, 1.0]), faces=mesh.faces[:, ::-1])
 
 
@@ -71,7 +71,7 @@ def box(x: float, y: float, z: float, bevel: float = 0.0) -> Mesh:
 
 
 def _bevelled_box(half: Array, bevel: float) -> Mesh:
-    """6 faces, 12 edge strips and 8 corner triangles; each box corner is three points, one a face."""
+    """6 faces, 12 edge strips and 8 corner triangles; each corner of the box is three points, one per face."""
     signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
     points = np.repeat(signs * (half - bevel), 3, axis=0).reshape(8, 3, 3)
     for axis in range(3):  # point `axis` of a corner lies on the face across that axis
@@ -110,7 +110,7 @@ def between(low: Sequence[float], high: Sequence[float], bevel: float = 0.0) -> 
 
 
 def cushion(x: float, y: float, z: float, radius: float, n: int = 6, puff: float = 0.0) -> Mesh:
-    """A box with rounded edges that stands on y = 0; `puff` lets its faces swell by that length."""
+    """A box with rounded edges that stands on y = 0; `puff` is how far its faces bulge."""
     half = np.array([x, y, z]) / 2.0
     radius = min(radius, 0.98 * float(half.min()))
     steps = _cushion_steps(n)
@@ -181,7 +181,7 @@ def join(meshes: Sequence[Mesh]) -> Mesh:
 
 
 def patch(points: Array, uvs: Array | None = None) -> Mesh:
-    """Two triangles a cell of a grid of points (n_u, n_v, 3), outside where u x v points."""
+    """Two triangles per cell of a grid of points (n_u, n_v, 3), outside where u x v points."""
     n_u, n_v = points.shape[:2]
     index = np.arange(n_u * n_v).reshape(n_u, n_v)
     quads = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1).reshape(-1, 4)

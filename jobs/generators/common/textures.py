@@ -1,6 +1,6 @@
 """Textures of the project's own scenes: small seamless pictures made of filtered noise and simple patterns.
 
-Colours are given linear and encoded as sRGB at the end, as glTF wants base colour textures.
+Colours are linear and become sRGB at the end, which glTF requires of base colour textures.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ def encode(linear: Array) -> Image.Image:
 
 
 def noise(height: int, width: int, seed: int, stretch: tuple[float, float] = (1.0, 1.0), slope: float = 1.2) -> Array:
-    """Seamless noise of mean 0 and variance 1; `stretch` > 1 draws it out down or across."""
+    """Seamless noise of mean 0 and variance 1; `stretch` > 1 stretches it down or across."""
     white = np.random.default_rng(seed).standard_normal((height, width))
     fy = np.fft.fftfreq(height)[:, None] * stretch[0]
     fx = np.fft.fftfreq(width)[None, :] * stretch[1]
@@ -50,7 +50,7 @@ def wood(light: Colour, dark: Colour, seed: int, size: int = 512, planks: int = 
     if planks > 1:
         edge = (np.arange(size) * planks % size) < 2 * planks
         colour[edge] *= 0.45
-        for plank in range(planks):  # one butt joint a board
+        for plank in range(planks):  # one butt joint per board
             at = int(rng.integers(size - 2))
             colour[rows == plank, at : at + 2] *= 0.5
     return encode(colour)
@@ -65,7 +65,7 @@ def tiles(
     joint: float = 0.03,
     spread: float = 0.08,
 ) -> Image.Image:
-    """count x count square tiles, colours in turn along the diagonals, each a little different."""
+    """count x count square tiles, their colours alternating along the diagonals, each a little different."""
     rng = np.random.default_rng(seed)
     at = (np.arange(size) + 0.5) * count / size
     cell = at.astype(int)
@@ -139,7 +139,7 @@ def lozenges(ground: Colour, figure: Colour, border: Colour, seed: int, size: in
 
 
 def leaves(colours: Sequence[Colour], seed: int, size: int = 512) -> Image.Image:
-    """Soft blotches of several colours: plaster, hedges, a lawn seen from afar."""
+    """Soft blotches of several colours: plaster, hedges, a distant lawn."""
     colour = np.broadcast_to(np.asarray(colours[0], dtype=float), (size, size, 3)).copy()
     for i, other in enumerate(colours[1:]):
         t = 0.5 + 0.8 * noise(size, size, seed + i, slope=1.0)

@@ -74,7 +74,7 @@ def sweep(
 ) -> Mesh:
     """Carry a closed profile (k, 2), or a circle of that radius, along a path (n, 3), mitred at its corners.
 
-    The profile's second axis follows `up`, its first lies to the right of the way; ends are capped. Texture
+    The profile's second axis follows `up`, its first points to the right of the path; ends are capped. Texture
     coordinates run along the profile (u) and the path (v), both in metres.
     """
     p = np.asarray(path, dtype=float)
@@ -90,7 +90,7 @@ def sweep(
         way = before[i] + after[i]
         way /= np.linalg.norm(way)
         side = np.cross(way, np.asarray(up, dtype=float))
-        if np.linalg.norm(side) < 1e-6:  # the way runs along `up`: keep the side of before
+        if np.linalg.norm(side) < 1e-6:  # the path runs along `up`: keep the previous side
             side = np.array([1.0, 0.0, 0.0]) if side_before is None else side_before - way * (side_before @ way)
         side /= np.linalg.norm(side)
         if side_before is not None and np.isscalar(profile) and side @ side_before < 0:

@@ -1,4 +1,4 @@
-"""What a kitchen cooks with: tap, range, hood, refrigerator, pans; each stands on y = 0."""
+"""Kitchen equipment: tap, range, hood, refrigerator, pans; each stands on y = 0."""
 
 import numpy as np
 

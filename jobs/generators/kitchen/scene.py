@@ -81,7 +81,7 @@ def open_shelves(rng: np.random.Generator) -> Part:
 
 
 def shelf_thing(rng: np.random.Generator, kind: int, level: int) -> tuple[float, Part]:
-    """A thing for a shelf and the room it takes along it."""
+    """A thing for a shelf, and its width."""
     glaze = ("Porcelain", "Glaze", "GlazeGreen", "Cream")[int(rng.integers(4))]
     if kind == 0:
         return 0.28, plate_stack(int(rng.integers(4, 9)), glaze, float(rng.uniform(0.8, 0.95)))
@@ -99,7 +99,7 @@ def west_side(rng: np.random.Generator) -> Part:
     """The cooker under its hood, cupboards beside it, the refrigerator; all look along +x."""
 
     def along(part: Part, z: float, y: float = 0.0) -> Part:
-        """From a part whose left end is x = 0 to one that starts at z and runs towards -z."""
+        """Move a part whose left end is x = 0 so that it starts at z and runs towards -z."""
         return moved(part, WEST + 0.62, y, z, turn_y=90)
 
     part = along(base_cupboard(0.46, "Cabinet", "drawers"), -1.02) + along(cooker(), -0.115)
@@ -123,7 +123,7 @@ def west_side(rng: np.random.Generator) -> Part:
 
 
 def on_worktops(rng: np.random.Generator) -> Part:
-    """What stands on the worktops and the window sill."""
+    """Things on the worktops and the window sill."""
     y = 0.9155
     back = NORTH + 0.2
     part: Part = []

@@ -31,7 +31,7 @@ from .stonework import newel, rail
 
 
 def main_flight() -> Part:
-    """Sixteen steps as layers that lie on each other, each with a rounded nosing; the first two are wider."""
+    """Sixteen steps as stacked layers, each with a rounded nosing; the first two are wider."""
     part: Part = []
     for k in range(N_MAIN):
         z, y = FOOT - k * TREAD, k * RISE
@@ -132,7 +132,7 @@ def _strip(n: int) -> np.ndarray:
 def balusters_at() -> Iterator[Array]:
     """Places of all balusters."""
     for s in (-1, 1):
-        for k in range(2 * (N_MAIN - 1) - 2):  # along the main flight, two a tread
+        for k in range(2 * (N_MAIN - 1) - 2):  # along the main flight, two per tread
             z = FOOT - 0.30 - k * TREAD / 2
             yield place(s * (MAIN_HALF + 0.12), main_curb_y(z) - 0.012, z)
         for z in np.arange(LANDING_Z - 0.42, SIDE_Z + 0.30, -0.165):

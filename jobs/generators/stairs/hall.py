@@ -43,7 +43,7 @@ def shell() -> Part:
         ("Street", between((-40, -1.2, FRONT + 0.1), (40, -1.0, 60))),
     ]
     heights = np.random.default_rng(4).uniform(4.5, 7.5, 12)
-    for i, height in enumerate(heights):  # houses across the square, too low to take the sun away
+    for i, height in enumerate(heights):  # houses across the square, too low to block the sun
         left = -36.0 + 6.0 * i
         part.append(
             ("Facade" if i % 3 else "Plaster", between((left, -1.1, 50.0 - i % 2), (left + 5.99, height, 58.0)))

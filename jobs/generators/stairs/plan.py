@@ -13,5 +13,5 @@ SIDE_Z = -2.5  # front edge of the side flights
 GALLERY = LANDING + N_SIDE * RISE
 GALLERY_X = LANDING_HALF + (N_SIDE - 1) * TREAD  # inner edge of the galleries
 WINDOW_X = np.arange(-3, 4) * 1.60
-WINDOW_WIDTH, WINDOW_FOOT, WINDOW_SPRING = 1.32, 0.40, 5.85  # the spring line is that far above the foot
+WINDOW_WIDTH, WINDOW_FOOT, WINDOW_SPRING = 1.32, 0.40, 5.85  # height of the spring line above the foot
 COLUMN_Z = (-1.7, 1.3, 4.3, 7.3)

@@ -87,7 +87,7 @@ def column(height: float, radius: float, flutes: int = 16) -> Part:
 
 
 def arch_infill(width: float, depth: float) -> Part:
-    """What is left of a square head above a half circle; the spring line at y = 0, from z = -depth to 0."""
+    """The part of a square head above a half circle; the spring line at y = 0, from z = -depth to 0."""
     radius, edge = width / 2, width / 2 + 0.02
     angle = np.linspace(np.pi, 0, 19)
     arc = np.stack([radius * np.cos(angle), radius * np.sin(angle).round(9)], axis=-1)
