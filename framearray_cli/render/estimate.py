@@ -91,21 +91,21 @@ def check(job: Job) -> Estimate:
         with open_embree(prepared) as embree:
             prepared, settings = resolve_auto(prepared, embree)
             identity = identity_of(prepared)
-            work, ambient = plan_work(prepared, embree)
-            work, target = allot_hits(prepared, work, ambient)
+            setup, ambient = plan_work(prepared, embree)
+            setup, target = allot_hits(prepared, setup, ambient)
             before_frames = time.perf_counter() - started - clock.seconds
-            pixels = _probe_pixels(work)
-            first, second = (_probe(prepared, work, ambient, int(p)) for p in (FIRST_SHARE * pixels, pixels))
-            mirrors = mirror_share(work)
-            blocks = light_blocks(prepared, mirrors, per_pixel=work.per_pixel)
+            pixels = _probe_pixels(setup)
+            first, second = (_probe(prepared, setup, ambient, int(p)) for p in (FIRST_SHARE * pixels, pixels))
+            mirrors = mirror_share(setup)
+            blocks = light_blocks(prepared, mirrors, per_pixel=setup.per_pixel)
             resident, available = resident_memory(), free_memory()
-    scale = work.n_pixels / second.pixels
+    scale = setup.n_pixels / second.pixels
     largest = max(len(block) for block in blocks)
-    more = max(window_memory(prepared, largest, mirrors, work.per_pixel), ambient_memory(prepared))
-    disk = int(_frame_bytes(first, second, work.n_pixels) * prepared.n_cameras)
+    more = max(window_memory(prepared, largest, mirrors, setup.per_pixel), ambient_memory(prepared))
+    disk = int(_frame_bytes(first, second, setup.n_pixels) * prepared.n_cameras)
     free = free_space(job.output.directory)
-    hits = float(work.per_pixel.sum()) * work.n_pixels
-    copies = prepared.n_cameras - work.n_frames  # frames of a camera that stands still, which are written only
+    hits = float(setup.per_pixel.sum()) * setup.n_pixels
+    copies = prepared.n_cameras - setup.n_frames  # frames of a camera that stands still, which are written only
     return Estimate(
         prepared=prepared,
         settings=settings,
@@ -115,7 +115,7 @@ def check(job: Job) -> Estimate:
         available=resident + available,
         disk=disk,
         free=free,
-        seconds=before_frames + second.seconds * hits * _repeats(work, len(blocks)) + second.writing * scale * copies,
+        seconds=before_frames + second.seconds * hits * _repeats(setup, len(blocks)) + second.writing * scale * copies,
         blocks=len(blocks),
         warnings=_warnings(job, identity, memory_lacks=more > available, disk_lacks=disk > free),
     )
@@ -134,33 +134,33 @@ def _warnings(job: Job, identity: Identity, *, memory_lacks: bool, disk_lacks: b
     return tuple(found)
 
 
-def _rays_of_a_hit(work: FrameSetup) -> int:
+def _rays_of_a_hit(setup: FrameSetup) -> int:
     """About how many rays a hit takes that do not depend on the lights."""
-    return 1 + work.obscurance.n_rays + (4 if work.balance else 2) * work.n_r
+    return 1 + setup.obscurance.n_rays + (4 if setup.balance else 2) * setup.n_r
 
 
-def _repeats(work: FrameSetup, blocks: int) -> float:
+def _repeats(setup: FrameSetup, blocks: int) -> float:
     """How much longer a render in blocks takes: each finds its hits again."""
-    again = _rays_of_a_hit(work)
-    return 1 + (blocks - 1) * again / (again + work.lights.n_lights)
+    again = _rays_of_a_hit(setup)
+    return 1 + (blocks - 1) * again / (again + setup.lights.n_lights)
 
 
-def _probe_pixels(work: FrameSetup) -> int:
+def _probe_pixels(setup: FrameSetup) -> int:
     """Pixels a frame for the second probe."""
-    rays = _rays_of_a_hit(work) + work.lights.n_lights
-    hits = float(np.mean(work.per_pixel)) * min(2 * work.n_r + 2, work.n_frames)
-    return int(min(max(PROBE_RAYS / (rays * hits), FEWEST_PIXELS), MOST_PIXELS, work.n_pixels))
+    rays = _rays_of_a_hit(setup) + setup.lights.n_lights
+    hits = float(np.mean(setup.per_pixel)) * min(2 * setup.n_r + 2, setup.n_frames)
+    return int(min(max(PROBE_RAYS / (rays * hits), FEWEST_PIXELS), MOST_PIXELS, setup.n_pixels))
 
 
-def _small(work: FrameSetup, pixels: int) -> FrameSetup:
+def _small(setup: FrameSetup, pixels: int) -> FrameSetup:
     """A few frames from the middle of the path, with about that many pixels each."""
-    n = min(2 * work.n_r + 2, work.n_frames)
-    first = (work.n_frames - n) // 2
-    cams, span = work.cams, slice(first, first + n)
-    shrink = min(math.sqrt(pixels / work.n_pixels), 1.0)
+    n = min(2 * setup.n_r + 2, setup.n_frames)
+    first = (setup.n_frames - n) // 2
+    cams, span = setup.cams, slice(first, first + n)
+    shrink = min(math.sqrt(pixels / setup.n_pixels), 1.0)
     width, height = (max(1, round(side * shrink)) for side in (cams.width, cams.height))
     return replace(
-        work,
+        setup,
         cams=cams._replace(
             position=cams.position[span],
             right=cams.right[span],
@@ -170,14 +170,14 @@ def _small(work: FrameSetup, pixels: int) -> FrameSetup:
             width=width,
             height=height,
         ),
-        per_pixel=work.per_pixel[span],
+        per_pixel=setup.per_pixel[span],
         allotment=None,  # of another resolution; `per_pixel` has its means
     )
 
 
-def _probe(prepared: Prepared, work: FrameSetup, ambient: Ambient, pixels: int) -> _Probe:
+def _probe(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: int) -> _Probe:
     """Render and write small frames."""
-    small = _small(work, pixels)
+    small = _small(setup, pixels)
     n, writing = small.n_frames, 0.0
     with TracePool(small, prepared.threads) as pool, tempfile.TemporaryDirectory() as name:
         started = time.perf_counter()

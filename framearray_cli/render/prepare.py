@@ -112,7 +112,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambi
         cams = cams._replace(**{name: getattr(cams, name)[:1] for name in ("position", "right", "up", "forward")})
     step_x, step_y = lattice_steps(job.samples.obscurance)
     mirrors = scene.has_mirrors and job.specular.depth > 0
-    work = FrameSetup(
+    setup = FrameSetup(
         cams=cams,
         surfaces=prepared.surfaces,
         tracer=embree.tracer,
@@ -143,7 +143,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambi
         denoise=job.denoise.obscurance,
         halves=_halves(job, still=prepared.still),
     )
-    return work, ambient
+    return setup, ambient
 
 
 def composed_with(ambient: Ambient, lights: Lights) -> Ambient:

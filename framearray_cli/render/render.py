@@ -59,16 +59,16 @@ def render(
         prepared, on_disk, directory = session.prepared, session.on_disk, job.output.directory
         if not session.wanted:
             return nothing_to_do(session, time.perf_counter() - started)
-        work, ambient, manifest, rays = _plan(session, events)
+        setup, ambient, manifest, rays = _plan(session, events)
         with session.folder.alone():
             write_manifest(directory, manifest)
         record_path = record_file(directory, session.run.cameras)
         with RecordWriter(record_path, session.identity.fingerprint, session.run) as record:
             run = _Run(prepared, record, events, rays, started)
             try:
-                for block in light_blocks(prepared, mirror_share(work), per_pixel=work.per_pixel):
+                for block in light_blocks(prepared, mirror_share(setup), per_pixel=setup.per_pixel):
                     wanted = on_disk.missing(session.chosen, block)
-                    run.frames(work.for_lights(block), ambient, block, wanted)
+                    run.frames(setup.for_lights(block), ambient, block, wanted)
             except BaseException:
                 with suppress(OutputError), session.folder.alone():  # report the first error, not one from here
                     write_manifest(directory, with_summary(manifest, run.summary(on_disk, ambient)))
@@ -84,15 +84,15 @@ def _plan(session: RenderSession, events: RenderEvents) -> tuple[FrameSetup, Amb
     prepared, output = session.prepared, session.prepared.job.output
     for name in {output.format, "exr"} if output.layers else {output.format}:
         require_writer(name)
-    work, ambient = plan_work(prepared, session.embree)
+    setup, ambient = plan_work(prepared, session.embree)
     events.planned(ambient)
-    work, target = allot_hits(prepared, work, ambient)
+    setup, target = allot_hits(prepared, setup, ambient)
     rays = Counter({"ambient": ambient.rays})
     if target:
-        require_memory(prepared, work.per_pixel)
+        require_memory(prepared, setup.per_pixel)
         events.allotted(target)
         rays["target"] = target.rays
-    return work, ambient, describe(prepared, ambient, session.identity, session.settings, target), rays
+    return setup, ambient, describe(prepared, ambient, session.identity, session.settings, target), rays
 
 
 class _Run:
@@ -104,28 +104,28 @@ class _Run:
         self._prepared, self._record, self._events, self._started = prepared, record, events, started
         self._rays, self._stages = rays, Counter[str]()
         self._images, self._done, self._lock = 0, set[int](), Lock()
-        self._crew: TracePool | None = None
+        self._pool: TracePool | None = None
 
-    def frames(self, work: FrameSetup, ambient: Ambient, lights: range, wanted: Sequence[int]) -> None:
+    def frames(self, setup: FrameSetup, ambient: Ambient, lights: range, wanted: Sequence[int]) -> None:
         """Find every frame's hits, compose each frame as soon as its window is complete, write it, forget it.
 
         Args:
-            work: for a block of light positions, `lights`.
+            setup: for a block of light positions, `lights`.
             wanted: cameras whose images are written.
         """
         if not wanted:
             return
         prepared, target = self._prepared, array_target(self._prepared)
-        self._crew = crew = TracePool(work, prepared.threads)
+        self._pool = pool = TracePool(setup, prepared.threads)
         ambient, half = composed_with(ambient, prepared.lights), target.format.half
-        if work.lights.n_lights < prepared.n_lights:
+        if setup.lights.n_lights < prepared.n_lights:
             ambient = ambient.for_lights(lights)
         frames = [0] if prepared.still else wanted
-        window = Window(work, ambient, crew)
+        window = Window(setup, ambient, pool)
         writer = ArrayWriter(target, lights, prepared.threads, self._events.written, self._finished)
         try:
-            with crew, writer:
-                for j in ready_frames(window, work, frames, crew):
+            with pool, writer:
+                for j in ready_frames(window, setup, frames, pool):
                     block = writer.block()
                     composed = window.compose(j, block)
                     if composed.beyond and half == "auto":  # too bright for halves: some will be floats
@@ -133,13 +133,13 @@ class _Run:
                     writer.write(composed, wanted if prepared.still else [j], block)
                 writer.finish()
         finally:
-            self._rays += crew.rays()
-            self._stages.update(crew.seconds())
-            self._crew = None
+            self._rays += pool.rays()
+            self._stages.update(pool.seconds())
+            self._pool = None
 
     def _finished(self, done: FinishedFiles) -> None:
         """Note that all files of a camera are on disk; from any thread."""
-        frame, crew = done.composed, self._crew
+        frame, pool = done.composed, self._pool
         notes = []
         if frame.bad:
             notes = [_bad_values(frame.bad, frame.c, frame.first_bad, self._prepared.job.camera.resolution[0])]
@@ -151,7 +151,7 @@ class _Run:
             notes=tuple(notes),
             errors=done.errors,
         )
-        rays = self._rays + (crew.rays() if crew else Counter[str]())
+        rays = self._rays + (pool.rays() if pool else Counter[str]())
         self._record.add(entry, rays, time.perf_counter() - self._started)
         with self._lock:
             self._done.add(done.c)
