@@ -1,4 +1,4 @@
-"""Whose folder it is: the files of one frame array never mix with those of another."""
+"""Claim an output folder for one frame array: its files never mix with those of another."""
 
 import json
 import os
@@ -19,19 +19,19 @@ from .manifest import FILE_NAME, Manifest, array_files
 from .manifest_toml import read_manifest
 from .record import FOLDER, record_files
 
-# Differences that a message tells, and how long the values of one may be.
-MOST_TOLD, LONGEST_SHOWN = 4, 60
+# Number of differences that a message lists, and the longest text of two values.
+MOST_REPORTED, LONGEST_SHOWN = 4, 60
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identity:
-    """What decides every byte of an array's files.
+    """All that determines the bytes of an array's files.
 
     Attributes:
         name: of the job.
         fingerprint: of all that pixels depend on.
-        scene: fingerprint of the scene alone.
-        job: the job, a plain table.
+        scene: fingerprint of only the scene.
+        job: the job as a plain table.
     """
 
     name: str
@@ -41,22 +41,22 @@ class Identity:
 
 
 def check_folder(folder: Path, new: Identity, *, restart: bool) -> Manifest | None:
-    """The array that lies in a folder, if any, once it is known that it may be written to or removed.
+    """Return the array in a folder, if any, after checking that it may be completed or removed.
 
     Raises:
-        OutputError: it may not, or its manifest cannot be read.
+        OutputError: another array lies there, or its manifest cannot be read.
     """
     old = read_array(folder)
     if old is not None and not restart and (changed := differences(old, new)):
-        raise OutputError(f"{folder}: {in_the_way(old, changed)}")
+        raise OutputError(f"{folder}: {conflict_text(old, changed)}")
     return old
 
 
 def claim_folder(folder: Path, new: Identity, *, restart: bool) -> int:
-    """Make a folder ready for a frame array, and remove what lies there if that is wished.
+    """Prepare a folder for a frame array; remove the array that lies there if asked.
 
     Args:
-        restart: remove the array in the folder first, all files that its manifest lists and nothing else.
+        restart: remove the array in the folder first: the files that its manifest lists, and no others.
 
     Returns:
         Number of files removed.
@@ -75,10 +75,10 @@ def claim_folder(folder: Path, new: Identity, *, restart: bool) -> int:
 
 
 def read_array(folder: Path) -> Manifest | None:
-    """The manifest in a folder; None without one.
+    """Read the manifest in a folder; None if there is none.
 
     Raises:
-        OutputError: there is one and it cannot be read.
+        OutputError: it cannot be read.
     """
     try:
         if not (folder / FILE_NAME).exists():
@@ -93,9 +93,9 @@ def read_array(folder: Path) -> Manifest | None:
 
 
 def differences(old: Manifest, new: Identity) -> list[str]:
-    """What keeps a job from giving the very files that a manifest lists; nothing where it gives them.
+    """List why a job would not produce the files that a manifest lists; empty if it would.
 
-    Where job and scene lie, and the machine that renders, play no part.
+    The paths of job and scene and the machine that renders are ignored.
     """
     found = []
     if old.version != __version__:
@@ -109,7 +109,7 @@ def differences(old: Manifest, new: Identity) -> list[str]:
 
 
 def _relevant(job: Mapping[str, Any]) -> dict[str, Any]:
-    """The part of a job's table that files depend on."""
+    """Return the part of a job's table that files depend on."""
     table: dict[str, Any] = json.loads(json.dumps({k: v for k, v in job.items() if k != "render"}, default=str))
     for section, key in (("output", "directory"), ("scene", "file")):
         table.get(section, {}).pop(key, None)
@@ -117,7 +117,7 @@ def _relevant(job: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _changes(old: Mapping[str, Any], new: Mapping[str, Any], place: str = "") -> list[str]:
-    """The keys that two tables disagree on, with both values where these are short."""
+    """List the keys whose values differ between two tables, with both values where these are short."""
     found = []
     for key in dict.fromkeys((*old, *new)):
         a, b = old.get(key), new.get(key)
@@ -133,24 +133,24 @@ def _short(value: Any) -> str:
     return "nothing" if value is None else json.dumps(value)
 
 
-def in_the_way(old: Manifest, changed: Sequence[str]) -> str:
-    """Say what lies in a folder, what of it differs, and what can be done."""
+def conflict_text(old: Manifest, changed: Sequence[str]) -> str:
+    """Word the conflict with the array in a folder: what it is, how it differs, and what to do."""
     images = f"{old.n_cameras} x {' x '.join(map(str, old.axes.values()))} images"
-    more = f" and {len(changed) - MOST_TOLD} more" if len(changed) > MOST_TOLD else ""
+    more = f" and {len(changed) - MOST_REPORTED} more" if len(changed) > MOST_REPORTED else ""
     return (
         f"holds another frame array, {old.name!r} with {images}, made by a different job or from a different scene "
-        f"({'; '.join(changed[:MOST_TOLD])}{more}); "
+        f"({'; '.join(changed[:MOST_REPORTED])}{more}); "
         "choose another folder with --output, or remove that array with --restart"
     )
 
 
 def free_space(folder: Path) -> int:
-    """Bytes free on the disk of a folder, or of the nearest one above it that exists."""
+    """Return the bytes free on the disk of a folder, which need not exist yet."""
     return shutil.disk_usage(_existing(folder)).free
 
 
 def free_files(folder: Path) -> int | None:
-    """How many more files the disk of a folder takes, however small; None where it does not count them."""
+    """Return the number of files that the disk of a folder can still hold; None if it has no such limit."""
     if not hasattr(os, "statvfs"):  # Windows
         return None
     disk = os.statvfs(_existing(folder))
@@ -158,7 +158,7 @@ def free_files(folder: Path) -> int | None:
 
 
 def _existing(folder: Path) -> Path:
-    """A folder, or the nearest one above it that exists."""
+    """Return a folder, or its nearest ancestor that exists."""
     # unlike Path.exists, os.path.exists is false for a name that is too long
     while not os.path.exists(folder) and folder != folder.parent:
         folder = folder.parent
@@ -166,11 +166,11 @@ def _existing(folder: Path) -> Path:
 
 
 def remove_array(old: Manifest) -> int:
-    """Remove all files that a manifest lists, and the manifest last; returns how many there were.
+    """Remove all files that a manifest lists, the manifest last; return how many were removed.
 
     Raises:
         OSError: one of them cannot be removed.
-        OutputError: a link within the folder leads to one elsewhere; then none is removed.
+        OutputError: a link in the folder leads out of it; no file is removed.
     """
     removed, files = 0, (*array_files(old), *record_files(old.directory), old.directory / FILE_NAME)
     whole = old.directory.resolve()
@@ -181,6 +181,6 @@ def remove_array(old: Manifest) -> int:
         if os.path.lexists(file) and not file.is_dir():
             file.unlink()
             removed += 1
-    with suppress(OSError):  # somebody else's files in it
+    with suppress(OSError):  # other files lie in it
         (old.directory / FOLDER).rmdir()
     return removed

@@ -1,29 +1,35 @@
-"""Looks whether every file of a frame array is there and what it was when it was finished: `framearray verify`."""
+"""Compare the files of a frame array with the checksums in its records.
+
+`framearray verify` does so for every file of the array, a render for the files of the cameras that it is to complete.
+"""
 
 import os
-from collections.abc import Callable, Container, Iterator, Sequence
+import stat
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import reason
+from framearray_cli.base.hashing import digest
 
 from .images.images import read_image, read_layers
 from .manifest import Manifest, array_files
 from .manifest_toml import read_manifest
-from .record import ArrayRecords, Entry, damaged, read_records
+from .record import ArrayRecords, Entry, read_records
 
-NEVER = "was never finished"
+NEVER_FINISHED = "was never finished"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Verified:
-    """What was found.
+class Verification:
+    """The result of `verify`.
 
     Attributes:
-        files: of the whole array.
-        wrong: names of files that are missing, damaged or were never finished, with what is wrong.
-        unknown: files that are whole images but of which no checksum is known.
+        files: number of files of the whole array.
+        wrong: (name, problem) of each file that is missing, damaged or was never finished.
+        unknown: number of whole images without a known checksum.
     """
 
     manifest: Manifest
@@ -32,12 +38,12 @@ class Verified:
     unknown: int
 
 
-def verify(out: Path, threads: int, progress: Callable[[int, int], None]) -> Verified:
+def verify(out: Path, threads: int, progress: Callable[[int, int], None]) -> Verification:
     """Read every file of an array.
 
     Args:
         out: output folder of a render, or its manifest.
-        progress: told files done and files in all.
+        progress: called with the numbers of files read so far and of all files.
 
     Raises:
         OutputError: the manifest or a record cannot be read.
@@ -46,25 +52,45 @@ def verify(out: Path, threads: int, progress: Callable[[int, int], None]) -> Ver
     checksums = read_records(manifest.directory, manifest.fingerprint).checksums()
     names = [file.relative_to(manifest.directory).as_posix() for file in array_files(manifest)]
 
-    def look(name: str) -> list[tuple[str, str]]:
+    def check(name: str) -> list[tuple[str, str]]:
         if name in checksums:
-            return list(damaged(manifest.directory, checksums, [name]))
-        return list(_without_checksum(manifest, name))
+            return list(find_damage(manifest.directory, checksums, [name]))
+        return list(_check_without_checksum(manifest, name))
 
     wrong: list[tuple[str, str]] = []
     with ThreadPoolExecutor(threads, thread_name_prefix="verify") as pool:
-        for done, found in enumerate(pool.map(look, names), start=1):
+        for done, found in enumerate(pool.map(check, names), start=1):
             wrong += found
             progress(done, len(names))
     unknown = len(set(names) - set(checksums)) - sum(1 for name, _ in wrong if name not in checksums)
-    return Verified(manifest=manifest, files=len(names), wrong=tuple(wrong), unknown=unknown)
+    return Verification(manifest=manifest, files=len(names), wrong=tuple(wrong), unknown=unknown)
 
 
-def _without_checksum(manifest: Manifest, name: str) -> Iterator[tuple[str, str]]:
-    """A file that no record tells of: whether it is an image of the right size, at least."""
+def find_damage(
+    folder: Path, checksums: Mapping[str, tuple[int, str]], names: Iterable[str]
+) -> Iterator[tuple[str, str]]:
+    """Yield (name, problem) of each file that has changed since it was finished, in the order of `names`."""
+    for name in names:
+        path, (size, known) = folder / name, checksums[name]
+        try:
+            found = path.stat()
+            if not stat.S_ISREG(found.st_mode):  # a device or a pipe may have no end
+                yield name, "is no file"
+            elif found.st_size != size:
+                yield name, f"expected {size:,} bytes, found {found.st_size:,}"
+            elif digest(path)[1] != known:
+                yield name, "its bytes have changed"
+        except FileNotFoundError:
+            yield name, "missing"
+        except OSError as error:
+            yield name, f"cannot be read: {reason(error)}"
+
+
+def _check_without_checksum(manifest: Manifest, name: str) -> Iterator[tuple[str, str]]:
+    """Yield the problem of a file that no record lists, if it is no image of the right size."""
     path = manifest.directory / name
     if not os.path.isfile(path):
-        yield name, NEVER
+        yield name, NEVER_FINISHED
         return
     try:
         layers = bool(manifest.layers) and ".layers." in name
@@ -79,11 +105,11 @@ def _without_checksum(manifest: Manifest, name: str) -> Iterator[tuple[str, str]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OnDisk:
-    """What lies in an output folder.
+    """The part of a frame array that lies in the output folder.
 
     Attributes:
-        records: of what is whole.
-        damaged: names of files that were finished and are missing or changed, with what is wrong.
+        records: entries whose files are all whole.
+        damaged: (name, problem) of each file that was finished and is missing or has changed.
     """
 
     records: ArrayRecords
@@ -91,11 +117,11 @@ class OnDisk:
 
     @property
     def images(self) -> int:
-        """Images that are on disk."""
+        """Number of whole images."""
         return sum(len(lights) for lights in _lights_by_camera(self.records).values())
 
     def missing(self, cameras: Sequence[int], lights: range) -> list[int]:
-        """The cameras, in rising order, of which an image under some light positions is missing."""
+        """Cameras, in the given order, that lack an image at one of the light positions."""
         done = _lights_by_camera(self.records)
         return [c for c in cameras if not set(lights) <= done.get(c, set())]
 
@@ -114,11 +140,11 @@ def scan_output(
     cameras: Container[int] | None = None,
     scanning: Callable[[int], None] = lambda files: None,
 ) -> OnDisk:
-    """Read all records of an array, and the files that they name: those that are not what they were do not count.
+    """Read all records of an array and compare the files that they list; damaged files do not count.
 
     Args:
-        cameras: whose files are read; what records say of others is believed. None: of all.
-        scanning: called with the number of files before they are read.
+        cameras: compare only the files of these, and trust the records of all others; None: compare all.
+        scanning: called with the number of files before the first is read.
 
     Raises:
         OutputError: a record cannot be read.
@@ -130,13 +156,13 @@ def scan_output(
     if files := sum(len(entry.files) for entry in read):
         scanning(files)
 
-    def wrong(entry: Entry) -> list[tuple[str, str]]:
-        return list(damaged(folder, checksums, entry.files))
+    def problems(entry: Entry) -> list[tuple[str, str]]:
+        return list(find_damage(folder, checksums, entry.files))
 
     with ThreadPoolExecutor(threads, thread_name_prefix="verify") as pool:
-        found = list(pool.map(wrong, read))
-    bad = {id(entry) for entry, problems in zip(read, found, strict=True) if problems}
+        found = list(pool.map(problems, read))
+    bad = {id(entry) for entry, wrong in zip(read, found, strict=True) if wrong}
     whole = tuple(entry for entry in records.entries if id(entry) not in bad)
     return OnDisk(
-        records=replace(records, entries=whole), damaged=tuple(problem for problems in found for problem in problems)
+        records=replace(records, entries=whole), damaged=tuple(problem for wrong in found for problem in wrong)
     )

@@ -1,7 +1,7 @@
-"""Two runs, one folder: they may work side by side on different cameras, and only then.
+"""Locks of an output folder: several runs may render into it at once, as long as their cameras differ.
 
-Each run holds a lock of its own, `records/0-47.lock`, which the system lets go however the run ends. A guard, held for
-a moment, keeps runs from looking at the locks, or writing the manifest, at the same time.
+Each run holds a lock of its own, `records/0-47.lock`, which the system releases however the run ends. A guard, held for
+milliseconds, ensures that only one run at a time reads the locks or writes the manifest.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,24 +16,24 @@ from framearray_cli.base.files import make_folder, reason
 from .ranges import parse_frames
 from .record import FOLDER, MOST, record_file
 
-# Seconds that a run waits for another one to leave the guard, which it holds for milliseconds.
+# Seconds that a run waits for the guard.
 PATIENCE = 60.0
 
 
 class ArrayFolder:
-    """An output folder in which some cameras are this run's."""
+    """An output folder, with locks on the cameras of this run."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder / FOLDER
 
     @contextmanager
-    def alone(self) -> Iterator[None]:
-        """Keep all other runs waiting for a moment.
+    def exclusive(self) -> Iterator[None]:
+        """Hold the guard of the folder; all other runs wait.
 
         Raises:
-            OutputError: the folder cannot be written to, or another run does not let go.
+            OutputError: the folder cannot be written to, or another run does not release the guard.
         """
-        make_folder(self._folder.parent)  # what is in its way is told first
+        make_folder(self._folder.parent)  # reports first what is in the way of the folder itself
         make_folder(self._folder)
         guard = self._folder / ".guard"
         try:
@@ -46,17 +46,17 @@ class ArrayFolder:
             raise OutputError(f"{guard}: cannot be locked: {what}") from error
 
     @contextmanager
-    def reserved(self, cameras: Sequence[int], text: str) -> Iterator[None]:
-        """Keep other runs off some cameras; to be begun within `alone`.
+    def reserve(self, cameras: Sequence[int], text: str) -> Iterator[None]:
+        """Lock some cameras against other runs; enter it within `exclusive`.
 
         Args:
-            text: their range.
+            text: the cameras as a range.
 
         Raises:
-            BusyError: another run works on some of them.
+            BusyError: another run renders some of them.
         """
         own = record_file(self._folder.parent, text).with_suffix(".lock")
-        for other in self.others():
+        for other in self.other_locks():
             if not set(cameras).isdisjoint(_cameras_of(other)):
                 raise BusyError(
                     f"{self._folder.parent}: another run is rendering cameras {other.stem} into this folder; "
@@ -67,22 +67,22 @@ class ArrayFolder:
         try:
             yield
         finally:
-            with suppress(OSError):  # before it is let go: afterwards it might be that of another run
+            with suppress(OSError):  # before the release: afterwards it might be the lock of another run
                 own.unlink()
             lock.release()
 
-    def require_no_other(self) -> None:
-        """Refuse to go on where any other run works.
+    def require_no_other_run(self) -> None:
+        """Refuse to go on while any other run renders into the folder.
 
         Raises:
-            OutputError: one does.
+            OutputError: another run does.
         """
-        if held := self.others():
+        if held := self.other_locks():
             cameras = ", ".join(file.stem for file in held)
             raise OutputError(f"{self._folder.parent}: another run is rendering cameras {cameras} into this folder")
 
-    def others(self) -> list[Path]:
-        """Locks that other runs hold; those that nobody holds are removed."""
+    def other_locks(self) -> list[Path]:
+        """Return the locks that other runs hold, and remove those that no run holds."""
         held = []
         for file in sorted(self._folder.glob("*.lock")):
             lock = FileLock(file)
@@ -98,7 +98,7 @@ class ArrayFolder:
 
 
 def _cameras_of(lock: Path) -> range | tuple[int, ...]:
-    """The cameras of another run; of a range that is too long for a file name, all."""
+    """Return the cameras of another run; all, if its range is too long for a file name."""
     try:
         return parse_frames(lock.stem, MOST)
     except ValueError:

@@ -1,6 +1,6 @@
-"""Manifest: what a folder of images holds, so that a program which never saw the renderer can use it.
+"""Manifest: the contents of a folder of images, for programs that know nothing of the renderer.
 
-Notation: a place is a tuple of indices, one for each light axis, in the order of `Manifest.axes`.
+Notation: a place is a tuple of indices, one per light axis, in the order of `Manifest.axes`.
 """
 
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ class ManifestCamera:
     """One eye.
 
     Attributes:
-        world_from_camera: 4x4, row after row, acts on columns; the camera looks along -z, y up; the world is the
+        world_from_camera: 4x4, by rows, acts on columns; the camera looks along -z, y up; the world is the
             scene file's own coordinates.
         fov: vertical field of view, degrees.
     """
@@ -55,7 +55,7 @@ class ManifestCamera:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ManifestLight:
-    """One light index: all its sources shine together.
+    """One light position: all its sources shine together.
 
     Attributes:
         ambient: I_A, radiance, RGB.
@@ -80,13 +80,13 @@ class ManifestLight:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ManifestGroup:
-    """Sources whose light is stored by itself, so that it can be changed afterwards.
+    """Sources whose light is stored separately, so that it can be changed after rendering.
 
     Attributes:
         name: of the group.
-        axis: of light positions that the group's images are numbered along; groups of one axis move together.
-        images: file pattern with {camera} and {light}: the direct light of this group alone.
-        lights: positions along the axis; `ambient` is what this group adds to I_A.
+        axis: light axis that the group's images are numbered along; groups of one axis move together.
+        images: file pattern with {camera} and {light}: only the direct light of this group.
+        lights: positions along the axis; `ambient` is the contribution of this group to I_A.
     """
 
     name: str
@@ -103,27 +103,27 @@ class ManifestGroup:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Manifest:
-    """What an output folder holds.
+    """The contents of an output folder.
 
     Attributes:
         version: of the program that rendered it.
         name: of the job.
-        fingerprint: of job and scene, see fingerprint.py.
+        fingerprint: of job and scene, see render/identity.py.
         images: file pattern with {camera} and {light}, relative to the folder, "/" between folders; "" in an array
             with groups.
-        layers: file pattern with {camera}, or "" where no layers were written.
+        layers: file pattern with {camera}, or "" if no layers were written.
         resolution: width, height, pixels.
         fps: frames per second.
         cameras: N_c eyes.
-        lights: N_l light indices; none in an array with groups.
-        groups: what is stored in place of `images`, if the job has groups of sources.
+        lights: N_l light positions; none in an array with groups.
+        groups: stored in place of `images` if the job has groups of sources.
         ambient_images: file pattern with {camera}: R W, which I_A multiplies; "" without groups.
-        background_images: file pattern with {camera}: what comes from the background; "" where that is black.
-        background_ambient: what the background adds to I_A, RGB.
+        background_images: file pattern with {camera}: the light of the background; "" if it is black.
+        background_ambient: contribution of the background to I_A, RGB.
         job: the job as resolved, a plain table.
-        scene: what the scene file held, a plain table.
-        summary: how the run went, a plain table.
-        directory: the folder; known after reading, not written.
+        scene: contents of the scene file, a plain table.
+        summary: result and cost of all runs, a plain table.
+        directory: the folder; set when read, not written.
     """
 
     version: str
@@ -189,7 +189,7 @@ class Manifest:
 
     @property
     def axes(self) -> dict[str, int]:
-        """Light positions along each axis, by name: the main one first, if anything moves along it."""
+        """Number of light positions along each axis, by name; the main axis first, if any group uses it."""
         if not self.groups:
             return {MAIN_AXIS: len(self.lights)}
         found = {group.axis: len(group.lights) for group in reversed(self.groups)}
@@ -197,7 +197,7 @@ class Manifest:
 
     @property
     def group_names(self) -> tuple[str, ...]:
-        """Names of all that can be lit anew: the groups, and BACKGROUND where there is one."""
+        """Names of all that can be relit: the groups, and BACKGROUND if there is one."""
         return (*(group.name for group in self.groups), *((BACKGROUND,) if self.background_images else ()))
 
     @property
@@ -207,13 +207,13 @@ class Manifest:
 
 
 def matrix_rows(matrix: Float64) -> Matrix:
-    """Turn a (4, 4) array into the form that `ManifestCamera` holds."""
+    """Convert a (4, 4) array to the rows that `ManifestCamera` holds."""
     a, b, c, d = (tuple(float(value) for value in row) for row in matrix)
     return a, b, c, d  # type: ignore[return-value]  # lengths are checked by ManifestCamera
 
 
 def image_path(manifest: Manifest, c: int, l: int, group: ManifestGroup | None = None) -> Path:
-    """Find the file of image [c, l], or that of a group.
+    """Return the file of image [c, l], or that of a group.
 
     Raises:
         OutputError: the array has no such image.
@@ -228,7 +228,7 @@ def image_path(manifest: Manifest, c: int, l: int, group: ManifestGroup | None =
 
 
 def array_files(manifest: Manifest) -> Iterator[Path]:
-    """All files of the array but the manifest, whether they exist or not."""
+    """Yield all files of the array except the manifest, whether they exist or not."""
     for c in range(manifest.n_cameras):
         for pattern in (manifest.layers, manifest.ambient_images, manifest.background_images):
             if pattern:
@@ -239,7 +239,7 @@ def array_files(manifest: Manifest) -> Iterator[Path]:
 
 
 def layers_path(manifest: Manifest, c: int) -> Path:
-    """Find the layers of camera c.
+    """Return the file of the layers of camera c.
 
     Raises:
         OutputError: the array has no such camera, or no layers.

@@ -1,4 +1,4 @@
-"""`manifest.toml`: short keys on top, then the job, then one block a camera and a light; people read it first."""
+"""`manifest.toml`, for programs and people: short keys first, then the job, then one block per camera and per light."""
 
 import os
 import tomllib
@@ -16,7 +16,7 @@ from framearray_cli.base.forms.words import shown
 
 from .manifest import FILE_NAME, Manifest, ManifestCamera, ManifestGroup, ManifestLight
 
-# Of the manifest itself; a program that knows format 1 may not understand 2, which has groups of sources.
+# Versions of the format; 2 adds groups of sources, which a program for version 1 may not understand.
 FORMAT, FORMAT_OF_GROUPS = 1, 2
 
 _LIGHT_KEYS = ("ambient", "ambient_error", "sources")
@@ -40,7 +40,7 @@ def read_manifest(place: Path) -> Manifest:
     """Read the manifest of an output folder, given the folder or the file.
 
     Raises:
-        OutputError: it is missing, broken, made by a newer program, or leads out of its folder.
+        OutputError: it is missing, broken, made by a newer program, or names files outside its folder.
     """
     path = place / FILE_NAME if os.path.isdir(place) else place
     require_file(path)
@@ -53,7 +53,7 @@ def read_manifest(place: Path) -> Manifest:
         raise OutputError(f"{path}: no such file; expected the output folder of `framearray render`") from error
     except OSError as error:
         raise OutputError(f"{path}: cannot be read: {reason(error)}") from error
-    except (ValueError, RecursionError) as error:  # the first: no UTF-8, no TOML, or a number of too many digits
+    except (ValueError, RecursionError) as error:  # ValueError: not UTF-8, not TOML, or a number with too many digits
         raise OutputError(f"{path}: not valid TOML: {error}; render again, or restore the file") from error
     found = table.get("format")
     if found not in (FORMAT, FORMAT_OF_GROUPS):
@@ -67,7 +67,7 @@ def read_manifest(place: Path) -> Manifest:
 
 
 def to_toml(manifest: Manifest) -> str:
-    """Write a manifest as TOML text."""
+    """Return a manifest as TOML text."""
     import tomli_w
 
     grouped = bool(manifest.groups)
@@ -78,7 +78,7 @@ def to_toml(manifest: Manifest) -> str:
     head |= {key: getattr(manifest, key) for key in ("resolution", "fps", "n_cameras", "n_lights")}
     tables = {"summary": manifest.summary, "scene": manifest.scene, "job": manifest.job}
     text = ["# A frame array; docs/guide/manifest.md explains the keys.\n", tomli_w.dumps(plain(head | tables))]
-    # Written by hand, because a matrix on one line is easier to read than on the 22 lines of tomli_w.
+    # Formatted here, because a matrix on one line is easier to read than on the 22 lines of tomli_w.
     for c, camera in enumerate(manifest.cameras):
         rows = ", ".join(inline_floats(row) for row in camera.world_from_camera)
         text.append(f"\n[[cameras]]  # {c}\nworld_from_camera = [{rows}]\nfov = {float(camera.fov)!r}\n")
@@ -91,7 +91,7 @@ def to_toml(manifest: Manifest) -> str:
 
 
 def _light_lines(key: str, lights: Sequence[ManifestLight]) -> list[str]:
-    """Write a block a light index."""
+    """Return one block per light position."""
     text = []
     for l, light in enumerate(lights):
         text.append(f"\n[[{key}]]  # {l}\nambient = {inline_floats(light.ambient)}\n")
@@ -102,9 +102,9 @@ def _light_lines(key: str, lights: Sequence[ManifestLight]) -> list[str]:
 
 
 def _from_table(table: Mapping[str, Any], directory: Path) -> Manifest:
-    """Build a manifest from what the file says; keys of no concern here are left alone."""
+    """Build a manifest from the table of its file; ignore unknown keys."""
     cameras = tuple(
-        _built(f"cameras[{c}]", ManifestCamera, camera, ("world_from_camera", "fov"))
+        _build(f"cameras[{c}]", ManifestCamera, camera, ("world_from_camera", "fov"))
         for c, camera in enumerate(_tables(table, "cameras"))
     )
     groups = tuple(_group(k, group) for k, group in enumerate(_tables(table, "groups")))
@@ -112,7 +112,7 @@ def _from_table(table: Mapping[str, Any], directory: Path) -> Manifest:
     optional = ("layers", "job", "scene", "summary", "ambient_images", "background_images", "background_ambient")
     missing = [key for key in needed if key not in table]
     _check(not missing, f"expected the keys {', '.join(missing)}, found none")
-    rest = {key: _frozen(table[key]) for key in (*needed, *optional[4:]) if key in table}
+    rest = {key: _freeze(table[key]) for key in (*needed, *optional[4:]) if key in table}
     rest |= {key: table[key] for key in optional[:4] if key in table}
     lights = _lights("lights", table)
     manifest = Manifest(cameras=cameras, lights=lights, groups=groups, directory=directory, **rest)
@@ -123,22 +123,22 @@ def _from_table(table: Mapping[str, Any], directory: Path) -> Manifest:
 
 def _lights(place: str, table: Mapping[str, Any]) -> tuple[ManifestLight, ...]:
     lights = _tables(table, "lights")
-    return tuple(_built(f"{place}[{l}]", ManifestLight, light, _LIGHT_KEYS) for l, light in enumerate(lights))
+    return tuple(_build(f"{place}[{l}]", ManifestLight, light, _LIGHT_KEYS) for l, light in enumerate(lights))
 
 
 def _group(k: int, table: Mapping[str, Any]) -> ManifestGroup:
     lights = _lights(f"groups[{k}].lights", table)
     group = {**table, "lights": list(lights)}
-    built: ManifestGroup = _built(f"groups[{k}]", ManifestGroup, group, ("name", "axis", "images", "lights"))
+    built: ManifestGroup = _build(f"groups[{k}]", ManifestGroup, group, ("name", "axis", "images", "lights"))
     return built
 
 
-def _built(place: str, kind: type[Any], table: Mapping[str, Any], keys: Sequence[str]) -> Any:
-    """Make one camera, light or group; a ValueError starts with its place in the file."""
+def _build(place: str, kind: type[Any], table: Mapping[str, Any], keys: Sequence[str]) -> Any:
+    """Build one camera, light or group; a ValueError starts with its place in the file."""
     try:
         missing = [key for key in keys if key not in table]
         _check(not missing, f"expected the keys {', '.join(missing)}, found none")
-        return kind(**{key: _frozen(table[key]) for key in keys})
+        return kind(**{key: _freeze(table[key]) for key in keys})
     except (ValueError, TypeError) as error:
         raise ValueError(f"{place}: {error}") from error
 
@@ -149,13 +149,13 @@ def _tables(table: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
     return list(found)
 
 
-def _frozen(value: Any) -> Any:
-    """Turn lists into tuples, all the way down; tables stay."""
-    return tuple(_frozen(item) for item in value) if isinstance(value, list) else value
+def _freeze(value: Any) -> Any:
+    """Convert lists to tuples, recursively; leave tables as they are."""
+    return tuple(_freeze(item) for item in value) if isinstance(value, list) else value
 
 
 def plain(value: Any) -> Any:
-    """Turn a value into what TOML can hold: numpy values, tuples and paths become plain, None is left out."""
+    """Convert a value to what TOML can hold: numpy values, tuples and paths become plain, None is left out."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items() if item is not None}
     if isinstance(value, np.ndarray | np.generic):

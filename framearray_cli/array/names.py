@@ -1,4 +1,4 @@
-"""How the files of a frame array are named: patterns for `str.format` with {camera} and {light}."""
+"""File names of a frame array: patterns for `str.format` with {camera} and {light}."""
 
 import re
 import string
@@ -7,13 +7,13 @@ from pathlib import PurePosixPath
 
 from framearray_cli.base.forms.words import shown
 
-_FIELD = re.compile(r"\{[^{}]*\}")  # one field with its format, whose colon is no part of a name
+_FIELD = re.compile(r"\{[^{}]*\}")  # one field with its format, whose colon is not part of a name
 
 
 def file_patterns(name: str, n_cameras: int, n_lights: int, extension: str) -> tuple[str, str]:
-    """Name the files of an array so that they sort: patterns of images and of layers, both in one folder.
+    """Return the patterns of images and of layers, chosen so that names sort; both go into one folder.
 
-    A `glob` of "name.c0007.*" finds the images of camera 7 alone, "name.layers.*" all layers.
+    A `glob` of "name.c0007.*" finds only the images of camera 7, "name.layers.*" all layers.
     """
     l_digits = max(3, len(str(n_lights - 1)))
     images = f"{_safe(name)}.{_camera(n_cameras)}.l{{light:0{l_digits}d}}.{extension}"
@@ -21,12 +21,12 @@ def file_patterns(name: str, n_cameras: int, n_lights: int, extension: str) -> t
 
 
 def camera_pattern(name: str, what: str, n_cameras: int, extension: str) -> str:
-    """Name files of which there is one a camera."""
+    """Return the pattern of files of which there is one per camera."""
     return f"{_safe(name)}.{what}.{_camera(n_cameras)}.{extension}"
 
 
 def file_name(pattern: str, c: int, l: int = 0) -> str:
-    """The file that a pattern names for camera c and light position l; a pattern without {light} has no use for l."""
+    """Return the file name for camera c and light position l; a pattern without {light} ignores l."""
     return pattern.format(camera=c, light=l)
 
 
@@ -39,10 +39,10 @@ def _camera(n_cameras: int) -> str:
 
 
 def check_pattern(key: str, pattern: str, fields: Mapping[str, bool]) -> None:
-    """Refuse a file pattern that leads out of its folder, or that does more than number files.
+    """Refuse a file pattern that leads out of its folder, or does more than number files.
 
     Args:
-        key: what the pattern is called.
+        key: name of the pattern in messages.
         pattern: for `str.format`.
         fields: name -> whether the pattern must have it.
 
@@ -50,7 +50,7 @@ def check_pattern(key: str, pattern: str, fields: Mapping[str, bool]) -> None:
         ValueError: the pattern is refused.
     """
     path = PurePosixPath(pattern)
-    # Backslash and colon lead out of a folder on Windows; a reader there must not follow them either.
+    # Backslash and colon lead out of a folder on Windows; a reader there must not follow them.
     if (
         path.is_absolute()
         or ".." in path.parts
@@ -64,7 +64,7 @@ def check_pattern(key: str, pattern: str, fields: Mapping[str, bool]) -> None:
         raise ValueError(f"{key}: broken pattern {shown(pattern)}: {error}") from error
     names = [name for name, _, _ in parts if name is not None]
     for name, spec, conversion in parts:
-        # Anything else, such as {camera.__class__}, would let a manifest look into this program.
+        # Anything else, such as {camera.__class__}, would let a manifest inspect this program.
         if name is not None and (name not in fields or conversion or not re.fullmatch(r"(0?[1-9]d)?", spec or "")):
             allowed = " and ".join(f"{{{known}:04d}}" for known in fields)
             raise ValueError(f"{key}: expected no other fields than {allowed}, got {shown(pattern)}")

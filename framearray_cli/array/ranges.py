@@ -1,7 +1,7 @@
-"""Ranges of frames as OpenCue writes them, several of them with commas in between.
+"""Frame ranges in the notation of OpenCue, separated by commas.
 
 "5", "0-47", "0-47x3" (every third), "0-47y3" (all but every third), "0-47:3" (all; OpenCue would render them in another
-order), "47-0x-3" (downwards). Order plays no part here: frames are rendered as they follow each other on the path.
+order), "47-0x-3" (downwards). Order is ignored: frames are rendered in the order of the path.
 """
 
 import re
@@ -12,13 +12,13 @@ _PART = re.compile(r"(\d{1,6})(?:-(\d{1,6})(?:([xy:])(-?\d{1,6}))?)?")
 
 
 def parse_frames(text: str, n: int) -> tuple[int, ...]:
-    """The frames of a range, in rising order, each once.
+    """Return the frames of a range, in rising order, each once.
 
     Args:
-        n: how many there are; frames count from 0.
+        n: number of frames of the path; frames count from 0.
 
     Raises:
-        ValueError: the text is no range, or goes beyond the last frame; it says what was expected.
+        ValueError: the text is not a range, or exceeds the last frame; the message says what was expected.
     """
     found: set[int] = set()
     for part in text.replace(" ", "").split(","):
@@ -40,7 +40,7 @@ def parse_frames(text: str, n: int) -> tuple[int, ...]:
 
 
 def frames_text(frames: Iterable[int]) -> str:
-    """The shortest range of consecutive frames that says the same: "0-47,50"."""
+    """Return the shortest text for some frames, by runs of consecutive ones: "0-47,50"."""
     runs = []
     for _, group in groupby(enumerate(sorted(set(frames))), key=lambda entry: entry[1] - entry[0]):
         run: Sequence[int] = [frame for _, frame in group]

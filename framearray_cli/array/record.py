@@ -1,17 +1,16 @@
-"""What was finished, in the output folder: a line for each frame whose files are all on disk, with their checksums.
+"""Records of finished frames in the output folder: one line per frame whose files are all on disk, with checksums.
 
-Lines are appended, so that one costs the same however many there are. A render that is started again reads them, looks
-whether the files are still what they were, and goes on with the rest. Each run of some part of the camera path writes
-into a file of its own (`records/0000-0047.jsonl`), so that parts may run side by side.
+Lines are appended, so that each costs the same however long the record is. A resumed render reads them, checks that the
+files are unchanged, and renders the rest. Each run writes a file of its own, named after its cameras
+(`records/0-47.jsonl`), so that several may run side by side.
 """
 
 import hashlib
 import json
 import os
 import re
-import stat
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -21,7 +20,7 @@ from typing import Any, Self
 from framearray_cli.base.arrays import is_number
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import make_folder, reason, require_file
-from framearray_cli.base.hashing import digest, line_digest
+from framearray_cli.base.hashing import line_digest
 
 FOLDER = "records"
 MOST = 10**6  # cameras, and light positions of all groups: more than any job has
@@ -34,11 +33,11 @@ class Entry:
 
     Attributes:
         c: camera.
-        lights: the first light position, and the one after the last.
-        files: name -> size in bytes and checksum, of all files that belong to it.
-        hits: mean hits a pixel.
-        notes: what the user should know of it.
-        errors: light position -> mean square of the standard error and mean radiance; see `standarderror.summed_up`.
+        lights: the first light position, and the one past the last.
+        files: name -> (size in bytes, checksum) of all its files.
+        hits: mean hits per pixel.
+        notes: messages for the user.
+        errors: light position -> (mean square of the standard error, mean radiance).
     """
 
     c: int
@@ -51,12 +50,12 @@ class Entry:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedRun:
-    """One run of the program: what it was to do, and what it took until its last entry.
+    """One run of the program: its task, and its cost until its last entry.
 
     Attributes:
-        cameras: those that it was to render, see ranges.py.
-        processor: name of the machine's processor; kernels differ from one to the other.
-        rays: by kind, all that were traced.
+        cameras: range of those to render, see ranges.py.
+        processor: name of the machine's processor; kernels differ between processors.
+        rays: number of rays traced, by kind.
         seconds: of wall time.
     """
 
@@ -68,21 +67,21 @@ class RecordedRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArrayRecords:
-    """What all records of a folder say of one array; of a frame that was finished twice, the last entry counts."""
+    """All records of one array; the last entry of a frame counts."""
 
     entries: tuple[Entry, ...] = ()
     runs: tuple[RecordedRun, ...] = ()
 
     def checksums(self) -> dict[str, tuple[int, str]]:
-        """Size and checksum of every file that was finished."""
+        """Return size and checksum of every finished file, by name."""
         return {name: known for entry in self.entries for name, known in entry.files.items()}
 
 
 class RecordWriter:
-    """Appends to a record; lines appear whole, from any thread."""
+    """Appends to a record; whole lines, from any thread."""
 
     def __init__(self, file: Path, fingerprint: str, run: RecordedRun) -> None:
-        """Open the record, or begin it.
+        """Open the record, or create it, and note the run.
 
         Raises:
             OutputError: it cannot be written.
@@ -93,7 +92,7 @@ class RecordWriter:
             self._file = open(file, "ab", buffering=0)  # noqa: SIM115  # closed in __exit__
         except OSError as error:
             raise OutputError(f"{file}: cannot be written: {reason(error)}") from error
-        self._torn = True  # a line of an earlier run may have been cut short
+        self._torn = True  # the last line of an earlier run may be incomplete
         try:
             self._put({"fingerprint": fingerprint, "cameras": run.cameras, "processor": run.processor})
         except BaseException:
@@ -101,7 +100,7 @@ class RecordWriter:
             raise
 
     def add(self, entry: Entry, rays: Mapping[str, int], seconds: float) -> None:
-        """Note that a frame is finished, and what the run took so far.
+        """Note that a frame is finished, and the cost of the run so far.
 
         Raises:
             OutputError: it cannot be written.
@@ -121,12 +120,12 @@ class RecordWriter:
         self._put(line)
 
     def _put(self, line: Mapping[str, Any]) -> None:
-        text = sealed(line) + b"\n"
+        text = seal(line) + b"\n"
         try:
             with self._lock:
                 left = memoryview(b"\n" + text if self._torn else text)
                 self._torn = True
-                while left:  # a disk that becomes full takes a part
+                while left:  # a disk that becomes full writes a part
                     left = left[self._file.write(left) :]
                 self._torn = False
                 if not os.fstat(self._file.fileno()).st_nlink:
@@ -145,18 +144,18 @@ class RecordWriter:
 
 
 def record_file(folder: Path, cameras: str) -> Path:
-    """The record of a part of the camera path."""
+    """Return the record of a run over some cameras, given as a range."""
     name = cameras if len(cameras) <= 60 else f"{cameras[:40]}-{hashlib.sha256(cameras.encode()).hexdigest()[:12]}"
     return folder / FOLDER / f"{name}.jsonl"
 
 
 def record_files(folder: Path) -> list[Path]:
-    """All records of a folder."""
+    """Return all records of a folder."""
     return sorted((folder / FOLDER).glob("*.jsonl"))
 
 
 def read_records(folder: Path, fingerprint: str) -> ArrayRecords:
-    """What was finished of the array with this fingerprint; lines of other arrays, and torn ones, do not count.
+    """Read the entries of the array with this fingerprint; skip lines of other arrays, and torn ones.
 
     Raises:
         OutputError: a record cannot be read.
@@ -173,7 +172,7 @@ def read_records(folder: Path, fingerprint: str) -> ArrayRecords:
                     runs.append(RecordedRun(cameras=cameras, processor=processor))
             elif current and (entry := _entry(line)):
                 entries[entry.c, *entry.lights] = entry
-                runs[-1] = replace(runs[-1], **_taken(line))
+                runs[-1] = replace(runs[-1], **_run_costs(line))
     return ArrayRecords(entries=tuple(entries.values()), runs=tuple(runs))
 
 
@@ -184,19 +183,19 @@ def _lines(file: Path) -> Iterator[dict[str, Any]]:
     except OSError as error:
         raise OutputError(f"{file}: cannot be read: {reason(error)}") from error
     for line in data.splitlines():
-        found = unsealed(line)
-        if found is not None:  # else torn, or damaged: what it tells of is made again
+        found = unseal(line)
+        if found is not None:  # else torn or damaged: its frame is rendered again
             yield found
 
 
-def sealed(table: Mapping[str, Any]) -> bytes:
-    """A line of a record: JSON that begins with a checksum of all the rest."""
+def seal(table: Mapping[str, Any]) -> bytes:
+    """Return a line of a record: JSON that begins with a checksum of the rest."""
     body = json.dumps(table, separators=(",", ":")).encode()
     return b'{"check":"' + line_digest(body) + b'",' + body[1:]
 
 
-def unsealed(line: bytes) -> dict[str, Any] | None:
-    """What `sealed` made a line of; None where the line is not what it was."""
+def unseal(line: bytes) -> dict[str, Any] | None:
+    """Return the table of a line that `seal` made; None if the line was changed."""
     match = _SEAL.match(line)
     if not match:
         return None
@@ -211,7 +210,7 @@ def unsealed(line: bytes) -> dict[str, Any] | None:
 
 
 def _entry(line: Mapping[str, Any]) -> Entry | None:
-    """An entry, unless the line holds something else."""
+    """Read an entry; None if the line holds something else."""
     try:
         entry = Entry(
             c=int(line["c"]),
@@ -229,32 +228,14 @@ def _entry(line: Mapping[str, Any]) -> Entry | None:
 
 
 def _is_plain(name: str) -> bool:
-    """Whether a name leads to a file in the folder itself, as those of all images do."""
+    """Whether a name denotes a file in the folder itself, as those of all images do."""
     return name not in ("", ".", "..") and not any(character in name for character in "/\\\0")
 
 
-def _taken(line: Mapping[str, Any]) -> dict[str, Any]:
-    """What a run says that it took; nothing where that is not what a run writes."""
+def _run_costs(line: Mapping[str, Any]) -> dict[str, Any]:
+    """Read the cost of a run so far; leave out what no run would write."""
     rays, seconds = line.get("rays"), line.get("seconds")
     counts = isinstance(rays, dict) and all(isinstance(n, int) for n in rays.values())
     return ({"rays": rays} if counts else {}) | (
         {"seconds": float(seconds)} if isinstance(seconds, int | float) and is_number(seconds) else {}
     )
-
-
-def damaged(folder: Path, checksums: Mapping[str, tuple[int, str]], names: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Files that are not what they were when they were finished, with what is wrong; in the order of `names`."""
-    for name in names:
-        path, (size, known) = folder / name, checksums[name]
-        try:
-            found = path.stat()
-            if not stat.S_ISREG(found.st_mode):  # a device or a pipe may have no end
-                yield name, "is no file"
-            elif found.st_size != size:
-                yield name, f"expected {size:,} bytes, found {found.st_size:,}"
-            elif digest(path)[1] != known:
-                yield name, "its bytes have changed"
-        except FileNotFoundError:
-            yield name, "missing"
-        except OSError as error:
-            yield name, f"cannot be read: {reason(error)}"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.array.folder import Identity, differences, free_space, in_the_way, read_array
+from framearray_cli.array.folder import Identity, conflict_text, differences, free_space, read_array
 from framearray_cli.base.memory import free_memory, resident_memory
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
@@ -21,7 +21,7 @@ from framearray_cli.job.job import Job
 from .automatic.choose import AutoSettings, require_least_memory, resolve_auto
 from .identity import identity_of
 from .memory import ambient_memory, light_blocks, mirror_share, window_memory
-from .prepare import Prepared, composed_with, open_embree, plan_work, prepare
+from .prepare import Prepared, image_ambient, open_embree, plan_work, prepare
 from .target.pilot import Target, allot_hits
 from .writer import ArrayWriter, array_target
 
@@ -130,7 +130,7 @@ def _warnings(job: Job, identity: Identity, *, memory_lacks: bool, disk_lacks: b
     folder = job.output.directory
     old = read_array(folder)
     if old is not None and (changed := differences(old, identity)):
-        found.append(f"{folder} {in_the_way(old, changed)}")
+        found.append(f"{folder} {conflict_text(old, changed)}")
     return tuple(found)
 
 
@@ -182,7 +182,7 @@ def _probe(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: int)
     with TracePool(small, prepared.threads) as pool, tempfile.TemporaryDirectory() as name:
         started = time.perf_counter()
         with _writer(prepared, small, Path(name), pool.threads) as writer:
-            window = Window(small, composed_with(ambient, prepared.lights), pool)
+            window = Window(small, image_ambient(ambient, prepared.lights), pool)
             for j in ready_frames(window, small, range(n), pool):
                 composed = window.compose(j, writer.block())
                 writer.write(composed, range(j, j + 1))

@@ -28,7 +28,7 @@ from .target.pilot import Target
 _KEYS = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
 
 
-def describe(
+def initial_manifest(
     prepared: Prepared, ambient: Ambient, identity: Identity, settings: AutoSettings | None, target: Target | None
 ) -> Manifest:
     """The manifest of a render that has not begun.

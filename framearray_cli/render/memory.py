@@ -26,7 +26,7 @@ PILOT_FRAMES, PILOT_BATCH = 8, 2048
 LAYER_CHANNELS = 14
 
 
-def taken_memory() -> int:
+def program_memory() -> int:
     """Bytes that the program will hold beside frames: what it holds now, and what it still loads and keeps."""
     return resident_memory() + GROWTH
 
@@ -34,7 +34,7 @@ def taken_memory() -> int:
 def memory_limit(prepared: Prepared) -> int:
     """Bytes that frames under way may take: what the limit leaves beside the rest, or a share of what is free."""
     if prepared.job.render.memory:
-        return prepared.job.render.memory - taken_memory()
+        return prepared.job.render.memory - program_memory()
     free = free_memory()
     return min(int(FREE_SHARE * free), free - GROWTH)
 
@@ -52,7 +52,7 @@ def require_memory(prepared: Prepared, per_pixel: Float64 | None = None) -> None
     if prepared.job.render.memory is None:
         needed, limit = max(needed, ambient_memory(prepared)) + GROWTH, free_memory()
     else:  # told as the job's limit is: of the whole program
-        needed, limit = needed + taken_memory(), prepared.job.render.memory
+        needed, limit = needed + program_memory(), prepared.job.render.memory
     if needed > limit:
         less = "a smaller camera.resolution, reuse.n_r or samples.hits takes less"
         if prepared.job.samples.error is not None:

@@ -13,7 +13,7 @@ AMBIENT = "ambient"  # stands beside the groups: R W
 _UNLIT = {Plane.INDIRECT: AMBIENT, Plane.BACKGROUND: BACKGROUND}
 
 
-class StoredImage(NamedTuple):
+class PlaneFiles(NamedTuple):
     """Where the images of one plane go.
 
     Attributes:
@@ -40,7 +40,7 @@ class ArrayNames:
         layers: pattern.
     """
 
-    images: tuple[StoredImage, ...]
+    images: tuple[PlaneFiles, ...]
     layers: str
 
     def layers_file(self, c: int) -> str:
@@ -55,7 +55,7 @@ class ArrayNames:
 def names_without_groups(name: str, n_cameras: int, n_lights: int, extension: str) -> ArrayNames:
     """Name the files of an array without groups."""
     images, layers = file_patterns(name, n_cameras, n_lights, extension)
-    return ArrayNames(images=tuple(StoredImage(images, l, "") for l in range(n_lights)), layers=layers)
+    return ArrayNames(images=tuple(PlaneFiles(images, l, "") for l in range(n_lights)), layers=layers)
 
 
 def array_names(job: Job, n_cameras: int, lights: Lights) -> ArrayNames:
@@ -67,7 +67,7 @@ def array_names(job: Job, n_cameras: int, lights: Lights) -> ArrayNames:
     for group in lights.groups:
         n = len(group.positions)
         pattern, _ = file_patterns(f"{name}.{group.name}", n_cameras, n, extension)
-        images += [StoredImage(pattern, l, group.name) for l in range(n)]
+        images += [PlaneFiles(pattern, l, group.name) for l in range(n)]
     for what in map(_UNLIT.__getitem__, lights.unlit):
-        images.append(StoredImage(camera_pattern(name, what, n_cameras, extension), None, what))
+        images.append(PlaneFiles(camera_pattern(name, what, n_cameras, extension), None, what))
     return ArrayNames(images=tuple(images), layers=camera_pattern(name, "layers", n_cameras, "exr"))

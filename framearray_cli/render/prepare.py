@@ -106,7 +106,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambi
     job, scene = prepared.job, prepared.scene
     cams = eye_cameras(prepared)
     background = np.array(job.scene.background, np.float32)
-    ambient = _named(_ambient(prepared, embree, background), prepared.lights)
+    ambient = _name_groups(_ambient(prepared, embree, background), prepared.lights)
     n_r = job.n_r
     if prepared.still:  # one frame, with the hits that its whole window would have
         cams = cams._replace(**{name: getattr(cams, name)[:1] for name in ("position", "right", "up", "forward")})
@@ -146,7 +146,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambi
     return setup, ambient
 
 
-def composed_with(ambient: Ambient, lights: Lights) -> Ambient:
+def image_ambient(ambient: Ambient, lights: Lights) -> Ambient:
     """What images are composed with: I_A; with groups, none, and 1 at the plane of R W.
 
     An array with groups has the I_A of each group in its manifest, and adds it when a picture is made.
@@ -158,7 +158,7 @@ def composed_with(ambient: Ambient, lights: Lights) -> Ambient:
     return replace(ambient, intensity=intensity)
 
 
-def _named(ambient: Ambient, lights: Lights) -> Ambient:
+def _name_groups(ambient: Ambient, lights: Lights) -> Ambient:
     """The same estimate with notes that say which group a light index belongs to."""
     l = int(ambient.standard_error.argmax())
     group = next((group for group in lights.groups if l in group.positions), None)

@@ -23,11 +23,11 @@ from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 
-from .manifest import describe
+from .manifest import initial_manifest
 from .memory import light_blocks, mirror_share, require_memory
-from .prepare import Prepared, composed_with, plan_work
+from .prepare import Prepared, image_ambient, plan_work
 from .progress import RenderEvents
-from .session import RenderSession, nothing_to_do, open_session
+from .session import RenderSession, complete_manifest, open_session
 from .summary import Summary, summarize, with_summary
 from .target.pilot import allot_hits
 from .writer import ArrayWriter, FinishedFiles, array_target
@@ -58,9 +58,9 @@ def render(
     with open_session(job, events, engine, restart=restart, cameras=cameras) as session:
         prepared, on_disk, directory = session.prepared, session.on_disk, job.output.directory
         if not session.wanted:
-            return nothing_to_do(session, time.perf_counter() - started)
+            return complete_manifest(session, time.perf_counter() - started)
         setup, ambient, manifest, rays = _plan(session, events)
-        with session.folder.alone():
+        with session.folder.exclusive():
             write_manifest(directory, manifest)
         record_path = record_file(directory, session.run.cameras)
         with RecordWriter(record_path, session.identity.fingerprint, session.run) as record:
@@ -70,10 +70,10 @@ def render(
                     wanted = on_disk.missing(session.chosen, block)
                     run.frames(setup.for_lights(block), ambient, block, wanted)
             except BaseException:
-                with suppress(OutputError), session.folder.alone():  # report the first error, not one from here
+                with suppress(OutputError), session.folder.exclusive():  # report the first error, not one from here
                     write_manifest(directory, with_summary(manifest, run.summary(on_disk, ambient)))
                 raise
-        with session.folder.alone():
+        with session.folder.exclusive():
             summary = run.summary(on_disk, ambient)
             write_manifest(directory, with_summary(manifest, summary))
     return summary
@@ -92,7 +92,7 @@ def _plan(session: RenderSession, events: RenderEvents) -> tuple[FrameSetup, Amb
         require_memory(prepared, setup.per_pixel)
         events.allotted(target)
         rays["target"] = target.rays
-    return setup, ambient, describe(prepared, ambient, session.identity, session.settings, target), rays
+    return setup, ambient, initial_manifest(prepared, ambient, session.identity, session.settings, target), rays
 
 
 class _Run:
@@ -117,7 +117,7 @@ class _Run:
             return
         prepared, target = self._prepared, array_target(self._prepared)
         self._pool = pool = TracePool(setup, prepared.threads)
-        ambient, half = composed_with(ambient, prepared.lights), target.format.half
+        ambient, half = image_ambient(ambient, prepared.lights), target.format.half
         if setup.lights.n_lights < prepared.n_lights:
             ambient = ambient.for_lights(lights)
         frames = [0] if prepared.still else wanted

@@ -64,11 +64,11 @@ def open_session(
         run = RecordedRun(cameras=frames_text(chosen), processor=processor())
         check_folder(directory, identity, restart=restart)
         folder = ArrayFolder(directory)
-        with folder.alone():
+        with folder.exclusive():
             if restart:
-                folder.require_no_other()
+                folder.require_no_other_run()
             events.removed(claim_folder(directory, identity, restart=restart))
-            held.enter_context(folder.reserved(chosen, run.cameras))
+            held.enter_context(folder.reserve(chosen, run.cameras))
         if settings:
             events.resolved(settings)
         on_disk = scan_output(directory, identity.fingerprint, prepared.threads, frozenset(chosen), events.scanning)
@@ -80,10 +80,10 @@ def open_session(
         )  # fmt: skip
 
 
-def nothing_to_do(session: RenderSession, seconds: float) -> Summary:
+def complete_manifest(session: RenderSession, seconds: float) -> Summary:
     """All that is wanted is on disk; complete the manifest where it does not say so yet."""
     prepared, directory = session.prepared, session.prepared.job.output.directory
-    with session.folder.alone():
+    with session.folder.exclusive():
         manifest = read_manifest(directory)
         known = manifest.summary.get("notes")
         notes = tuple(note for note in known if isinstance(note, str)) if isinstance(known, list) else ()

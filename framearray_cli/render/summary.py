@@ -88,14 +88,14 @@ def summarize(
         pixels=width * height,
         hits=math.fsum(by_camera.values()) / max(len(by_camera), 1),
         peak_memory=peak_memory(),
-        notes=tuple(dict.fromkeys((*notes, *found, *_mixed(records)))),
+        notes=tuple(dict.fromkeys((*notes, *found, *_processor_notes(records)))),
         standard_error=_standard_error(prepared.lights, errors) if errors else {},
         all_rays=dict(all_rays) or dict(rays),
         all_seconds=sum(run.seconds for run in records.runs) or seconds,
     )
 
 
-def _mixed(records: ArrayRecords) -> list[str]:
+def _processor_notes(records: ArrayRecords) -> list[str]:
     """Say it where processors of several kinds worked on an array: their kernels round differently."""
     kinds = sorted({run.processor for run in records.runs} | {processor()})
     if len(kinds) < 2:

@@ -188,9 +188,9 @@ class ArrayWriter:
             left.one_less()
 
         for future in [self._pool.submit(run, task) for task in tasks]:
-            future.add_done_callback(self._hand_on_error)
+            future.add_done_callback(self._pass_error)
 
-    def _hand_on_error(self, future: Future[None]) -> None:
+    def _pass_error(self, future: Future[None]) -> None:
         error = None if future.cancelled() else future.exception()
         if error is not None:
             self._free.put(error)

@@ -165,7 +165,7 @@ def test_wrong_addresses(address, tmp_path):
 
 
 def test_what_a_worker_must_see(tmp_path):
-    from framearray_cli.render.parts.worker import unfit
+    from framearray_cli.render.parts.worker import worker_problem
 
     scene, probe = tmp_path / "scene.glb", tmp_path / "out/records/.parts-1"
     scene.write_bytes(b"scene")
@@ -178,12 +178,14 @@ def test_what_a_worker_must_see(tmp_path):
         "probe": str(probe),
         "scene": digest(scene),
     }
-    assert unfit(good) == ""
-    assert "has framearray" in unfit(good | {"version": "0.0.1"})
-    assert f"does not see the output folder {tmp_path / 'out'}" in unfit(good | {"probe": str(probe) + "2"})
-    assert "does not see the scene" in unfit(good | {"table": {"scene": {"file": str(tmp_path / "other.glb")}}})
+    assert worker_problem(good) == ""
+    assert "has framearray" in worker_problem(good | {"version": "0.0.1"})
+    assert f"does not see the output folder {tmp_path / 'out'}" in worker_problem(good | {"probe": str(probe) + "2"})
+    assert "does not see the scene" in worker_problem(
+        good | {"table": {"scene": {"file": str(tmp_path / "other.glb")}}}
+    )
     scene.write_bytes(b"scenf")
-    assert "has another file" in unfit(good)
+    assert "has another file" in worker_problem(good)
 
 
 def test_dask_is_not_loaded_without_it(tmp_path, capsys):

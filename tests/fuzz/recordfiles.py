@@ -9,7 +9,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from framearray_cli.array.record import FOLDER, sealed
+from framearray_cli.array.record import FOLDER, seal
 
 from .case import Arguments, Case
 from .fuzzarrays import copy_of, make_arrays, replace, secrets_lost, with_secrets
@@ -18,7 +18,7 @@ from .pathfiles import RANGES
 from .tables import mutated
 from .texts import mutated_bytes
 
-SHARES = {"bytes": 0.35, "lines": 0.15, "sealed": 0.3, "file": 0.2}
+SHARES = {"bytes": 0.35, "lines": 0.15, "seal": 0.3, "file": 0.2}
 # Values that a line may have that was written by somebody who knows its checksum.
 FORGED: tuple[dict[str, Any], ...] = (
     {"lights": [0, 10**12]}, {"lights": [0, 10**9]}, {"lights": [-5, 5]}, {"lights": [0]}, {"c": 10**9}, {"c": -1},
@@ -43,7 +43,7 @@ def cases(rng: Random, folder: Path) -> Iterator[Case]:
             rng.choice(sorted(array.glob("*.exr"))).unlink()
         kind = rng.choices(list(SHARES), list(SHARES.values()))[0]
         record = next((array / FOLDER).glob("*.jsonl"))
-        what = {"bytes": _bytes, "lines": _lines, "sealed": _sealed, "file": _files}[kind](rng, record)
+        what = {"bytes": _bytes, "lines": _lines, "seal": _sealed, "file": _files}[kind](rng, record)
         go_on: Arguments = ("render", folder / job, "-o", array, "-q")
         arguments = rng.choice(
             (go_on, go_on, (*go_on, "--restart"), (*go_on, "--cameras", rng.choice(RANGES)), ("verify", array, "-q"),
@@ -111,7 +111,7 @@ def _sealed(rng: Random, record: Path) -> str:
         _, changed = mutated(rng, tables[k], {})
         tables[k] = json.loads(json.dumps(changed, default=str))
         what = "a table changed"
-    replace(record, b"\n".join(map(sealed, tables)) + b"\n")
+    replace(record, b"\n".join(map(seal, tables)) + b"\n")
     return what
 
 

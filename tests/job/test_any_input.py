@@ -17,7 +17,7 @@ from support.movies import array_of
 from framearray_cli.array.manifest_toml import read_manifest, to_toml
 from framearray_cli.array.names import check_pattern
 from framearray_cli.array.ranges import frames_text, parse_frames
-from framearray_cli.array.record import sealed, unsealed
+from framearray_cli.array.record import seal, unseal
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.problems import problems_of
 from framearray_cli.base.forms.schema import file_schema
@@ -250,10 +250,10 @@ JSON = st.recursive(
     bit=st.integers(0, 7),
 )
 def test_a_sealed_line_reads_back_or_is_refused(table, at, bit):
-    line = sealed(table)
-    found = unsealed(line)
+    line = seal(table)
+    found = unseal(line)
     assert found == json.loads(json.dumps(table))
     broken = bytearray(line)
     broken[at % len(line)] ^= 1 << bit
-    assert unsealed(bytes(broken)) is None
-    assert unsealed(line[: at % len(line)]) is None
+    assert unseal(bytes(broken)) is None
+    assert unseal(line[: at % len(line)]) is None

@@ -102,7 +102,7 @@ def test_who_listens_listens_to_events_that_there_are(module: Any, name: str, ba
     ]
     methods = {node.name for node in found.body if isinstance(node, ast.FunctionDef)}
     events = {event for event in dir(base) if not event.startswith("_")}
-    own = {"send", "watching"}  # of the reporter
+    own = {"send", "watch_task"}  # of the reporter
     assert {method for method in methods if not method.startswith("_")} - own <= events
     assert "written" in methods
     if base is PartEvents:

@@ -10,11 +10,11 @@ from support import tiny
 from support.tiny import WALK
 
 import framearray_cli.render.render as rendering
-from framearray_cli.array.integrity import scan_output
+from framearray_cli.array.integrity import find_damage, scan_output
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.ranges import frames_text, parse_frames
-from framearray_cli.array.record import damaged, read_records, record_files, sealed, unsealed
+from framearray_cli.array.record import read_records, record_files, seal, unseal
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.hashing import digest
 from framearray_cli.engine.terms.ambient import estimate as ambient
@@ -113,8 +113,8 @@ def test_torn_and_foreign_lines_do_not_count(scene: Path, tmp_path: Path, whole:
         b"",
         b"{",
         b'{"c":0}',
-        sealed({"c": 0}),
-        sealed({"c": 0, "lights": [0, 3], "files": [1], "hits": 0}),
+        seal({"c": 0}),
+        seal({"c": 0, "lights": [0, 3], "files": [1], "hits": 0}),
         b"\xff\xfe",
         b"[" * 100000,
         b"7",
@@ -170,7 +170,7 @@ def test_damage_is_found_and_mended(scene: Path, tmp_path: Path, whole: Path) ->
         (tmp_path / name).write_bytes(data)
     records = read_records(tmp_path, read_manifest(tmp_path).fingerprint)
     checksums = records.checksums()
-    assert sorted(name for name, _ in damaged(tmp_path, checksums, checksums)) == sorted(names)
+    assert sorted(name for name, _ in find_damage(tmp_path, checksums, checksums)) == sorted(names)
     heard: list[int] = []
 
     class Hears(Counting):
@@ -191,7 +191,7 @@ def test_another_processor_is_told(scene: Path, tmp_path: Path) -> None:
     [file] = record_files(tmp_path)
     lines = file.read_bytes().splitlines()
     head = next(k for k, line in enumerate(lines) if b"processor" in line)
-    lines[head] = sealed({**(unsealed(lines[head]) or {}), "processor": "another"})
+    lines[head] = seal({**(unseal(lines[head]) or {}), "processor": "another"})
     file.write_bytes(b"\n".join(lines) + b"\n")
     summary = render(job(scene, tmp_path))
     assert any("several kinds of processor" in note and "another" in note for note in summary.notes)

@@ -5,7 +5,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from framearray_cli.array.record import record_files, unsealed
+from framearray_cli.array.record import record_files, unseal
 from support import tiny
 
 N = 24
@@ -50,7 +50,7 @@ def lines(folder: Path) -> list[tuple[str, dict[str, Any]]]:
     return [
         (file.stem, line)
         for file in record_files(folder)
-        for line in map(unsealed, file.read_bytes().splitlines())
+        for line in map(unseal, file.read_bytes().splitlines())
         if line
     ]
 

@@ -1,7 +1,7 @@
-"""What an image says about itself: attribute names and camera matrices as OpenEXR defines them.
+"""Metadata of an image file: attribute names and camera matrices as OpenEXR defines them.
 
 Notation: matrices here act on columns, `camera_from_world @ point`. OpenEXR (Imath) multiplies rows from the left,
-`point * M44f`, so `images.py` stores each matrix transposed.
+`point * M44f`, so `exr.py` stores each matrix transposed.
 """
 
 from collections.abc import Mapping
@@ -17,12 +17,12 @@ from framearray_cli.base.units import frame_rate
 Attribute: TypeAlias = str | int | float | Fraction | tuple[float, float, float] | Float64
 Attributes: TypeAlias = Mapping[str, Attribute]
 
-# EXR and TIFF files carry a date. A fixed one makes equal images equal files.
+# EXR and TIFF files carry a date. A fixed one makes files of equal images equal.
 FIXED_DATE = "2000:01:01 00:00:00"
 
 
 def exr_camera_from_world(world_from_camera: Float64) -> Float64:
-    """Find OpenEXR's worldToCamera: x right, y up, z along the view (left-handed, as in RenderMan).
+    """Return OpenEXR's worldToCamera: x right, y up, z along the view (left-handed, as in RenderMan).
 
     Args:
         world_from_camera: (4, 4) rigid; the camera looks along -z, y up.
@@ -36,7 +36,7 @@ def exr_camera_from_world(world_from_camera: Float64) -> Float64:
 
 
 def exr_ndc_from_world(world_from_camera: Float64, fov_deg: float, width: int, height: int) -> Float64:
-    """Find OpenEXR's worldToNDC: after division by w, (0, 0) is the image's upper left corner, (1, 1) the lower right.
+    """Return OpenEXR's worldToNDC: after division by w, (0, 0) is the image's upper left corner, (1, 1) the lower right.
 
     z / w is 1 - 1 / distance along the view: the standard leaves z open, and this keeps the matrix invertible.
 
@@ -73,7 +73,7 @@ def frame_attributes(
     group: str = "",
     software: str = "framearray",
 ) -> dict[str, Attribute]:
-    """Name what belongs into the file of image [c, l], or of camera c where `l` is None.
+    """Return the attributes of the file of image [c, l], or of camera c where `l` is None.
 
     Args:
         world_from_camera: (4, 4), in the scene file's own coordinates; the camera looks along -z, y up.
@@ -82,7 +82,7 @@ def frame_attributes(
         fps: frames per second.
         c: camera index.
         l: light index.
-        group: of sources whose light it is, or what else is stored by itself; "": all light.
+        group: whose light the file holds, or the name of another stored part; "": all light.
         software: program and version.
     """
     attributes: dict[str, Attribute] = {

@@ -1,4 +1,4 @@
-"""A quick look whether an image file is there, whole and of the right size, without decoding all of it."""
+"""Check quickly that an image file exists, is whole and has the right size, without decoding all of it."""
 
 import os
 from pathlib import Path
@@ -8,18 +8,18 @@ from framearray_cli.base.files import require_file
 
 from .exr import last_row
 from .images import format_name, read_image
-from .png import opened_picture
+from .png import open_picture
 
 JPEG_END = b"\xff\xd9"
 
 
 def check_image(path: Path, resolution: tuple[int, int]) -> None:
-    """Look at the head and the end of an image file, as one that was cut short has lost its end; of PNG at all sums.
+    """Check the head and the end of an image file, as a truncated file has lost its end; of PNG, all checksums.
 
-    Where that tells nothing (tiles, bytes behind the end of a JPEG), the whole image is decoded.
+    Where that is inconclusive (tiles, bytes behind the end of a JPEG), decode the whole image.
 
     Args:
-        resolution: width and height that are expected, pixels.
+        resolution: expected width and height, pixels.
 
     Raises:
         OutputError: the file is missing, damaged, cut short or of another size.
@@ -42,21 +42,21 @@ def check_image(path: Path, resolution: tuple[int, int]) -> None:
 
 
 def _size_of_png(path: Path) -> tuple[int, int]:
-    """Read the size of a PNG, and check the sum of each chunk, which Pillow does not when it decodes."""
-    with opened_picture(path) as picture:
+    """Read the size of a PNG and check the checksum of each chunk, which Pillow skips when it decodes."""
+    with open_picture(path) as picture:
         size: tuple[int, int] = picture.size
         picture.verify()
     return size
 
 
 def _size_of_jpeg(path: Path) -> tuple[int, int] | None:
-    """Read the size from the head of a JPEG whose end is there; None if either is not found."""
+    """Read the size from the head of a JPEG; None if the head is unreadable or the end marker is missing."""
     try:
         with path.open("rb") as file:
             file.seek(-len(JPEG_END), os.SEEK_END)
             if file.read() != JPEG_END:
                 return None
-        with opened_picture(path) as picture:
+        with open_picture(path) as picture:
             size: tuple[int, int] = picture.size
             return size
     except (OSError, OutputError):

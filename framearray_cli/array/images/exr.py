@@ -1,4 +1,4 @@
-"""Read and write EXR and TIFF, by OpenImageIO, which raises nothing: every return value is checked here."""
+"""Read and write EXR and TIFF with OpenImageIO, which raises nothing: every return value is checked here."""
 
 import os
 from fractions import Fraction
@@ -22,7 +22,7 @@ _HEADS = (b"\x76\x2f\x31\x01", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")  # of EXR
 
 
 def spec_of(shape: tuple[int, ...], names: list[str], kinds: list[str], attributes: Attributes) -> Any:
-    """Describe an image of `shape` (h, w, channels) with "half" or "float" for each channel."""
+    """Describe an image of `shape` (h, w, channels) with "half" or "float" per channel."""
     library = oiio()
     height, width, channels = shape
     spec = library.ImageSpec(width, height, channels, "float" if "float" in kinds else "half")
@@ -35,14 +35,14 @@ def spec_of(shape: tuple[int, ...], names: list[str], kinds: list[str], attribut
 
 
 def write_pixels(path: Path, format_name: str, spec: Any, pixels: NDArray[Any]) -> None:
-    """Write pixels (h, w, channels) through OpenImageIO, by format name: a temporary file has no suffix of its own."""
+    """Write pixels (h, w, channels) in a named format: a temporary file has no suffix to choose it by."""
     library = oiio()
     pixels = np.ascontiguousarray(pixels)  # a strided array can be stored wrongly without an error
     with whole_file(path) as part:
         output = library.ImageOutput.create(format_name)
         if output is None:
             raise OutputError(f"{path}: OpenImageIO cannot write {format_name}: {library.geterror()}")
-        # All three run in turn; the file is good only if none fails and no error was left behind.
+        # All three calls run; the file is good only if none fails and no error was left behind.
         done = output.open(str(part), spec) and output.write_image(pixels)
         done = output.close() and done
         message = output.geterror()
@@ -53,7 +53,7 @@ def write_pixels(path: Path, format_name: str, spec: Any, pixels: NDArray[Any]) 
 
 
 def read_pixels(path: Path) -> tuple[list[str], Float32]:
-    """Read all channels as float32: names and (h, w, channels)."""
+    """Read all channels as float32; return their names and pixels (h, w, channels)."""
     library = oiio()
     if not os.path.isfile(path):
         raise OutputError(f"{path}: no such file")
@@ -73,7 +73,7 @@ def read_pixels(path: Path) -> tuple[list[str], Float32]:
 
 
 def last_row(path: Path) -> tuple[int, int] | None:
-    """Read the last row of an EXR or TIFF, which one that was cut short has lost: width and height, or None."""
+    """Return width and height of an EXR or TIFF if its last row, which a truncated file lacks, can be read."""
     library = oiio()
     source = library.ImageInput.open(str(path)) if os.path.isfile(path) and _begins_well(path) else None
     if source is None:
@@ -92,14 +92,14 @@ def oiio() -> Any:
     with extra("images need OpenImageIO", "OpenImageIO", reason=True):
         import OpenImageIO
     OpenImageIO.attribute("threads", 1)
-    OpenImageIO.attribute("exr_threads", -1)  # -1: compress in the calling thread; 1 would hand it to another
+    OpenImageIO.attribute("exr_threads", -1)  # -1: compress in the calling thread; 1 would use another
     return OpenImageIO
 
 
 def _set_attribute(spec: Any, name: str, value: Attribute) -> None:
     library = oiio()
     if isinstance(value, np.ndarray):
-        rows = np.asarray(value.T, np.float32)  # row vectors in the file, see imageattributes.py
+        rows = np.asarray(value.T, np.float32)  # row vectors in the file, see attributes.py
         spec.attribute(name, library.TypeDesc("matrix44"), tuple(rows.ravel().tolist()))
     elif isinstance(value, Fraction):
         spec.attribute(name, library.TypeDesc("rational"), (value.numerator, value.denominator))
@@ -117,7 +117,7 @@ def _check_end(path: Path, part: Path, n_bytes: int) -> None:
 
 
 def _begins_well(path: Path) -> bool:
-    """Whether a file begins like EXR or TIFF; any other kind OpenImageIO would try with all its readers."""
+    """Whether a file begins like EXR or TIFF; OpenImageIO would try all its readers on any other."""
     try:
         with path.open("rb") as file:
             return file.read(4) in _HEADS

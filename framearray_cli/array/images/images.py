@@ -1,6 +1,6 @@
 """Read and write one image.
 
-EXR and TIFF go through OpenImageIO. It reports success for a PNG on a full disk and reads half a JPEG without a word,
+EXR and TIFF go through OpenImageIO. It reports success for a PNG on a full disk and reads half a JPEG without an error,
 so PNG and JPEG go through Pillow, in memory.
 """
 
@@ -24,7 +24,7 @@ from .png import can_encode, encode_jpeg, encode_png, read_codes
 
 Extension = Literal["exr", "png", "tif", "jpg"]
 
-HALF_MAX = 65504.0  # the largest half; what lies beyond becomes infinite
+HALF_MAX = 65504.0  # the largest half; values beyond become infinite
 EXR_COMPRESSIONS = ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
 FLOAT_LAYERS = ("depth", "samples")  # layers that need more than the 11 bits of a half
 FOR_SCREENS = ("png", "jpg")  # formats of 8-bit sRGB; the others keep the radiance
@@ -33,14 +33,14 @@ _SAME = {"jpeg": "jpg", "tiff": "tif"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImageFormat:
-    """How images are stored.
+    """Format of image files and its options.
 
     Attributes:
         format: exr and tif keep linear radiance; png and jpg are sRGB, 8 bits, clipped to [0, 1].
-        compression: of EXR; one of EXR_COMPRESSIONS, with a level if wanted: "zip:1" (that of "zip") to "zip:9",
-            "dwaa:45".
+        compression: of EXR; one of EXR_COMPRESSIONS, optionally with a level: "zip:1" (the default of "zip") to
+            "zip:9", "dwaa:45".
         half: how EXR stores values: "auto" as half, or as float in an image with values beyond 65504; "always" as
-            half, such values cut to 65504; "never" as float. TIFF is always float.
+            half, such values clamped to 65504; "never" as float. TIFF is always float.
         quality: of JPEG, 1 to 100.
         exposure: stops added to what png and jpg show; exr and tif keep the radiance as it is.
     """
@@ -53,7 +53,7 @@ class ImageFormat:
 
     @property
     def composes_halves(self) -> bool:
-        """Whether images may be handed over as halves; with "auto" only those without values beyond 65504."""
+        """Whether `write_image` accepts halves; with "auto" only images without values beyond 65504."""
         return self.format == "exr" and self.half != "never"
 
     def __post_init__(self) -> None:
@@ -67,13 +67,13 @@ class ImageFormat:
 
 
 def format_name(path: Path | str) -> str:
-    """The format that a file's suffix stands for, in its usual spelling: "png", "jpg"; "" without a suffix."""
+    """Return the format of a file's suffix in its usual spelling: "png", "jpg"; "" without a suffix."""
     suffix = Path(path).suffix.lower()[1:]
     return _SAME.get(suffix, suffix)
 
 
 def require_writer(name: Extension) -> None:
-    """Make sure that a format can be written here, before any work is done: libraries may be built without it.
+    """Check, before any work is done, that a format can be written here: libraries may be built without it.
 
     Raises:
         MissingExtraError: it cannot.
@@ -102,11 +102,11 @@ def write_image(
     Several threads may write different images at once.
 
     Args:
-        path: the file; its suffix plays no part, `image_format.format` decides.
-        image: (h, w, 3), linear, finite; one of halves, for EXR alone, is stored as it is, and not looked at.
+        path: the file; its suffix is ignored, `image_format.format` decides.
+        image: (h, w, 3), linear, finite; halves, for EXR only, are stored unchecked.
         image_format: format and its options.
-        attributes: EXR keeps all of them, PNG what is text or a number, TIFF the program's name, JPEG none.
-        more: images of the same shape that EXR stores as layers of these names, as it stores the image itself.
+        attributes: EXR keeps all of them, PNG text and numbers, TIFF the program's name, JPEG none.
+        more: images of the same shape that EXR stores as layers of these names, with the same precision.
 
     Raises:
         ValueError: the image holds NaN or infinity, or has another shape.
@@ -132,12 +132,14 @@ def write_image(
         text = {name: value for name, value in attributes.items() if isinstance(value, str)}
         spec = spec_of(image.shape, ["R", "G", "B"], ["float"] * 3, text)
         spec.attribute("compression", "none")  # zip saves a fifth of a noisy float image and takes 20 times as long
-        spec.attribute("tiff:write_exif", 0)  # else it fails to write an empty Exif directory, and says so
+        spec.attribute(
+            "tiff:write_exif", 0
+        )  # else OpenImageIO fails to write an empty Exif directory and reports an error
         write_pixels(path, "tiff", spec, image)
 
 
 def _halves(image: Image, largest: float) -> NDArray[np.float16]:
-    """Cut before the cast: half a step above 65504 a half becomes infinite."""
+    """Convert to halves; clamp first, as half a step above 65504 a half becomes infinite."""
     return (np.clip(image, -HALF_MAX, HALF_MAX) if largest > HALF_MAX else image).astype(np.float16)
 
 
@@ -148,7 +150,7 @@ def _write_exr(
     image_format: ImageFormat,
     attributes: Attributes,
 ) -> None:
-    """Write an image, and others of the same kind of numbers as its layers."""
+    """Write an image, with others of the same number type as its layers."""
     kind = "half" if image.dtype == np.float16 else "float"
     layers = [_halves(layer, np.inf) if kind == "half" else layer for layer in more.values()]
     names = ["R", "G", "B"] + [f"{name}.{letter}" for name in more for letter in "RGB"]
@@ -165,7 +167,7 @@ def write_codes(
 
     Args:
         path: the file.
-        codes: what is shown.
+        codes: the pixels.
         image_format: png (what None means) or jpg, and its quality.
         attributes: as in `write_image`.
 
@@ -183,8 +185,8 @@ def write_layers(
 ) -> None:
     """Write a multi-channel EXR, whole or not at all.
 
-    Names follow OpenEXR's `layer.channel`: "obscurance.R", "normal.X", "depth.Z"; "samples" alone is a channel without
-    a layer. Layers named in FLOAT_LAYERS, and channels with values beyond 65504, are stored as float, others as half.
+    Names follow OpenEXR's `layer.channel`: "obscurance.R", "normal.X", "depth.Z"; "samples" is a channel without a
+    layer. Layers named in FLOAT_LAYERS, and channels with values beyond 65504, are stored as float, others as half.
 
     Args:
         path: the file.
@@ -213,7 +215,7 @@ def read_image(path: Path) -> Image:
     """Read an image as linear radiance: (h, w, 3) float32; PNG and JPEG are decoded from sRGB.
 
     Raises:
-        OutputError: the file is missing, damaged or cut short, or has no channels R, G, B.
+        OutputError: the file is missing, damaged or truncated, or has no channels R, G, B.
     """
     if format_name(path) in FOR_SCREENS:
         return linear_from_srgb8(read_codes(path))
@@ -227,25 +229,25 @@ def read_layers(path: Path) -> dict[str, Float32]:
     """Read every channel of an EXR: name -> (h, w) float32, in the order of the file (by name).
 
     Raises:
-        OutputError: the file is missing, damaged or cut short.
+        OutputError: the file is missing, damaged or truncated.
     """
     names, pixels = read_pixels(path)
     return {name: np.ascontiguousarray(pixels[..., i]) for i, name in enumerate(names)}
 
 
-def _compression(wish: str) -> str:
-    """Check the name of an EXR compression and fill in its level; OpenImageIO takes any name it does not know for zip.
+def _compression(name_and_level: str) -> str:
+    """Check the name of an EXR compression and fill in its level; OpenImageIO takes any unknown name for zip.
 
     Noise hardly compresses: level 1 takes 6 ms for 400x300, level 4 (zip's own default) 10 ms and saves 7 %.
     """
-    name, _, level = wish.partition(":")
-    if name not in EXR_COMPRESSIONS or (":" in wish and not level.isdigit()):
-        raise ValueError(f"expected one of {', '.join(EXR_COMPRESSIONS)}, got {wish!r}")
-    return f"{name}:1" if name in ("zip", "zips") and not level else wish
+    name, _, level = name_and_level.partition(":")
+    if name not in EXR_COMPRESSIONS or (":" in name_and_level and not level.isdigit()):
+        raise ValueError(f"expected one of {', '.join(EXR_COMPRESSIONS)}, got {name_and_level!r}")
+    return f"{name}:1" if name in ("zip", "zips") and not level else name_and_level
 
 
 def _largest(label: str, values: Float32) -> float:
-    """Return the largest magnitude, after a check: NaN and infinity come through min and max."""
+    """Return the largest magnitude, and refuse NaN and infinity, which min and max pass on."""
     low, high = float(values.min()), float(values.max())
     if not (math.isfinite(low) and math.isfinite(high)):
         raise ValueError(f"{label}: not finite, {np.count_nonzero(~np.isfinite(values))} values")

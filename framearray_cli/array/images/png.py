@@ -1,4 +1,4 @@
-"""Read and write PNG and JPEG, by Pillow: codes of 8 bits."""
+"""Read and write PNG and JPEG with Pillow: 8-bit codes."""
 
 import io
 import struct
@@ -17,9 +17,9 @@ from framearray_cli.base.files import reason, require_file
 
 from .attributes import Attributes
 
-MOST_PIXELS = 16384**2  # of an image; the largest that a job may have
+MOST_PIXELS = 16384**2  # of an image; no job may have more
 _PNG_HEAD, _JPEG_HEAD = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
-# How Pillow reports broken files, beside OSError.
+# What Pillow raises for broken files, beside OSError.
 _PILLOW_ERRORS = (SyntaxError, ValueError, EOFError, IndexError, KeyError, TypeError, struct.error, zlib.error)
 
 
@@ -27,17 +27,17 @@ def read_codes(path: Path) -> Bytes:
     """Read the 8-bit sRGB codes of a PNG or JPEG: (h, w, 3) uint8.
 
     Raises:
-        OutputError: the file is missing, damaged or cut short.
+        OutputError: the file is missing, damaged or truncated.
     """
-    with opened_picture(path) as picture:
+    with open_picture(path) as picture:
         return np.asarray(picture.convert("RGB"))
 
 
 @contextmanager
-def opened_picture(path: Path) -> Iterator[Any]:
-    """Open a PNG or JPEG with Pillow; what goes wrong while it is used is told of the file.
+def open_picture(path: Path) -> Iterator[Any]:
+    """Open a PNG or JPEG with Pillow; errors raised while it is in use name the file.
 
-    Pillow's own `open` takes files of any format, and refuses sizes that a job may ask for.
+    Pillow's own `open` takes files of any format, and refuses sizes that a job may have.
 
     Raises:
         OutputError: the file is missing, damaged, of another format, or larger than any job's.
@@ -69,13 +69,13 @@ def can_encode(name: str) -> bool:
 
 
 def check_size(path: Path, width: int, height: int) -> None:
-    """Refuse what a few bytes may claim, before memory is taken for it."""
+    """Refuse a size beyond any job, which a few bytes can claim, before memory is allocated for it."""
     if width * height > MOST_PIXELS:
         raise OutputError(f"{path}: damaged: it says that it has {width} x {height} pixels, more than any job")
 
 
 def encode_png(codes: Bytes, attributes: Attributes) -> memoryview:
-    """Encode (h, w, 3) 8-bit codes as PNG; a file in memory."""
+    """Encode (h, w, 3) 8-bit codes as PNG, in memory."""
     import PIL.Image
     import PIL.PngImagePlugin
 
@@ -90,7 +90,7 @@ def encode_png(codes: Bytes, attributes: Attributes) -> memoryview:
 
 
 def encode_jpeg(codes: Bytes, quality: int) -> memoryview:
-    """Encode (h, w, 3) 8-bit codes as JPEG without chroma subsampling, as coloured edges would bleed; in memory."""
+    """Encode (h, w, 3) 8-bit codes as JPEG, in memory, without chroma subsampling, which makes coloured edges bleed."""
     import PIL.Image
 
     buffer = io.BytesIO()

@@ -42,13 +42,13 @@ def openjd(
         )
     with Screen(out, quiet=quiet) as screen:
         screen.wait("reading the job")
-        from framearray_cli.render.parts.chunks import default_size, in_chunks, reach
+        from framearray_cli.render.parts.chunks import default_size, plan_chunks, resolve_n_r
         from framearray_cli.render.parts.openjd import template, write_template
         from framearray_cli.scene.paths.paths import eyes
 
-        n_r, still = reach(job), eyes(job).at_rest
+        n_r, still = resolve_n_r(job), eyes(job).at_rest
         size = chunk or (frames if still else default_size(frames, n_r))
-        chunks = in_chunks(range(frames), size, frames, n_r, still=still)
+        chunks = plan_chunks(range(frames), size, frames, n_r, still=still)
         write_template(file, template(job, job_file, file.parent, size, job.render.threads), force=force)
     if not quiet:
         say(out, [chunks_line(chunks), f"{file}; next: openjd run {shlex.quote(str(file))}"])

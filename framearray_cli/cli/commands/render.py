@@ -168,7 +168,7 @@ class Shown(PartEvents):
     def awaiting_workers(self, address: str | None) -> None:
         self._screen.say([f"waiting for workers of {address or 'this machine'}"])
 
-    def cut(self, workers: int, chunks: "Chunks") -> None:
+    def chunked(self, workers: int, chunks: "Chunks") -> None:
         self._screen.say([f"{workers_text(workers)}, {chunks_line(chunks)}"])
         self._screen.count("rendering", self._total, "image")
 

@@ -12,7 +12,7 @@ from ..options import Quiet, Threads, with_threads
 from ..screen import Screen, out, say
 
 if TYPE_CHECKING:
-    from framearray_cli.array.integrity import Verified
+    from framearray_cli.array.integrity import Verification
 
 
 def verify(
@@ -55,7 +55,7 @@ def verify(
     )
 
 
-def verified_lines(found: "Verified") -> list[str]:
+def verified_lines(found: "Verification") -> list[str]:
     """What is wrong with the files of an array, each by name."""
     folder, n = found.manifest.directory, len(found.wrong)
     lines = [f"{folder / name}: {problem}" for name, problem in found.wrong]

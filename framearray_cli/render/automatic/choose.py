@@ -30,7 +30,7 @@ ROOM = 4 * 2**30
 ORDINARY = 0.9
 DEFAULT = Reuse(n_r=DEFAULT_N_R, hits=float(DEFAULT_HITS))
 # Numbers of frames that the share of hits seen is told for.
-TOLD = (1, 2, 4, 8, 16)
+SEEN_AT = (1, 2, 4, 8, 16)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,9 +89,9 @@ def resolve_auto(prepared: Prepared, embree: EmbreeScene) -> tuple[Prepared, Aut
         balance=job.reuse.weights == "balance",
     )
     wanted = wanted_variance(job)
-    enough, trying = exact_enough(model, job), to_try(job, model.found.n_frames)
+    enough, trying = accuracy_test(model, job), candidates(job, model.found.n_frames)
     chosen = choose(model, enough, trying, lambda reuse: _blocks(prepared, reuse))
-    result = applied(prepared, chosen)
+    result = apply_reuse(prepared, chosen)
     require_memory(result)
     return result, AutoSettings(
         reuse=chosen,
@@ -100,7 +100,7 @@ def resolve_auto(prepared: Prepared, embree: EmbreeScene) -> tuple[Prepared, Aut
         error=(model.variance(chosen) / wanted) ** 0.5,
         time=model.time(chosen, _blocks(prepared, chosen)) / model.time(DEFAULT, _blocks(prepared, DEFAULT)),
         hits=(float(model.counts(chosen).mean()), model.least(chosen)),
-        seen={k: model.found.seen(k) for k in TOLD if k <= min(model.found.reach, model.found.n_frames - 1)},
+        seen={k: model.found.seen(k) for k in SEEN_AT if k <= min(model.found.reach, model.found.n_frames - 1)},
     )
 
 
@@ -114,7 +114,7 @@ def require_least_memory(prepared: Prepared) -> None:
     if hits == "auto" or prepared.job.samples.error is not None:
         hits = HITS[0]
     least = Reuse(n_r=0 if n_r == "auto" else n_r, hits=hits)
-    require_memory(applied(prepared, least))
+    require_memory(apply_reuse(prepared, least))
 
 
 def auto_keys(job: Job) -> tuple[str, ...]:
@@ -123,7 +123,7 @@ def auto_keys(job: Job) -> tuple[str, ...]:
     return tuple(key for key, value in values.items() if value == "auto")
 
 
-def applied(prepared: Prepared, reuse: Reuse) -> Prepared:
+def apply_reuse(prepared: Prepared, reuse: Reuse) -> Prepared:
     """The same job with these settings."""
     job = prepared.job
     new = changed(job, reuse=changed(job.reuse, n_r=reuse.n_r), samples=changed(job.samples, hits=reuse.hits))
@@ -136,14 +136,14 @@ def wanted_variance(job: Job) -> float:
     return 1.0 / (ORDINARY * (2 * DEFAULT.n_r + 1) * float(independent_hits(np.array(hits))))
 
 
-def exact_enough(model: Model, job: Job) -> Callable[[Reuse], bool]:
+def accuracy_test(model: Model, job: Job) -> Callable[[Reuse], bool]:
     """What settings must be: as exact as wanted, and places that were just revealed no worse than by default."""
     wanted = wanted_variance(job)
     least = model.least(replace(DEFAULT, hits=DEFAULT.hits if job.samples.hits == "auto" else job.samples.hits))
     return lambda reuse: model.variance(reuse) <= wanted and model.least(reuse) >= least
 
 
-def to_try(job: Job, n_frames: int) -> Iterator[list[Reuse]]:
+def candidates(job: Job, n_frames: int) -> Iterator[list[Reuse]]:
     """The settings that a job leaves open, a list a window with hits rising; no window is longer than the path."""
     n_r, hits = job.reuse.n_r, job.samples.hits
     longest = min(LONGEST[job.reuse.weights], n_frames - 1)
@@ -179,4 +179,4 @@ def choose(
 
 
 def _blocks(prepared: Prepared, reuse: Reuse) -> int:
-    return len(light_blocks(applied(prepared, reuse), 0.0, ROOM))
+    return len(light_blocks(apply_reuse(prepared, reuse), 0.0, ROOM))

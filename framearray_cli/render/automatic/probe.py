@@ -66,16 +66,16 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
     """
     job, n_c = prepared.job, 1 if prepared.still else prepared.n_cameras
     cams = eye_cameras(prepared)
-    lights = some_lights(prepared.light_arrays, spread_in_shares(prepared.n_lights, PROBE_LIGHTS))
+    lights = some_lights(prepared.light_arrays, evenly_spaced(prepared.n_lights, PROBE_LIGHTS))
     order = pixel_order(cams.width, cams.height)
-    pixels = order[spread_in_shares(len(order), PROBE_HITS)]
+    pixels = order[evenly_spaced(len(order), PROBE_HITS)]
     n, samples = len(pixels), Samples(job.seed, pixels, per_pixel=1, first=0)
     world = World(prepared.surfaces, embree.tracer)
     hits, hit_rays = empty_hits(PROBE_HITS), room_for_hits(PROBE_HITS)
     test_rays = room_for_tests(PROBE_HITS, lights.n_lights)
     irradiance = with_room((PROBE_HITS, lights.channels, lights.n_lights), np.float32)
     frames, densities, diffuse, shadow = [], [], [], 0
-    for c in spread_in_shares(n_c, PROBE_FRAMES):
+    for c in evenly_spaced(n_c, PROBE_FRAMES):
         native_hits(cams, c, samples, 0, n, world, False, hit_rays.packets, hits)
         shadow += direct(hits, n, lights, embree.tracer, test_rays, irradiance)
         eyes = range(max(c - reach, 0), min(c + reach, n_c - 1) + 1)
@@ -95,7 +95,7 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
     )
 
 
-def spread_in_shares(n: int, most: int) -> list[int]:
+def evenly_spaced(n: int, most: int) -> list[int]:
     """At most so many of the numbers 0 to n - 1, evenly spread, each in the middle of its share."""
     count = min(n, most)
     return [(2 * i + 1) * n // (2 * count) for i in range(count)]

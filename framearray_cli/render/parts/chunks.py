@@ -16,7 +16,7 @@ from framearray_cli.job.job import Job
 from ..prepare import open_embree, prepare
 
 # Frames of a chunk for each frame of N_r unless somebody says: the halo of 2 N_r frames is a quarter of it then.
-FRAMES_A_REACH = 8
+FRAMES_PER_N_R = 8
 # Without reuse there is no halo; reading the scene and estimating the ambient light is what each chunk repeats.
 FEWEST = 16
 
@@ -34,7 +34,7 @@ class Chunks:
     more: float
 
 
-def cut(cameras: Sequence[int], size: int) -> list[tuple[int, ...]]:
+def split_cameras(cameras: Sequence[int], size: int) -> list[tuple[int, ...]]:
     """Cut cameras into as few chunks of at most `size` as there can be, of almost the same length.
 
     Lengths are those of the Open Job Description for contiguous chunks.
@@ -53,23 +53,23 @@ def cut(cameras: Sequence[int], size: int) -> list[tuple[int, ...]]:
 
 
 def default_size(n: int, n_r: int, workers: int = 1) -> int:
-    """Frames of a chunk unless somebody says: at most `FRAMES_A_REACH` N_r, and a whole number of chunks a worker.
+    """Frames of a chunk unless somebody says: at most `FRAMES_PER_N_R` N_r, and a whole number of chunks a worker.
 
     Args:
         n: frames that are wanted.
     """
-    most = max(FRAMES_A_REACH * n_r, FEWEST)
+    most = max(FRAMES_PER_N_R * n_r, FEWEST)
     return max(-(-n // (workers * -(-n // (workers * most)))), 1) if n else 1
 
 
-def in_chunks(cameras: Sequence[int], size: int, n_c: int, n_r: int, *, still: bool = False) -> Chunks:
+def plan_chunks(cameras: Sequence[int], size: int, n_c: int, n_r: int, *, still: bool = False) -> Chunks:
     """Cut cameras into chunks, and tell what that costs.
 
     Args:
         n_c: cameras of the whole path.
         still: whether the camera never moves, so that every chunk finds the one frame that there is.
     """
-    each = cut(cameras, size)
+    each = split_cameras(cameras, size)
     if still or not each:
         return Chunks(each=tuple(each), more=float(max(len(each) - 1, 0)))
     hits = frame_hits(n_c, n_r, 1.0)
@@ -81,7 +81,7 @@ def in_chunks(cameras: Sequence[int], size: int, n_c: int, n_r: int, *, still: b
     return Chunks(each=tuple(each), more=sum(map(found, each)) / found(cameras) - 1.0)
 
 
-def reach(job: Job) -> int:
+def resolve_n_r(job: Job) -> int:
     """N_r of a job whose scene is there; where it says "auto", what a render will choose.
 
     Raises:

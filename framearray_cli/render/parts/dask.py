@@ -30,7 +30,7 @@ def require_dask() -> Any:
 
 
 @contextmanager
-def connected(address: str) -> Iterator[Any]:
+def connect(address: str) -> Iterator[Any]:
     """A client of a scheduler.
 
     Raises:
@@ -39,7 +39,7 @@ def connected(address: str) -> Iterator[Any]:
     distributed = require_dask()
     found: SimpleQueue[Any] = SimpleQueue()
 
-    def connect() -> None:
+    def open_client() -> None:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
@@ -48,7 +48,7 @@ def connected(address: str) -> Iterator[Any]:
             found.put(error)
 
     # Dask's own limit of time does not hold where something else than a scheduler answers
-    threading.Thread(target=connect, name="connect", daemon=True).start()
+    threading.Thread(target=open_client, name="connect", daemon=True).start()
     try:
         client = found.get(timeout=PATIENCE + 1.0)
     except Empty:
@@ -65,7 +65,7 @@ def connected(address: str) -> Iterator[Any]:
 
 
 @contextmanager
-def local(workers: int) -> Iterator[Any]:
+def start_local(workers: int) -> Iterator[Any]:
     """A client of a scheduler of its own, with so many worker processes; a worker that dies is replaced."""
     distributed = require_dask()
     from .worker import IgnoreSignals

@@ -18,7 +18,7 @@ class PartEvents(RenderEvents):
     def awaiting_workers(self, address: str | None) -> None:
         """No worker has come yet to the scheduler at an address, or on this machine."""
 
-    def cut(self, workers: int, chunks: "Chunks") -> None:
+    def chunked(self, workers: int, chunks: "Chunks") -> None:
         """The camera path was cut, and that many workers begin."""
 
     def ambient_known(self, figures: AmbientFigures) -> None:

@@ -57,12 +57,12 @@ class ChunkQueue:
         self._waiting = list(reversed(chunks.each))
         self._at_work: dict[Any, tuple[int, ...]] = {}
         self._left = {chunk[0]: len(chunk) * self._n_lights for chunk in chunks.each}
-        self._something, self._lock = threading.Event(), threading.Lock()  # a chunk came back; of what is counted
+        self._came_back, self._lock = threading.Event(), threading.Lock()  # a chunk came back; of what is counted
         self._deaths: dict[int, tuple[int, int]] = {}  # by chunk: how many, and images left at the last
-        self._heard: set[str] = set()
+        self._received: set[str] = set()
         self.notes: tuple[str, ...] = ()
         self.peak_memory = self.images = 0
-        client.subscribe_topic(common["topic"], self._hear)
+        client.subscribe_topic(common["topic"], self._receive)
 
     def render_all(self) -> None:
         """Hand out chunks until all are rendered.
@@ -74,8 +74,8 @@ class ChunkQueue:
             for _ in range(max(count_workers(self._client), 1) - len(self._at_work)):
                 if self._waiting:
                     self._hand_out(self._waiting.pop())
-            self._something.wait(LOOK_EVERY)
-            self._something.clear()
+            self._came_back.wait(LOOK_EVERY)
+            self._came_back.clear()
             for future in [future for future in self._at_work if future.done()]:
                 self._take_back(future, self._at_work.pop(future))
 
@@ -84,7 +84,7 @@ class ChunkQueue:
 
         future = self._client.submit(render_chunk, self._common, chunk, pure=False)
         self._at_work[future] = chunk
-        future.add_done_callback(lambda _: self._something.set())
+        future.add_done_callback(lambda _: self._came_back.set())
 
     def _take_back(self, future: Any, chunk: tuple[int, ...]) -> None:
         """Look at what became of a chunk."""
@@ -95,7 +95,7 @@ class ChunkQueue:
         except CancelledError as error:
             raise WorkerError(LOST) from error
         except KilledWorker:
-            self._once_more(chunk)
+            self._retry(chunk)
             return
         except Exception as error:
             if not lacks_program(error):
@@ -104,11 +104,11 @@ class ChunkQueue:
             raise WorkerError(f"a worker that came later: lacks framearray {version}; install it there") from error
         if "error" in result:
             raise self._error(result)
-        self._hear_left(chunk[0], 0, last=True)
+        self._count_written(chunk[0], 0, last=True)
         self.notes = tuple(dict.fromkeys((*self.notes, *result["notes"])))
         self.peak_memory = max(self.peak_memory, result["peak_memory"])
 
-    def _once_more(self, chunk: tuple[int, ...]) -> None:
+    def _retry(self, chunk: tuple[int, ...]) -> None:
         """Hand out a chunk that several workers died on, if it got further meanwhile; else something is wrong with it.
 
         Raises:
@@ -140,11 +140,11 @@ class ChunkQueue:
             found.add_note(note)
         return found
 
-    def _hear(self, event: tuple[float, dict[str, Any]]) -> None:
+    def _receive(self, event: tuple[float, dict[str, Any]]) -> None:
         """Take a message of a worker; in a thread of Dask."""
         message = event[1]
         if "left" in message:
-            self._hear_left(message["chunk"], message["left"])
+            self._count_written(message["chunk"], message["left"])
         if self._first("ambient", message):
             figures = message["ambient"]
             self._events.ambient_known(AmbientFigures(**figures | {"notes": tuple(figures["notes"])}))
@@ -156,12 +156,12 @@ class ChunkQueue:
 
     def _first(self, kind: str, message: dict[str, Any]) -> bool:
         """Whether this is the first message of a kind, which all workers send and one is reported of."""
-        if kind not in message or kind in self._heard:
+        if kind not in message or kind in self._received:
             return False
-        self._heard.add(kind)
+        self._received.add(kind)
         return True
 
-    def _hear_left(self, chunk: int, left: int, *, last: bool = False) -> None:
+    def _count_written(self, chunk: int, left: int, *, last: bool = False) -> None:
         """Count what a chunk has written; messages that come after its end do not count."""
         with self._lock:
             if chunk not in self._left:
@@ -180,7 +180,7 @@ class ChunkQueue:
         end = time.monotonic() + STOPPING
         with suppress(OutputError):
             while time.monotonic() < end:
-                with self._folder.alone():
-                    if not self._folder.others():
+                with self._folder.exclusive():
+                    if not self._folder.other_locks():
                         return
                 time.sleep(0.1)

@@ -23,10 +23,10 @@ from framearray_cli.job.read import job_table
 from ..automatic.choose import require_least_memory
 from ..messages import workers_text
 from ..prepare import Prepared
-from ..session import RenderSession, nothing_to_do, open_session
+from ..session import RenderSession, complete_manifest, open_session
 from ..summary import Summary, summarize, with_summary
-from .chunks import Chunks, default_size, in_chunks
-from .dask import connected, local, require_dask
+from .chunks import Chunks, default_size, plan_chunks
+from .dask import connect, require_dask, start_local
 from .progress import PartEvents
 from .queue import LOOK_EVERY, ChunkQueue, count_workers, lacks_program
 
@@ -70,19 +70,19 @@ def render_in_parts(
     started = time.perf_counter()
     require_dask()
     with ExitStack() as stack:
-        client = stack.enter_context(connected(options.address)) if options.address else None
+        client = stack.enter_context(connect(options.address)) if options.address else None
         with open_session(job, events, restart=restart, cameras=cameras) as session:
             if not session.wanted:
-                return nothing_to_do(session, time.perf_counter() - started)
+                return complete_manifest(session, time.perf_counter() - started)
             memory = None if options.address else _memory(session.prepared, options.workers)
         if client is None:
             events.starting_workers()
-            client = stack.enter_context(local(options.workers))
-        n_workers = _some_workers(client, options, events)
-        common = stack.enter_context(_common(job, session, options, memory))
-        _require_fit(client, common)
-        chunks = _cut(session, options, n_workers)
-        events.cut(n_workers, chunks)
+            client = stack.enter_context(start_local(options.workers))
+        n_workers = _await_workers(client, options, events)
+        common = stack.enter_context(_share(job, session, options, memory))
+        _require_fit_workers(client, common)
+        chunks = _split(session, options, n_workers)
+        events.chunked(n_workers, chunks)
         queue = ChunkQueue(client, common, chunks, session, events)
         try:
             queue.render_all()
@@ -100,11 +100,11 @@ def render_in_parts(
     return summary
 
 
-def _cut(session: RenderSession, options: WorkerOptions, n_workers: int) -> Chunks:
+def _split(session: RenderSession, options: WorkerOptions, n_workers: int) -> Chunks:
     prepared, n = session.prepared, len(session.wanted)
     n_r = 0 if prepared.still else prepared.job.n_r
     size = options.chunk or (n if prepared.still else default_size(n, n_r, n_workers))
-    return in_chunks(session.wanted, size, prepared.n_cameras, n_r, still=prepared.still)
+    return plan_chunks(session.wanted, size, prepared.n_cameras, n_r, still=prepared.still)
 
 
 def _memory(prepared: Prepared, workers: int) -> int:
@@ -124,7 +124,7 @@ def _memory(prepared: Prepared, workers: int) -> int:
     return each
 
 
-def _some_workers(client: Any, options: WorkerOptions, events: PartEvents) -> int:
+def _await_workers(client: Any, options: WorkerOptions, events: PartEvents) -> int:
     """How many workers there are, once there is one."""
     if not count_workers(client):
         events.awaiting_workers(options.address)
@@ -134,7 +134,7 @@ def _some_workers(client: Any, options: WorkerOptions, events: PartEvents) -> in
 
 
 @contextmanager
-def _common(job: Job, session: RenderSession, options: WorkerOptions, memory: int | None) -> Iterator[dict[str, Any]]:
+def _share(job: Job, session: RenderSession, options: WorkerOptions, memory: int | None) -> Iterator[dict[str, Any]]:
     """What all chunks share; a file in the output folder, there meanwhile, shows workers that it is this one."""
     from .worker import Common
 
@@ -158,8 +158,8 @@ def _common(job: Job, session: RenderSession, options: WorkerOptions, memory: in
         topic=f"framearray-{token}",
     )
     try:
-        with session.folder.alone():
-            if not session.folder.others():  # nobody works here, so what a killed program left may go
+        with session.folder.exclusive():
+            if not session.folder.other_locks():  # nobody works here, so what a killed program left may go
                 for old in probe.parent.glob(f"{PROBE}*"):
                     old.unlink()
         probe.touch()
@@ -172,15 +172,15 @@ def _common(job: Job, session: RenderSession, options: WorkerOptions, memory: in
             probe.unlink()
 
 
-def _require_fit(client: Any, common: dict[str, Any]) -> None:
+def _require_fit_workers(client: Any, common: dict[str, Any]) -> None:
     """Look whether all workers can render the job.
 
     Raises:
         WorkerError: one cannot.
     """
-    from .worker import unfit
+    from .worker import worker_problem
 
-    for address, found in client.run(unfit, common, on_error="return").items():
+    for address, found in client.run(worker_problem, common, on_error="return").items():
         if isinstance(found, BaseException) and lacks_program(found):
             found = f"worker {address}: lacks framearray {common['version']}; install it there"
         elif isinstance(found, BaseException):
@@ -205,6 +205,6 @@ def _summarize(session: RenderSession, queue: ChunkQueue, seconds: float) -> Sum
 def _write_manifest(session: RenderSession, summary: Summary) -> None:
     """Write the manifest of the whole over those of the chunks."""
     folder = session.prepared.job.output.directory
-    with session.folder.alone():
+    with session.folder.exclusive():
         manifest = replace(read_manifest(folder), job=session.identity.job)
         write_manifest(folder, with_summary(manifest, summary))

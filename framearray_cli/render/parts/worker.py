@@ -32,7 +32,7 @@ from ..target.pilot import Target
 # Seconds between two looks whether the chunk is still wanted, and between two messages on how far it is.
 LOOK_EVERY, SEND_EVERY = 0.2, 0.5
 # Seconds that a chunk waits for one that still runs in this process before it is given to another worker.
-TURN = 1.0
+RETRY_AFTER = 1.0
 # Seconds that a chunk waits for cameras which a run that is about to end still holds.
 PATIENCE = 60.0
 
@@ -71,7 +71,7 @@ class Common:
         return changed(found, render=changed(found.render, **machine))
 
 
-def unfit(common: dict[str, Any]) -> str:
+def worker_problem(common: dict[str, Any]) -> str:
     """Why a worker cannot render chunks of a job; "" if it can."""
     here = f"worker {socket.gethostname()}"
     if common["version"] != __version__:
@@ -101,15 +101,15 @@ def render_chunk(common: dict[str, Any], cameras: tuple[int, ...]) -> dict[str, 
         "error": name of its class, "problems" and "notes", or "summary": what `render` gave, a plain table.
     """
     worker = get_worker()
-    if not _one_at_a_time.acquire(timeout=TURN):
+    if not _one_at_a_time.acquire(timeout=RETRY_AFTER):
         raise Reschedule
     try:
-        if problem := unfit(common):
+        if problem := worker_problem(common):
             return {"error": "WorkerError", "problems": [problem], "notes": []}
         reporter = _Reporter(worker, Common(**common), cameras)
-        with reporter.watching(), compile_clock(lambda: reporter.send(compiling=True)):
+        with reporter.watch_task(), compile_clock(lambda: reporter.send(compiling=True)):
             job = reporter.common.job(worker.state.nthreads)
-            summary = _patiently(lambda: render(job, reporter, cameras=cameras))
+            summary = _retry_while_busy(lambda: render(job, reporter, cameras=cameras))
         return {"notes": list(reporter.notes), "peak_memory": summary.peak_memory}
     except FrameArrayError as error:
         problems = list(error.problems) if isinstance(error, JobError) else [str(error)]
@@ -123,7 +123,7 @@ def render_chunk(common: dict[str, Any], cameras: tuple[int, ...]) -> dict[str, 
         _one_at_a_time.release()
 
 
-def _patiently(run: Callable[[], Summary]) -> Summary:
+def _retry_while_busy(run: Callable[[], Summary]) -> Summary:
     """Wait for cameras that are held: by a run that was stopped, or a worker that lost its scheduler."""
     end = time.monotonic() + PATIENCE
     while True:
@@ -132,7 +132,7 @@ def _patiently(run: Callable[[], Summary]) -> Summary:
         except BusyError:
             if time.monotonic() > end:
                 raise
-            time.sleep(TURN)
+            time.sleep(RETRY_AFTER)
 
 
 class _Unwanted(BaseException):
@@ -154,7 +154,7 @@ class _Reporter(RenderEvents):
         self._worker.log_event(self.common.topic, {"chunk": self._first, **message})
 
     @contextmanager
-    def watching(self) -> Iterator[None]:
+    def watch_task(self) -> Iterator[None]:
         """Look from time to time whether the chunk is still wanted."""
         done = threading.Event()
 
@@ -173,28 +173,28 @@ class _Reporter(RenderEvents):
             done.set()
             thread.join()
 
-    def _go_on(self) -> None:
+    def _raise_if_unwanted(self) -> None:
         if self._unwanted:
             raise _Unwanted
 
     def prepared(self, prepared: Prepared) -> None:
-        self._go_on()
+        self._raise_if_unwanted()
 
     def scanned(self, on_disk: OnDisk, wanted: int) -> None:
         self._left = wanted
         self.send(left=wanted)
 
     def planned(self, ambient: Ambient) -> None:
-        self._go_on()
+        self._raise_if_unwanted()
         self.notes = ambient.notes
         self.send(ambient=asdict(ambient_figures(ambient)))
 
     def allotted(self, target: Target) -> None:
-        self._go_on()
+        self._raise_if_unwanted()
         self.send(target=asdict(target))
 
     def written(self, images: int) -> None:
-        self._go_on()
+        self._raise_if_unwanted()
         with self._lock:
             self._left -= images
             now = time.monotonic()

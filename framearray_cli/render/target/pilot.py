@@ -20,7 +20,7 @@ from framearray_cli.engine.hits.outer import outer_hits
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 
-from ..automatic.probe import MOST_DENSE, spread_in_shares
+from ..automatic.probe import MOST_DENSE, evenly_spaced
 from ..prepare import Prepared
 from .allot import FEWEST, Witnesses, allot
 
@@ -80,7 +80,7 @@ def allot_hits(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> tuple
     most = float(prepared.job.samples.most_hits * (2 * prepared.job.n_r + 1 if prepared.still else 1))
     with TracePool(setup, prepared.threads) as pool:
         pilot = _Pilot(setup, ambient, blocks_of(setup.cams.width, setup.cams.height))
-        found = pool.run(pilot.look, range(setup.n_frames))
+        found = pool.run(pilot.measure, range(setup.n_frames))
         rays = pool.rays().total()
     radiance = float(np.mean([frame.radiance for frame in found]))
     wanted = (error * radiance) ** 2
@@ -107,7 +107,7 @@ def allot_hits(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> tuple
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Found:
+class _FrameNoise:
     """What a pilot tells of a frame.
 
     Attributes:
@@ -128,9 +128,9 @@ class _Pilot:
         self.setup = replace(setup, seed=setup.seed + PILOT_SEED)
         self.ambient = ambient
         self.blocks = blocks
-        self._judges = frozenset(spread_in_shares(setup.n_frames, JUDGED))
+        self._judges = frozenset(evenly_spaced(setup.n_frames, JUDGED))
 
-    def look(self, c: int, scratch: Scratch) -> _Found:
+    def measure(self, c: int, scratch: Scratch) -> _FrameNoise:
         """What the pilot finds in frame c."""
         eyes = self.setup.frames_around(c, self.setup.n_r)
         random = np.random.default_rng((self.setup.seed, c)).random((2, self.blocks.n, 2))
@@ -140,12 +140,12 @@ class _Pilot:
         block, density = np.empty((2, n, len(eyes)), np.int32), np.empty((2, n, len(eyes)))
         for first in range(0, n, batch):
             span = slice(first, min(first + batch, n))
-            pair = of_samples(span.stop - span.start)
+            pair = hit_pairs(span.stop - span.start)
             radiance = self._radiance(c, pixels[span], scratch)[pair]
             mean += float(radiance.sum(dtype=np.float64)) / (2 * n * radiance[0, 0].size)
             # two values of one hit each tell its variance
             variance[span] = np.square(radiance[0] - radiance[1], dtype=np.float64).mean(axis=(1, 2)) / 2
-            seen, arriving = self._seen(c, eyes, 2 * len(pair[0]), scratch)
+            seen, arriving = self._views(c, eyes, 2 * len(pair[0]), scratch)
             block[:, span], density[:, span] = seen[pair], arriving[pair]
         # a hit in every frame of the window is shared by so many
         shared = (1.0 / density.sum(axis=-1)).mean(axis=0)
@@ -160,7 +160,7 @@ class _Pilot:
                 block=block.reshape(views).swapaxes(0, 1),
                 density=density.reshape(views).swapaxes(0, 1),
             )
-        return _Found(radiance=mean, u=(variance * shared).reshape(by_half), witnesses=witnesses)
+        return _FrameNoise(radiance=mean, u=(variance * shared).reshape(by_half), witnesses=witnesses)
 
     def _radiance(self, c: int, pixels: Int32, scratch: Scratch) -> Float32:
         """What images of two hits of each of some pixels would show, (hits, n_lights, 3); the hits are in `scratch`."""
@@ -172,7 +172,7 @@ class _Pilot:
         estimate_terms(setup, scratch.hits, n, scratch, records, "pilot", "pilot")
         return _radiance(setup, self.ambient, records)
 
-    def _seen(self, c: int, eyes: range, n: int, scratch: Scratch) -> tuple[Int32, Float64]:
+    def _views(self, c: int, eyes: range, n: int, scratch: Scratch) -> tuple[Int32, Float64]:
         """The block that each eye sees each hit in, and its hits there for one of eye c, (n, n_eyes)."""
         setup, own = self.setup, c - eyes.start
         if setup.n_r == 0:
@@ -189,7 +189,7 @@ class _Pilot:
         return self.blocks.of_pixel[pixel[:, :n]].T, np.minimum(ratio, MOST_DENSE).T
 
 
-def of_samples(n: int) -> Int32:
+def hit_pairs(n: int) -> Int32:
     """Where `native_hits` puts the two hits of each of n pixels, (2, n): by groups of 16 pixels, then by sample."""
     pixel = np.arange(n)
     group, members = pixel // LANES * LANES, np.minimum(n - pixel // LANES * LANES, LANES)

@@ -33,7 +33,7 @@ def job(folder: Path, memory: Any = None, **samples: Any) -> Any:
 @pytest.fixture(autouse=True)
 def _program_of_no_size(monkeypatch: pytest.MonkeyPatch) -> None:
     """Limits of this file are some kilobytes; the program itself is not counted here."""
-    monkeypatch.setattr("framearray_cli.render.memory.taken_memory", lambda: 0)
+    monkeypatch.setattr("framearray_cli.render.memory.program_memory", lambda: 0)
 
 
 @pytest.mark.parametrize("samples", [{}, {"shadow_step": 3}, {"shadow_step": 3, "shadow_unbiased": True}])
@@ -77,8 +77,8 @@ def test_mirrors_are_seen_before_the_first_frame(tmp_path: Path) -> None:
 def test_the_limit_is_that_of_the_whole_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What the program holds already is not there for frames."""
     inputs = tiny.prepared(job(tmp_path, window_memory(tiny.prepared(job(tmp_path)), 6) + 1000))
-    monkeypatch.setattr("framearray_cli.render.memory.taken_memory", lambda: 1000)
+    monkeypatch.setattr("framearray_cli.render.memory.program_memory", lambda: 1000)
     assert [len(block) for block in light_blocks(inputs, 0.0)] == [4, 3]
-    monkeypatch.setattr("framearray_cli.render.memory.taken_memory", lambda: 2**40)
+    monkeypatch.setattr("framearray_cli.render.memory.program_memory", lambda: 2**40)
     with pytest.raises(JobError, match=r"needs at least 1024\.0 GiB"):
         require_memory(inputs)

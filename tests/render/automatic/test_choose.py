@@ -10,16 +10,16 @@ from framearray_cli.job.read import job_table
 from framearray_cli.render.automatic.choose import (
     DEFAULT,
     HITS,
-    applied,
+    accuracy_test,
+    apply_reuse,
     auto_keys,
+    candidates,
     choose,
-    exact_enough,
     resolve_auto,
-    to_try,
     wanted_variance,
 )
 from framearray_cli.render.automatic.cost import Model, Reuse
-from framearray_cli.render.automatic.probe import Acceptance, probe, spread_in_shares
+from framearray_cli.render.automatic.probe import Acceptance, evenly_spaced, probe
 from framearray_cli.render.identity import job_fingerprint
 from framearray_cli.render.prepare import open_embree
 
@@ -62,26 +62,26 @@ def cheapest(enough: Callable[[Reuse], bool], of: Model, n_r: list[int], hits: l
 @pytest.mark.parametrize("changes", [{}, {"balance": False}, {"n_lights": 1}, {"obscurance": 50}, {"shadow_step": 8}])
 def test_the_choice_is_the_cheapest_of_all(path: str, changes: dict[str, object]) -> None:
     found, job = model(PATHS[path], **changes), tiny.job(**AUTO)
-    chosen = choose(found, exact_enough(found, job), to_try(job, PATHS[path].n_frames))
+    chosen = choose(found, accuracy_test(found, job), candidates(job, PATHS[path].n_frames))
     longest = min(16, PATHS[path].n_frames - 1)
-    assert chosen == cheapest(exact_enough(found, job), found, list(range(longest + 1)), list(HITS))
+    assert chosen == cheapest(accuracy_test(found, job), found, list(range(longest + 1)), list(HITS))
 
 
 @pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize("n_r", [0, 3, 9])
 def test_with_a_given_window_there_are_just_enough_hits(path: str, n_r: int) -> None:
     found, job = model(PATHS[path]), tiny.job(reuse={"n_r": n_r}, samples={"hits": "auto"})
-    chosen = choose(found, exact_enough(found, job), to_try(job, 200))
+    chosen = choose(found, accuracy_test(found, job), candidates(job, 200))
     fewer = HITS[HITS.index(chosen.hits) - 1]
     assert chosen.n_r == n_r
-    enough = exact_enough(found, job)
+    enough = accuracy_test(found, job)
     assert enough(chosen) and not enough(Reuse(n_r=n_r, hits=fewer))
 
 
 def test_with_given_hits_the_window_is_just_long_enough() -> None:
     job = tiny.job(reuse={"n_r": "auto"}, samples={"hits": 4})
     found = model(SLOW)
-    chosen = choose(found, exact_enough(found, job), to_try(job, 200))
+    chosen = choose(found, accuracy_test(found, job), candidates(job, 200))
     assert (chosen.n_r, chosen.hits) == (3, 4)
     assert found.variance(Reuse(n_r=2, hits=4)) > wanted_variance(job) == pytest.approx(1 / (0.9 * 7 * 4**1.3))
 
@@ -89,7 +89,7 @@ def test_with_given_hits_the_window_is_just_long_enough() -> None:
 def test_the_faster_the_camera_the_shorter_the_window() -> None:
     job = tiny.job(**AUTO)
     chosen = [
-        choose(model(PATHS[name]), exact_enough(model(PATHS[name]), job), to_try(job, 200))
+        choose(model(PATHS[name]), accuracy_test(model(PATHS[name]), job), candidates(job, 200))
         for name in ("slow", "fast", "cut")
     ]
     windows = [one.n_r for one in chosen]
@@ -101,38 +101,40 @@ def test_where_nothing_reaches_the_error_the_window_ends_where_hits_are_lost() -
     """More frames bring rays and no hits; fewer leave out hits that are nearly free."""
     job = tiny.job(reuse={"n_r": "auto"}, samples={"hits": 2})
     for found, n_r in ((CUT, 0), (made_up(lambda k: float(k <= 2)), 2)):
-        assert choose(model(found), exact_enough(model(found), job), to_try(job, 200)).n_r == n_r
+        assert choose(model(found), accuracy_test(model(found), job), candidates(job, 200)).n_r == n_r
 
 
 def test_an_average_of_all_hits_has_no_longer_window_than_the_default() -> None:
     job = tiny.job(**(AUTO | {"reuse": {"n_r": "auto", "weights": "average"}}))
-    assert [row[0].n_r for row in to_try(job, 200)] == [0, 1, 2, 3]
+    assert [row[0].n_r for row in candidates(job, 200)] == [0, 1, 2, 3]
 
 
 def test_no_window_is_longer_than_the_path() -> None:
-    assert [row[0].n_r for row in to_try(tiny.job(**AUTO), 3)] == [0, 1, 2]
+    assert [row[0].n_r for row in candidates(tiny.job(**AUTO), 3)] == [0, 1, 2]
 
 
 def test_places_that_were_just_revealed_are_no_worse_than_by_default() -> None:
     """In 3 of 100 pixels nobody but the eye itself sees anything: few frames of many hits serve them better."""
     job, found = tiny.job(**AUTO), model(made_up(lambda k: 1.0 if k == 0 else 0.97))
-    chosen = choose(found, exact_enough(found, job), to_try(job, 200))
+    chosen = choose(found, accuracy_test(found, job), candidates(job, 200))
     assert found.least(chosen) >= found.least(DEFAULT) == 2
-    alone = choose(found, lambda reuse: found.variance(reuse) <= wanted_variance(job), to_try(job, 200))
+    alone = choose(found, lambda reuse: found.variance(reuse) <= wanted_variance(job), candidates(job, 200))
     assert found.least(alone) < 2 and found.time(alone) < found.time(chosen)
 
 
 def test_blocks_of_lights_make_long_windows_dear() -> None:
     """Settings that need much memory find their hits once for each block."""
     job, found = tiny.job(**AUTO), model(SLOW)
-    free = choose(found, exact_enough(found, job), to_try(job, 200))
-    tight = choose(found, exact_enough(found, job), to_try(job, 200), lambda reuse: 1 if reuse.n_r < free.n_r else 8)
+    free = choose(found, accuracy_test(found, job), candidates(job, 200))
+    tight = choose(
+        found, accuracy_test(found, job), candidates(job, 200), lambda reuse: 1 if reuse.n_r < free.n_r else 8
+    )
     assert tight.n_r < free.n_r
 
 
 def test_a_still_camera_has_as_many_hits_as_by_default() -> None:
     job = tiny.job(**AUTO)
-    chosen = choose(model(STILL), exact_enough(model(STILL), job), to_try(job, 1))
+    chosen = choose(model(STILL), accuracy_test(model(STILL), job), candidates(job, 1))
     assert (chosen.n_r, chosen.hits) == (0, 14)
 
 
@@ -163,11 +165,7 @@ def test_path_ends_count_as_they_are_rendered() -> None:
 
 
 def test_spread_numbers_lie_in_the_middle() -> None:
-    assert (
-        spread_in_shares(5, 16) == [0, 1, 2, 3, 4]
-        and spread_in_shares(12, 3) == [2, 6, 10]
-        and spread_in_shares(1, 8) == [0]
-    )
+    assert evenly_spaced(5, 16) == [0, 1, 2, 3, 4] and evenly_spaced(12, 3) == [2, 6, 10] and evenly_spaced(1, 8) == [0]
 
 
 def test_expected_hits_are_those_of_a_render() -> None:
@@ -202,7 +200,7 @@ def test_what_is_chosen_is_a_job_of_numbers() -> None:
     table = job_table(first.job)
     assert (table["reuse"]["n_r"], table["samples"]["hits"]) == (why.reuse.n_r, why.reuse.hits)
     assert job_fingerprint(first) == job_fingerprint(again)
-    assert job_fingerprint(first) == job_fingerprint(applied(inputs, why.reuse))
+    assert job_fingerprint(first) == job_fingerprint(apply_reuse(inputs, why.reuse))
     assert type(first.job).model_validate(table) == first.job
 
 

@@ -7,13 +7,13 @@ import pytest
 
 from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.render.messages import chunks_line
-from framearray_cli.render.parts.chunks import cut, default_size, in_chunks
+from framearray_cli.render.parts.chunks import default_size, plan_chunks, split_cameras
 
 
 @pytest.mark.parametrize(("n", "size"), [(1, 1), (5, 9), (24, 24), (25, 24), (96, 24), (100, 24), (101, 7), (8, 1)])
 def test_chunks_are_few_and_alike(n, size):
     cameras = tuple(range(3, 3 + n))
-    chunks = cut(cameras, size)
+    chunks = split_cameras(cameras, size)
     assert sum(chunks, ()) == cameras
     lengths = [len(chunk) for chunk in chunks]
     assert len(chunks) == -(-n // size)
@@ -24,17 +24,17 @@ def test_chunks_are_few_and_alike(n, size):
 def test_a_farm_cuts_in_the_same_places(n, size):
     """The extension TASK_CHUNKING, as openjd-model reads it."""
     model = pytest.importorskip("openjd.model._step_param_space_iter")
-    chunks = [f"{chunk[0]}-{chunk[-1]}" for chunk in cut(range(n), size)]
+    chunks = [f"{chunk[0]}-{chunk[-1]}" for chunk in split_cameras(range(n), size)]
     assert chunks == model.divide_int_list_into_contiguous_chunks(size, list(range(n)))
 
 
 def test_nothing_is_cut_into_nothing():
-    assert cut((), 4) == []
+    assert split_cameras((), 4) == []
     assert default_size(0, 3) == 1
 
 
 def test_cameras_with_gaps_are_cut_too():
-    assert cut((0, 3, 6, 9, 12), 2) == [(0, 3), (6, 9), (12,)]
+    assert split_cameras((0, 3, 6, 9, 12), 2) == [(0, 3), (6, 9), (12,)]
 
 
 @pytest.mark.parametrize("n_r", [0, 1, 3, 9])
@@ -42,7 +42,7 @@ def test_cameras_with_gaps_are_cut_too():
 def test_the_cost_is_that_of_the_frames_that_are_found(n_r, size):
     n = 60
     hits = frame_hits(n, n_r, 1.0)
-    chunks = in_chunks(range(n), size, n, n_r)
+    chunks = plan_chunks(range(n), size, n, n_r)
     found = 0.0
     for chunk in chunks.each:
         found += sum(hits[c] for c in range(n) if any(abs(c - j) <= n_r for j in chunk))
@@ -51,19 +51,19 @@ def test_the_cost_is_that_of_the_frames_that_are_found(n_r, size):
 
 
 def test_halos_of_long_chunks_cost_about_2_n_r_over_their_length():
-    chunks = in_chunks(range(2400), 24, 2400, 3)
+    chunks = plan_chunks(range(2400), 24, 2400, 3)
     assert chunks.more == pytest.approx(6 / 24, rel=0.02)
     assert chunks_line(chunks) == "100 chunks of 24 frames; halos add 25% to the hits"
 
 
 def test_what_is_told():
-    assert chunks_line(in_chunks(range(5), 9, 5, 2)) == "1 chunk of 5 frames"
-    assert chunks_line(in_chunks(range(1), 9, 1, 0)) == "1 chunk of 1 frame"
-    assert chunks_line(in_chunks(range(5), 2, 5, 0)) == "3 chunks of 1 to 2 frames; halos add 0% to the hits"
+    assert chunks_line(plan_chunks(range(5), 9, 5, 2)) == "1 chunk of 5 frames"
+    assert chunks_line(plan_chunks(range(1), 9, 1, 0)) == "1 chunk of 1 frame"
+    assert chunks_line(plan_chunks(range(5), 2, 5, 0)) == "3 chunks of 1 to 2 frames; halos add 0% to the hits"
 
 
 def test_a_camera_that_stands_still_has_one_frame_to_find():
-    assert in_chunks(range(8), 2, 8, 3, still=True).more == 3.0
+    assert plan_chunks(range(8), 2, 8, 3, still=True).more == 3.0
 
 
 @pytest.mark.parametrize("workers", [1, 2, 3, 7])
@@ -71,7 +71,7 @@ def test_a_camera_that_stands_still_has_one_frame_to_find():
 def test_by_default_all_workers_have_work_to_the_end(workers, n, n_r):
     size = default_size(n, n_r, workers)
     assert 1 <= size <= max(8 * n_r, 16)
-    count = len(cut(range(n), size))
+    count = len(split_cameras(range(n), size))
     rounds = -(-count // workers)
     assert count > (rounds - 1) * workers
     assert size * rounds * workers >= n

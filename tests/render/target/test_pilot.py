@@ -22,7 +22,7 @@ from framearray_cli.engine.inputs.cameras import OUTSIDE
 from framearray_cli.job.job import Job
 from framearray_cli.render.memory import require_memory
 from framearray_cli.render.messages import target_lines
-from framearray_cli.render.target.pilot import allot_hits, of_samples
+from framearray_cli.render.target.pilot import allot_hits, hit_pairs
 
 
 def job(**changes: Any) -> Job:
@@ -32,7 +32,7 @@ def job(**changes: Any) -> Job:
     return Job.model_validate(table)
 
 
-def aimed_work(inputs: Any) -> Any:
+def allotted_setup(inputs: Any) -> Any:
     with tiny.open_embree(inputs) as embree:
         setup, ambient = tiny.plan_work(inputs, embree)
         return allot_hits(inputs, setup, ambient)
@@ -80,22 +80,22 @@ def test_pairs_are_two_hits_of_one_pixel(n: int) -> None:
         pixels, hits = setup.order[:n], empty_hits(2 * n)
         samples = Samples(3, pixels, per_pixel=2, first=0, halves=True)
         native_hits(setup.cams, 0, samples, 0, 2 * n, setup.world, True, room_for_hits(2 * n).packets, hits)
-    pair = of_samples(n)
+    pair = hit_pairs(n)
     assert sorted(pair.ravel()) == list(range(2 * n))
     np.testing.assert_array_equal(hits.pixel[pair], [pixels, pixels])
     np.testing.assert_array_equal(hits.half[pair], [[0] * n, [1] * n])  # even and odd: independent of each other
 
 
 def test_noisier_places_get_more_hits() -> None:
-    setup, target = aimed_work(tiny.prepared(job(samples={"error": 0.2})))
+    setup, target = allotted_setup(tiny.prepared(job(samples={"error": 0.2})))
     assert setup.allotment.hits.std() > 0.1 * target.hits
-    tighter, other = aimed_work(tiny.prepared(job(samples={"error": 0.1})))
+    tighter, other = allotted_setup(tiny.prepared(job(samples={"error": 0.1})))
     assert 2 < other.hits / target.hits < 5  # half the error takes 2^(2 / 1.3) = 2.9 times the hits
     assert (tighter.per_pixel > setup.per_pixel).all()
 
 
 def test_the_cap_binds_and_is_told() -> None:
-    _, target = aimed_work(tiny.prepared(job(samples={"error": 1e-4, "most_hits": 3})))
+    _, target = allotted_setup(tiny.prepared(job(samples={"error": 1e-4, "most_hits": 3})))
     assert target.capped > 0.9 and target.expected > target.error
     assert "samples.most_hits" in target_lines(target)[1]
     assert target.frames[1] <= 3
@@ -103,7 +103,7 @@ def test_the_cap_binds_and_is_told() -> None:
 
 def test_a_dark_array_takes_the_fewest_hits_and_renders() -> None:
     dark = {"sources": [{"type": "point", "keys": [{"frame": 0, "position": [0, 2, 0], "intensity": 0}]}]}
-    setup, target = aimed_work(tiny.prepared(job(light=dark, scene={"background": 0}, samples={"error": 0.05})))
+    setup, target = allotted_setup(tiny.prepared(job(light=dark, scene={"background": 0}, samples={"error": 0.05})))
     assert target.expected == 0 and target.radiance == 0 and setup.allotment.hits.max() < 1
 
 
@@ -168,7 +168,7 @@ def test_hits_that_do_not_fit_into_memory_are_refused() -> None:
 
 def test_a_camera_at_rest_gets_the_hits_of_its_whole_window(tmp_path: Path) -> None:
     walking = {"frames": 5, "keys": [{"frame": 0, "eye": [0, 1.2, 1.6], "target": [0, 1, 0]}]}
-    setup, target = aimed_work(tiny.prepared(job(camera=walking, samples={"error": 1e-3, "most_hits": 2})))
+    setup, target = allotted_setup(tiny.prepared(job(camera=walking, samples={"error": 1e-3, "most_hits": 2})))
     assert setup.n_frames == 1 and setup.n_r == 0
     assert isinstance(setup.allotment, Allotment) and setup.allotment.hits.max() == 10
     assert target.capped > 0

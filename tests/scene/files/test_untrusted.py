@@ -10,8 +10,9 @@ from support import movies
 from framearray_cli.array.images.check import check_image
 from framearray_cli.array.images.exr import last_row
 from framearray_cli.array.images.images import read_image
+from framearray_cli.array.integrity import find_damage
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.array.record import Entry, RecordedRun, RecordWriter, damaged, read_records, record_file, sealed
+from framearray_cli.array.record import Entry, RecordedRun, RecordWriter, read_records, record_file, seal
 from framearray_cli.base.errors import OutputError
 from framearray_cli.engine.images.standard_error import standard_error
 
@@ -20,11 +21,11 @@ GOOD = {"c": 0, "lights": [0, 2], "files": {"a.exr": [4, "0"]}, "hits": 1.0, "ra
 
 
 def write(folder: Path, *lines: dict) -> None:
-    """A record of one session with lines that are sealed as those of the program are."""
+    """A record of one session with lines sealed as the program seals them."""
     file = record_file(folder, "0-1")
     file.parent.mkdir(exist_ok=True)
     head = {"fingerprint": PRINT, "cameras": "0-1", "processor": "p"}
-    file.write_bytes(b"\n".join(map(sealed, (head, *lines))) + b"\n")
+    file.write_bytes(b"\n".join(map(seal, (head, *lines))) + b"\n")
 
 
 def test_a_good_line_counts(tmp_path: Path) -> None:
@@ -104,7 +105,7 @@ def test_what_has_no_end_is_not_read(tmp_path: Path, kind: str) -> None:
         with pytest.raises(OutputError, match=r"a\.\w+: (expected a file|no such file)"):
             check_image(path, (4, 4))
         assert name[-3:] in ("png", "jpg") or last_row(path) is None
-        assert list(damaged(tmp_path, {name: (0, "0")}, [name])) == [(name, "is no file")]
+        assert list(find_damage(tmp_path, {name: (0, "0")}, [name])) == [(name, "is no file")]
 
 
 def test_a_whole_array_is_read(tmp_path: Path) -> None:

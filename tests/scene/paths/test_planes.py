@@ -12,7 +12,7 @@ from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.render.identity import identity_of
 from framearray_cli.render.manifest import describe
 from framearray_cli.render.names import array_names
-from framearray_cli.render.prepare import composed_with
+from framearray_cli.render.prepare import image_ambient
 from framearray_cli.render.writer import array_target
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.scene.paths.planes import Plane, first_with_background, pictures, planes_of_groups
@@ -70,9 +70,9 @@ def test_ambient_light_multiplies_the_plane_of_its_own_and_no_other() -> None:
         rays=1,
         notes=(),
     )
-    given = composed_with(estimate, found).intensity
+    given = image_ambient(estimate, found).intensity
     assert given[:, 0].tolist() == [0, 0, 0, 0, 1, 0]
-    assert composed_with(estimate, lights(tiny.job())) is estimate
+    assert image_ambient(estimate, lights(tiny.job())) is estimate
 
 
 @pytest.mark.parametrize(
