@@ -1,4 +1,4 @@
-"""`manifest.toml`, for programs and people: short keys first, then the job, then one block per camera and per light."""
+"""`manifest.toml`: short keys first, as people read it too, then the job, then one block per camera and per light."""
 
 import os
 import tomllib

@@ -1,4 +1,4 @@
-"""What decides every byte of a frame array's files, as hashes and as a table."""
+"""Identity of a frame array: all that determines the bytes of its files, as hashes and as a table."""
 
 import json
 
@@ -13,7 +13,7 @@ from .prepare import Prepared
 
 
 def identity_of(prepared: Prepared) -> Identity:
-    """What decides every byte of the files of a job."""
+    """Return the identity of the array that a job renders."""
     job, scene = prepared.job, scene_fingerprint(prepared)
     return Identity(
         name=job.name,
@@ -24,16 +24,16 @@ def identity_of(prepared: Prepared) -> Identity:
 
 
 def scene_fingerprint(prepared: Prepared) -> str:
-    """Hash the scene as it was read: its triangles, materials and textures; where the file lies plays no part."""
+    """Hash the scene as it was read: its triangles, materials and textures; its path is ignored."""
     arrays = (np.ascontiguousarray(array).reshape(-1).view(np.uint8).data for array in prepared.surfaces)
     return fingerprint(prepared.scene.centre.tobytes(), *arrays)
 
 
 def job_fingerprint(prepared: Prepared, scene: str | None = None) -> str:
-    """Hash whatever the pixels depend on: the job without its output and machine, and the scene as it was read.
+    """Hash all that pixels depend on: the job without `output` and `render`, and the scene as it was read.
 
     Args:
-        scene: its fingerprint, where it is known.
+        scene: fingerprint of the scene, if known.
     """
     table = {key: value for key, value in job_table(prepared.job).items() if key not in ("output", "render")}
     for where in ("file", "folders"):

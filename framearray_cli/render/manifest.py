@@ -1,4 +1,4 @@
-"""What a manifest says of a render: everything that a program needs which has never seen this one."""
+"""Build the manifest of a render, with everything that other programs need."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -31,11 +31,7 @@ _KEYS = {"point": ("position", "intensity"), "directional": ("direction", "irrad
 def initial_manifest(
     prepared: Prepared, ambient: Ambient, identity: Identity, settings: AutoSettings | None, target: Target | None
 ) -> Manifest:
-    """The manifest of a render that has not begun.
-
-    Args:
-        ambient: the estimate.
-    """
+    """Return the manifest of a render that has not begun."""
     job, report = prepared.job, prepared.scene.report
     files = array_names(job, prepared.n_cameras, prepared.lights)
     summary: dict[str, Any] = {"finished": False, "images": 0, "ambient_paths": ambient.paths}
@@ -69,12 +65,12 @@ def initial_manifest(
 
 
 def _images(prepared: Prepared, ambient: Ambient, files: ArrayNames) -> dict[str, Any]:
-    """What the images are, and the light of each."""
+    """Return the file patterns of the images, and their lights."""
     lights = prepared.lights
     i_a = ambient.intensity.astype(np.float64)
     if not lights.groups:
         return {"images": files.pattern(""), "lights": _lights(range(lights.n), lights.sources, i_a, ambient)}
-    dark = i_a[lights.planes.index(Plane.INDIRECT)]  # no source shines there: what the background adds
+    dark = i_a[lights.planes.index(Plane.INDIRECT)]  # no source shines there: the background only
     groups = tuple(
         ManifestGroup(
             name=group.name,
@@ -95,7 +91,7 @@ def _images(prepared: Prepared, ambient: Ambient, files: ArrayNames) -> dict[str
 def _lights(
     positions: range, sources: Sequence[LightPath], i_a: Float64, ambient: Ambient
 ) -> tuple[ManifestLight, ...]:
-    """Sources and I_A, (n_lights, 3), of some light indices."""
+    """Return sources and I_A, (n_lights, 3), at some light positions."""
     return tuple(
         ManifestLight(
             ambient=tuple(i_a[l].tolist()),

@@ -1,4 +1,4 @@
-"""How much memory a job will need."""
+"""Memory that a job needs, and its blocks of light positions."""
 
 import numpy as np
 
@@ -17,22 +17,22 @@ from framearray_cli.engine.terms.ambient.estimate import BATCH
 from .prepare import Prepared
 from .writer import BLOCKS, image_format
 
-# Share of the free memory that frames under way may take unless the job says; the rest is for scene, files and others.
+# Share of the free memory for frames in progress unless the job sets a limit; the rest is for scene, files and others.
 FREE_SHARE = 2 / 3
-# What is not there yet when a job is planned: compiled kernels, and the arrays of each thread; found at 1920 x 1080.
+# Memory still to be allocated when a job is planned: kernels, and the arrays of each thread; measured at 1920 x 1080.
 GROWTH = 256 * 2**20
-# Mirrors are looked for in this many frames of the path, this many rays at a time.
+# Number of frames searched for mirrors, and rays per batch.
 PILOT_FRAMES, PILOT_BATCH = 8, 2048
 LAYER_CHANNELS = 14
 
 
 def program_memory() -> int:
-    """Bytes that the program will hold beside frames: what it holds now, and what it still loads and keeps."""
+    """Return the bytes that the program needs besides frames: those it holds now, and those it will still load."""
     return resident_memory() + GROWTH
 
 
 def memory_limit(prepared: Prepared) -> int:
-    """Bytes that frames under way may take: what the limit leaves beside the rest, or a share of what is free."""
+    """Return the bytes that frames in progress may take: the rest of the job's limit, or a share of the free memory."""
     if prepared.job.render.memory:
         return prepared.job.render.memory - program_memory()
     free = free_memory()
@@ -40,18 +40,18 @@ def memory_limit(prepared: Prepared) -> int:
 
 
 def require_memory(prepared: Prepared, per_pixel: Float64 | None = None) -> None:
-    """Refuse a job that does not fit into memory even light by light; the system would end it without a word.
+    """Refuse a job that does not fit into memory even light by light; the system would kill it without a message.
 
     Args:
         per_pixel: see `window_memory`.
 
     Raises:
-        JobError: it does not.
+        JobError: it does not fit.
     """
     needed, limit = window_memory(prepared, 1, per_pixel=per_pixel), memory_limit(prepared)
     if prepared.job.render.memory is None:
         needed, limit = max(needed, ambient_memory(prepared)) + GROWTH, free_memory()
-    else:  # told as the job's limit is: of the whole program
+    else:  # report memory of the whole program, as the job's limit is given
         needed, limit = needed + program_memory(), prepared.job.render.memory
     if needed > limit:
         less = "a smaller camera.resolution, reuse.n_r or samples.hits takes less"
@@ -62,20 +62,20 @@ def require_memory(prepared: Prepared, per_pixel: Float64 | None = None) -> None
 
 
 def ambient_memory(prepared: Prepared) -> int:
-    """Bytes that batches of walks take: what each gathers of every light, in float32 and twice in float64."""
+    """Return the bytes of all batches of walks: radiance per walk and light, in float32 and twice in float64."""
     return prepared.threads * BATCH * prepared.n_lights * 3 * (4 + 8 + 8)
 
 
 def window_memory(
     prepared: Prepared, n_lights: int, mirror_share: float = 0.0, per_pixel: Float64 | None = None
 ) -> int:
-    """Bytes that the window of frames and the images under way take for some of the lights.
+    """Return the bytes of the window of frames and of the images in progress, for some of the lights.
 
-    A hit takes its irradiance under every light, a row, and its place and weight in every frame that uses it.
+    A hit takes its irradiance under every light, one row, and its place and weight in every frame that uses it.
 
     Args:
-        mirror_share: of the pixels that see a mirror; their hits are held until their frame is composed.
-        per_pixel: (n_frames,) mean native hits a pixel of every frame; None: what `samples.hits` says.
+        mirror_share: share of pixels that see a mirror; their hits are held until their frame is composed.
+        per_pixel: (n_frames,) mean native hits per pixel of every frame; None: as `samples.hits` says.
     """
     job = prepared.job
     n_frames, n_r = (1, 0) if prepared.still else (prepared.n_cameras, job.n_r)
@@ -88,9 +88,9 @@ def window_memory(
     per_hit = per_record + 16 * job.output.layers + frames * (8 if balance else 4)
     # a frame's mirror hits wait for N_r frames; twice while the lists of all batches are joined, and chains add some
     mirrored = mirror_share * job.specular.hits * (n_r + 3) * per_record
-    # of the frame that is being found: the pixel of each hit in every frame around, before hits are sorted by it
+    # of the frame being traced: the pixel of each hit in every frame of the window, before hits are sorted by it
     finding = float(per_pixel.max()) * frames * 4
-    layers = 2 * LAYER_CHANNELS * 4 * job.output.layers  # as they are summed, and as they are written
+    layers = 2 * LAYER_CHANNELS * 4 * job.output.layers  # while summed, and while written
     differences = (BLOCKS + 1) * 12 * n_lights * job.samples.halves
     per_image_pixel = (
         finding
@@ -105,12 +105,12 @@ def window_memory(
 def light_blocks(
     prepared: Prepared, mirror_share: float, limit: int | None = None, per_pixel: Float64 | None = None
 ) -> list[range]:
-    """Cut the light positions into as few blocks, of about one size, as the memory limit allows.
+    """Split the light positions into as few blocks of about equal size as the memory limit allows.
 
-    Every block goes along the whole camera path and finds its hits again: they depend on no light.
+    Every block renders the whole camera path and finds its hits again.
 
     Args:
-        limit: bytes; None: what the job says, or the machine has free.
+        limit: bytes; None: `memory_limit`.
         per_pixel: see `window_memory`.
     """
     n, limit = prepared.n_lights, memory_limit(prepared) if limit is None else limit
@@ -122,7 +122,7 @@ def light_blocks(
 
 
 def mirror_share(setup: FrameSetup) -> float:
-    """The largest share of pixels that see a mirror, over some frames of the path; from one ray a pixel."""
+    """Return the largest share of pixels that see a mirror, over some frames of the path; traces one ray per pixel."""
     if not setup.depth:
         return 0.0
     rays, hits, most = room_for_hits(PILOT_BATCH), empty_hits(PILOT_BATCH), 0

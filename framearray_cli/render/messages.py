@@ -1,4 +1,4 @@
-"""What commands print of what they found."""
+"""Lines that commands print about a render."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from .target.pilot import Target
 
 
-MOST_DAMAGED = 5  # files that are told by name
+MOST_DAMAGED = 5  # files listed by name
 
 
 def estimate_lines(estimate: "Estimate") -> list[str]:
-    """What a job holds, and what it will take."""
+    """Describe a job and its expected cost."""
     prepared = estimate.prepared
     n_c, n_l, job = prepared.n_cameras, prepared.n_lights, prepared.job
     width, height = job.camera.resolution
@@ -42,7 +42,7 @@ def estimate_lines(estimate: "Estimate") -> list[str]:
 
 
 def _light_count(prepared: "Prepared") -> str:
-    """What is stored for each camera."""
+    """Return the number of images per camera."""
     lights = prepared.lights
     if not lights.groups:
         return f"{lights.n:,} lights"
@@ -55,14 +55,14 @@ def _blocks(n: int) -> str:
 
 
 def scene_lines(prepared: "Prepared") -> list[str]:
-    """What a scene holds, and what was left out of it."""
+    """Describe the contents of a scene, and what was left out of it."""
     from framearray_cli.scene.scene import scene_report_lines
 
     return scene_report_lines(prepared.scene.report, prepared.job.scene.file)
 
 
 def ambient_lines(figures: "AmbientFigures") -> list[str]:
-    """The ambient light, and how well it is known."""
+    """Describe the ambient light and its error."""
     error = figures.error
     known = f"standard error at most {error:.1%}, {figures.paths:,} paths" if error > 0 else "fixed, or nothing arrives"
     return [
@@ -72,13 +72,13 @@ def ambient_lines(figures: "AmbientFigures") -> list[str]:
 
 
 def settings_lines(settings: "AutoSettings") -> list[str]:
-    """The settings that were chosen, and what is expected of them."""
+    """Describe the chosen settings and their expected results."""
     from .automatic.choose import DEFAULT
 
-    said = {"reuse.n_r": f"n_r = {settings.reuse.n_r}", "samples.hits": f"hits = {settings.reuse.hits:g}"}
+    texts = {"reuse.n_r": f"n_r = {settings.reuse.n_r}", "samples.hits": f"hits = {settings.reuse.hits:g}"}
     default = f"n_r = {DEFAULT.n_r}, hits = {DEFAULT.hits:g}"
     lines = [
-        f"automatic: {', '.join(said[key] for key in settings.keys)}; expected: {settings.hits[0]:.1f} hits a pixel "
+        f"automatic: {', '.join(texts[key] for key in settings.keys)}; expected: {settings.hits[0]:.1f} hits per pixel "
         f"(1st percentile {settings.hits[1]:.1f}), {settings.error:.2f} times the error that is wanted, "
         f"{settings.time:.2f} times the time of {default}"
     ]
@@ -86,15 +86,15 @@ def settings_lines(settings: "AutoSettings") -> list[str]:
         lines.append("  note: no window reaches the error that is wanted; this one makes the most of its time")
     if settings.seen:
         shares = ", ".join(f"{share:.0%} ({k})" for k, share in settings.seen.items())
-        lines.append(f"  hits that are seen so many frames away: {shares}")
+        lines.append(f"  hits that are seen that many frames away: {shares}")
     return lines
 
 
 def target_lines(target: "Target") -> list[str]:
-    """The error that the job wants, and the hits that it takes."""
+    """Describe the wanted error and the hits allotted for it."""
     least, most = target.frames
     lines = [
-        f"error: {target.error:.3g} of the mean radiance is wanted; {target.hits:.1f} native hits a pixel "
+        f"error: {target.error:.3g} of the mean radiance is wanted; {target.hits:.1f} native hits per pixel "
         f"({least:.1f} to {most:.1f} by frame) are expected to give {target.expected:.3g}"
     ]
     if target.expected > 1.05 * target.error:
@@ -105,43 +105,43 @@ def target_lines(target: "Target") -> list[str]:
     return lines
 
 
-def summary_lines(summary: "Summary", told: Sequence[str], job: "Job") -> list[str]:
-    """What a render took.
+def summary_lines(summary: "Summary", printed: Sequence[str], job: "Job") -> list[str]:
+    """Describe the cost and result of a render.
 
     Args:
-        told: notes that were printed before.
+        printed: notes that were printed before.
     """
     there = f"{summary.there:,} of {summary.total:,} images"
     return [
         *(_cost_lines(summary) if summary.images else []),
         *_error_lines(summary),
-        *(f"note: {note}" for note in summary.notes if note not in told),
+        *(f"note: {note}" for note in summary.notes if note not in printed),
         *([f"{there} are there; the rest is left to other runs"] if summary.there < summary.total else []),
         f"images and manifest: {job.output.directory}",
     ]
 
 
 def _cost_lines(summary: "Summary") -> list[str]:
-    """What this run took."""
+    """Describe the cost of this run."""
     kinds = summary.rays_per_pixel_image
     mirrors = sum(n for kind, n in kinds.items() if "mirror" in kind or kind == "pilot")
     rays = sum(kinds.values()) - mirrors - kinds["ambient"]
     rate = sum(summary.rays.values()) / summary.seconds / 1e6
     beside = f" + {mirrors:.2f} for mirrors" if mirrors else ""
-    each = f"{1e3 * summary.seconds / summary.images:.1f} ms an image"
+    each = f"{1e3 * summary.seconds / summary.images:.1f} ms per image"
     return [
         f"{summary.images:,} images in {duration(summary.seconds)}: {each}, "
-        f"{summary.images / summary.seconds:.1f} images a second",
-        f"{rays:.2f} rays a pixel an image{beside}, {rate:.1f} Mrays/s, "
-        f"{summary.hits:.1f} hits a pixel, peak memory {size(summary.peak_memory)}",
+        f"{summary.images / summary.seconds:.1f} images per second",
+        f"{rays:.2f} rays per pixel per image{beside}, {rate:.1f} Mrays/s, "
+        f"{summary.hits:.1f} hits per pixel, peak memory {size(summary.peak_memory)}",
     ]
 
 
 def on_disk_lines(on_disk: "OnDisk", wanted: int) -> list[str]:
-    """What of an array is there already."""
+    """Describe the files of an array that are on disk already."""
     lines = [f"damaged: {name}: {problem}" for name, problem in on_disk.damaged[:MOST_DAMAGED]]
     if len(on_disk.damaged) > MOST_DAMAGED:
-        lines.append(f"damaged: {len(on_disk.damaged) - MOST_DAMAGED:,} files more")
+        lines.append(f"damaged: {len(on_disk.damaged) - MOST_DAMAGED:,} more files")
     if on_disk.images:
         left = f"{wanted:,} are left" if wanted else "nothing is left to do"
         lines.append(f"{on_disk.images:,} images are there and whole; {left}")
@@ -149,7 +149,7 @@ def on_disk_lines(on_disk: "OnDisk", wanted: int) -> list[str]:
 
 
 def chunks_line(chunks: "Chunks") -> str:
-    """How the camera path was cut: "4 chunks of 24 frames; halos add 19 % to the hits"."""
+    """Describe the chunks of the camera path: "4 chunks of 24 frames; halos add 19% to the hits"."""
     n, sizes = len(chunks.each), sorted({len(chunk) for chunk in chunks.each})
     frames = f"{' to '.join(map(str, sizes))} frame{'s' if sizes[-1] > 1 else ''}"
     if n == 1:
@@ -158,12 +158,12 @@ def chunks_line(chunks: "Chunks") -> str:
 
 
 def workers_text(n: int) -> str:
-    """A number of workers."""
+    """Return "1 worker" or "4 workers"."""
     return f"{n:,} worker{'s' if n > 1 else ''}"
 
 
 def _error_lines(summary: "Summary") -> list[str]:
-    """How noisy the images are, where the job asks."""
+    """Describe the noise of the images, if the job asks for it."""
     found = summary.standard_error
     if not found:
         return []

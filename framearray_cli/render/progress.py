@@ -1,4 +1,4 @@
-"""What a render reports while it runs."""
+"""Events of a render, for progress displays."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -13,25 +13,25 @@ if TYPE_CHECKING:
 
 
 class RenderEvents:
-    """The events of a render, in their order; override those that you want. Calls may come from any thread."""
+    """The events of a render, in order; override those of interest. Calls may come from any thread."""
 
     def prepared(self, prepared: "Prepared") -> None:
         """Inputs were read."""
 
     def removed(self, files: int) -> None:
-        """That many files of the array that lay in the folder were removed."""
+        """The array in the folder was removed, with that many files."""
 
     def resolved(self, settings: "AutoSettings") -> None:
-        """What the job leaves open was chosen."""
+        """Settings were chosen where the job says "auto"."""
 
     def scanning(self, files: int) -> None:
-        """That many files of the array are there; they will be compared with their checksums."""
+        """That many files on disk are about to be compared with their checksums."""
 
     def scanned(self, on_disk: "OnDisk", wanted: int) -> None:
-        """What of the array is there already, and the number of images that will be rendered."""
+        """The files on disk were compared; `wanted` images are to be rendered."""
 
     def planned(self, ambient: "Ambient") -> None:
-        """The ambient light is known."""
+        """The ambient light was estimated."""
 
     def allotted(self, target: "Target") -> None:
         """Native hits were allotted for the error that the job wants."""
@@ -42,13 +42,13 @@ class RenderEvents:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AmbientFigures:
-    """The ambient light in few numbers.
+    """The ambient light in a few figures.
 
     Attributes:
-        lowest, highest: mean of I_A over the channels, at the light positions where it is least and most; radiance.
-        error: largest standard error of a light position, relative.
+        lowest, highest: mean of I_A over the channels, radiance, at the darkest and brightest light position.
+        error: largest relative standard error of a light position.
         paths: walks or particles per light position.
-        notes: what the user should know.
+        notes: messages for the user.
     """
 
     lowest: float
@@ -59,7 +59,7 @@ class AmbientFigures:
 
 
 def ambient_figures(ambient: "Ambient") -> AmbientFigures:
-    """Sum an estimate up for a report."""
+    """Summarize an estimate for display."""
     mean = ambient.intensity.mean(axis=1)
     return AmbientFigures(
         lowest=float(mean.min()),

@@ -1,4 +1,4 @@
-"""A session of a render: inputs read, the output folder claimed, and known what is there and what is left to do."""
+"""Open a render session: read the inputs, claim the output folder, and find what is left to do."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -24,13 +24,13 @@ from .summary import Summary, summarize, with_summary
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RenderSession:
-    """A render that knows what it has to do.
+    """A render whose inputs, folder and remaining work are known.
 
     Attributes:
-        settings: that were chosen where the job leaves them open; `prepared` has numbers for them.
-        run: what the record will say of this run.
-        folder: the output folder; `on_disk`: what is there.
-        chosen: cameras that were asked for; `wanted`: those of them of which something is missing.
+        settings: chosen where the job says "auto"; `prepared` has the numbers. None: no "auto".
+        run: entry of this run in the record.
+        folder: the output folder; `on_disk`: its whole files.
+        chosen: cameras that were asked for; `wanted`: those that lack an image.
     """
 
     prepared: Prepared
@@ -48,7 +48,7 @@ class RenderSession:
 def open_session(
     job: Job, events: RenderEvents, engine: Engine = "auto", *, restart: bool, cameras: Sequence[int] | None
 ) -> Iterator[RenderSession]:
-    """Read what a job names, claim its folder, keep other runs off its cameras, and scan what is there; see `render`.
+    """Read the inputs of a job, claim its folder, lock its cameras, and scan the files on disk; see `render`.
 
     Raises:
         JobError, SceneError, OutputError: as `render`.
@@ -81,7 +81,7 @@ def open_session(
 
 
 def complete_manifest(session: RenderSession, seconds: float) -> Summary:
-    """All that is wanted is on disk; complete the manifest where it does not say so yet."""
+    """Summarize a render that has nothing left to do; complete the manifest if it does not say so yet."""
     prepared, directory = session.prepared, session.prepared.job.output.directory
     with session.folder.exclusive():
         manifest = read_manifest(directory)

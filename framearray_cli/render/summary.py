@@ -1,4 +1,4 @@
-"""How a render went, of this run and of all runs that worked on the array: for the user, and for the manifest."""
+"""Summary of a render: images, time, rays and notes of this run and of all runs, for the user and the manifest."""
 
 import math
 from collections import Counter
@@ -17,17 +17,17 @@ from .prepare import Prepared
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Summary:
-    """How a render went.
+    """Images, cost and notes of a render.
 
     Attributes:
-        images: that this run wrote; `there`: all that are on disk; `total`: of the array.
+        images: number written by this run; `there`: on disk; `total`: of the array.
         seconds: of this run so far; `stages`: processor seconds by kind of work.
-        rays: number by kind, of this run.
-        pixels: of one image.
-        hits: mean accepted hits a pixel of a frame, native and outer.
+        rays: number traced by this run, by kind.
+        pixels: number per image.
+        hits: mean accepted hits per pixel and frame, native and outer.
         peak_memory: bytes.
-        notes: what the user should know.
-        standard_error: see `standarderror.summed_up`; empty unless the job asks for it.
+        notes: messages for the user.
+        standard_error: table for the manifest; empty unless the job asks for it.
         all_rays, all_seconds: of all runs.
     """
 
@@ -47,7 +47,7 @@ class Summary:
 
     @property
     def rays_per_pixel_image(self) -> dict[str, float]:
-        """Rays a pixel an image, by kind, of this run."""
+        """Rays per pixel per image of this run, by kind."""
         return {kind: n / (self.pixels * max(self.images, 1)) for kind, n in self.rays.items()}
 
 
@@ -61,12 +61,12 @@ def summarize(
     stages: dict[str, float],
     notes: tuple[str, ...],
 ) -> Summary:
-    """Put a run together with what all runs left in the folder.
+    """Combine this run with the records of all runs.
 
     Args:
         records: of what is on disk.
         images, seconds, rays, stages: of this run.
-        notes: of what was planned.
+        notes: of the ambient light.
     """
     by_camera: dict[int, float] = {}
     errors: dict[tuple[int, int], tuple[float, float]] = {}
@@ -96,7 +96,7 @@ def summarize(
 
 
 def _processor_notes(records: ArrayRecords) -> list[str]:
-    """Say it where processors of several kinds worked on an array: their kernels round differently."""
+    """Return a note if processors of several kinds worked on an array, as their kernels round differently."""
     kinds = sorted({run.processor for run in records.runs} | {processor()})
     if len(kinds) < 2:
         return []
@@ -104,7 +104,7 @@ def _processor_notes(records: ArrayRecords) -> list[str]:
 
 
 def _standard_error(lights: Lights, errors: dict[tuple[int, int], tuple[float, float]]) -> dict[str, Any]:
-    """What the manifest says of the errors; with groups, of those of their own light."""
+    """Return the manifest's table of standard errors; with groups, of planes lit by sources only."""
     lit = {p for p, plane in enumerate(lights.planes) if plane.lit}
     found: dict[str, Any] = summed_up({(c, p): error for (c, p), error in errors.items() if p in lit})
     for group in lights.groups:
@@ -114,7 +114,7 @@ def _standard_error(lights: Lights, errors: dict[tuple[int, int], tuple[float, f
 
 
 def with_summary(manifest: Manifest, summary: Summary) -> Manifest:
-    """The manifest of what is on disk after a run."""
+    """Return the manifest with the summary of what is on disk after a run."""
     per_image = summary.pixels * max(summary.there, 1)
     table = {
         "finished": summary.there == summary.total,

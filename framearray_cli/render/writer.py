@@ -1,4 +1,4 @@
-"""Writes finished frames while the next ones are traced."""
+"""Write finished frames while the next ones are traced."""
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -31,7 +31,7 @@ BLOCKS = 2
 
 
 def image_format(job: Job) -> ImageFormat:
-    """How the job wants its images stored."""
+    """Return the image format of a job."""
     out = job.output
     return ImageFormat(
         format=out.format, compression=out.compression, half=out.half, quality=out.quality, exposure=out.exposure
@@ -40,11 +40,11 @@ def image_format(job: Job) -> ImageFormat:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ArrayTarget:
-    """Where the images of an array go, and what their files say beside pixels.
+    """Destination of an array's images, and the metadata of their files.
 
     Attributes:
-        directory: that they are written into.
-        names: of images and layers.
+        directory: output folder.
+        names: file names of images and layers.
         resolution: width, height, pixels.
     """
 
@@ -56,7 +56,7 @@ class ArrayTarget:
     fps: float
 
     def attributes(self, c: int, l: int | None = None, group: str = "") -> Attributes:
-        """What the file of camera c says, at light position l of a group if it belongs to one."""
+        """Return the metadata of a file of camera c, at light position l of a group if it belongs to one."""
         return frame_attributes(
             world_from_camera=self.eyes.world_from_camera[c],
             fov_deg=self.eyes.fov_deg,
@@ -69,7 +69,7 @@ class ArrayTarget:
 
 
 def array_target(prepared: Prepared) -> ArrayTarget:
-    """Where the images of a job go."""
+    """Return the target of a job's images."""
     job = prepared.job
     return ArrayTarget(
         directory=job.output.directory,
@@ -83,12 +83,12 @@ def array_target(prepared: Prepared) -> ArrayTarget:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FinishedFiles:
-    """The files of a camera at some image planes, which are all on disk.
+    """The files of a camera at some image planes, all on disk.
 
     Attributes:
         composed: the frame; its images may be overwritten by now.
         files: name -> size and checksum of every file, layers included.
-        errors: plane -> mean square of the standard error, and mean radiance, of images that tell theirs.
+        errors: plane -> (mean square of the standard error, mean radiance), of images that estimate theirs.
     """
 
     composed: Composed
@@ -99,21 +99,21 @@ class FinishedFiles:
 
 
 class _Countdown:
-    """Does something when the last of n things is done, in the thread of that one."""
+    """Calls a function when the last of n tasks is done, in the thread of that task."""
 
-    def __init__(self, n: int, last: Callable[[], None]) -> None:
-        self._left, self._last, self._lock = n, last, threading.Lock()
+    def __init__(self, n: int, call: Callable[[], None]) -> None:
+        self._left, self._call, self._lock = n, call, threading.Lock()
 
-    def one_less(self) -> None:
+    def count_down(self) -> None:
         with self._lock:
             self._left -= 1
             done = self._left == 0
         if done:
-            self._last()
+            self._call()
 
 
 class ArrayWriter:
-    """A few threads that write images; hands out blocks of memory for frames and takes them back when written.
+    """Threads that write images; lends blocks of memory for frames and reclaims them when written.
 
     An error in a thread stops the render at the next frame.
     """
@@ -144,7 +144,7 @@ class ArrayWriter:
             self._free.put(np.empty(shape, np.float16) if halves else np.empty(shape, np.float32))
 
     def block(self) -> Images:
-        """A block to compose a frame into, (n_planes, height, width, 3); waits until one is free.
+        """Return a block to compose a frame into, (n_planes, height, width, 3); waits until one is free.
 
         Raises:
             OutputError: an earlier frame could not be written.
@@ -158,7 +158,7 @@ class ArrayWriter:
         """Write a composed frame as that of each of the given cameras.
 
         Args:
-            block: what is free when that is done; the frame's own images if None.
+            block: to reclaim afterwards; the frame's own images if None.
         """
         block = composed.images if block is None else block
         unfinished = _Countdown(len(cameras), lambda: self._free.put(block))
@@ -166,18 +166,18 @@ class ArrayWriter:
             self._write_camera(composed, c, unfinished)
 
     def _write_camera(self, composed: Composed, c: int, unfinished: "_Countdown") -> None:
-        """Write all files of a camera, then report that they are there."""
+        """Write all files of a camera, then report them as finished."""
         errors: dict[int, tuple[float, float]] = {}
         tasks: list[Callable[[], Path]] = [partial(self._write_image, composed, c, p, errors) for p in self._planes]
         if composed.layers is not None:
             tasks.append(partial(self._write_layers, composed.layers, c))
         files: dict[str, tuple[int, str]] = {}
 
-        def whole() -> None:
+        def finish() -> None:
             self._finished(FinishedFiles(composed=composed, c=c, planes=self._planes, files=files, errors=errors))
-            unfinished.one_less()
+            unfinished.count_down()
 
-        left = _Countdown(len(tasks), whole)
+        left = _Countdown(len(tasks), finish)
 
         def run(task: Callable[[], Path]) -> None:
             path = task()
@@ -185,7 +185,7 @@ class ArrayWriter:
                 files[path.name] = digest(path)
             except OSError as error:
                 raise OutputError(f"{path}: cannot be read back: {reason(error)}") from error
-            left.one_less()
+            left.count_down()
 
         for future in [self._pool.submit(run, task) for task in tasks]:
             future.add_done_callback(self._pass_error)
@@ -226,7 +226,7 @@ class ArrayWriter:
         return path
 
     def finish(self) -> None:
-        """Wait until everything is written; all blocks are free again.
+        """Wait until all is written and all blocks are free.
 
         Raises:
             OutputError: something could not be written.

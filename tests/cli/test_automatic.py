@@ -9,9 +9,9 @@ from support import tiny
 from support.program import run, write_job
 
 BOTH = {"camera": tiny.WALK, "reuse": {"n_r": "auto"}, "samples": {"hits": "auto"}}
-LINE = r"^automatic: n_r = (\d+), hits = ([\d.]+); expected: [\d.]+ hits a pixel \(1st percentile [\d.]+\), "
+LINE = r"^automatic: n_r = (\d+), hits = ([\d.]+); expected: [\d.]+ hits per pixel \(1st percentile [\d.]+\), "
 LINE += r"[\d.]+ times the error that is wanted, [\d.]+ times the time of n_r = 3, hits = 2$"
-SEEN = r"^  hits that are seen so many frames away: \d+% \(1\), \d+% \(2\), \d+% \(4\)$"
+SEEN = r"^  hits that are seen that many frames away: \d+% \(1\), \d+% \(2\), \d+% \(4\)$"
 
 
 def manifest(folder: Path) -> dict:

@@ -26,8 +26,10 @@ def test_a_render_says_what_it_did(tmp_path, capsys):
     lines = [line for line in told.out.splitlines() if not line.startswith("compiling")]
     assert re.fullmatch(r".*tiny\.glb: \d+ triangles, \d+ materials, 1 textures", lines[0])
     assert re.fullmatch(r"ambient light: I_A [\d.]+ to [\d.]+ \(standard error at most .*\)", lines[1])
-    assert re.fullmatch(r"3 images in .*: .* ms an image, .* images a second", lines[2])
-    assert re.search(r"rays a pixel an image \+ .* for mirrors, .* Mrays/s, .* hits a pixel, peak memory", lines[3])
+    assert re.fullmatch(r"3 images in .*: .* ms per image, .* images per second", lines[2])
+    assert re.search(
+        r"rays per pixel per image \+ .* for mirrors, .* Mrays/s, .* hits per pixel, peak memory", lines[3]
+    )
     assert lines[-1] == f"images and manifest: {tmp_path / 'out'}"
     assert names(tmp_path / "out") == FILES
     assert tomllib.loads((tmp_path / "out" / "manifest.toml").read_text())["summary"]["finished"] is True

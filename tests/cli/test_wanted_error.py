@@ -9,7 +9,7 @@ import tomli_w
 from support import tiny
 from support.program import run, write_job
 
-LINE = r"^error: 0\.2 of the mean radiance is wanted; ([\d.]+) native hits a pixel \(([\d.]+) to ([\d.]+) by frame\) "
+LINE = r"^error: 0\.2 of the mean radiance is wanted; ([\d.]+) native hits per pixel \(([\d.]+) to ([\d.]+) by frame\) "
 LINE += r"are expected to give ([\d.]+)$"
 
 

@@ -84,7 +84,7 @@ def test_lines_of_the_ambient_light() -> None:
 def test_lines_of_a_target_that_is_not_reached() -> None:
     first, note = target_lines(TARGET)
     assert first == (
-        "error: 0.1 of the mean radiance is wanted; 3.0 native hits a pixel (1.5 to 4.5 by frame) "
+        "error: 0.1 of the mean radiance is wanted; 3.0 native hits per pixel (1.5 to 4.5 by frame) "
         "are expected to give 0.2"
     )
     assert "25.0% of all places" in note

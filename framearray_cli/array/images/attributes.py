@@ -36,7 +36,7 @@ def exr_camera_from_world(world_from_camera: Float64) -> Float64:
 
 
 def exr_ndc_from_world(world_from_camera: Float64, fov_deg: float, width: int, height: int) -> Float64:
-    """Return OpenEXR's worldToNDC: after division by w, (0, 0) is the image's upper left corner, (1, 1) the lower right.
+    """Return OpenEXR's worldToNDC: after division by w, (0, 0) is the upper left corner, (1, 1) the lower right.
 
     z / w is 1 - 1 / distance along the view: the standard leaves z open, and this keeps the matrix invertible.
 

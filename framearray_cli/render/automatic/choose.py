@@ -1,7 +1,7 @@
-"""`reuse.n_r = "auto"` and `samples.hits = "auto"`: the settings that take the least time for an error that is wanted.
+"""`reuse.n_r = "auto"` and `samples.hits = "auto"`: the settings that reach a wanted error in the least time.
 
-The error that is wanted is that which the default, n_r = 3 and hits = 2, has on an ordinary walk; where the job says
-`samples.hits`, that which n_r = 3 has with so many.
+The wanted error is that of the default, n_r = 3 and hits = 2, on an ordinary walk; where the job gives `samples.hits`,
+that of n_r = 3 with these hits.
 """
 
 from collections.abc import Callable, Iterator
@@ -20,31 +20,31 @@ from ..prepare import Prepared
 from .cost import Model, Reuse, independent_hits
 from .probe import probe
 
-# Longest windows that are tried. With `average` old views of a place bring an error that no number of hits removes.
+# Longest windows tried. With `average`, distant views of a place bring an error that no number of hits removes.
 LONGEST = {"balance": 16, "average": DEFAULT_N_R}
-# Numbers of hits that are tried, rising.
+# Numbers of hits tried, in rising order.
 HITS = (*sorted(SHARES), *map(float, range(1, 17)))
-# What does not fit into so many bytes is thought to be rendered in blocks of light positions, whatever a machine has.
+# Memory in bytes assumed for choosing, on any machine; what exceeds it counts as rendered in blocks of light positions.
 ROOM = 4 * 2**30
-# Of the hits of the default window, how many count on an ordinary walk: 0.91 to 0.93 in the three jobs of the paper.
+# Share of the hits of the default window that count on an ordinary walk: 0.91 to 0.93 in the three jobs of the paper.
 ORDINARY = 0.9
 DEFAULT = Reuse(n_r=DEFAULT_N_R, hits=float(DEFAULT_HITS))
-# Numbers of frames that the share of hits seen is told for.
+# Frame distances for which the share of hits seen is reported.
 SEEN_AT = (1, 2, 4, 8, 16)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AutoSettings:
-    """What was chosen where the job says "auto", and why.
+    """The settings chosen where the job says "auto", and the reasons.
 
     Attributes:
-        reuse: the settings; those that the job says itself are among them.
+        reuse: the settings, including those that the job gives.
         keys: of the job file that say "auto".
-        enough: whether it is as exact as wanted; else nothing that was tried is.
-        error: expected, over that which is wanted.
-        time: expected, over that of the default.
-        hits: expected hits of a pixel, native and outer: mean and 1st percentile.
-        seen: share of hits that eyes some frames away see, by that number of frames.
+        enough: whether the settings reach the wanted error; if not, no candidate does.
+        error: expected error over the wanted one.
+        time: expected time over that of the default.
+        hits: expected hits per pixel, native and outer: mean and 1st percentile.
+        seen: share of hits that eyes k frames away see, by k.
     """
 
     reuse: Reuse
@@ -56,7 +56,7 @@ class AutoSettings:
     seen: dict[int, float]
 
     def table(self) -> dict[str, object]:
-        """For the manifest."""
+        """Return the table for the manifest."""
         return {
             "keys": list(self.keys),
             "n_r": self.reuse.n_r,
@@ -71,10 +71,10 @@ class AutoSettings:
 
 
 def resolve_auto(prepared: Prepared, embree: EmbreeScene) -> tuple[Prepared, AutoSettings | None]:
-    """The same job with a number for each "auto", and why; no choice where the job says all numbers.
+    """Replace each "auto" of a job by a number; return the reasons too, or None if the job has no "auto".
 
     Raises:
-        JobError: it does not fit into memory with what was chosen.
+        JobError: with the chosen settings the job does not fit into memory.
     """
     job = prepared.job
     keys = auto_keys(job)
@@ -89,8 +89,8 @@ def resolve_auto(prepared: Prepared, embree: EmbreeScene) -> tuple[Prepared, Aut
         balance=job.reuse.weights == "balance",
     )
     wanted = wanted_variance(job)
-    enough, trying = accuracy_test(model, job), candidates(job, model.found.n_frames)
-    chosen = choose(model, enough, trying, lambda reuse: _blocks(prepared, reuse))
+    enough, rows = accuracy_test(model, job), candidates(job, model.found.n_frames)
+    chosen = choose(model, enough, rows, lambda reuse: _blocks(prepared, reuse))
     result = apply_reuse(prepared, chosen)
     require_memory(result)
     return result, AutoSettings(
@@ -105,7 +105,7 @@ def resolve_auto(prepared: Prepared, embree: EmbreeScene) -> tuple[Prepared, Aut
 
 
 def require_least_memory(prepared: Prepared) -> None:
-    """Refuse a job that does not fit into memory whatever is chosen; see `require_memory`.
+    """Refuse a job that fits into memory with no choice of settings; see `require_memory`.
 
     Raises:
         JobError: it does not.
@@ -118,33 +118,33 @@ def require_least_memory(prepared: Prepared) -> None:
 
 
 def auto_keys(job: Job) -> tuple[str, ...]:
-    """The keys of a job that say "auto"."""
+    """Return the keys of a job that say "auto"."""
     values = {"reuse.n_r": job.reuse.n_r, "samples.hits": job.samples.hits}
     return tuple(key for key, value in values.items() if value == "auto")
 
 
 def apply_reuse(prepared: Prepared, reuse: Reuse) -> Prepared:
-    """The same job with these settings."""
+    """Return the same job with these settings."""
     job = prepared.job
     new = changed(job, reuse=changed(job.reuse, n_r=reuse.n_r), samples=changed(job.samples, hits=reuse.hits))
     return replace(prepared, job=new)
 
 
 def wanted_variance(job: Job) -> float:
-    """Variance of a pixel of the default window on an ordinary walk, in units of that of one hit."""
+    """Return the variance of a pixel with the default window on an ordinary walk, in units of that of one hit."""
     hits = DEFAULT.hits if job.samples.hits == "auto" else job.samples.hits
     return 1.0 / (ORDINARY * (2 * DEFAULT.n_r + 1) * float(independent_hits(np.array(hits))))
 
 
 def accuracy_test(model: Model, job: Job) -> Callable[[Reuse], bool]:
-    """What settings must be: as exact as wanted, and places that were just revealed no worse than by default."""
+    """Return the test for settings: the wanted error, and no fewer hits than by default on places just revealed."""
     wanted = wanted_variance(job)
     least = model.least(replace(DEFAULT, hits=DEFAULT.hits if job.samples.hits == "auto" else job.samples.hits))
     return lambda reuse: model.variance(reuse) <= wanted and model.least(reuse) >= least
 
 
 def candidates(job: Job, n_frames: int) -> Iterator[list[Reuse]]:
-    """The settings that a job leaves open, a list a window with hits rising; no window is longer than the path."""
+    """Yield the settings that a job leaves open, one list per window, hits rising; no window exceeds the path."""
     n_r, hits = job.reuse.n_r, job.samples.hits
     longest = min(LONGEST[job.reuse.weights], n_frames - 1)
     for window in range(longest + 1) if n_r == "auto" else [n_r]:
@@ -155,20 +155,20 @@ def candidates(job: Job, n_frames: int) -> Iterator[list[Reuse]]:
 def choose(
     model: Model,
     enough: Callable[[Reuse], bool],
-    trying: Iterator[list[Reuse]],
+    rows: Iterator[list[Reuse]],
     blocks: Callable[[Reuse], int] = lambda _: 1,
 ) -> Reuse:
-    """The settings of least time that are exact enough; the shorter window if two are alike.
+    """Return the fastest settings that pass the test; the shorter window of two that are equally fast.
 
-    Where none are, those of the least time for the error they give: time falls and variance grows as hits
-    become fewer, so that their product tells which window makes the most of its time.
+    If none pass, return those with the least product of time and variance: with fewer hits time falls and variance
+    grows, so the product shows which window uses its time best.
 
     Args:
-        trying: lists of settings, in each of which hits, time and accuracy rise.
-        blocks: of light positions that settings are rendered in.
+        rows: lists of settings, in each of which hits, time and accuracy rise.
+        blocks: number of blocks of light positions that settings are rendered in.
     """
     reached, rest = [], []
-    for row in trying:
+    for row in rows:
         good = next(filter(enough, row), None)
         if good is not None:
             reached.append(good)

@@ -1,7 +1,7 @@
-"""Expected error and time of an image with some settings of reuse, from what a probe of the camera path found.
+"""Expected error and time of an image with some settings of reuse, from a probe of the camera path.
 
-Both rest on counts alone, never on a clock or on what the machine has free: the same job gives the same numbers
-anywhere. `docs/decisions/auto.md` says where the constants come from, and how far off they are.
+Both are computed only from counts, never from a clock or free memory: the same job gives the same numbers on any
+machine. `docs/decisions/auto.md` says where the constants come from, and how far off they are.
 """
 
 from dataclasses import dataclass
@@ -13,22 +13,22 @@ from framearray_cli.engine.frames.passes import frame_hits
 
 from .probe import Acceptance
 
-# The variance of a pixel falls with this power of the hits that one eye finds in it: they are spread evenly.
+# The variance of a pixel falls with this power of the hits of one eye in it, because they are evenly spread.
 EVENNESS = 1.3
 
-# Nanoseconds of a processor. A ray of each kind, with all that the program does for it.
+# Nanoseconds of processor time. Per ray of each kind, with all work that belongs to it.
 EYE_RAY, OBSCURANCE_RAY, SHADOW_RAY, VISIBILITY_RAY = 115.0, 190.0, 48.0, 40.0
-# A hit: to weigh it by the density of one eye in one frame, and to sort it into one frame.
+# Per hit: weighing it by the density of one eye in one frame, and sorting it into one frame.
 WEIGH, SORT = 0.5, 5.0
-# A pixel: to look up the hits of one eye; under each light position, to add a hit and to store the sum.
+# Per pixel: looking up the hits of one eye; per light position, adding a hit and storing the sum.
 LOOK_UP, ADD, STORE = 18.0, 0.3, 3.2
-# Shadow rays that `shadow_step` = s leaves: a share of 1 / s, and this for places where the light changes.
+# Share of shadow rays traced with `shadow_step` = s: 1 / s, plus this for places where visibility changes.
 BISECTED = 0.04
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reuse:
-    """Settings of reuse: N_r, and native hits of a pixel in a frame."""
+    """Settings of reuse: N_r, and native hits per pixel and frame."""
 
     n_r: int
     hits: float
@@ -36,7 +36,7 @@ class Reuse:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Model:
-    """What error and time depend on beside settings of reuse; see `Acceptance`, and the job file for the others."""
+    """What error and time depend on besides `Reuse`; see `Acceptance`, and the job file for the other fields."""
 
     found: Acceptance
     n_lights: int
@@ -45,27 +45,27 @@ class Model:
     balance: bool = True
 
     def counts(self, reuse: Reuse) -> Float64:
-        """Expected hits, native and outer, in the pixel of each probed hit, (n,)."""
+        """Return the expected hits, native and outer, in the pixel of each probed hit, (n,)."""
         return self._arriving(self._native(reuse), reuse.n_r)
 
     def least(self, reuse: Reuse) -> float:
-        """Expected hits that all but one in a hundred pixels have."""
+        """Return the number of hits that 99 % of the pixels are expected to exceed."""
         return float(np.percentile(self.counts(reuse), 1))
 
     def variance(self, reuse: Reuse) -> float:
-        """Expected variance of a pixel, mean over pixels, in units of that of one hit.
+        """Return the expected variance of a pixel, mean over pixels, in units of that of one hit.
 
-        It is 1 over the number of hits, those of one eye counted by `independent_hits`; a pixel that no hit reaches
+        It is 1 over the number of hits, where `independent_hits` counts those of one eye; a pixel that no hit reaches
         gets one.
         """
         sums = self._arriving(independent_hits(self._native(reuse)), reuse.n_r)
         return float((1.0 / np.maximum(sums, 1.0)).mean())
 
     def time(self, reuse: Reuse, blocks: int = 1) -> float:
-        """Expected time of a pixel of a frame under all light positions, ns of a processor; mirrors left out.
+        """Return the expected processor time per pixel and frame for all light positions, ns; mirrors left out.
 
         Args:
-            blocks: of light positions; each finds the hits again.
+            blocks: number of blocks of light positions; each finds the hits again.
         """
         found, n_r = self.found, min(reuse.n_r, self.found.n_frames - 1)
         native = reuse.hits * (found.n_frames + 2 * reuse.n_r) / found.n_frames
@@ -80,11 +80,11 @@ class Model:
         return native * (blocks * find + light) + pixel
 
     def _native(self, reuse: Reuse) -> Float64:
-        """Native hits a pixel of every frame, (n_frames,)."""
+        """Return native hits per pixel of every frame, (n_frames,)."""
         return frame_hits(self.found.n_frames, reuse.n_r, reuse.hits)
 
     def _arriving(self, each: Float64, n_r: int) -> Float64:
-        """What arrives at each probed hit from the eyes of its window, each of which has so much a pixel, (n,)."""
+        """Sum over the eyes of the window, at each probed hit, `each[eye]` per pixel times relative density, (n,)."""
         found, offsets = self.found, np.arange(-n_r, n_r + 1)
         eyes = np.clip(found.frame[:, None] + offsets, 0, found.n_frames - 1)  # beyond the path densities are 0
         sums: Float64 = (each[eyes] * found.density[:, offsets + found.reach]).sum(axis=1)
@@ -92,6 +92,6 @@ class Model:
 
 
 def independent_hits(hits: Float64) -> Float64:
-    """How many independent hits the hits of one eye in a pixel are worth; see `EVENNESS`."""
+    """Return the number of independent hits with the same variance as the hits of one eye; see `EVENNESS`."""
     value: Float64 = np.where(hits >= 1.0, hits**EVENNESS, hits)
     return value

@@ -1,4 +1,4 @@
-"""What neighbour eyes see of each other's hits along a job's own camera path, from a sparse probe."""
+"""Probe a job's camera path sparsely: how densely neighbour eyes sample each other's hits."""
 
 from dataclasses import dataclass
 
@@ -17,25 +17,25 @@ from framearray_cli.engine.terms.direct import direct
 
 from ..prepare import Prepared, eye_cameras
 
-# Frames of the path that are looked at, native hits of each, and light positions that shadow rays are counted for.
+# Number of frames probed, native hits per frame, and light positions for which shadow rays are counted.
 PROBE_FRAMES, PROBE_HITS, PROBE_LIGHTS = 16, 512, 32
-# Hits of a neighbour for one of the eye itself, at most: where the eye itself sees a surface from its edge.
+# Limit of a neighbour's hits per hit of the eye itself, for surfaces that the eye sees nearly edge-on.
 MOST_DENSE = 1000.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Acceptance:
-    """Some hits of some frames, and how densely the eyes around would sample the same places.
+    """Some hits of some frames, and how densely the neighbour eyes would sample the same places.
 
-    Only hits that reflect diffusely are kept, as the others have no noise; where none does, all are.
+    Only hits that reflect diffusely are kept, as the others have no noise; if none does, all are kept.
 
     Attributes:
         n_frames: of the path; 1 for a camera at rest.
         frame: (n,) the frame whose eye found each hit.
-        density: (n, 2 reach + 1) hits that eye frame + k, k from -reach to reach, puts into a pixel of the frame for
-            each hit a pixel that it finds, p_k / p_c; 0 where it does not see the place, or is not on the path.
+        density: (n, 2 reach + 1) relative density p_k / p_c of eye frame + k, k from -reach to reach: hits that it adds
+            to a pixel of the frame per native hit per pixel; 0 where it does not see the place, or is off the path.
         reflecting: share of all hits that reflect diffusely.
-        shadow_rays: of a hit under all light positions, each of them tested.
+        shadow_rays: per hit for all light positions, without `shadow_step`.
     """
 
     n_frames: int
@@ -46,11 +46,11 @@ class Acceptance:
 
     @property
     def reach(self) -> int:
-        """The farthest neighbour that was asked."""
+        """Distance of the farthest neighbour probed, frames."""
         return int(self.density.shape[1]) // 2
 
     def seen(self, k: int) -> float:
-        """Share of hits that the eyes k frames before and after see; beyond the reach, as at its end."""
+        """Return the share of hits that the eyes k frames before and after see; beyond the reach, as at its end."""
         k, shares = min(k, self.reach), []
         for offset in (-k, k):
             there = (self.frame + offset >= 0) & (self.frame + offset < self.n_frames)
@@ -60,9 +60,9 @@ class Acceptance:
 
 
 def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
-    """Look for a few hundred native hits of some frames from all eyes at most `reach` frames away.
+    """Test a few hundred native hits of some frames from all eyes at most `reach` frames away.
 
-    The hits are some of those that a render finds, so the same job gives the same answer anywhere.
+    The hits are among those that a render finds, so the same job gives the same result on any machine.
     """
     job, n_c = prepared.job, 1 if prepared.still else prepared.n_cameras
     cams = eye_cameras(prepared)
@@ -96,13 +96,13 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
 
 
 def evenly_spaced(n: int, most: int) -> list[int]:
-    """At most so many of the numbers 0 to n - 1, evenly spread, each in the middle of its share."""
+    """Return at most `most` of the numbers 0 to n - 1, evenly spaced, each in the middle of its interval."""
     count = min(n, most)
     return [(2 * i + 1) * n // (2 * count) for i in range(count)]
 
 
 def _densities(cams: Cameras, c: int, eyes: range, hits: Hits, n: int, embree: EmbreeScene, test_rays: Rays) -> Float64:
-    """Density of the hits of each eye at hits 0 to n - 1, over that of eye c, (n, n_eyes)."""
+    """Return the density of each eye at hits 0 to n - 1, relative to that of eye c, (n, n_eyes)."""
     stride = -(-n // LANES) * LANES
     pixel, density = np.empty((len(eyes), stride), np.int32), np.empty((len(eyes), stride))
     outer_hits(cams, c, eyes.start, hits, n, embree.tracer, test_rays, pixel, density)

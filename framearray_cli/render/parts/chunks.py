@@ -1,7 +1,7 @@
-"""The camera path in chunks of consecutive frames, and what their halos cost.
+"""Split the camera path into chunks of consecutive frames, and compute the cost of their halos.
 
-A chunk is rendered by itself. The hits of N_r frames on either side of it, its halo, reach into it too; they are found
-again by the neighbours, who have them as frames of their own.
+Each chunk is rendered independently. The hits of the N_r frames on either side of it, its halo, reach into it too, so
+the chunk traces them, and so does the neighbour chunk that holds these frames.
 """
 
 from collections.abc import Sequence
@@ -15,9 +15,9 @@ from framearray_cli.job.job import Job
 
 from ..prepare import open_embree, prepare
 
-# Frames of a chunk for each frame of N_r unless somebody says: the halo of 2 N_r frames is a quarter of it then.
+# Default frames of a chunk, per frame of N_r: the halo of 2 N_r frames is a quarter of it.
 FRAMES_PER_N_R = 8
-# Without reuse there is no halo; reading the scene and estimating the ambient light is what each chunk repeats.
+# Least default: without reuse there is no halo, but each chunk reads the scene and estimates the ambient light again.
 FEWEST = 16
 
 
@@ -27,7 +27,7 @@ class Chunks:
 
     Attributes:
         each: the cameras of every chunk, in rising order.
-        more: hits that are found beside those of the whole in one run, over these; 0 for one chunk.
+        more: additional hits of the halos, relative to a render in one run; 0 for one chunk.
     """
 
     each: tuple[tuple[int, ...], ...]
@@ -35,7 +35,7 @@ class Chunks:
 
 
 def split_cameras(cameras: Sequence[int], size: int) -> list[tuple[int, ...]]:
-    """Cut cameras into as few chunks of at most `size` as there can be, of almost the same length.
+    """Split cameras into the fewest chunks of at most `size`, of almost equal length.
 
     Lengths are those of the Open Job Description for contiguous chunks.
 
@@ -53,21 +53,21 @@ def split_cameras(cameras: Sequence[int], size: int) -> list[tuple[int, ...]]:
 
 
 def default_size(n: int, n_r: int, workers: int = 1) -> int:
-    """Frames of a chunk unless somebody says: at most `FRAMES_PER_N_R` N_r, and a whole number of chunks a worker.
+    """Return the default frames of a chunk: at most `FRAMES_PER_N_R` N_r, and a whole number of chunks per worker.
 
     Args:
-        n: frames that are wanted.
+        n: number of frames to render.
     """
     most = max(FRAMES_PER_N_R * n_r, FEWEST)
     return max(-(-n // (workers * -(-n // (workers * most)))), 1) if n else 1
 
 
 def plan_chunks(cameras: Sequence[int], size: int, n_c: int, n_r: int, *, still: bool = False) -> Chunks:
-    """Cut cameras into chunks, and tell what that costs.
+    """Split cameras into chunks and compute the cost.
 
     Args:
-        n_c: cameras of the whole path.
-        still: whether the camera never moves, so that every chunk finds the one frame that there is.
+        n_c: number of cameras of the whole path.
+        still: whether the camera never moves, so that every chunk traces the same single frame.
     """
     each = split_cameras(cameras, size)
     if still or not each:
@@ -82,10 +82,10 @@ def plan_chunks(cameras: Sequence[int], size: int, n_c: int, n_r: int, *, still:
 
 
 def resolve_n_r(job: Job) -> int:
-    """N_r of a job whose scene is there; where it says "auto", what a render will choose.
+    """Return N_r of a job; where it says "auto", the N_r that a render will choose.
 
     Raises:
-        JobError, SceneError: that cannot be found out, or there is no scene.
+        JobError, SceneError: the job cannot be rendered, or has no scene file.
     """
     if not job.scene.file.is_file():
         raise SceneError(f"{job.scene.file}: no such file")

@@ -1,4 +1,4 @@
-"""Dask: a scheduler that somebody runs, or one with workers on this machine, as long as a render takes."""
+"""Dask: connect to a running scheduler, or start one with workers on this machine for the time of a render."""
 
 import logging
 import threading
@@ -16,14 +16,14 @@ SILENT = logging.CRITICAL + 1
 
 
 def require_dask() -> Any:
-    """The library, if it is there.
+    """Import Dask distributed and silence its log.
 
     Raises:
         MissingExtraError: Dask distributed is not installed.
     """
     with extra("--workers and --dask need Dask distributed", '"framearray[dask]"'):
         import distributed
-    for name in list(logging.root.manager.loggerDict):  # what matters is told by this program, in its own words
+    for name in list(logging.root.manager.loggerDict):  # this program reports what matters, in its own words
         if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
             logging.getLogger(name).setLevel(SILENT)
     return distributed
@@ -31,10 +31,10 @@ def require_dask() -> Any:
 
 @contextmanager
 def connect(address: str) -> Iterator[Any]:
-    """A client of a scheduler.
+    """Connect a client to a scheduler.
 
     Raises:
-        JobError: none answers at that address.
+        JobError: no scheduler answers at that address.
     """
     distributed = require_dask()
     found: SimpleQueue[Any] = SimpleQueue()
@@ -44,17 +44,17 @@ def connect(address: str) -> Iterator[Any]:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 found.put(distributed.Client(address, timeout=PATIENCE, set_as_default=False))
-        except Exception as error:  # of any kind, where something else than a scheduler answers
+        except Exception as error:  # of any kind, if something other than a scheduler answers
             found.put(error)
 
-    # Dask's own limit of time does not hold where something else than a scheduler answers
+    # Dask's own timeout does not hold if something other than a scheduler answers
     threading.Thread(target=open_client, name="connect", daemon=True).start()
     try:
         client = found.get(timeout=PATIENCE + 1.0)
     except Empty:
         client = TimeoutError()
     if isinstance(client, Exception):
-        late = isinstance(client, OSError | MemoryError)  # Dask takes what others answer for a huge message
+        late = isinstance(client, OSError | MemoryError)  # Dask reads the answer of another program as a huge message
         why = f"none answered within {PATIENCE:.0f} s" if late else str(client)
         wanted = 'expected the address of a Dask scheduler, such as "tcp://host:8786"'
         raise JobError(f"--dask {address}", [f"{wanted}; {why}"]) from client
@@ -66,7 +66,7 @@ def connect(address: str) -> Iterator[Any]:
 
 @contextmanager
 def start_local(workers: int) -> Iterator[Any]:
-    """A client of a scheduler of its own, with so many worker processes; a worker that dies is replaced."""
+    """Start a scheduler with worker processes on this machine and connect a client; workers that die are replaced."""
     distributed = require_dask()
     from .worker import IgnoreSignals
 
@@ -76,7 +76,7 @@ def start_local(workers: int) -> Iterator[Any]:
             n_workers=workers,
             threads_per_worker=1,
             processes=True,
-            memory_limit=0,  # chunks know theirs; Dask would end a worker that is above
+            memory_limit=0,  # chunks have a limit of their own; Dask would kill a worker above its limit
             dashboard_address=None,
             host="127.0.0.1",
             silence_logs=SILENT,

@@ -14,21 +14,21 @@ from framearray_cli.base.files import write_bytes
 from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.job.job import Job
 
-SUFFIXES = (".json", ".yaml", ".yml")  # what readers of templates go by
+SUFFIXES = (".json", ".yaml", ".yml")  # by which readers recognize the format
 
-# Seconds after which a farm gives up: no chunk should take a day, nor should reading all files again take four hours.
+# Seconds after which a farm gives up: no chunk should take a day, and no verification four hours.
 LONGEST_CHUNK, LONGEST_VERIFY = 24 * 3600, 4 * 3600
-# Seconds from the signal that ends a chunk to the one that kills it. A render stops within about one.
+# Seconds from the signal that ends a chunk to the one that kills it. A render stops within about one second.
 NOTICE = 30
 
 
 def template(job: Job, job_file: Path, folder: Path, chunk: int, threads: int | None = None) -> dict[str, Any]:
-    """A template of two steps: the chunks, then a look at every file.
+    """Return a template of two steps: render the chunks, then verify every file.
 
     Args:
-        folder: where the template will lie; files in it are named from there, so that it can be moved with them.
-        chunk: frames of a chunk, at most.
-        threads: of each chunk; None: as many as the machine has.
+        folder: of the template; paths in it are relative to the template, so that both can be moved together.
+        chunk: most frames per chunk.
+        threads: per chunk; None: all of the machine.
     """
     memory = job.render.memory
     needs = [{"name": "amount.worker.vcpu", "min": threads}] if threads else []
@@ -42,7 +42,7 @@ def template(job: Job, job_file: Path, folder: Path, chunk: int, threads: int | 
         "name": job.name,
         "description": (
             f"The frame array {job.name}: {job.camera.frames} cameras, rendered in chunks of the camera path. Each "
-            "finds the hits of its halo, N_r frames on either side, by itself. All machines must see the job file, the "
+            "also traces the hits of its halo, N_r frames on either side. All machines must see the job file, the "
             "scene and the output folder. A chunk that was stopped goes on where it was when it is run again."
         ),
         "parameterDefinitions": _parameters(job, job_file, folder, chunk, threads),
@@ -86,7 +86,7 @@ def _action(arguments: list[str], timeout: int) -> dict[str, Any]:
 
 
 def _parameters(job: Job, job_file: Path, folder: Path, chunk: int, threads: int | None) -> list[dict[str, Any]]:
-    """What can be changed when the template is submitted."""
+    """Return the parameters that can be changed when the template is submitted."""
 
     def number(name: str, value: int, most: int, label: str, description: str) -> dict[str, Any]:
         return {
@@ -104,7 +104,7 @@ def _parameters(job: Job, job_file: Path, folder: Path, chunk: int, threads: int
             "name": name,
             "type": "PATH",
             **more,
-            "default": _from(folder, place),
+            "default": _template_path(folder, place),
             "description": description,
             "userInterface": {
                 "control": "CHOOSE_INPUT_FILE" if more["objectType"] == "FILE" else "CHOOSE_DIRECTORY",
@@ -123,13 +123,13 @@ def _parameters(job: Job, job_file: Path, folder: Path, chunk: int, threads: int
             "OutputFolder", job.output.directory, "Output folder", "One folder for all chunks.",
             objectType="DIRECTORY", dataFlow="OUT",
         ),
-        number("ChunkSize", chunk, job.camera.frames, "Frames a chunk", "Frames of a chunk of the camera path."),
+        number("ChunkSize", chunk, job.camera.frames, "Frames per chunk", "Frames of a chunk of the camera path."),
         *([number("Threads", threads, MOST_THREADS, "Threads", "Threads of each chunk.")] if threads else []),
     ]  # fmt: skip
 
 
-def _from(folder: Path, place: Path) -> str:
-    """A place as the template names it: from its own folder on if it is in there, else from the root."""
+def _template_path(folder: Path, place: Path) -> str:
+    """Return a path as the template names it: relative if it lies in the template's folder, else absolute."""
     place, folder = place.absolute(), folder.absolute()
     return place.relative_to(folder).as_posix() if place.is_relative_to(folder) else str(place)
 
@@ -138,7 +138,7 @@ def write_template(target: Path, made: dict[str, Any], *, force: bool) -> None:
     """Write a template, whole or not at all.
 
     Raises:
-        OutputError: there is a file already, or it cannot be written.
+        OutputError: the file exists already, or cannot be written.
     """
     if target.suffix.lower() not in SUFFIXES:
         raise OutputError(f"{target}: expected a name that ends in {', '.join(SUFFIXES)}")

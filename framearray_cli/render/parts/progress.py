@@ -1,4 +1,4 @@
-"""What a render in parts reports beside the events of any render."""
+"""Events of a render in parts, besides those of any render."""
 
 from typing import TYPE_CHECKING
 
@@ -10,22 +10,22 @@ if TYPE_CHECKING:
 
 
 class PartEvents(RenderEvents):
-    """The events of a render in parts; override those that you want. Calls may come from any thread."""
+    """The events of a render in parts; override those of interest. Calls may come from any thread."""
 
     def starting_workers(self) -> None:
-        """Worker processes of this machine are started."""
+        """Worker processes are being started on this machine."""
 
     def awaiting_workers(self, address: str | None) -> None:
-        """No worker has come yet to the scheduler at an address, or on this machine."""
+        """No worker has connected yet to the scheduler at an address, or on this machine."""
 
     def chunked(self, workers: int, chunks: "Chunks") -> None:
-        """The camera path was cut, and that many workers begin."""
+        """The camera path was split into chunks, and that many workers begin."""
 
     def ambient_known(self, figures: AmbientFigures) -> None:
-        """The first worker knows the ambient light of the whole array."""
+        """The first worker has estimated the ambient light of the whole array."""
 
     def target_known(self, target: "Target") -> None:
-        """The first worker allotted native hits for the error that the job wants."""
+        """The first worker has allotted native hits for the error that the job wants."""
 
     def compiling(self) -> None:
-        """A worker compiles kernels."""
+        """A worker is compiling kernels."""

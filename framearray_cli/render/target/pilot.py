@@ -1,8 +1,8 @@
-"""`samples.error`: a pilot looks how noisy each place is, and native hits are allotted so that images reach a target.
+"""`samples.error`: a pilot measures the noise of each block of pixels, and native hits are allotted to reach a target.
 
-The pilot has random numbers of its own and is thrown away, so that the number of hits of a pixel does not depend on
-what they show: means stay right, and weights know the numbers. It depends on the job alone, so that every run of a
-job allots the same hits.
+The pilot has random numbers of its own and is discarded, so that the number of hits of a pixel does not depend on their
+values: means stay unbiased, and weights know the numbers. It depends only on the job, so that every run of a job allots
+the same hits.
 """
 
 from dataclasses import dataclass, replace
@@ -26,22 +26,22 @@ from .allot import FEWEST, Witnesses, allot
 
 # Added to the job's seed for the pilot; no job's seed is as large.
 PILOT_SEED = 1 << 40
-# Frames of the path whose pilot judges what was allotted.
+# Number of frames whose pilot hits judge the allotment.
 JUDGED = 32
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Target:
-    """What a wanted error takes.
+    """The error that a job wants, and the native hits allotted for it.
 
     Attributes:
-        error: that is wanted of every frame: root mean square over the pixels of all its images, over the array's
-            mean radiance.
-        expected: of the whole array; `worst`: of the worst frame.
-        radiance: mean of the array, as the pilot saw it.
-        hits: native hits a pixel of a frame, mean; `frames`: least and most of a frame's mean.
-        capped: share of all blocks that have as many hits as they may.
-        rays: that the pilot traced.
+        error: wanted of every frame: root mean square over the pixels of all its images, relative to the mean radiance
+            of the array.
+        expected: error of the whole array; `worst`: of the worst frame.
+        radiance: mean of the array, estimated by the pilot.
+        hits: mean native hits per pixel; `frames`: least and greatest mean of a frame.
+        capped: share of all blocks that have the most hits allowed.
+        rays: traced by the pilot.
     """
 
     error: float
@@ -54,7 +54,7 @@ class Target:
     rays: int
 
     def table(self) -> dict[str, object]:
-        """For the manifest."""
+        """Return the table for the manifest."""
         return {
             "error": self.error,
             "expected": round(self.expected, 5),
@@ -68,15 +68,15 @@ class Target:
 
 
 def allot_hits(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> tuple[FrameSetup, Target | None]:
-    """The same setup with native hits allotted for `samples.error`; as it is where the job has no target.
+    """Allot native hits for `samples.error`; return the setup unchanged where the job has no target.
 
     Args:
-        setup: of all light positions.
+        setup: for all light positions.
     """
     error = prepared.job.samples.error
     if error is None:
         return setup, None
-    # one frame serves for the whole window of a camera that stands still
+    # for a camera at rest, one frame stands for the whole window
     most = float(prepared.job.samples.most_hits * (2 * prepared.job.n_r + 1 if prepared.still else 1))
     with TracePool(setup, prepared.threads) as pool:
         pilot = _Pilot(setup, ambient, blocks_of(setup.cams.width, setup.cams.height))
@@ -108,12 +108,12 @@ def allot_hits(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> tuple
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _FrameNoise:
-    """What a pilot tells of a frame.
+    """Noise of a frame, as measured by the pilot.
 
     Attributes:
         radiance: mean over all its images.
-        u: (2, n_blocks) by each half, see allot.py.
-        witnesses: of some frames.
+        u: (2, n_blocks) variance by half of the pilot, see allot.py.
+        witnesses: for some frames only.
     """
 
     radiance: float
@@ -122,7 +122,7 @@ class _FrameNoise:
 
 
 class _Pilot:
-    """Two hits, independent of each other, of two pixels of each block: one pixel for each half of the pilot."""
+    """Two independent hits in each of two pixels per block: one pixel for each half of the pilot."""
 
     def __init__(self, setup: FrameSetup, ambient: Ambient, blocks: Blocks) -> None:
         self.setup = replace(setup, seed=setup.seed + PILOT_SEED)
@@ -131,7 +131,7 @@ class _Pilot:
         self._judges = frozenset(evenly_spaced(setup.n_frames, JUDGED))
 
     def measure(self, c: int, scratch: Scratch) -> _FrameNoise:
-        """What the pilot finds in frame c."""
+        """Measure the noise of frame c."""
         eyes = self.setup.frames_around(c, self.setup.n_r)
         random = np.random.default_rng((self.setup.seed, c)).random((2, self.blocks.n, 2))
         pixels = np.concatenate([self.blocks.some_pixel(half) for half in random])
@@ -143,11 +143,11 @@ class _Pilot:
             pair = hit_pairs(span.stop - span.start)
             radiance = self._radiance(c, pixels[span], scratch)[pair]
             mean += float(radiance.sum(dtype=np.float64)) / (2 * n * radiance[0, 0].size)
-            # two values of one hit each tell its variance
+            # variance of one hit, from the difference of two
             variance[span] = np.square(radiance[0] - radiance[1], dtype=np.float64).mean(axis=(1, 2)) / 2
             seen, arriving = self._views(c, eyes, 2 * len(pair[0]), scratch)
             block[:, span], density[:, span] = seen[pair], arriving[pair]
-        # a hit in every frame of the window is shared by so many
+        # with one hit per pixel from each frame of the window: the variance, over the number of hits that arrive
         shared = (1.0 / density.sum(axis=-1)).mean(axis=0)
         by_half = (2, self.blocks.n)
         witnesses = None
@@ -163,7 +163,7 @@ class _Pilot:
         return _FrameNoise(radiance=mean, u=(variance * shared).reshape(by_half), witnesses=witnesses)
 
     def _radiance(self, c: int, pixels: Int32, scratch: Scratch) -> Float32:
-        """What images of two hits of each of some pixels would show, (hits, n_lights, 3); the hits are in `scratch`."""
+        """Trace two hits in each of some pixels into `scratch`, and return their radiance, (hits, n_lights, 3)."""
         setup, n = self.setup, 2 * len(pixels)
         samples, packets = Samples(setup.seed, pixels, per_pixel=2, first=0, halves=True), scratch.hit_rays.packets
         native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, scratch.hits)
@@ -173,7 +173,7 @@ class _Pilot:
         return _radiance(setup, self.ambient, records)
 
     def _views(self, c: int, eyes: range, n: int, scratch: Scratch) -> tuple[Int32, Float64]:
-        """The block that each eye sees each hit in, and its hits there for one of eye c, (n, n_eyes)."""
+        """Return the block in which each eye sees each hit, and the eye's hits there per hit of eye c, (n, n_eyes)."""
         setup, own = self.setup, c - eyes.start
         if setup.n_r == 0:
             return self.blocks.of_pixel[scratch.hits.pixel[:n]][:, None], np.ones((n, 1))
@@ -190,7 +190,7 @@ class _Pilot:
 
 
 def hit_pairs(n: int) -> Int32:
-    """Where `native_hits` puts the two hits of each of n pixels, (2, n): by groups of 16 pixels, then by sample."""
+    """Return the places of the two hits of each of n pixels, (2, n): `native_hits` groups 16 pixels, then samples."""
     pixel = np.arange(n)
     group, members = pixel // LANES * LANES, np.minimum(n - pixel // LANES * LANES, LANES)
     places: Int32 = np.stack([2 * group + sample * members + pixel - group for sample in range(2)])
@@ -198,9 +198,9 @@ def hit_pairs(n: int) -> Int32:
 
 
 def _radiance(setup: FrameSetup, ambient: Ambient, records: HitRecords) -> Float32:
-    """What an image of each hit alone would show under every light, (n, n_lights, 3)."""
-    triple = {at: records.row[:, None, at : at + 3] for at in (LIGHT_INDEPENDENT, INDIRECT, REFLECTIVITY)}
+    """Return the radiance of each hit under every light, (n, n_lights, 3)."""
+    rgb = {at: records.row[:, None, at : at + 3] for at in (LIGHT_INDEPENDENT, INDIRECT, REFLECTIVITY)}
     direct = np.swapaxes(records.irradiance, 1, 2) * setup.lights.colour / np.float32(np.pi)
-    indirect = ambient.intensity * triple[INDIRECT]
-    radiance: Float32 = triple[LIGHT_INDEPENDENT] + triple[REFLECTIVITY] * direct + indirect
+    indirect = ambient.intensity * rgb[INDIRECT]
+    radiance: Float32 = rgb[LIGHT_INDEPENDENT] + rgb[REFLECTIVITY] * direct + indirect
     return radiance
