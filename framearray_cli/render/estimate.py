@@ -1,4 +1,4 @@
-"""What a job will take, without rendering it: `framearray check`."""
+"""Estimate memory, disk space and time of a job without rendering it: `framearray check`."""
 
 import math
 import tempfile
@@ -25,26 +25,26 @@ from .prepare import Prepared, image_ambient, open_embree, plan_work, prepare
 from .target.pilot import Target, allot_hits
 from .writer import ArrayWriter, array_target
 
-# A probe traces about this many rays, which takes a second or two.
+# Rays of a probe, about, which take one or two seconds.
 PROBE_RAYS = 12_000_000
-# More pixels a frame tell nothing new; with fewer, threads and batches of hits are not busy as in a render.
+# More pixels per frame add no information; with fewer, threads and batches of hits are less busy than in a render.
 MOST_PIXELS, FEWEST_PIXELS = 12_000, 1_000
-# A first probe of this share of the pixels compiles kernels, and shows how the size of files grows with that of images.
+# Share of the pixels for a first probe, which compiles kernels and shows how file sizes grow with image sizes.
 FIRST_SHARE = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
-    """What a job takes.
+    """Estimated cost of a job.
 
     Attributes:
-        memory: bytes at most, of the whole program; `available`: bytes the machine can give it.
+        memory: most bytes of the whole program; `available`: bytes that the machine can give it.
         disk: bytes of all images and layers; `free`: bytes free where they go.
-        seconds: from start to end, writing included, with kernels that were compiled before.
-        settings: that were chosen where the job leaves them open; None where it says all.
-        target: what the error takes that the job wants; None where it wants none.
-        blocks: of light positions, rendered one after the other because of the memory limit.
-        warnings: what would go wrong.
+        seconds: from start to end, writing included, with kernels compiled before.
+        settings: chosen where the job says "auto"; None: no "auto".
+        target: hits allotted for the error that the job wants; None: no target.
+        blocks: number of blocks of light positions, rendered one after the other because of the memory limit.
+        warnings: expected problems.
     """
 
     prepared: Prepared
@@ -62,13 +62,13 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Probe:
-    """What a few small frames took.
+    """Measured cost of a few small frames.
 
     Attributes:
-        pixels: of a frame.
-        seconds: a native hit of the path.
-        file_bytes: of a frame, all its images and layers.
-        writing: seconds to write a frame and nothing else; measured for a camera that stands still only.
+        pixels: per frame.
+        seconds: per native hit.
+        file_bytes: per frame, all its images and layers.
+        writing: seconds to only write a frame; measured only for a camera at rest.
     """
 
     pixels: int
@@ -78,7 +78,7 @@ class _Probe:
 
 
 def check(job: Job) -> Estimate:
-    """Read everything that a job names, and estimate what it takes from a few small frames that are thrown away.
+    """Read the inputs of a job, and estimate its cost from a few small frames that are discarded.
 
     Raises:
         JobError, SceneError: the job cannot be rendered.
@@ -105,7 +105,7 @@ def check(job: Job) -> Estimate:
     disk = int(_frame_bytes(first, second, setup.n_pixels) * prepared.n_cameras)
     free = free_space(job.output.directory)
     hits = float(setup.per_pixel.sum()) * setup.n_pixels
-    copies = prepared.n_cameras - setup.n_frames  # frames of a camera that stands still, which are written only
+    copies = prepared.n_cameras - setup.n_frames  # frames of a camera at rest, which are only written
     return Estimate(
         prepared=prepared,
         settings=settings,
@@ -123,7 +123,7 @@ def check(job: Job) -> Estimate:
 
 def _warnings(job: Job, identity: Identity, *, memory_lacks: bool, disk_lacks: bool) -> tuple[str, ...]:
     found = []
-    if memory_lacks:  # a job that is far beyond was refused
+    if memory_lacks:  # a job far beyond the free memory was refused
         found.append("the job may need more memory than is free")
     if disk_lacks:
         found.append("the images need more space than the disk has free")
@@ -135,25 +135,25 @@ def _warnings(job: Job, identity: Identity, *, memory_lacks: bool, disk_lacks: b
 
 
 def _rays_of_a_hit(setup: FrameSetup) -> int:
-    """About how many rays a hit takes that do not depend on the lights."""
+    """Return the approximate number of rays per hit that do not depend on the lights."""
     return 1 + setup.obscurance.n_rays + (4 if setup.balance else 2) * setup.n_r
 
 
 def _repeats(setup: FrameSetup, blocks: int) -> float:
-    """How much longer a render in blocks takes: each finds its hits again."""
+    """Return how much longer a render in blocks takes: each finds its hits again."""
     again = _rays_of_a_hit(setup)
     return 1 + (blocks - 1) * again / (again + setup.lights.n_lights)
 
 
 def _probe_pixels(setup: FrameSetup) -> int:
-    """Pixels a frame for the second probe."""
+    """Return the pixels per frame of the second probe."""
     rays = _rays_of_a_hit(setup) + setup.lights.n_lights
     hits = float(np.mean(setup.per_pixel)) * min(2 * setup.n_r + 2, setup.n_frames)
     return int(min(max(PROBE_RAYS / (rays * hits), FEWEST_PIXELS), MOST_PIXELS, setup.n_pixels))
 
 
 def _small(setup: FrameSetup, pixels: int) -> FrameSetup:
-    """A few frames from the middle of the path, with about that many pixels each."""
+    """Return a few frames from the middle of the path, with about that many pixels each."""
     n = min(2 * setup.n_r + 2, setup.n_frames)
     first = (setup.n_frames - n) // 2
     cams, span = setup.cams, slice(first, first + n)
@@ -208,7 +208,7 @@ def _writer(prepared: Prepared, small: FrameSetup, folder: Path, threads: int) -
 
 
 def _frame_bytes(first: _Probe, second: _Probe, pixels: int) -> float:
-    """Bytes of a frame's files. They grow by a power of the pixels: larger images are smoother and compress better."""
+    """Return bytes of a frame's files, a power of its pixels: larger images are smoother and compress better."""
     if first.pixels == second.pixels:
         return second.file_bytes * pixels / second.pixels
     power = math.log(second.file_bytes / first.file_bytes) / math.log(second.pixels / first.pixels)

@@ -1,4 +1,4 @@
-"""From a job to everything that is known before the first frame: scene, eyes, lights, ambient light, plan."""
+"""Prepare a render: scene, eyes, lights, ambient light, and the setup of frames."""
 
 from dataclasses import dataclass, replace
 
@@ -26,9 +26,9 @@ from framearray_cli.scene.paths.paths import Eyes, Lights, eyes, lights
 from framearray_cli.scene.paths.planes import Plane
 from framearray_cli.scene.scene import Scene, load_scene
 
-# Native hits of a pixel of a frame from which on they are sampled in two halves.
+# Least native hits per pixel that are sampled in two halves.
 FEWEST_SPLIT = 4
-# A limit that leaves less than this is refused as a whole, once it is known what the frames take.
+# Least memory granted to the scene; a limit that leaves less is refused later, when the needs of frames are known.
 LEAST_SCENE_MEMORY = 64 * 2**20
 
 
@@ -60,7 +60,7 @@ class Prepared:
 
     @property
     def threads(self) -> int:
-        """Threads of the render: the job's, else one for each core that this process may use."""
+        """Threads of the render: the job's, else one per core that this process may use."""
         return self.job.render.threads or available_cores()
 
 
@@ -68,8 +68,8 @@ def prepare(job: Job) -> Prepared:
     """Read the scene of a job and place its eyes and lights.
 
     Raises:
-        JobError: a path that cannot be followed.
-        SceneError: a scene that cannot be read or rendered.
+        JobError: a path is invalid.
+        SceneError: the scene cannot be read or rendered.
     """
     if job.denoise.obscurance:
         require_denoiser()
@@ -91,7 +91,7 @@ def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepare
 
 
 def _scene_memory(job: Job) -> int | None:
-    """Bytes that reading the scene may take: what the job leaves beside what the program holds already."""
+    """Return the bytes that reading the scene may take: the rest of the job's limit."""
     limit = job.render.memory
     return None if limit is None else max(limit - resident_memory(), LEAST_SCENE_MEMORY)
 
@@ -102,7 +102,7 @@ def open_embree(prepared: Prepared, engine: Engine = "auto") -> EmbreeScene:
 
 
 def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambient]:
-    """Estimate the ambient light and put together what every frame needs."""
+    """Estimate the ambient light and build the setup of all frames."""
     job, scene = prepared.job, prepared.scene
     cams = eye_cameras(prepared)
     background = np.array(job.scene.background, np.float32)
@@ -147,7 +147,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambi
 
 
 def image_ambient(ambient: Ambient, lights: Lights) -> Ambient:
-    """What images are composed with: I_A; with groups, none, and 1 at the plane of R W.
+    """Return the I_A that images are composed with; with groups, 0 for all planes but that of R W, and 1 there.
 
     An array with groups has the I_A of each group in its manifest, and adds it when a picture is made.
     """
@@ -159,7 +159,7 @@ def image_ambient(ambient: Ambient, lights: Lights) -> Ambient:
 
 
 def _name_groups(ambient: Ambient, lights: Lights) -> Ambient:
-    """The same estimate with notes that say which group a light index belongs to."""
+    """Return the same estimate with the group of the light position in its notes."""
     l = int(ambient.standard_error.argmax())
     group = next((group for group in lights.groups if l in group.positions), None)
     if group is None:
@@ -169,10 +169,10 @@ def _name_groups(ambient: Ambient, lights: Lights) -> Ambient:
 
 
 def _halves(job: Job, *, still: bool) -> int:
-    """How the job's hits are told apart in two halves; see `FrameSetup.halves`.
+    """Return how the job's hits are split into two halves; see `FrameSetup.halves`.
 
-    Frames see a place differently, so halves of frames differ by more than noise; that shows where there is little
-    noise. Halves of one or two samples are spread worse over a pixel than these samples together are.
+    Frames see a place differently, so halves of frames differ by more than noise, which matters where noise is low.
+    Halves of one or two samples are spread less evenly over a pixel than all these samples.
     """
     if not job.samples.halves:
         return 0
@@ -181,7 +181,7 @@ def _halves(job: Job, *, still: bool) -> int:
 
 
 def eye_cameras(prepared: Prepared) -> Cameras:
-    """All eyes as kernels take them; what is nearer to an eye than rays start above a surface it does not see."""
+    """Return all eyes as kernels take them; an eye sees nothing nearer than the ray offset from surfaces."""
     near = nearest(prepared.surfaces)
     return cameras(prepared.eyes, prepared.job.camera.resolution, prepared.scene.centre, near)
 

@@ -2,8 +2,8 @@
 
 import time
 from collections import Counter
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from threading import Lock
 
@@ -30,7 +30,7 @@ from .progress import RenderEvents
 from .session import RenderSession, complete_manifest, open_session
 from .summary import Summary, summarize, with_summary
 from .target.pilot import allot_hits
-from .writer import ArrayWriter, FinishedFiles, array_target
+from .writer import ArrayTarget, ArrayWriter, FinishedFiles, array_target
 
 
 def render(
@@ -41,18 +41,17 @@ def render(
     restart: bool = False,
     cameras: Sequence[int] | None = None,
 ) -> Summary:
-    """Render a frame array, or some cameras of it, or what is missing of that in the job's folder.
+    """Render a frame array, or some of its cameras; images that lie in the job's folder already are kept.
 
-    Images are the same to the last bit, whether they are rendered in one run or in several.
+    Images are the same to the last bit, whether rendered in one run or in several.
 
     Args:
-        restart: remove the array that lies in the job's folder first; without it, another array there is an error.
-        cameras: those that are wanted, in rising order; None: all.
+        restart: first remove the array in the job's folder; otherwise another array there is an error.
+        cameras: those to render, in rising order; None: all.
 
     Raises:
         JobError, SceneError: the job cannot be rendered.
-        OutputError: something could not be written; images that were finished stay, and the next run goes on with the
-            rest.
+        OutputError: a file could not be written; finished images stay, and the next run renders the rest.
     """
     events, started = events or RenderEvents(), time.perf_counter()
     with open_session(job, events, engine, restart=restart, cameras=cameras) as session:
@@ -68,7 +67,8 @@ def render(
             try:
                 for block in light_blocks(prepared, mirror_share(setup), per_pixel=setup.per_pixel):
                     wanted = on_disk.missing(session.chosen, block)
-                    run.frames(setup.for_lights(block), ambient, block, wanted)
+                    if wanted:
+                        _render_block(run, setup.for_lights(block), ambient, block, wanted)
             except BaseException:
                 with suppress(OutputError), session.folder.exclusive():  # report the first error, not one from here
                     write_manifest(directory, with_summary(manifest, run.summary(on_disk, ambient)))
@@ -80,7 +80,7 @@ def render(
 
 
 def _plan(session: RenderSession, events: RenderEvents) -> tuple[FrameSetup, Ambient, Manifest, Counter[str]]:
-    """Find ambient light, hits and manifest of the whole array, and count the rays that they took."""
+    """Estimate the ambient light, allot hits, and build the manifest of the whole array; count the rays traced."""
     prepared, output = session.prepared, session.prepared.job.output
     for name in {output.format, "exr"} if output.layers else {output.format}:
         require_writer(name)
@@ -95,54 +95,61 @@ def _plan(session: RenderSession, events: RenderEvents) -> tuple[FrameSetup, Amb
     return setup, ambient, initial_manifest(prepared, ambient, session.identity, session.settings, target), rays
 
 
+def _render_block(run: "_Run", setup: FrameSetup, ambient: Ambient, lights: range, wanted: Sequence[int]) -> None:
+    """Render the wanted cameras at a block of light positions [FA alg. 1].
+
+    Trace the hits of each frame, compose a frame as soon as the hits of its window are there, and write it.
+
+    Args:
+        setup: for the block of light positions, `lights`.
+        ambient: for all light positions.
+    """
+    target, still = array_target(run.prepared), run.prepared.still
+    i_a = image_ambient(ambient, run.prepared.lights).for_lights(lights)
+    with run.open_pool(setup) as pool, run.open_writer(target, lights) as writer:
+        window = Window(setup, i_a, pool)
+        for j in ready_frames(window, setup, [0] if still else wanted, pool):
+            images = writer.block()
+            composed = window.compose(j, images)
+            if composed.beyond and target.format.half == "auto":  # too bright for halves: some will be floats
+                composed = window.compose(j, np.empty(images.shape, np.float32))
+            writer.write(composed, wanted if still else [j], images)
+        writer.finish()
+
+
 class _Run:
-    """One run of the program over some frames; counts what it took so far."""
+    """One run of the program: records finished frames, and counts rays and time."""
 
     def __init__(
         self, prepared: Prepared, record: RecordWriter, events: RenderEvents, rays: Counter[str], started: float
     ) -> None:
-        self._prepared, self._record, self._events, self._started = prepared, record, events, started
+        self.prepared, self._record, self._events, self._started = prepared, record, events, started
         self._rays, self._stages = rays, Counter[str]()
         self._images, self._done, self._lock = 0, set[int](), Lock()
         self._pool: TracePool | None = None
 
-    def frames(self, setup: FrameSetup, ambient: Ambient, lights: range, wanted: Sequence[int]) -> None:
-        """Find every frame's hits, compose each frame as soon as its window is complete, write it, forget it.
-
-        Args:
-            setup: for a block of light positions, `lights`.
-            wanted: cameras whose images are written.
-        """
-        if not wanted:
-            return
-        prepared, target = self._prepared, array_target(self._prepared)
-        self._pool = pool = TracePool(setup, prepared.threads)
-        ambient, half = image_ambient(ambient, prepared.lights), target.format.half
-        if setup.lights.n_lights < prepared.n_lights:
-            ambient = ambient.for_lights(lights)
-        frames = [0] if prepared.still else wanted
-        window = Window(setup, ambient, pool)
-        writer = ArrayWriter(target, lights, prepared.threads, self._events.written, self._finished)
+    @contextmanager
+    def open_pool(self, setup: FrameSetup) -> Iterator[TracePool]:
+        """Open a pool whose rays and processor seconds count for this run."""
+        self._pool = pool = TracePool(setup, self.prepared.threads)
         try:
-            with pool, writer:
-                for j in ready_frames(window, setup, frames, pool):
-                    block = writer.block()
-                    composed = window.compose(j, block)
-                    if composed.beyond and half == "auto":  # too bright for halves: some will be floats
-                        composed = window.compose(j, np.empty(block.shape, np.float32))
-                    writer.write(composed, wanted if prepared.still else [j], block)
-                writer.finish()
+            with pool:
+                yield pool
         finally:
             self._rays += pool.rays()
             self._stages.update(pool.seconds())
             self._pool = None
 
+    def open_writer(self, target: ArrayTarget, lights: range) -> ArrayWriter:
+        """Return a writer that reports images and records finished frames."""
+        return ArrayWriter(target, lights, self.prepared.threads, self._events.written, self._finished)
+
     def _finished(self, done: FinishedFiles) -> None:
-        """Note that all files of a camera are on disk; from any thread."""
+        """Record that all files of a camera are on disk; called from any thread."""
         frame, pool = done.composed, self._pool
         notes = []
         if frame.bad:
-            notes = [_bad_values(frame.bad, frame.c, frame.first_bad, self._prepared.job.camera.resolution[0])]
+            notes = [_bad_values(frame.bad, frame.c, frame.first_bad, self.prepared.job.camera.resolution[0])]
         entry = Entry(
             c=done.c,
             lights=(done.planes.start, done.planes.stop),
@@ -158,8 +165,8 @@ class _Run:
             self._images += len(done.planes)
 
     def summary(self, on_disk: OnDisk, ambient: Ambient) -> Summary:
-        """What this and all other runs did; what was found damaged counts again once it was rendered anew."""
-        prepared = self._prepared
+        """Summarize this and all other runs; files found damaged count once they are rendered again."""
+        prepared = self.prepared
         records = read_records(prepared.job.output.directory, self._record.fingerprint)
         bad = {name for name, _ in on_disk.damaged}
         whole = tuple(e for e in records.entries if e.c in self._done or bad.isdisjoint(e.files))

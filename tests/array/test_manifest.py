@@ -58,8 +58,8 @@ def test_round_trip(tmp_path: Path) -> None:
     assert read_manifest(tmp_path) != make_manifest(fps=24)
 
 
-def test_the_file_says_what_the_contract_asks(tmp_path: Path) -> None:
-    """What a program reads that knows docs/guide/manifest.md alone."""
+def test_the_file_has_the_documented_keys(tmp_path: Path) -> None:
+    """Read the file as a program would that is written only from docs/guide/manifest.md."""
     manifest = make_manifest()
     table = tomllib.loads(write_manifest(tmp_path, manifest).read_text(encoding="utf-8"))
     assert table["format"] == 1
@@ -121,7 +121,7 @@ def test_file_names_sort_and_widen() -> None:
     assert names == sorted(names)
 
 
-def test_fingerprint_knows_where_each_part_ends() -> None:
+def test_a_fingerprint_depends_on_where_each_part_ends() -> None:
     assert fingerprint(b"job", b"scene") == fingerprint(b"job", memoryview(b"scene"))
     different = {fingerprint(b"job", b"scene"), fingerprint(b"jobs", b"cene"), fingerprint(b"jobscene"), fingerprint()}
     assert len(different) == 4
@@ -205,7 +205,7 @@ def test_missing_and_unreadable_manifests(tmp_path: Path) -> None:
         read_manifest(tmp_path)
 
 
-def test_unknown_keys_are_left_alone(tmp_path: Path) -> None:
+def test_unknown_keys_are_ignored(tmp_path: Path) -> None:
     text = to_toml(make_manifest()).replace("format = 1", 'format = 1\nlater = "addition"')
     (tmp_path / "manifest.toml").write_text(text, encoding="utf-8")
     assert read_manifest(tmp_path) == make_manifest()

@@ -1,4 +1,4 @@
-"""Pictures put together from the files of an array."""
+"""Pictures combined from the files of an array."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -57,7 +57,7 @@ def test_groups_ambient_and_background_are_summed(array: Manifest) -> None:
     np.testing.assert_allclose(day - night, lost * [1.0, 0.5, 0.0], atol=1e-5)
 
 
-def test_between_two_positions_pictures_are_blended(array: Manifest) -> None:
+def test_pictures_between_two_positions_are_blended(array: Manifest) -> None:
     pictures = Pictures(array)
     made = pictures.picture(0, (1.25, 0))
     np.testing.assert_allclose(made, 0.75 * pictures.picture(0, (1, 0)) + 0.25 * pictures.picture(0, (2, 0)), rtol=1e-5)

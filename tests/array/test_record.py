@@ -1,4 +1,4 @@
-"""The records of what was finished: lines that are torn, files that are removed."""
+"""Records of finished frames: torn lines, and removed files."""
 
 import sys
 
@@ -9,8 +9,8 @@ from framearray_cli.base.errors import OutputError
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="an open file cannot be removed there")
-def test_a_record_that_is_removed_while_it_is_written(tmp_path):
-    """Else hours of frames would be finished, and nobody knew."""
+def test_removing_a_record_while_it_is_written_is_an_error(tmp_path):
+    """Otherwise hours of finished frames would go unrecorded."""
     file = record_file(tmp_path, "0-3")
     with RecordWriter(file, "print", RecordedRun(cameras="0-3", processor="this one")) as record:
         record.add(Entry(c=0, lights=(0, 1), files={}), {}, 0.0)

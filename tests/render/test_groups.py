@@ -1,4 +1,4 @@
-"""Light that is stored by group of sources: added up, it is what a render of all sources gives."""
+"""Light stored by group of sources: the sum equals a render of all sources."""
 
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def rendered(scene: Path, folder: Path, sources: Any, **changes: Any) -> Pictures:
-    """Pictures of a job; nothing of the light's frames but what the sources say."""
+    """Render a job whose number of light positions follows from its sources, and open its pictures."""
     scene_table = {"file": str(scene), "background": changes.pop("background", SKY)}
     output = {"directory": str(folder), "format": "exr", "half": changes.pop("half", "never")}
     table = tiny.table(
@@ -51,7 +51,7 @@ def rendered(scene: Path, folder: Path, sources: Any, **changes: Any) -> Picture
 
 
 def at(source: Any, frame: int, factor: Any = (1.0, 1.0, 1.0)) -> dict[str, Any]:
-    """One key frame of a source as a source that stands still, without a group."""
+    """Return a fixed source, without a group, from one key frame of a source."""
     power = "irradiance" if "irradiance" in source["keys"][0] else "intensity"
     [key] = [key for key in source["keys"] if key["frame"] == frame]
     lit = (np.array(key[power]) * factor).tolist()
@@ -63,7 +63,7 @@ def grouped(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Pictures:
     return rendered(scene, tmp_path_factory.mktemp("groups") / "out", SOURCES)
 
 
-def test_what_is_stored(grouped: Pictures) -> None:
+def test_groups_are_stored_as_the_manifest_lists_them(grouped: Pictures) -> None:
     manifest = grouped.manifest
     assert manifest.axes == {"light": 2, "lamps": 3}
     assert [(group.name, group.axis, len(group.lights)) for group in manifest.groups] == [
@@ -79,10 +79,10 @@ def test_what_is_stored(grouped: Pictures) -> None:
 
 
 @pytest.mark.parametrize("place", [(0, 0), (1, 0), (0, 2)])
-def test_a_pair_of_positions_is_what_a_render_of_it_gives(
+def test_a_pair_of_positions_equals_a_render_of_it(
     scene: Path, tmp_path: Path, grouped: Pictures, place: tuple[int, int]
 ) -> None:
-    """Two light axes serve their full product."""
+    """Two light axes cover their full product."""
     sun, lamp = place
     whole = rendered(scene, tmp_path, [at(LAMP, lamp), at(SUN, sun), at(tiny.RED, 0)])
     for c in range(3):
@@ -92,7 +92,7 @@ def test_a_pair_of_positions_is_what_a_render_of_it_gives(
         assert np.abs(other - right).max() > 0.01, "the comparison can fail"
 
 
-def test_changed_light_is_what_a_render_with_it_gives(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
+def test_changed_light_equals_a_render_with_it(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
     changed = [at(LAMP, 2, FACTORS["lamps"]), at(SUN, 1, FACTORS["sun"]), at(tiny.RED, 0, FACTORS["main"])]
     whole = rendered(scene, tmp_path, changed)
     for c in range(3):
@@ -100,14 +100,14 @@ def test_changed_light_is_what_a_render_with_it_gives(scene: Path, tmp_path: Pat
         np.testing.assert_allclose(made, whole.picture(c, (0,)), rtol=2e-5, atol=2e-6)
 
 
-def test_ambient_light_that_is_put_out(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
+def test_ambient_light_can_be_turned_off(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
     dark = rendered(scene, tmp_path, [at(LAMP, 0), at(SUN, 0), at(tiny.RED, 0)], ambient={"intensity": [0.0] * 3})
     made = grouped.picture(1, (0, 0), Relight(ambient=(0.0, 0.0, 0.0)))
     np.testing.assert_allclose(made, dark.picture(1, (0,)), rtol=2e-5, atol=2e-6)
 
 
 def test_half_floats_keep_half_precision(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
-    """Each of the files that are added is within half a step of 2^-11."""
+    """Each file in the sum is within half a step of 2^-11."""
     halves = rendered(scene, tmp_path, SOURCES, half="auto")
     for place in ((0, 0), (1, 2)):
         made, exact = (
@@ -140,12 +140,12 @@ def test_a_black_background_is_not_stored(scene: Path, tmp_path: Path) -> None:
 
 
 def test_blocks_of_light_positions_and_steps_give_the_same(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
-    """A memory limit cuts the positions of all groups into blocks, wherever that falls."""
+    """A memory limit splits the positions of all groups into blocks, also in the middle of a group."""
     import framearray_cli.render.render as module
 
-    cut = [range(0, 4), range(4, 8), range(8, 9)]
+    blocks = [range(0, 4), range(4, 8), range(8, 9)]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "light_blocks", lambda *_, **__: cut)
+        patch.setattr(module, "light_blocks", lambda *_, **__: blocks)
         made = rendered(scene, tmp_path / "blocks", SOURCES)
     for file in array_files(made.manifest):
         if "layers" not in file.name:
@@ -156,7 +156,7 @@ def test_blocks_of_light_positions_and_steps_give_the_same(scene: Path, tmp_path
         assert np.mean(np.abs(near - right)) < 0.02 * np.mean(right), "ends of every axis are tested"
 
 
-def test_halves_tell_errors_of_groups(scene: Path, tmp_path: Path) -> None:
+def test_halves_report_errors_of_groups(scene: Path, tmp_path: Path) -> None:
     made = rendered(scene, tmp_path, SOURCES, half="auto", samples={"halves": True})
     found = made.manifest.summary["standard_error"]
     assert found["group"] in ("lamps", "sun", "main") and found["light"] < 3
@@ -178,7 +178,7 @@ def test_halves_tell_errors_of_groups(scene: Path, tmp_path: Path) -> None:
         ({"light": {"sources": [LAMP], "frames": 4}}, "every source has an axis of its own"),
     ],
 )
-def test_jobs_that_do_not_go_with_groups(changes: Any, message: str) -> None:
+def test_jobs_that_groups_rule_out(changes: Any, message: str) -> None:
     table = tiny.table(light={"sources": SOURCES})
     del table["light"]["frames"]
     for key, value in changes.items():
@@ -187,11 +187,11 @@ def test_jobs_that_do_not_go_with_groups(changes: Any, message: str) -> None:
         tiny.Job.model_validate(table)
 
 
-def test_notes_and_lines_tell_groups(scene: Path) -> None:
-    from dataclasses import replace as changed
+def test_notes_name_groups(scene: Path) -> None:
+    from dataclasses import replace
 
     from framearray_cli.engine.terms.ambient.estimate import Ambient
-    from framearray_cli.render.prepare import _named
+    from framearray_cli.render.prepare import _name_groups
     from framearray_cli.scene.paths.paths import lights
 
     job = tiny.Job.model_validate({**tiny.table(), "light": {"sources": SOURCES}})
@@ -207,5 +207,5 @@ def test_notes_and_lines_tell_groups(scene: Path) -> None:
         rays=1,
         notes=("ambient: standard error 50 % at light 4 after 1 walks",),
     )
-    assert _named(ambient, found).notes == ("ambient: standard error 50 % at light 1 of sun after 1 walks",)
-    assert _named(ambient, changed(found, groups=())).notes == ambient.notes
+    assert _name_groups(ambient, found).notes == ("ambient: standard error 50 % at light 1 of sun after 1 walks",)
+    assert _name_groups(ambient, replace(found, groups=())).notes == ambient.notes

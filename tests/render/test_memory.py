@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support import ROOT, tiny
 
-# A process of its own, so that nothing but the render is measured.
+# A process of its own, so that only the render is measured.
 RENDER = """
 import sys
 from pathlib import Path
@@ -32,7 +32,7 @@ print(render(job).peak_memory)
 
 
 def peak(tmp_path: Path, frames: int, size: tuple[int, int], lights: int, n_r: int) -> int:
-    """Peak memory in bytes of one render."""
+    """Return the peak memory of one render, bytes."""
     scene = tiny.save_glb(tiny.room_meshes(), tmp_path / "room.glb")
     width, height = size
     tests = str(ROOT / "tests")
@@ -47,19 +47,19 @@ def peak(tmp_path: Path, frames: int, size: tuple[int, int], lights: int, n_r: i
 
 @pytest.fixture(scope="module", autouse=True)
 def _compiled(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Kernels are there: to compile them takes memory."""
+    """Compile all kernels first, as that takes memory."""
     peak(tmp_path_factory.mktemp("first"), 2, (24, 18), 3, 1)
 
 
 @pytest.mark.slow
 def test_peak_memory_of_24_and_of_96_cameras_is_the_same(tmp_path: Path) -> None:
-    """A frame takes 11 MB here and 3 % are 16 MB: of the 72 frames more, two that stayed would show."""
+    """A frame takes 11 MB here and 3 % are 16 MB: two of the 72 additional frames, if kept, would show."""
     short, long = (peak(tmp_path, frames, (200, 150), 24, 3) for frames in (24, 96))
     assert long == pytest.approx(short, rel=0.03)
 
 
-def test_a_window_that_keeps_its_frames_would_be_seen(tmp_path: Path) -> None:
-    """The measure can fail: a larger n_r holds more frames."""
+def test_a_window_that_keeps_its_frames_would_be_detected(tmp_path: Path) -> None:
+    """The measurement can fail: a larger n_r holds more frames."""
     narrow, wide = (peak(tmp_path, 12, (120, 90), 24, n_r) for n_r in (1, 4))
     assert wide > 1.03 * narrow
 
@@ -69,8 +69,8 @@ def test_peak_memory_of_a_short_and_of_a_long_path_is_the_same(tmp_path: Path) -
     assert long == pytest.approx(short, rel=0.03)
 
 
-def test_the_peak_is_that_of_this_process_alone() -> None:
-    """A process that a large one starts is not large itself."""
+def test_the_peak_is_only_that_of_this_process() -> None:
+    """A child of a large process does not count as large."""
     ballast = np.ones(400 * 2**20, np.uint8)
     code = "from framearray_cli.base.memory import peak_memory; print(peak_memory())"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)

@@ -1,4 +1,4 @@
-"""What a render reports while it runs, and what a render in parts passes on of its workers."""
+"""Events of a render, and those that a render in parts passes on from its workers."""
 
 import ast
 import inspect
@@ -27,7 +27,7 @@ TARGET = Target(
 
 
 class Kept(PartEvents):
-    """Keeps what is reported."""
+    """Keeps all reported events."""
 
     def __init__(self) -> None:
         self.seen: list[Any] = []
@@ -46,22 +46,22 @@ class Kept(PartEvents):
 
 
 def sent(**message: Any) -> tuple[float, dict[str, Any]]:
-    """A message as it arrives: tuples become lists on the way."""
+    """Return a message as it arrives: tuples become lists on the way."""
     return 0.0, json.loads(json.dumps({"chunk": 0, **message}))
 
 
-def test_of_messages_that_all_workers_send_the_first_is_reported() -> None:
-    hear: list[Any] = []
-    client = SimpleNamespace(subscribe_topic=lambda topic, handler: hear.append(handler))
+def test_only_the_first_of_the_messages_that_all_workers_send_is_reported() -> None:
+    handlers: list[Any] = []
+    client = SimpleNamespace(subscribe_topic=lambda topic, handler: handlers.append(handler))
     session: Any = SimpleNamespace(folder=None, prepared=SimpleNamespace(n_lights=4))
     events = Kept()
     ChunkQueue(client, {"topic": "t"}, Chunks(each=((0, 1), (2, 3)), more=0.0), session, events)
     for _ in range(2):
-        hear[0](sent(compiling=True))
-        hear[0](sent(ambient=asdict(FIGURES)))
-        hear[0](sent(target=asdict(TARGET)))
-    hear[0](sent(left=5))
-    hear[0](sent(left=3))
+        handlers[0](sent(compiling=True))
+        handlers[0](sent(ambient=asdict(FIGURES)))
+        handlers[0](sent(target=asdict(TARGET)))
+    handlers[0](sent(left=5))
+    handlers[0](sent(left=3))
     assert events.seen == ["compiling", FIGURES, TARGET, 3, 2]
     assert hash(events.seen[1]) and hash(events.seen[2])  # tuples again
 
@@ -93,8 +93,8 @@ def test_lines_of_a_target_that_is_not_reached() -> None:
 @pytest.mark.parametrize(
     ("module", "name", "base"), [(command, "Shown", PartEvents), (worker, "_Reporter", RenderEvents)]
 )
-def test_who_listens_listens_to_events_that_there_are(module: Any, name: str, base: type) -> None:
-    """A method of another name would never be called, without an error."""
+def test_listeners_override_existing_events(module: Any, name: str, base: type) -> None:
+    """A method with a wrong name would never be called, and nothing would report it."""
     [found] = [
         node
         for node in ast.walk(ast.parse(inspect.getsource(module)))
@@ -106,4 +106,4 @@ def test_who_listens_listens_to_events_that_there_are(module: Any, name: str, ba
     assert {method for method in methods if not method.startswith("_")} - own <= events
     assert "written" in methods
     if base is PartEvents:
-        assert events <= methods, "an event that nobody sees"
+        assert events <= methods, "an event that is not shown"

@@ -1,4 +1,4 @@
-"""A render that goes on, or that is split: the same bytes as one that was not."""
+"""A render that is resumed or split writes the same bytes as one that is not."""
 
 import random
 from pathlib import Path
@@ -49,7 +49,7 @@ def whole(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Counting(RenderEvents):
-    """Counts what is written, and stops after some images."""
+    """Counts written images, and stops after some."""
 
     def __init__(self, most: float = np.inf) -> None:
         self.images, self._most = 0, most
@@ -60,7 +60,7 @@ class Counting(RenderEvents):
             raise OutputError("stopped by the test")
 
 
-def test_parts_in_any_order_are_the_whole(scene: Path, tmp_path: Path, whole: Path) -> None:
+def test_parts_in_any_order_equal_the_whole(scene: Path, tmp_path: Path, whole: Path) -> None:
     parts = [(0, 1), (2, 5), (3,), (4, 6)]
     random.Random(3).shuffle(parts)
     for k, part in enumerate(parts):
@@ -94,7 +94,7 @@ def test_a_stopped_render_goes_on(scene: Path, tmp_path: Path, whole: Path) -> N
 
 
 def test_blocks_of_lights_go_on(scene: Path, tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run that was stopped in its second block, and goes on with another limit of memory."""
+    """A run stopped in its second block, and resumed with other blocks."""
     monkeypatch.setattr(rendering, "light_blocks", lambda *_, **__: [range(0, 1), range(1, 3)])
     with pytest.raises(OutputError, match="stopped"):
         render(job(scene, tmp_path), Counting(most=N + 5))
@@ -109,7 +109,7 @@ def test_torn_and_foreign_lines_do_not_count(scene: Path, tmp_path: Path, whole:
     [file] = record_files(tmp_path)
     lines = file.read_bytes().splitlines(keepends=True)
     entries = [k for k, line in enumerate(lines) if b'"c":' in line]
-    for cut in (
+    for foreign in (
         b"",
         b"{",
         b'{"c":0}',
@@ -119,7 +119,7 @@ def test_torn_and_foreign_lines_do_not_count(scene: Path, tmp_path: Path, whole:
         b"[" * 100000,
         b"7",
     ):
-        torn = [*lines[: entries[1]], cut + b"\n", *lines[entries[1] : entries[2]], lines[entries[2]][:-20]]
+        torn = [*lines[: entries[1]], foreign + b"\n", *lines[entries[1] : entries[2]], lines[entries[2]][:-20]]
         file.write_bytes(b"".join(torn))
         assert scan_output(tmp_path, read_manifest(tmp_path).fingerprint).images == 3 * 2
         assert read_records(tmp_path, "sha256:other").entries == ()
@@ -143,8 +143,8 @@ def test_no_flipped_bit_of_a_record_is_believed(scene: Path, tmp_path: Path) -> 
         assert set(map(repr, found)) <= set(map(repr, known))
 
 
-def test_a_part_reads_its_own_files_alone(scene: Path, tmp_path: Path, whole: Path) -> None:
-    """Else parts of a long path would read all of it, each of them."""
+def test_a_part_reads_only_its_own_files(scene: Path, tmp_path: Path, whole: Path) -> None:
+    """Otherwise each part of a long path would read all of it."""
     render(job(scene, tmp_path), cameras=(0, 1))
     name = sorted(images(tmp_path))[0]
     (tmp_path / name).write_bytes(b"")
@@ -154,7 +154,7 @@ def test_a_part_reads_its_own_files_alone(scene: Path, tmp_path: Path, whole: Pa
     assert images(tmp_path) == images(whole)
 
 
-def test_damage_is_found_and_mended(scene: Path, tmp_path: Path, whole: Path) -> None:
+def test_damage_is_found_and_repaired(scene: Path, tmp_path: Path, whole: Path) -> None:
     render(job(scene, tmp_path))
     rng = random.Random(7)
     names = rng.sample(sorted(images(tmp_path)), 6)
@@ -171,22 +171,22 @@ def test_damage_is_found_and_mended(scene: Path, tmp_path: Path, whole: Path) ->
     records = read_records(tmp_path, read_manifest(tmp_path).fingerprint)
     checksums = records.checksums()
     assert sorted(name for name, _ in find_damage(tmp_path, checksums, checksums)) == sorted(names)
-    heard: list[int] = []
+    reported: list[int] = []
 
-    class Hears(Counting):
+    class Scanned(Counting):
         def scanning(self, files: int) -> None:
-            heard.append(files)
+            reported.append(files)
 
         def scanned(self, on_disk: Any, wanted: int) -> None:
-            heard.append(len(on_disk.damaged))
+            reported.append(len(on_disk.damaged))
 
-    render(job(scene, tmp_path), Hears())
-    assert heard == [len(images(whole)), 6]
+    render(job(scene, tmp_path), Scanned())
+    assert reported == [len(images(whole)), 6]
     assert images(tmp_path) == images(whole)
     assert scan_output(tmp_path, read_manifest(tmp_path).fingerprint).damaged == ()
 
 
-def test_another_processor_is_told(scene: Path, tmp_path: Path) -> None:
+def test_another_processor_is_reported(scene: Path, tmp_path: Path) -> None:
     render(job(scene, tmp_path), cameras=(0,))
     [file] = record_files(tmp_path)
     lines = file.read_bytes().splitlines()
@@ -200,22 +200,22 @@ def test_another_processor_is_told(scene: Path, tmp_path: Path) -> None:
 def test_notes_stay_where_only_the_manifest_was_missing(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A render that was killed after its last image and before it wrote the manifest."""
-    begun: list[Manifest] = []
+    """A render killed after its last image and before it wrote the manifest."""
+    written: list[Manifest] = []
     keep = rendering.write_manifest
-    monkeypatch.setattr(rendering, "write_manifest", lambda folder, m: (begun.append(m), keep(folder, m)))
+    monkeypatch.setattr(rendering, "write_manifest", lambda folder, m: (written.append(m), keep(folder, m)))
     few = {"ambient": {"paths": None}, "light": {"sources": [{**tiny.SUN}]}}
     monkeypatch.setattr(ambient, "TARGET_ERROR", 1e-9)
     render(job(scene, tmp_path, **few))
     whole = read_manifest(tmp_path).summary
     assert any("set ambient.paths for more" in note for note in whole["notes"])
-    keep(tmp_path, begun[0])
+    keep(tmp_path, written[0])
     assert render(job(scene, tmp_path, **few)).images == 0
     assert read_manifest(tmp_path).summary["notes"] == whole["notes"]
     assert read_manifest(tmp_path).summary["finished"] is True
 
 
-def test_a_camera_that_stands_still(scene: Path, tmp_path: Path) -> None:
+def test_a_camera_at_rest_is_rendered_in_parts(scene: Path, tmp_path: Path) -> None:
     still = {"camera": {**CAMERA, "keys": WALK["keys"][:1]}}
     render(job(scene, tmp_path / "whole", **still))
     render(job(scene, tmp_path / "parts", **still), cameras=(5, 6))
@@ -223,7 +223,7 @@ def test_a_camera_that_stands_still(scene: Path, tmp_path: Path) -> None:
     assert images(tmp_path / "parts") == images(tmp_path / "whole")
 
 
-def test_a_digest_tells_any_flipped_bit(tmp_path: Path) -> None:
+def test_a_digest_detects_any_flipped_bit(tmp_path: Path) -> None:
     data = bytearray(np.random.default_rng(1).bytes(5000))
     (tmp_path / "a").write_bytes(data)
     known = digest(tmp_path / "a")
@@ -256,13 +256,13 @@ def test_ranges(text: str, frames: tuple[int, ...]) -> None:
 @pytest.mark.parametrize(
     "text", ["", "a", "3-1x1", "1-3x-1", "0-9x0", "0-9y1", "-1", "0-10", "10-0", "1..3", "1-2-3", "9" * 50]
 )
-def test_what_is_no_range(text: str) -> None:
+def test_other_texts_are_refused_as_ranges(text: str) -> None:
     with pytest.raises(ValueError, match="expected"):
         parse_frames(text, 10)
 
 
 class Blocked(RenderEvents):
-    """Starts other runs from within one."""
+    """Starts other runs during a render."""
 
     def __init__(self, *others: Any) -> None:
         self.found_others: list[str] = []
@@ -281,7 +281,7 @@ class Blocked(RenderEvents):
 
 
 def test_two_runs_in_one_folder(scene: Path, tmp_path: Path, whole: Path) -> None:
-    """Side by side on other cameras; not on the same ones, and neither is taken away from the other."""
+    """Runs on different cameras work side by side; runs on the same cameras, and --restart, are refused."""
     whole_job = job(scene, tmp_path)
     blocked = Blocked(
         lambda: render(whole_job, cameras=(0, 1)),
@@ -298,7 +298,7 @@ def test_two_runs_in_one_folder(scene: Path, tmp_path: Path, whole: Path) -> Non
     assert not list((tmp_path / "records").glob("*.lock"))
 
 
-def test_a_lock_of_a_run_that_was_killed_stops_nobody(scene: Path, tmp_path: Path) -> None:
+def test_a_lock_of_a_killed_run_stops_no_other(scene: Path, tmp_path: Path) -> None:
     (tmp_path / "records").mkdir()
     (tmp_path / "records" / "0-6.lock").write_text("")
     assert render(job(scene, tmp_path), cameras=(1,)).images == 3

@@ -1,4 +1,4 @@
-"""The chunks of a render, handed out to Dask workers one at a time, and taken back."""
+"""Queue of the chunks of a render: submit them to Dask workers, one per worker, and collect the results."""
 
 import threading
 import time
@@ -16,18 +16,18 @@ from ..target.pilot import Target
 from .chunks import Chunks
 from .progress import PartEvents
 
-# Seconds between two looks at what goes on, and for which workers get to stop by themselves.
+# Seconds between two checks for results, and seconds that workers get to stop.
 LOOK_EVERY, STOPPING = 0.5, 5.0
-# How often Dask may give a chunk up, because some workers in turn died on it, without an image more.
+# Times that Dask may give up a chunk, because several workers died on it, without a further image.
 MOST_DEATHS = 2
 LOST = "the Dask scheduler has gone away"
 
 
 def count_workers(client: Any) -> int:
-    """How many workers there are.
+    """Return the number of workers.
 
     Raises:
-        WorkerError: the scheduler is not there any more.
+        WorkerError: the scheduler is gone.
     """
     try:
         if client.status == "running":
@@ -38,7 +38,7 @@ def count_workers(client: Any) -> int:
 
 
 def lacks_program(error: BaseException | None) -> bool:
-    """Whether a worker could not load what it was to run; Dask may hand on no more than the words of the error."""
+    """Whether a worker could not import this program; Dask may pass on only the text of the error."""
     while error is not None:
         if isinstance(error, ImportError) or "ModuleNotFoundError" in str(error) or "ImportError" in str(error):
             return True
@@ -47,7 +47,7 @@ def lacks_program(error: BaseException | None) -> bool:
 
 
 class ChunkQueue:
-    """The chunks of a render: those that wait, and those that workers are at."""
+    """The chunks of a render: those waiting, and those in progress on workers."""
 
     def __init__(
         self, client: Any, common: dict[str, Any], chunks: Chunks, session: RenderSession, events: PartEvents
@@ -57,37 +57,37 @@ class ChunkQueue:
         self._waiting = list(reversed(chunks.each))
         self._at_work: dict[Any, tuple[int, ...]] = {}
         self._left = {chunk[0]: len(chunk) * self._n_lights for chunk in chunks.each}
-        self._came_back, self._lock = threading.Event(), threading.Lock()  # a chunk came back; of what is counted
-        self._deaths: dict[int, tuple[int, int]] = {}  # by chunk: how many, and images left at the last
+        self._chunk_ended, self._lock = threading.Event(), threading.Lock()  # set when a chunk ends; guards the counts
+        self._deaths: dict[int, tuple[int, int]] = {}  # by chunk: number of deaths, and images left at the last
         self._received: set[str] = set()
         self.notes: tuple[str, ...] = ()
         self.peak_memory = self.images = 0
         client.subscribe_topic(common["topic"], self._receive)
 
     def render_all(self) -> None:
-        """Hand out chunks until all are rendered.
+        """Submit chunks until all are rendered.
 
         Raises:
-            FrameArrayError: what a worker met, the first time that one met something.
+            FrameArrayError: the first error of a worker.
         """
         while self._waiting or self._at_work:
             for _ in range(max(count_workers(self._client), 1) - len(self._at_work)):
                 if self._waiting:
-                    self._hand_out(self._waiting.pop())
-            self._came_back.wait(LOOK_EVERY)
-            self._came_back.clear()
+                    self._submit(self._waiting.pop())
+            self._chunk_ended.wait(LOOK_EVERY)
+            self._chunk_ended.clear()
             for future in [future for future in self._at_work if future.done()]:
-                self._take_back(future, self._at_work.pop(future))
+                self._collect(future, self._at_work.pop(future))
 
-    def _hand_out(self, chunk: tuple[int, ...]) -> None:
+    def _submit(self, chunk: tuple[int, ...]) -> None:
         from .worker import render_chunk
 
         future = self._client.submit(render_chunk, self._common, chunk, pure=False)
         self._at_work[future] = chunk
-        future.add_done_callback(lambda _: self._came_back.set())
+        future.add_done_callback(lambda _: self._chunk_ended.set())
 
-    def _take_back(self, future: Any, chunk: tuple[int, ...]) -> None:
-        """Look at what became of a chunk."""
+    def _collect(self, future: Any, chunk: tuple[int, ...]) -> None:
+        """Take the result of a chunk."""
         from distributed import KilledWorker
 
         try:
@@ -109,10 +109,10 @@ class ChunkQueue:
         self.peak_memory = max(self.peak_memory, result["peak_memory"])
 
     def _retry(self, chunk: tuple[int, ...]) -> None:
-        """Hand out a chunk that several workers died on, if it got further meanwhile; else something is wrong with it.
+        """Queue a chunk again that several workers died on, if it progressed meanwhile.
 
         Raises:
-            WorkerError: it did not.
+            WorkerError: it did not progress.
         """
         first = chunk[0]
         deaths, left = self._deaths.get(first, (0, -1))
@@ -120,13 +120,13 @@ class ChunkQueue:
         if deaths > MOST_DEATHS:
             raise WorkerError(
                 f"cameras {frames_text(chunk)}: workers died on them again and again, most likely of too little "
-                "memory; have fewer workers on a machine, or see what they say"
+                "memory; run fewer workers per machine, or read their logs"
             )
         self._deaths[first] = deaths, self._left[first]
         self._waiting.append(chunk)
 
     def _error(self, result: dict[str, Any]) -> BaseException:
-        """What a worker met, as if it were met here."""
+        """Rebuild the error of a worker."""
         problems, kind = result["problems"], result["error"]
         found: BaseException
         if kind == "MemoryError":
@@ -141,7 +141,7 @@ class ChunkQueue:
         return found
 
     def _receive(self, event: tuple[float, dict[str, Any]]) -> None:
-        """Take a message of a worker; in a thread of Dask."""
+        """Handle a message of a worker; called in a thread of Dask."""
         message = event[1]
         if "left" in message:
             self._count_written(message["chunk"], message["left"])
@@ -155,14 +155,14 @@ class ChunkQueue:
             self._events.compiling()
 
     def _first(self, kind: str, message: dict[str, Any]) -> bool:
-        """Whether this is the first message of a kind, which all workers send and one is reported of."""
+        """Whether this is the first message of a kind that all workers send and only one event reports."""
         if kind not in message or kind in self._received:
             return False
         self._received.add(kind)
         return True
 
     def _count_written(self, chunk: int, left: int, *, last: bool = False) -> None:
-        """Count what a chunk has written; messages that come after its end do not count."""
+        """Count the images that a chunk has written; ignore messages that arrive after its end."""
         with self._lock:
             if chunk not in self._left:
                 return
@@ -174,8 +174,8 @@ class ChunkQueue:
             self._events.written(written)
 
     def stop(self) -> None:
-        """Take all chunks back, and wait a moment until workers have let go of the folder."""
-        with suppress(Exception):  # the scheduler may be gone; what stopped the render is reported
+        """Cancel all chunks, and wait briefly until workers have released the folder."""
+        with suppress(Exception):  # the scheduler may be gone; report the error that stopped the render
             self._client.cancel(list(self._at_work), force=True)
         end = time.monotonic() + STOPPING
         with suppress(OutputError):

@@ -1,4 +1,4 @@
-"""A render whose chunks are handed out to Dask workers, on this machine or on others that share its folders."""
+"""Render in parts: chunks of the camera path on Dask workers, on this machine or others that share its folders."""
 
 import secrets
 import time
@@ -30,19 +30,19 @@ from .dask import connect, require_dask, start_local
 from .progress import PartEvents
 from .queue import LOOK_EVERY, ChunkQueue, count_workers, lacks_program
 
-# Share of the free memory that workers get; the rest is for files that the system keeps in memory.
+# Share of the free memory for workers; the rest is for the file cache of the system.
 SHARE = 0.9
-PROBE = ".parts-"  # begins the name of a file in the folder, which workers look for
+PROBE = ".parts-"  # prefix of a file in the folder that workers look for
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorkerOptions:
-    """Which workers render.
+    """Workers that render.
 
     Attributes:
-        workers: processes of this machine, if no scheduler is named.
+        workers: number of processes of this machine, if no scheduler is given.
         address: of a Dask scheduler.
-        chunk: frames of a chunk, at most; None: `chunks.default_size`.
+        chunk: most frames per chunk; None: `chunks.default_size`.
     """
 
     workers: int = 1
@@ -60,12 +60,12 @@ def render_in_parts(
 ) -> Summary:
     """Render as `render.render` does, with the same bytes; each chunk of the camera path is rendered by one worker.
 
-    A worker that dies costs the frames that its chunk had under way: the chunk is handed out again, and goes on.
+    When a worker dies, only the frames in progress are lost: its chunk is submitted again and continues.
 
     Raises:
         JobError, SceneError, OutputError: as `render`; also where no scheduler answers.
         MissingExtraError: Dask is not installed.
-        WorkerError: workers do not see what they need, or die again and again.
+        WorkerError: workers cannot see their files, or die repeatedly.
     """
     started = time.perf_counter()
     require_dask()
@@ -87,11 +87,11 @@ def render_in_parts(
         try:
             queue.render_all()
         except BaseException:
-            cancel_alarm()  # a signal that was heard must not break off what follows
+            cancel_alarm()  # an earlier signal must not interrupt what follows
             queue.stop()
             with suppress(OutputError):  # report the first error, not one from here
                 summary = _summarize(session, queue, time.perf_counter() - started)
-                if missed := summary.there - session.on_disk.images - queue.images:  # of which no message came
+                if missed := summary.there - session.on_disk.images - queue.images:  # images that no message reported
                     events.written(missed)
                 _write_manifest(session, summary)
             raise
@@ -108,7 +108,7 @@ def _split(session: RenderSession, options: WorkerOptions, n_workers: int) -> Ch
 
 
 def _memory(prepared: Prepared, workers: int) -> int:
-    """Bytes that each worker of this machine may take.
+    """Return the bytes that each worker of this machine may take.
 
     Raises:
         JobError: the job does not fit into that.
@@ -125,7 +125,7 @@ def _memory(prepared: Prepared, workers: int) -> int:
 
 
 def _await_workers(client: Any, options: WorkerOptions, events: PartEvents) -> int:
-    """How many workers there are, once there is one."""
+    """Wait for a worker; return the number of workers."""
     if not count_workers(client):
         events.awaiting_workers(options.address)
     while not (n := count_workers(client)):
@@ -135,7 +135,7 @@ def _await_workers(client: Any, options: WorkerOptions, events: PartEvents) -> i
 
 @contextmanager
 def _share(job: Job, session: RenderSession, options: WorkerOptions, memory: int | None) -> Iterator[dict[str, Any]]:
-    """What all chunks share; a file in the output folder, there meanwhile, shows workers that it is this one."""
+    """Put together what all chunks share, with a temporary file by which workers recognize the output folder."""
     from .worker import Common
 
     folder, scene = job.output.directory, job.scene.file
@@ -159,7 +159,7 @@ def _share(job: Job, session: RenderSession, options: WorkerOptions, memory: int
     )
     try:
         with session.folder.exclusive():
-            if not session.folder.other_locks():  # nobody works here, so what a killed program left may go
+            if not session.folder.other_locks():  # no run is active, so files of killed programs can go
                 for old in probe.parent.glob(f"{PROBE}*"):
                     old.unlink()
         probe.touch()
@@ -173,7 +173,7 @@ def _share(job: Job, session: RenderSession, options: WorkerOptions, memory: int
 
 
 def _require_fit_workers(client: Any, common: dict[str, Any]) -> None:
-    """Look whether all workers can render the job.
+    """Check that all workers can render the job.
 
     Raises:
         WorkerError: one cannot.
@@ -190,7 +190,7 @@ def _require_fit_workers(client: Any, common: dict[str, Any]) -> None:
 
 
 def _summarize(session: RenderSession, queue: ChunkQueue, seconds: float) -> Summary:
-    """Put together what all chunks left in the folder."""
+    """Summarize the records of all chunks in the folder."""
     prepared, before = session.prepared, session.on_disk.records
     records = read_records(prepared.job.output.directory, session.identity.fingerprint)
     rays = sum((Counter(run.rays) for run in records.runs), Counter[str]())
@@ -203,7 +203,7 @@ def _summarize(session: RenderSession, queue: ChunkQueue, seconds: float) -> Sum
 
 
 def _write_manifest(session: RenderSession, summary: Summary) -> None:
-    """Write the manifest of the whole over those of the chunks."""
+    """Replace the manifests of the chunks by that of the whole render."""
     folder = session.prepared.job.output.directory
     with session.folder.exclusive():
         manifest = replace(read_manifest(folder), job=session.identity.job)

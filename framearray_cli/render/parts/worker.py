@@ -1,4 +1,4 @@
-"""What a Dask worker does: renders one chunk, reports how far it is, and stops when nobody wants the chunk any more."""
+"""Render one chunk on a Dask worker, report its progress, and stop when the chunk is cancelled."""
 
 import signal
 import socket
@@ -29,11 +29,12 @@ from ..render import render
 from ..summary import Summary
 from ..target.pilot import Target
 
-# Seconds between two looks whether the chunk is still wanted, and between two messages on how far it is.
+# Seconds between two checks whether the chunk is still wanted, and between two progress messages.
 LOOK_EVERY, SEND_EVERY = 0.2, 0.5
-# Seconds that a chunk waits for one that still runs in this process before it is given to another worker.
+# Seconds that a chunk waits for one still running in this process before Dask reschedules it, and between two attempts
+# to lock its cameras.
 RETRY_AFTER = 1.0
-# Seconds that a chunk waits for cameras which a run that is about to end still holds.
+# Seconds that a chunk waits for cameras that an ending run still locks.
 PATIENCE = 60.0
 
 _one_at_a_time = threading.Lock()
@@ -41,16 +42,16 @@ _one_at_a_time = threading.Lock()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Common:
-    """What all chunks of a render share.
+    """Parameters that all chunks of a render share.
 
     Attributes:
-        version: of the program that hands out the chunks.
-        table: the job, see `jobfile.job_table`; `file`: where it was read, for messages.
-        folder: of the images; `probe`: a file in it, which only those see who see the same folder.
+        version: of the program that submits the chunks.
+        table: the job, see `job_table`; `file`: its path, for messages.
+        folder: of the images; `probe`: a file in it, visible only to workers that see the same folder.
         scene: size and checksum of the scene file.
-        threads: of a chunk; None: those that the worker was given.
+        threads: per chunk; None: those of the worker.
         memory: bytes that a chunk may take; None: as the job says.
-        topic: that messages go to.
+        topic: of messages.
     """
 
     version: str
@@ -64,7 +65,7 @@ class Common:
     topic: str
 
     def job(self, threads: int) -> Job:
-        """The job of a chunk, on a worker with so many threads."""
+        """Return the job of a chunk, on a worker with `threads` threads."""
         found = job_of_table(self.table, Path(self.file), Path(self.folder))
         machine = {"threads": self.threads or found.render.threads or min(threads, MOST_THREADS)}
         machine |= {"memory": self.memory} if self.memory else {}
@@ -72,7 +73,7 @@ class Common:
 
 
 def worker_problem(common: dict[str, Any]) -> str:
-    """Why a worker cannot render chunks of a job; "" if it can."""
+    """Return why this worker cannot render chunks of a job; "" if it can."""
     here = f"worker {socket.gethostname()}"
     if common["version"] != __version__:
         return f"{here}: has framearray {__version__}, expected {common['version']}; install the same version"
@@ -92,13 +93,13 @@ def worker_problem(common: dict[str, Any]) -> str:
 def render_chunk(common: dict[str, Any], cameras: tuple[int, ...]) -> dict[str, Any]:
     """Render some cameras of a job; runs on a worker.
 
-    What goes wrong is returned, so that Dask neither logs it nor tries again.
+    Errors are returned, so that Dask neither logs them nor retries.
 
     Args:
         common: the fields of `Common`.
 
     Returns:
-        "error": name of its class, "problems" and "notes", or "summary": what `render` gave, a plain table.
+        "notes" and "peak_memory" of the render, or "error" (name of its class), "problems" and "notes".
     """
     worker = get_worker()
     if not _one_at_a_time.acquire(timeout=RETRY_AFTER):
@@ -118,13 +119,13 @@ def render_chunk(common: dict[str, Any], cameras: tuple[int, ...]) -> dict[str, 
     except MemoryError:
         return {"error": "MemoryError", "problems": [], "notes": []}
     except _Unwanted:
-        return {}  # nobody reads it
+        return {}  # the result of a cancelled task is not read
     finally:
         _one_at_a_time.release()
 
 
 def _retry_while_busy(run: Callable[[], Summary]) -> Summary:
-    """Wait for cameras that are held: by a run that was stopped, or a worker that lost its scheduler."""
+    """Retry while a run that was stopped, or a worker that lost its scheduler, still locks the cameras."""
     end = time.monotonic() + PATIENCE
     while True:
         try:
@@ -136,11 +137,11 @@ def _retry_while_busy(run: Callable[[], Summary]) -> Summary:
 
 
 class _Unwanted(BaseException):
-    """The chunk was taken back."""
+    """The chunk was cancelled."""
 
 
 class _Reporter(RenderEvents):
-    """Reports how many images are left, and ends the render when the chunk was taken back."""
+    """Reports the number of images left, and ends the render when the chunk is cancelled."""
 
     def __init__(self, worker: Worker, common: Common, cameras: tuple[int, ...]) -> None:
         self._worker, self.common, self._first = worker, common, cameras[0]
@@ -150,12 +151,12 @@ class _Reporter(RenderEvents):
         self.notes: tuple[str, ...] = ()
 
     def send(self, **message: Any) -> None:
-        """Send something to the one who hands out the chunks."""
+        """Send a message to the program that submits the chunks."""
         self._worker.log_event(self.common.topic, {"chunk": self._first, **message})
 
     @contextmanager
     def watch_task(self) -> Iterator[None]:
-        """Look from time to time whether the chunk is still wanted."""
+        """Check regularly whether the chunk is still wanted."""
         done = threading.Event()
 
         def watch() -> None:
@@ -206,7 +207,7 @@ class _Reporter(RenderEvents):
 
 
 class IgnoreSignals(WorkerPlugin):
-    """Workers of this machine get Ctrl-C from the terminal too; the program that started them ends them."""
+    """Makes workers of this machine ignore signals: the terminal sends them Ctrl-C too, but their parent ends them."""
 
     name = "framearray-signals"
 

@@ -120,7 +120,7 @@ def test_exr_is_float_where_a_half_would_be_infinite(tmp_path: Path, sign: int) 
     np.testing.assert_array_equal(read_image(tmp_path / "beyond.exr"), image)
 
 
-def test_exr_cuts_to_half_where_asked(tmp_path: Path) -> None:
+def test_exr_clamps_to_half_where_asked(tmp_path: Path) -> None:
     image = noisy()
     image[3, 4] = [65505, 1e30, -70000]
     write_image(tmp_path / "a.exr", image, ImageFormat(half="always"))
@@ -151,7 +151,7 @@ def test_jpg_is_close(tmp_path: Path) -> None:
     assert np.abs(codes - srgb8_from_linear(image)).mean() < 1.5
 
 
-def test_exposure_brightens_the_screen_formats_alone(tmp_path: Path) -> None:
+def test_exposure_brightens_only_the_screen_formats(tmp_path: Path) -> None:
     image = smooth() / 8
     write_image(tmp_path / "a.png", image, ImageFormat(format="png", exposure=1.0))
     np.testing.assert_array_equal(srgb8_from_linear(read_image(tmp_path / "a.png")), srgb8_from_linear(2 * image))
@@ -227,7 +227,7 @@ def test_threads_write_different_images(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", FORMATS)
 @pytest.mark.parametrize(("size", "limit"), [(200, 4096), (40, 300), (40, 0)])
 def test_a_full_disk_is_an_error_and_leaves_nothing(tmp_path: Path, name: str, size: int, limit: int) -> None:
-    """A limit on the size of a file stands for the full disk: the same calls fail, with EFBIG for ENOSPC."""
+    """A limit on the size of a file stands for the full disk: the same calls fail, with EFBIG instead of ENOSPC."""
     write_image(tmp_path / "warm", noisy(), ImageFormat(format=name))
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -311,7 +311,7 @@ def test_sizes_beyond_any_job_take_no_memory(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("error")
-def test_large_pngs_of_a_job_are_no_bombs(tmp_path: Path) -> None:
+def test_large_pngs_of_a_job_are_not_refused_as_bombs(tmp_path: Path) -> None:
     path = tmp_path / "a.png"
     PIL.Image.new("1", (16384, 16384)).save(path)  # Pillow's own `open` raises from 179 million pixels on
     check_image(path, (16384, 16384))
@@ -431,7 +431,7 @@ def test_impossible_frame_rates_are_refused(fps: float) -> None:
 
 
 def test_comparisons_can_fail(tmp_path: Path) -> None:
-    """One code of one pixel changed in a PNG is seen."""
+    """A change of one code of one pixel in a PNG is detected."""
     image = noisy()
     write_image(tmp_path / "a.png", image, ImageFormat(format="png"))
     with PIL.Image.open(tmp_path / "a.png") as picture:

@@ -1,4 +1,4 @@
-"""Automatic settings: the cheapest that are exact enough, from the camera path alone, and the same every time."""
+"""Automatic settings: the cheapest that are exact enough, computed only from the job, and the same every time."""
 
 from collections.abc import Callable
 
@@ -28,7 +28,7 @@ REACH = 16
 
 
 def made_up(share: Callable[[int], float], n_frames: int = 200, n: int = 400) -> Acceptance:
-    """Hits in the middle of a path, of which a share is seen k frames away; a place that is lost stays lost."""
+    """Return hits in the middle of a path, of which share(k) is seen k frames away; lost places stay lost."""
     lot = (np.arange(n) + 0.5) / n
     offsets = np.arange(-REACH, REACH + 1)
     frame = np.full(n, n_frames // 2, np.int32)
@@ -47,14 +47,14 @@ STILL = made_up(lambda k: 1.0, n_frames=1)
 SLOW = made_up(lambda k: 0.995**k)
 USUAL = made_up(lambda k: 0.97**k)
 FAST = made_up(lambda k: max(1.0 - 0.3 * k, 0.0))
-CUT = made_up(lambda k: float(k == 0))
-PATHS = {"still": STILL, "slow": SLOW, "usual": USUAL, "fast": FAST, "cut": CUT}
+JUMP = made_up(lambda k: float(k == 0))
+PATHS = {"still": STILL, "slow": SLOW, "usual": USUAL, "fast": FAST, "jump": JUMP}
 
 
 def cheapest(enough: Callable[[Reuse], bool], of: Model, n_r: list[int], hits: list[float]) -> Reuse:
-    """By trying everything."""
-    all_of_them = [Reuse(n_r=k, hits=h) for k in n_r for h in hits]
-    good = [reuse for reuse in all_of_them if enough(reuse)]
+    """Search all settings."""
+    tried = [Reuse(n_r=k, hits=h) for k in n_r for h in hits]
+    good = [reuse for reuse in tried if enough(reuse)]
     return min(good, key=of.time)
 
 
@@ -90,7 +90,7 @@ def test_the_faster_the_camera_the_shorter_the_window() -> None:
     job = tiny.job(**AUTO)
     chosen = [
         choose(model(PATHS[name]), accuracy_test(model(PATHS[name]), job), candidates(job, 200))
-        for name in ("slow", "fast", "cut")
+        for name in ("slow", "fast", "jump")
     ]
     windows = [one.n_r for one in chosen]
     assert windows[0] > windows[1] > windows[2] == 0
@@ -98,9 +98,9 @@ def test_the_faster_the_camera_the_shorter_the_window() -> None:
 
 
 def test_where_nothing_reaches_the_error_the_window_ends_where_hits_are_lost() -> None:
-    """More frames bring rays and no hits; fewer leave out hits that are nearly free."""
+    """More frames cost rays and bring no hits; fewer leave out hits that are nearly free."""
     job = tiny.job(reuse={"n_r": "auto"}, samples={"hits": 2})
-    for found, n_r in ((CUT, 0), (made_up(lambda k: float(k <= 2)), 2)):
+    for found, n_r in ((JUMP, 0), (made_up(lambda k: float(k <= 2)), 2)):
         assert choose(model(found), accuracy_test(model(found), job), candidates(job, 200)).n_r == n_r
 
 
@@ -114,15 +114,15 @@ def test_no_window_is_longer_than_the_path() -> None:
 
 
 def test_places_that_were_just_revealed_are_no_worse_than_by_default() -> None:
-    """In 3 of 100 pixels nobody but the eye itself sees anything: few frames of many hits serve them better."""
+    """In 3 of 100 pixels only the eye itself sees the place: few frames of many hits serve them better."""
     job, found = tiny.job(**AUTO), model(made_up(lambda k: 1.0 if k == 0 else 0.97))
     chosen = choose(found, accuracy_test(found, job), candidates(job, 200))
     assert found.least(chosen) >= found.least(DEFAULT) == 2
-    alone = choose(found, lambda reuse: found.variance(reuse) <= wanted_variance(job), candidates(job, 200))
-    assert found.least(alone) < 2 and found.time(alone) < found.time(chosen)
+    by_variance = choose(found, lambda reuse: found.variance(reuse) <= wanted_variance(job), candidates(job, 200))
+    assert found.least(by_variance) < 2 and found.time(by_variance) < found.time(chosen)
 
 
-def test_blocks_of_lights_make_long_windows_dear() -> None:
+def test_blocks_of_lights_make_long_windows_expensive() -> None:
     """Settings that need much memory find their hits once for each block."""
     job, found = tiny.job(**AUTO), model(SLOW)
     free = choose(found, accuracy_test(found, job), candidates(job, 200))
@@ -139,7 +139,7 @@ def test_a_still_camera_has_as_many_hits_as_by_default() -> None:
 
 
 def test_time_by_hand() -> None:
-    """Every term of the sum once, on a path where all is seen and reflects."""
+    """Compute every term of the sum by hand, on a path where every eye sees every hit and all reflect."""
     found = Acceptance(
         n_frames=1000, frame=np.array([500], np.int32), density=np.ones((1, 5)), reflecting=1.0, shadow_rays=10.0
     )
@@ -151,8 +151,8 @@ def test_time_by_hand() -> None:
     right = native * (e.EYE_RAY + 3 * e.OBSCURANCE_RAY + rays + 3 * e.SORT + 10 * e.SHADOW_RAY)
     right += 3 * e.LOOK_UP + 20 * (3 * native * e.ADD + e.STORE)
     assert one.time(Reuse(n_r=1, hits=2)) == pytest.approx(right)
-    dearer = Model(found=found, n_lights=20, obscurance=3, balance=True).time(Reuse(n_r=1, hits=2))
-    assert dearer == pytest.approx(right + native * (rays + 9 * e.WEIGH))
+    balanced = Model(found=found, n_lights=20, obscurance=3, balance=True).time(Reuse(n_r=1, hits=2))
+    assert balanced == pytest.approx(right + native * (rays + 9 * e.WEIGH))
 
 
 def test_path_ends_count_as_they_are_rendered() -> None:
@@ -164,26 +164,26 @@ def test_path_ends_count_as_they_are_rendered() -> None:
     assert model(found).counts(Reuse(n_r=3, hits=2)).tolist() == [14]  # 4, 4, 4 and 2
 
 
-def test_spread_numbers_lie_in_the_middle() -> None:
+def test_evenly_spaced_numbers_lie_in_the_middle() -> None:
     assert evenly_spaced(5, 16) == [0, 1, 2, 3, 4] and evenly_spaced(12, 3) == [2, 6, 10] and evenly_spaced(1, 8) == [0]
 
 
 def test_expected_hits_are_those_of_a_render() -> None:
-    """A probe of every frame foretells how many hits pixels rest on, native and outer, path ends included."""
+    """A probe of every frame predicts the number of hits per pixel, native and outer, path ends included."""
     job = tiny.job(camera=tiny.WALK, reuse={"n_r": 2}, samples={"hits": 2})
     inputs = tiny.prepared(job)
     with open_embree(inputs) as embree:
         found = probe(inputs, embree, 3)
     assert found.frame.tolist() == sorted(found.frame) and set(found.frame.tolist()) == set(range(6))
-    foretold = model(found).counts(Reuse(n_r=2, hits=2))
+    predicted = model(found).counts(Reuse(n_r=2, hits=2))
     rendered = np.stack([frame.hits for frame in tiny.render_frames(inputs).composed])
-    spread_of_mean = np.std(foretold) / len(foretold) ** 0.5
-    # escaped rays and mirrors are not foretold: they are few, and their directions are seen as other hits are
-    assert abs(float(foretold.mean()) - float(rendered.mean())) < 4 * spread_of_mean
-    assert abs(float(model(found).counts(Reuse(n_r=1, hits=2)).mean()) - float(rendered.mean())) > 4 * spread_of_mean
+    error_of_mean = np.std(predicted) / len(predicted) ** 0.5
+    # escaped rays and mirrors are not predicted: they are few, and neighbours see them as they see other hits
+    assert abs(float(predicted.mean()) - float(rendered.mean())) < 4 * error_of_mean
+    assert abs(float(model(found).counts(Reuse(n_r=1, hits=2)).mean()) - float(rendered.mean())) > 4 * error_of_mean
 
 
-def test_what_is_chosen_is_a_job_of_numbers() -> None:
+def test_the_choice_is_a_job_of_numbers() -> None:
     inputs = tiny.prepared(tiny.job(camera=tiny.WALK, **AUTO))
     with open_embree(inputs) as embree:
         first, why = resolve_auto(inputs, embree)
@@ -211,7 +211,7 @@ def test_a_job_of_numbers_stays_as_it_is() -> None:
 
 
 @pytest.mark.parametrize("empty", ["nothing reflects", "nothing is hit"])
-def test_a_scene_without_noise_gets_settings_all_the_same(empty: str) -> None:
+def test_a_scene_without_noise_gets_settings_too(empty: str) -> None:
     black = tiny.Material(name="Black", reflectivity=(0.0, 0.0, 0.0))
     away = [key | {"target": [9.0, 1.0, 99.0]} for key in tiny.WALK["keys"]]
     scene = tiny.scene_of(tiny.box((-1, 0, -1), (1, 2, 1)), black)

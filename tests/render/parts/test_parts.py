@@ -1,4 +1,4 @@
-"""Chunks of the camera path: where it is cut, and what halos cost."""
+"""Chunks of the camera path: where it is split, and what halos cost."""
 
 import importlib
 
@@ -11,7 +11,7 @@ from framearray_cli.render.parts.chunks import default_size, plan_chunks, split_
 
 
 @pytest.mark.parametrize(("n", "size"), [(1, 1), (5, 9), (24, 24), (25, 24), (96, 24), (100, 24), (101, 7), (8, 1)])
-def test_chunks_are_few_and_alike(n, size):
+def test_chunks_are_few_and_of_almost_equal_length(n, size):
     cameras = tuple(range(3, 3 + n))
     chunks = split_cameras(cameras, size)
     assert sum(chunks, ()) == cameras
@@ -21,25 +21,25 @@ def test_chunks_are_few_and_alike(n, size):
 
 
 @pytest.mark.parametrize(("n", "size"), [(96, 24), (100, 24), (101, 7), (14, 4)])
-def test_a_farm_cuts_in_the_same_places(n, size):
+def test_a_farm_splits_in_the_same_places(n, size):
     """The extension TASK_CHUNKING, as openjd-model reads it."""
     model = pytest.importorskip("openjd.model._step_param_space_iter")
     chunks = [f"{chunk[0]}-{chunk[-1]}" for chunk in split_cameras(range(n), size)]
     assert chunks == model.divide_int_list_into_contiguous_chunks(size, list(range(n)))
 
 
-def test_nothing_is_cut_into_nothing():
+def test_no_cameras_give_no_chunks():
     assert split_cameras((), 4) == []
     assert default_size(0, 3) == 1
 
 
-def test_cameras_with_gaps_are_cut_too():
+def test_cameras_with_gaps_are_split_too():
     assert split_cameras((0, 3, 6, 9, 12), 2) == [(0, 3), (6, 9), (12,)]
 
 
 @pytest.mark.parametrize("n_r", [0, 1, 3, 9])
 @pytest.mark.parametrize("size", [1, 4, 24, 100])
-def test_the_cost_is_that_of_the_frames_that_are_found(n_r, size):
+def test_the_cost_is_that_of_the_frames_traced(n_r, size):
     n = 60
     hits = frame_hits(n, n_r, 1.0)
     chunks = plan_chunks(range(n), size, n, n_r)
@@ -56,19 +56,19 @@ def test_halos_of_long_chunks_cost_about_2_n_r_over_their_length():
     assert chunks_line(chunks) == "100 chunks of 24 frames; halos add 25% to the hits"
 
 
-def test_what_is_told():
+def test_line_about_chunks():
     assert chunks_line(plan_chunks(range(5), 9, 5, 2)) == "1 chunk of 5 frames"
     assert chunks_line(plan_chunks(range(1), 9, 1, 0)) == "1 chunk of 1 frame"
     assert chunks_line(plan_chunks(range(5), 2, 5, 0)) == "3 chunks of 1 to 2 frames; halos add 0% to the hits"
 
 
-def test_a_camera_that_stands_still_has_one_frame_to_find():
+def test_a_camera_at_rest_has_one_frame_to_trace():
     assert plan_chunks(range(8), 2, 8, 3, still=True).more == 3.0
 
 
 @pytest.mark.parametrize("workers", [1, 2, 3, 7])
 @pytest.mark.parametrize(("n", "n_r"), [(1, 0), (5, 3), (96, 3), (288, 3), (1000, 16), (20000, 0)])
-def test_by_default_all_workers_have_work_to_the_end(workers, n, n_r):
+def test_by_default_all_workers_are_busy_to_the_end(workers, n, n_r):
     size = default_size(n, n_r, workers)
     assert 1 <= size <= max(8 * n_r, 16)
     count = len(split_cameras(range(n), size))

@@ -1,4 +1,4 @@
-"""How hits are allotted to blocks of pixels: against a general solver, and with pilots that know little."""
+"""Allotment of hits to blocks of pixels: against a general solver, and with noisy pilots."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ def lognormal(*shape: int, seed: int = 1) -> Any:
     return np.exp(np.random.default_rng(seed).normal(size=shape))
 
 
-def test_places_alike_get_the_same_and_the_target_is_met() -> None:
+def test_equal_blocks_get_equal_hits_and_the_target_is_met() -> None:
     u = np.repeat([[5.0], [1.0]], 40, axis=1)
     hits = fewest_hits(u, 0.1, MANY)
     np.testing.assert_allclose(hits, np.broadcast_to(hits[:, :1], hits.shape), rtol=1e-12)
@@ -27,8 +27,8 @@ def test_places_alike_get_the_same_and_the_target_is_met() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_no_others_are_fewer(seed: int) -> None:
-    """Of all hits with at most the wanted error, found by a solver that knows nothing of Neyman."""
+def test_no_allotment_has_fewer_hits(seed: int) -> None:
+    """Compare with a general solver for the fewest hits with at most the wanted error."""
     u, wanted = lognormal(1, 8, seed=seed), 0.2
     found = fewest_hits(u, wanted, MANY)
     assert variances(u, found)[0] <= wanted * 1.001
@@ -56,14 +56,14 @@ def test_hits_stay_within_their_bounds() -> None:
 
 @pytest.mark.parametrize("n_r", [0, 3])
 def test_a_pilot_does_not_flatter_itself(n_r: int) -> None:
-    """Pairs that know little; what is told, and what is true by the variances that they were drawn from.
+    """Compare the expected error of noisy pairs with the true one, from the variances that they were drawn from.
 
     Every eye sees every place in the same block, so that the hits of a window add up block by block.
     """
     blocks, rng, wanted, frames = blocks_of(240, 160), np.random.default_rng(5), 0.02, 12
     rows, columns = blocks.shape
     true_u = np.exp(np.sin(np.arange(rows)[:, None] / 5) + np.cos(np.arange(columns) / 4)).reshape(-1)
-    told, true, naive = [], [], []
+    reported, true, naive = [], [], []
     for _ in range(6):
         variance = true_u * rng.chisquare(1, (2, frames, blocks.n))
         eyes = [range(max(c - n_r, 0), min(c + n_r, frames - 1) + 1) for c in range(frames)]
@@ -79,14 +79,14 @@ def test_a_pilot_does_not_flatter_itself(n_r: int) -> None:
             for c, window in enumerate(eyes)
         ]
         hits, expected = allot(variance / shared, blocks, wanted, MANY, witnesses)
-        told.append(expected.mean())
+        reported.append(expected.mean())
         arriving = np.stack([independent_hits(hits[window.start : window.stop]).sum(axis=0) for window in eyes])
         true.append((true_u / arriving).mean())
-        alone = fewest_hits((variance / shared).mean(axis=0), wanted, MANY)
-        naive.append(variances(true_u / shared, alone).mean())
-    np.testing.assert_allclose(told, wanted, rtol=0.01)
+        unjudged = fewest_hits((variance / shared).mean(axis=0), wanted, MANY)
+        naive.append(variances(true_u / shared, unjudged).mean())
+    np.testing.assert_allclose(reported, wanted, rtol=0.01)
     error = np.std(true) / np.sqrt(len(true))
-    # the hits of the frame itself are those of half a pilot where they are judged, which is a little too severe
+    # pairs count the hits of half a pilot for their own frame, which is a little too severe
     assert 0.85 * wanted < np.mean(true) < wanted + 4 * error
     assert np.mean(naive) > 1.3 * wanted  # a pilot that judges itself is off by far more
 
@@ -116,7 +116,7 @@ def test_blocks_cover_the_frame_and_are_few(width: int, height: int) -> None:
         np.testing.assert_array_equal(blocks.of_pixel[blocks.some_pixel(random)], np.arange(blocks.n))
 
 
-def test_pixels_have_the_number_above_or_below_and_all_the_same_over_some_frames() -> None:
+def test_pixels_have_rounded_hits_whose_mean_over_frames_is_exact() -> None:
     blocks = blocks_of(64, 48)
     hits = np.random.default_rng(3).uniform(0.25, 5, (1, blocks.n)).astype(np.float32).repeat(64, axis=0)
     allotment = Allotment(blocks=blocks, hits=hits)
@@ -129,7 +129,7 @@ def test_pixels_have_the_number_above_or_below_and_all_the_same_over_some_frames
     np.testing.assert_allclose(allotment.mean(), counts.mean(axis=1), rtol=0.01)
 
 
-def test_passes_give_every_pixel_its_number() -> None:
+def test_passes_give_every_pixel_its_hits() -> None:
     rng = np.random.default_rng(4)
     counts, order = rng.integers(0, 5, 300).astype(np.int32), rng.permutation(300).astype(np.int32)
     passes = passes_of_counts(order, counts)
@@ -140,4 +140,4 @@ def test_passes_give_every_pixel_its_number() -> None:
     np.testing.assert_array_equal(found, counts)
     ends = [part.first_hit + part.n for part in passes]
     assert [part.first_hit for part in passes] == [0, *ends[:-1]] and ends[-1] == counts.sum()
-    assert independent_hits(np.array([2.0])) > 2  # more than one hit of an eye is worth more than so many of many eyes
+    assert independent_hits(np.array([2.0])) > 2  # two hits of one eye count more than two of different eyes

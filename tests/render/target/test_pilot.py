@@ -1,4 +1,4 @@
-"""`samples.error`: the pilot, the weights of hits whose number differs, and renders that rest on them."""
+"""`samples.error`: the pilot, the weights of hits whose number varies by block, and renders with allotted hits."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +26,7 @@ from framearray_cli.render.target.pilot import allot_hits, hit_pairs
 
 
 def job(**changes: Any) -> Job:
-    """A tiny job that says an error instead of hits; along a walk, frames are reused."""
+    """Return a tiny job with an error instead of hits; its camera walks, so frames are reused."""
     table = tiny.table(**{"camera": WALK, "reuse": {"n_r": 2}} | changes)
     del table["samples"]["hits"]
     return Job.model_validate(table)
@@ -38,7 +38,7 @@ def allotted_setup(inputs: Any) -> Any:
         return allot_hits(inputs, setup, ambient)
 
 
-def test_weights_of_places_with_different_hits_are_those_of_the_formula() -> None:
+def test_weights_of_blocks_with_different_hits_follow_the_formula() -> None:
     rng, n, n_r, n_c, blocks = np.random.default_rng(2), 50, 1, 5, blocks_of(24, 16)
     pixel = rng.integers(OUTSIDE, 24 * 16, (n_c, n)).astype(np.int32)
     density = rng.random((n_c, n)) * (pixel != OUTSIDE)
@@ -58,7 +58,7 @@ def test_weights_of_places_with_different_hits_are_those_of_the_formula() -> Non
 
 
 @pytest.mark.parametrize("weights", ["average", "balance"])
-def test_frames_rest_on_the_hits_that_were_allotted(weights: str) -> None:
+def test_frames_have_the_hits_allotted(weights: str) -> None:
     inputs = tiny.prepared(job(samples={"error": 0.05}, reuse={"n_r": 2, "weights": weights}))
     with tiny.open_embree(inputs) as embree:
         planned, ambient = tiny.plan_work(inputs, embree)
@@ -94,7 +94,7 @@ def test_noisier_places_get_more_hits() -> None:
     assert (tighter.per_pixel > setup.per_pixel).all()
 
 
-def test_the_cap_binds_and_is_told() -> None:
+def test_the_cap_binds_and_is_reported() -> None:
     _, target = allotted_setup(tiny.prepared(job(samples={"error": 1e-4, "most_hits": 3})))
     assert target.capped > 0.9 and target.expected > target.error
     assert "samples.most_hits" in target_lines(target)[1]
@@ -131,7 +131,7 @@ def composed(setup: Any, ambient: Any, pool: Any) -> Any:
     return np.stack([frame.images for frame in tiny.frames_of(setup, ambient, pool)])
 
 
-def test_no_pixel_stays_without_a_hit() -> None:
+def test_every_pixel_gets_a_hit() -> None:
     inputs = tiny.prepared(job(camera=WALK | {"resolution": [5, 3]}, samples={"error": 5.0}))
     with tiny.open_embree(inputs) as embree:
         planned, ambient = tiny.plan_work(inputs, embree)
