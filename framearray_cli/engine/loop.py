@@ -1,9 +1,9 @@
-"""The frame loop [FA alg. 1]: the hits of every eye are found once, in the order of the path."""
+"""The frame loop [FA alg. 1]: find the hits of each eye once, and compose each frame as soon as its window is full."""
 
 from collections import deque
 from collections.abc import Iterator, Sequence
 
-from .frames.frame import find_frame
+from .frames.frame import find_hits
 from .frames.setup import FrameSetup
 from .frames.threads import TracePool
 from .images.window import Window
@@ -13,25 +13,24 @@ from .terms.ambient.estimate import Ambient
 def ready_frames(window: Window, setup: FrameSetup, wanted: Sequence[int], pool: TracePool) -> Iterator[int]:
     """Find the hits that the wanted frames show, and yield each of these frames as soon as it can be composed.
 
-    A frame may be composed several times until the next one is asked for; then the window drops what no later frame
-    shows.
+    The caller may compose a frame more than once before it asks for the next one.
 
     Args:
         window: an empty one.
         wanted: frames in rising order.
     """
     waiting = deque(wanted)
-    for c in setup.frames_for(wanted):
-        window.add(find_frame(setup, c, pool))
-        while waiting and setup.frames_around(waiting[0], setup.n_r)[-1] <= c:
+    for c in setup.eyes_for(wanted):
+        window.add(find_hits(setup, c, pool))
+        while waiting and setup.eyes_of(waiting[0])[-1] <= c:
             j = waiting.popleft()
             window.fill_holes(j)
             yield j
-            window.drop(j, needed=waiting[0] - setup.n_r if waiting else setup.n_frames)
+            window.drop(j, needed=setup.eyes_of(waiting[0])[0] if waiting else setup.n_frames)
 
 
 def window_of(j: int, setup: FrameSetup, ambient: Ambient, pool: TracePool) -> Window:
-    """A window that holds all that frame j shows."""
+    """A window that holds all hits that frame j shows."""
     window = Window(setup, ambient, pool)
     next(ready_frames(window, setup, [j], pool))
     return window

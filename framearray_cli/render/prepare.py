@@ -7,7 +7,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.memory import available_cores, resident_memory
 from framearray_cli.engine.embree import EmbreeScene, Engine
-from framearray_cli.engine.frames.passes import frame_hits, turns
+from framearray_cli.engine.frames.passes import frame_hits, frames_per_turn
 from framearray_cli.engine.frames.records import BY_SAMPLE
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.hits.hits import World
@@ -177,7 +177,7 @@ def _halves(job: Job, *, still: bool) -> int:
     if not job.samples.halves:
         return 0
     by_sample = job.hits >= FEWEST_SPLIT or still or job.n_r == 0
-    return BY_SAMPLE if by_sample else turns(job.hits)
+    return BY_SAMPLE if by_sample else frames_per_turn(job.hits)
 
 
 def eye_cameras(prepared: Prepared) -> Cameras:

@@ -8,7 +8,7 @@ from typing import Any
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.record import ArrayRecords
 from framearray_cli.base.memory import peak_memory
-from framearray_cli.engine.images.standard_error import summed_up
+from framearray_cli.engine.images.standard_error import error_summary
 from framearray_cli.engine.kernels.kernel import processor
 from framearray_cli.scene.paths.paths import Lights
 
@@ -106,7 +106,7 @@ def _processor_notes(records: ArrayRecords) -> list[str]:
 def _standard_error(lights: Lights, errors: dict[tuple[int, int], tuple[float, float]]) -> dict[str, Any]:
     """Return the manifest's table of standard errors; with groups, of planes lit by sources only."""
     lit = {p for p, plane in enumerate(lights.planes) if plane.lit}
-    found: dict[str, Any] = summed_up({(c, p): error for (c, p), error in errors.items() if p in lit})
+    found: dict[str, Any] = error_summary({(c, p): error for (c, p), error in errors.items() if p in lit})
     for group in lights.groups:
         if found["light"] in group.positions:
             return found | {"light": found["light"] - group.positions.start, "group": group.name}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support import tiny
 
-from framearray_cli.engine.images.band import MOST
+from framearray_cli.engine.images.band import HITS_AT_ONCE
 from framearray_cli.engine.inputs.cameras import OUTSIDE, Cameras, project
 from framearray_cli.engine.kernels.kernel import kernel
 from framearray_cli.scene.files import Material
@@ -82,9 +82,9 @@ def wall_job(first: Any, last: Any, **changes: Any) -> Any:
 
 
 def rounding(hits: float, weights: str = "average") -> float:
-    """The most that float32 may lose of a sum of equal hits: a rounding a hit among `MOST`, and one for each of those
-    sums; beside some dozen roundings of each hit. Weights that are not whole are summed hit by hit."""
-    return (hits / MOST + MOST + 24 + (hits if weights == "balance" else 0)) * 2.0**-24
+    """The most that float32 may lose of a sum of equal hits: one rounding per hit among `HITS_AT_ONCE`, and one per sum
+    of these; beside some dozen roundings of each hit. Weights that are not whole are summed hit by hit."""
+    return (hits / HITS_AT_ONCE + HITS_AT_ONCE + 24 + (hits if weights == "balance" else 0)) * 2.0**-24
 
 
 def wall(half: float) -> Any:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from framearray_cli.base.arrays import with_room
-from framearray_cli.engine.frames.records import INDIRECT, LIT, REFLECTIVITY, WEIGHT, HitRecords, Placed
+from framearray_cli.engine.frames.records import INDIRECT, LIT, REFLECTIVITY, WEIGHT, HitRecords, HitsByPixel
+from framearray_cli.engine.images.accumulate import accumulate
 from framearray_cli.engine.images.band import empty_band
-from framearray_cli.engine.images.compose import HitSource, SourceList, accumulate
+from framearray_cli.engine.images.sources import HitSource, SourceList
 from framearray_cli.engine.kernels.simd import LANES
 
 
@@ -20,9 +21,9 @@ def mean_of_many(n: int) -> tuple[Any, Any]:
     row[:, WEIGHT], row[:, LIT] = 1, 1
     row[:, REFLECTIVITY : REFLECTIVITY + 3] = rng.random((n, 3))
     row[:, INDIRECT : INDIRECT + 3] = rng.random((n, 3))
-    placed = Placed(start=np.array([0, n], np.int32), order=np.arange(n, dtype=np.int32))
+    by_pixel = HitsByPixel(start=np.array([0, n], np.int32), order=np.arange(n, dtype=np.int32))
     band = empty_band(1, 3)
-    parts = SourceList([HitSource(placed, HitRecords(row=row, irradiance=irradiance))])
+    parts = SourceList([HitSource(by_pixel, HitRecords(row=row, irradiance=irradiance))])
     accumulate(band, 0, 1, parts.addresses, 1, 3, True)
     light = row[:, REFLECTIVITY : REFLECTIVITY + 3, None].astype(np.float64) / np.pi * irradiance
     exact = [light.mean(axis=0).ravel(), row[:, INDIRECT : INDIRECT + 3].mean(axis=0, dtype=np.float64)]
@@ -32,6 +33,6 @@ def mean_of_many(n: int) -> tuple[Any, Any]:
 
 @pytest.mark.parametrize("n", [1, 64, 65, 10_000, 1_000_000])
 def test_a_million_hits_in_one_pixel(n: int) -> None:
-    """Sums in float32 lose a rounding a hit; even over a million of them that stays below a ten-thousandth."""
+    """Sums in float32 lose one rounding per hit; even over a million of them that stays below a ten-thousandth."""
     found, exact = mean_of_many(n)
     assert np.abs(found / exact - 1).max() < 1e-4

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from support import closed_forms as forms
 from support.stages import Part, look, make_job, point, quad, result_of, sun, write_scene
 
-from framearray_cli.engine.frames.threads import Scratch
+from framearray_cli.engine.frames.scratch import Scratch
 from framearray_cli.engine.hits.hits import SURFACE
 from framearray_cli.engine.hits.native import Samples, native_hits
 from framearray_cli.engine.terms.direct import direct

@@ -1,11 +1,11 @@
 """The door to Embree: build a scene, find first hits, test visibility.
 
-Kernels trace packets through a `Tracer`, which holds only addresses. So compiled kernels can be cached, and two engines
-can serve the same kernels:
+Kernels trace packets through a `Tracer`, which holds only addresses. Therefore compiled kernels can be cached, and two
+engines serve the same kernels:
 
 - `packets`: Embree's C functions `rtcIntersect16` and `rtcOccluded16`, 16 rays per call. The default.
 - `embreex`: the public API of embreex, which calls Embree once per ray. The fallback where the symbols cannot be
-  reached, and the twin that tests compare with.
+  reached, and the twin that tests compare packets with.
 """
 
 from types import TracebackType

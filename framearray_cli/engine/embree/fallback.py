@@ -1,4 +1,4 @@
-"""The same interface over embreex's public API: slower, and independent of how the wheel was linked."""
+"""Tracing through embreex's public API: slower than packets, but independent of how the wheel was linked."""
 
 import ctypes
 from typing import Any
@@ -29,13 +29,13 @@ from .packets import (
 )
 
 _CALLBACK = ctypes.CFUNCTYPE(None, *[ctypes.c_ssize_t] * 4)
-_FAR = 1e37  # embreex's own "no limit"; larger distances mean the same
-# Follow a ray through at most this many cut-out layers; each costs a call.
+_FAR = 1e37  # embreex's "no limit"; larger distances mean the same
+# A ray passes at most this many cut-out layers; each costs a call.
 _MAX_LAYERS = 256
 
 
 class EmbreexScene:
-    """Owns an embreex scene and the C callbacks that kernels call; each callback acquires the GIL."""
+    """An embreex scene and the C callbacks that kernels call; each callback acquires the GIL."""
 
     def __init__(self, scene: Scene) -> None:
         from embreex.mesh_construction import TriangleMesh
@@ -45,7 +45,7 @@ class EmbreexScene:
         self._n_opaque = scene.n_opaque
         self._scene = EmbreeScene()
         self._scene_has_masks = scene.n_opaque < len(scene.corners)
-        # One geometry: embreex numbers geometries in the order they are added, triangles as they come.
+        # one geometry: embreex then numbers triangles as in the scene
         self._mesh = TriangleMesh(self._scene, scene.corners)
         self._callbacks = (_CALLBACK(self._intersect), _CALLBACK(self._occlude))
         addresses = [ctypes.cast(callback, ctypes.c_void_p).value or 0 for callback in self._callbacks]
@@ -58,7 +58,7 @@ class EmbreexScene:
     def first_hits(self, origins: Float32, directions: Float32, tnear: Float32, tfar: Float32) -> dict[str, Any]:
         """Trace rays (n, 3), (n, 3), (n,), (n,) and return embreex's output: tfar, u, v, primID, Ng.
 
-        Hits nearer than tnear and hits that are cut out do not count.
+        Ignores hits nearer than tnear and hits that are cut out.
         """
         out = dict(self._scene.run(origins, directions, tfar.copy(), query="INTERSECT", output=1))
         if self._scene_has_masks or tnear.any():
@@ -68,14 +68,14 @@ class EmbreexScene:
     def _pass_over(
         self, origins: Float32, directions: Float32, tnear: Float32, tfar: Float32, out: dict[str, Any]
     ) -> None:
-        """Continue each ray behind a hit that does not count, until it finds one that does, or nothing."""
+        """Trace each ray on behind an ignored hit, until it finds one that counts, or nothing."""
         start = np.zeros(len(origins), np.float32)
         todo = self._ignored(out, tnear)
         for _ in range(_MAX_LAYERS):
             rays = np.flatnonzero(todo)
             if not len(rays):
                 return
-            # step past the layer by a few units in the last place of all that its distance was computed from
+            # step past the layer by a few units in the last place of the largest number that its distance came from
             reach = np.abs(origins[rays]).max(axis=1) / np.maximum(np.abs(directions[rays]).max(axis=1), 1e-30)
             step = np.float32(4e-7) * (out["tfar"][rays] + start[rays] + reach)
             start[rays] = np.maximum(out["tfar"][rays] + step, tnear[rays])
@@ -93,16 +93,18 @@ class EmbreexScene:
             todo[rays] = same | self._ignored({name: out[name][rays] for name in out}, tnear[rays])
 
     def _ignored(self, out: dict[str, Any], tnear: Float32) -> Any:
-        """(n,) whether a hit does not count."""
+        """Whether to ignore each hit, (n,)."""
         return ((out["primID"] >= 0) & (out["tfar"] < tnear)) | self._cut_out(out["primID"], out["u"], out["v"])
 
     def _cut_out(self, triangles: Int32, u: Float32, v: Float32) -> Any:
+        """Whether the alpha mask cuts out each hit, (n,)."""
         cut = np.zeros(len(triangles), bool)
         for i in np.flatnonzero(triangles >= self._n_opaque):
             cut[i] = is_cut_out(self._surfaces, triangles[i], u[i], v[i])
         return cut
 
     def _intersect(self, n_packets: int, _scene: int, address: int, _unused: int) -> None:
+        """Find the first hits of packets at an address; see `Tracer.batch`."""
         packets = _view(address, n_packets, HIT_ROWS)
         live, rays = _rays(packets)
         out = self.first_hits(*rays)
@@ -117,6 +119,7 @@ class EmbreexScene:
         bits[where[0], GEOMETRY, where[1]] = np.where(out["primID"] < 0, MISS, np.where(masked, MASKED, OPAQUE))
 
     def _occlude(self, n_packets: int, _scene: int, address: int, _unused: int) -> None:
+        """Test whether anything blocks the rays of packets at an address; see `Tracer.batch`."""
         packets = _view(address, n_packets, RAY_ROWS)
         live, rays = _rays(packets)
         origins, directions, tnear, tfar = rays
@@ -130,12 +133,13 @@ class EmbreexScene:
 
 
 def _view(address: int, n_packets: int, rows: int) -> Float32:
+    """Packets at an address, (n_packets, rows, 16)."""
     block = (ctypes.c_float * (n_packets * rows * LANES)).from_address(address)
     return np.ctypeslib.as_array(block).reshape(n_packets, rows, LANES)
 
 
 def _rays(packets: Float32) -> tuple[Any, tuple[Float32, Float32, Float32, Float32]]:
-    """Find the lanes that are not idle, and their rays in the form that embreex takes."""
+    """The lanes that are not idle, and their rays: origins, directions, tnear, tfar."""
     live = packets[:, TFAR] >= 0  # (n_packets, 16)
     by_lane = packets.transpose(0, 2, 1)[live]
     origins = np.ascontiguousarray(by_lane[:, ORIGIN : ORIGIN + 3])

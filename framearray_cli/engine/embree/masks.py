@@ -1,6 +1,6 @@
-"""Alpha masks as an Embree filter: for every kind of ray, a hit whose texel is cut out never happened.
+"""Alpha masks as an Embree filter: rays of every kind pass through points that a mask cuts out.
 
-Embree calls the filter only for masked triangles, so scenes without masks pay nothing.
+Embree calls the filter for masked triangles only, so scenes without masks pay nothing.
 """
 
 from functools import cache
@@ -59,10 +59,10 @@ def _surfaces_at(table: Any) -> Surfaces:
 
 @cache
 def _filter() -> Any:
-    """The compiled callback `void (RTCFilterFunctionNArguments*)`."""
+    """The filter as a compiled callback `void (RTCFilterFunctionNArguments*)`."""
 
     def filter_masked(address: int) -> None:
-        # what Embree passes: n rays, which of them have a hit, the user's table, and the hits
+        # what Embree passes: n rays, a flag per ray with a hit, the address of a `MaskTable`, and the hits
         arguments = _carray(_pointer(address), (6,), np.int64)
         n = _carray(_pointer(address + 40), (1,), np.uint32)[0]
         valid = _carray(_pointer(arguments[_VALID]), (n,), np.int32)
@@ -71,7 +71,7 @@ def _filter() -> Any:
         triangles = _carray(_pointer(arguments[_HIT]), (8, n), np.uint32)
         s = _surfaces_at(table)
         first_masked = table[13]
-        # take back the hits on points that are cut out
+        # reject the hits on points that are cut out
         for lane in range(n):
             if valid[lane] != 0:
                 triangle = np.int64(triangles[_HIT_TRIANGLE, lane]) + first_masked
@@ -85,7 +85,7 @@ def _filter() -> Any:
 
 
 class MaskTable:
-    """What the filter reads: the addresses of the scene's arrays in one block. Keeps those arrays alive."""
+    """What the filter reads: the addresses and lengths of the scene's arrays in one block. Keeps the arrays alive."""
 
     def __init__(self, scene: Scene) -> None:
         s = surfaces(scene)

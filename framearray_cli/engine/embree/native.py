@@ -13,7 +13,7 @@ from framearray_cli.scene.scene import Scene
 
 from ..kernels.simd import LANES
 from .masks import MaskTable
-from .packets import MASKED, OPAQUE, Tracer, aligned
+from .packets import MASKED, OPAQUE, Tracer, aligned_zeros
 
 _TRIANGLES = 0  # RTC_GEOMETRY_TYPE_TRIANGLE
 _INDEX_BUFFER, _VERTEX_BUFFER = 0, 1
@@ -27,8 +27,8 @@ _ROBUST = 1 << 2  # RTC_SCENE_FLAG_ROBUST: no ray slips between neighbouring tri
 def embree_library() -> ctypes.CDLL | None:
     """Load Embree from the embreex wheel; None where its symbols cannot be reached.
 
-    Opening the extension module again resolves every `rtc...` symbol through the module's own dependency, whatever the
-    wheel calls that library.
+    Opening the extension module again resolves every `rtc...` symbol through the module's own dependency, under any name
+    that the wheel gives that library.
     """
     from embreex import rtcore_scene
 
@@ -67,7 +67,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {
 
 
 class NativeScene:
-    """Owns an Embree device and scene, built and traced through Embree's C functions."""
+    """An Embree device and scene, built and traced through Embree's C functions."""
 
     def __init__(self, scene: Scene, library: ctypes.CDLL) -> None:
         self._library = library
@@ -75,7 +75,7 @@ class NativeScene:
         self._scene = library.rtcNewScene(self._device)
         self._kept: list[Any] = [scene]  # memory that Embree points into
         library.rtcSetSceneFlags(self._scene, _ROBUST)
-        # Embree reads 16 bytes per vertex of 12: the last one needs a float of padding
+        # Embree reads 16 bytes per vertex of 12: the last vertex needs a float of padding
         vertices = np.empty(scene.corners.size + 4, np.float32)
         vertices[: scene.corners.size] = scene.corners.reshape(-1)
         self._kept.append(vertices)
@@ -89,7 +89,7 @@ class NativeScene:
         problem = library.rtcGetDeviceError(self._device)
         if problem:
             raise SceneError(f"embree: building {n} triangles failed with error {problem}")
-        self._lanes = aligned(LANES).view(np.int32)
+        self._lanes = aligned_zeros(LANES).view(np.int32)
         self._lanes[:] = -1
         # RTCIntersectArguments and RTCOccludedArguments: flags, features; pointers to context, filter and function
         self._arguments = np.zeros(8, np.uint64)
@@ -105,6 +105,7 @@ class NativeScene:
         )
 
     def _attach(self, vertices: Float32, start: int, stop: int, masks: "MaskTable | None") -> None:
+        """Add triangles start to stop - 1 as a geometry, with a filter if they have masks."""
         if start == stop:
             return
         library = self._library
@@ -131,7 +132,7 @@ class NativeScene:
 
 
 def _configuration() -> bytes | None:
-    """Embree's settings for a device: none, but in tests that force an instruction set."""
+    """Embree's settings for a device: none, except where tests force an instruction set."""
     return os.environ.get("FRAMEARRAY_EMBREE", "").encode() or None
 
 

@@ -1,9 +1,8 @@
 """Rays in packets, and how kernels trace them.
 
-Kernels write rays where Embree reads them: in blocks of 16, structures of arrays, in Embree's own layout (RTCRay16,
-RTCRayHit16). A packet is (rows, 16) float32: 12 rows of ray (origin xyz, tnear, direction xyz, time, tfar, mask, id,
-flags) and, for first hits, the hit (Ng xyz, u, v, triangle, geometry, instance), then padding. A lane with tfar < 0 is
-idle.
+Kernels write 16 rays at a time where Embree reads them, in its own layout (RTCRay16, RTCRayHit16). A packet is (rows,
+16) float32: 12 rows of ray (origin xyz, tnear, direction xyz, time, tfar, mask, id, flags) and, for first hits, the hit
+(Ng xyz, u, v, triangle, geometry, instance), then padding. A lane with tfar < 0 is idle.
 """
 
 from typing import Any, NamedTuple
@@ -32,11 +31,11 @@ class Tracer(NamedTuple):
 
     Attributes:
         scene, intersect, occluded: addresses of the scene, and of the two functions that trace rays through it.
-        batch: 0 if the functions take one packet, as Embree's do: `(valid, scene, packet, arguments)`;
+        batch: 0 if the functions take one packet per call, as Embree's do: `(valid, scene, packet, arguments)`;
             1 if they take many: `(n_packets, scene, packets, unused)`.
         coherent: address of the arguments that mark the rays of a packet as coherent.
         lanes: address of 16 words of -1: the mask of a packet in which all lanes count.
-        first_masked: index of the first triangle with an alpha mask; those form a geometry of their own.
+        first_masked: index of the first triangle with an alpha mask; such triangles form a geometry of their own.
     """
 
     scene: int
@@ -66,6 +65,7 @@ _call: Any = intrinsic(_call_at)
 
 @kernel
 def _trace(tracer: Tracer, function: int, packets: Float32, n_packets: int, coherent: bool) -> None:
+    """Call one of the tracer's functions for packets 0 to n_packets - 1."""
     address = packets.ctypes.data
     if tracer.batch:
         _call(function, n_packets, tracer.scene, address, 0)
@@ -76,8 +76,8 @@ def _trace(tracer: Tracer, function: int, packets: Float32, n_packets: int, cohe
         _call(function, tracer.lanes, tracer.scene, address + p * size, arguments)
 
 
-def aligned(n_words: int) -> Float32:
-    """(n,) zeros that start at a cache line, as Embree requires."""
+def aligned_zeros(n_words: int) -> Float32:
+    """Allocate (n_words,) zeros that start at a cache line, as Embree requires."""
     block = np.zeros(n_words + LANES, np.float32)
     start = ((-block.ctypes.data) % 64) // 4
     return block[start : start + n_words]
@@ -85,7 +85,7 @@ def aligned(n_words: int) -> Float32:
 
 def empty_packets(n_packets: int, rows: int) -> Float32:
     """Allocate packets, (n, rows, 16) float32, with tnear 0 and the mask of all rays."""
-    packets = aligned(n_packets * rows * LANES).reshape(n_packets, rows, LANES)
+    packets = aligned_zeros(n_packets * rows * LANES).reshape(n_packets, rows, LANES)
     packets.view(np.int32)[:, MASK] = ALL_RAYS
     return packets
 
@@ -118,7 +118,7 @@ def intersect(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = Fa
 
     Args:
         coherent: the rays of a packet run close together. Embree then traverses them together, which halves the time
-            of shadow rays and saves a fifth of that of eye rays; for rays that scatter it gains nothing.
+            of shadow rays and saves a fifth of the time of eye rays; for rays that scatter it saves nothing.
         near: ignore hits nearer than this, in lengths of the directions.
     """
     n_packets = _idle_from(packets, n_rays)
@@ -149,14 +149,14 @@ def is_blocked(packets: Float32, i: int) -> bool:
 
 @inlined
 def scene_triangle(tracer: Tracer, triangle: int, geometry: int) -> int:
-    """The index in the scene of a triangle of a geometry; for one ray, or for lanes."""
+    """The index in the scene of a triangle of a geometry; for one ray or for lanes."""
     number: int = triangle + select(geometry > np.int32(OPAQUE), np.int32(tracer.first_masked), np.int32(0))
     return number
 
 
 @inlined
 def hit_triangle(tracer: Tracer, packets: Float32, i: int) -> int:
-    """The scene's triangle that ray i hit, or MISS, after `intersect`."""
+    """The index in the scene of the triangle that ray i hit, or MISS, after `intersect`."""
     bits = packets.view(np.int32)
     p, lane = i >> 4, i & 15
     return scene_triangle(tracer, bits[p, TRIANGLE, lane], bits[p, GEOMETRY, lane])

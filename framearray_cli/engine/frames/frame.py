@@ -1,7 +1,7 @@
-"""One frame's share of the work: native hits, their terms, and where the frames around see them.
+"""The hits of one eye: native hits, their terms, and the frames around that see them as outer hits.
 
-The hits of a frame are found in batches, each by one thread, each into its own slice of the frame's arrays; nothing
-depends on which thread takes which batch.
+Threads find hits in batches. Each batch writes its own slice of the arrays, so that no result depends on which thread
+takes which batch.
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,14 @@ from ..hits.native import Samples, extra_hits, native_hits
 from ..hits.outer import balance_weights, divide_by_own_hits, outer_hits, scale_by_expected_hits, sort_by_pixel
 from ..inputs.cameras import Cameras
 from ..inputs.random import HOLE_SAMPLE
+from .array_pool import ArrayPool
 from .mirror_paths import extra_mirror_hits, mirror_paths
 from .passes import Pass
-from .records import BY_SAMPLE, HitRecords, Placed, empty_records
+from .records import BY_SAMPLE, HitRecords, HitsByPixel, empty_records
+from .scratch import Scratch
 from .setup import FrameSetup
 from .shading import estimate_terms
-from .threads import ArrayPool, Scratch, TracePool
+from .threads import TracePool
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -32,107 +34,107 @@ class FrameHits:
 
     Attributes:
         records: of the native hits.
-        places: frame j -> where its pixels see them.
-        weights: frame j -> (n,) weight of each hit there, or (0,) where all weigh alike.
-        mirrored, mirror_places: reflected hits of the frame's own mirror pixels; None in a scene without mirrors.
-        mirror_hits: (2, n_pixels) native hits of each pixel whose mirrors were followed, of even and of odd sample
-            numbers; (2, 0) without mirrors.
-        normal, depth: (n, 3) and (n,) of native hits, for the layers; (0, 3) and (0,) without.
-        kept: the large arrays of the above but those of mirrors, by name, for the pool.
+        places: frame j -> the hits by the pixel of j that sees them.
+        weights: frame j -> (n,) weight w of each hit there, or (0,) where all weigh 1.
+        mirrored, mirror_places: reflected hits of mirror pixels of frame c; None in a scene without mirrors.
+        mirror_hits: (2, n_pixels) the number of native hits of each pixel whose mirrors were followed, with even and
+            with odd sample numbers; (2, 0) without mirrors.
+        normal, depth: (n, 3) and (n,) of native hits, for layers and denoising; (0, 3) and (0,) without.
+        pooled: the large arrays of the above, but those of mirrors, by their name in the pool.
     """
 
     c: int
     records: HitRecords
-    places: dict[int, Placed]
+    places: dict[int, HitsByPixel]
     weights: dict[int, Float32]
     mirrored: HitRecords | None
-    mirror_places: Placed | None
+    mirror_places: HitsByPixel | None
     mirror_hits: Int32
     normal: Float32
     depth: Float32
-    kept: dict[str, Any]
+    pooled: dict[str, Any]
 
     def forget_mirrors(self, arrays: ArrayPool) -> None:
-        """Give the memory of what the frame's own mirrors show to the next one, once the frame is composed."""
+        """Return the arrays of reflected hits to the pool; frame c itself cannot be composed afterwards."""
         if self.mirrored:
             for name, array in self.mirrored.arrays.items():
                 arrays.give(f"mirrored {name}", array)
         self.mirrored = self.mirror_places = None
 
     def put_back(self, arrays: ArrayPool) -> None:
-        """Give the frame's memory to the next one; the frame is of no use afterwards."""
-        for name, array in self.kept.items():
+        """Return all other arrays to the pool; the hits must not be read afterwards."""
+        for name, array in self.pooled.items():
             arrays.give(name, array)
 
 
-def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
-    """Find the native hits of eye c, estimate their terms, and place them in the frames that see them."""
+def find_hits(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
+    """Find the native hits of eye c, estimate their terms, and find the pixels of the frames around that see them."""
     parts = setup.passes(c)
     n = sum(part.n for part in parts)
-    frames = setup.frames_around(c, setup.n_r)
+    frames = setup.frames_around(c, setup.n_r)  # row r of pixel, order and weight is of frame frames[r]
     take = pool.arrays.take
     records = empty_records(n, *setup.stored_light, take)
     pixel = take("pixel", (len(frames), n), np.int32)
     order = take("order", (len(frames), n), np.int32)
     weight = take("weight", (len(frames), n if setup.balance else 0), np.float32)
-    kept = n if setup.layers or setup.denoise else 0
-    normal, depth = np.empty((kept, 3), np.float32), np.empty(kept, np.float32)
+    n_normals = n if setup.layers or setup.denoise else 0
+    normal, depth = np.empty((n_normals, 3), np.float32), np.empty(n_normals, np.float32)
 
-    def batch(task: tuple[Pass, int, int], scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
+    def find_batch(task: tuple[Pass, int, int], scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
         part, first, m = task
         span = slice(part.first_hit + first, part.first_hit + first + m)
-        _native(setup, c, part, first, m, scratch)
+        _find_native(setup, c, part, first, m, scratch)
         hits = scratch.hits
-        if kept:
-            normal[span], depth[span] = hits.shading[:m], _depths(setup.cams, c, hits, m)
+        if n_normals:
+            normal[span], depth[span] = _normals_and_depths(setup.cams, c, hits, m)
         estimate_terms(setup, hits, m, scratch, records.part(span), "obscurance", "shadow")
-        _place(setup, c, m, scratch, frames, pixel[:, span], weight[:, span])
+        _find_outer(setup, c, m, scratch, frames, pixel[:, span], weight[:, span])
         return mirror_paths(setup, hits, m, scratch) if setup.depth else []
 
     tasks = [(part, first, m) for part in parts for first, m in pool.batches(part.n)]
-    mirrored = [path for paths in pool.run(batch, tasks) for path in paths]
+    mirrored = [path for paths in pool.run(find_batch, tasks) for path in paths]
     mirror_hits = take("mirror_hits", (2, setup.n_pixels if setup.depth else 0), np.int32)
     if setup.depth:
         mirrored += extra_mirror_hits(setup, c, parts, pool, mirror_hits)
-    places = dict(zip(frames, _sorted(pixel, setup.n_pixels, order, pool), strict=True))
+    places = dict(zip(frames, _sort_each(pixel, setup.n_pixels, order, pool), strict=True))
     pool.arrays.give("pixel", pixel)
-    all_mirrored = _joined(setup, mirrored, pool) if setup.depth else None
+    reflected = _join(setup, mirrored, pool) if setup.depth else None
     return FrameHits(
         c=c,
         records=records,
         places=places,
         weights={j: weight[row] for row, j in enumerate(frames)},
-        kept={**records.arrays, "order": order, "weight": weight, "mirror_hits": mirror_hits},
-        mirrored=all_mirrored[1] if all_mirrored else None,
-        mirror_places=_placed(all_mirrored[0], setup.n_pixels, pool) if all_mirrored else None,
+        pooled={**records.arrays, "order": order, "weight": weight, "mirror_hits": mirror_hits},
+        mirrored=reflected[1] if reflected else None,
+        mirror_places=_sort_one(reflected[0], setup.n_pixels, pool) if reflected else None,
         mirror_hits=mirror_hits,
         normal=normal,
         depth=depth,
     )
 
 
-def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> list[tuple[Placed, HitRecords]]:
-    """One native hit for each of some pixels of eye c that nothing else reaches; then what mirrors show there."""
+def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> list[tuple[HitsByPixel, HitRecords]]:
+    """Find one native hit for each of the pixels of eye c that no other hit reaches; then what mirrors show there."""
     n, samples = len(pixels), Samples(setup.seed, pixels, per_pixel=1, first=HOLE_SAMPLE)
     records = empty_records(n, *setup.stored_light)
 
-    def batch(first: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
+    def find_batch(first: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
         m = min(pool.batch, n - first)
         extra_hits(setup.cams, c, samples, first, m, setup.world, scratch.hit_rays.packets, scratch.hits)
         scratch.rays["native"] += m
         estimate_terms(setup, scratch.hits, m, scratch, records.part(slice(first, first + m)), "obscurance", "shadow")
         return mirror_paths(setup, scratch.hits, m, scratch) if setup.depth else []
 
-    mirrored = [path for paths in pool.run(batch, range(0, n, pool.batch)) for path in paths]
-    found = [(_placed(pixels, setup.n_pixels, pool), records)]
+    mirrored = [path for paths in pool.run(find_batch, range(0, n, pool.batch)) for path in paths]
+    found = [(_sort_one(pixels, setup.n_pixels, pool), records)]
     if mirrored:
-        where, reflected = _joined(setup, mirrored, pool)
-        found.append((_placed(where, setup.n_pixels, pool), reflected))
+        pixel, reflected = _join(setup, mirrored, pool)
+        found.append((_sort_one(pixel, setup.n_pixels, pool), reflected))
     return found
 
 
-def _joined(setup: FrameSetup, parts: list[tuple[Int32, HitRecords]], pool: TracePool) -> tuple[Int32, HitRecords]:
-    """One list of reflected hits from those of all batches, in their order."""
+def _join(setup: FrameSetup, parts: list[tuple[Int32, HitRecords]], pool: TracePool) -> tuple[Int32, HitRecords]:
+    """Join the pixels and records of the reflected hits of all batches, in their order."""
     ends = np.cumsum([0, *(len(pixels) for pixels, _ in parts)])
     n = int(ends[-1])
 
@@ -152,14 +154,14 @@ def _joined(setup: FrameSetup, parts: list[tuple[Int32, HitRecords]], pool: Trac
     return pixel, whole
 
 
-def _placed(pixel: Int32, n_pixels: int, pool: TracePool) -> Placed:
+def _sort_one(pixel: Int32, n_pixels: int, pool: TracePool) -> HitsByPixel:
     """Sort hits by the pixel that they fall into."""
-    return _sorted(pixel[None], n_pixels, np.empty((1, len(pixel)), np.int32), pool)[0]
+    return _sort_each(pixel[None], n_pixels, np.empty((1, len(pixel)), np.int32), pool)[0]
 
 
-def _sorted(pixel: Int32, n_pixels: int, order: Int32, pool: TracePool) -> list[Placed]:
-    """Hits sorted by the pixels of every frame, (n_frames, n); a few frames are cut into ranges, one a thread."""
-    places = [Placed(start=np.empty(n_pixels + 1, np.int32), order=row) for row in order]
+def _sort_each(pixel: Int32, n_pixels: int, order: Int32, pool: TracePool) -> list[HitsByPixel]:
+    """Sort hits by their pixels in each frame, (n_frames, n); threads beyond one per frame share its pixels."""
+    places = [HitsByPixel(start=np.empty(n_pixels + 1, np.int32), order=row) for row in order]
     parts = -(-pool.threads // len(places))
     cuts = [n_pixels * part // parts for part in range(parts + 1)]
 
@@ -171,7 +173,8 @@ def _sorted(pixel: Int32, n_pixels: int, order: Int32, pool: TracePool) -> list[
     return places
 
 
-def _native(setup: FrameSetup, c: int, part: Pass, first: int, n: int, scratch: Scratch) -> None:
+def _find_native(setup: FrameSetup, c: int, part: Pass, first: int, n: int, scratch: Scratch) -> None:
+    """Find native hits first to first + n - 1 of a pass."""
     started = perf_counter()
     samples = Samples(setup.seed, part.pixels, part.per_pixel, part.first_sample, setup.halves == BY_SAMPLE)
     packets = scratch.hit_rays.packets
@@ -180,15 +183,21 @@ def _native(setup: FrameSetup, c: int, part: Pass, first: int, n: int, scratch: 
     scratch.seconds["native"] += perf_counter() - started
 
 
-def _depths(cams: Cameras, c: int, hits: Hits, n: int) -> Float32:
-    """Distance along the optical axis of eye c; 0 for escaped rays."""
+def _normals_and_depths(cams: Cameras, c: int, hits: Hits, n: int) -> tuple[Float32, Float32]:
+    """Shading normals of hits 0 to n - 1, and distances along the optical axis of eye c; 0 for escaped rays."""
     depth: Float32 = (hits.position[:n] - cams.position[c]) @ cams.forward[c]
     hits.shading[:n][hits.kind[:n] == ESCAPED] = 0.0
-    return np.where(hits.kind[:n] == SURFACE, depth, np.float32(0.0))
+    return hits.shading[:n], np.where(hits.kind[:n] == SURFACE, depth, np.float32(0.0))
 
 
-def _place(setup: FrameSetup, c: int, n: int, scratch: Scratch, frames: range, pixel: Int32, weight: Float32) -> None:
-    """Find the pixel of every frame around that sees each native hit, and the hit's weight there."""
+def _find_outer(
+    setup: FrameSetup, c: int, n: int, scratch: Scratch, frames: range, pixel: Int32, weight: Float32
+) -> None:
+    """Find the pixel of each frame that sees native hits 0 to n - 1 of eye c, and the weights of the hits there.
+
+    Args:
+        pixel, weight: (n_frames, n) overwritten; row r is of frame frames[r]. Rows of `seen` and `density` are of eyes.
+    """
     if setup.n_r == 0:  # nothing to project: a hit belongs to its own pixel
         pixel[0] = scratch.hits.pixel[:n]
         weight[:] = 1.0
@@ -200,8 +209,8 @@ def _place(setup: FrameSetup, c: int, n: int, scratch: Scratch, frames: range, p
     scratch.rays["visibility"] += outer_hits(
         setup.cams, c, eyes.start, scratch.hits, n, setup.tracer, scratch.test_rays, seen, density
     )
-    first = frames.start - eyes.start
-    pixel[:] = seen[first : first + len(frames), :n]
+    first_row = eyes.index(frames.start)
+    pixel[:] = seen[first_row : first_row + len(frames), :n]
     if setup.balance:
         per_pixel = setup.per_pixel
         if setup.allotment is not None:

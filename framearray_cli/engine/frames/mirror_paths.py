@@ -1,4 +1,4 @@
-"""What mirrors show: native hits followed from mirror to mirror; a reflected hit is a hit seen through a tint."""
+"""What mirrors show: native hits followed from mirror to mirror. A reflected hit is a hit seen through a tint."""
 
 from time import perf_counter
 
@@ -9,15 +9,16 @@ from framearray_cli.base.arrays import Int32
 from ..hits.hits import Hits
 from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
 from ..terms.mirrors import count_mirrors, reflect
-from .passes import Pass, halves_of
+from .passes import Pass, half_sizes
 from .records import HitRecords, empty_records
+from .scratch import Scratch
 from .setup import FrameSetup
 from .shading import estimate_terms
-from .threads import Scratch, TracePool
+from .threads import TracePool
 
 
 def mirror_paths(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
-    """Follow the mirrors among hits 0 to n - 1; a (pixels, records) pair a bounce."""
+    """Follow hits 0 to n - 1 that are on mirrors; return pixels and records of the reflected hits of each bounce."""
     found: list[tuple[Int32, HitRecords]] = []
     if count_mirrors(hits, n) == 0:
         return found
@@ -41,16 +42,17 @@ def mirror_paths(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch) -> lis
 def extra_mirror_hits(
     setup: FrameSetup, c: int, parts: tuple[Pass, ...], pool: TracePool, own: Int32
 ) -> list[tuple[Int32, HitRecords]]:
-    """Follow the native hits that only mirror pixels have.
+    """Find and follow the additional native hits of mirror pixels.
 
     Args:
-        own: (2, n_pixels) overwritten: native hits of each pixel, of even and of odd sample numbers.
+        parts: the native hits of eye c that all pixels have.
+        own: (2, n_pixels) overwritten: the number of native hits of each pixel, with even and with odd sample numbers.
     """
-    most = max((part.first_sample + part.per_pixel for part in parts), default=0)
+    first_sample = max((part.first_sample + part.per_pixel for part in parts), default=0)
     extra = max(setup.mirror_hits - setup.fewest_hits(c), 0)
     own[:] = 0
     for part in parts:
-        counts = halves_of(part.first_sample, part.per_pixel)[:, None]
+        counts = half_sizes(part.first_sample, part.per_pixel)[:, None]
         if len(part.pixels) == setup.n_pixels:
             own += counts
         else:
@@ -59,7 +61,7 @@ def extra_mirror_hits(
         return []
     flags = np.zeros(setup.n_pixels, np.uint8)
 
-    def look(first: int, scratch: Scratch) -> None:
+    def flag(first: int, scratch: Scratch) -> None:
         n = min(pool.batch, setup.n_pixels - first)
         hits = scratch.hits
         pilot_hits(setup.cams, c, setup.order, first, n, setup.world, scratch.hit_rays.packets, hits)
@@ -72,9 +74,9 @@ def extra_mirror_hits(
         scratch.rays["mirror"] += n
         return mirror_paths(setup, scratch.hits, n, scratch)
 
-    pool.run(look, range(0, setup.n_pixels, pool.batch))
+    pool.run(flag, range(0, setup.n_pixels, pool.batch))
     pixels = setup.order[flags[setup.order] > 0]
-    samples = Samples(setup.seed, pixels, extra, most, setup.halves != 0)
+    samples = Samples(setup.seed, pixels, extra, first_sample, setup.halves != 0)
     found = pool.run(follow, range(0, len(pixels) * extra, pool.batch))
-    own += halves_of(most, extra)[:, None] * flags
+    own += half_sizes(first_sample, extra)[:, None] * flags
     return [path for batch in found for path in batch]

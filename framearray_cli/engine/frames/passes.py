@@ -1,10 +1,10 @@
-"""How many native hits each frame gets, and which pixels get more or fewer.
+"""The number of native hits of each frame, and which pixels get more or fewer.
 
-Every frame of the array is to rest on (2 N_r + 1) * hits hits a pixel. Frames at the ends of the path have fewer
-neighbours: the frames that are missing are thought to be the path's own first or last ones, met again in reverse order,
-and their native hits are given to those. So frame 0 of N_r = 3 has twice the hits, and so do frames 1 and 2.
+Every frame of the array should rest on (2 N_r + 1) * hits hits per pixel. Frames at the ends of the path have fewer
+neighbours. We extend the path beyond its ends by its own frames in reverse order, and give the native hits of each
+frame of the extension to the frame that it repeats. With N_r = 3 frames 0, 1 and 2 have twice the hits.
 
-Fewer than one hit a pixel, 1/m, means a hit in every m-th pixel, in other pixels each frame.
+With 1/m hits per pixel each frame has one hit in every m-th pixel, in other pixels than its neighbours.
 """
 
 from dataclasses import dataclass
@@ -14,33 +14,33 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64, Int32
 
-# The smallest share of pixels that may get a hit in a frame is one in this many.
+# A frame has a hit in at least one of this many pixels.
 SPARSEST = 8
 
 
 def frame_hits(n_c: int, n_r: int, hits: float) -> Float64:
-    """Native hits a pixel of each frame, (n_c,): `hits`, more where the window ends at the path's ends.
+    """Native hits per pixel of each frame, (n_c,): `hits`, more near the ends of the path.
 
     The hits of any window [c - n_r, c + n_r] sum to at least (2 n_r + 1) * hits.
     """
-    # the path, there and back again
+    # the path, extended at both ends, in which frame 2 n_c - 1 - i repeats frame i
     virtual = np.arange(-n_r, n_c + n_r) % (2 * n_c)
     counts: Float64 = np.bincount(np.minimum(virtual, 2 * n_c - 1 - virtual), minlength=n_c).astype(np.float64)
     counts *= hits
     return counts
 
 
-def turns(hits: float) -> int:
-    """After how many frames every pixel had a native hit: m for 1/m hits, 1 for whole ones."""
+def frames_per_turn(hits: float) -> int:
+    """The number of frames after which every pixel has had its hits: m for 1/m hits, 1 for whole numbers."""
     return Fraction(hits - int(hits)).limit_denominator(SPARSEST).denominator
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pass:
-    """Some native hits of a frame: `per_pixel` in each of `pixels`.
+    """Native hits of a frame: `per_pixel` in each of `pixels`.
 
     Attributes:
-        pixels: in the order in which they are traced.
+        pixels: in the order of tracing.
         first_sample: sample number of the first hit of each pixel.
         first_hit: number of the pass's first hit in the frame.
     """
@@ -57,18 +57,18 @@ class Pass:
 
 
 def passes(order: Int32, width: int, c: int, per_pixel: float) -> tuple[Pass, ...]:
-    """Native hits of frame c: whole ones for every pixel, then one for the share of pixels that a fraction asks for.
+    """Native hits of eye c: the whole number in every pixel, then one more in a share of the pixels.
 
     Args:
         order: (n_pixels,) every pixel once, in the order of tracing.
-        per_pixel: hits a pixel, a multiple of 1/m with m at most `SPARSEST`.
+        per_pixel: hits per pixel, a multiple of 1/m with m at most `SPARSEST`.
     """
     whole = int(per_pixel)
     share = Fraction(per_pixel - whole).limit_denominator(SPARSEST)
     found = [Pass(pixels=order, per_pixel=whole, first_sample=0, first_hit=0)] if whole else []
     if share:
         m = share.denominator
-        # a step of about m / golden ratio from row to row spreads the pixels of one frame, one of 1 those of the frames
+        # a step of about m / golden ratio per row spreads the pixels of a frame; a step of 1 per frame visits them all
         row_step = max(1, round(m * 0.382))
         turn = (order % width + row_step * (order // width) + c) % m
         some = np.ascontiguousarray(order[turn < share.numerator])
@@ -77,11 +77,11 @@ def passes(order: Int32, width: int, c: int, per_pixel: float) -> tuple[Pass, ..
 
 
 def passes_of_counts(order: Int32, counts: Int32) -> tuple[Pass, ...]:
-    """The native hits of a frame whose pixels have different numbers of them: a pass for each number.
+    """Native hits of a frame whose pixels have different numbers of them: one pass per number.
 
     Args:
         order: (n_pixels,) every pixel once, in the order of tracing.
-        counts: (n_pixels,) hits of each pixel.
+        counts: (n_pixels,) number of hits of each pixel.
     """
     in_order, found, first_hit = counts[order], [], 0
     for count in np.unique(counts[counts > 0]).tolist():
@@ -91,7 +91,7 @@ def passes_of_counts(order: Int32, counts: Int32) -> tuple[Pass, ...]:
     return tuple(found)
 
 
-def halves_of(first: int, n: int) -> Int32:
-    """How many of the samples first to first + n - 1 have an even number, and how many an odd one: (2,)."""
+def half_sizes(first: int, n: int) -> Int32:
+    """The number of samples among first to first + n - 1 that are even, and that are odd, (2,)."""
     even = (first + n + 1) // 2 - (first + 1) // 2
     return np.array([even, n - even], np.int32)

@@ -1,4 +1,4 @@
-"""What the work on frames is given, and what it leaves: settings, records of hits, and where they fall."""
+"""What finding and composing frames is given: arrays as kernels take them, and the settings of all terms."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -20,22 +20,25 @@ from .records import BY_SAMPLE
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FrameSetup:
-    """Everything that the terms of every frame need, as kernels take it.
+    """What all frames of a path share, as kernels take it.
 
     Attributes:
-        lights: those whose light is computed; `kept`: which of them are stored and composed.
-        planes: what the image of each of these holds.
-        per_pixel: (n_c,) native hits a pixel of every frame.
-        mirror_hits: native hits of a pixel that sees a mirror, if more; 0 in a scene without mirrors.
-        depth: mirror bounces that are followed; 0 in a scene without mirrors.
-        balance: weights of hits by the balance heuristic, else all alike.
+        cams: all eyes c of the path.
+        lights: light positions l whose light is computed; `kept`: those of them that are stored and composed.
+        planes: what the image of each kept one holds.
+        n_r: N_r, the number of frames before and after a frame that share its hits.
+        per_pixel: (n_c,) number n_c of native hits per pixel of every eye.
+        mirror_hits: number of native hits of a pixel that sees a mirror, if more; 0 in a scene without mirrors.
+        depth: number of mirror bounces to follow; 0 in a scene without mirrors.
+        balance: whether hits are weighed by the balance heuristic; else all weigh 1.
         background: (3,) radiance outside the scene.
         shadow_step, shadow_unbiased: see `terms/direct_steps.py`; step 1 tests every light position.
         layers: whether normals and depths are kept for the layers.
-        denoise: whether W is denoised in composing.
-        allotment: native hits by place, where they differ; `per_pixel` has their means then.
-        halves: how hits are told apart in two halves: BY_SAMPLE, or so many frames of the camera path in turn belong
-            to one half, or 0: not at all.
+        denoise: whether W is denoised before composing.
+        allotment: native hits per block, where they differ; `per_pixel` then holds their means.
+        halves: how hits are split into two halves: BY_SAMPLE, or the number of successive frames that belong to one
+            half, or 0 for no split.
+        order: (n_pixels,) every pixel once, in the order of tracing.
     """
 
     cams: Cameras
@@ -73,42 +76,42 @@ class FrameSetup:
 
     @property
     def world(self) -> World:
-        """What rays meet."""
+        """The surfaces, and how to trace rays to them."""
         return World(self.surfaces, self.tracer)
 
     def passes(self, c: int) -> tuple[Pass, ...]:
-        """The native hits of frame c."""
+        """The native hits of eye c."""
         if self.allotment is not None:
             return passes_of_counts(self.order, self.allotment.counts(c))
         return passes(self.order, self.cams.width, c, float(self.per_pixel[c]))
 
     def fewest_hits(self, c: int) -> int:
-        """Native hits that every pixel of frame c has."""
+        """The number of native hits that every pixel of eye c has at least."""
         return int(self.per_pixel[c] if self.allotment is None else self.allotment.counts(c).min())
 
     def half_of(self, c: int) -> int:
-        """The half that all hits of frame c belong to, or BY_SAMPLE."""
+        """The half that all hits of eye c belong to, or BY_SAMPLE."""
         return c // self.halves % 2 if self.halves > 0 else BY_SAMPLE
 
     @property
     def light_independent_from(self) -> int:
-        """The first plane that holds what is the same under every light, as do all that follow it."""
+        """The first plane with light-independent radiance; all that follow have it too."""
         return first_with_background(self.planes)
 
     @property
     def stored_light(self) -> tuple[int, int]:
-        """Channels of irradiance, and light positions whose irradiance is stored with a hit."""
+        """The number of channels of irradiance, and of light positions whose irradiance is stored per hit."""
         return self.lights.channels, len(self.kept)
 
     @property
     def keeps_all(self) -> bool:
-        """Whether all light that is computed is stored too."""
+        """Whether the light of all positions is stored."""
         return len(self.kept) == self.lights.n_lights
 
     def for_lights(self, block: range) -> "FrameSetup":
-        """The same setup for some light positions; their images are the same to the last bit.
+        """The setup for a block of light positions; their images stay the same to the last bit.
 
-        Shadow steps walk along the whole light path wherever a block ends, so all of it is computed, and some is kept.
+        Shadow steps need the whole light path: all positions are computed, and those of the block kept.
         """
         planes = self.planes[block.start : block.stop]
         setup = replace(self, layers=self.layers and block.start == 0, planes=planes)
@@ -116,9 +119,13 @@ class FrameSetup:
             return replace(setup, kept=block)
         return replace(setup, lights=some_lights(self.lights, block), kept=range(len(block)))
 
-    def frames_for(self, wanted: Sequence[int]) -> list[int]:
-        """The frames whose hits are needed to compose some frames, in rising order."""
-        return sorted({k for j in wanted for k in self.frames_around(j, self.n_r)})
+    def eyes_of(self, j: int) -> range:
+        """The window of frame j: the eyes whose hits it shows."""
+        return self.frames_around(j, self.n_r)
+
+    def eyes_for(self, wanted: Sequence[int]) -> list[int]:
+        """The eyes whose hits the wanted frames show, in rising order."""
+        return sorted({c for j in wanted for c in self.eyes_of(j)})
 
     def frames_around(self, c: int, reach: int) -> range:
         """The frames of the path from c - reach to c + reach."""

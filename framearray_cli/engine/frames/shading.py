@@ -1,4 +1,4 @@
-"""The terms of a batch of hits: obscurance W, what is the same under every light, and the irradiance of every light."""
+"""The terms of a batch of hits: obscurance W, light-independent radiance, and the irradiance E[l] of every light."""
 
 from time import perf_counter
 
@@ -13,8 +13,8 @@ from ..terms.direct import direct
 from ..terms.direct_steps import direct_by_steps
 from ..terms.obscurance import obscurance
 from .records import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, HitRecords, lit_bit
+from .scratch import Scratch
 from .setup import FrameSetup
-from .threads import Scratch
 
 _NOTHING = np.empty((0, 3), np.float32)
 
@@ -29,10 +29,12 @@ def estimate_terms(
     shadow_kind: str,
     throughput: Rgb = _NOTHING,
 ) -> None:
-    """Estimate W, the constant part and E[l] of hits 0 to n - 1.
+    """Estimate W, the light-independent radiance and E[l] of hits 0 to n - 1.
 
     Args:
-        throughput: (>= n, 3) what mirrors leave of the light of each hit, or (0, 3).
+        out: overwritten.
+        obscurance_kind, shadow_kind: kinds of rays and stages to count the cost under.
+        throughput: (>= n, 3) the tint t of the mirrors on the way to each hit, or (0, 3) without mirrors.
     """
     started = perf_counter()
     scratch.rays[obscurance_kind] += obscurance(
@@ -66,43 +68,45 @@ def write_rows(
     irradiance: Float32,
     row: Float32,
 ) -> None:
-    """Write what composing needs of hits 0 to n - 1 beside their irradiance; see `HitRecords`.
+    """Write the rows of hits 0 to n - 1; see `HitRecords`.
 
     Args:
-        background: (3,) what escaped rays see.
+        background: (3,) radiance that escaped rays see.
         obscurance: (>= n, 3) W.
-        skylight: (>= n, 3) background that reaches each hit, or (0, 3).
-        throughput: (>= n, 3) what mirrors leave of the light of each hit, or (0, 3).
+        skylight: (>= n, 3) S, the background that reaches each hit, or (0, 3).
+        throughput: (>= n, 3) t, see `estimate_terms`.
         row: (n, LANES) overwritten.
     """
     for i in range(n):
         row[i, WEIGHT] = 1.0
         for channel in range(3):
+            # t R: behind mirrors all light of the hit is tinted
             tint = throughput[i, channel] if throughput.shape[0] else np.float32(1.0)
             reflectivity = tint * hits.reflectivity[i, channel]
-            steady = tint * background[channel] if hits.kind[i] == ESCAPED else np.float32(0.0)
+            # B, which has no l: the background where the ray left the scene, and t R S
+            light_independent = tint * background[channel] if hits.kind[i] == ESCAPED else np.float32(0.0)
             if skylight.shape[0]:
-                steady += reflectivity * skylight[i, channel]
+                light_independent += reflectivity * skylight[i, channel]
             row[i, INDIRECT + channel] = reflectivity * obscurance[i, channel]
-            row[i, LIGHT_INDEPENDENT + channel] = steady
+            row[i, LIGHT_INDEPENDENT + channel] = light_independent
             row[i, OBSCURANCE + channel] = obscurance[i, channel]
             row[i, REFLECTIVITY + channel] = reflectivity
-        row[i, LIT] = _lit(irradiance, i)
+        row[i, LIT] = _lit_bits(irradiance, i)
         row[i, HALF] = hits.half[i]
         for column in range(HALF + 1, LANES):
             row[i, column] = 0.0
 
 
 @inlined
-def _lit(irradiance: Float32, i: int) -> int:
-    """Which packets of light positions give hit i any light, a bit each or one for several."""
+def _lit_bits(irradiance: Float32, i: int) -> int:
+    """The packets of light positions that give hit i any light, as bits; see `lit_bit`."""
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]
     found = 0
     for channel in range(channels):
         row = (i * channels + channel) * n_lights
         for l in range(0, n_lights, LANES):
-            light = bits(~(load(irradiance, row + l) == np.float32(0.0)))
-            if l + LANES > n_lights:
+            light = bits(~(load(irradiance, row + l) == np.float32(0.0)))  # set for NaN, too
+            if l + LANES > n_lights:  # the last packet reads beyond the end
                 light &= (1 << (n_lights - l)) - 1
             found |= int(light != 0) << lit_bit(n_lights, l)
     return found

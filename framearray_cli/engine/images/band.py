@@ -1,10 +1,11 @@
-"""Composing one frame: hits of 2 N_r + 1 eyes and mirror paths become N_l images [FA eq. 2].
+"""The sums of a band of pixels, and how they become N_l images [FA eq. 2].
 
-    image[l] = (direct[l] + I_A[l] R W + constant) weighed over all hits + the same over reflected hits / n_native
+    image[l] = sum(w (R / pi E[l] + I_A[l] R W + B)) / sum(w)       over native and outer hits
+             + sum(t (R / pi E[l] + I_A[l] R W + B)) / n_native     over reflected hits
 
-A band of pixels is summed in arrays that stay in the cache: `accumulate` over the hits of all eyes of the
-window, `accumulate` for the frame's reflected hits, `finish`. Sums happen in this fixed order, so that images do not
-depend on the number of threads.
+B is light-independent radiance, t the tint of mirrors. The sums of a band stay in the cache: `accumulate` over the hits
+of all eyes of the window, `accumulate` over the frame's reflected hits, `finish`. This order is fixed, so that images
+do not depend on the number of threads.
 """
 
 from typing import NamedTuple, TypeAlias
@@ -26,16 +27,16 @@ HALF_MAX = np.float32(65504.0)  # the largest half
 
 
 class Band(NamedTuple):
-    """Sums over the pixels of a band, and room for the hits of one pixel.
+    """The sums of the pixels of a band, and a queue of lit hits of one pixel.
 
     Attributes:
         direct: (n_pixels, 3, n_lights or more, a multiple of LANES) sum of w R / pi E[l], in units of the lights'
             colour.
-        sums: (n_pixels, LANES) weighed sums of rows of hits, see `HitRecords`.
+        sums: (n_pixels, LANES) sums of w row, see `HitRecords`.
         hits: (n_pixels,) number of hits.
-        places: (MOST,) where the irradiance of a hit stands: an address.
-        shares: (MOST, 3) w R / pi of a hit.
-        lit: (MOST,) which of its light is not zero: see `HitRecords`.
+        places: (HITS_AT_ONCE,) address of the irradiance of a hit.
+        shares: (HITS_AT_ONCE, 3) w R / pi of a hit.
+        lit: (HITS_AT_ONCE,) LIT of a hit.
     """
 
     direct: Float32
@@ -50,10 +51,10 @@ class Finish(NamedTuple):
     """How sums become radiance.
 
     Attributes:
-        colour: (3, n_lights) what direct sums are in units of.
-        ambient: (3, n_lights) I_A, radiance.
-        light_independent_from: the first light position whose images hold what is the same under every light.
-        lowest: the least value that is right: 0, or minus infinity where estimates may be negative.
+        colour: (3, n_lights) the unit of direct sums.
+        ambient: (3, n_lights) I_A[l], radiance.
+        light_independent_from: the first plane whose images include B.
+        lowest: the least valid value: 0, or minus infinity where estimates may be negative.
     """
 
     colour: Rgb
@@ -62,19 +63,19 @@ class Finish(NamedTuple):
     lowest: Real
 
 
-# Hits of a pixel that are summed at once.
-MOST = 64
+# Number of lit hits whose direct light is summed together.
+HITS_AT_ONCE = 64
 
 
 def empty_band(n_pixels: int, n_lights: int) -> Band:
-    """Room for the sums of n_pixels pixels."""
+    """Allocate the sums of n_pixels pixels."""
     return Band(
         direct=with_room((n_pixels, 3, -(-n_lights // LANES) * LANES), np.float32),
         sums=with_room((n_pixels, LANES), np.float32),
         hits=np.empty(n_pixels, np.int32),
-        places=np.empty(MOST, np.int64),
-        shares=np.empty((MOST, 3), np.float32),
-        lit=np.empty(MOST, np.int64),
+        places=np.empty(HITS_AT_ONCE, np.int64),
+        shares=np.empty((HITS_AT_ONCE, 3), np.float32),
+        lit=np.empty(HITS_AT_ONCE, np.int64),
     )
 
 
@@ -85,28 +86,32 @@ def as_stored(images: Images) -> Stored:
 
 @kernel
 def finish(band: Band, first_pixel: int, n: int, how: Finish, images: Stored) -> tuple[int, int, int, int]:
-    """Write the pixels of a band into all images of the frame; the band's direct sums are used up.
+    """Write the n pixels of a band into all images of the frame; overwrites the band's direct sums.
 
     Args:
-        images: (n_lights, n_pixels of the image, 3), written: float32, or uint16 for the bits of halves, what lies
-            beyond the largest half cut to that.
+        images: (n_lights, n_pixels of the image, 3), overwritten from pixel `first_pixel` on: float32, or uint16 for
+            the bits of halves, with values beyond the largest half cut to it.
 
     Returns:
         number of values that were not finite or below `how.lowest`, written as 0; light index and pixel of the first;
         number of values beyond the largest half.
     """
+    # --- loop state ---
     colour, ambient, light_independent_from, lowest = how
-    bad, bad_light, bad_pixel, beyond = 0, -1, -1, 0
-    n_lights, sums = images.shape[0], band.direct
+    n_lights, sums = images.shape[0], band.direct  # sums: direct light, and then radiance
+    bad, bad_light, bad_pixel = 0, -1, -1  # invalid values; light position and pixel of the first
+    beyond = 0  # values beyond the largest half
+
     for i in range(n):
         for channel in range(3):
-            indirect, steady = band.sums[i, INDIRECT + channel], band.sums[i, LIGHT_INDEPENDENT + channel]
-            wrong = large = 0
+            # 1. Radiance under each l: colour[l] sum(w R / pi E[l]) + I_A[l] R W, and B for light-independent planes.
+            indirect, light_independent = band.sums[i, INDIRECT + channel], band.sums[i, LIGHT_INDEPENDENT + channel]
+            wrong = large = 0  # invalid values, and values beyond the largest half, of this pixel and channel
             for part in range(2):
                 first, end, rest = (
                     (0, light_independent_from, np.float32(0.0))
                     if part == 0
-                    else (light_independent_from, n_lights, steady)
+                    else (light_independent_from, n_lights, light_independent)
                 )
                 for l in range(first, end):
                     value = colour[channel, l] * sums[i, channel, l] + ambient[channel, l] * indirect + rest
@@ -114,23 +119,27 @@ def finish(band: Band, first_pixel: int, n: int, how: Finish, images: Stored) ->
                     large += HALF_MAX < abs(value) < np.inf
                     sums[i, channel, l] = value
             beyond += large
+
+            # 2. Blacken and count invalid values; rare, so that the loop above stays free of jumps.
             for l in range(n_lights if wrong else 0):
                 if not (sums[i, channel, l] >= lowest and abs(sums[i, channel, l]) < np.inf):
                     sums[i, channel, l] = 0.0
                     if bad == 0:
                         bad_light, bad_pixel = l, first_pixel + i
                     bad += 1
+
+    # 3. From all lights of a pixel to all pixels of a light.
     transpose(sums, 3 * n, images, 3 * first_pixel)
     return bad, bad_light, bad_pixel, beyond
 
 
 @kernel
 def transpose(sums: Float32, n: int, images: Stored, first: int) -> None:
-    """Write the first n values of each light, light by light: sums has all lights of a value, images all values of one.
+    """Write n values (pixel, channel) of each light: in `sums` lights are neighbours, in `images` values.
 
     Args:
         sums: (n_pixels, 3, n_lights or more).
-        images: (n_lights, n_pixels, 3); written from value `first` on.
+        images: (n_lights, n_pixels, 3), overwritten from value `first` on.
     """
     n_lights, row, stride = images.shape[0], images.shape[1] * images.shape[2], sums.shape[2]
     step = lane_numbers() * np.int32(stride)

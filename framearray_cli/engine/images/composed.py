@@ -1,4 +1,4 @@
-"""What composing a frame gives: its images, layers and errors."""
+"""A composed frame: its images, layers and errors."""
 
 from dataclasses import dataclass
 
@@ -9,12 +9,12 @@ from framearray_cli.base.arrays import Float32, Images, Int32
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Layers:
-    """What a frame shows whatever the light, per pixel; (height, width, channels) or (height, width).
+    """What is the same under every light, (height, width, channels) or (height, width).
 
     Attributes:
         obscurance, indirect, reflectivity: W, R W and R, averaged over all hits.
         normal, depth: shading normal and distance along the optical axis, averaged over native hits; 0 if all escape.
-        samples: hits that the pixel rests on, native and outer.
+        samples: number of hits of the pixel, native and outer.
     """
 
     obscurance: Float32
@@ -27,16 +27,17 @@ class Layers:
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Composed:
-    """One finished frame.
+    """A composed frame.
 
     Attributes:
+        c: the eye of the frame.
         images: (n_lights, height, width, 3) radiance.
         layers: None unless the job keeps them.
-        hits: (n_pixels,) number of hits that each pixel rests on, native and outer.
-        beyond: number of values beyond the largest half; where images are halves, such values were cut to it.
-        bad: number of values that were not finite or negative; each was replaced by 0.
+        hits: (n_pixels,) number of hits of each pixel, native and outer.
+        beyond: number of values beyond the largest half; where images are halves, they were cut to it.
+        bad: number of values that were not finite, or negative; each was replaced by 0.
         first_bad: light index and pixel of the first of them, or None.
-        differences: (n_lights, height, width, 3) of the halves of the hits, see standarderror.py; or None.
+        differences: (n_lights, height, width, 3) D of the halves of the hits, see `standard_error.py`; or None.
     """
 
     c: int
@@ -49,7 +50,14 @@ class Composed:
     differences: Float32 | None = None
 
 
-def _layers(maps: Float32, own: Float32, samples: Int32, shape: tuple[int, ...]) -> Layers:
+def layers_of(maps: Float32, own: Float32, samples: Int32, shape: tuple[int, ...]) -> Layers:
+    """The layers of a frame.
+
+    Args:
+        maps, samples: see `Pixels`.
+        own: (n_pixels, 4) normal and depth, see `average_native`.
+        shape: (height, width).
+    """
     return Layers(
         obscurance=maps[:, :3].reshape(*shape, 3),
         indirect=maps[:, 3:6].reshape(*shape, 3),

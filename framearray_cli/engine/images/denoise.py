@@ -1,8 +1,8 @@
-"""The door to Open Image Denoise: W of a whole frame, made smooth once for all light positions.
+"""The door to Open Image Denoise: remove the noise from W of a frame, once for all light positions.
 
-Obscurance exists once a camera, not once an image, so denoising it costs 1/N_l of what a denoised renderer pays. W is
-denoised alone and multiplied by the reflectivity afterwards, so that textures are not touched; normals and
-reflectivity tell the filter where objects end. It takes no depth.
+W exists once per camera position, not once per image, so denoising costs 1/N_l of what it costs to denoise images. The
+product R W is formed afterwards, so that textures stay sharp. Normals and reflectivity guide the filter at the edges of
+objects; it takes no depth.
 """
 
 from typing import Any
@@ -24,7 +24,7 @@ def require_denoiser() -> Any:
     return pyoidn
 
 
-def denoised(obscurance: Float32, reflectivity: Float32, normal: Float32) -> Float32:
+def denoise_obscurance(obscurance: Float32, reflectivity: Float32, normal: Float32) -> Float32:
     """Remove the noise from an image of W.
 
     Args:

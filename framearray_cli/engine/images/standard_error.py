@@ -1,15 +1,15 @@
-"""How far an image is from what it would be with endless samples, told from the image itself.
+"""The standard error of an image, estimated from two halves of its own hits.
 
-The hits of a pixel are kept apart in two halves with weights W_A and W_B, sampled independently of each other: the
-samples of every frame take turns, or whole frames do where a frame has few samples a pixel. With a and b the means
-of the halves, the image is I = (W_A a + W_B b) / (W_A + W_B), and
+The hits of a pixel belong to one of two halves with weights W_A and W_B, sampled independently. The samples of every
+frame alternate between the halves; with few samples per pixel whole frames do. With a and b the means of the halves,
+the image is I = (W_A a + W_B b) / (W_A + W_B), and
 
     D = (a - b) sqrt(W_A W_B) / (W_A + W_B)
 
-has mean 0 and the variance of I, since that of a mean goes with one over its weight. D is signed, so images that are
-added, each with a factor, have a D that is the sum of theirs with the same factors. D^2 tells a variance by one
-degree of freedom a pixel, so it is averaged over a neighbourhood, weighed by hits: neighbours have the same variance
-a hit, not the same number of hits.
+has mean 0 and the variance of I, since the variance of a mean is proportional to one over its weight. D is signed: a
+sum of images, each times a factor, has the sum of their D times the same factors. D^2 estimates the variance with one
+degree of freedom per pixel, so we average it over a neighbourhood, weighed by hits: neighbours have the same variance
+per hit, not the same number of hits.
 """
 
 import math
@@ -19,17 +19,17 @@ import numpy as np
 
 from framearray_cli.base.arrays import Flags, Float32, Float64, Int32
 
-RADIUS = 2  # of the neighbourhood, pixels: 25 values tell a standard error to 14 %
+RADIUS = 2  # of the neighbourhood, pixels: 25 values estimate a standard error to within 14 %
 
 
 def half_factors(weights: Float64 | Int32) -> Float32:
-    """Factors of the hits of both halves in D.
+    """The factors of the hits of both halves in D.
 
     Args:
-        weights: (2, n_pixels) sums over the halves of each pixel.
+        weights: (2, n_pixels) W_A and W_B.
 
     Returns:
-        (2, n_pixels), of the hits of the first half above 0, of those of the second below; 0 where a half is empty.
+        (2, n_pixels), positive for the first half and negative for the second; 0 where a half is empty.
     """
     first, second = np.asarray(weights, np.float64)
     both = (first > 0) & (second > 0)
@@ -39,11 +39,11 @@ def half_factors(weights: Float64 | Int32) -> Float32:
 
 
 def fill_unknown(differences: Float32, known: Flags, hits: Int32) -> None:
-    """Give pixels of which one half has no hits the D of the nearest other pixel, for their own number of hits.
+    """Where a half has no hits, take D from the nearest pixel that has both, rescaled to the pixel's number of hits.
 
     Args:
         differences: (n_images, height, width, 3) D, changed.
-        known: (height, width) pixels with hits of both halves; where there are none, D stays as it is.
+        known: (height, width) pixels with hits of both halves; if there are none at all, D stays as it is.
         hits: (height, width) number of hits.
     """
     if known.all() or not known.any():
@@ -56,12 +56,12 @@ def fill_unknown(differences: Float32, known: Flags, hits: Int32) -> None:
 
 
 def standard_error(difference: Float32, hits: Float32 | Int32, radius: int = RADIUS) -> Float32:
-    """Standard error of every pixel of an image, from its D or that of images that were added.
+    """The standard error of every pixel of an image, or of a sum of images.
 
     Args:
         difference: (height, width, 3) D.
         hits: (height, width) number of hits of each pixel.
-        radius: of the square neighbourhood that D^2 is averaged over, pixels.
+        radius: of the square neighbourhood over which D^2 is averaged, pixels.
 
     Returns:
         (height, width, 3), in the unit of the image.
@@ -70,7 +70,7 @@ def standard_error(difference: Float32, hits: Float32 | Int32, radius: int = RAD
 
     n = np.maximum(np.asarray(hits, np.float32), 1)[..., None]
     size = 2 * radius + 1
-    # a power of 2 keeps every bit, and the squares of what is very bright from overflowing
+    # scaling by a power of 2 is exact, and keeps the squares of very bright values from overflowing
     scale = np.float32(2.0 ** max(math.frexp(float(np.abs(difference).max(initial=0.0)))[1] - 1, 0))
     scaled = difference / scale
     variance = uniform_filter(n * scaled * scaled, size=(size, size, 0), mode="nearest") / n
@@ -83,15 +83,15 @@ def square_mean(error: Float32) -> float:
     return float(np.mean(np.square(error, dtype=np.float64)))
 
 
-def summed_up(errors: Mapping[tuple[int, int], tuple[float, float]]) -> dict[str, float | int]:
-    """What a manifest says of the errors of an array.
+def error_summary(errors: Mapping[tuple[int, int], tuple[float, float]]) -> dict[str, float | int]:
+    """The summary of the errors of an array for its manifest.
 
     Args:
         errors: (camera, light) -> mean square of the standard error and mean radiance of an image.
 
     Returns:
-        `rms`: root of the mean square over all images, radiance; `relative`: that over the mean radiance, 0 where all
-        is black; `largest`: the largest of an image, with its `camera` and `light`.
+        `rms`: root of the mean square over all images, radiance; `relative`: `rms` over the mean radiance, 0 if all is
+        black; `largest`: the largest root mean square of an image, with its `camera` and `light`.
     """
     squares = {image: square for image, (square, _) in errors.items()}
     rms = float(np.sqrt(np.mean(list(squares.values()))))

@@ -1,1 +1,1 @@
-"""How hot loops are compiled, and where compiled ones are kept."""
+"""How hot loops are compiled, and where their machine code is kept."""

@@ -1,8 +1,8 @@
 """Where compiled kernels are kept between runs.
 
-numba keeps a compiled function until the function's own source file changes. Kernels here call small functions of other
-files, so that is not enough: after an edit, or an update by git, old machine code would run on. This module therefore
-keeps kernels in a folder whose name is a digest of all source files, and of what else the machine code depends on.
+numba reuses the machine code of a function until the function's own source file changes. Kernels here call small
+functions of other files; after an edit of these, or an update by git, old machine code would run on. This module
+therefore keeps kernels in a folder named by a digest of all source files, and of what else the machine code depends on.
 It touches the disk only when the first kernel is needed.
 """
 
@@ -21,7 +21,7 @@ from framearray_cli.base.files import reason
 
 # Folders of earlier states of the source to keep: enough to switch between a few branches.
 KEPT = 3
-# Processors that Linux guards against Downfall take ten times as long for their gather instruction.
+# On processors that Linux guards against Downfall, gather instructions take ten times as long.
 _GUARD = Path("/sys/devices/system/cpu/vulnerabilities/gather_data_sampling")
 
 _problems: list[str] = []
@@ -29,7 +29,7 @@ _problems: list[str] = []
 
 @cache
 def slow_gathers() -> bool:
-    """Whether gather instructions are slower than single loads on this machine; kernels then do without them."""
+    """Whether gather instructions are slower than single loads on this machine; kernels then avoid them."""
     with suppress(OSError):
         return "Mitigation" in _GUARD.read_text()
     return False
@@ -42,9 +42,9 @@ def package_folder() -> Path:
 
 
 def source_digest(package: Path) -> str:
-    """A short digest of every source file of the package, and of the flags of this machine that kernels depend on.
+    """A short digest of all source files of the package, and of the flags of this machine that kernels depend on.
 
-    numba itself keeps kernels apart by its version, Python's, and the name and the instructions of the processor.
+    numba itself keeps kernels apart by its version, Python's version, and the name and instructions of the processor.
     """
     total = hashlib.sha256(b"slow gathers\0" if slow_gathers() else b"")
     for file in sorted(package.rglob("*.py")):
@@ -56,7 +56,7 @@ def source_digest(package: Path) -> str:
 def kernel_folder() -> Path | None:
     """Find or make the folder for kernels of this state of the source, and remove those of old states.
 
-    It lies in the folder of NUMBA_CACHE_DIR, else in the user's cache folder, else beside the source.
+    It lies in NUMBA_CACHE_DIR if that is set, else in the user's cache folder, else beside the source.
 
     Returns:
         None if no folder can be written: each run then compiles its kernels, and `problem` says why.
@@ -73,13 +73,13 @@ def kernel_folder() -> Path | None:
         if _usable(base / digest):
             _drop_old(base, digest)
             if not chosen:
-                _problems.clear()  # the user need not know that it is the second best
+                _problems.clear()  # a second choice that works needs no report
             return base / digest
     return None
 
 
 def problem() -> str:
-    """Why kernels could not be read or kept; empty if they could."""
+    """Why kernels could not be read or written; empty if they could."""
     return _problems[0] if _problems else ""
 
 
@@ -87,7 +87,7 @@ def problem() -> str:
 def forgive(kept: Any) -> Iterator[None]:
     """Ignore errors of reading or writing a kernel: numba then compiles it, as if there were no cache.
 
-    A disk may be full. A file may be damaged, and reading it may raise anything.
+    A disk may be full. Reading a damaged file may raise any exception.
 
     Args:
         kept: numba's cache of the kernel.
@@ -102,7 +102,7 @@ def forgive(kept: Any) -> Iterator[None]:
 
 
 def _usable(folder: Path) -> bool:
-    """Make a folder if needed, and return whether files can be written there."""
+    """Make a folder if needed; return whether files can be written there."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -114,8 +114,8 @@ def _usable(folder: Path) -> bool:
 
 
 def _drop_old(base: Path, digest: str) -> None:
-    """Remove the folders of the states of the source that were used least recently."""
-    with suppress(OSError):  # another process does the same
+    """Remove the least recently used folders of other states of the source, all but KEPT."""
+    with suppress(OSError):  # another process may do the same
         others = sorted((f for f in base.iterdir() if f.name != digest), key=lambda f: f.stat().st_mtime)
         for old in others[: -KEPT or None]:
             shutil.rmtree(old, ignore_errors=True)

@@ -5,13 +5,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-# When the compiling of each function began, innermost last: numba compiles one function, and within it those it calls.
-_begun: list[float] = []
+# Start times of the functions being compiled, innermost last: within a function numba compiles those that it calls.
+_compiling: list[float] = []
 
 
 @dataclass(slots=True, kw_only=True)
 class CompileClock:
-    """The time that compiling took so far, in seconds."""
+    """The time spent compiling so far, in seconds."""
 
     seconds: float = 0.0
 
@@ -21,22 +21,22 @@ def compile_clock(begins: Callable[[], None] = lambda: None) -> Iterator[Compile
     """Measure the time spent compiling; kernels loaded from disk do not count.
 
     Args:
-        begins: is called when the first kernel starts to compile, on any thread.
+        begins: called once, when the first kernel starts to compile, on any thread.
     """
     from numba.core import event
 
     clock = CompileClock()
-    own: list[float] = []  # of this clock; several may run
+    own: list[float] = []  # start times of this clock; several clocks may run
 
     class CompileEvents(event.Listener):
         def on_start(self, event: object) -> None:
             if not own and clock.seconds == 0.0:
                 begins()
             own.append(time.perf_counter())
-            _begun.append(own[-1])
+            _compiling.append(own[-1])
 
         def on_end(self, event: object) -> None:
-            _begun.pop()
+            _compiling.pop()
             started = own.pop()
             if not own:
                 clock.seconds += time.perf_counter() - started
@@ -46,5 +46,5 @@ def compile_clock(begins: Callable[[], None] = lambda: None) -> Iterator[Compile
 
 
 def is_compiling() -> bool:
-    """Whether a kernel is being compiled, within `compile_clock`."""
-    return bool(_begun)
+    """Whether a kernel is being compiled; known within `compile_clock` only."""
+    return bool(_compiling)

@@ -1,14 +1,14 @@
 """Compile hot loops, and keep them on disk.
 
-`kernel` turns off two defaults of numba that cost more than the loops themselves here: counting references to every
-array that is passed on (an atomic instruction each, for arrays that the caller holds anyway), and checking every
-division for zero. So a kernel must not allocate: its caller passes scratch arrays. A kernel releases the GIL, and is
-compiled once for all runs.
+`kernel` turns off two defaults of numba that would cost more than the loops themselves: reference counts of every array
+passed on (an atomic instruction each, for arrays that the caller holds anyway), and the check of every division for
+zero. Without reference counts a kernel must not allocate; its caller passes scratch arrays. A kernel releases the GIL,
+and is compiled once for all runs.
 
 `inlined` is for the small functions that kernels are written with.
 
-Decorating a function only declares it. The first call loads its machine code from disk, or compiles it; only then is
-a folder made for it (`kernelcache.py`). numba's own settings stay untouched.
+Decorating a function only declares it. The first call loads its machine code from disk, or compiles it and makes a
+folder for it (`cache.py`). numba's own settings stay untouched.
 """
 
 import platform
@@ -38,7 +38,7 @@ _OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False}
 
 
 class _OwnLocator(_OfSourceFile, _Locator):  # type: ignore[misc]
-    """Names the folder for the kernels of a source file, inside the one for this state of the package."""
+    """The folder for the kernels of a source file, inside the one for this state of the package."""
 
     def __init__(self, function: Any, file: str, folder: Path) -> None:
         self._py_file, self._lineno = file, function.__code__.co_firstlineno
@@ -67,7 +67,7 @@ class _OwnCache(_FunctionCache):  # type: ignore[misc]
 
 
 class _LazyCache:
-    """Stands in for numba's cache of a function, and opens it when numba first asks for machine code."""
+    """numba's cache of a function, opened when numba first asks for machine code."""
 
     def __init__(self, function: Any) -> None:
         self._function = function
@@ -99,7 +99,7 @@ class _LazyCache:
 def keep_on_disk(function: F) -> F:
     """Keep the machine code of a declared function (`nb.njit`, `CFunc`) for later runs."""
     compiled: Any = function
-    if hasattr(compiled, "enable_caching"):  # not where NUMBA_DISABLE_JIT leaves Python's functions as they are
+    if hasattr(compiled, "enable_caching"):  # NUMBA_DISABLE_JIT leaves plain Python functions
         compiled._cache = _LazyCache(getattr(compiled, "py_func", None) or compiled.__wrapped__)
     return function
 
@@ -117,7 +117,7 @@ def inlined(function: F) -> F:
 
 
 def _prefetch_of(typingctx: Any, address: Any, n_bytes: Any) -> Any:
-    """Prefetch bytes from an address on into the processor's cache, line by line, without waiting."""
+    """Prefetch n_bytes from an address on into the processor's cache, line by line, without waiting."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         word, byte = ir.IntType(64), ir.IntType(8).as_pointer()
@@ -144,14 +144,14 @@ def _number_at(dtype: Any, element: Any) -> Callable[..., Any]:
     return of
 
 
-# For kernels that take the addresses of many arrays: passing each array by itself would cost more than a short loop.
+# For kernels that take the addresses of many arrays: passing the arrays themselves would cost more than a short loop.
 prefetch: Any = intrinsic(_prefetch_of)
 real_at: Any = intrinsic(_number_at(types.float32, ir.FloatType()))
 integer_at: Any = intrinsic(_number_at(types.int32, ir.IntType(32)))
 
 
 def processor() -> str:
-    """The name of the system and of the processor that kernels are compiled for: those of others round differently."""
+    """The system and processor that kernels are compiled for; kernels for another one round differently."""
     from llvmlite import binding
 
     return f"{platform.system()} {platform.machine()} {binding.get_host_cpu_name()}"

@@ -12,9 +12,10 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Int32
 from framearray_cli.engine.frames.blocks import Allotment, Blocks, blocks_of
 from framearray_cli.engine.frames.records import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY, HitRecords, empty_records
+from framearray_cli.engine.frames.scratch import Scratch
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.shading import estimate_terms
-from framearray_cli.engine.frames.threads import Scratch, TracePool
+from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.native import Samples, native_hits
 from framearray_cli.engine.hits.outer import outer_hits
 from framearray_cli.engine.kernels.simd import LANES
@@ -134,7 +135,7 @@ class _Pilot:
         """Measure the noise of frame c."""
         eyes = self.setup.frames_around(c, self.setup.n_r)
         random = np.random.default_rng((self.setup.seed, c)).random((2, self.blocks.n, 2))
-        pixels = np.concatenate([self.blocks.some_pixel(half) for half in random])
+        pixels = np.concatenate([self.blocks.random_pixels(half) for half in random])
         n, batch = len(pixels), len(scratch.hits.pixel) // 2
         mean, variance = 0.0, np.empty(n)
         block, density = np.empty((2, n, len(eyes)), np.int32), np.empty((2, n, len(eyes)))

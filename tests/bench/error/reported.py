@@ -11,7 +11,7 @@ from bench.core.frames import frame
 from bench.core.markdown import grid, number, percent
 from bench.core.results import DOCS, Table
 from bench.speed.speed import tell
-from framearray_cli.engine.frames.passes import turns
+from framearray_cli.engine.frames.passes import frames_per_turn
 from framearray_cli.engine.frames.records import BY_SAMPLE
 from framearray_cli.engine.images.standard_error import square_mean, standard_error
 from framearray_cli.render.prepare import FEWEST_SPLIT
@@ -73,7 +73,7 @@ def measure(name: str, folder: Path) -> list[Table]:
 def compare(case: Case, variant: Variant, c: int, wanted: Reference) -> list[Table]:
     """Each image of frame c made by a variant: what it tells, and how far it is from the reference."""
     setup = varied(case, variant).setup
-    halves = BY_SAMPLE if variant.hits >= FEWEST_SPLIT or variant.n_r == 0 else turns(variant.hits)
+    halves = BY_SAMPLE if variant.hits >= FEWEST_SPLIT or variant.n_r == 0 else frames_per_turn(variant.hits)
     made = frame(replace(case, setup=replace(setup, halves=halves)), c, SEED)
     assert made.differences is not None
     hits = made.hits.reshape(made.images.shape[1:3])

@@ -27,7 +27,7 @@ from framearray_cli.engine.embree.packets import (
     TRIANGLE,
     U,
     V,
-    aligned,
+    aligned_zeros,
     empty_packets,
     intersect,
     occlude,
@@ -283,7 +283,7 @@ def test_without_the_symbols_embreex_takes_over(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_packets_start_at_cache_lines() -> None:
-    assert all(aligned(n).ctypes.data % 64 == 0 for n in range(1, 200))
+    assert all(aligned_zeros(n).ctypes.data % 64 == 0 for n in range(1, 200))
     assert all(empty_packets(n, HIT_ROWS)[-1].ctypes.data % 64 == 0 for n in range(1, 20))
 
 

@@ -20,11 +20,13 @@ from framearray_cli.engine.frames.records import (
     REFLECTIVITY,
     WEIGHT,
     HitRecords,
-    Placed,
+    HitsByPixel,
 )
 from framearray_cli.engine.hits.outer import sort_by_pixel
-from framearray_cli.engine.images.band import MOST, Band, Finish, as_stored, empty_band, finish
-from framearray_cli.engine.images.compose import HitSource, SourceList, accumulate, compose_differences, weigh_halves
+from framearray_cli.engine.images.accumulate import accumulate
+from framearray_cli.engine.images.band import HITS_AT_ONCE, Band, Finish, as_stored, empty_band, finish
+from framearray_cli.engine.images.compose import compose_differences, weigh_halves
+from framearray_cli.engine.images.sources import HitSource, SourceList
 from framearray_cli.engine.kernels.simd import LANES
 
 N_PIXELS, N_LIGHTS, NOTHING = 40, 7, np.empty(0, np.float32)
@@ -70,7 +72,7 @@ class Case:
         accumulate(band, first, n, parts.addresses, *self.irradiance.shape[1:], mean)
 
     def source(self, records: HitRecords, scale: Any = NOTHING, odd_scale: Any = NOTHING) -> HitSource:
-        return HitSource(Placed(start=self.start, order=self.order), records, self.weight, scale, odd_scale)
+        return HitSource(HitsByPixel(start=self.start, order=self.order), records, self.weight, scale, odd_scale)
 
     def sums(self, values: Any, scale: Any = NOTHING) -> Any:
         """Weighed sums of values (n, ...) by pixel."""
@@ -128,7 +130,7 @@ def test_a_list_of_sources_refuses_what_kernels_would_misread(column: str) -> No
     def listed(**changed: Any) -> SourceList:
         a = arrays | changed
         placed, records = (
-            Placed(start=a["start"], order=a["order"]),
+            HitsByPixel(start=a["start"], order=a["order"]),
             HitRecords(row=a["row"], irradiance=a["irradiance"]),
         )
         return SourceList([HitSource(placed, records, a["weight"], a["scale"], a["odd_scale"])])
@@ -247,7 +249,7 @@ def test_bands_of_any_size_give_the_same(bands: Any) -> None:
 
 @pytest.mark.parametrize("channels", [1, 3])
 def test_a_pixel_may_have_more_hits_than_are_summed_at_once(channels: int) -> None:
-    case = Case(channels, n=40 * 3 * MOST, weighed=False)
+    case = Case(channels, n=40 * 3 * HITS_AT_ONCE, weighed=False)
     np.testing.assert_allclose(composed(case)[0], case.picture(*lights()), rtol=2e-5)
 
 

@@ -1,4 +1,4 @@
-"""W is denoised once a camera, and nothing else is."""
+"""W is denoise_obscurance once a camera, and nothing else is."""
 
 import sys
 
@@ -8,14 +8,14 @@ from support import tiny
 
 from framearray_cli.base.errors import MissingExtraError
 from framearray_cli.engine.images import denoise, window
-from framearray_cli.engine.images.denoise import denoised
+from framearray_cli.engine.images.denoise import denoise_obscurance
 
 SKY = {"background": [0.5, 0.5, 0.5]}
 
 
 def test_a_denoiser_that_does_nothing_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """R times (R W / R) is R W again: at silhouettes, on mirrors and against the sky too."""
-    monkeypatch.setattr(window, "denoised", lambda obscurance, reflectivity, normal: obscurance)
+    monkeypatch.setattr(window, "denoise_obscurance", lambda obscurance, reflectivity, normal: obscurance)
     monkeypatch.setattr("framearray_cli.render.prepare.require_denoiser", lambda: None)
     images = [
         tiny.render_frames(
@@ -35,7 +35,7 @@ def test_noise_of_obscurance_shrinks() -> None:
     noisy = np.clip(truth + 0.1 * rng.normal(size=truth.shape), 0, 1).astype(np.float32)
     normal = np.zeros_like(truth)
     normal[:, :32, 0] = normal[:, 32:, 1] = 1.0
-    smooth = denoised(noisy, np.full_like(truth, 0.5), normal)
+    smooth = denoise_obscurance(noisy, np.full_like(truth, 0.5), normal)
     assert smooth.min() >= 0 and smooth.max() <= 1
     assert np.sqrt(((smooth - truth) ** 2).mean()) < 0.5 * np.sqrt(((noisy - truth) ** 2).mean())
 

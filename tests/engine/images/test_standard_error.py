@@ -11,7 +11,7 @@ from support.tiny import WALK
 from framearray_cli.array.images.images import read_image, read_layers
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.engine.frames.threads import TracePool
-from framearray_cli.engine.images.standard_error import fill_unknown, half_factors, standard_error, summed_up
+from framearray_cli.engine.images.standard_error import error_summary, fill_unknown, half_factors, standard_error
 from framearray_cli.engine.loop import window_of
 from framearray_cli.job.job import Job
 from framearray_cli.render.render import render
@@ -59,9 +59,9 @@ def test_unknown_pixels_take_the_nearest_difference_for_their_hits() -> None:
 
 
 def test_an_array_is_summed_up() -> None:
-    found = summed_up({(0, 0): (1.0, 2.0), (0, 1): (9.0, 4.0), (1, 0): (2.0, 0.0)})
+    found = error_summary({(0, 0): (1.0, 2.0), (0, 1): (9.0, 4.0), (1, 0): (2.0, 0.0)})
     assert found == {"rms": 2.0, "relative": 1.0, "largest": 3.0, "camera": 0, "light": 1}
-    assert summed_up({(0, 0): (0.0, 0.0)})["relative"] == 0.0
+    assert error_summary({(0, 0): (0.0, 0.0)})["relative"] == 0.0
 
 
 def windowed(job: Job, j: int, eyes: Any = None) -> Any:

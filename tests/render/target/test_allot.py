@@ -113,7 +113,7 @@ def test_blocks_cover_the_frame_and_are_few(width: int, height: int) -> None:
         np.full((blocks.n, 2), 1 - 1e-12),
         np.random.default_rng(1).random((blocks.n, 2)),
     ):
-        np.testing.assert_array_equal(blocks.of_pixel[blocks.some_pixel(random)], np.arange(blocks.n))
+        np.testing.assert_array_equal(blocks.of_pixel[blocks.random_pixels(random)], np.arange(blocks.n))
 
 
 def test_pixels_have_rounded_hits_whose_mean_over_frames_is_exact() -> None:

@@ -1,10 +1,10 @@
 """Sixteen numbers at a time in kernels: one instruction computes all lanes of a ray packet.
 
-LLVM vectorizes a plain loop only where it can prove that no array overlaps another. It cannot prove that for loops that
-look things up, so kernels that write packets ask for vectors: `Lanes` of float32, float64, int32, uint8 or uint64, and
-flags, with the operators of numbers. On processors with narrower registers LLVM splits the operations.
+LLVM vectorizes a plain loop only if it can prove that no array overlaps another. It cannot for loops that look things
+up, so kernels that write packets use explicit vectors: `Lanes` of float32, float64, int32, uint8 or uint64, and flags,
+with the operators of numbers. On processors with narrower registers LLVM splits the operations.
 
-A function written with `select`, `gather`, `sqrt` and their like also works for single numbers.
+A function written with `select`, `gather`, `sqrt` and the like also works for single numbers.
 
 Two things differ from single numbers. LLVM may fuse sums and products (one rounding instead of two), and `>>` shifts
 int32 as bits, without the sign. Operands that do not fit together raise a typing error.

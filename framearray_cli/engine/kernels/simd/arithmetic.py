@@ -26,8 +26,8 @@ def _operator(function: Any, compute: Callable[..., Any], dtypes: tuple[Any, ...
 
     Args:
         compute: generates the code from a builder, the dtype and the operands.
-        dtypes: for which the operator exists.
-        flags: the result is flags instead of lanes of the same dtype.
+        dtypes: those that have the operator.
+        flags: whether the result is flags instead of lanes of the same dtype.
     """
 
     class _Typed(_Template):  # type: ignore[misc]
@@ -139,7 +139,7 @@ def _select_of(typingctx: Any, flags: Any, yes: Any, no: Any) -> Any:
 
 
 def _function(name: str) -> Callable[..., Any]:
-    """LLVM's own function of reals, of lanes or of one number."""
+    """An LLVM function of reals, for lanes or for one number."""
 
     def of(typingctx: Any, value: Any) -> Any:
         if (value.dtype if isinstance(value, Lanes) else value) not in REAL:
@@ -156,7 +156,7 @@ def _function(name: str) -> Callable[..., Any]:
 
 
 def _converted(dtype: Any) -> Callable[..., Any]:
-    """The conversion of lanes, or of one number, to a dtype."""
+    """The conversion to a dtype, for lanes or for one number."""
     lanes = Lanes(dtype)
 
     def of(typingctx: Any, value: Any) -> Any:

@@ -87,16 +87,16 @@ def _stored_of(typingctx: Any, array: Any, value: Any) -> Any:
         def number(x: int) -> Any:
             return ir.Constant(kind, [x] * LANES)
 
-        # the sign apart, the size at most the largest half
+        # split off the sign, and cut the size to the largest half
         bits = builder.bitcast(args[1], kind)
         sign = builder.and_(bits, number(-(1 << 31)))
         size = builder.xor(bits, sign)
         size = builder.select(builder.icmp_signed("<", size, number(_LARGEST_HALF)), size, number(_LARGEST_HALF))
-        # subnormal halves: at this number one step of float32 is the smallest half, so adding it rounds
+        # subnormal halves: next to this number a step of float32 is the smallest half, so adding it rounds
         coarse = number((127 - 15 + 23 - 10 + 1) << 23)
         small = builder.fadd(builder.bitcast(size, reals), builder.bitcast(coarse, reals))
         small = builder.sub(builder.bitcast(small, kind), coarse)
-        # normal halves: change the bias of the exponent, and round to even the 13 bits that are dropped
+        # normal halves: change the bias of the exponent, and drop 13 bits, rounding to even
         odd = builder.and_(builder.lshr(size, number(13)), number(1))
         normal = builder.add(builder.add(size, number(((15 - 127) << 23) + 0xFFF)), odd)
         normal = builder.lshr(normal, number(13))
@@ -135,7 +135,7 @@ def _gather_of(typingctx: Any, array: Any, offsets: Any) -> Any:
 
 
 def _gathered(builder: Any, lanes: Lanes, data: Any, offsets: Any) -> Any:
-    """LLVM's own gather; it becomes single loads where the processor has no such instruction."""
+    """LLVM's gather; it becomes single loads on processors without such an instruction."""
     result, flags = vector_of(lanes), vector_of(FLAGS)
     wide = builder.sext(offsets, ir.VectorType(ir.IntType(64), LANES))
     at, places = builder.gep(data, [ir.IntType(64)(0)]), ir.VectorType(data.type, LANES)

@@ -1,0 +1,46 @@
+"""The arrays that one thread computes in, kept from batch to batch."""
+
+from collections import Counter, defaultdict
+
+import numpy as np
+
+from ..hits.hits import empty_hits
+from ..hits.rays import room_for_hits, room_for_tests
+from ..terms.direct_steps import room_for_steps
+from .setup import FrameSetup
+
+# Rays traced together within a batch.
+RAYS = 4096
+
+
+class Scratch:
+    """One thread's arrays and counters, kept from batch to batch.
+
+    Attributes:
+        hit_rays, test_rays: packets of rays that find hits, and of rays that are only tested for being blocked.
+        hits: the batch.
+        reflected, throughput: reflected hits and the tint of the mirrors on the way, of this bounce and the last one.
+        steps: see `terms/direct_steps.py`; None without shadow steps.
+        irradiance: of all lights, where only some are kept; else empty.
+        pixel, density: (4 N_r + 1, batch) of the eyes around, see `outer_hits`.
+        obscurance, skylight: (batch, 3) W and S.
+        rays: number of rays traced by kind; `seconds`: by stage.
+    """
+
+    def __init__(self, setup: FrameSetup, batch: int) -> None:
+        n_eyes = 4 * setup.n_r + 1  # the windows of all frames that see a hit of eye c
+        rays = max(RAYS, batch, setup.obscurance.n_rays)
+        self.hit_rays = room_for_hits(rays)
+        self.test_rays = room_for_tests(RAYS, setup.lights.n_lights)
+        self.hits = empty_hits(batch)
+        self.reflected = [empty_hits(batch) for _ in range(2 if setup.depth else 0)]
+        self.throughput = [np.empty((batch, 3), np.float32) for _ in self.reflected]
+        self.steps = room_for_steps(setup.lights.n_lights) if setup.shadow_step > 1 else None
+        full = (0 if setup.keeps_all else batch, setup.lights.channels, setup.lights.n_lights)
+        self.irradiance = np.empty(full, np.float32)
+        self.pixel = np.empty((n_eyes, batch), np.int32)
+        self.density = np.empty((n_eyes, batch if setup.balance else 0), np.float64)
+        self.obscurance = np.empty((batch, 3), np.float32)
+        self.skylight = np.empty((batch if setup.obscurance.sky else 0, 3), np.float32)
+        self.rays: Counter[str] = Counter()
+        self.seconds: defaultdict[str, float] = defaultdict(float)

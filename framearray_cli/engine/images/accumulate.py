@@ -1,0 +1,145 @@
+"""Summing the hits of a band of pixels in one pass over all sources.
+
+Notation of the kernels: a hit has weight w, reflectivity R, irradiance E[l] and a row, see `HitRecords`. Its share of
+the direct light is w R / pi.
+"""
+
+import numpy as np
+
+from framearray_cli.base.arrays import Addresses, Real
+
+from ..frames.records import HALF, LIT, REFLECTIVITY, WEIGHT, lit_bit
+from ..kernels.kernel import inlined, integer_at, kernel, prefetch, real_at
+from ..kernels.simd import LANES, lane_numbers, lanes_from, load, reals, store
+from .band import HITS_AT_ONCE, INVERSE_PI, Band
+from .sources import IRRADIANCE, ODD_SCALE, ORDER, ROW, SCALE, START, WEIGHTS
+
+# Prefetch the irradiance of the hit that comes this many hits later, and the row of the one twice as far ahead: memory
+# answers in about the time that the sums of this many hits take.
+AHEAD = 8
+ROW_BYTES = 4 * LANES
+
+
+@kernel
+def accumulate(
+    band: Band, first_pixel: int, n: int, sources: Addresses, channels: int, n_lights: int, mean: bool
+) -> None:
+    """Sum the hits of pixels first_pixel to first_pixel + n - 1, pixel by pixel, source by source.
+
+    Args:
+        sources: of a `SourceList`.
+        channels: of irradiance, 1 or 3.
+        n_lights: of irradiance; 0 leaves direct light out.
+        mean: replace what the band holds by means over the weights, zero in a pixel without hits; else add sums to it.
+    """
+    for i in range(n):
+        # --- loop state ---
+        pixel = first_pixel + i
+        n_hits = 0  # hits of the pixel
+        waiting = 0  # lit hits whose share and address are noted in the band, but not yet summed
+        fresh = mean  # whether the pixel's direct sums still hold something else, to be overwritten
+        total = reals(lane_numbers()) * np.float32(0.0)  # sum of w row, in a register; its first lane sums w
+
+        for s in range(sources.shape[0]):
+            # 1. The hits of the pixel in this source, and the factors of its even and odd samples.
+            source = sources[s]
+            start, end = integer_at(source[START], pixel), integer_at(source[START], pixel + 1)
+            last = integer_at(source[START], first_pixel + n)
+            even = real_at(source[SCALE], pixel) if source[SCALE] != 0 else np.float32(1.0)
+            odd = real_at(source[ODD_SCALE], pixel) if source[ODD_SCALE] != 0 else even
+            n_hits += end - start
+            for entry in range(start, end):
+                _fetch(source, entry, last, channels, n_lights)
+                # 2. The weight w of the hit.
+                hit = integer_at(source[ORDER], entry)
+                row = source[ROW] + ROW_BYTES * hit
+                w = odd if real_at(row, HALF) > 0.0 else even
+                if source[WEIGHTS] != 0:
+                    w *= real_at(source[WEIGHTS], hit)
+                # 3. What has no l: w R W, w B, w W and w R at once.
+                total = total + lanes_from(row) * w
+                # 4. Note where E[l] of a lit hit is, and its share w R / pi.
+                lit = int(real_at(row, LIT))
+                if lit == 0 or n_lights == 0:
+                    continue
+                if waiting == HITS_AT_ONCE:
+                    _add_light(band, i, waiting, channels, n_lights, fresh)
+                    waiting, fresh = 0, False
+                band.places[waiting], band.lit[waiting] = source[IRRADIANCE] + 4 * channels * n_lights * hit, lit
+                for channel in range(3):
+                    band.shares[waiting, channel] = w * INVERSE_PI * real_at(row, REFLECTIVITY + channel)
+                waiting += 1
+
+        # 5. Divide by sum(w) for means, else add to the band; then sum the direct light of the hits that still wait.
+        if mean:
+            store(band.sums, LANES * i, total)
+            weight = band.sums[i, WEIGHT]
+            inverse = np.float32(1.0) / weight if weight > 0.0 else np.float32(0.0)
+            store(band.sums, LANES * i, total * inverse)
+            band.hits[i] = n_hits
+            _scale(band, i, waiting, n_lights, fresh, inverse)
+        else:
+            store(band.sums, LANES * i, load(band.sums, LANES * i) + total)
+        _add_light(band, i, waiting, channels, n_lights, fresh)
+
+
+@inlined
+def _add_light(band: Band, i: int, n: int, channels: int, n_lights: int, fresh: bool) -> None:
+    """Add the direct light of the n waiting hits to pixel i of the band; each sum is read and written once."""
+    # --- loop state ---
+    stride = band.direct.shape[2]  # from channel to channel of a pixel
+    any_lit = 0  # LIT of all hits together: packets of light positions with light of any of them
+    for k in range(n):
+        any_lit |= band.lit[k]
+
+    for l in range(0, n_lights, LANES):
+        # 1. Sum w R / pi E[l] of the hits lit by light positions l to l + 15, in registers.
+        at, bit = 3 * i * stride + l, lit_bit(n_lights, l)
+        red = green = blue = reals(lane_numbers()) * np.float32(0.0)
+        for k in range(n if (any_lit >> bit) & 1 else 0):
+            if (band.lit[k] >> bit) & 1 == 0:
+                continue
+            place = band.places[k] + 4 * l
+            if channels == 1:
+                e = lanes_from(place)
+                red = red + e * band.shares[k, 0]
+                green = green + e * band.shares[k, 1]
+                blue = blue + e * band.shares[k, 2]
+            else:
+                red = red + lanes_from(place) * band.shares[k, 0]
+                green = green + lanes_from(place + 4 * n_lights) * band.shares[k, 1]
+                blue = blue + lanes_from(place + 8 * n_lights) * band.shares[k, 2]
+
+        # 2. Only then add the sum before: in a sum of a million hits each single one would lose its last digits.
+        if not fresh:
+            red, green = red + load(band.direct, at), green + load(band.direct, at + stride)
+            blue = blue + load(band.direct, at + 2 * stride)
+        store(band.direct, at, red)
+        store(band.direct, at + stride, green)
+        store(band.direct, at + 2 * stride, blue)
+
+
+@inlined
+def _fetch(source: Addresses, entry: int, last: int, channels: int, n_lights: int) -> None:
+    """Prefetch the row of a hit that comes soon, and the irradiance of an earlier one; its row says where it is lit."""
+    if entry + 2 * AHEAD < last:
+        prefetch(source[ROW] + ROW_BYTES * integer_at(source[ORDER], entry + 2 * AHEAD), 1)
+    if entry + AHEAD < last:
+        hit = integer_at(source[ORDER], entry + AHEAD)
+        lit = int(real_at(source[ROW], LANES * hit + LIT))
+        for l in range(0, n_lights if lit != 0 else 0, LANES):
+            if (lit >> lit_bit(n_lights, l)) & 1:
+                for channel in range(channels):
+                    prefetch(source[IRRADIANCE] + 4 * (n_lights * (channels * hit + channel) + l), ROW_BYTES)
+
+
+@inlined
+def _scale(band: Band, i: int, n: int, n_lights: int, fresh: bool, factor: Real) -> None:
+    """Multiply the shares of the n waiting hits, and the direct sums of pixel i of the band unless they are fresh."""
+    for k in range(n):
+        for channel in range(3):
+            band.shares[k, channel] *= factor
+    if not fresh:
+        for channel in range(3):
+            for l in range(n_lights):
+                band.direct[i, channel, l] *= factor
