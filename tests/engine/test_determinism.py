@@ -1,4 +1,4 @@
-"""Same job, same bytes: whatever the number of threads, whichever engine, however often."""
+"""Same job, same bytes: for any number of threads, either engine, in every run."""
 
 import hashlib
 from dataclasses import replace
@@ -18,7 +18,7 @@ from framearray_cli.render.render import render
 
 SKY = {"background": [0.3, 0.4, 0.5]}
 LAMP = tiny.TABLE["light"]["sources"][0]
-# More than one batch of hits a frame and more than one band of pixels, so that threads have something to share.
+# More than one batch of hits per frame and more than one band of pixels, so that threads share work.
 CAMERA = {**WALK, "frames": 4, "resolution": [60, 45], "keys": [WALK["keys"][0], {**WALK["keys"][1], "frame": 3}]}
 
 
@@ -41,7 +41,7 @@ def job(scene: Path, out: Path, threads: int, **changes: Any) -> Job:
 
 
 def digests(folder: Path) -> dict[str, str]:
-    """Hash of every file but the manifest and the records, which tell times."""
+    """Hash of every image and layer file; manifest and records hold times."""
     files = sorted(file for file in folder.rglob("*") if file.is_file() and file.suffix == ".exr")
     return {str(file.relative_to(folder)): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
 
@@ -53,7 +53,7 @@ def written(scene: Path, folder: Path, threads: int, engine: Any = "auto", **cha
 
 @pytest.mark.parametrize("paths", [None, 100, 10_000])
 def test_particles_from_the_lights_are_the_same_for_any_number_of_threads(paths: int | None) -> None:
-    """Batches beyond the one that is enough are forgotten, and their rays too."""
+    """Batches beyond the last one needed are dropped, and their rays not counted."""
     inputs = tiny.prepared(tiny.job(scene=SKY, light={"sources": [LAMP, tiny.SUN]}))
     with tiny.open_embree(inputs) as embree:
         walks = LightWalks(

@@ -1,4 +1,4 @@
-"""The frame loop: one function finds frames, and what it traces does not depend on how often a frame is composed."""
+"""The frame loop: one function finds hits, and what it traces does not depend on how often a frame is composed."""
 
 import ast
 from dataclasses import replace
@@ -30,7 +30,7 @@ def callers(name: str) -> list[str]:
     return found
 
 
-def test_one_function_of_the_package_finds_frames() -> None:
+def test_one_function_of_the_package_finds_hits() -> None:
     assert callers("find_hits") == ["loop.ready_frames"]
 
 

@@ -1,12 +1,12 @@
 """The engine against its slow twin: every pixel, with and without reuse.
 
-Tolerance. A pixel's value is a weighed mean of hits, each the end of a chain of about a hundred float32 operations
-(ray, hit, texture, cosine, falloff, sums), where the twin computes in float64; so it may be off by 128 roundings of
-2^-24 of its own size or, where dark and bright terms meet, of the image's mean.
+Tolerance. A pixel is a weighed mean of hits, each the end of a chain of about a hundred float32 operations (ray, hit,
+texture, cosine, falloff, sums); the twin computes in float64. The two may differ by 128 roundings of 2^-24 of the
+pixel's value or, where dark and bright terms meet, of the image's mean.
 
-A ray that passes an edge within rounding may fall on its other side in one of the two; that changes a pixel by a
-whole hit. About 1e4 rays an image and 1e-6 of the room's size leave 0.1 such pixels an image; more than 2 are an
-error, and none is hidden: what is counted is every pixel beyond rounding.
+A ray that passes an edge within rounding may fall on different sides in the two; that changes a pixel by a whole hit.
+With about 1e4 rays per image and 1e-6 of the room's size, 0.1 pixels per image do so. More than 2 are an error. Every
+pixel that differs by more than rounding counts.
 """
 
 from itertools import pairwise
@@ -50,7 +50,7 @@ NO_REUSE: dict[str, dict[str, Any]] = {
     "sky seen": {"scene": SKY},
     "sky gathered": {"scene": SKY, "obscurance": {"outside": "background"}},
     "three colours of light": {"light": {"sources": [LAMP, SUN, RED]}},
-    "sun alone": {"light": {"frames": 1, "sources": [SUN]}},
+    "only the sun": {"light": {"frames": 1, "sources": [SUN]}},
     "one ray, one hit": {"samples": {"hits": 1, "obscurance": 1}},
     "mirrors to depth 1": {"specular": {"depth": 1}},
     "mirrors to depth 9": {"specular": {"depth": 9}},
@@ -95,7 +95,7 @@ def test_a_scene_without_normals_or_colours() -> None:
 
 
 def test_the_twin_sees_mirrors_in_mirrors() -> None:
-    """Else the depths above would all test the same picture. Both sides are the twin's, so nothing flips."""
+    """Otherwise the depths above would all test the same picture. Both sides are the twin's, so no pixel flips."""
     jobs = [tiny.job(specular={"depth": depth}) for depth in range(4)]
     images = [compare(tiny.prepared(job), lights=[0])[1].image(0, 0) for job in jobs]
     for one, deeper in pairwise(images):
@@ -145,7 +145,7 @@ REUSE: dict[str, dict[str, Any]] = {
         },
         "reuse": {"n_r": 2},
     },
-    "round about, a third of a turn a frame": {
+    "turning round, a third of a turn per frame": {
         "camera": {
             "frames": 4,
             "keys": [
@@ -181,7 +181,7 @@ def test_a_camera_that_stands_still_is_rendered_once(weights: str) -> None:
 
 @pytest.mark.parametrize("weights", ["average", "balance"])
 def test_every_hit_of_a_long_window_is_used(weights: str) -> None:
-    """In a room without a way out, seen from a point that hardly moves, nearly every hit is seen by all frames."""
+    """In a closed room, seen from a point that hardly moves, nearly all frames show nearly every hit."""
     walk = {"frames": 5, "keys": [WALK["keys"][0], {"frame": 4, "eye": [0.2, 1.3, 1.699], "target": [-0.1, 0.9, -1.0]}]}
     reuse = {"n_r": 1, "weights": weights}
     inputs = tiny.prepared(tiny.job(camera=walk, reuse=reuse), tiny.scene_of(tiny.box((-2, 0, -2), (2, 2.5, 2))))

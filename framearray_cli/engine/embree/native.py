@@ -27,8 +27,8 @@ _ROBUST = 1 << 2  # RTC_SCENE_FLAG_ROBUST: no ray slips between neighbouring tri
 def embree_library() -> ctypes.CDLL | None:
     """Load Embree from the embreex wheel; None where its symbols cannot be reached.
 
-    Opening the extension module again resolves every `rtc...` symbol through the module's own dependency, under any name
-    that the wheel gives that library.
+    Opening the extension module again resolves every `rtc...` symbol through the module's own dependency, however the
+    wheel names that library.
     """
     from embreex import rtcore_scene
 

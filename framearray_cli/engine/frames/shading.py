@@ -78,12 +78,12 @@ def write_rows(
         row: (n, LANES) overwritten.
     """
     for i in range(n):
+        # 1. R W, B, W and R of each channel, with R tinted by t behind mirrors. B has no l: it is the background where
+        #    the ray left the scene, and R S.
         row[i, WEIGHT] = 1.0
         for channel in range(3):
-            # t R: behind mirrors all light of the hit is tinted
             tint = throughput[i, channel] if throughput.shape[0] else np.float32(1.0)
             reflectivity = tint * hits.reflectivity[i, channel]
-            # B, which has no l: the background where the ray left the scene, and t R S
             light_independent = tint * background[channel] if hits.kind[i] == ESCAPED else np.float32(0.0)
             if skylight.shape[0]:
                 light_independent += reflectivity * skylight[i, channel]
@@ -91,6 +91,7 @@ def write_rows(
             row[i, LIGHT_INDEPENDENT + channel] = light_independent
             row[i, OBSCURANCE + channel] = obscurance[i, channel]
             row[i, REFLECTIVITY + channel] = reflectivity
+        # 2. Where E[l] is not zero, the half of the sample, and zeros up to the end of the cache line.
         row[i, LIT] = _lit_bits(irradiance, i)
         row[i, HALF] = hits.half[i]
         for column in range(HALF + 1, LANES):

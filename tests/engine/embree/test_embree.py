@@ -37,8 +37,8 @@ from framearray_cli.scene.files import Material
 from framearray_cli.scene.scene import Scene, load_scene
 
 CHUNK = 1 << 16
-# Embree divides by a reciprocal that it refines by one Newton step, an instruction set its own way; step and product
-# round to float32 and leave up to 4 units in the last place. A division would leave none: distances here are exact.
+# Embree divides by a reciprocal that it refines by one Newton step, which depends on the instruction set. Step and
+# product round to float32 and leave up to 4 units in the last place. Exact distances here leave none to a division.
 RECIPROCAL = 2.0**-21
 
 
@@ -81,7 +81,7 @@ def blocked(scene: EmbreeScene, origins: Any, dirs: Any, far: Any, coherent: boo
 
 
 def both(scene: Scene, *rays: Any, coherent: bool = False) -> tuple[Any, Any, Any, Any]:
-    """First hits and occlusion of the two engines; `coherent` is what the first is told of its packets."""
+    """First hits and occlusion of the two engines; `coherent` is passed to the first."""
     with EmbreeScene(scene, "packets") as a, EmbreeScene(scene, "embreex") as b:
         assert (a.engine, b.engine) == ("packets", "embreex")
         return first_hits(a, *rays, coherent), first_hits(b, *rays), blocked(a, *rays, coherent), blocked(b, *rays)
@@ -127,7 +127,7 @@ def test_every_hit_of_a_million_rays_is_the_same(large: Scene) -> None:
     np.testing.assert_array_equal(dark_a, hit)  # no mask: what blocks a ray is what it hits
 
 
-def test_hits_are_the_same_where_packets_are_told_to_be_coherent(large: Scene) -> None:
+def test_hits_are_the_same_in_packets_marked_as_coherent(large: Scene) -> None:
     """Rays that are, as eye and shadow rays, and rays that are not."""
     origins, dirs, far = random_rays(large, 200_000)
     rng = np.random.default_rng(4)
@@ -139,7 +139,7 @@ def test_hits_are_the_same_where_packets_are_told_to_be_coherent(large: Scene) -
         hit = (a[:, 0] >= 0) & ~other
         np.testing.assert_array_equal(a[hit], b[hit])
         np.testing.assert_array_equal(dark_a, dark_b)
-        # of triangles that lie on one another either may be found first; they are equally far, but for a digit
+        # either of two coincident triangles may be found first; their distances differ in the last digits only
         assert (a[other, 0] >= 0).all() and (b[other, 0] >= 0).all()
         np.testing.assert_allclose(a[other, 1], b[other, 1], rtol=RECIPROCAL)
         assert other.mean() < 1e-3
@@ -217,7 +217,7 @@ def test_opaque_and_masked_triangles_of_one_scene() -> None:
 
 
 @pytest.mark.parametrize("engine", ["packets", "embreex"])
-def test_what_is_nearer_than_asked_for_is_passed_over(engine: Any) -> None:
+def test_hits_nearer_than_the_limit_are_ignored(engine: Any) -> None:
     """Three sheets one behind the other, the first of them where rays start."""
     sheets = [tiny.quad((-1, -1, z), (1, -1, z), (1, 1, z), (-1, 1, z)) for z in (0.0, -1.0, -2.0)]
     scene = tiny.scene_of(np.concatenate(sheets))
@@ -228,12 +228,12 @@ def test_what_is_nearer_than_asked_for_is_passed_over(engine: Any) -> None:
             assert first_hits(opened, origins, dirs, near=near)[:, 1] == pytest.approx(np.full(20, found), rel=1e-6)
         assert (first_hits(opened, origins, dirs, near=2.5)[:, 0] == MISS).all()
         assert (first_hits(opened, origins, dirs, 1.5, near=1.2)[:, 0] == MISS).all()
-        # a later call of the same room for rays asks for nothing, and gets all
+        # a later call with the same packets and no limit ignores nothing
         assert first_hits(opened, origins + np.float32([0, 0, 0.5]), dirs)[:, 1] == pytest.approx(0.5, rel=1e-6)
 
 
 @pytest.mark.parametrize("masked", [False, True])
-def test_both_engines_pass_over_the_same(masked: bool) -> None:
+def test_both_engines_ignore_the_same_hits(masked: bool) -> None:
     scene = litter(3_000, texture=0, **({"alpha_texture": 0, "alpha_cutoff": 0.5} if masked else {}))
     origins, dirs, far = random_rays(scene, 4_000)
     with EmbreeScene(scene, "packets") as a, EmbreeScene(scene, "embreex") as b:
@@ -241,7 +241,7 @@ def test_both_engines_pass_over_the_same(masked: bool) -> None:
         usual = first_hits(a, origins, dirs, far)
     assert (one[:, 0] != other[:, 0]).sum() <= 4  # where triangles meet at an edge, or a mask at a texel's
     assert (one[one[:, 0] >= 0, 1] >= 0.7).all()
-    assert (usual[usual[:, 0] >= 0, 1] < 0.7).sum() > 100  # there was something to pass over
+    assert (usual[usual[:, 0] >= 0, 1] < 0.7).sum() > 100  # there was something to ignore
     same = usual[:, 1] >= 0.7
     np.testing.assert_array_equal(one[same], usual[same])
 

@@ -1,4 +1,4 @@
-"""A memory limit cuts the lights into blocks; the images are the same to the last bit."""
+"""A memory limit cuts the lights into blocks; the images stay the same to the last bit."""
 
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ def job(folder: Path, memory: Any = None, **samples: Any) -> Any:
 
 @pytest.fixture(autouse=True)
 def _program_of_no_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Limits of this file are some kilobytes; the program itself is not counted here."""
+    """Limits in this file are some kilobytes, so the program itself does not count."""
     monkeypatch.setattr("framearray_cli.render.memory.program_memory", lambda: 0)
 
 
@@ -75,7 +75,7 @@ def test_mirrors_are_seen_before_the_first_frame(tmp_path: Path) -> None:
 
 
 def test_the_limit_is_that_of_the_whole_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the program holds already is not there for frames."""
+    """Memory that the program already holds is not available to frames."""
     inputs = tiny.prepared(job(tmp_path, window_memory(tiny.prepared(job(tmp_path)), 6) + 1000))
     monkeypatch.setattr("framearray_cli.render.memory.program_memory", lambda: 1000)
     assert [len(block) for block in light_blocks(inputs, 0.0)] == [4, 3]

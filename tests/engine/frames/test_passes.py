@@ -1,4 +1,4 @@
-"""How many native hits each frame gets, and which pixels get more."""
+"""The number of native hits of each frame, and the pixels that get more."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def test_every_window_has_enough_hits(n_c: int, n_r: int) -> None:
         windows = [counts[max(c - n_r, 0) : c + n_r + 1].sum() for c in range(n_c)]
         assert counts.shape == (n_c,) and (counts >= hits).all()
         assert min(windows) >= (2 * n_r + 1) * hits
-        assert counts.sum() == (n_c + 2 * n_r) * hits, "not one hit more than the frames that are missing"
+        assert counts.sum() == (n_c + 2 * n_r) * hits, "no more than the hits of the missing frames"
 
 
 @pytest.mark.parametrize(("n_c", "n_r"), [(n_c, n_r) for n_c, n_r in PATHS if n_c > 4 * n_r])
@@ -76,7 +76,7 @@ def test_features_that_a_scene_lacks_are_off() -> None:
 
 
 @pytest.mark.parametrize(("hits", "m"), [(1 / 2, 2), (1 / 3, 3), (1 / 4, 4), (1 / 7, 7), (1 / 8, 8)])
-def test_a_fraction_visits_every_pixel_once_in_as_many_frames(hits: float, m: int) -> None:
+def test_a_fraction_1_over_m_visits_every_pixel_once_in_m_frames(hits: float, m: int) -> None:
     order = pixel_order(21, 13)
     found = [passes(order, 21, c, hits) for c in range(m)]
     assert all(len(parts) == 1 and parts[0].per_pixel == 1 and parts[0].first_sample == 0 for parts in found)
@@ -91,10 +91,10 @@ def test_whole_hits_come_first_and_then_the_fraction() -> None:
 
 
 def test_a_pixel_that_nobody_reaches_gets_a_hit() -> None:
-    """Sparse hits leave holes; they would be black."""
+    """Sparse hits leave holes, which would be black."""
     sky = {"background": [0.5, 0.5, 0.5]}
     job = tiny.job(samples={"hits": 0.125}, camera=tiny.WALK, reuse={"n_r": 1}, scene=sky)
     for frame in tiny.render_frames(tiny.prepared(job)).composed:
         assert (frame.hits >= 1).all() and frame.hits.mean() < 1.5
-        # where alone an outer hit on a mirror's edge falls, nothing is seen: a pixel or two of 432
+        # a pixel whose only hit is an outer one on a mirror stays black: one or two of 432
         assert (frame.images.max(axis=(0, 3)) == 0).sum() <= 2

@@ -1,4 +1,4 @@
-"""What composing is told of a hit, against numpy."""
+"""The rows of hits that composing reads, against numpy."""
 
 from typing import Any
 
@@ -36,7 +36,7 @@ def written(n_lights: int = 20, channels: int = 1, skylight: bool = False, throu
     def values() -> Any:
         return rng.random((N, 3)).astype(np.float32)
 
-    irradiance = with_room((N, channels, n_lights), np.float32, fill=5)  # what is behind it is not looked at
+    irradiance = with_room((N, channels, n_lights), np.float32, fill=5)  # what lies behind it does not count
     irradiance[:] = rng.random(irradiance.shape) * (rng.random(irradiance.shape) < 1 / (n_lights + 1))
     given = {
         "background": np.float32([1, 2, 3]),
@@ -56,12 +56,12 @@ def test_rows_are_those_of_numpy(skylight: bool, throughput: bool) -> None:
     row, hits, given = written(skylight=skylight, throughput=throughput)
     tint = given["throughput"] if throughput else 1.0
     reflectivity = tint * hits.reflectivity
-    steady = np.where((hits.kind == ESCAPED)[:, None], tint * given["background"], 0.0)
+    light_independent = np.where((hits.kind == ESCAPED)[:, None], tint * given["background"], 0.0)
     if skylight:
-        steady = steady + reflectivity * given["skylight"]
+        light_independent = light_independent + reflectivity * given["skylight"]
     expected = {
         INDIRECT: reflectivity * given["obscurance"],
-        LIGHT_INDEPENDENT: steady,
+        LIGHT_INDEPENDENT: light_independent,
         OBSCURANCE: given["obscurance"],
         REFLECTIVITY: reflectivity,
     }
@@ -73,15 +73,15 @@ def test_rows_are_those_of_numpy(skylight: bool, throughput: bool) -> None:
 
 @pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize("n_lights", [1, 15, 16, 17, 48, LANES * LIT_BITS, LANES * LIT_BITS + 1, 1700])
-def test_a_bit_says_where_there_is_light(channels: int, n_lights: int) -> None:
+def test_bits_mark_the_packets_that_have_light(channels: int, n_lights: int) -> None:
     row, _, given = written(n_lights, channels)
     np.testing.assert_array_equal(row[:, LIT], lit_packets(given["irradiance"]))
     assert 0 < np.count_nonzero(row[:, LIT]) < N
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -1.0, 1e-45])
-def test_whatever_is_not_zero_is_light(value: float) -> None:
-    """Values that are no radiance must come through to composing, which counts them."""
+def test_any_value_but_zero_is_light(value: float) -> None:
+    """Invalid values must reach composing, which counts them."""
     hits = points(1, (0, 0, 0), (0, 1, 0))
     irradiance = with_room((1, 1, 33), np.float32, fill=0)
     irradiance[0, 0, 32] = value

@@ -1,4 +1,4 @@
-"""The threads of a frame: every task once, results in order, errors at once; memory that is used again."""
+"""The threads of a pool: every task once, results in order, errors at once; and memory that is used again."""
 
 from collections.abc import Iterator
 from threading import Barrier
@@ -30,8 +30,8 @@ def test_every_item_is_done_once_and_results_keep_their_order(pool: TracePool) -
     assert pool.run(task, []) == []
 
 
-def test_all_threads_work_each_with_arrays_of_its_own(pool: TracePool) -> None:
-    together = Barrier(3, timeout=60)  # breaks where three tasks do not run at a time
+def test_all_threads_run_each_with_arrays_of_its_own(pool: TracePool) -> None:
+    together = Barrier(3, timeout=60)  # breaks if three tasks do not run at the same time
 
     def task(_item: int, scratch: object) -> int:
         together.wait()
@@ -53,7 +53,7 @@ def test_an_error_reaches_the_caller_and_ends_the_work(pool: TracePool) -> None:
     assert len(done) < 99_999
 
 
-def test_the_pool_works_on_after_an_error(pool: TracePool) -> None:
+def test_the_pool_is_usable_after_an_error(pool: TracePool) -> None:
     def task(item: int, _scratch: object) -> int:
         return 1 // item
 
@@ -62,7 +62,7 @@ def test_the_pool_works_on_after_an_error(pool: TracePool) -> None:
     assert pool.run(task, [1, 1, 1, 1]) == [1, 1, 1, 1]
 
 
-def test_kept_memory_serves_what_is_about_as_large() -> None:
+def test_returned_memory_serves_arrays_of_about_its_size() -> None:
     arrays = ArrayPool()
     array = arrays.take("row", (50, 16), np.float32)
     block = array.base

@@ -1,4 +1,4 @@
-"""Sums of hits become images."""
+"""Sums of hits, and how they become images."""
 
 import gc
 from typing import Any
@@ -92,18 +92,18 @@ class Case:
         """(n_lights, n_pixels, 3) weighed means."""
         total = self.sums(np.ones(len(self.pixel)))
         indirect = self.sums(self.reflectivity.astype(np.float64) * self.obscurance)
-        steady = self.sums(self.constant.astype(np.float64)) if len(self.constant) else 0
+        light_independent = self.sums(self.constant.astype(np.float64)) if len(self.constant) else 0
         direct = self.sums(self.direct())  # (n_pixels, 3, n_lights)
         value = (
             colour * direct
             + ambient * indirect[:, :, None]
-            + np.reshape(steady, (-1, 3, 1) if len(self.constant) else ())
+            + np.reshape(light_independent, (-1, 3, 1) if len(self.constant) else ())
         )
         return (value / total[:, None, None]).transpose(2, 0, 1)
 
 
 def test_a_list_of_sources_keeps_its_arrays() -> None:
-    """Nobody else holds them; without the list their memory would be free, and soon be somebody's."""
+    """Nothing else holds them; without the list their memory would be freed and used again."""
     case = Case(1)
     dropped = []
 
@@ -178,7 +178,7 @@ def test_differences_are_sums_with_a_factor_for_each_half(channels: int, weighed
         + ambient * case.sums(case.reflectivity.astype(np.float64) * case.obscurance * factor[:, None])[:, :, None]
         + case.sums(case.constant.astype(np.float64) * factor[:, None])[:, :, None]
     )
-    # terms of both signs, so their roundings are judged by what they are of
+    # terms of both signs: their roundings are proportional to the largest of them
     np.testing.assert_allclose(images, value.transpose(2, 0, 1), rtol=0, atol=5e-6 * abs(value).max())
     assert (value > 0).any() and (value < 0).any()
 
@@ -235,7 +235,7 @@ def test_light_that_is_zero_is_left_out(channels: int, n_lights: int) -> None:
     dark = np.repeat(rng.random((300, 1, n_packets)) < 0.7, LANES, axis=2)[:, :, :n_lights]
     case.irradiance[np.broadcast_to(dark, case.irradiance.shape)] = 0
     case.irradiance[case.pixel == 7] = 0
-    band.direct[:] = np.nan  # what a band held before counts for nothing
+    band.direct[:] = np.nan  # what a band held before does not count
     case.add(band, 0, N_PIXELS)
     direct = case.sums(case.direct()) / case.sums(np.ones(300))[:, None, None]
     np.testing.assert_allclose(band.direct[:, :, :n_lights], direct, rtol=2e-6)
@@ -254,7 +254,7 @@ def test_a_pixel_may_have_more_hits_than_are_summed_at_once(channels: int) -> No
 
 
 @pytest.mark.parametrize("bands", [[(0, 40)], [(0, 1), (1, 39)], [(0, 3), (3, 37)]])
-def test_halves_are_the_nearest_ones(bands: Any) -> None:
+def test_halves_are_rounded_to_the_nearest(bands: Any) -> None:
     images, bad = composed(Case(1), bands, np.float16)
     np.testing.assert_array_equal(images, composed(Case(1))[0].astype(np.float16))
     assert sum(entry[3] for entry in bad) == 0
@@ -267,8 +267,8 @@ def test_values_beyond_the_largest_half_are_cut_and_counted() -> None:
     assert bad[0][3] == (exact > 65504).sum() > 0 and bad[0][0] == 0
 
 
-def test_a_scale_a_pixel_multiplies_all_its_hits() -> None:
-    """What mirrors show is added so, after the mean over all hits."""
+def test_a_scale_per_pixel_multiplies_all_its_hits() -> None:
+    """Reflected hits are added so, after the mean over all hits."""
     case, other = Case(3), Case(3, n=100, seed=2, weighed=False)
     scale = np.random.default_rng(3).random(N_PIXELS).astype(np.float32)
     colour, ambient = lights()
@@ -291,7 +291,7 @@ def test_a_pixel_without_hits_is_black() -> None:
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -1.0, 3e38])
-def test_what_is_not_a_radiance_is_counted_located_and_black(value: float) -> None:
+def test_an_invalid_value_is_counted_located_and_black(value: float) -> None:
     case = Case(3, weighed=False)
     hit = case.order[case.start[21]]
     case.reflectivity[hit] = 1.0
@@ -303,7 +303,7 @@ def test_what_is_not_a_radiance_is_counted_located_and_black(value: float) -> No
         assert bad == [(1, 5, 21, 1)]
         assert images[4, 21, 1] > 1e34
     else:
-        expected = 1 if value == -1.0 else 2  # -1 drowns in the pixel's other light
+        expected = 1 if value == -1.0 else 2  # -1 is outweighed by the other light of the pixel
         assert bad[0] == (expected, 5 if value == -1.0 else 4, 21, 0)
     assert images[5, 21, 2] == 0
     assert np.isfinite(images).all() and (images >= 0).all()

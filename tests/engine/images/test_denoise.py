@@ -1,4 +1,4 @@
-"""W is denoise_obscurance once a camera, and nothing else is."""
+"""W is denoised once per camera position, and nothing else is."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Standard errors told by two halves of the hits: the arithmetic, what is written, and what stays as it is."""
+"""Standard errors from two halves of the hits: the arithmetic, what is written, and what does not change."""
 
 from pathlib import Path
 from typing import Any
@@ -21,12 +21,12 @@ def test_factors_make_a_difference_of_means_with_the_variance_of_the_mean() -> N
     weights = np.array([[1.0, 3.0, 0.5], [1.0, 5.0, 2.0]])
     first, second = half_factors(weights)
     np.testing.assert_allclose(first * weights[0], -second * weights[1], rtol=1e-6)  # equal halves: no difference
-    # one unit of variance a unit of weight: sum of w f^2 is that of the mean, one over the weight in all
+    # one unit of variance per unit of weight: the sum of w f^2 is the variance of the mean, one over the total weight
     np.testing.assert_allclose(weights[0] * first**2 + weights[1] * second**2, 1 / weights.sum(axis=0), rtol=1e-6)
     assert (first > 0).all() and (second < 0).all()
 
 
-def test_a_pixel_with_one_half_alone_has_no_difference() -> None:
+def test_a_pixel_with_only_one_half_has_no_difference() -> None:
     assert (half_factors(np.array([[2.0, 0.0, 0.0], [0.0, 3.0, 0.0]])) == 0).all()
 
 
@@ -40,7 +40,7 @@ def test_the_error_is_the_root_of_the_mean_square_nearby() -> None:
 
 
 def test_neighbours_share_the_variance_of_a_hit() -> None:
-    """Not that of a pixel: where every second one has twice the hits, each keeps its own."""
+    """They share no variance per pixel: where every second one has more hits, each keeps its own."""
     hits = np.tile([4, 8], (9, 9))
     difference = np.repeat(1 / np.sqrt(hits)[..., None], 3, axis=-1).astype(np.float32)
     np.testing.assert_allclose(standard_error(difference, hits), difference, rtol=1e-6)
@@ -58,21 +58,21 @@ def test_unknown_pixels_take_the_nearest_difference_for_their_hits() -> None:
     assert np.array_equal(differences, untouched)
 
 
-def test_an_array_is_summed_up() -> None:
+def test_the_summary_of_an_array() -> None:
     found = error_summary({(0, 0): (1.0, 2.0), (0, 1): (9.0, 4.0), (1, 0): (2.0, 0.0)})
     assert found == {"rms": 2.0, "relative": 1.0, "largest": 3.0, "camera": 0, "light": 1}
     assert error_summary({(0, 0): (0.0, 0.0)})["relative"] == 0.0
 
 
 def windowed(job: Job, j: int, eyes: Any = None) -> Any:
-    """Frame j of a job, of all hits of its window or those of some eyes."""
+    """Compose frame j of a job from all hits of its window, or from those of some eyes."""
     with tiny.planned(tiny.prepared(job)) as (setup, ambient), TracePool(setup, 1) as pool:
         shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
         return window_of(j, setup, ambient, pool).compose(j, np.empty(shape, np.float32), eyes)
 
 
 def test_the_difference_is_that_of_the_two_halves_of_the_window() -> None:
-    """Against images composed of the hits of each half alone, which weigh by their number."""
+    """Against images composed of the hits of one half only; each half weighs by its number of hits."""
     job = tiny.job(
         camera=WALK, reuse={"n_r": 2, "weights": "average"}, samples={"hits": 1, "halves": True}, specular={"depth": 0}
     )
@@ -95,7 +95,7 @@ def test_images_stay_as_they_are_where_frames_are_the_halves() -> None:
 
 @pytest.mark.parametrize(("still", "depth"), [(True, 0), (True, 4), (False, 4)])
 def test_halves_of_samples_differ_wherever_there_is_light(still: bool, depth: int) -> None:
-    """Where no frame shares its hits, or a mirror shows what it does."""
+    """Without reuse, or with mirrors, samples and not frames are the halves."""
     camera = {} if still else WALK
     job = tiny.job(camera=camera, samples={"hits": 2, "halves": True}, specular={"depth": depth, "hits": 6})
     frame = tiny.render_frames(tiny.prepared(job)).composed[0]
@@ -133,13 +133,13 @@ def test_images_hold_error_and_difference(tmp_path: Path, half: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "message"),
     [
         ({"output": {"format": "png"}}, 'expected output.format = "exr"'),
         ({"samples": {"hits": 1}}, "expected at least two hits"),
     ],
 )
-def test_what_halves_cannot_do_is_told(changes: dict[str, Any], told: str) -> None:
+def test_halves_refuse_what_they_cannot_do(changes: dict[str, Any], message: str) -> None:
     changes = {**changes, "samples": {"halves": True, **changes.get("samples", {})}}
-    with pytest.raises(ValueError, match=told):
+    with pytest.raises(ValueError, match=message):
         tiny.job(**changes)

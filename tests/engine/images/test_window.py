@@ -1,4 +1,4 @@
-"""The window of frames: what is held, when a frame is composed, and what a composed frame tells."""
+"""The window: the hits it holds, when a frame is composed, and what a composed frame holds."""
 
 from dataclasses import replace
 from typing import Any
@@ -21,7 +21,7 @@ def path(frames: int) -> dict[str, Any]:
 
 
 class Watched(Window):
-    """A window that notes which frames were found, and how many it held at most."""
+    """A window that notes the eyes that were added, and the most that it held at a time."""
 
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)
@@ -56,7 +56,7 @@ def test_no_more_than_the_window_is_held_and_every_frame_comes_once(n_c: int, n_
 
 
 def test_memory_of_dropped_frames_is_not_seen_again() -> None:
-    """A frame is composed alike whether its arrays are fresh or were those of an earlier frame."""
+    """A frame is the same whether its arrays are new or were used by an earlier eye."""
     inputs = tiny.prepared(tiny.job(camera=path(8), reuse={"n_r": 1}, scene=SKY))
     rendered = tiny.render_frames(inputs).images
     with tiny.planned(inputs) as (setup, ambient):
@@ -68,7 +68,7 @@ def test_memory_of_dropped_frames_is_not_seen_again() -> None:
 
 @pytest.mark.parametrize("kernel", ["compose_pixels", "compose_differences"])
 def test_a_task_that_fails_gives_its_sums_to_the_next(kernel: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each thread has one set of sums: one that is lost would end all later frames."""
+    """Each thread has one band: a lost one would end all later frames."""
     inputs = tiny.prepared(tiny.job(camera=path(3), reuse={"n_r": 1}, samples={"halves": True}))
 
     def fail(*_arguments: object) -> None:
@@ -87,7 +87,7 @@ def test_a_task_that_fails_gives_its_sums_to_the_next(kernel: str, monkeypatch: 
 
 @pytest.mark.parametrize("weights", ["average", "balance"])
 def test_twice_the_light_is_twice_the_picture(weights: str) -> None:
-    """Direct and indirect together, to the last bit: a factor of two changes no digit."""
+    """Direct and indirect light together, to the last bit: a factor of two changes no digit."""
     lamp = tiny.TABLE["light"]["sources"][0]
     twice = {**lamp, "keys": [{**key, "intensity": [2 * i for i in key["intensity"]]} for key in lamp["keys"]]}
     images = []
@@ -99,7 +99,7 @@ def test_twice_the_light_is_twice_the_picture(weights: str) -> None:
 
 
 def test_layers_are_what_the_pictures_are_made_of() -> None:
-    """Fixed lights of no strength: the picture is the background and I_A times the indirect layer."""
+    """Lights of no strength and a fixed I_A: the picture is I_A times the indirect layer."""
     dark = {"type": "point", "keys": [{"frame": 0, "position": [0, 1, 0], "intensity": 0.0}]}
     table = tiny.table(camera=path(3), reuse={"n_r": 1}, light={"frames": 1, "sources": [dark]})
     table["ambient"] = {"intensity": [2.0, 3.0, 4.0]}
@@ -139,7 +139,7 @@ def test_no_layers_if_the_job_wants_none() -> None:
 
 
 def test_a_value_that_is_not_finite_is_counted_located_and_black() -> None:
-    """Light 1 of 3 is far too strong for float32: only its picture is touched, and the first place is told."""
+    """Light 1 of 3 is far too strong for float32: only its picture changes, and the first place is noted."""
     inputs = tiny.prepared(tiny.job(scene=SKY))
     strength = inputs.light_arrays.strength.copy()
     strength[..., 1] = 3e38
@@ -157,7 +157,7 @@ def test_a_value_that_is_not_finite_is_counted_located_and_black() -> None:
 
 
 def test_unbiased_shadows_keep_their_mean_in_the_picture() -> None:
-    """Slats that hide the light at single positions: steps overlook them, checks do not, and no value is cut off."""
+    """Slats that hide the light at single positions: shadow steps miss them, checks find them, no value is cut off."""
     slats = [tiny.box((x, 1.5, -2), (x + 0.02, 1.6, 2)) for x in np.arange(-1.9, 1.9, 0.1)]
     floor = tiny.quad((-2, 0, 2), (2, 0, 2), (2, 0, -2), (-2, 0, -2))
     scene = tiny.scene_of(np.concatenate([floor, *slats]))

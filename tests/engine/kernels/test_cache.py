@@ -1,4 +1,4 @@
-"""Old machine code never runs on after the source has changed, and importing the package leaves no trace."""
+"""Machine code is never reused after the source has changed, and importing the package writes nothing."""
 
 import errno
 import os
@@ -20,7 +20,7 @@ elsewhere = pytest.mark.skipif(os.name == "nt", reason="the place of caches is s
 
 @pytest.fixture
 def cache_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """An empty place for caches; the folder that other tests use is found again afterwards."""
+    """An empty folder for caches; later tests find theirs again."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setattr(kernelcache, "_problems", [])
@@ -42,7 +42,7 @@ def test_any_change_of_any_file_changes_the_digest(tmp_path: Path) -> None:
 
 
 def test_the_digest_is_of_every_module_in_every_folder_of_the_package(tmp_path: Path) -> None:
-    """Wherever the module that computes it stands."""
+    """The digest starts at the package, not at the folder of the module that computes it."""
     assert kernelcache.package_folder() == PACKAGE
     copy = tmp_path / "package"
     shutil.copytree(PACKAGE, copy, ignore=lambda folder, names: {"__pycache__"} & set(names))
@@ -98,7 +98,7 @@ print(state() == before, len(list(home.rglob("*.nbi"))))
 
 
 @elsewhere
-def test_importing_kernels_leaves_no_folder_and_numba_as_it_is(tmp_path: Path) -> None:
+def test_importing_kernels_makes_no_folder_and_does_not_change_numba(tmp_path: Path) -> None:
     """The first kernel that is called makes the folder; numba's settings and classes stay for other libraries."""
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     environment["XDG_CACHE_HOME"] = str(tmp_path)
@@ -118,7 +118,7 @@ def test_kernels_go_into_a_folder_of_this_source_and_old_ones_are_dropped(cache_
 
 
 def test_the_users_choice_stands(cache_home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What else the user keeps there stays."""
+    """Other files of the user there stay."""
     chosen = tmp_path / "chosen"
     for k in range(5):
         (chosen / f"other{k}").mkdir(parents=True)
@@ -135,20 +135,20 @@ def test_the_users_choice_stands(cache_home: Path, tmp_path: Path, monkeypatch: 
 def test_where_the_users_folder_cannot_be_used_it_is_one_beside_the_source(
     cache_home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Never numba's own places: those do not change when another file of the source does."""
+    """Never in numba's own folders, which do not change when another file of the source does."""
     package = tmp_path / "package"
     package.mkdir()
     monkeypatch.setattr(kernelcache, "package_folder", lambda: package)
     cache_home.write_text("in the way")
     beside = package / "__pycache__" / "framearray"
     assert kernelcache.kernel_folder() == beside / kernelcache.source_digest(package)
-    assert not kernelcache.problem(), "nothing that a user need know"
+    assert not kernelcache.problem(), "nothing to report to a user"
     beside.rename(tmp_path / "moved")
     beside.write_text("in the way, too")
     kernelcache.kernel_folder.cache_clear()
     assert kernelcache.kernel_folder() is None
     assert kernelcache.problem().startswith(f"{cache_home}{os.sep}")
-    assert kernel(doubled)(21) == 42, "it is compiled all the same"
+    assert kernel(doubled)(21) == 42, "compiled all the same"
 
 
 def test_a_choice_that_cannot_be_used_is_reported(cache_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,7 +188,7 @@ def test_a_kernel_that_cannot_be_kept_runs_all_the_same(cache_home: Path, monkey
 
 @pytest.mark.parametrize("suffix", ["nbi", "nbc"])
 def test_a_damaged_kernel_is_compiled_again(suffix: str, cache_home: Path) -> None:
-    """As a power cut may leave it: of the right length, and empty."""
+    """As a power cut may leave it: the right length, all zeros."""
     assert kernel(doubled)(21) == 42
     (file,) = (kernelcache.kernel_folder() or cache_home).rglob(f"*.{suffix}")
     file.write_bytes(bytes(file.stat().st_size))

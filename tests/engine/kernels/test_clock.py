@@ -5,14 +5,14 @@ import numba
 from framearray_cli.engine.kernels.clock import compile_clock, is_compiling
 
 
-def test_each_clock_tells_once_and_measures_by_itself() -> None:
-    told: list[str] = []
-    with compile_clock(lambda: told.append("outer")) as outer, compile_clock(lambda: told.append("inner")) as inner:
+def test_each_clock_reports_once_and_measures_its_own_time() -> None:
+    begun: list[str] = []
+    with compile_clock(lambda: begun.append("outer")) as outer, compile_clock(lambda: begun.append("inner")) as inner:
         for k in range(3):
             numba.njit(lambda x, k=k: x + k)(1)
             assert not is_compiling()
-    assert sorted(told) == ["inner", "outer"]
+    assert sorted(begun) == ["inner", "outer"]
     assert 0 < inner.seconds <= outer.seconds + 1e-3
     before = outer.seconds
     numba.njit(lambda x: x - 1)(1)
-    assert outer.seconds == before, "a clock that has ended hears nothing"
+    assert outer.seconds == before, "a clock that has ended measures nothing"

@@ -1,4 +1,4 @@
-"""Sixteen numbers at a time: every operation against numpy, and functions of lanes against those of one number."""
+"""Sixteen numbers at a time: every operation against numpy, and functions of lanes against functions of one number."""
 
 from collections.abc import Callable
 from typing import Any
@@ -43,12 +43,12 @@ READ, WRITTEN = np.s_[ODD : ODD + LANES], np.s_[5 : 5 + LANES]
 
 
 def fresh(dtype: Any, n: int = 2 * LANES) -> Any:
-    """Numbers that a test recognises if they are still there."""
+    """An array of 77, so that a test sees which elements were written."""
     return np.full(n, 77, dtype)
 
 
 def only_changed(array: Any, at: slice) -> Any:
-    """What stands in a place, after a look that nothing else was written."""
+    """The elements at a slice; nothing else was written."""
     rest = np.ones(len(array), bool)
     rest[at] = False
     assert (array[rest] == 77).all()
@@ -56,12 +56,12 @@ def only_changed(array: Any, at: slice) -> Any:
 
 
 def flagged(number: int) -> Any:
-    """(16,) what `bits` tells, one flag a lane."""
+    """(16,) the flags that `bits` packed, one per lane."""
     return (number >> np.arange(LANES)) & 1 == 1
 
 
 @kernel
-def with_reals(a: Any, b: Any, one: Any, out: Any, told: Any) -> None:
+def with_reals(a: Any, b: Any, one: Any, out: Any, answers: Any) -> None:
     """Operators of reals; `one` is a number of the same dtype."""
     x, y = load(a, 3), load(b, 3)
     store(out, 0, x + y)
@@ -85,11 +85,11 @@ def with_reals(a: Any, b: Any, one: Any, out: Any, told: Any) -> None:
         out[224 + i] = floor(a[3 + i])
         out[240 + i] = select(a[3 + i] < b[3 + i], a[3 + i], b[3 + i])
     less, more = x < y, x > y
-    told[0], told[1], told[2] = bits(less), bits(x <= y), bits(more)
-    told[3], told[4], told[5] = bits(x >= y), bits(x == y), bits(less | more)
-    told[6], told[7], told[8] = bits(less & more), bits(~less), bits(less ^ (x <= y))
-    told[9], told[10] = bits(x < one), bits(one < x)
-    told[11], told[12] = popcount(less), popcount(a[3] < b[3])
+    answers[0], answers[1], answers[2] = bits(less), bits(x <= y), bits(more)
+    answers[3], answers[4], answers[5] = bits(x >= y), bits(x == y), bits(less | more)
+    answers[6], answers[7], answers[8] = bits(less & more), bits(~less), bits(less ^ (x <= y))
+    answers[9], answers[10] = bits(x < one), bits(one < x)
+    answers[11], answers[12] = popcount(less), popcount(a[3] < b[3])
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -97,8 +97,8 @@ def test_reals_are_those_of_numpy(dtype: Any) -> None:
     a, b = np.random.default_rng(1).normal(size=(2, 2 * LANES)).astype(dtype) * 9
     a[3:11] = (np.nan, 1, np.inf, -0.0, np.finfo(dtype).smallest_subnormal, -np.inf, np.nan, 2.5)
     b[3:11] = (1, np.nan, np.inf, 0.0, 0.5, np.inf, np.nan, 2.5)
-    one, out, told = dtype(0.75), fresh(dtype, 272), np.zeros(13, np.int64)
-    with_reals(a, b, one, out, told)
+    one, out, answers = dtype(0.75), fresh(dtype, 272), np.zeros(13, np.int64)
+    with_reals(a, b, one, out, answers)
     x, y = a[READ], b[READ]
     with np.errstate(all="ignore"):
         expected = [x + y, x - y, x * y, x / y, -x, np.sqrt(x), np.floor(x), np.where(x < y, x, one)]
@@ -109,12 +109,12 @@ def test_reals_are_those_of_numpy(dtype: Any) -> None:
     assert (out[256:] == 77).all()
     less, same, more = x < y, x == y, x > y  # each false for nan
     flags = [less, less | same, more, more | same, same, less | more, less & more, ~less, same, x < one, one < x]
-    np.testing.assert_array_equal([flagged(number) for number in told[:11]], flags)
-    assert told[11] == less.sum() and told[12] == less[0]
+    np.testing.assert_array_equal([flagged(number) for number in answers[:11]], flags)
+    assert answers[11] == less.sum() and answers[12] == less[0]
 
 
 @kernel
-def with_integers(a: Any, b: Any, out: Any, told: Any) -> None:
+def with_integers(a: Any, b: Any, out: Any, answers: Any) -> None:
     x, y = load(a, 3), load(b, 3)
     store(out, 0, x + y)
     store(out, 16, x - y)
@@ -126,7 +126,7 @@ def with_integers(a: Any, b: Any, out: Any, told: Any) -> None:
     store(out, 112, -x)
     store(out, 128, x >> 5)
     store(out, 144, select(x == y, x, 3))
-    told[0], told[1] = bits(x == y), bits(x == 9)
+    answers[0], answers[1] = bits(x == y), bits(x == 9)
 
 
 @pytest.mark.parametrize("dtype", [np.int32, np.uint8, np.uint64])
@@ -134,28 +134,28 @@ def test_integers_are_those_of_numpy_and_shifts_bring_in_zeros(dtype: Any) -> No
     info = np.iinfo(dtype)
     a, b = np.random.default_rng(2).integers(info.min, info.max, (2, 2 * LANES), dtype, endpoint=True)
     a[3:7], b[3:7] = (info.min, info.max, 9, 0), (info.max, info.max, 9, 0)
-    out, told = fresh(dtype, 176), np.zeros(2, np.int64)
-    with_integers(a, b, out, told)
+    out, answers = fresh(dtype, 176), np.zeros(2, np.int64)
+    with_integers(a, b, out, answers)
     x, y = a[READ], b[READ]
     shifted = (x.view(f"u{x.itemsize}") >> dtype(5).view(f"u{x.itemsize}")).view(dtype)
     expected = [x + y, x - y, x * y, x & y, x | y, x ^ y, ~x, np.zeros_like(x) - x, shifted, np.where(x == y, x, 3)]
     np.testing.assert_array_equal(out[:160].reshape(10, LANES), np.array(expected, dtype))
     assert (out[160:] == 77).all()
-    np.testing.assert_array_equal([flagged(number) for number in told], [x == y, x == 9])
+    np.testing.assert_array_equal([flagged(number) for number in answers], [x == y, x == 9])
 
 
 @kernel
-def with_signs(a: Any, b: Any, told: Any) -> None:
+def with_signs(a: Any, b: Any, answers: Any) -> None:
     x, y = load(a, 3), load(b, 3)
-    told[0], told[1], told[2], told[3] = bits(x < y), bits(x <= y), bits(x > y), bits(x >= 5)
+    answers[0], answers[1], answers[2], answers[3] = bits(x < y), bits(x <= y), bits(x > y), bits(x >= 5)
 
 
 def test_int32_has_an_order() -> None:
     a, b = np.random.default_rng(3).integers(-9, 9, (2, 2 * LANES), np.int32)
-    told = np.zeros(4, np.int64)
-    with_signs(a, b, told)
+    answers = np.zeros(4, np.int64)
+    with_signs(a, b, answers)
     x, y = a[READ], b[READ]
-    np.testing.assert_array_equal([flagged(number) for number in told], [x < y, x <= y, x > y, x >= 5])
+    np.testing.assert_array_equal([flagged(number) for number in answers], [x < y, x <= y, x > y, x >= 5])
 
 
 @kernel
@@ -267,12 +267,12 @@ def test_of_two_lanes_at_one_place_the_later_stays() -> None:
 
 
 @kernel
-def pick(mask: Any, f: Any, d: Any, i: Any, out_f: Any, out_d: Any, out_i: Any, told: Any) -> None:
+def pick(mask: Any, f: Any, d: Any, i: Any, out_f: Any, out_d: Any, out_i: Any, answers: Any) -> None:
     flags = load(mask, 0) > 0
     compress(flags, load(f, 3), out_f, 5)
     compress(flags, load(d, 3), out_d, 5)
     compress(flags, load(i, 3), out_i, 5)
-    told[0], told[1], told[2] = popcount(flags), bits(flags), ctz(bits(flags))
+    answers[0], answers[1], answers[2] = popcount(flags), bits(flags), ctz(bits(flags))
 
 
 @pytest.mark.parametrize("lanes", [[], [0], [15], [1, 4, 5, 11], list(range(LANES))])
@@ -280,12 +280,12 @@ def test_compress_writes_the_flagged_lanes_and_nothing_else(lanes: list[int]) ->
     mask = np.zeros(LANES, np.int32)
     mask[lanes] = 1
     arrays = [np.random.default_rng(6).integers(-99, 70, 2 * LANES).astype(t) for t in (np.float32, "f8", np.int32)]
-    outs, told = [fresh(array.dtype) for array in arrays], np.zeros(3, np.int64)
-    pick(mask, *arrays, *outs, told)
+    outs, answers = [fresh(array.dtype) for array in arrays], np.zeros(3, np.int64)
+    pick(mask, *arrays, *outs, answers)
     for array, out in zip(arrays, outs, strict=True):
         written = only_changed(out, np.s_[5 : 5 + len(lanes)])
         np.testing.assert_array_equal(written, array[READ][lanes])
-    assert told.tolist() == [len(lanes), sum(1 << lane for lane in lanes), lanes[0] if lanes else 64]
+    assert answers.tolist() == [len(lanes), sum(1 << lane for lane in lanes), lanes[0] if lanes else 64]
 
 
 MISUSES: dict[str, Callable[..., Any]] = {
@@ -434,7 +434,7 @@ def nasty_room() -> Any:
     uvs[::11, 1, 0], uvs[5::11, 0, 1] = np.nan, np.inf
     assert len(s.colours) == n and (s.reflectivity_texture >= 0).any()
     texture = np.where(np.arange(len(s.material)) % 2, 0, s.reflectivity_texture[s.material]).astype(np.int32)
-    # a material a triangle, so that textured and plain ones are neighbours
+    # one material per triangle, so that textured and plain ones are neighbours
     material = np.arange(n, dtype=np.int32)
     reflectivity, specular = s.reflectivity[s.material], s.specular[s.material]
     specular[::3] = (0.5, 0.25, 0.75)
@@ -527,7 +527,7 @@ def test_lanes_are_seen_where_numbers_are() -> None:
     assert (abs(depth[1] - depth[0]) <= FEW * length).all()
     z = cams.forward[1].astype(np.float64) @ points
     image = np.stack([12 + 8 * (cams.right[1] @ points) / z, 9 - 8 * (cams.up[1] @ points) / z])
-    # by how much rounding may move a point in the image; what is nearer to a pixel's border may change sides
+    # rounding may move a point in the image by this much; nearer to a pixel's border it may change sides
     moved = 8 * FEW * length / abs(z) * (1 + abs(image - [[12], [9]]) / 8)
     clear = (abs(image - np.round(image)) > moved).all(axis=0) & (abs(z) > FEW * length)
     assert clear.mean() > 0.99 and (pixel[0] != OUTSIDE).mean() > 0.2
