@@ -23,10 +23,10 @@ def images(folder: Path) -> dict[str, bytes]:
 
 
 def test_a_choice_is_printed_and_stored(tmp_path, capsys):
-    told = run(capsys, "render", write_job(tmp_path, **BOTH))
-    assert (told.code, told.err) == (0, "")
-    n_r, hits = re.search(LINE, told.out, re.MULTILINE).groups()
-    assert re.search(SEEN, told.out, re.MULTILINE)
+    result = run(capsys, "render", write_job(tmp_path, **BOTH))
+    assert (result.code, result.err) == (0, "")
+    n_r, hits = re.search(LINE, result.out, re.MULTILINE).groups()
+    assert re.search(SEEN, result.out, re.MULTILINE)
     stored = manifest(tmp_path / "out")
     assert stored["summary"]["finished"] is True
     assert stored["summary"]["automatic"]["keys"] == ["reuse.n_r", "samples.hits"]
@@ -35,7 +35,7 @@ def test_a_choice_is_printed_and_stored(tmp_path, capsys):
     assert stored["job"]["specular"]["hits"] == 14
     checked = run(capsys, "check", write_job(tmp_path, **BOTH))
     assert (checked.code, checked.err) == (0, "")
-    assert re.search(LINE, checked.out, re.MULTILINE).group() == re.search(LINE, told.out, re.MULTILINE).group()
+    assert re.search(LINE, checked.out, re.MULTILINE).group() == re.search(LINE, result.out, re.MULTILINE).group()
     assert "warning" not in checked.out, "the array that lies there is the same one"
 
 
@@ -47,10 +47,10 @@ def test_the_numbers_that_were_chosen_give_the_same_array(tmp_path, capsys):
     same = write_job(tmp_path, "same.toml", **(BOTH | numbers | {"specular": {"hits": 14}}))
     assert run(capsys, "render", "-q", write_job(tmp_path, **BOTH), "--threads", "1", "--restart").code == 0
     assert (manifest(tmp_path / "out")["fingerprint"], images(tmp_path / "out")) == (stored["fingerprint"], first)
-    told = run(capsys, "render", same)
-    assert "nothing is left to do" in told.out
-    told = run(capsys, "render", same, "--restart")
-    assert (told.code, told.err, "automatic" in told.out) == (0, "", False)
+    result = run(capsys, "render", same)
+    assert "nothing is left to do" in result.out
+    result = run(capsys, "render", same, "--restart")
+    assert (result.code, result.err, "automatic" in result.out) == (0, "", False)
     assert (manifest(tmp_path / "out")["fingerprint"], images(tmp_path / "out")) == (stored["fingerprint"], first)
     assert "automatic" not in manifest(tmp_path / "out")["summary"]
 
@@ -59,15 +59,15 @@ def test_the_numbers_that_were_chosen_give_the_same_array(tmp_path, capsys):
     ("changes", "key"), [({"reuse": {"n_r": "auto"}}, "n_r = "), ({"samples": {"hits": "auto"}}, "hits = ")]
 )
 def test_one_of_the_two(changes, key, tmp_path, capsys):
-    told = run(capsys, "check", write_job(tmp_path, camera=tiny.WALK, **changes))
-    assert told.code == 0
-    assert re.search(rf"^automatic: {key}[\d.]+; expected", told.out, re.MULTILINE)
+    result = run(capsys, "check", write_job(tmp_path, camera=tiny.WALK, **changes))
+    assert result.code == 0
+    assert re.search(rf"^automatic: {key}[\d.]+; expected", result.out, re.MULTILINE)
 
 
 def test_another_word_is_a_problem(tmp_path, capsys):
-    told = run(capsys, "render", write_job(tmp_path, reuse={"n_r": "Auto"}, samples={"hits": "best"}))
-    assert told.code == 2
-    assert told.err.splitlines() == [
+    result = run(capsys, "render", write_job(tmp_path, reuse={"n_r": "Auto"}, samples={"hits": "best"}))
+    assert result.code == 2
+    assert result.err.splitlines() == [
         f'{tmp_path / "job.toml"}: samples.hits: expected a whole number from 1 to 65000, 1/2, 1/3, ... 1/8 or "auto", '
         'got "best"',
         f'{tmp_path / "job.toml"}: reuse.n_r: expected a whole number from 0 to 64 or "auto", got "Auto"',
@@ -78,6 +78,6 @@ def test_another_word_is_a_problem(tmp_path, capsys):
 def test_a_job_beyond_memory_is_refused_before_anything_is_chosen(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("framearray_cli.render.memory.free_memory", lambda: 2**20)
     monkeypatch.setattr("framearray_cli.render.automatic.choose.probe", None)
-    told = run(capsys, "render", "-q", write_job(tmp_path, **BOTH))
-    assert told.code == 2
-    assert re.search(r"rendering needs at least [\d.]+ GiB of memory", told.err)
+    result = run(capsys, "render", "-q", write_job(tmp_path, **BOTH))
+    assert result.code == 2
+    assert re.search(r"rendering needs at least [\d.]+ GiB of memory", result.err)

@@ -81,8 +81,8 @@ def test_a_worker_that_dies_is_not_missed(place, tmp_path):
         wait_for(lambda: len(finished(out)) >= 5, process)
         dask.workers[0].send_signal(signal.SIGKILL)
         dask.start_worker()
-        told = finish(process)
-    assert (told.code, told.out, told.err) == (0, "", "")
+        result = finish(process)
+    assert (result.code, result.out, result.err) == (0, "", "")
     assert same(out, place / "whole")
     times = finished(out)
     assert len(times) == N and set(times.values()) == {1}
@@ -99,8 +99,8 @@ def test_workers_stop_when_nobody_wants_their_chunks(number, place, tmp_path):
         process = start(*command)
         wait_for(lambda: len(finished(out)) >= 4, process)
         process.send_signal(number)
-        told = finish(process)
-        assert told.code == (143 if number == signal.SIGTERM else -number)
+        result = finish(process)
+        assert result.code == (143 if number == signal.SIGTERM else -number)
         time.sleep(3.0)  # the scheduler notices, and so do the workers
         there = finished(out)
         time.sleep(2.0)
@@ -117,11 +117,11 @@ def test_a_scheduler_that_goes_away(place, tmp_path):
         process = start("render", "-q", place / "job.toml", "--dask", dask.address, "--chunk", 12, "-o", out)
         wait_for(lambda: len(finished(out)) >= 4, process)
         dask.scheduler.kill()
-        told = finish(process)
-    assert told.code == 4
-    assert told.err.splitlines()[0] == "the Dask scheduler has gone away"
-    assert told.err.splitlines()[1].endswith("; the same command goes on with the rest")
-    assert len(told.err.splitlines()) == 2
+        result = finish(process)
+    assert result.code == 4
+    assert result.err.splitlines()[0] == "the Dask scheduler has gone away"
+    assert result.err.splitlines()[1].endswith("; the same command goes on with the rest")
+    assert len(result.err.splitlines()) == 2
     assert finish(start("render", "-q", place / "job.toml", "-o", out)).code == 0
     assert same(out, place / "whole")
 
@@ -134,10 +134,10 @@ def test_a_worker_without_the_program(place, tmp_path):
     with cluster(tmp_path, workers=1) as dask:
         dask.start_worker(python_path=tmp_path / "old")
         time.sleep(3.0)
-        told = finish(start("render", "-q", place / "job.toml", "--dask", dask.address, "-o", tmp_path / "out"))
-    assert told.code == 4
-    assert f"lacks framearray {framearray_cli.__version__}; install it there" in told.err
-    assert len(told.err.splitlines()) == 1
+        result = finish(start("render", "-q", place / "job.toml", "--dask", dask.address, "-o", tmp_path / "out"))
+    assert result.code == 4
+    assert f"lacks framearray {framearray_cli.__version__}; install it there" in result.err
+    assert len(result.err.splitlines()) == 1
 
 
 def test_what_says_that_the_program_is_not_there():
@@ -154,13 +154,13 @@ def test_what_says_that_the_program_is_not_there():
 )
 def test_wrong_addresses(address, tmp_path):
     begun = time.monotonic()
-    told = finish(start("render", write_job(tmp_path, **JOB), "--dask", address))
+    result = finish(start("render", write_job(tmp_path, **JOB), "--dask", address))
     assert time.monotonic() - begun < 15
-    assert told.code == 2
-    assert told.err.startswith(
+    assert result.code == 2
+    assert result.err.startswith(
         f'--dask {address}: expected the address of a Dask scheduler, such as "tcp://host:8786"; '
     )
-    assert len(told.err.splitlines()) == 2
+    assert len(result.err.splitlines()) == 2
     assert not (tmp_path / "out").exists()
 
 

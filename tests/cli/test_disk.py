@@ -35,9 +35,9 @@ def disk(tmp_path: Path) -> Iterator[Path]:
 def test_a_disk_that_becomes_full(file_format, disk, tmp_path):
     camera = tiny.WALK | {"resolution": [120, 90], "frames": N}
     output = {"format": file_format, "directory": "disk/out"}
-    told = finish(start("render", "-q", write_job(tmp_path, camera=camera, output=output)))
-    assert (told.code, told.out) == (4, "")
-    lines = told.err.splitlines()
+    result = finish(start("render", "-q", write_job(tmp_path, camera=camera, output=output)))
+    assert (result.code, result.out) == (4, "")
+    lines = result.err.splitlines()
     assert lines[0].startswith(f"{disk / 'out'}{os.sep}")
     assert ": cannot be written: " in lines[0]
     assert lines[1].endswith(" are free on that disk")
@@ -76,24 +76,24 @@ def test_a_disk_that_is_full(disk, tmp_path):
         while file.write(bytes(65536)):
             pass
     (disk / "out").mkdir()
-    told = finish(start("render", "-q", write_job(tmp_path, output={"directory": "disk/out"})))
-    assert (told.code, told.out) == (4, "")
-    assert told.err.splitlines()[0].endswith("cannot be written: No space left on device")
+    result = finish(start("render", "-q", write_job(tmp_path, output={"directory": "disk/out"})))
+    assert (result.code, result.out) == (4, "")
+    assert result.err.splitlines()[0].endswith("cannot be written: No space left on device")
     assert names(disk / "out") <= {"records"}
 
 
 def test_a_disk_that_is_read_only(disk, tmp_path):
     subprocess.run(["mount", "-o", "remount,ro", str(disk)], check=True)
-    told = finish(start("render", "-q", write_job(tmp_path, output={"directory": "disk/out"})))
-    assert (told.code, told.out) == (4, "")
-    assert told.err.startswith(f"{disk / 'out'}: cannot make the folder: Read-only file system\n")
+    result = finish(start("render", "-q", write_job(tmp_path, output={"directory": "disk/out"})))
+    assert (result.code, result.out) == (4, "")
+    assert result.err.startswith(f"{disk / 'out'}: cannot make the folder: Read-only file system\n")
 
 
 @pytest.mark.skipif(os.name == "nt" or (hasattr(os, "geteuid") and os.geteuid() == 0), reason="root may write anywhere")
 def test_a_folder_that_may_not_be_written_to(tmp_path):
     (tmp_path / "out").mkdir(mode=0o555)
-    told = finish(start("render", "-q", write_job(tmp_path)))
-    assert (told.code, told.err) == (4, f"{tmp_path / 'out'}: cannot be written to: Permission denied\n")
+    result = finish(start("render", "-q", write_job(tmp_path)))
+    assert (result.code, result.err) == (4, f"{tmp_path / 'out'}: cannot be written to: Permission denied\n")
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="no /dev/full")
@@ -101,9 +101,9 @@ def test_a_folder_that_may_not_be_written_to(tmp_path):
 def test_output_that_cannot_be_printed(command, tmp_path):
     write_job(tmp_path)
     with FULL.open("w") as full:
-        told = finish(start(*command, stdout=full, cwd=tmp_path))
-    assert told.code == 4
-    assert told.err == "standard output: cannot be written: No space left on device\n"
+        result = finish(start(*command, stdout=full, cwd=tmp_path))
+    assert result.code == 4
+    assert result.err == "standard output: cannot be written: No space left on device\n"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no such pipes there")

@@ -16,18 +16,18 @@ REST = {"keys": tiny.WALK["keys"][:1], "frames": 30, "resolution": [160, 120]}
 
 
 def run(*arguments: str | Path) -> Result:
-    told = finish(start(*arguments))
-    assert (told.code, told.err) == (0, "")
-    return told
+    result = finish(start(*arguments))
+    assert (result.code, result.err) == (0, "")
+    return result
 
 
-def bytes_after(label: str, told: Result) -> float:
-    number, unit = re.search(rf"^{label}: about ([\d.]+) (\w+)", told.out, re.MULTILINE).groups()  # type: ignore[union-attr]
+def bytes_after(label: str, result: Result) -> float:
+    number, unit = re.search(rf"^{label}: about ([\d.]+) (\w+)", result.out, re.MULTILINE).groups()  # type: ignore[union-attr]
     return float(number) * UNITS[unit]
 
 
-def seconds(told: Result) -> float:
-    line = re.search("^time: about (.*) on this machine", told.out, re.MULTILINE).group(1)  # type: ignore[union-attr]
+def seconds(result: Result) -> float:
+    line = re.search("^time: about (.*) on this machine", result.out, re.MULTILINE).group(1)  # type: ignore[union-attr]
     return sum(float(number) * SECONDS[unit] for number, unit in re.findall(r"([\d.]+) (\w+)", line))
 
 
@@ -46,12 +46,12 @@ def job(folder: Path, **changes: object) -> Path:
 )
 def test_memory_and_disk(changes, tmp_path):
     file = job(tmp_path, **changes)
-    told = run("check", file)
+    result = run("check", file)
     run("render", "-q", file)
     summary = tomllib.loads((tmp_path / "out" / "manifest.toml").read_text())["summary"]
     images = sum(entry.stat().st_size for entry in (tmp_path / "out").iterdir() if entry.suffix != ".toml")
-    assert bytes_after("memory", told) == pytest.approx(summary["peak_memory"], rel=0.25)
-    assert bytes_after("disk", told) == pytest.approx(images, rel=0.25)
+    assert bytes_after("memory", result) == pytest.approx(summary["peak_memory"], rel=0.25)
+    assert bytes_after("disk", result) == pytest.approx(images, rel=0.25)
 
 
 @pytest.mark.slow

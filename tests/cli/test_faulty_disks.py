@@ -52,10 +52,10 @@ def fail_and_go_on(
     out = tmp_path / "out"
     if not (tmp_path / "whole").exists():
         assert run(capsys, "render", "-q", job, "-o", tmp_path / "whole").code == 0
-    told = faulty(library, number, after, out, job)
-    assert told.code == 4, told
-    lines = told.err.splitlines()
-    assert lines[0].startswith(f"{out}") and lines[0].endswith(f": {os.strerror(number)}"), told.err
+    result = faulty(library, number, after, out, job)
+    assert result.code == 4, result
+    lines = result.err.splitlines()
+    assert lines[0].startswith(f"{out}") and lines[0].endswith(f": {os.strerror(number)}"), result.err
     assert len(lines) <= 2 and not [file for file in out.rglob(".*") if file.name != ".guard"]
     if (out / "manifest.toml").exists():
         wrong = run(capsys, "verify", out).err.splitlines()[:-1]

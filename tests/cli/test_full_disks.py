@@ -52,10 +52,10 @@ def whole(folder: Path, kind: str, capsys: pytest.CaptureFixture[str]) -> Path:
     return folder / "whole"
 
 
-def check_failure(told: Result, out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def check_failure(result: Result, out: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """One message; no half file under its own name, and all that is there whole."""
-    assert (told.code, told.out) == (4, "")
-    first, *rest = told.err.splitlines()
+    assert (result.code, result.out) == (4, "")
+    first, *rest = result.err.splitlines()
     assert first.startswith(f"{out}") and first.endswith("No space left on device"), first
     assert all(" free on that disk" in line or "the same command goes on" in line for line in rest), rest
     assert not [file for file in out.rglob(".*") if file.name != ".guard"], "nothing half"
@@ -70,9 +70,9 @@ def fill_and_go_on(disk: SmallDisk, kind: str, space: int, right: Path, capsys: 
     """Render with little space, then with enough; whether the space was too little."""
     out, file = disk.folder / "out", job(disk.folder.parent, kind, "disk/out")
     disk.leave(space)
-    told = run(capsys, "render", "-q", file)
-    if told.code:
-        check_failure(told, out, capsys)
+    result = run(capsys, "render", "-q", file)
+    if result.code:
+        check_failure(result, out, capsys)
     disk.free()
     again = run(capsys, "render", "-q", file)
     assert (again.code, again.err) == (0, "")
@@ -83,7 +83,7 @@ def fill_and_go_on(disk: SmallDisk, kind: str, space: int, right: Path, capsys: 
     for path in sorted(out.rglob("*"), reverse=True):
         path.unlink() if path.is_file() else path.rmdir()
     out.rmdir()
-    return told.code == 4
+    return result.code == 4
 
 
 def size_of(out: Path) -> int:

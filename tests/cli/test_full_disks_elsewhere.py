@@ -79,8 +79,8 @@ def test_a_file(name, share, array, disk, capsys):
     taken = size(disk.folder)
     file.write_bytes(b"former")
     disk.leave(int(share * (taken - PAGE)))
-    told = run(capsys, *command)
-    assert (told.code, told.err) == (4, f"{file}: cannot be written: {FULL}\n")
+    result = run(capsys, *command)
+    assert (result.code, result.err) == (4, f"{file}: cannot be written: {FULL}\n")
     assert file.read_bytes() == b"former"
     assert names(disk.folder) == {name, "ballast"}
 
@@ -100,9 +100,9 @@ def test_a_folder(name, share, array, disk, capsys):
             file.unlink()
         before = {path: data for path, data in before.items() if path.suffix != ".jpg"}
     disk.leave(int(share * taken))
-    told = run(capsys, *command)
-    assert told.code == 4, told
-    assert told.err.startswith(f"{disk.folder}") and told.err.endswith(f": {FULL}\n") and told.err.count("\n") == 1
+    result = run(capsys, *command)
+    assert result.code == 4, result
+    assert result.err.startswith(f"{disk.folder}") and result.err.endswith(f": {FULL}\n") and result.err.count("\n") == 1
     after = {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     assert after.items() >= before.items() if name == "cache" else after == before
     assert names(disk.folder) == {name, "ballast"}
@@ -124,9 +124,9 @@ def test_repairing_on_a_full_disk(disk, tmp_path, capsys):
     (out / "tiny.c0001.l001.png").write_bytes(b"")
     (out / "tiny.c0004.l002.png").unlink()
     disk.leave(0)
-    told = run(capsys, "verify", "-q", "--repair", out)
-    assert told.code == 4
-    assert told.err.splitlines()[0].endswith(f": {FULL}")
+    result = run(capsys, "verify", "-q", "--repair", out)
+    assert result.code == 4
+    assert result.err.splitlines()[0].endswith(f": {FULL}")
     assert run(capsys, "verify", "-q", out).err.count("tiny.c000") == 2, "nothing else was harmed"
     disk.free()
     assert run(capsys, "verify", "-q", "--repair", out).code == 0
@@ -140,11 +140,11 @@ def test_a_report(disk, tmp_path, capsys):
     job = write_job(tmp_path, output={"format": "exr"})
     command = ["report", "-q", job, "--camera", "0", "--light", "0", "--times", "1", "-o", disk.folder / "report"]
     disk.leave(0)
-    told = run(capsys, *command)
-    assert told.code == 4
-    assert told.err.endswith(f": {FULL}\n") and told.err.count("\n") == 1
+    result = run(capsys, *command)
+    assert result.code == 4
+    assert result.err.endswith(f": {FULL}\n") and result.err.count("\n") == 1
     disk.leave(100_000)
-    told = run(capsys, *command)
-    assert told.code == 4
-    assert told.err.endswith(f": {FULL}\n") and told.err.count("\n") == 1
+    result = run(capsys, *command)
+    assert result.code == 4
+    assert result.err.endswith(f": {FULL}\n") and result.err.count("\n") == 1
     assert not [file for file in disk.folder.rglob("*.part")]

@@ -106,9 +106,9 @@ def test_while_the_manifest_is_written(call, number, tmp_path, monkeypatch, caps
 
     with monkeypatch.context() as patch:
         patch.setattr(render, "write_manifest", stopping)
-        told = run(capsys, "render", "-q", job)
-    assert told.code == 128 + number
-    assert told.err.splitlines()[0] == {2: "interrupted", 15: "terminated"}[number]
+        result = run(capsys, "render", "-q", job)
+    assert result.code == 128 + number
+    assert result.err.splitlines()[0] == {2: "interrupted", 15: "terminated"}[number]
     assert images(tmp_path / "out") == (0 if call == 1 else 6 * 16)
     assert run(capsys, "render", "-q", job).code == 0
     assert contents(tmp_path / "out") == contents(tmp_path / "whole")

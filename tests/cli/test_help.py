@@ -59,16 +59,16 @@ def test_every_exit_code_is_documented():
 
 @pytest.mark.parametrize("arguments", [[], ["--help"]])
 def test_help_lists_the_commands(arguments, capsys):
-    told = run(capsys, *arguments)
-    assert (told.code, told.err) == (0, "")
-    assert all(re.search(rf"^  {command} ", told.out, re.MULTILINE) for command in COMMANDS)
+    result = run(capsys, *arguments)
+    assert (result.code, result.err) == (0, "")
+    assert all(re.search(rf"^  {command} ", result.out, re.MULTILINE) for command in COMMANDS)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_explains_itself(command, capsys):
-    told = run(capsys, command, "--help")
-    assert (told.code, told.err) == (0, "")
-    assert told.out.startswith(f"Usage: framearray {command} [OPTIONS]")
+    result = run(capsys, command, "--help")
+    assert (result.code, result.err) == (0, "")
+    assert result.out.startswith(f"Usage: framearray {command} [OPTIONS]")
 
 
 def test_version(capsys):

@@ -56,18 +56,18 @@ def joined(group: Path, most: int) -> Callable[[], object]:
 
 
 def rendered(job: Path, out: Path, **options: object) -> Result:
-    told = finish(start("render", "-q", job, **options))
-    assert (out / "manifest.toml").exists() == (told.code == 0)
-    return told
+    result = finish(start("render", "-q", job, **options))
+    assert (out / "manifest.toml").exists() == (result.code == 0)
+    return result
 
 
 def test_a_group_that_is_too_small_is_told_beforehand(group, tmp_path):
     """And the very job is killed where nobody asks."""
     job = write_job(tmp_path, output={"format": "exr"}, **LARGE)
-    told = rendered(job, tmp_path / "out", preexec_fn=joined(group, 300 * MIB))
-    assert told.code == 2
-    assert told.err.startswith(f"{job}: rendering needs at least 0.")
-    assert " GiB may be used; a smaller camera.resolution" in told.err
+    result = rendered(job, tmp_path / "out", preexec_fn=joined(group, 300 * MIB))
+    assert result.code == 2
+    assert result.err.startswith(f"{job}: rendering needs at least 0.")
+    assert " GiB may be used; a smaller camera.resolution" in result.err
     assert not (tmp_path / "out").exists()
     environment = os.environ | {"PYTHONPATH": str(PACKAGE_PARENT)}
     blind = subprocess.run(
@@ -80,9 +80,9 @@ def test_a_group_that_is_too_small_is_told_beforehand(group, tmp_path):
 @pytest.mark.parametrize("most", [250, 300, 350, 400, 450, 500, 600, 800])
 def test_no_group_of_any_size_kills_a_render(most, group, tmp_path):
     job = write_job(tmp_path, output={"format": "exr"}, **LARGE)
-    told = rendered(job, tmp_path / "out", preexec_fn=joined(group, most * MIB))
-    assert told.code in (0, 2), told.err
-    print(f"{most} MiB: {'rendered' if told.code == 0 else told.err.splitlines()[0]}")
+    result = rendered(job, tmp_path / "out", preexec_fn=joined(group, most * MIB))
+    assert result.code in (0, 2), result.err
+    print(f"{most} MiB: {'rendered' if result.code == 0 else result.err.splitlines()[0]}")
 
 
 @pytest.mark.parametrize(("name", "flag", "most"), [("RLIMIT_AS", "-v", 600 * MIB), ("RLIMIT_DATA", "-d", 200 * MIB)])
@@ -92,10 +92,10 @@ def test_an_address_space_that_is_too_small(name, flag, most, tmp_path):
 
     job = write_job(tmp_path)
     for command in (["render", "-q", job], ["check", job], ["init", tmp_path / "tiny.glb", "-o", tmp_path / "a.toml"]):
-        told = finish(start(*command, preexec_fn=limit))
-        assert told.code == 2
-        assert told.err.startswith(f"`ulimit {flag}` lets this program have ")
-        assert told.err.count("\n") == 1
+        result = finish(start(*command, preexec_fn=limit))
+        assert result.code == 2
+        assert result.err.startswith(f"`ulimit {flag}` lets this program have ")
+        assert result.err.count("\n") == 1
     assert not (tmp_path / "out").exists()
 
 
@@ -104,9 +104,9 @@ def test_a_job_that_does_not_fit_into_the_address_space(tmp_path):
         resource.setrlimit(resource.RLIMIT_AS, (2 * 1024 * MIB,) * 2)
 
     job = write_job(tmp_path, camera=tiny.WALK | {"resolution": [3840, 2160]}, reuse={"n_r": 3})
-    told = rendered(job, tmp_path / "out", preexec_fn=limit)
-    assert told.code == 2
-    assert "rendering needs at least" in told.err
+    result = rendered(job, tmp_path / "out", preexec_fn=limit)
+    assert result.code == 2
+    assert "rendering needs at least" in result.err
 
 
 def test_threads_that_cannot_be_started(tmp_path, monkeypatch, capsys):
@@ -119,6 +119,6 @@ def test_threads_that_cannot_be_started(tmp_path, monkeypatch, capsys):
         raise RuntimeError("can't start new thread")
 
     monkeypatch.setattr(cli, "app", refused)
-    told = run(capsys, "render", tmp_path / "job.toml")
-    assert told.code == 2
-    assert told.err.startswith("no more threads can be started; --threads 1 takes the fewest; ")
+    result = run(capsys, "render", tmp_path / "job.toml")
+    assert result.code == 2
+    assert result.err.startswith("no more threads can be started; --threads 1 takes the fewest; ")

@@ -49,23 +49,23 @@ def rendered(tmp_path_factory):
 def test_a_long_name_is_told(arguments, code, rendered, capsys, monkeypatch):
     monkeypatch.chdir(rendered)
     before = names(rendered)
-    told = run(capsys, *arguments)
-    assert told.code == code
-    assert LONG in told.err
-    assert "File name too long" in told.err or "no such" in told.err
+    result = run(capsys, *arguments)
+    assert result.code == code
+    assert LONG in result.err
+    assert "File name too long" in result.err or "no such" in result.err
     assert names(rendered) == before
 
 
 def test_a_long_name_in_a_job_is_told(tmp_path, capsys):
-    told = run(capsys, "check", write_job(tmp_path, scene={"file": f"{LONG}.glb"}))
-    assert (told.code, told.out) == (3, "")
-    assert told.err.endswith(f"{LONG}.glb: cannot be read: File name too long\n")
+    result = run(capsys, "check", write_job(tmp_path, scene={"file": f"{LONG}.glb"}))
+    assert (result.code, result.out) == (3, "")
+    assert result.err.endswith(f"{LONG}.glb: cannot be read: File name too long\n")
 
 
 @pytest.mark.parametrize("key", ["scene.file", "output.directory"])
 def test_no_file_has_a_name_of_thousands_of_letters(key, tmp_path, capsys):
     table, name = key.split(".")
-    told = run(capsys, "check", write_job(tmp_path, **{table: {name: "a/" * 5000}}))
-    assert (told.code, told.out) == (2, "")
-    assert f"{key}: " in told.err
-    assert len(told.err) < 1000
+    result = run(capsys, "check", write_job(tmp_path, **{table: {name: "a/" * 5000}}))
+    assert (result.code, result.out) == (2, "")
+    assert f"{key}: " in result.err
+    assert len(result.err) < 1000

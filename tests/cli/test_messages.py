@@ -17,10 +17,10 @@ def test_exit_codes_are_those_of_the_documentation():
 @pytest.mark.parametrize("command", ["render", "check"])
 def test_problems_of_a_job_are_told_at_once(command, tmp_path, capsys):
     job = write_job(tmp_path, samples={"hits": 2, "obscurence": 5}, camera={"fov": "wide"})
-    told = run(capsys, command, job)
-    assert told.code == 2
-    assert told.out == ""
-    assert told.err.splitlines() == [
+    result = run(capsys, command, job)
+    assert result.code == 2
+    assert result.out == ""
+    assert result.err.splitlines() == [
         f'{job}: camera.fov: expected a number from 0.001 to 179.9, got "wide"',
         f'{job}: samples.obscurence: unknown key; did you mean "obscurance"?',
         "2 problems; nothing was rendered.",
@@ -45,10 +45,10 @@ def test_what_is_no_job_file(name, content, message, tmp_path, capsys, monkeypat
         Path(name).write_bytes(content)
     elif content is not None:
         Path(name).mkdir()
-    told = run(capsys, "render", name)
-    assert (told.code, told.out) == (2, "")
-    assert message in told.err.splitlines()
-    assert re.fullmatch(r"\d problems?; nothing was rendered\.", told.err.splitlines()[-1])
+    result = run(capsys, "render", name)
+    assert (result.code, result.out) == (2, "")
+    assert message in result.err.splitlines()
+    assert re.fullmatch(r"\d problems?; nothing was rendered\.", result.err.splitlines()[-1])
 
 
 def test_a_name_of_a_job_is_no_markup(capsys, tmp_path, monkeypatch):
@@ -58,9 +58,9 @@ def test_a_name_of_a_job_is_no_markup(capsys, tmp_path, monkeypatch):
 
 @pytest.mark.skipif(os.name == "nt", reason="file names are text there")
 def test_a_name_that_cannot_be_shown(tmp_path):
-    told = finish(start("render", os.fsdecode(b"n\xffx.toml"), cwd=tmp_path))
-    assert told.code == 2
-    assert told.err.startswith("n\\udcffx.toml: no such file")
+    result = finish(start("render", os.fsdecode(b"n\xffx.toml"), cwd=tmp_path))
+    assert result.code == 2
+    assert result.err.startswith("n\\udcffx.toml: no such file")
 
 
 @pytest.mark.parametrize(
@@ -82,10 +82,10 @@ def test_a_name_that_cannot_be_shown(tmp_path):
 def test_wrong_command_lines(arguments, message, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_job(tmp_path)
-    told = run(capsys, *arguments)
-    assert (told.code, told.out) == (2, "")
-    assert message in told.err
-    assert "Usage: framearray" in told.err
+    result = run(capsys, *arguments)
+    assert (result.code, result.out) == (2, "")
+    assert message in result.err
+    assert "Usage: framearray" in result.err
     assert names(tmp_path) == {"job.toml", "tiny.glb"}
 
 
@@ -101,25 +101,25 @@ def test_wrong_command_lines(arguments, message, tmp_path, capsys, monkeypatch):
 def test_wrong_scenes(scene, message, tmp_path, capsys):
     (tmp_path / "points.obj").write_text("v 0 0 0\nv 1 0 0\n")
     (tmp_path / "broken.glb").write_bytes(b"glTF" + bytes(200))
-    told = run(capsys, "render", write_job(tmp_path, scene={"file": scene}))
-    assert (told.code, told.out) == (3, "")
-    assert told.err.startswith(f"{tmp_path}{os.sep}{message}")
-    assert len(told.err.splitlines()) == 1
+    result = run(capsys, "render", write_job(tmp_path, scene={"file": scene}))
+    assert (result.code, result.out) == (3, "")
+    assert result.err.startswith(f"{tmp_path}{os.sep}{message}")
+    assert len(result.err.splitlines()) == 1
     assert "out" not in names(tmp_path)
 
 
 def test_an_output_folder_that_is_a_file(tmp_path, capsys):
-    told = run(capsys, "render", "-q", write_job(tmp_path, output={"directory": "tiny.glb"}))
-    assert (told.code, told.out) == (4, "")
-    assert told.err == f"{tmp_path / 'tiny.glb'}: a file of that name is in the way of the folder\n"
+    result = run(capsys, "render", "-q", write_job(tmp_path, output={"directory": "tiny.glb"}))
+    assert (result.code, result.out) == (4, "")
+    assert result.err == f"{tmp_path / 'tiny.glb'}: a file of that name is in the way of the folder\n"
 
 
 @pytest.mark.parametrize("change", [{"camera": {"resolution": [16384, 16384]}}, {"light": {"frames": 100_000}}])
 def test_a_job_beyond_memory(change, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("framearray_cli.render.memory.free_memory", lambda: 2**30)
-    told = run(capsys, "render", "-q", write_job(tmp_path, **change))
-    assert (told.code, told.out) == (2, "")
-    assert re.search(r"job\.toml: rendering needs at least [\d.]+ GiB of memory, 1\.0 GiB", told.err)
+    result = run(capsys, "render", "-q", write_job(tmp_path, **change))
+    assert (result.code, result.out) == (2, "")
+    assert re.search(r"job\.toml: rendering needs at least [\d.]+ GiB of memory, 1\.0 GiB", result.err)
     assert "out" not in names(tmp_path)
 
 
@@ -128,25 +128,25 @@ def test_memory_that_runs_out_all_the_same(tmp_path, capsys, monkeypatch):
         raise MemoryError
 
     monkeypatch.setattr("framearray_cli.render.render.plan_work", fail)
-    told = run(capsys, "render", "-q", write_job(tmp_path))
-    assert told.code == 2
-    assert told.err.startswith("not enough memory; ")
+    result = run(capsys, "render", "-q", write_job(tmp_path))
+    assert result.code == 2
+    assert result.err.startswith("not enough memory; ")
 
 
 def test_a_movie_path_with_a_problem(tmp_path, capsys):
     run(capsys, "render", "-q", write_job(tmp_path))
     path = tmp_path / "path.toml"
     path.write_text("segments = 3\n")
-    told = run(capsys, "assemble", tmp_path / "out", path, "-o", tmp_path / "walk.mp4")
-    assert (told.code, told.out) == (2, "")
-    assert told.err.endswith("1 problem; nothing was written.\n")
+    result = run(capsys, "assemble", tmp_path / "out", path, "-o", tmp_path / "walk.mp4")
+    assert (result.code, result.out) == (2, "")
+    assert result.err.endswith("1 problem; nothing was written.\n")
     assert not (tmp_path / "walk.mp4").exists()
 
 
 def test_a_movie_of_no_array(tmp_path, capsys):
-    told = run(capsys, "assemble", tmp_path / "nosuch", tmp_path / "path.toml", "-o", tmp_path / "walk.mp4")
-    assert (told.code, told.out) == (4, "")
-    assert "no such file; expected the output folder of `framearray render`" in told.err
+    result = run(capsys, "assemble", tmp_path / "nosuch", tmp_path / "path.toml", "-o", tmp_path / "walk.mp4")
+    assert (result.code, result.out) == (4, "")
+    assert "no such file; expected the output folder of `framearray render`" in result.err
 
 
 def test_our_own_mistakes_keep_their_traceback(tmp_path, monkeypatch):
@@ -174,30 +174,30 @@ def test_our_own_mistakes_keep_their_traceback(tmp_path, monkeypatch):
 def test_a_range_in_which_obscurances_mean_nothing(command, value, message, tmp_path, capsys):
     """W of a range of 0 would be empty, and of an infinite one undefined: d / d_max."""
     job = write_job(tmp_path, obscurance={"range": value})
-    told = run(capsys, command, job)
-    assert (told.code, told.out) == (2, "")
-    assert told.err.splitlines() == [f"{job}: obscurance.range: {message}", "1 problem; nothing was rendered."]
+    result = run(capsys, command, job)
+    assert (result.code, result.out) == (2, "")
+    assert result.err.splitlines() == [f"{job}: obscurance.range: {message}", "1 problem; nothing was rendered."]
     assert names(tmp_path) == {"job.toml", "tiny.glb"}
 
 
 def test_all_problems_are_counted_at_the_end(tmp_path, capsys):
-    told = run(capsys, "check", write_job(tmp_path, camera={f"k{i}": 1 for i in range(1200)}))
-    assert told.code == 2
-    assert told.err.splitlines()[-2].endswith("job.toml: and 1150 more problems")
-    assert told.err.splitlines()[-1] == "1,200 problems; nothing was rendered."
+    result = run(capsys, "check", write_job(tmp_path, camera={f"k{i}": 1 for i in range(1200)}))
+    assert result.code == 2
+    assert result.err.splitlines()[-2].endswith("job.toml: and 1150 more problems")
+    assert result.err.splitlines()[-1] == "1,200 problems; nothing was rendered."
 
 
 @pytest.mark.skipif(os.name == "nt", reason="such names are none there")
 def test_names_cannot_command_the_terminal(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    told = run(capsys, "check", "a\x1b[31m\u202eb\n.toml")
-    assert told.err == "a\\x1b[31m\\u202eb\\n.toml: no such file\n1 problem; nothing was rendered.\n"
+    result = run(capsys, "check", "a\x1b[31m\u202eb\n.toml")
+    assert result.err == "a\\x1b[31m\\u202eb\\n.toml: no such file\n1 problem; nothing was rendered.\n"
     job = write_job(tmp_path, scene={"materials": {"x\x1b[2J": {"specular": 0.5}}})
     assert "\x1b" not in run(capsys, "check", job).err
 
 
 def test_a_long_name_of_a_material_is_told_shortly(tmp_path, capsys):
-    told = run(capsys, "check", write_job(tmp_path, scene={"materials": {"x" * 5000: {"specular": 0.5}}}))
-    assert told.code == 3
-    assert '"' + "x" * 100 + '...": no such material' in told.err
-    assert len(told.err) < 1000
+    result = run(capsys, "check", write_job(tmp_path, scene={"materials": {"x" * 5000: {"specular": 0.5}}}))
+    assert result.code == 3
+    assert '"' + "x" * 100 + '...": no such material' in result.err
+    assert len(result.err) < 1000

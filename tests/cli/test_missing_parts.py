@@ -41,8 +41,8 @@ def hiding(library: str, *arguments: str | Path) -> tuple[int, str]:
     """Exit code and errors of a command without a library."""
     environment = os.environ | {"PYTHONPATH": str(PACKAGE_PARENT)}
     command = [sys.executable, "-c", HIDING, library, *map(str, arguments)]
-    told = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
-    return told.returncode, told.stderr
+    errors = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    return errors.returncode, errors.stderr
 
 
 @pytest.mark.slow
@@ -64,9 +64,9 @@ def test_libraries_that_are_not_installed(array, tmp_path):
     ]
     before = names(tmp_path)
     for library, command, advice in cases:
-        code, told = hiding(library, *command)
-        assert code == (2 if advice else 0), (library, told)
-        assert advice in told and told.count("\n") == bool(advice), (library, told)
+        code, errors = hiding(library, *command)
+        assert code == (2 if advice else 0), (library, errors)
+        assert advice in errors and errors.count("\n") == bool(advice), (library, errors)
     assert names(tmp_path) - {"other"} == before
     assert not list((tmp_path / "other").glob("tiny.*"))
 
@@ -76,11 +76,11 @@ def test_an_encoder_that_is_missing(suffix, change, array, tmp_path, monkeypatch
     pytest.importorskip("av")
     (array / "tiny.c0000.l000.exr").unlink()  # not even looked for
     monkeypatch.setitem(video.VIDEOS, suffix, replace(video.VIDEOS[suffix], **change))
-    told = run(capsys, "assemble", array, "--light", "-o", tmp_path / f"a{suffix}")
-    assert told.code == 2
-    assert told.err.startswith(f"{suffix}: PyAV is built without {video.VIDEOS[suffix].codec} here; ")
+    result = run(capsys, "assemble", array, "--light", "-o", tmp_path / f"a{suffix}")
+    assert result.code == 2
+    assert result.err.startswith(f"{suffix}: PyAV is built without {video.VIDEOS[suffix].codec} here; ")
     assert (
-        told.err.endswith(f"{'.mkv' if suffix == '.mov' else '.mkv, .webm, .mov'} can be made here\n")
+        result.err.endswith(f"{'.mkv' if suffix == '.mov' else '.mkv, .webm, .mov'} can be made here\n")
         or suffix == ".mov"
     )
     assert not list(tmp_path.glob("*a.*"))
@@ -98,9 +98,9 @@ def test_a_typeface_that_is_missing(array, tmp_path, monkeypatch, capsys):
         ["assemble", array, "--light", "--label", "-o", tmp_path / "a.mp4"],
         ["assemble", array, "--light", "--label", "-o", tmp_path / "a.##.png"],
     ):
-        told = run(capsys, *command)
-        assert told.code == 2
-        assert told.err.startswith("labels need Pillow with FreeType (")
+        result = run(capsys, *command)
+        assert result.code == 2
+        assert result.err.startswith("labels need Pillow with FreeType (")
     assert not list(tmp_path.glob("*a*.png"))
     assert run(capsys, "sheet", array, "-o", tmp_path / "a.exr").code == 0, "it has no labels"
     label.typeface.cache_clear()
@@ -121,16 +121,16 @@ def test_formats_that_a_library_was_built_without(array, tmp_path, monkeypatch, 
         ),
         (["view", array, "--export", tmp_path / "a"], "Pillow is built without JPG here; "),
     ):
-        told = run(capsys, *command)
-        assert (told.code, told.err.count("\n")) == (2, 1), told
-        assert told.err.startswith(said)
+        result = run(capsys, *command)
+        assert (result.code, result.err.count("\n")) == (2, 1), result
+        assert result.err.startswith(said)
     assert not list((tmp_path / "other").glob("tiny.*"))
 
 
 def test_an_image_library_without_a_format(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(exrtiff.OIIO_NAMES, "exr", "none")
-    told = run(capsys, "render", "-q", write_job(tmp_path, output={"format": "png"}))
-    assert told.code == 2, "layers are EXR"
-    assert told.err.startswith("OpenImageIO is built without EXR here; ")
+    result = run(capsys, "render", "-q", write_job(tmp_path, output={"format": "png"}))
+    assert result.code == 2, "layers are EXR"
+    assert result.err.startswith("OpenImageIO is built without EXR here; ")
     assert not list((tmp_path / "out").glob("tiny.*"))
     assert run(capsys, "render", "-q", write_job(tmp_path, output={"format": "png", "layers": False})).code == 0

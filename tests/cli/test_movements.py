@@ -26,17 +26,17 @@ def array(tmp_path: Path) -> Path:
     ],
 )
 def test_movements(array: Path, tmp_path: Path, capsys, options: list[str], said: str, rate: Fraction) -> None:
-    told = run(capsys, "assemble", array, *options, "-o", tmp_path / "m.mkv")
-    assert (told.code, told.err) == (0, "")
-    assert told.out.endswith(f"m.mkv: {said}\n")
+    result = run(capsys, "assemble", array, *options, "-o", tmp_path / "m.mkv")
+    assert (result.code, result.err) == (0, "")
+    assert result.out.endswith(f"m.mkv: {said}\n")
     movie = decoded(tmp_path / "m.mkv")
     assert (len(movie.frames), movie.rate) == (int(said.split()[0]), rate)
 
 
 def test_a_path_file_with_another_rate_and_blends(array: Path, tmp_path: Path, capsys) -> None:
     path = path_file(tmp_path, "fps = 30\n[[segments]]\nseconds = 1\nlight = [0, 3]\n")
-    told = run(capsys, "assemble", array, path, "--fps", "12", "--blend", "-o", tmp_path / "m.webp", "-q")
-    assert (told.code, told.out, told.err) == (0, "", "")
+    result = run(capsys, "assemble", array, path, "--fps", "12", "--blend", "-o", tmp_path / "m.webp", "-q")
+    assert (result.code, result.out, result.err) == (0, "", "")
     assert decoded(tmp_path / "m.webp").length == 1
 
 
@@ -59,10 +59,10 @@ def test_a_path_file_with_another_rate_and_blends(array: Path, tmp_path: Path, c
 def test_wrong_usage(array: Path, tmp_path: Path, capsys, monkeypatch, options: list[str], message: str) -> None:
     monkeypatch.chdir(tmp_path)
     path_file(tmp_path, "[[segments]]\nframes = 2\n")
-    told = run(capsys, "assemble", "out", *options, "-o", "m.mp4")
-    assert (told.code, told.out) == (2, "")
-    assert "Usage: framearray assemble" in told.err
-    assert message in re.sub(r"\s+", " ", told.err)
+    result = run(capsys, "assemble", "out", *options, "-o", "m.mp4")
+    assert (result.code, result.out) == (2, "")
+    assert "Usage: framearray assemble" in result.err
+    assert message in re.sub(r"\s+", " ", result.err)
     assert names(tmp_path) == {"out", "path.toml"}
 
 
@@ -82,10 +82,10 @@ def test_what_the_array_or_the_screen_has_not(
     array: Path, tmp_path: Path, capsys, monkeypatch, options: list[str], message: str
 ) -> None:
     monkeypatch.delenv("OCIO", raising=False)
-    told = run(capsys, "assemble", array, *options, "-o", tmp_path / "m.mp4")
-    assert (told.code, told.out) == (2, "")
-    assert told.err.startswith(message)
-    assert told.err.endswith("1 problem; nothing was written.\n")
+    result = run(capsys, "assemble", array, *options, "-o", tmp_path / "m.mp4")
+    assert (result.code, result.out) == (2, "")
+    assert result.err.startswith(message)
+    assert result.err.endswith("1 problem; nothing was written.\n")
     assert names(tmp_path) == {"out"}
 
 
@@ -93,5 +93,5 @@ def test_a_movement_through_an_array_with_groups(tmp_path: Path, capsys) -> None
     array = grouped(tmp_path / "out").directory
     assert run(capsys, "assemble", array, "--light", "-o", tmp_path / "m.mov").code == 0
     assert len(decoded(tmp_path / "m.mov").frames) == 4
-    told = run(capsys, "assemble", array, "--walk", "--at", "3", "-o", tmp_path / "n.mov")
-    assert told.err.startswith("--at: expected one of 3 places of lamp (0 to 2, or -3 to -1), got 3\n")
+    result = run(capsys, "assemble", array, "--walk", "--at", "3", "-o", tmp_path / "n.mov")
+    assert result.err.startswith("--at: expected one of 3 places of lamp (0 to 2, or -3 to -1), got 3\n")

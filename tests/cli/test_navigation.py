@@ -123,9 +123,9 @@ def test_points_of_a_rendered_room_lie_on_its_surfaces(tmp_path, capsys):
     ],
 )
 def test_a_long_value_of_an_option_is_told_shortly(options, array, capsys):
-    told = run(capsys, options[0], array, *options[1:], "1" * 5000)
-    assert told.code == 2
-    assert "111..." in told.err and len(told.err) < 1000
+    result = run(capsys, options[0], array, *options[1:], "1" * 5000)
+    assert result.code == 2
+    assert "111..." in result.err and len(result.err) < 1000
 
 
 @pytest.mark.parametrize("key", ["groups.{}.intensity", "segments[0].axes.{}"])
@@ -133,6 +133,6 @@ def test_a_long_key_of_a_movie_path_is_told_shortly(key, array, tmp_path, capsys
     name = "x" * 5000
     text = f"[[segments]]\nframes = 2\ncamera = [0, 1]\n{f'axes = {{ {name} = [0, 1] }}' if 'axes' in key else ''}\n"
     (tmp_path / "path.toml").write_text(text + (f"[groups.{name}]\nintensity = 2\n" if "groups" in key else ""))
-    told = run(capsys, "assemble", array, tmp_path / "path.toml", "-o", tmp_path / "a.gif")
-    assert told.code == 2
-    assert "x" * 100 + "..." in told.err and len(told.err) < 1000
+    result = run(capsys, "assemble", array, tmp_path / "path.toml", "-o", tmp_path / "a.gif")
+    assert result.code == 2
+    assert "x" * 100 + "..." in result.err and len(result.err) < 1000

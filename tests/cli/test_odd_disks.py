@@ -61,9 +61,9 @@ def test_a_quota(image_format, quota, tmp_path, capsys):
     camera = tiny.WALK | {"resolution": [160, 120], "frames": 40}
     output = {"format": image_format, "directory": str(quota / "out")}
     job = write_job(tmp_path, camera=camera, light={"frames": 4}, output=output)
-    told = run(capsys, "render", "-q", job)
-    assert told.code == 4
-    assert told.err.splitlines()[0].endswith(": cannot be written: Disk quota exceeded")
+    ran = run(capsys, "render", "-q", job)
+    assert ran.code == 4
+    assert ran.err.splitlines()[0].endswith(": cannot be written: Disk quota exceeded")
     subprocess.run(["btrfs", "qgroup", "limit", "none", str(quota)], check=True)
     assert run(capsys, "render", "-q", job).code == 0
     assert run(capsys, "render", "-q", job, "-o", tmp_path / "whole").code == 0
@@ -76,9 +76,9 @@ def test_a_quota(image_format, quota, tmp_path, capsys):
 def test_a_disk_that_takes_no_more_files(inodes, array, tmp_path, capsys):
     disks = mounted(tmp_path / "disk", f"size=64m,nr_inodes={inodes}")
     disk = next(disks)
-    told = run(capsys, "render", "-q", tmp_path / "job.toml", "-o", disk.folder / "out")
-    assert told.code == 4
-    lines = told.err.splitlines()
+    ran = run(capsys, "render", "-q", tmp_path / "job.toml", "-o", disk.folder / "out")
+    assert ran.code == 4
+    lines = ran.err.splitlines()
     assert lines[0].endswith(": No space left on device")
     assert any(re.fullmatch(r"that disk takes \d more files \(inodes\)", line) for line in lines), lines
     disk.remount("size=64m,nr_inodes=1000")
@@ -110,10 +110,10 @@ def test_names_that_lead_nowhere(name, array, tmp_path, capsys):
         ["init", scene, "-o", place / "a.toml"],
     ]
     for command in commands:
-        told = run(capsys, *command)
+        ran = run(capsys, *command)
         allowed = (0, 4) if command[0] == "check" else (2, 3, 4)
-        assert told.code in allowed, (command, told)
-        assert len(told.err.splitlines()) <= 2, (command, told)
+        assert ran.code in allowed, (command, ran)
+        assert len(ran.err.splitlines()) <= 2, (command, ran)
     assert names(tmp_path) == before
 
 
@@ -124,12 +124,12 @@ def test_few_open_files(most, tmp_path):
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
-    told = finish(start("render", "-q", write_job(tmp_path, camera=WALK), preexec_fn=limit))
+    ran = finish(start("render", "-q", write_job(tmp_path, camera=WALK), preexec_fn=limit))
     if most == 8:
-        assert (told.code, told.err) == (0, "")
+        assert (ran.code, ran.err) == (0, "")
     else:
-        assert told.code == 4
-        assert told.err.endswith(": Too many open files; `ulimit -n 1024` lets this program open more\n")
+        assert ran.code == 4
+        assert ran.err.endswith(": Too many open files; `ulimit -n 1024` lets this program open more\n")
 
 
 def test_an_array_on_a_disk_that_is_read_only(array, tmp_path, capsys):
@@ -145,13 +145,13 @@ def test_an_array_on_a_disk_that_is_read_only(array, tmp_path, capsys):
         ["export", "-q", out, "-f", "nerfstudio", "-o", tmp_path / "nerf"],
         ["view", "-q", out, "--cache", tmp_path / "cache", "--export", tmp_path / "page"],
     ):
-        told = run(capsys, *command)
-        assert (told.code, told.err) == (0, "")
+        ran = run(capsys, *command)
+        assert (ran.code, ran.err) == (0, "")
     for command in (["render", "-q", job, "-o", out], ["render", "-q", job, "-o", out, "--restart"], ["view", out]):
-        told = run(capsys, *command)
-        assert told.code == 4
-        assert "Read-only file system" in told.err.splitlines()[0]
-    assert told.err.splitlines()[1] == "--cache FOLDER keeps what the page needs elsewhere"
+        ran = run(capsys, *command)
+        assert ran.code == 4
+        assert "Read-only file system" in ran.err.splitlines()[0]
+    assert ran.err.splitlines()[1] == "--cache FOLDER keeps what the page needs elsewhere"
     assert contents(out) == contents(array)
     disks.close()
 
@@ -171,13 +171,13 @@ def _somebody_else(folder: Path) -> None:
     rights = ["--inh-caps", "-all,+dac_read_search", "--ambient-caps", "+dac_read_search"]
     become = ["setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups", *rights, "--"]
 
-    def told(*command: str | Path) -> Result:
+    def ran(*command: str | Path) -> Result:
         words = [*become, sys.executable, "-m", "framearray_cli", *map(str, command)]
         environment = os.environ | {"PYTHONPATH": str(ROOT)}
         return finish(subprocess.Popen(words, stdout=-1, stderr=-1, text=True, env=environment))
 
-    assert told("verify", "-q", array).code == 0
-    sheet = told("sheet", "-q", array, "-o", folder / "a.png")
+    assert ran("verify", "-q", array).code == 0
+    sheet = ran("sheet", "-q", array, "-o", folder / "a.png")
     assert (sheet.code, sheet.err) == (4, f"{folder / 'a.png'}: cannot be written: Permission denied\n")
-    page = told("view", array)
+    page = ran("view", array)
     assert page.code == 4 and page.err.startswith(f"{array / '.view'}: cannot make the folder: Permission denied\n")

@@ -47,10 +47,10 @@ def parameters(template: dict[str, Any]) -> dict[str, Any]:
 def test_what_is_written(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     job = write_job(tmp_path, **(JOB | {"render": {"threads": 2, "memory": "3 GiB"}}))
-    told = run(capsys, "openjd", job, "--chunk", "3")
-    assert (told.code, told.err) == (0, "")
+    result = run(capsys, "openjd", job, "--chunk", "3")
+    assert (result.code, result.err) == (0, "")
     # frames 0 and 5 count twice, for those that are missing beyond the ends; each half finds one of the other
-    assert told.out.splitlines()[0] == "2 chunks of 3 frames; halos add 25% to the hits"
+    assert result.out.splitlines()[0] == "2 chunks of 3 frames; halos add 25% to the hits"
     template = written(tmp_path / "job.openjd.json")
     defaults = {"JobFile": "job.toml", "SceneFile": "tiny.glb", "OutputFolder": "out", "ChunkSize": 3, "Threads": 2}
     assert parameters(template) == defaults
@@ -88,8 +88,8 @@ def test_files_elsewhere_are_named_from_the_root(tmp_path, capsys):
 def test_bad_options(arguments, code, message, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "there.json").write_text("mine")
-    told = run(capsys, "openjd", write_job(tmp_path, **JOB), *arguments)
-    assert told.code == code and message in told.err and "Traceback" not in told.err
+    result = run(capsys, "openjd", write_job(tmp_path, **JOB), *arguments)
+    assert result.code == code and message in result.err and "Traceback" not in result.err
     assert (tmp_path / "there.json").read_text() == "mine"
     assert not (tmp_path / "job.openjd.json").exists()
 
@@ -98,18 +98,18 @@ def test_bad_jobs(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     job = write_job(tmp_path, **JOB)
     (tmp_path / "tiny.glb").unlink()
-    told = run(capsys, "openjd", job)
-    assert told.code == 3 and "tiny.glb" in told.err
+    result = run(capsys, "openjd", job)
+    assert result.code == 3 and "tiny.glb" in result.err
     job.write_text(job.read_text().replace("resolution", "resolutoin"))
-    told = run(capsys, "openjd", job)
-    assert told.code == 2 and 'did you mean "resolution"' in told.err
+    result = run(capsys, "openjd", job)
+    assert result.code == 2 and 'did you mean "resolution"' in result.err
     assert not (tmp_path / "job.openjd.json").exists()
 
 
 def test_what_a_render_chooses_is_known(tmp_path, capsys):
     job = write_job(tmp_path, **(JOB | {"reuse": {"n_r": "auto"}}))
-    told = run(capsys, "openjd", job, "--chunk", "3", "-o", tmp_path / "a.json")
-    assert told.code == 0 and told.out.startswith("2 chunks of 3 frames; halos add ")
+    result = run(capsys, "openjd", job, "--chunk", "3", "-o", tmp_path / "a.json")
+    assert result.code == 0 and result.out.startswith("2 chunks of 3 frames; halos add ")
 
 
 @needs_openjd

@@ -21,9 +21,9 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def test_a_render_says_what_it_did(tmp_path, capsys):
-    told = run(capsys, "render", write_job(tmp_path))
-    assert (told.code, told.err) == (0, "")
-    lines = [line for line in told.out.splitlines() if not line.startswith("compiling")]
+    result = run(capsys, "render", write_job(tmp_path))
+    assert (result.code, result.err) == (0, "")
+    lines = [line for line in result.out.splitlines() if not line.startswith("compiling")]
     assert re.fullmatch(r".*tiny\.glb: \d+ triangles, \d+ materials, 1 textures", lines[0])
     assert re.fullmatch(r"ambient light: I_A [\d.]+ to [\d.]+ \(standard error at most .*\)", lines[1])
     assert re.fullmatch(r"3 images in .*: .* ms per image, .* images per second", lines[2])
@@ -41,14 +41,14 @@ def test_each_note_is_told_once(tmp_path, capsys):
     part = tiny.Part(material=0, corners=floor)
     meshes = tiny.Meshes(parts=(part,), materials=(material,), textures=(), dropped={}, notes=())
     tiny.save_glb(meshes, tmp_path / "tiny.glb")
-    told = run(capsys, "render", write_job(tmp_path))
-    assert told.code == 0
-    assert told.out.count("met a second surface") == 1
+    result = run(capsys, "render", write_job(tmp_path))
+    assert result.code == 0
+    assert result.out.count("met a second surface") == 1
 
 
 def test_quiet_is_silent(tmp_path, capsys):
-    told = run(capsys, "render", "--quiet", write_job(tmp_path))
-    assert (told.code, told.out, told.err) == (0, "", "")
+    result = run(capsys, "render", "--quiet", write_job(tmp_path))
+    assert (result.code, result.out, result.err) == (0, "", "")
     assert names(tmp_path / "out") == FILES
 
 
@@ -71,11 +71,11 @@ def test_the_same_job_may_be_rendered_again(tmp_path, capsys):
     before = contents(tmp_path / "out")
     (tmp_path / "out" / "tiny.c0000.l001.png").unlink()
     (tmp_path / "out" / "tiny.c0000.l002.png").write_bytes(b"damaged")
-    told = run(capsys, "render", job)
-    assert told.code == 0
+    result = run(capsys, "render", job)
+    assert result.code == 0
     assert contents(tmp_path / "out") == before
-    assert "damaged: tiny.c0000.l001.png: missing\n" in told.out
-    assert re.search(r"damaged: tiny\.c0000\.l002\.png: expected [\d,]+ bytes, found 7", told.out)
+    assert "damaged: tiny.c0000.l001.png: missing\n" in result.out
+    assert re.search(r"damaged: tiny\.c0000\.l002\.png: expected [\d,]+ bytes, found 7", result.out)
     times = {file: file.stat().st_mtime_ns for file in (tmp_path / "out").glob("*.png")}
     again = run(capsys, "render", job)
     assert again.code == 0
@@ -94,14 +94,14 @@ def test_another_array_is_in_the_way(change, tmp_path, capsys):
     assert run(capsys, "render", "-q", write_job(tmp_path)).code == 0
     before = {file.name: file.read_bytes() for file in (tmp_path / "out").rglob("*.*")}
     other = write_job(tmp_path, "other.toml", **change)
-    told = run(capsys, "render", "-q", other)
-    assert (told.code, told.out) == (4, "")
-    assert told.err.startswith(f"{tmp_path / 'out'}: holds another frame array, 'tiny' with 1 x 3 images")
-    assert "--output" in told.err
-    assert "--restart" in told.err
+    result = run(capsys, "render", "-q", other)
+    assert (result.code, result.out) == (4, "")
+    assert result.err.startswith(f"{tmp_path / 'out'}: holds another frame array, 'tiny' with 1 x 3 images")
+    assert "--output" in result.err
+    assert "--restart" in result.err
     assert {"seed": "seed: 5 there, 6 now", "name": 'name: "tiny" there, "other" now'}.get(
         next(iter(change)), 'output.format: "png" there, "exr" now'
-    ) in told.err
+    ) in result.err
     assert {file.name: file.read_bytes() for file in (tmp_path / "out").rglob("*.*")} == before
     warned = run(capsys, "check", other)
     assert warned.code == 0
@@ -114,9 +114,9 @@ def test_a_changed_scene_is_another_array(tmp_path, capsys):
     job = write_job(tmp_path)
     assert run(capsys, "render", "-q", job).code == 0
     tiny.save_glb(tiny.room_meshes(mirrors=False), tmp_path / "tiny.glb")
-    told = run(capsys, "render", "-q", job)
-    assert told.code == 4
-    assert "(scene: another model, texture or material)" in told.err
+    result = run(capsys, "render", "-q", job)
+    assert result.code == 4
+    assert "(scene: another model, texture or material)" in result.err
 
 
 def test_restart_removes_what_the_manifest_lists_and_nothing_else(tmp_path, capsys):
@@ -125,9 +125,9 @@ def test_restart_removes_what_the_manifest_lists_and_nothing_else(tmp_path, caps
     (out / "mine.txt").write_text("keep")
     (out / "tiny.c0007.l000.png").write_text("not in the array")
     other = write_job(tmp_path, "other.toml", name="other", light={"frames": 4})
-    told = run(capsys, "render", other, "--restart")
-    assert (told.code, told.err) == (0, "")
-    assert f"removed {len(FILES)} files of the frame array in {out}" in told.out
+    result = run(capsys, "render", other, "--restart")
+    assert (result.code, result.err) == (0, "")
+    assert f"removed {len(FILES)} files of the frame array in {out}" in result.out
     theirs = {"mine.txt", "tiny.c0007.l000.png"}
     ours = {f"other.c0000.l{l:03d}.png" for l in range(4)} | {"other.layers.c0000.exr", "manifest.toml", "records"}
     assert names(out) == theirs | ours
@@ -146,9 +146,9 @@ def test_restart_removes_nothing_that_a_link_leads_to(tmp_path, capsys):
     assert 'layers = "tiny.layers.' in text
     manifest.write_text(text.replace('layers = "tiny.layers.', 'layers = "link/'))
     before = names(out)
-    told = run(capsys, "render", "-q", job, "--restart")
-    assert (told.code, told.out) == (4, "")
-    assert told.err == f"{out / 'link'}: leads out of the folder of the array; remove what lies there yourself\n"
+    result = run(capsys, "render", "-q", job, "--restart")
+    assert (result.code, result.out) == (4, "")
+    assert result.err == f"{out / 'link'}: leads out of the folder of the array; remove what lies there yourself\n"
     assert (elsewhere / "c0000.exr").read_text() == "mine"
     assert names(out) == before
 
@@ -163,9 +163,9 @@ def test_restart_of_a_job_with_a_problem_removes_nothing(tmp_path, capsys):
 def test_a_broken_manifest_is_not_guessed_at(tmp_path, capsys):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "manifest.toml").write_text("format = \n")
-    told = run(capsys, "render", "-q", "--restart", write_job(tmp_path))
-    assert (told.code, told.out) == (4, "")
-    assert re.match(r".*manifest\.toml: not valid TOML: .*; remove that file, or choose another folder", told.err)
+    result = run(capsys, "render", "-q", "--restart", write_job(tmp_path))
+    assert (result.code, result.out) == (4, "")
+    assert re.match(r".*manifest\.toml: not valid TOML: .*; remove that file, or choose another folder", result.err)
     assert names(tmp_path / "out") == {"manifest.toml"}
 
 
@@ -173,16 +173,16 @@ def test_an_array_that_leads_out_of_its_folder_is_not_removed(tmp_path, capsys):
     assert run(capsys, "render", "-q", write_job(tmp_path)).code == 0
     manifest = tmp_path / "out" / "manifest.toml"
     manifest.write_text(manifest.read_text().replace('images = "tiny', 'images = "../tiny'))
-    told = run(capsys, "render", "-q", "--restart", write_job(tmp_path, seed=3))
-    assert told.code == 4
-    assert "inside the folder" in told.err
+    result = run(capsys, "render", "-q", "--restart", write_job(tmp_path, seed=3))
+    assert result.code == 4
+    assert "inside the folder" in result.err
     assert (tmp_path / "tiny.glb").exists()
 
 
 def test_check_writes_nothing(tmp_path, capsys):
-    told = run(capsys, "check", write_job(tmp_path))
-    assert (told.code, told.err) == (0, "")
-    text = told.out
+    result = run(capsys, "check", write_job(tmp_path))
+    assert (result.code, result.err) == (0, "")
+    text = result.out
     assert "array: 1 cameras x 3 lights = 3 images of 24 x 18" in text
     for line in ("memory: about ", f"disk: about .* in {re.escape(str(tmp_path / 'out'))}", "time: about "):
         assert re.search(f"^{line}", text, re.MULTILINE), text
@@ -191,8 +191,8 @@ def test_check_writes_nothing(tmp_path, capsys):
 
 
 def test_the_installed_command_and_the_module_are_the_same(tmp_path):
-    told = finish(start("render", "-q", write_job(tmp_path)))
-    assert (told.code, told.out, told.err) == (0, "", "")
+    result = finish(start("render", "-q", write_job(tmp_path)))
+    assert (result.code, result.out, result.err) == (0, "", "")
     assert names(tmp_path / "out") == FILES
 
 
@@ -219,5 +219,5 @@ def test_images_are_halves_unless_they_are_too_bright(tmp_path, capsys, irradian
 def test_a_range_of_next_to_nothing(method, tmp_path, capsys):
     obscurance = {"range": 1e-45, "falloff": "cbrt", "outside": "background"}
     job = write_job(tmp_path, obscurance=obscurance, ambient={"method": method, "paths": 64}, light={"frames": 3})
-    told = run(capsys, "render", "-q", job)
-    assert (told.code, told.err) == (0, "")
+    result = run(capsys, "render", "-q", job)
+    assert (result.code, result.err) == (0, "")

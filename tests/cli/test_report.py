@@ -39,10 +39,10 @@ def read_rows(place: Path) -> list[dict[str, str]]:
 
 
 def test_a_report_has_all_its_parts(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    told = report(capsys, made, *FEW)
-    assert (told.code, told.err) == (0, "")
+    result = report(capsys, made, *FEW)
+    assert (result.code, result.err) == (0, "")
     place = made / "out-report"
-    assert f"report: {place / 'index.html'}" in told.out and "for an RMSE of" in told.out
+    assert f"report: {place / 'index.html'}" in result.out and "for an RMSE of" in result.out
     page = (place / "index.html").read_text()
     for name in re.findall(r'(?:src|href)="([^"]+)"', page):
         assert (place / name).is_file(), name
@@ -73,9 +73,9 @@ def test_references_are_used_again(made: Path, capsys: pytest.CaptureFixture[str
 
 
 def test_advice_is_for_the_errors_that_were_asked_for(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    told = report(capsys, made, *FEW, "--error", "5", "--error", "0.000001", "--output", str(made / "elsewhere"))
-    assert re.search(r"for an RMSE of 500.0%: \w", told.out)
-    assert "for an RMSE of 0.0%: nothing that was tried" in told.out
+    result = report(capsys, made, *FEW, "--error", "5", "--error", "0.000001", "--output", str(made / "elsewhere"))
+    assert re.search(r"for an RMSE of 500.0%: \w", result.out)
+    assert "for an RMSE of 0.0%: nothing that was tried" in result.out
     assert (made / "elsewhere" / "index.html").is_file()
 
 
@@ -89,9 +89,9 @@ def test_advice_is_for_the_errors_that_were_asked_for(made: Path, capsys: pytest
     ],
 )
 def test_wrong_wishes(made: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, str], words: str) -> None:
-    told = report(capsys, made, *options)
-    assert told.code == 2 and words in told.err
-    assert "Traceback" not in told.err
+    result = report(capsys, made, *options)
+    assert result.code == 2 and words in result.err
+    assert "Traceback" not in result.err
 
 
 def test_one_camera_and_one_light(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -99,7 +99,7 @@ def test_one_camera_and_one_light(tmp_path: Path, capsys: pytest.CaptureFixture[
     still = {"resolution": [40, 30], "keys": tiny.WALK["keys"][:1]}
     changes = SMALL | {"camera": still, "light": {"frames": 1, "sources": [tiny.SUN]}}
     write_job(tmp_path, **changes)
-    told = report(capsys, tmp_path, *FEW)
-    assert (told.code, told.err) == (0, "")
+    result = report(capsys, tmp_path, *FEW)
+    assert (result.code, result.err) == (0, "")
     rows = read_rows(tmp_path / "out-report")
     assert all(row["flicker_camera"] == row["flicker_light"] == "" for row in rows)

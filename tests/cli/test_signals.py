@@ -36,13 +36,13 @@ def stop(process: subprocess.Popen[str], number: signal.Signals) -> Result:
     """Send a signal; the process must end promptly, and say nothing but what is expected of it."""
     started = time.monotonic()
     process.send_signal(number)
-    told = finish(process)
+    result = finish(process)
     assert time.monotonic() - started < PROMPT
     word = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}[number]
-    assert told.code == 128 + number
-    assert told.err.splitlines()[0] == word
-    assert "Traceback" not in told.err
-    return told
+    assert result.code == 128 + number
+    assert result.err.splitlines()[0] == word
+    assert "Traceback" not in result.err
+    return result
 
 
 def check_files(out: Path, format_suffix: str) -> int:
@@ -83,8 +83,8 @@ def test_while_loading(tmp_path):
     process = start("render", write_job(tmp_path, **(LONG | {"scene": {"file": "long.obj"}})))
     wait_for(works(process), process)
     time.sleep(0.3)
-    told = stop(process, signal.SIGINT)
-    assert told.err == "interrupted\n"
+    result = stop(process, signal.SIGINT)
+    assert result.err == "interrupted\n"
     assert not (tmp_path / "out").exists()
 
 
@@ -102,10 +102,10 @@ def test_while_rendering(number, tmp_path):
     process, _ = begun(tmp_path, ambient={"paths": 64})
     out = tmp_path / "out"
     wait_for(lambda: len(list(out.glob("*.l[0-9]*.exr"))) > 20, process)
-    told = stop(process, number)
+    result = stop(process, number)
     images = check_files(out, "exr")
     message = f"{images} of 8,000 images were written to {out}; the same command goes on with the rest"
-    assert told.err.splitlines()[1:] == [message]
+    assert result.err.splitlines()[1:] == [message]
 
 
 def test_while_nothing_but_writing_goes_on(tmp_path):
@@ -231,6 +231,6 @@ def test_a_job_may_come_through_a_pipe(tmp_path):
     os.set_blocking(end, True)
     os.write(end, text)
     os.close(end)
-    told = finish(process)
-    assert told.code == 2
-    assert told.err.startswith(f"{pipe}: camera.fov: expected a number from 0.001 to 179.9, got 500.0\n")
+    result = finish(process)
+    assert result.code == 2
+    assert result.err.startswith(f"{pipe}: camera.fov: expected a number from 0.001 to 179.9, got 500.0\n")

@@ -22,9 +22,9 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def test_a_whole_array(array, capsys):
-    told = run(capsys, "verify", array)
-    assert (told.code, told.err) == (0, "")
-    assert told.out.endswith(f"{N_FILES} files of tiny are whole\n")
+    result = run(capsys, "verify", array)
+    assert (result.code, result.err) == (0, "")
+    assert result.out.endswith(f"{N_FILES} files of tiny are whole\n")
     assert run(capsys, "verify", "-q", array / "manifest.toml").out == ""
 
 
@@ -36,10 +36,10 @@ def test_every_flipped_byte_is_found_and_mended(array, capsys):
         data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
         (array / name).write_bytes(data)
     (array / names[5]).unlink()
-    told = run(capsys, "verify", "-q", array)
-    assert told.code == 5
-    assert told.err.splitlines()[-1].startswith(f"6 of {N_FILES} files are missing or damaged; ")
-    assert {line.split(": ")[0] for line in told.err.splitlines()[:-1]} == {str(array / name) for name in names}
+    result = run(capsys, "verify", "-q", array)
+    assert result.code == 5
+    assert result.err.splitlines()[-1].startswith(f"6 of {N_FILES} files are missing or damaged; ")
+    assert {line.split(": ")[0] for line in result.err.splitlines()[:-1]} == {str(array / name) for name in names}
     mended = run(capsys, "verify", "--repair", array)
     assert (mended.code, mended.err) == (0, "")
     assert contents(array) == before
@@ -49,9 +49,9 @@ def test_every_flipped_byte_is_found_and_mended(array, capsys):
 def test_an_unfinished_array_is_finished(array, capsys, tmp_path):
     job = write_job(tmp_path, "part.toml", camera=WALK, output={"directory": "part"})
     assert run(capsys, "render", "-q", job, "--cameras", "1-2").code == 0
-    told = run(capsys, "verify", tmp_path / "part")
-    assert told.code == 5
-    assert told.err.count("was never finished") == 2 * (3 + 1)
+    result = run(capsys, "verify", tmp_path / "part")
+    assert result.code == 5
+    assert result.err.count("was never finished") == 2 * (3 + 1)
     assert run(capsys, "verify", "-q", "--repair", tmp_path / "part").code == 0
     assert contents(tmp_path / "part") == contents(array)
 
@@ -59,9 +59,9 @@ def test_an_unfinished_array_is_finished(array, capsys, tmp_path):
 def test_without_records_images_are_looked_at(array, capsys):
     for file in (array / "records").iterdir():
         file.unlink()
-    told = run(capsys, "verify", array)
-    assert told.code == 0
-    assert f"{N_FILES} files are whole, but have no checksum" in told.out
+    result = run(capsys, "verify", array)
+    assert result.code == 0
+    assert f"{N_FILES} files are whole, but have no checksum" in result.out
     (array / "tiny.c0001.l001.png").write_bytes((array / "tiny.c0001.l001.png").read_bytes()[:-100])
     (array / "tiny.layers.c0002.exr").write_bytes(b"no image")
     assert run(capsys, "verify", array).err.splitlines()[-1].startswith(f"2 of {N_FILES} files are missing or damaged")
@@ -69,10 +69,10 @@ def test_without_records_images_are_looked_at(array, capsys):
 
 @pytest.mark.parametrize("cameras", ["0-9", "3-1x1", "x", ""])
 def test_cameras_that_are_no_range(cameras, tmp_path, capsys):
-    told = run(capsys, "render", "-q", write_job(tmp_path, camera=WALK), "--cameras", cameras)
-    assert told.code == 2
-    assert "--cameras" in told.err
-    assert "expected" in told.err
+    result = run(capsys, "render", "-q", write_job(tmp_path, camera=WALK), "--cameras", cameras)
+    assert result.code == 2
+    assert "--cameras" in result.err
+    assert "expected" in result.err
     assert not (tmp_path / "out").exists()
 
 
@@ -90,8 +90,8 @@ def test_one_flipped_byte_in_each_of_a_hundred_images(tmp_path, capsys):
             place = rng.randrange(len(data))
             data[place] = (data[place] + rng.randrange(1, 256)) % 256
             (out / name).write_bytes(data)
-        told = run(capsys, "verify", "-q", out)
-        assert told.code == 5
-        assert {line.split(": ")[0] for line in told.err.splitlines()[:-1]} == {str(out / name) for name in names}
+        result = run(capsys, "verify", "-q", out)
+        assert result.code == 5
+        assert {line.split(": ")[0] for line in result.err.splitlines()[:-1]} == {str(out / name) for name in names}
         assert run(capsys, "verify", "-q", "--repair", out).code == 0
         assert contents(out) == before

@@ -33,9 +33,9 @@ def images(folder: Path) -> dict[str, bytes]:
 
 def test_what_it_takes_is_printed_and_stored(tmp_path, capsys):
     job = wanting(tmp_path, error=0.2, halves=True)
-    told = run(capsys, "render", job)
-    assert (told.code, told.err) == (0, "")
-    hits, least, most, expected = map(float, re.search(LINE, told.out, re.MULTILINE).groups())
+    result = run(capsys, "render", job)
+    assert (result.code, result.err) == (0, "")
+    hits, least, most, expected = map(float, re.search(LINE, result.out, re.MULTILINE).groups())
     assert least <= hits <= most
     summary = stored(tmp_path / "out")["summary"]
     assert summary["finished"] is True
@@ -47,7 +47,7 @@ def test_what_it_takes_is_printed_and_stored(tmp_path, capsys):
     assert 0.5 < summary["standard_error"]["relative"] / 0.2 < 1.5
     checked = run(capsys, "check", job)
     assert (checked.code, checked.err) == (0, "")
-    assert re.search(LINE, checked.out, re.MULTILINE).group() == re.search(LINE, told.out, re.MULTILINE).group()
+    assert re.search(LINE, checked.out, re.MULTILINE).group() == re.search(LINE, result.out, re.MULTILINE).group()
 
 
 def test_the_array_is_the_same_whatever_the_threads(tmp_path, capsys):
@@ -64,13 +64,13 @@ def test_another_error_is_another_array(tmp_path, capsys):
 
 
 def test_too_few_hits_are_told(tmp_path, capsys):
-    told = run(capsys, "render", wanting(tmp_path, error=0.001, most_hits=2))
-    assert told.code == 0
+    result = run(capsys, "render", wanting(tmp_path, error=0.001, most_hits=2))
+    assert result.code == 0
     note = "  note: 100.0% of all places have as many hits as samples.most_hits allows, too few for this error"
-    assert note in told.out.splitlines()
+    assert note in result.out.splitlines()
 
 
 def test_hits_and_error_together_are_refused(tmp_path, capsys):
-    told = run(capsys, "render", wanting(tmp_path, hits=2, error=0.1))
-    assert told.code == 2
-    assert "samples.error: expected either hits or error" in told.err
+    result = run(capsys, "render", wanting(tmp_path, hits=2, error=0.1))
+    assert result.code == 2
+    assert "samples.error: expected either hits or error" in result.err

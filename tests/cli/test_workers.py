@@ -92,8 +92,8 @@ def test_a_killed_worker_costs_its_chunk(seed, kills, place, tmp_path):
         enough = 3 * N * (kill - 1 + rng.uniform(0.2, 0.8)) / kills
         wait_for(lambda enough=enough: images(out) >= enough, process)
         rng.choice(workers_of(process)).send_signal(signal.SIGKILL)
-    told = finish(process)
-    assert (told.code, told.out, told.err) == (0, "", "")
+    result = finish(process)
+    assert (result.code, result.out, result.err) == (0, "", "")
     assert same(out, place / "whole")
     times = finished(out)
     assert len(times) == N and set(times.values()) == {1}, "what was finished was not rendered anew"
@@ -111,9 +111,9 @@ def test_a_chunk_that_kills_all_workers_is_given_up(place, tmp_path, monkeypatch
     for kill in range(3):  # each once it has planned, and before its first image
         wait_for(lambda kill=kill: sum(begun_again(out).values()) + bool(lines(out)) > kill, process)
         workers_of(process)[0].kill()
-    told = finish(process)
-    assert (told.code, told.out) == (4, "")
-    assert told.err.startswith("cameras 0-23: workers died on them again and again")
+    result = finish(process)
+    assert (result.code, result.out) == (4, "")
+    assert result.err.startswith("cameras 0-23: workers died on them again and again")
     monkeypatch.delenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES")
     assert finish(start("render", "-q", place / "job.toml", "--workers", 1, "-o", out)).code == 0
     assert same(out, place / "whole")
@@ -129,13 +129,13 @@ def test_a_signal_ends_all_workers(number, place, tmp_path):
     workers, sent = workers_of(process), time.monotonic()
     for one in [process, *workers]:
         one.send_signal(number)
-    told = finish(process)
+    result = finish(process)
     assert time.monotonic() - sent < 5.0
-    assert told.code == 128 + number
+    assert result.code == 128 + number
     word = "interrupted" if number == signal.SIGINT else "terminated"
     done = sum(finished(out).values()) * 3
     kept = f"{done} of {3 * N} images were written to {out}; the same command goes on with the rest"
-    assert told.err.splitlines() == [word, kept]
+    assert result.err.splitlines() == [word, kept]
     assert len(workers) == 2 and not any(worker.is_running() for worker in workers)
     assert manifest(out)["summary"]["images"] == done
     assert not [file for file in out.rglob(".*") if file.name != ".guard"]
@@ -147,9 +147,9 @@ def test_a_signal_ends_all_workers(number, place, tmp_path):
 def test_a_full_disk_is_told_as_without_workers(place, tmp_path):
     for disk in mounted(tmp_path / "disk", "size=1m"):
         out = disk.folder / "out"
-        told = finish(start("render", "-q", place / "job.toml", "-o", out, "--workers", 2, "--chunk", 6))
-        assert (told.code, told.out) == (4, "")
-        first, free, kept = told.err.splitlines()
+        result = finish(start("render", "-q", place / "job.toml", "-o", out, "--workers", 2, "--chunk", 6))
+        assert (result.code, result.out) == (4, "")
+        first, free, kept = result.err.splitlines()
         assert first.startswith(f"{out}/") and ": cannot be written: " in first
         assert free.endswith(" are free on that disk")
         done = sum(finished(out).values()) * 3
@@ -161,15 +161,15 @@ def test_a_full_disk_is_told_as_without_workers(place, tmp_path):
 
 def test_memory_is_shared(tmp_path):
     job = write_job(tmp_path, **(JOB | {"render": {"memory": "1 GiB"}}))
-    told = finish(start("render", job, "--workers", 8))  # tests that ran before would count as memory of the program
-    assert told.code == 2
-    assert "8 workers share 1.0 GiB, fewer have more each" in told.err
+    result = finish(start("render", job, "--workers", 8))  # tests that ran before would count as memory of the program
+    assert result.code == 2
+    assert "8 workers share 1.0 GiB, fewer have more each" in result.err
     assert not (tmp_path / "out/manifest.toml").exists()
 
 
 def test_options_that_do_not_go_together(tmp_path, capsys):
     job = write_job(tmp_path, **JOB)
     for options in (["--chunk", "3"], ["--workers", "2", "--dask", "tcp://a:1"], ["--dask", " "], ["--workers", "0"]):
-        told = run(capsys, "render", job, *options)
-        assert told.code == 2 and "--" in told.err
+        result = run(capsys, "render", job, *options)
+        assert result.code == 2 and "--" in result.err
     assert not (tmp_path / "out").exists()

@@ -1,4 +1,4 @@
-"""Small frame arrays written by hand, whose every image can be told from its neighbours."""
+"""Small frame arrays written by hand; every image differs from its neighbours."""
 
 from pathlib import Path
 
