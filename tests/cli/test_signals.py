@@ -11,17 +11,19 @@ from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
+import psutil
 import pytest
 from support import tiny
-from support.program import Result, finish, start, wait_for, write_job
+from support.program import Result, finish, is_prompt, start, wait_for, write_job
 
 from framearray_cli.array.images.images import read_image
 from framearray_cli.cli import signals as interrupts
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of other kinds there")
 
-PROMPT = 2.0  # seconds
-# long enough to be met at every stage: a minute of walks, then hours of frames
+PROMPT = 2.0  # seconds on an idle machine
+ASLEEP = 40  # polls in a row, 5 ms each, that find a process asleep where it waits for input
+# long enough to be stopped at every stage: a minute of walks, then hours of frames
 LONG = {
     "ambient": {"paths": 2**24},
     "camera": tiny.WALK | {"resolution": [160, 120], "frames": 500},
@@ -33,11 +35,12 @@ LONG = {
 
 
 def stop(process: subprocess.Popen[str], number: signal.Signals) -> Result:
-    """Send a signal; the process must end promptly, and say nothing but what is expected of it."""
+    """Send a signal; the process must end promptly, and print only what is expected of it."""
     started = time.monotonic()
     process.send_signal(number)
-    result = finish(process)
-    assert time.monotonic() - started < PROMPT
+    result = finish(process, seconds=60)
+    took = time.monotonic() - started
+    assert is_prompt(took, PROMPT), f"ended after {took:.1f} s"
     word = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}[number]
     assert result.code == 128 + number
     assert result.err.splitlines()[0] == word
@@ -46,31 +49,31 @@ def stop(process: subprocess.Popen[str], number: signal.Signals) -> Result:
 
 
 def check_files(out: Path, format_suffix: str) -> int:
-    """No half file, and the manifest tells what there is; returns the number of images."""
+    """Check that there is no half file, and that the manifest lists what there is; return the number of images."""
     assert not list(out.glob(".*"))
     images = sorted(out.glob(f"*.l[0-9]*.{format_suffix}"))
     for image in images:
         assert read_image(image).shape == (120, 160, 3)
     summary = tomllib.loads((out / "manifest.toml").read_text())["summary"]
     assert summary["finished"] is False
-    assert 0 < summary["images"] <= len(images), "those of cameras that are whole"
+    assert 0 < summary["images"] <= len(images), "the manifest counts cameras whose images are complete"
     return len(images)
 
 
-def said(process: subprocess.Popen[str], log: Path, text: str) -> Callable[[], bool]:
+def has_printed(log: Path, text: str) -> Callable[[], bool]:
     return lambda: text in log.read_text()
 
 
-def works(process: subprocess.Popen[str]) -> Callable[[], bool]:
-    """Whether the program has loaded what it renders with, so that its signal handlers are set."""
+def has_loaded(process: subprocess.Popen[str]) -> Callable[[], bool]:
+    """Whether the program has loaded the libraries that it renders with, so that its signal handlers are set."""
     maps, started = Path(f"/proc/{process.pid}/maps"), time.monotonic()
     if not maps.exists():  # no Linux
         return lambda: time.monotonic() > started + 3
     return lambda: "llvmlite" in maps.read_text()
 
 
-def begun(tmp_path: Path, **changes: object) -> tuple[subprocess.Popen[str], Path]:
-    """A long render under way, and the file that its output goes to."""
+def start_long_render(tmp_path: Path, **changes: object) -> tuple[subprocess.Popen[str], Path]:
+    """Start a long render; return it and the file that its output goes to."""
     log = tmp_path / "log"
     with log.open("w") as file:
         return start("render", write_job(tmp_path, **(LONG | changes)), stdout=file), log
@@ -81,7 +84,7 @@ def test_while_loading(tmp_path):
     lines = "".join(f"v {i} {i * i} 0\nf -1 -2 -3\n" for i in range(600_000))  # takes some seconds to read
     (tmp_path / "long.obj").write_text(lines)
     process = start("render", write_job(tmp_path, **(LONG | {"scene": {"file": "long.obj"}})))
-    wait_for(works(process), process)
+    wait_for(has_loaded(process), process)
     time.sleep(0.3)
     result = stop(process, signal.SIGINT)
     assert result.err == "interrupted\n"
@@ -90,8 +93,8 @@ def test_while_loading(tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_while_the_ambient_light_is_estimated(number, tmp_path):
-    process, log = begun(tmp_path)
-    wait_for(said(process, log, "triangles"), process)
+    process, log = start_long_render(tmp_path)
+    wait_for(has_printed(log, "triangles"), process)
     time.sleep(0.5)
     assert stop(process, number).err.count("\n") == 1
     assert not [file for file in (tmp_path / "out").rglob("*") if file.is_file() and file.name != ".guard"]
@@ -99,7 +102,7 @@ def test_while_the_ambient_light_is_estimated(number, tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_while_rendering(number, tmp_path):
-    process, _ = begun(tmp_path, ambient={"paths": 64})
+    process, _ = start_long_render(tmp_path, ambient={"paths": 64})
     out = tmp_path / "out"
     wait_for(lambda: len(list(out.glob("*.l[0-9]*.exr"))) > 20, process)
     result = stop(process, number)
@@ -109,9 +112,9 @@ def test_while_rendering(number, tmp_path):
 
 
 def test_while_nothing_but_writing_goes_on(tmp_path):
-    """A camera at rest: its one frame is found at once, then written for 500 eyes."""
+    """The camera stands still: its one frame is traced at once, then written for 500 eyes."""
     camera = {"keys": tiny.WALK["keys"][:1], "frames": 500, "resolution": [160, 120]}
-    process, _ = begun(tmp_path, ambient={"paths": 64}, camera=camera, output={"format": "png"})
+    process, _ = start_long_render(tmp_path, ambient={"paths": 64}, camera=camera, output={"format": "png"})
     wait_for(lambda: len(list((tmp_path / "out").glob("*.l[0-9]*.png"))) > 20, process)
     stop(process, signal.SIGINT)
     assert check_files(tmp_path / "out", "png") < 8000
@@ -119,7 +122,7 @@ def test_while_nothing_but_writing_goes_on(tmp_path):
 
 def test_a_stopped_render_can_be_rendered_to_its_end(tmp_path):
     camera = tiny.WALK | {"resolution": [80, 60], "frames": 30}
-    process, _ = begun(tmp_path, ambient={"paths": 64}, camera=camera, light={"frames": 4}, samples={"hits": 4})
+    process, _ = start_long_render(tmp_path, ambient={"paths": 64}, camera=camera, light={"frames": 4}, samples={"hits": 4})
     out = tmp_path / "out"
     wait_for(lambda: len(list(out.glob("*.l[0-9]*.exr"))) > 2, process)
     stop(process, signal.SIGINT)
@@ -130,14 +133,14 @@ def test_a_stopped_render_can_be_rendered_to_its_end(tmp_path):
 
 def test_while_checking(tmp_path):
     process = start("check", write_job(tmp_path, **LONG))
-    wait_for(works(process), process)
+    wait_for(has_loaded(process), process)
     time.sleep(0.5)
     stop(process, signal.SIGTERM)
     assert not (tmp_path / "out").exists()
 
 
 def test_before_the_command_line_is_loaded(monkeypatch):
-    """Ctrl-C ends the process by itself then, without the traceback of an import."""
+    """Ctrl-C ends the process without Python's help then, and without the traceback of an import."""
     seen = []
     fake = ModuleType("framearray_cli.cli.main")
     fake.main = lambda: seen.append(signal.getsignal(signal.SIGINT))
@@ -151,8 +154,8 @@ def test_before_the_command_line_is_loaded(monkeypatch):
 def test_while_kernels_compile(tmp_path, monkeypatch):
     """A thread that compiles cannot be stopped; it is not waited for."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    process, log = begun(tmp_path, ambient={"paths": 64})
-    wait_for(said(process, log, "ambient light"), process)
+    process, log = start_long_render(tmp_path, ambient={"paths": 64})
+    wait_for(has_printed(log, "ambient light"), process)
     time.sleep(1.0)  # now the frame's threads compile
     assert "compiling" in log.read_text()
     assert stop(process, signal.SIGINT).err == "interrupted\n"
@@ -160,7 +163,7 @@ def test_while_kernels_compile(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("module", ["llvmlite.binding.executionengine", "importlib._bootstrap"])
 def test_an_exception_is_not_raised_where_it_would_be_forgotten(module):
-    """A callback from C, for instance, prints an exception and goes on; then it is raised a moment later."""
+    """A callback from C, for instance, prints an exception and goes on; the program raises it a moment later."""
     inside: list[object] = []
     exec("def f(stop): stop(); inside.append(stop)", space := {"__name__": module, "inside": inside})
 
@@ -175,7 +178,7 @@ def test_an_exception_is_not_raised_where_it_would_be_forgotten(module):
 
 
 def test_a_lock_that_a_signal_broke_counts_as_the_signal(monkeypatch, capsys):
-    """What happened once in some hundred runs, when a signal came while a thread pool took in work."""
+    """This happened once in some hundred runs, when a signal came while a thread pool took in work."""
     from framearray_cli.cli import main as cli
 
     def broken(*_: object, **__: object) -> None:
@@ -199,7 +202,7 @@ def test_a_lock_that_a_signal_broke_counts_as_the_signal(monkeypatch, capsys):
 
 
 def writer_of(pipe: Path, process: subprocess.Popen[str]) -> int:
-    """The end of a pipe that is written to, once the process waits at the other one."""
+    """Return the writing end of a pipe, once the process has opened the reading end."""
     ends: list[int] = []
 
     def opened() -> bool:
@@ -213,12 +216,28 @@ def writer_of(pipe: Path, process: subprocess.Popen[str]) -> int:
     return ends[0]
 
 
+def wait_for_sleep(process: subprocess.Popen[str]) -> None:
+    """Wait until a process sleeps in a system call.
+
+    A signal that comes between two system calls, after Python has opened a pipe and before it reads, interrupts
+    neither; Python would notice it only when the read returns.
+    """
+    states = list[str]()
+
+    def sleeps() -> bool:
+        states.append(psutil.Process(process.pid).status())
+        return len(states) >= ASLEEP and set(states[-ASLEEP:]) == {psutil.STATUS_SLEEPING}
+
+    wait_for(sleeps, process)
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_job_that_never_comes_is_waited_for_until_a_signal(number, tmp_path):
     pipe = tmp_path / "job.toml"
     os.mkfifo(pipe)
     process = start("check", pipe)
     end = writer_of(pipe, process)
+    wait_for_sleep(process)
     stop(process, number)
     os.close(end)
 
