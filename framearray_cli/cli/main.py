@@ -1,4 +1,4 @@
-"""The command line: its commands, and how errors become messages and exit codes; they end the process here alone."""
+"""The command line: its commands, and the only place where errors become messages and exit codes."""
 
 import io
 import re
@@ -28,10 +28,10 @@ from .commands.view import view
 from .screen import err, out, say
 from .signals import listen
 
-OUT_OF_MEMORY = 2  # the job asks for more than the machine has
-NO_THREADS = "can't start new thread"  # what Python says
+OUT_OF_MEMORY = 2  # the job needs more than the machine has
+NO_THREADS = "can't start new thread"  # the text of Python's error
 RENDERING = ("render", "check", "init", "report")  # commands that may trace rays
-WRITING = ("assemble", "init", "export", "sheet")  # commands that do not render the images of a job
+WRITING = ("assemble", "init", "export", "sheet")  # commands that write, but render no images of a job
 
 app = typer.Typer(
     name="framearray",
@@ -67,31 +67,31 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and turn errors into messages and exit codes."""
     listen()
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # a file name that the terminal cannot show is no reason to fail
+        if isinstance(stream, io.TextIOWrapper):  # do not fail on a file name that the terminal cannot show
             stream.reconfigure(errors="backslashreplace")
     arguments = sys.argv[1:] if arguments is None else arguments
-    begun: list[str] = []  # the command that runs, once it is known
+    running: list[str] = []  # the command, once it is known
     try:
-        app(list(arguments) or ["--help"], prog_name="framearray", obj=begun)
+        app(list(arguments) or ["--help"], prog_name="framearray", obj=running)
     except (FrameArrayError, MemoryError, Stopped, RuntimeError) as error:
-        lines, exit_code = ending(error, begun[0] if begun else "")
-        _fail(lines, exit_code)
+        lines, exit_code = ending(error, running[0] if running else "")
+        _exit_with(lines, exit_code)
 
 
 def ending(error: BaseException, command: str) -> tuple[list[str], int]:
-    """Find what to print about an error that ends a command, and the exit code; any other is raised again.
+    """Return the lines to print about an error that ends a command, and the exit code; raise any other error again.
 
     Args:
         command: name of the command.
     """
-    notes = list(getattr(error, "__notes__", ()))  # what was added to the error on its way
+    notes = list(getattr(error, "__notes__", ()))  # callers add them to the error
     if isinstance(error, JobError):
         return _problem_lines(error, "nothing was written" if command in WRITING else "nothing was rendered")
     if isinstance(error, FrameArrayError):
         return [*str(error).splitlines(), *notes], error.exit_code
     if isinstance(error, MemoryError):
         less = (
-            "a render takes less with a smaller resolution or n_r, or fewer lights; `framearray check` tells how much"
+            "a render takes less with a smaller resolution or n_r, or fewer lights; `framearray check` prints how much"
         )
         return [f"not enough memory; {less}", *notes], OUT_OF_MEMORY
     if stopped := stopped_by(error):
@@ -105,15 +105,15 @@ def ending(error: BaseException, command: str) -> tuple[list[str], int]:
 
 
 def _problem_lines(error: JobError, outcome: str) -> tuple[list[str], int]:
-    """List the problems of a job file, a path file or options, and what came of them."""
+    """List the problems of a job file, a path file or options, and their outcome."""
     more = re.fullmatch(r"and (\d+) more problems", error.problems[-1])
     n = len(error.problems) - 1 + int(more[1]) if more else len(error.problems)
     lines = [f"{error.file}: {problem}".replace("\n", "\\n") for problem in error.problems]
     return [*lines, f"{n:,} problem{'s' if n > 1 else ''}; {outcome}."], error.exit_code
 
 
-def _fail(lines: Sequence[str], code: int) -> NoReturn:
-    """Print what is wrong and end the process; where nobody can read that, the exit code still says it."""
+def _exit_with(lines: Sequence[str], code: int) -> NoReturn:
+    """Print what is wrong and end the process; the exit code says it where nobody can read the message."""
     with suppress(OutputError, OSError):  # a terminal that was closed
         say(err, lines)
     sys.exit(code)

@@ -1,4 +1,4 @@
-"""Options that several commands share."""
+"""Arguments and options that several commands share."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,17 +11,18 @@ if TYPE_CHECKING:
     from framearray_cli.job.job import Job
 
 JobFile = Annotated[Path, typer.Argument(metavar="JOB", help="Job file, TOML.", show_default=False)]
+ArrayFolder = Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `render` wrote.", show_default=False)]
 Threads = Annotated[
     int | None,
     typer.Option(
-        "--threads", min=1, max=MOST_THREADS, help="Threads; default: the job's, else one for each core.", metavar="N"
+        "--threads", min=1, max=MOST_THREADS, help="Threads; default: the job's, else one per core.", metavar="N"
     ),
 ]
 Output = Annotated[
     str | None,
     typer.Option("--output", "-o", help="Folder for the images, instead of the job's.", metavar="FOLDER"),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors.")]
 Exposure = Annotated[
     float,
     typer.Option("--exposure", min=-MOST_STOPS, max=MOST_STOPS, help="Stops added to PNG and JPEG.", metavar="STOPS"),
@@ -32,20 +33,20 @@ At = Annotated[
 ]
 
 
-def read(job_file: Path, threads: int | None, output: str | None) -> "Job":
-    """Read a job file; options replace what it says."""
+def load_job(job_file: Path, threads: int | None, output: str | None) -> "Job":
+    """Read a job file; options replace its keys."""
     from framearray_cli.base.forms.table import changed
     from framearray_cli.job.read import read_job
 
     job = with_threads(read_job(job_file), threads)
     if output is None:
         return job
-    table = job.output.model_copy(update={"directory": place(output).absolute()})  # as it is: links are not followed
+    table = job.output.model_copy(update={"directory": output_path(output).absolute()})  # keep links
     return changed(job, output=table)
 
 
 def with_threads(job: "Job", threads: int | None) -> "Job":
-    """The same job with so many threads, if that is wished."""
+    """Return the job with another number of threads; None leaves it as it is."""
     if threads is None:
         return job
     from framearray_cli.base.forms.table import changed
@@ -53,8 +54,8 @@ def with_threads(job: "Job", threads: int | None) -> "Job":
     return changed(job, render=changed(job.render, threads=threads))
 
 
-def frames_of(text: str, n: int) -> tuple[int, ...]:
-    """The frames of an option `--cameras`."""
+def parse_cameras(text: str, n: int) -> tuple[int, ...]:
+    """Return the frames that an option `--cameras` names, of a path of n frames."""
     from framearray_cli.array.ranges import parse_frames
 
     try:
@@ -63,8 +64,8 @@ def frames_of(text: str, n: int) -> tuple[int, ...]:
         raise typer.BadParameter(str(error), param_hint="--cameras") from error
 
 
-def place(name: str, option: str = "--output") -> Path:
-    """A file or folder to write to."""
-    if not name.strip():  # most often a shell variable that is not set; Path would make "." of it
+def output_path(name: str, option: str = "--output") -> Path:
+    """Return the path of a file or folder to write."""
+    if not name.strip():  # usually an unset shell variable; Path would turn it into "."
         raise typer.BadParameter("expected a name, got none", param_hint=option)
     return Path(name)

@@ -1,9 +1,9 @@
-"""What a person sees while a render runs: a bar on a terminal, plain lines elsewhere, nothing if quiet."""
+"""Progress on the screen: a bar on a terminal, plain lines elsewhere, nothing if quiet."""
 
 import os
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from types import TracebackType
 from typing import IO, Self
@@ -20,12 +20,12 @@ from framearray_cli.engine.kernels.cache import problem
 
 out, err = Console(), Console(stderr=True)
 
-# Plain lines: a log file should tell that work goes on, not fill up.
+# Plain lines show in a log file that work goes on, without filling it up.
 SECONDS_BETWEEN_LINES = 5.0
 
 
 class _Rate(ProgressColumn):
-    """Units a second, over the last while."""
+    """Print units per second, over the last few seconds."""
 
     def __init__(self, unit: str) -> None:
         super().__init__()
@@ -37,9 +37,9 @@ class _Rate(ProgressColumn):
 
 
 class Screen:
-    """Shows what goes on: first what is waited for, then a count of finished units up to a total.
+    """Show what the program waits for, then count finished units up to a total.
 
-    On a terminal the last line moves. Elsewhere there are plain lines, rarely. If quiet, there is nothing.
+    On a terminal the last line moves. Elsewhere print a plain line every few seconds. If quiet, print nothing.
     """
 
     def __init__(self, console: Console, *, quiet: bool = False) -> None:
@@ -53,12 +53,12 @@ class Screen:
         self.done = self.total = 0
 
     def say(self, lines: Iterable[str]) -> None:
-        """Print lines, above the moving one."""
+        """Print lines above the moving one."""
         if not self._quiet:
             say(self._console, lines)
 
     def wait(self, what: str) -> None:
-        """Show that something goes on whose end is not known; on a terminal alone."""
+        """Show work of unknown length; only on a terminal."""
         if self._moving and self._bar is None:
             if self._status is None:
                 self._status = self._console.status("")
@@ -66,12 +66,12 @@ class Screen:
             self._status.update(Text(what))
 
     def compiling(self) -> None:
-        """Tell why the first run on a machine starts slowly."""
+        """Print why the first run on a machine starts slowly."""
         when = "each time" if problem() else "the first time only"
         self.say([f"compiling for this machine; that takes up to a minute, {when}"])
 
     def count(self, label: str, total: int, unit: str) -> None:
-        """Start to count."""
+        """Start to count up to a total."""
         self._label, self._unit, self.total = label, unit, total
         self._started = self._last = time.monotonic()
         self._end_wait()
@@ -88,8 +88,18 @@ class Screen:
             self._task = self._bar.add_task(label, total=total)
             self._bar.start()
 
+    def counter(self, label: str, unit: str) -> Callable[[int, int], None]:
+        """Return a function of (units done, total) that counts one more unit; its first call starts to count."""
+
+        def count_one(done: int, total: int) -> None:
+            if not self.total:
+                self.count(label, total, unit)
+            self.advance()
+
+        return count_one
+
     def advance(self, units: int = 1) -> None:
-        """Count units that were finished; from any thread."""
+        """Count finished units; any thread may call."""
         with self._lock:
             self.done += units
             if self._bar is not None:
@@ -101,12 +111,12 @@ class Screen:
             self._last = now
             rate = self.done / (now - self._started)
             left = duration((self.total - self.done) / rate)
-            line = f"{self._label}: {self.done} of {self.total} {self._unit}s, {rate:.1f} a second, {left} left"
-        with suppress(OutputError):  # no reason to end a long render
+            line = f"{self._label}: {self.done} of {self.total} {self._unit}s, {rate:.1f} per second, {left} left"
+        with suppress(OutputError):  # a full log is no reason to end a long render
             say(self._console, [line])
 
     def end(self) -> None:
-        """Take the moving line away; what is counted is done."""
+        """Remove the moving line; counting has ended."""
         with suppress(OSError):  # a terminal that was closed
             self._end_wait()
             if self._bar is not None:
@@ -129,29 +139,29 @@ class Screen:
 
 
 def say(console: Console, lines: Iterable[str]) -> None:
-    """Print lines as they are: no wrapping, no markup, no colours; what a terminal would obey becomes text.
+    """Print lines as they are, without wrapping, markup and colours; escape what would control a terminal.
 
     Raises:
-        OutputError: they cannot be printed, into a file on a full disk for instance.
+        OutputError: they cannot be printed, for instance into a file on a full disk.
     """
     try:
         for line in lines:
             console.print(printable(line), markup=False, highlight=False, soft_wrap=True, emoji=False)
-    except BrokenPipeError:  # whoever read it has gone
+    except BrokenPipeError:  # the reader has gone
         raise
     except OSError as error:
-        _let_go(console.file)
+        _discard(console.file)
         raise OutputError(f"standard output: cannot be written: {reason(error)}") from error
 
 
 def printable(text: str) -> str:
-    """A text of which every character can be seen: names may hold escape sequences, or turn the line around."""
+    """Escape invisible characters: names may hold escape sequences, or reverse the line."""
     if text.replace("\n", "").isprintable():
         return text
     return "".join(c if c.isprintable() or c in "\n\xa0" else c.encode("unicode_escape").decode() for c in text)
 
 
-def _let_go(stream: IO[str]) -> None:
-    """Send the rest of a stream to nowhere: what it still holds would fail again when the process ends."""
-    with suppress(OSError, ValueError):  # a stream without a file has nothing to fail
+def _discard(stream: IO[str]) -> None:
+    """Send the rest of a stream to the null device: its buffer would fail again when the process ends."""
+    with suppress(OSError, ValueError):  # a stream without a file cannot fail
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

@@ -1,4 +1,4 @@
-"""Signals that ask the program to end, as Ctrl-C does: one exception, whatever the program is doing."""
+"""Signals that end the program, such as Ctrl-C: raise one exception, at any stage of the program."""
 
 import os
 import signal
@@ -12,13 +12,13 @@ from framearray_cli.engine.kernels.clock import is_compiling
 
 from .screen import err, out, say
 
-PATIENCE = 1.0  # seconds that threads get to end by themselves after a signal
-# Callbacks from C and optional imports, in which every exception is caught.
+PATIENCE = 1.0  # seconds that threads have to end after a signal
+# Modules with callbacks from C and optional imports, which catch every exception.
 FORGETFUL = ("numba", "llvmlite", "importlib", "_frozen_importlib", "_frozen_importlib_external")
 
 
 def listen() -> None:
-    """Turn signals into `Stopped` from now on; a terminal may close without consequence where `nohup` says so."""
+    """Turn signals into `Stopped` from now on; under `nohup` go on when the terminal closes."""
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)  # Windows lacks the last
         if number is not None and (name != "SIGHUP" or signal.getsignal(number) != signal.SIG_IGN):
@@ -26,10 +26,10 @@ def listen() -> None:
 
 
 def stop(signum: int, frame: FrameType | None) -> None:
-    """Turn a signal into an exception, so that everything is tidied up; a second signal ends the process at once."""
+    """Raise an exception on a signal, so that everything is cleaned up; a second signal ends the process at once."""
     signal.signal(signum, signal.SIG_DFL)
-    if is_compiling():  # that cannot be stopped, and would be waited for
-        timer = threading.Timer(PATIENCE, _leave, [Stopped(signum)])
+    if is_compiling():  # nothing stops a thread that compiles, and the process would wait for it
+        timer = threading.Timer(PATIENCE, _exit_now, [Stopped(signum)])
         timer.daemon = True
         timer.start()
     if hasattr(signal, "setitimer"):
@@ -38,7 +38,7 @@ def stop(signum: int, frame: FrameType | None) -> None:
 
 
 def _interrupt(signum: int, frame: FrameType | None) -> None:
-    """Raise `Stopped`, unless that would be forgotten now; then in a moment, and again should it be forgotten."""
+    """Raise `Stopped`; where it would be caught and lost now, raise it in a moment, and again if it is lost."""
     busy = False
     while frame is not None and not busy:
         busy = frame.f_globals.get("__name__", "").partition(".")[0] in FORGETFUL
@@ -50,8 +50,8 @@ def _interrupt(signum: int, frame: FrameType | None) -> None:
     raise Stopped(signum)
 
 
-def _leave(stopped: Stopped) -> None:
-    """End the process whatever its threads are doing."""
+def _exit_now(stopped: Stopped) -> None:
+    """End the process without waiting for its threads."""
     with suppress(OutputError, OSError):  # a terminal that was closed
         out.show_cursor()
         say(err, [stopped.word])

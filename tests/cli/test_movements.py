@@ -1,4 +1,4 @@
-"""`framearray assemble` on the command line: with a path file and without, its options, its messages."""
+"""`framearray assemble` on the command line, with and without a path file: options and messages."""
 
 import re
 from fractions import Fraction
@@ -15,22 +15,22 @@ def array(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("options", "said", "rate"),
+    ("options", "printed", "rate"),
     [
-        (["--walk"], "5 frames from 5 images, 24 frames a second", 24),
-        (["--light", "--at", "50%"], "4 frames from 4 images, 24 frames a second", 24),
-        (["--diagonal", "--fps", "12.5"], "5 frames from 5 images, 12.5 frames a second", Fraction(25, 2)),
-        (["--light", "--seconds", "1", "--blend", "--label"], "24 frames from 24 images, 24 frames a second", 24),
-        (["--walk", "--seconds", "0.5", "--at", "-1"], "12 frames from 5 images, 24 frames a second", 24),
-        (["--walk", "--view", "aces", "--exposure", "1"], "5 frames from 5 images, 24 frames a second", 24),
+        (["--walk"], "5 frames from 5 images, 24 frames per second", 24),
+        (["--light", "--at", "50%"], "4 frames from 4 images, 24 frames per second", 24),
+        (["--diagonal", "--fps", "12.5"], "5 frames from 5 images, 12.5 frames per second", Fraction(25, 2)),
+        (["--light", "--seconds", "1", "--blend", "--label"], "24 frames from 24 images, 24 frames per second", 24),
+        (["--walk", "--seconds", "0.5", "--at", "-1"], "12 frames from 5 images, 24 frames per second", 24),
+        (["--walk", "--view", "aces", "--exposure", "1"], "5 frames from 5 images, 24 frames per second", 24),
     ],
 )
-def test_movements(array: Path, tmp_path: Path, capsys, options: list[str], said: str, rate: Fraction) -> None:
+def test_movements(array: Path, tmp_path: Path, capsys, options: list[str], printed: str, rate: Fraction) -> None:
     result = run(capsys, "assemble", array, *options, "-o", tmp_path / "m.mkv")
     assert (result.code, result.err) == (0, "")
-    assert result.out.endswith(f"m.mkv: {said}\n")
+    assert result.out.endswith(f"m.mkv: {printed}\n")
     movie = decoded(tmp_path / "m.mkv")
-    assert (len(movie.frames), movie.rate) == (int(said.split()[0]), rate)
+    assert (len(movie.frames), movie.rate) == (int(printed.split()[0]), rate)
 
 
 def test_a_path_file_with_another_rate_and_blends(array: Path, tmp_path: Path, capsys) -> None:
@@ -49,9 +49,9 @@ def test_a_path_file_with_another_rate_and_blends(array: Path, tmp_path: Path, c
             "expected a path file, --walk, --light or --diagonal; got the path file path.toml and",
         ),
         (["--walk", "--light"], "expected a path file, --walk, --light or --diagonal; got --walk and --light"),
-        (["path.toml", "--seconds", "2"], "a path file says itself how long its segments are"),
-        (["path.toml", "--at", "2"], "goes with --walk and --light, where something stays"),
-        (["--diagonal", "--at", "2"], "goes with --walk and --light, where something stays"),
+        (["path.toml", "--seconds", "2"], "a path file gives the lengths of its segments"),
+        (["path.toml", "--at", "2"], "needs --walk or --light, where the other stays"),
+        (["--diagonal", "--at", "2"], "needs --walk or --light, where the other stays"),
         (["--walk", "--seconds", "0"], "Invalid value for '--seconds'"),
         (["--walk", "--fps", "0"], "Invalid value for '--fps'"),
     ],
@@ -78,7 +78,7 @@ def test_wrong_usage(array: Path, tmp_path: Path, capsys, monkeypatch, options: 
         (["--walk", "--view", "filmic"], "--view: expected srgb, aces or a view of ocio://default ("),
     ],
 )
-def test_what_the_array_or_the_screen_has_not(
+def test_places_and_views_that_do_not_exist(
     array: Path, tmp_path: Path, capsys, monkeypatch, options: list[str], message: str
 ) -> None:
     monkeypatch.delenv("OCIO", raising=False)

@@ -1,4 +1,4 @@
-"""`sheet` and `export`, as typed: what they say, and how they end."""
+"""`sheet` and `export` on the command line: messages and exit codes."""
 
 import json
 from pathlib import Path
@@ -41,17 +41,17 @@ def test_a_sheet_that_cannot_be_drawn(array, tmp_path, capsys, monkeypatch, opti
 
 
 @pytest.mark.parametrize(
-    ("kind", "folder", "said"),
+    ("kind", "folder", "printed"),
     [
         ("nerfstudio", "x", "4 cameras, 1 light position, "),
         ("colmap", "x", "4 cameras, 1 light position, "),
         ("cinema", "x.cdb", "4 cameras, 3 light positions"),
     ],
 )
-def test_an_array_is_exported(array, tmp_path, capsys, kind, folder, said):
+def test_an_array_is_exported(array, tmp_path, capsys, kind, folder, printed):
     result = run(capsys, "export", array, "--format", kind, "-o", tmp_path / "x")
     assert (result.code, result.err) == (0, "")
-    assert result.out.startswith(f"{tmp_path / folder}: {said}")
+    assert result.out.startswith(f"{tmp_path / folder}: {printed}")
     assert ("points" in result.out) == (kind != "cinema")
     again = run(capsys, "export", array, "-f", kind, "-o", tmp_path / "x")
     assert again.code == 4
@@ -87,16 +87,16 @@ def test_an_export_that_cannot_be_made(array, tmp_path, capsys, monkeypatch, opt
 
 
 def misses(mesh: trimesh.Trimesh, points: np.ndarray, size: np.ndarray) -> float:
-    """Share of points that are farther from the mesh than a size each."""
+    """Return the share of points that are farther from the mesh than their own bound."""
     _, distance, _ = trimesh.proximity.closest_point_naive(mesh, points)
     return float(np.mean(distance > size))
 
 
 def test_points_of_a_rendered_room_lie_on_its_surfaces(tmp_path, capsys):
-    """Depth is a mean over hits anywhere in a pixel: a point is off by less than what the pixel covers there.
+    """Depth is a mean over hits anywhere in a pixel, so a point is off by less than the width of the pixel there.
 
     The pixel of an eye at distance d covers d / f / cos(alpha), alpha the angle to its axis; the bound takes the
-    nearest of all eyes and leaves the cosine out, so it is the stricter.
+    nearest of all eyes without the cosine, which makes it stricter.
     """
     job = write_job(tmp_path, camera={**WALK, "resolution": [96, 72]})
     assert run(capsys, "render", job, "-q").code == 0
@@ -122,14 +122,14 @@ def test_points_of_a_rendered_room_lie_on_its_surfaces(tmp_path, capsys):
         ("sheet", "-o", "a.png", "--at"),
     ],
 )
-def test_a_long_value_of_an_option_is_told_shortly(options, array, capsys):
+def test_a_long_value_of_an_option_is_shortened(options, array, capsys):
     result = run(capsys, options[0], array, *options[1:], "1" * 5000)
     assert result.code == 2
     assert "111..." in result.err and len(result.err) < 1000
 
 
 @pytest.mark.parametrize("key", ["groups.{}.intensity", "segments[0].axes.{}"])
-def test_a_long_key_of_a_movie_path_is_told_shortly(key, array, tmp_path, capsys):
+def test_a_long_key_of_a_movie_path_is_shortened(key, array, tmp_path, capsys):
     name = "x" * 5000
     text = f"[[segments]]\nframes = 2\ncamera = [0, 1]\n{f'axes = {{ {name} = [0, 1] }}' if 'axes' in key else ''}\n"
     (tmp_path / "path.toml").write_text(text + (f"[groups.{name}]\nintensity = 2\n" if "groups" in key else ""))

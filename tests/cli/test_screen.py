@@ -1,4 +1,4 @@
-"""What is shown while something runs: on a terminal, in a log file, and if quiet."""
+"""Progress: on a terminal, in a log file, and if quiet."""
 
 import io
 import re
@@ -13,7 +13,7 @@ from framearray_cli.cli.screen import Screen, say
 
 
 class Clock:
-    """A clock that a test moves."""
+    """A clock that a test sets."""
 
     def __init__(self) -> None:
         self.now = 100.0
@@ -51,19 +51,19 @@ def test_a_log_gets_a_line_in_five_seconds_at_most(clock):
             shown.advance()
     lines = text(console).splitlines()
     assert lines == [
-        "rendering: 40 of 1200 images, 8.0 a second, 2 min 25 s left",
-        "rendering: 80 of 1200 images, 8.0 a second, 2 min 20 s left",
+        "rendering: 40 of 1200 images, 8.0 per second, 2 min 25 s left",
+        "rendering: 80 of 1200 images, 8.0 per second, 2 min 20 s left",
     ]
 
 
-def test_a_log_gets_nothing_that_is_waited_for(clock):
+def test_a_log_gets_no_waiting(clock):
     console = plain()
     with Screen(console) as shown:
         shown.wait("reading the scene")
     assert text(console) == ""
 
 
-def test_compiling_is_told_everywhere_but_to_the_quiet(clock):
+def test_compiling_is_printed_unless_quiet(clock):
     for quiet in (False, True):
         console = plain()
         with Screen(console, quiet=quiet) as shown:
@@ -83,7 +83,7 @@ def test_quiet_is_silent_on_a_terminal_too(clock):
     assert shown.done == 3
 
 
-def test_a_terminal_shows_a_bar_and_takes_it_away():
+def test_a_terminal_shows_a_bar_and_removes_it():
     console = terminal()
     with Screen(console) as shown:
         shown.wait("reading the scene")

@@ -91,7 +91,7 @@ def test_lines_of_a_target_that_is_not_reached() -> None:
 
 
 @pytest.mark.parametrize(
-    ("module", "name", "base"), [(command, "Shown", PartEvents), (worker, "_Reporter", RenderEvents)]
+    ("module", "name", "base"), [(command, "RenderingEvents", PartEvents), (worker, "_Reporter", RenderEvents)]
 )
 def test_listeners_override_existing_events(module: Any, name: str, base: type) -> None:
     """A method with a wrong name would never be called, and nothing would report it."""

@@ -1,1 +1,1 @@
-"""One file a command: it parses, calls one function, prints. Heavy imports happen when a command runs."""
+"""One file per command: it parses, calls one function, prints. Heavy imports happen when a command runs."""

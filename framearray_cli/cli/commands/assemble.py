@@ -8,62 +8,74 @@ import typer
 
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS
 
-from ..options import Quiet, place
+from ..options import ArrayFolder, Quiet, output_path
 from ..screen import Screen, out, say
+
+PathFile = Annotated[
+    Path | None, typer.Argument(metavar="PATH", help="Movie path, TOML; or one of the movements.", show_default=False)
+]
+Target = Annotated[
+    str,
+    typer.Option(
+        "--output",
+        "-o",
+        help="movie.mp4 (.webm, .mkv, .mov, .gif, .webp) or a sequence: frame.####.png",
+        metavar="FILE",
+        show_default=False,
+    ),
+]
+Walk = Annotated[bool, typer.Option("--walk", help="The camera moves, the light stays.")]
+Light = Annotated[bool, typer.Option("--light", help="The light moves, the camera stays.")]
+Diagonal = Annotated[bool, typer.Option("--diagonal", help="Both move.")]
+Stay = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--at",
+        help="Where the other stays: an index, first, last or 50%; AXIS=PLACE for one light axis. Default: first.",
+        metavar="PLACE",
+    ),
+]
+Seconds = Annotated[
+    float | None,
+    typer.Option(
+        "--seconds",
+        min=0.001,
+        max=MOST_SECONDS,
+        help="Length of a movement; default: one frame per image.",
+        metavar="S",
+    ),
+]
+FrameRate = Annotated[
+    float | None, typer.Option("--fps", min=LEAST_FPS, max=MOST_FPS, help="Frames per second.", metavar="RATE")
+]
+Blend = Annotated[bool, typer.Option("--blend", help="Blend between light positions.")]
+Stops = Annotated[
+    float,
+    typer.Option(
+        "--exposure", min=-MOST_STOPS, max=MOST_STOPS, help="Stops added to movies, PNG and JPEG.", metavar="STOPS"
+    ),
+]
+View = Annotated[
+    str, typer.Option("--view", help="srgb, aces, or a view of the configuration in $OCIO.", metavar="VIEW")
+]
+Label = Annotated[bool, typer.Option("--label", help="Write camera and light index into each picture.")]
 
 
 def assemble(
-    array: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `render` wrote.", show_default=False)],
-    path_file: Annotated[
-        Path | None,
-        typer.Argument(metavar="PATH", help="Movie path, TOML; or one of the movements.", show_default=False),
-    ] = None,
+    array: ArrayFolder,
+    path_file: PathFile = None,
     *,
-    target: Annotated[
-        str,
-        typer.Option(
-            "--output",
-            "-o",
-            help="movie.mp4 (.webm, .mkv, .mov, .gif, .webp) or a sequence: frame.####.png",
-            metavar="FILE",
-            show_default=False,
-        ),
-    ],
-    walk: Annotated[bool, typer.Option("--walk", help="The camera moves, the light stays.")] = False,
-    light: Annotated[bool, typer.Option("--light", help="The light moves, the camera stays.")] = False,
-    diagonal: Annotated[bool, typer.Option("--diagonal", help="Both move.")] = False,
-    at: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--at",
-            help="Where the other stays: an index, first, last or 50%; AXIS=PLACE for one light axis. Default: first.",
-            metavar="PLACE",
-        ),
-    ] = None,
-    seconds: Annotated[
-        float | None,
-        typer.Option(
-            "--seconds",
-            min=0.001,
-            max=MOST_SECONDS,
-            help="Length of a movement; default: a frame an image.",
-            metavar="S",
-        ),
-    ] = None,
-    fps: Annotated[
-        float | None, typer.Option("--fps", min=LEAST_FPS, max=MOST_FPS, help="Frames a second.", metavar="RATE")
-    ] = None,
-    blend: Annotated[bool, typer.Option("--blend", help="Blend between light positions.")] = False,
-    exposure: Annotated[
-        float,
-        typer.Option(
-            "--exposure", min=-MOST_STOPS, max=MOST_STOPS, help="Stops added to movies, PNG and JPEG.", metavar="STOPS"
-        ),
-    ] = 0.0,
-    view: Annotated[
-        str, typer.Option("--view", help="srgb, aces, or a view of the configuration in $OCIO.", metavar="VIEW")
-    ] = "srgb",
-    label: Annotated[bool, typer.Option("--label", help="Write camera and light index into each picture.")] = False,
+    target: Target,
+    walk: Walk = False,
+    light: Light = False,
+    diagonal: Diagonal = False,
+    at: Stay = None,
+    seconds: Seconds = None,
+    fps: FrameRate = None,
+    blend: Blend = False,
+    exposure: Stops = 0.0,
+    view: View = "srgb",
+    label: Label = False,
     quiet: Quiet = False,
 ) -> None:
     """Cut a movie or an image sequence out of a frame array."""
@@ -74,35 +86,31 @@ def assemble(
 
     choices: dict[SweepKind, bool] = {"walk": walk, "light": light, "diagonal": diagonal}
     kinds = [kind for kind, wanted in choices.items() if wanted]
-    _check(path_file, kinds, at, seconds)
+    _refuse_conflicts(path_file, kinds, at, seconds)
     with Screen(out, quiet=quiet) as screen:
-
-        def progress(done: int, total: int) -> None:
-            if not screen.total:
-                screen.count("assembling", total, "frame")
-            screen.advance()
-
         result = run(
             array,
             path_file or Sweep(kind=kinds[0], at=tuple(at or ()), seconds=seconds),
-            place(target),
+            output_path(target),
             look=Look(exposure=exposure, view=find_view(view), label=label),
             fps=fps,
             positions="blend" if blend else None,
-            progress=progress,
+            progress=screen.counter("assembling", "frame"),
         )
     if not quiet:
-        rate = f"{float(result.fps):g} frames a second"
+        rate = f"{float(result.fps):g} frames per second"
         say(out, [f"{result.target}: {result.n_frames} frames from {result.n_images} images, {rate}"])
 
 
-def _check(path_file: Path | None, kinds: Sequence[str], at: Sequence[str] | None, seconds: float | None) -> None:
+def _refuse_conflicts(
+    path_file: Path | None, kinds: Sequence[str], at: Sequence[str] | None, seconds: float | None
+) -> None:
     """Refuse options that do not go together."""
     ways = ([f"the path file {path_file}"] if path_file else []) + [f"--{kind}" for kind in kinds]
     if len(ways) != 1:
         found = " and ".join(ways) or "none of them"
         raise typer.BadParameter(f"expected a path file, --walk, --light or --diagonal; got {found}", param_hint="PATH")
     if path_file and seconds is not None:
-        raise typer.BadParameter("a path file says itself how long its segments are", param_hint="--seconds")
+        raise typer.BadParameter("a path file gives the lengths of its segments", param_hint="--seconds")
     if at and kinds in ([], ["diagonal"]):
-        raise typer.BadParameter("goes with --walk and --light, where something stays", param_hint="--at")
+        raise typer.BadParameter("needs --walk or --light, where the other stays", param_hint="--at")

@@ -1,16 +1,15 @@
 """`framearray export`."""
 
-from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from ..options import Exposure, Quiet, place
+from ..options import ArrayFolder, Exposure, Quiet, output_path
 from ..screen import Screen, out, say
 
 
 def export(
-    array: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `render` wrote.", show_default=False)],
+    array: ArrayFolder,
     kind: Annotated[
         Literal["nerfstudio", "colmap", "cinema"],
         typer.Option("--format", "-f", help="What the folder is for.", show_default=False),
@@ -40,23 +39,17 @@ def export(
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier export.")] = False,
     quiet: Quiet = False,
 ) -> None:  # fmt: skip
-    """Hand a frame array to other tools: images with cameras, lights, depth and points."""
+    """Export a frame array for other tools: images with cameras, lights, depth and points."""
     from framearray_cli.array.images.images import FOR_SCREENS, ImageFormat
     from framearray_cli.tools.export import export_array as run
 
     if exposure and image_format not in FOR_SCREENS:
         raise typer.BadParameter("changes only PNG and JPEG", param_hint="--exposure")
     with Screen(out, quiet=quiet) as screen:
-
-        def progress(done: int, total: int) -> None:
-            if not screen.total:
-                screen.count("exporting", total, "image")
-            screen.advance()
-
         made = run(
-            array, place(target), kind, cameras=cameras, light=light, at=at or (),
+            array, output_path(target), kind, cameras=cameras, light=light, at=at or (),
             image_format=ImageFormat(format=image_format, exposure=exposure), points=points, copy=copy,
-            force=force, progress=progress,
+            force=force, progress=screen.counter("exporting", "image"),
         )  # fmt: skip
     if not quiet:
         lights = f"{made.n_lights} light position{'s' if made.n_lights > 1 else ''}"

@@ -8,7 +8,7 @@ import typer
 
 from framearray_cli.engine.kernels.clock import compile_clock
 
-from ..options import Quiet, place
+from ..options import Quiet, output_path
 from ..screen import Screen, out, say
 
 MOST = 1000  # frames or lights of a first job
@@ -33,15 +33,15 @@ def init(
     ] = None,
     inside: Annotated[
         bool | None,
-        typer.Option("--inside/--outside", help="Take the scene for a room, or for a thing to look at."),
+        typer.Option("--inside/--outside", help="Treat the scene as a room, or as an object to look at."),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a job file that is there.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing job file.")] = False,
     quiet: Quiet = False,
 ) -> None:
     """Write a first job for a scene: camera, lights and exposure are found or chosen."""
-    job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else place(target)
+    job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else output_path(target)
     with Screen(out, quiet=quiet) as screen:
-        screen.wait("looking around in the scene")
+        screen.wait("exploring the scene")
         from framearray_cli.starter import Wishes
         from framearray_cli.starter import init as run
 

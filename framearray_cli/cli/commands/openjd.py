@@ -9,7 +9,7 @@ import typer
 from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.render.messages import chunks_line
 
-from ..options import JobFile, Quiet, place, read
+from ..options import JobFile, Quiet, load_job, output_path
 from ..screen import Screen, out, say
 
 
@@ -21,20 +21,20 @@ def openjd(
     ] = None,
     chunk: Annotated[
         int | None,
-        typer.Option("--chunk", min=1, help="Frames of a chunk; default: 8 N_r, at least 16.", metavar="N"),
+        typer.Option("--chunk", min=1, help="Frames per chunk, at most; default: 8 N_r, at least 16.", metavar="N"),
     ] = None,
     threads: Annotated[
         int | None,
         typer.Option(
-            "--threads", min=1, max=MOST_THREADS, help="Threads of a chunk; default: the machine's cores.", metavar="N"
+            "--threads", min=1, max=MOST_THREADS, help="Threads per chunk; default: the machine's cores.", metavar="N"
         ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a template that is there.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing template.")] = False,
     quiet: Quiet = False,
 ) -> None:
     """Write an Open Job Description template that renders a job in chunks on a farm."""
-    job = read(job_file, threads, None)
-    file = Path(f"{job_file.stem}.openjd.json") if target is None else place(target)
+    job = load_job(job_file, threads, None)
+    file = Path(f"{job_file.stem}.openjd.json") if target is None else output_path(target)
     frames = job.camera.frames
     if chunk is not None and chunk > frames:
         raise typer.BadParameter(

@@ -23,7 +23,7 @@ from framearray_cli.render.messages import (
 from framearray_cli.render.parts.progress import PartEvents
 from framearray_cli.render.progress import ambient_figures
 
-from ..options import JobFile, Output, Quiet, Threads, frames_of, read
+from ..options import JobFile, Output, Quiet, Threads, load_job, parse_cameras
 from ..screen import Screen, out, say
 
 if TYPE_CHECKING:
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from framearray_cli.render.progress import AmbientFigures
     from framearray_cli.render.target.pilot import Target
 
-LITTLE_SPACE = 64 * 1024 * 1024  # bytes; with less, a full disk is the likely reason of an error
-FEW_FILES = 100  # fewer than a run has open, and leaves when it fails
+LITTLE_SPACE = 64 * 1024 * 1024  # bytes; with less, a full disk is the likely cause of an error
+FEW_FILES = 100  # fewer than a run has open, and leaves free when it fails
 
 
 def render(
@@ -61,33 +61,33 @@ def render(
     ] = None,
     chunk: Annotated[
         int | None,
-        typer.Option("--chunk", min=1, help="Frames of a part, with --workers or --dask.", metavar="N"),
+        typer.Option("--chunk", min=1, help="Frames per part, at most; with --workers or --dask.", metavar="N"),
     ] = None,
     restart: Annotated[bool, typer.Option("--restart", help="Remove the frame array in the folder first.")] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Render every (camera, light) image of a job into a folder, with a manifest, or what is missing of them there."""
-    job = read(job_file, threads, output)
-    chosen = None if cameras is None else frames_of(cameras, job.camera.frames)
-    render_shown(job, quiet=quiet, restart=restart, cameras=chosen, options=_worker_options(workers, dask, chunk))
+    """Render every image of a job into a folder, with a manifest; skip those that are there."""
+    job = load_job(job_file, threads, output)
+    chosen = None if cameras is None else parse_cameras(cameras, job.camera.frames)
+    render_on_screen(job, quiet=quiet, restart=restart, cameras=chosen, options=_worker_options(workers, dask, chunk))
 
 
 def _worker_options(workers: int | None, dask: str | None, chunk: int | None) -> "WorkerOptions | None":
-    """Which workers render; None: this process does."""
+    """Return the options of the workers that render; None: this process renders."""
     if workers and dask is not None:
         raise typer.BadParameter("expected either --workers or --dask", param_hint="--workers")
     if not workers and dask is None:
         if chunk:
-            raise typer.BadParameter("goes with --workers and --dask", param_hint="--chunk")
+            raise typer.BadParameter("needs --workers or --dask", param_hint="--chunk")
         return None
-    if dask is not None and not dask.strip():  # most often a shell variable that is not set
+    if dask is not None and not dask.strip():  # usually an unset shell variable
         raise typer.BadParameter("expected an address, got none", param_hint="--dask")
     from framearray_cli.render.parts.run import WorkerOptions
 
     return WorkerOptions(workers=workers or 1, address=dask, chunk=chunk)
 
 
-def render_shown(
+def render_on_screen(
     job: "Job",
     *,
     quiet: bool,
@@ -95,20 +95,20 @@ def render_shown(
     cameras: Sequence[int] | None = None,
     options: "WorkerOptions | None" = None,
 ) -> None:
-    """Render, and show on the screen what goes on."""
+    """Render, and show the progress on the screen."""
     with Screen(out, quiet=quiet) as screen:
         screen.wait("reading the scene")
         from framearray_cli.render.render import render as run
 
-        shown = Shown(screen, job)
+        events = RenderingEvents(screen, job)
         try:
             with compile_clock(screen.compiling):
                 if options is None:
-                    summary = run(job, shown, restart=restart, cameras=cameras)
+                    summary = run(job, events, restart=restart, cameras=cameras)
                 else:
                     from framearray_cli.render.parts.run import render_in_parts
 
-                    summary = render_in_parts(job, shown, options, restart=restart, cameras=cameras)
+                    summary = render_in_parts(job, events, options, restart=restart, cameras=cameras)
         except BaseException as error:
             if isinstance(error, OutputError):
                 _add_space(error, job.output.directory)
@@ -117,24 +117,24 @@ def render_shown(
                 error.add_note(f"{done}; the same command goes on with the rest")
             raise
     if not quiet:
-        say(out, summary_lines(summary, shown.told, job))
+        say(out, summary_lines(summary, events.printed, job))
 
 
-class Shown(PartEvents):
-    """Prints the scene, then the ambient light, then a progress bar.
+class RenderingEvents(PartEvents):
+    """Print the scene, then the ambient light, then a progress bar.
 
     Attributes:
-        told: notes that were printed.
+        printed: notes that were printed.
     """
 
     def __init__(self, screen: Screen, job: "Job") -> None:
         self._screen, self._job = screen, job
         self._total = 0
-        self.told: tuple[str, ...] = ()
+        self.printed: tuple[str, ...] = ()
 
     def prepared(self, prepared: "Prepared") -> None:
         self._screen.say(scene_lines(prepared))
-        self._screen.wait("looking at the output folder")
+        self._screen.wait("reading the output folder")
 
     def removed(self, files: int) -> None:
         if files:
@@ -144,7 +144,7 @@ class Shown(PartEvents):
         self._screen.say(settings_lines(settings))
 
     def scanning(self, files: int) -> None:
-        self._screen.wait(f"looking whether {files:,} files are whole")
+        self._screen.wait(f"comparing {files:,} files with their checksums")
 
     def scanned(self, on_disk: "OnDisk", wanted: int) -> None:
         self._total = wanted
@@ -153,7 +153,7 @@ class Shown(PartEvents):
 
     def planned(self, ambient: "Ambient") -> None:
         self._screen.say(ambient_lines(ambient_figures(ambient)))
-        self.told = ambient.notes
+        self.printed = ambient.notes
         self._screen.count("rendering", self._total, "image")
 
     def allotted(self, target: "Target") -> None:
@@ -183,7 +183,7 @@ class Shown(PartEvents):
 
 
 def _add_space(error: OutputError, folder: Path) -> None:
-    """Say it where little space is left on the disk that could not be written to."""
+    """Add to an error how little space is left on the disk that could not be written to."""
     from framearray_cli.array.folder import free_files, free_space
 
     with suppress(OSError):  # that disk may have gone

@@ -8,7 +8,7 @@ import typer
 from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.render.messages import scene_lines
 
-from ..options import JobFile, Quiet, Threads, read
+from ..options import JobFile, Quiet, Threads, load_job
 from ..screen import Screen, out, say
 
 if TYPE_CHECKING:
@@ -16,44 +16,52 @@ if TYPE_CHECKING:
     from framearray_cli.report.run import Report
 
 
+Folder = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", help="Folder of the report; default: beside the images.", metavar="FOLDER"),
+]
+Cameras = Annotated[
+    list[int] | None, typer.Option("--camera", help="A camera to look at; may be repeated.", metavar="C")
+]
+Lights = Annotated[
+    list[int] | None, typer.Option("--light", help="A light position to look at; may be repeated.", metavar="L")
+]
+Vary = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--vary", help="Values of a setting to try: samples.hits=1,2,4; may be repeated.", metavar="KEY=VALUES"
+    ),
+]
+Errors = Annotated[
+    list[float] | None,
+    typer.Option(
+        "--error", min=1e-6, help="RMSE to find the cheapest settings for: 0.05; may be repeated.", metavar="E"
+    ),
+]
+Times = Annotated[
+    float, typer.Option("--times", min=1, help="Samples of a reference over those of a picture.", metavar="N")
+]
+
+
 def report(
     job_file: JobFile,
-    folder: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", help="Folder of the report; default: beside the images.", metavar="FOLDER"),
-    ] = None,
-    camera: Annotated[
-        list[int] | None, typer.Option("--camera", help="A camera to look at; may be repeated.", metavar="C")
-    ] = None,
-    light: Annotated[
-        list[int] | None, typer.Option("--light", help="A light position to look at; may be repeated.", metavar="L")
-    ] = None,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--vary", help="Values of a setting to try: samples.hits=1,2,4; may be repeated.", metavar="KEY=VALUES"
-        ),
-    ] = None,
-    error: Annotated[
-        list[float] | None,
-        typer.Option(
-            "--error", min=1e-6, help="RMSE to find the cheapest settings for: 0.05; may be repeated.", metavar="E"
-        ),
-    ] = None,
-    times: Annotated[
-        float, typer.Option("--times", min=1, help="Samples of a reference over those of a picture.", metavar="N")
-    ] = 100.0,
+    folder: Folder = None,
+    camera: Cameras = None,
+    light: Lights = None,
+    vary: Vary = None,
+    error: Errors = None,
+    times: Times = 100.0,
     threads: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Measure what each setting of a job buys and costs: speed against error, as a page with tables and plots."""
-    job = read(job_file, threads, None)
+    """Measure the effect of each setting of a job on speed and error, as a page with tables and plots."""
+    job = load_job(job_file, threads, None)
     with Screen(out, quiet=quiet) as screen:
         screen.wait("reading the scene")
         from framearray_cli import report as reporting
 
-        class Shown(reporting.ReportEvents):
-            """Prints the scene, then a progress bar."""
+        class MeasuringEvents(reporting.ReportEvents):
+            """Print the scene, then a progress bar."""
 
             def opened(self, case: "Case") -> None:
                 screen.say(scene_lines(case.prepared))
@@ -71,21 +79,21 @@ def report(
             errors=error or (),
             times=times,
         )
-        place = folder.absolute() if folder else job.output.directory.with_name(f"{job.output.directory.name}-report")
+        beside = job.output.directory.with_name(f"{job.output.directory.name}-report")
         with compile_clock(screen.compiling):
-            made = reporting.make_report(job, place, options, Shown())
+            made = reporting.make_report(job, folder.absolute() if folder else beside, options, MeasuringEvents())
         reporting.write_report(made)
     if not quiet:
         say(out, report_lines(made))
 
 
 def report_lines(made: "Report") -> list[str]:
-    """What a report found: the job's own settings, and the cheapest ones for some errors."""
+    """Sum up a report: the job's own settings, and the cheapest ones for some errors."""
     from framearray_cli.report import advice_lines
 
     own = made.measured[0]
-    lines = [f"as the job says: {own.ms:.3g} ms an image before writing, RMSE {own.quality.rmse:.1%}"]
+    lines = [f"as the job says: {own.ms:.3g} ms per image before writing, RMSE {own.quality.rmse:.1%}"]
     for one in made.advice:
-        found = f"{one.best.named.name}, {one.best.ms:.3g} ms an image" if one.best else "nothing that was tried"
+        found = f"{one.best.named.name}, {one.best.ms:.3g} ms per image" if one.best else "nothing that was tried"
         lines += [f"for an RMSE of {one.error:.1%}: {found}", *(f"  {line}" for line in advice_lines(one.best, made))]
     return [*lines, f"report: {made.folder / 'index.html'}"]

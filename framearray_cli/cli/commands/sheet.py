@@ -1,18 +1,17 @@
 """`framearray sheet`."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ..options import At, Exposure, Quiet, place
+from ..options import ArrayFolder, At, Exposure, Quiet, output_path
 from ..screen import Screen, out, say
 
-MOST_WIDTH = 20_000  # pixels; more is a typing error
+MOST_WIDTH = 20_000  # pixels; more is taken for a typing error
 
 
 def sheet(
-    array: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `render` wrote.", show_default=False)],
+    array: ArrayFolder,
     target: Annotated[
         str,
         typer.Option(
@@ -36,15 +35,9 @@ def sheet(
     from framearray_cli.tools.sheet import make_sheet
 
     with Screen(out, quiet=quiet) as screen:
-
-        def progress(done: int, total: int) -> None:
-            if not screen.total:
-                screen.count("drawing", total, "image")
-            screen.advance()
-
         made = make_sheet(
-            array, place(target), columns=columns, rows=rows, width=width, exposure=exposure, side=side,
-            at=at or (), progress=progress,
+            array, output_path(target), columns=columns, rows=rows, width=width, exposure=exposure, side=side,
+            at=at or (), progress=screen.counter("drawing", "image"),
         )  # fmt: skip
     if not quiet:
         shown = f"{len(made.cameras)} cameras, {len(made.lights)} light positions"

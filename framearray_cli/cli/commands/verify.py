@@ -1,6 +1,5 @@
 """`framearray verify`."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -8,7 +7,7 @@ import typer
 from framearray_cli.base.errors import CheckError
 from framearray_cli.base.memory import RENDER_NEEDS, available_cores, require_address_space
 
-from ..options import Quiet, Threads, with_threads
+from ..options import ArrayFolder, Quiet, Threads, with_threads
 from ..screen import Screen, out, say
 
 if TYPE_CHECKING:
@@ -16,24 +15,18 @@ if TYPE_CHECKING:
 
 
 def verify(
-    array: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `render` wrote.", show_default=False)],
+    array: ArrayFolder,
     repair: Annotated[
         bool, typer.Option("--repair", help="Render what is missing or damaged again, from the job in the manifest.")
     ] = False,
     threads: Threads = None,
     quiet: Quiet = False,
 ) -> None:
-    """Look whether every image of a frame array is there, whole and unchanged."""
+    """Check that every image of a frame array is there, whole and unchanged."""
     from framearray_cli.array.integrity import verify as run
 
     with Screen(out, quiet=quiet) as screen:
-
-        def progress(done: int, total: int) -> None:
-            if not screen.total:
-                screen.count("verifying", total, "file")
-            screen.advance()
-
-        found = run(array, threads or available_cores(), progress)
+        found = run(array, threads or available_cores(), screen.counter("verifying", "file"))
     lines = verified_lines(found)
     if not found.wrong or not repair:
         if found.wrong:
@@ -44,19 +37,19 @@ def verify(
     from framearray_cli.array.manifest import FILE_NAME
     from framearray_cli.job.read import job_of_table
 
-    from .render import render_shown
+    from .render import render_on_screen
 
     require_address_space(RENDER_NEEDS)
     if not quiet:
         say(out, lines)
     folder = found.manifest.directory
-    render_shown(
+    render_on_screen(
         with_threads(job_of_table(found.manifest.job, folder / FILE_NAME, folder.absolute()), threads), quiet=quiet
     )
 
 
 def verified_lines(found: "Verification") -> list[str]:
-    """What is wrong with the files of an array, each by name."""
+    """List the files of an array that are missing or damaged, by name, and sum up."""
     folder, n = found.manifest.directory, len(found.wrong)
     lines = [f"{folder / name}: {problem}" for name, problem in found.wrong]
     if found.unknown:

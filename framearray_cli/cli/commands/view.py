@@ -1,6 +1,5 @@
 """`framearray view`."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -9,22 +8,22 @@ from framearray_cli.base.memory import available_cores
 from framearray_cli.base.signals import Stopped, cancel_alarm
 from framearray_cli.base.units import MOST_THREADS, size
 
-from ..options import Quiet, place
+from ..options import ArrayFolder, Quiet, output_path
 from ..screen import Screen, out, say
 
 if TYPE_CHECKING:
     from framearray_cli.base.errors import OutputError
 
-MOST_PROBLEMS = 5  # told in full
+MOST_PROBLEMS = 5  # named one by one
 
 
 def view(
-    array: Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `render` wrote.", show_default=False)],
+    array: ArrayFolder,
     target: Annotated[
         str | None,
         typer.Option("--export", help="Write the page as files for any web server.", metavar="FOLDER"),
     ] = None,
-    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port; 0: one that is free.")] = 0,
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port; 0: a free one.")] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
     cache: Annotated[
         str | None,
@@ -32,7 +31,7 @@ def view(
     ] = None,
     threads: Annotated[
         int | None,
-        typer.Option("--threads", min=1, max=MOST_THREADS, help="Threads; default: one for each core.", metavar="N"),
+        typer.Option("--threads", min=1, max=MOST_THREADS, help="Threads; default: one per core.", metavar="N"),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
@@ -40,12 +39,14 @@ def view(
     from framearray_cli.tools.view.run import open_tiles, show_page, write_page
 
     workers = threads or available_cores()
-    tiles = open_tiles(array, place(cache, "--cache") if cache is not None else None, workers)
+    tiles = open_tiles(array, output_path(cache, "--cache") if cache is not None else None, workers)
     with Screen(out, quiet=quiet) as screen:
         if target is not None:
             screen.count("preparing", tiles.n_pictures, "picture")
-            n_bytes, problems = write_page(tiles, place(target, "--export"), threads=workers, progress=screen.advance)
-            screen.say([*_problem_lines(problems), f"{target}: the page, {size(n_bytes)}; any web server can show it"])
+            n_bytes, problems = write_page(
+                tiles, output_path(target, "--export"), threads=workers, progress=screen.advance
+            )
+            screen.say([*_warning_lines(problems), f"{target}: the page, {size(n_bytes)}; any web server can show it"])
             return
 
         def opened(url: str) -> None:
@@ -54,7 +55,7 @@ def view(
 
         def prepared(problems: list["OutputError"]) -> None:
             screen.end()
-            screen.say([*_problem_lines(problems), f"all pictures are prepared, in {tiles.folder}"])
+            screen.say([*_warning_lines(problems), f"all pictures are prepared, in {tiles.folder}"])
 
         try:
             show_page(
@@ -66,11 +67,11 @@ def view(
                 progress=screen.advance,
                 prepared=prepared,
             )
-        except Stopped:  # the way to end it
+        except Stopped:  # how a user ends it
             cancel_alarm()
 
 
-def _problem_lines(problems: list["OutputError"]) -> list[str]:
+def _warning_lines(problems: list["OutputError"]) -> list[str]:
     rest = len(problems) - MOST_PROBLEMS
     more = [f"warning: {rest} more images are missing or damaged"] if rest > 0 else []
     return [*(f"warning: {problem}" for problem in problems[:MOST_PROBLEMS]), *more]
