@@ -1,6 +1,6 @@
 """Quality and cost of settings.
 
-What each setting of a job buys and costs, as tables, plots and a page: `framearray report`.
+The effect of each setting of a job on speed and error, as tables, plots and a page: `framearray report`.
 """
 
 from .page import advice_lines, write_report

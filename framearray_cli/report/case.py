@@ -1,4 +1,4 @@
-"""A job that is opened for measuring, and the same job with other settings, or under some of its light positions."""
+"""A job that is open for measuring, also with other settings, or with some of its light positions."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -23,10 +23,10 @@ from .settings import Settings
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Case:
-    """A job, opened and planned.
+    """A job that is open for measuring, and the setup of its frames.
 
     Attributes:
-        settings: what its setup was planned with.
+        settings: those that `setup` was planned with.
     """
 
     prepared: Prepared
@@ -37,41 +37,41 @@ class Case:
 
     @property
     def threads(self) -> int:
-        """Threads of the job."""
+        """Number of threads of the job."""
         return self.prepared.threads
 
 
 @contextmanager
-def opened(job: Job) -> Iterator[Case]:
+def open_case(job: Job) -> Iterator[Case]:
     """Open a job for measuring.
 
     Raises:
-        JobError, SceneError: as a render would; or the job's light is stored by group.
+        JobError, SceneError: a render would raise it, or the job stores light by group.
     """
     if job.light.groups:
-        problem = "light.sources: expected sources without group and axis, as a report measures pictures of all light"
+        problem = "light.sources: expected sources without group and axis, as a report measures images of all light"
         raise JobError(job.file or job.name, [problem])
-    with planned(prepare(job)) as case:
+    with plan_case(prepare(job)) as case:
         yield case
 
 
 @contextmanager
-def planned(prepared: Prepared) -> Iterator[Case]:
-    """Plan a job that is prepared, for measuring."""
+def plan_case(prepared: Prepared) -> Iterator[Case]:
+    """Plan the frames of a job that is prepared."""
     with open_embree(prepared) as embree:
         prepared, _ = resolve_auto(prepared, embree)
         setup, ambient = plan_work(prepared, embree)
         yield Case(prepared=prepared, embree=embree, setup=setup, ambient=ambient, settings=Settings.of(prepared.job))
 
 
-def varied(case: Case, settings: Settings) -> Case:
-    """The same job with other settings; every frame counts as an interior one of its path.
+def with_settings(case: Case, settings: Settings) -> Case:
+    """Return the job with other settings, as if every frame were an interior one of its path.
 
-    Frames at the ends of a path have more native hits than others; here none has. The ambient light is the same, and
-    pixels that see a mirror rest on their share more or fewer hits, too.
+    Frames at the ends of a path have more native hits than others; here none has. Keep the ambient light. Scale the
+    hits of pixels that see a mirror by the same share.
     """
-    job = settings.applied(case.prepared.job)
-    share = settings.rests_on / case.settings.rests_on
+    job = settings.apply_to(case.prepared.job)
+    share = settings.window_hits / case.settings.window_hits
     job = changed(
         job,
         specular=changed(job.specular, hits=min(math.ceil(share * job.specular.hits), MOST_HITS)),
@@ -91,8 +91,8 @@ def varied(case: Case, settings: Settings) -> Case:
     return replace(case, prepared=prepared, setup=setup, settings=settings)
 
 
-def under(case: Case, l: Sequence[int]) -> Case:
-    """The same job with light positions l alone."""
+def with_lights(case: Case, l: Sequence[int]) -> Case:
+    """Return the job with only light positions l."""
     lights = some_lights(case.setup.lights, l)
     ambient = replace(
         case.ambient,

@@ -1,4 +1,4 @@
-"""The door to HDR-FLIP: how visible a difference is at all exposures that a picture may be shown at [Andersson21]."""
+"""The door to HDR-FLIP: how visible a difference is, at all exposures that may show the image [Andersson21]."""
 
 from typing import Any
 
@@ -7,15 +7,15 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Image
 from framearray_cli.base.extras import not_installed
 
-# What the extra `report` brings.
+# The libraries of the extra `report`.
 EXTRA = ("matplotlib", "flip_evaluator", "jinja2")
 
 
 def require_extra() -> None:
-    """Make sure that everything a report needs is there, before any work is done.
+    """Check that the libraries that a report needs are installed, before any work is done.
 
     Raises:
-        MissingExtraError: it is not.
+        MissingExtraError: one is missing.
     """
     from importlib.util import find_spec
 
@@ -25,7 +25,7 @@ def require_extra() -> None:
 
 
 def flip_map(image: Image, reference: Image) -> Float32:
-    """HDR-FLIP of every pixel, (h, w), 0 to 1; 67 pixels a degree, as on a desktop screen.
+    """Compute HDR-FLIP of every pixel, (h, w), 0 to 1, at 67 pixels per degree, as on a desktop screen.
 
     Args:
         image, reference: (h, w, 3) linear radiance; below 0 counts as 0.

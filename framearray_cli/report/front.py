@@ -1,4 +1,4 @@
-"""Which settings are worth their time, and what they gain over rendering every image from scratch."""
+"""The best front of error and time, the cheapest settings for an error, and the gain over images from scratch."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 from .measure import Measured
 from .settings import SCRATCH
 
-# Settings are as good as asked for when their error is at most this many times as large: errors are measured, too.
+# Settings reach an error if theirs is at most this many times as large: measured errors are noisy.
 SLACK = 1.02
 
 
@@ -17,16 +17,16 @@ class Advice:
     """The cheapest settings for an error.
 
     Attributes:
-        error: that was asked for, as RMSE.
-        best: None where no settings that were tried reach it.
+        error: the RMSE that the user asks for.
+        best: None if no tested settings reach it.
     """
 
     error: float
     best: Measured | None
 
 
-def worth_trying(measured: Sequence[Measured]) -> list[Measured]:
-    """Settings that no others beat in time and RMSE, the quickest first: the best front."""
+def best_front(measured: Sequence[Measured]) -> list[Measured]:
+    """Return the settings that no others beat in both time and RMSE, the quickest first."""
     front: list[Measured] = []
     for one in sorted(measured, key=lambda m: (m.ms, m.quality.rmse)):
         if not front or one.quality.rmse < front[-1].quality.rmse:
@@ -34,8 +34,8 @@ def worth_trying(measured: Sequence[Measured]) -> list[Measured]:
     return front
 
 
-def advice(measured: Sequence[Measured], wanted: Sequence[float]) -> list[Advice]:
-    """The cheapest settings for every error; one image a time is no setting of a job."""
+def advise(measured: Sequence[Measured], wanted: Sequence[float]) -> list[Advice]:
+    """Return the cheapest settings for each error, without those for single lights, which no job can have."""
     usable = [m for m in measured if not m.named.settings.one_light]
     found = []
     for error in wanted:
@@ -45,10 +45,10 @@ def advice(measured: Sequence[Measured], wanted: Sequence[float]) -> list[Advice
 
 
 def times_faster(one: Measured, measured: Sequence[Measured]) -> float | None:
-    """How many times as long images from scratch take at the same RMSE; None where they were not measured.
+    """Return the time of images from scratch at the same RMSE over that of some settings; None if not measured.
 
-    Time over error is a line between the two nearest counts of hits, both axes logarithmic; beyond the last one it goes
-    on as noise does: four times the time for half the error.
+    Interpolate time over error between the two nearest numbers of hits, on logarithmic axes. Extrapolate as noise
+    behaves: four times the time for half the error.
     """
     scratch = sorted((m.quality.rmse, m.ms) for m in measured if m.named.family == SCRATCH)
     if not scratch:

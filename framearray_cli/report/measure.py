@@ -1,4 +1,4 @@
-"""Making the pictures of some settings, and timing them."""
+"""Render frames with some settings, time them, and compare them with references."""
 
 import statistics
 import time
@@ -15,23 +15,23 @@ from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 
-from .case import Case, under, varied
-from .quality import Quality, mean_quality, quality
+from .case import Case, with_lights, with_settings
+from .quality import Quality, compare_frames, mean_quality
 from .reference import Reference
-from .settings import Named, Settings
+from .settings import NamedSettings, Settings
 
-# Seeds of the two runs that are compared with the two halves of a reference.
+# Seeds of the two runs to compare with the two halves of a reference.
 SEEDS = (101, 202)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Run:
-    """Frames in a row, made with some settings.
+class TimedFrames:
+    """Consecutive frames, rendered with some settings.
 
     Attributes:
         images: (n_frames, n_lights, h, w, 3) radiance.
-        seconds: wall time of an interior frame, finding and composing, without writing.
-        hits: (n_frames, n_pixels) hits that each pixel rests on.
+        seconds: wall time per interior frame, to trace and to compose, without writing.
+        hits: (n_frames, n_pixels) number of hits of each pixel.
     """
 
     images: Float32
@@ -44,13 +44,13 @@ class Measured:
     """Cost and error of some settings.
 
     Attributes:
-        ms: wall time an image, before writing.
-        quality: means over all probe images.
-        hits: accepted hits a pixel: mean and 1st percentile.
+        ms: wall time per image, before writing.
+        quality: mean over all probe images.
+        hits: accepted hits per pixel: mean and 1st percentile.
         example: (h, w, 3) the first probe image, of the first run.
     """
 
-    named: Named
+    named: NamedSettings
     ms: float
     quality: Quality
     hits: tuple[float, float]
@@ -58,39 +58,41 @@ class Measured:
 
 
 class TimedWindow(Window):
-    """A window that takes the time until each frame is found.
+    """A window that measures how long tracing each frame takes.
 
     Attributes:
-        started: when the search for the next frame began; whoever composes between two frames sets it anew.
-        finding: seconds of each frame.
+        started: start time of the next frame; reset it after composing between two frames.
+        tracing: seconds of each frame.
     """
 
     def __init__(self, setup: FrameSetup, ambient: Ambient, pool: TracePool) -> None:
         super().__init__(setup, ambient, pool)
-        self.started, self.finding = time.perf_counter(), list[float]()
+        self.started, self.tracing = time.perf_counter(), list[float]()
 
     def add(self, frame: FrameHits) -> None:
-        """Take in the hits of the next frame, and note what it took to find them."""
-        self.finding.append(time.perf_counter() - self.started)
+        """Add the hits of the next frame, and note the time since the last one."""
+        self.tracing.append(time.perf_counter() - self.started)
         super().add(frame)
         self.started = time.perf_counter()
 
     def fill_holes(self, j: int) -> None:
-        """Fill the holes of frame j, as a part of finding the hits that complete it."""
+        """Fill the holes of frame j, and add the time to the frame that completes its window."""
         super().fill_holes(j)
-        self.finding[-1] += time.perf_counter() - self.started
+        self.tracing[-1] += time.perf_counter() - self.started
         self.started = time.perf_counter()
 
 
-def run(case: Case, settings: Settings, cameras: Sequence[int], lights: Sequence[int], seed: int) -> Run:
-    """Make frames in a row with some settings, as a render does, window and all.
+def render_frames(
+    case: Case, settings: Settings, cameras: Sequence[int], lights: Sequence[int], seed: int
+) -> TimedFrames:
+    """Render consecutive frames with some settings and a window, as a render does.
 
     Args:
-        cameras: frames in a row.
-        lights: light positions whose images are handed back.
+        cameras: indices of the frames.
+        lights: light positions of the returned images.
     """
-    changed = varied(case, settings)
-    changed = under(changed, lights) if settings.one_light else changed
+    changed = with_settings(case, settings)
+    changed = with_lights(changed, lights) if settings.one_light else changed
     setup = replace(changed.setup, seed=seed)
     shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
     block = np.empty(shape, np.float16)
@@ -101,30 +103,30 @@ def run(case: Case, settings: Settings, cameras: Sequence[int], lights: Sequence
         window = TimedWindow(setup, changed.ambient, pool)
         for j in ready_frames(window, setup, range(cameras[0], cameras[-1] + 1), pool):
             started = time.perf_counter()
-            window.compose(j, block)  # as a render composes it; what is compared is not rounded to halves
+            window.compose(j, block)  # timed as a render composes; the images to compare are not rounded to halves
             composing.append(time.perf_counter() - started)
             hits.append(window.compose(j, exact).hits)
             images.append(exact[list(kept)])
             window.started = time.perf_counter()
-    return Run(
+    return TimedFrames(
         images=np.stack(images),
-        seconds=statistics.median(window.finding) + statistics.median(composing),
+        seconds=statistics.median(window.tracing) + statistics.median(composing),
         hits=np.stack(hits),
     )
 
 
 def measure(
-    case: Case, named: Named, cameras: Sequence[Sequence[int]], lights: Sequence[int],
+    case: Case, named: NamedSettings, cameras: Sequence[Sequence[int]], lights: Sequence[int],
     pairs: Sequence[tuple[int, int]], references: dict[int, Reference],
 ) -> Measured:  # fmt: skip
-    """Make the probe images of some settings twice, and compare them with the references."""
+    """Render the probe images of some settings twice, and compare them with the references."""
     found, seconds, hits, example = [], [], [], None
     for frames in cameras:
-        runs = [run(case, named.settings, frames, lights, seed) for seed in SEEDS]
+        runs = [render_frames(case, named.settings, frames, lights, seed) for seed in SEEDS]
         seconds += [r.seconds for r in runs]
         hits.append(runs[0].hits)
         pictures = (runs[0].images, runs[1].images)
-        found += quality(pictures, [references[c] for c in frames], case.ambient, lights, pairs)
+        found += compare_frames(pictures, [references[c] for c in frames], case.ambient, lights, pairs)
         example = runs[0].images[0, 0] if example is None else example
     assert example is not None
     all_hits = np.concatenate([h.ravel() for h in hits])
@@ -137,9 +139,9 @@ def measure(
     )
 
 
-def measure_alone(
-    case: Case, named: Named, cameras: Sequence[Sequence[int]], lights: Sequence[int], twin: Measured
+def measure_single_lights(
+    case: Case, named: NamedSettings, cameras: Sequence[Sequence[int]], lights: Sequence[int], twin: Measured
 ) -> Measured:
-    """Time images that are made for one light position each; their pictures are those of `twin`, which shares hits."""
-    seconds = [run(case, named.settings, frames[:1], lights[:1], SEEDS[0]).seconds for frames in cameras]
+    """Time images rendered for one light position each; take their errors from `twin`, which has the same pixels."""
+    seconds = [render_frames(case, named.settings, frames[:1], lights[:1], SEEDS[0]).seconds for frames in cameras]
     return replace(twin, named=named, ms=1e3 * statistics.median(seconds))

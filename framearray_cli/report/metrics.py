@@ -1,7 +1,7 @@
 """Distances between an image and its reference, (h, w, 3) linear radiance each.
 
-Every measure that is relative is so to the mean of the reference, a number of the whole image, if it does not say
-otherwise; so they can be compared between options, and between light positions.
+Unless stated otherwise, relative measures are divided by the mean of the whole reference, so that they can be compared
+between options and light positions.
 """
 
 from dataclasses import dataclass
@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64, Image
 
-# relMSE divides by R^2 + EPSILON: below a radiance of 0.1 an error counts as if it were at 0.1.
+# relMSE divides by R^2 + EPSILON, so an error at a radiance far below 0.1 counts as one at 0.1.
 EPSILON = 0.01
 # A shadow edge: irradiance changes by more than this share of its local maximum between neighbours ...
 EDGE_STEP = 0.25
-# ... where normals are closer than this cosine, and depths than this share: no other edge is there.
+# ... while the cosine between normals is above, and the relative step of depth below these: no edge of geometry.
 EDGE_COSINE, EDGE_DEPTH = 0.95, 0.05
-# Pixels whose local maximum is below this share of the image's largest irradiance have no edge worth the name.
+# Ignore edges whose local maximum is below this share of the image's largest irradiance.
 EDGE_LEAST = 0.02
-# Side of the blocks of pixels that a standard error is estimated from: errors of neighbours go together.
+# Side of the blocks of pixels for a standard error: errors of neighbours are correlated.
 BLOCK = 20
 
 
@@ -31,8 +31,8 @@ class Errors:
         rmse: root mean square error over the mean of the reference.
         relmse: mean of (I - R)^2 / (R^2 + EPSILON).
         bias: mean of I - R over the mean of the reference.
-        edge_rmse, edge_max: root mean square and largest error at shadow edges, over the mean of the reference; a
-            pixel's error is the mean over its channels. 0 where there is no shadow edge.
+        edge_rmse, edge_max: root mean square and largest error at shadow edges, over the mean of the reference; the
+            error of a pixel is the mean over its channels. 0 without shadow edges.
     """
 
     rmse: float
@@ -60,28 +60,28 @@ def errors(image: Image, reference: Image, edges: NDArray[np.bool_]) -> Errors:
 
 
 def rmse(image: Image, reference: Image) -> float:
-    """Root mean square error, radiance."""
+    """Return the root mean square error, radiance."""
     return float(np.sqrt(np.mean(np.square(image - reference, dtype=np.float64))))
 
 
 def relmse(image: Image, reference: Image) -> float:
-    """Mean of (I - R)^2 / (R^2 + EPSILON)."""
+    """Return the mean of (I - R)^2 / (R^2 + EPSILON)."""
     squares = np.square(image - reference, dtype=np.float64) / (np.square(reference, dtype=np.float64) + EPSILON)
     return float(squares.mean())
 
 
 def squared_bias(runs: tuple[Image, Image], halves: tuple[Image, Image]) -> tuple[float, float]:
-    """Mean squared difference of what the runs and the halves tend to, and its standard error.
+    """Estimate the mean squared difference between the limits of runs and halves, and its standard error.
 
-    All four images are independent, so the noise of (run 0 - half 0) and of (run 1 - half 1) does not go together, and
-    the mean of their product has none but the square of the bias as its mean. It may come out below zero.
+    All four images are independent, so the noise of (run 0 - half 0) and of (run 1 - half 1) is uncorrelated, and the
+    expected mean of their product is the squared bias. Noise may make it negative.
     """
     product = (runs[0] - halves[0]).astype(np.float64) * (runs[1] - halves[1])
     return block_mean(product.mean(axis=-1))
 
 
 def block_mean(values: Float64) -> tuple[float, float]:
-    """Mean of an (h, w) map and its standard error, from the spread between blocks of pixels."""
+    """Return the mean of an (h, w) map and its standard error, from the spread between blocks of pixels."""
     h, w = (side // BLOCK * BLOCK for side in values.shape)
     blocks = values[:h, :w].reshape(h // BLOCK, BLOCK, w // BLOCK, BLOCK).mean(axis=(1, 3)).ravel()
     if len(blocks) < 2:
@@ -90,11 +90,11 @@ def block_mean(values: Float64) -> tuple[float, float]:
 
 
 def shadow_edges(irradiance: Float32, normal: Float32, depth: Float32) -> NDArray[np.bool_]:
-    """Find the pixels at the edges of shadows: irradiance jumps there, while normal and depth do not.
+    """Find the pixels at edges of shadows, where irradiance jumps, but normal and depth do not.
 
     Args:
-        irradiance: (h, w) of the light alone, any unit.
-        normal: (h, w, 3) and depth: (h, w), 0 where nothing is seen.
+        irradiance: (h, w) from the light sources only, in any unit.
+        normal: (h, w, 3) and depth: (h, w), 0 where no surface is seen.
     Returns:
         (h, w)
     """
@@ -112,7 +112,7 @@ def shadow_edges(irradiance: Float32, normal: Float32, depth: Float32) -> NDArra
 
 
 def _near(values: Float32, extreme: np.ufunc) -> Float32:
-    """The extreme of each pixel and its four neighbours; at the border the other side counts as one."""
+    """Return the extreme of each pixel and its four neighbours; the image wraps around at its border."""
     found = values
     for axis in (0, 1):
         for step in (1, -1):

@@ -1,4 +1,4 @@
-"""Where in the window errors come from: the same frame made of the hits of one eye of its window at a time."""
+"""Error by offset in the window: a frame composed from the hits of one eye of its window at a time."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -9,7 +9,7 @@ import numpy as np
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.loop import window_of
 
-from .case import Case, varied
+from .case import Case, with_settings
 from .measure import SEEDS
 from .metrics import squared_bias
 from .reference import Reference
@@ -17,14 +17,14 @@ from .reference import Reference
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Offset:
-    """What the hits of one eye bring to a frame.
+    """The contribution of the hits of one eye to a frame.
 
     Attributes:
-        offset: of the eye along the path.
+        offset: of the eye along the path, in frames.
         accepted: hits that the frame sees, over those that the eye found.
-        covered: share of pixels that get any.
+        covered: share of pixels with such hits.
         rmse: over covered pixels, relative to the mean of the reference there.
-        squared_bias, squared_bias_error: of the same, see `Quality`.
+        squared_bias, squared_bias_error: over covered pixels, see `Quality`.
     """
 
     offset: int
@@ -35,9 +35,9 @@ class Offset:
     squared_bias_error: float
 
 
-def by_offset(case: Case, c: int, lights: Sequence[int], reference: Reference) -> list[Offset]:
-    """Make frame c of each eye of its window alone, with the job's own settings."""
-    changed = varied(case, case.settings)
+def measure_offsets(case: Case, c: int, lights: Sequence[int], reference: Reference) -> list[Offset]:
+    """Compose frame c from only one eye of its window at a time, with the job's own settings."""
+    changed = with_settings(case, case.settings)
     images = np.empty((2, case.setup.lights.n_lights, case.setup.cams.height, case.setup.cams.width, 3), np.float32)
     windows, found = [], []
     with ExitStack() as pools:
@@ -47,11 +47,11 @@ def by_offset(case: Case, c: int, lights: Sequence[int], reference: Reference) -
             windows.append(window_of(c, setup, changed.ambient, pool))
         for k in changed.setup.frames_around(c, changed.setup.n_r):
             hits = [window.compose(c, images[i], [k]).hits for i, window in enumerate(windows)]
-            found.append(_offset(case, k - c, hits, images, lights, reference))
+            found.append(_compare_offset(case, k - c, hits, images, lights, reference))
     return found
 
 
-def _offset(
+def _compare_offset(
     case: Case, offset: int, hits: Sequence[np.ndarray], images: np.ndarray, lights: Sequence[int],
     reference: Reference,
 ) -> Offset:  # fmt: skip

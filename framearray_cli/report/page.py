@@ -27,7 +27,7 @@ def write_report(report: Report) -> None:
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    environment.filters.update(percent=_percent, number=_number)
+    environment.filters.update(percent=_format_percent, number=_format_number)
     template = environment.from_string((files(__package__) / "page.html").read_text(encoding="utf-8"))
     text = template.render(
         report=report,
@@ -44,15 +44,15 @@ def write_report(report: Report) -> None:
 
 
 def advice_lines(best: Measured | None, report: Report) -> Sequence[str]:
-    """Lines to paste into the job to get some settings; a remark where there is nothing to paste."""
+    """Return the lines to paste into the job to get some settings; a comment where there are none."""
     if best is None:
-        return ["# no settings that were tried reach it"]
+        return ["# no tested settings reach it"]
     return best.named.settings.lines(Settings.of(report.job)) or ["# as the job is"]
 
 
-def _percent(value: float) -> str:
+def _format_percent(value: float) -> str:
     return f"{100 * value:.3g} %"
 
 
-def _number(value: float | None) -> str:
+def _format_number(value: float | None) -> str:
     return "" if value is None else f"{value:.3g}"

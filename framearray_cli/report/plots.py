@@ -16,7 +16,7 @@ CYCLE = ("#2b6cb0", "#2f855a", "#b7791f", "#6b46c1", "#0987a0", "#b83280", "#9c4
 
 
 def draw_plots(report: Report) -> dict[str, str]:
-    """Draw every plot into the report's folder; returns what it shows -> file name.
+    """Draw every plot into the report's folder; return title -> file name.
 
     Raises:
         OutputError: one cannot be written.
@@ -26,10 +26,10 @@ def draw_plots(report: Report) -> dict[str, str]:
     matplotlib.use("svg")
     matplotlib.rcParams.update({"svg.hashsalt": "framearray", "svg.fonttype": "none", "font.size": 9})
     plots: dict[str, Callable[[Report, Any], None]] = {
-        "error and time": _error_and_time,
-        "bias and noise": _bias_and_noise,
-        "by offset": _by_offset,
-        "flicker": _flicker,
+        "error and time": _plot_error_and_time,
+        "bias and noise": _plot_bias_and_noise,
+        "by offset": _plot_offsets,
+        "flicker": _plot_flicker,
     }
     found = {}
     for title, draw in plots.items():
@@ -57,7 +57,7 @@ def _draw(file: Path, draw: Callable[[Report, Any], None], report: Report) -> bo
 
 
 def _families(report: Report) -> dict[str, list[Measured]]:
-    """Points that are joined, by family; each starts from the job's own settings where it varies one of them."""
+    """Return the points that a line joins, by family; a family that varies one setting starts at the job's own."""
     own = report.measured[0]
     families: dict[str, list[Measured]] = {}
     for one in report.measured[1:]:
@@ -70,7 +70,7 @@ def _colour(family: str, i: int) -> str:
     return COLOURS.get(family, CYCLE[i % len(CYCLE)])
 
 
-def _error_and_time(report: Report, axes: Any) -> None:
+def _plot_error_and_time(report: Report, axes: Any) -> None:
     for i, (family, points) in enumerate(_families(report).items()):
         points = sorted(points, key=lambda m: m.ms)
         times, errors = [m.ms for m in points], [m.quality.rmse for m in points]
@@ -82,12 +82,12 @@ def _error_and_time(report: Report, axes: Any) -> None:
     )  # fmt: skip
     own = report.measured[0]
     axes.plot([own.ms], [own.quality.rmse], "*", color=COLOURS["job"], markersize=13, label="as the job says")
-    axes.set(xscale="log", yscale="log", xlabel="ms an image", ylabel="RMSE over the mean of the reference")
+    axes.set(xscale="log", yscale="log", xlabel="ms per image", ylabel="RMSE over the mean of the reference")
     axes.legend(fontsize=7, ncols=2)
 
 
 def _bars(axes: Any, names: list[str], series: dict[str, list[float]], label: str) -> None:
-    """Horizontal bars, one group a name."""
+    """Draw horizontal bars, one group per name."""
     height = 0.8 / len(series)
     for i, (name, values) in enumerate(series.items()):
         places = [k + (i - (len(series) - 1) / 2) * height for k in range(len(names))]
@@ -98,13 +98,13 @@ def _bars(axes: Any, names: list[str], series: dict[str, list[float]], label: st
     axes.legend(fontsize=7)
 
 
-def _bias_and_noise(report: Report, axes: Any) -> None:
+def _plot_bias_and_noise(report: Report, axes: Any) -> None:
     shown = [m for m in report.measured if not m.named.settings.one_light]
     series = {"bias": [m.quality.bias for m in shown], "noise": [m.quality.noise for m in shown]}
     _bars(axes, [m.named.name for m in shown], series, "over the mean of the reference")
 
 
-def _flicker(report: Report, axes: Any) -> None:
+def _plot_flicker(report: Report, axes: Any) -> None:
     shown = [m for m in report.measured if not m.named.settings.one_light]
     series = {}
     for name, key in (("along the camera path", "flicker_camera"), ("along the light path", "flicker_light")):
@@ -115,7 +115,7 @@ def _flicker(report: Report, axes: Any) -> None:
         _bars(axes, [m.named.name for m in shown], series, "relMSE of what changes from image to image")
 
 
-def _by_offset(report: Report, axes: Any) -> None:
+def _plot_offsets(report: Report, axes: Any) -> None:
     if len(report.offsets) < 2:
         return
     at = [o.offset for o in report.offsets]

@@ -1,4 +1,4 @@
-"""How good the pictures of some settings are: every measure of error, averaged over the probe images."""
+"""Quality of the images of some settings: every measure of error, averaged over the probe images."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -15,18 +15,18 @@ from .reference import Reference
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quality:
-    """Distances of pictures from their references.
+    """Distances of images from their references.
 
     Attributes:
         rmse: root mean square error over the mean of the reference.
         relmse: mean of (I - R)^2 / (R^2 + EPSILON).
-        flip: mean HDR-FLIP, 0 to 1; it takes long, so of neighbours only the first has it.
+        flip: mean HDR-FLIP, 0 to 1; only for the first of neighbours, because it is slow.
         mean_off: mean of I - R over the mean of the reference.
         edge_rmse, edge_max: error at shadow edges, see `Errors`.
-        squared_bias, squared_bias_error: what independent runs have in common, and its standard error; over the square
-            of the mean of the reference. Noise may make it negative.
-        flicker_camera, flicker_light: relMSE of what changes from one image to the next along either path; None where
-            no two images in a row were looked at.
+        squared_bias, squared_bias_error: squared bias and its standard error, over the squared mean of the reference;
+            noise may make it negative.
+        flicker_camera, flicker_light: relMSE of the change from one image to the next along either path; None without
+            two consecutive images.
     """
 
     rmse: float
@@ -47,21 +47,21 @@ class Quality:
 
     @property
     def noise(self) -> float:
-        """Standard deviation over the mean of the reference: what of `rmse` is no bias."""
+        """Standard deviation over the mean of the reference: the rest of `rmse` beside the bias."""
         return float(np.sqrt(max(self.rmse**2 - max(self.squared_bias, 0.0), 0.0)))
 
 
-def quality(
+def compare_frames(
     runs: tuple[Float32, Float32], references: Sequence[Reference], ambient: Ambient, lights: Sequence[int],
     pairs: Sequence[tuple[int, int]],
 ) -> list[Quality]:  # fmt: skip
-    """Compare frames in a row with their references, image by image.
+    """Compare consecutive frames with their references, image by image.
 
     Args:
         runs: two runs with different seeds, (n_frames, n_lights, h, w, 3) each.
-        references: of each frame.
+        references: one per frame.
         lights: light positions of the images.
-        pairs: places in `lights` of neighbours on the light path.
+        pairs: indices in `lights` of neighbours on the light path.
     """
     neighbours = {second for _, second in pairs}
     right = np.stack([[r.image(k, ambient.intensity[l]) for k, l in enumerate(lights)] for r in references])
@@ -101,13 +101,13 @@ def _mean_flip(image: Image, wanted: Image) -> float:
 
 
 def _flicker(image: Image, wanted: Image, next_image: Image, next_wanted: Image) -> float:
-    """RelMSE of the change from one image to the next."""
+    """Return the relMSE of the change from one image to the next."""
     change: Float64 = (next_image - image).astype(np.float64) - (next_wanted - wanted)
     return float((change**2 / (wanted.astype(np.float64) ** 2 + EPSILON)).mean())
 
 
 def mean_quality(found: Sequence[Quality]) -> Quality:
-    """The mean of every measure over the images that have it; of RMSE, the root of the mean square."""
+    """Average every measure over the images that have it: take the root mean square of RMSE, the largest `edge_max`."""
     means: dict[str, float | None] = {}
     for f in fields(Quality):
         values = [value for value in (getattr(one, f.name) for one in found) if value is not None]

@@ -1,7 +1,7 @@
-"""Reference images: what every pixel tends to, with reuse off, in two halves of different seeds.
+"""Reference images, with reuse off and many hits per pixel, in two halves of different seeds.
 
-What a pixel shows is linear in the ambient light: light + I_A[l] * indirect. Both parts are kept, so that a reference
-stays right when the estimate of I_A changes, and says what a light alone does.
+A pixel is linear in the ambient light: light + I_A[l] * indirect. Keep both parts, so that a reference stays valid when
+the estimate of I_A changes, and shows direct light separately.
 """
 
 import math
@@ -22,10 +22,10 @@ from framearray_cli.engine.images.composed import Layers
 from framearray_cli.engine.loop import window_of
 from framearray_cli.render.identity import job_fingerprint
 
-from .case import Case, under
+from .case import Case, with_lights
 from .metrics import rmse
 
-# Native hits of a pixel in one pass: as many as memory holds easily; in all, 100 times those of the frame array.
+# Native hits per pixel in one pass, limited by memory; PASSES of both halves make 100 times those of the frame array.
 HITS = 28
 PASSES = 25
 # Seeds of the first and of the second half; no job uses them.
@@ -40,7 +40,7 @@ class Reference:
         light: (2, n_lights, h, w, 3) radiance without ambient light, of each half.
         indirect: (2, h, w, 3) radiance of an ambient light of 1, of each half.
         reflectivity, normal: (h, w, 3) and depth: (h, w), means; see `Layers`.
-        hits: native hits of a pixel in each half.
+        hits: native hits per pixel in each half.
     """
 
     light: Float32
@@ -51,49 +51,49 @@ class Reference:
     hits: int
 
     def half(self, i: int, l: int, ambient: Rgb) -> Image:
-        """Half i under the l-th of its light positions, with I_A of that position, (3,)."""
+        """Return half i at the l-th of its light positions, with I_A of that position, (3,)."""
         return np.asarray(self.light[i, l] + ambient * self.indirect[i], np.float32)
 
     def image(self, l: int, ambient: Rgb) -> Image:
-        """Both halves."""
+        """Return the mean of both halves."""
         return np.asarray((self.half(0, l, ambient) + self.half(1, l, ambient)) / 2, np.float32)
 
     def irradiance(self, l: int) -> Float32:
-        """What the l-th light position alone sends to each pixel, (h, w); 0 where nothing reflects diffusely."""
+        """Return the direct light at each pixel from the l-th light position, (h, w); 0 without diffuse reflection."""
         light, r = self.light[:, l].mean(axis=(0, -1)), self.reflectivity.mean(axis=-1)
         found: Float32 = np.divide(light, r, out=np.zeros_like(light), where=r > 0.01)
         return found
 
 
-def passes_for(times: float, rests_on: float) -> int:
-    """Passes of each half, so that a reference has `times` the samples of a pixel that rests on so many hits."""
-    return max(math.ceil(times * rests_on / (2 * HITS)), 1)
+def passes_for(times: float, hits: float) -> int:
+    """Return the passes per half that give a reference `times` the samples of a pixel with that many hits."""
+    return max(math.ceil(times * hits / (2 * HITS)), 1)
 
 
-def reference(case: Case, c: int, l: Sequence[int], folder: Path, passes: int = PASSES) -> Reference:
-    """Make the reference of frame c under light positions l, or read it where it was made before.
+def make_reference(case: Case, c: int, l: Sequence[int], folder: Path, passes: int = PASSES) -> Reference:
+    """Read the reference of frame c at light positions l from a folder, or render and write it.
 
-    It is kept by what its pixels depend on, but for the program itself: delete the folder when the method changes.
+    Its file is named by all inputs of its pixels except the program: delete the folder when the method changes.
 
     Raises:
-        OutputError: it cannot be kept.
+        OutputError: the file cannot be written.
     """
     average = case.setup.obscurance.average.tobytes()
-    pixels = job_fingerprint(case.prepared).encode()  # the seed, too, which does no harm
+    pixels = job_fingerprint(case.prepared).encode()  # includes the seed, which does no harm
     key = fingerprint(pixels, average, repr((c, list(l), HITS, passes, case.setup.cams.width)).encode())
     file = folder / f"reference-{sha256(key.encode()).hexdigest()[:16]}.npz"
     names = ("light", "indirect", "reflectivity", "normal", "depth")
     if os.path.isfile(file):
         with np.load(file) as kept:
             return Reference(**{name: kept[name] for name in names}, hits=HITS * passes)
-    made = _render(under(case, l), c, passes)
+    made = _render_reference(with_lights(case, l), c, passes)
     make_folder(folder)
     with whole_file(file) as part, part.open("wb") as stream:
         np.savez(stream, **{name: getattr(made, name) for name in names})
     return made
 
 
-def _render(case: Case, c: int, passes: int) -> Reference:
+def _render_reference(case: Case, c: int, passes: int) -> Reference:
     setup = replace(
         case.setup,
         n_r=0,
@@ -107,7 +107,7 @@ def _render(case: Case, c: int, passes: int) -> Reference:
     indirect: Float64 = np.zeros((2, *shape))
     for half, seed in enumerate(SEEDS):
         for i in range(passes):
-            parts = _pass(replace(setup, seed=seed + i), replace(case, setup=setup), c)
+            parts = _render_pass(replace(setup, seed=seed + i), replace(case, setup=setup), c)
             light[half] += parts[0] / passes
             indirect[half] += parts[1] / passes
     layers = parts[2]
@@ -121,8 +121,8 @@ def _render(case: Case, c: int, passes: int) -> Reference:
     )
 
 
-def _pass(setup: FrameSetup, case: Case, c: int) -> tuple[Float32, Float32, Layers]:
-    """One image a light position without ambient light, what an ambient light of 1 adds, and the layers."""
+def _render_pass(setup: FrameSetup, case: Case, c: int) -> tuple[Float32, Float32, Layers]:
+    """Return one image per light position without ambient light, the addition by one of 1, and the layers."""
     images = np.empty((2, setup.lights.n_lights, setup.cams.height, setup.cams.width, 3), np.float32)
     with TracePool(setup, case.threads) as pool:
         window = window_of(c, setup, case.ambient, pool)
@@ -133,8 +133,8 @@ def _pass(setup: FrameSetup, case: Case, c: int) -> tuple[Float32, Float32, Laye
     return images[0], images[1, 0] - images[0, 0], layers
 
 
-def noise(references: Sequence[Reference], case: Case, l: Sequence[int]) -> float:
-    """RMSE of a reference itself over its mean: half of what its halves differ by."""
+def reference_noise(references: Sequence[Reference], case: Case, l: Sequence[int]) -> float:
+    """Return the mean RMSE of references over their mean: half the RMSE between their halves."""
     shares = []
     for wanted in references:
         for k in range(len(l)):

@@ -1,4 +1,4 @@
-"""What `framearray report` does: references, pictures of many settings, and what follows from them."""
+"""`framearray report`: render references and images of many settings, and compare them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,26 +10,26 @@ import numpy as np
 from framearray_cli.base.arrays import Float32
 from framearray_cli.job.job import Job
 
-from .case import Case, opened
+from .case import Case, open_case
 from .flip import flip_map, require_extra
-from .front import Advice, advice, worth_trying
-from .measure import Measured, measure, measure_alone
-from .offsets import Offset, by_offset
-from .probes import Probes, probes
-from .reference import Reference, noise, passes_for, reference
-from .settings import Named, Settings, to_try
+from .front import Advice, advise, best_front
+from .measure import Measured, measure, measure_single_lights
+from .offsets import Offset, measure_offsets
+from .probes import Probes, choose_probes
+from .reference import Reference, make_reference, passes_for, reference_noise
+from .settings import NamedSettings, Settings, settings_to_try
 
 TIMES = 100.0  # samples of a reference over those of a picture
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportOptions:
-    """What the user asks of a report.
+    """The options of a report.
 
     Attributes:
-        cameras, lights: probe images; none: a few are chosen.
+        cameras, lights: probe images; if empty, the report chooses a few.
         vary: values to try by the job file's key.
-        errors: RMSE that the cheapest settings are looked for; none: the job's own, half of it and twice as much.
+        errors: each RMSE to find the cheapest settings for; if empty, the job's own, half of it and twice as much.
         times: samples of a reference over those of a picture.
     """
 
@@ -41,28 +41,28 @@ class ReportOptions:
 
 
 class ReportEvents:
-    """Is told how a report goes on; each method may be left as it is."""
+    """The events of a report; override those that you want."""
 
     def opened(self, case: Case) -> None:
         """The scene was read."""
 
     def planned(self, references: int, settings: int) -> None:
-        """So many references and settings will be made."""
+        """The report will make that many references and measure that many settings."""
 
     def done(self) -> None:
-        """One more of them."""
+        """One more of them is done."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Report:
-    """Everything that a report shows.
+    """The results of a report.
 
     Attributes:
-        settings: the job's own; `measured[0]` is what they cost and give.
-        reference_hits: native hits of a pixel of the references.
+        settings: the job's own; `measured[0]` is their cost and error.
+        reference_hits: native hits per pixel of the references.
         reference_noise: RMSE of the references themselves over their mean.
         example: (h, w, 3) the reference of the first probe image.
-        flip, signed: (h, w) error of the job's own settings there: HDR-FLIP, and I - R over the mean of R.
+        flip, signed: (h, w) error of the job's own settings in that image: HDR-FLIP, and I - R over the mean of R.
     """
 
     job: Job
@@ -81,58 +81,58 @@ class Report:
 
 
 def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEvents | None = None) -> Report:
-    """Measure a job and its variations; references are kept in the folder and used again.
+    """Measure a job with its own and with other settings; keep references in the folder for the next report.
 
     Raises:
         MissingExtraError: the libraries of the extra `report` are not installed.
-        JobError, SceneError: the job cannot be rendered, or has no such probe image or setting.
+        JobError, SceneError: the job cannot be rendered, or lacks a chosen image or setting.
         OutputError: the folder cannot be written.
     """
     require_extra()
     events = events or ReportEvents()
-    with opened(job) as case:
+    with open_case(job) as case:
         events.opened(case)
         still, n_l = case.prepared.still, case.prepared.n_lights
-        looked_at = probes(case.setup.n_frames, n_l, options.cameras, options.lights, file=job.file or job.name)
-        trying = to_try(case.settings, 1 if still else case.setup.n_frames, options.vary)
-        frames = [c for run in looked_at.cameras for c in run]
-        events.planned(len(frames), len(trying))
-        passes = passes_for(options.times, case.settings.rests_on)
+        chosen = choose_probes(case.setup.n_frames, n_l, options.cameras, options.lights, file=job.file or job.name)
+        tried = settings_to_try(case.settings, 1 if still else case.setup.n_frames, options.vary)
+        frames = [c for run in chosen.cameras for c in run]
+        events.planned(len(frames), len(tried))
+        passes = passes_for(options.times, case.settings.window_hits)
         references: dict[int, Reference] = {}
         for c in frames:
-            references[c] = reference(case, c, looked_at.lights, folder / "references", passes)
+            references[c] = make_reference(case, c, chosen.lights, folder / "references", passes)
             events.done()
         measured: list[Measured] = []
-        for named in trying:
-            measured.append(_measured(case, named, looked_at, references, measured))
+        for named in tried:
+            measured.append(_measure(case, named, chosen, references, measured))
             events.done()
         first, own = references[frames[0]], measured[0]
-        right = first.image(0, case.ambient.intensity[looked_at.lights[0]])
+        right = first.image(0, case.ambient.intensity[chosen.lights[0]])
         wanted = options.errors or [share * own.quality.rmse for share in (2.0, 1.0, 0.5)]
         return Report(
             job=job,
             folder=folder,
             settings=case.settings,
-            probes=looked_at,
+            probes=chosen,
             measured=tuple(measured),
-            front=tuple(worth_trying(measured)),
-            offsets=tuple(by_offset(case, frames[0], looked_at.lights, first)),
-            advice=tuple(advice(measured, wanted)),
+            front=tuple(best_front(measured)),
+            offsets=tuple(measure_offsets(case, frames[0], chosen.lights, first)),
+            advice=tuple(advise(measured, wanted)),
             reference_hits=2 * first.hits,
-            reference_noise=noise(list(references.values()), case, looked_at.lights),
+            reference_noise=reference_noise(list(references.values()), case, chosen.lights),
             example=right,
             flip=flip_map(own.example, right),
             signed=np.asarray((own.example - right).mean(axis=-1) / right.mean(dtype=np.float64), np.float32),
         )
 
 
-def _measured(
-    case: Case, named: Named, looked_at: Probes, references: dict[int, Reference], others: Sequence[Measured]
+def _measure(
+    case: Case, named: NamedSettings, chosen: Probes, references: dict[int, Reference], others: Sequence[Measured]
 ) -> Measured:
-    """Cost and error of some settings; `others` were measured before, light reuse before the same without it."""
-    cameras, lights = looked_at.cameras, looked_at.lights
+    """Measure some settings; `others` were measured before, with reuse among lights before without it."""
+    cameras, lights = chosen.cameras, chosen.lights
     if not named.settings.one_light:
-        return measure(case, named, cameras, lights, looked_at.light_pairs, references)
+        return measure(case, named, cameras, lights, chosen.light_pairs, references)
     shared = replace(named.settings, one_light=False)
     twin = next(other for other in others if other.named.settings == shared)
-    return measure_alone(case, named, cameras, lights, twin)
+    return measure_single_lights(case, named, cameras, lights, twin)

@@ -1,4 +1,4 @@
-"""The settings that speed and error depend on, and which of them a report tries.
+"""The settings that speed and error depend on, and those that a report tests.
 
 A setting is one line of a job file; the names of `Settings` are those of its keys, see `KEYS`.
 """
@@ -23,18 +23,18 @@ KEYS = {
     "samples.shadow_unbiased": "shadow_unbiased",
     "denoise.obscurance": "denoise",
 }
-# What hits are given for in their place: settings that are measured say how many hits there are.
+# Keys in place of `samples.hits`; measured settings always give a number of hits.
 TARGET = (("samples", "error"), ("samples", "most_hits"))
-# Fewer hits a pixel than that a frame cannot have: see `plan.py`.
+# The fewest hits per pixel and frame that a job may have.
 FEWEST_HITS = 1 / 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """What the cost and the error of a picture depend on; see the job file's reference.
+    """The settings that cost and error of an image depend on; see the reference of job files.
 
     Attributes:
-        one_light: every image is made for one light position alone, as other renderers do; no key of a job.
+        one_light: render every image for only one light position, as other renderers do; no key of a job.
     """
 
     n_r: int
@@ -48,20 +48,20 @@ class Settings:
 
     @staticmethod
     def of(job: Job) -> "Settings":
-        """Those of a job."""
+        """Return the settings of a job."""
         tables = {key: key.split(".") for key in KEYS}
         return Settings(**{KEYS[key]: getattr(getattr(job, table), name) for key, (table, name) in tables.items()})
 
     @property
-    def rests_on(self) -> float:
-        """Native hits that a pixel would rest on if every frame of its window saw what it sees."""
+    def window_hits(self) -> float:
+        """Hits of a pixel whose surface every frame of its window sees."""
         return (2 * self.n_r + 1) * self.hits
 
-    def applied(self, job: Job) -> Job:
-        """The job with these settings; they are checked as those of a file are.
+    def apply_to(self, job: Job) -> Job:
+        """Return the job with these settings, validated like those of a file.
 
         Raises:
-            JobError: a value that no job may have.
+            JobError: no job may have one of the values.
         """
         tables: dict[str, dict[str, Any]] = {}
         for key, field in KEYS.items():
@@ -70,13 +70,13 @@ class Settings:
         updates = {}
         for table, values in tables.items():
             old = getattr(job, table)
-            # what the job file says of it, and these; defaults that depend on others are worked out again
+            # the keys of the job file, and these; validation sets defaults that depend on other keys again
             said = {name: getattr(old, name) for name in old.model_fields_set if (table, name) not in TARGET}
             updates[table] = type(old).model_validate({**said, **values})
         return changed(job, **updates)
 
     def lines(self, base: "Settings") -> list[str]:
-        """What to write into a job file with settings `base` to get these."""
+        """Return the lines that change settings `base` of a job file into these."""
         tables: dict[str, list[str]] = {}
         for key, field in KEYS.items():
             if getattr(self, field) != getattr(base, field):
@@ -86,12 +86,12 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Named:
-    """Settings to try.
+class NamedSettings:
+    """Settings to test.
 
     Attributes:
-        name: how tables and plots call them.
-        family: points of one family are joined by a line in plots.
+        name: in tables and plots.
+        family: a line joins the points of one family in plots.
     """
 
     name: str
@@ -99,20 +99,20 @@ class Named:
     settings: Settings
 
 
-LIGHT_REUSE, SCRATCH = "light reuse alone", "from scratch"
+LIGHT_REUSE, SCRATCH = "light reuse only", "from scratch"
 
 
-def to_try(base: Settings, n_cameras: int, vary: Mapping[str, Sequence[Any]]) -> list[Named]:
-    """What a report tries: the job's own settings, each setting changed for itself, and the baselines.
+def settings_to_try(base: Settings, n_cameras: int, vary: Mapping[str, Sequence[Any]]) -> list[NamedSettings]:
+    """List the settings that a report tests: the job's own, one setting changed at a time, and the baselines.
 
     Args:
         base: the job's.
         n_cameras: N_c; a window is no longer than the path.
-        vary: values by the job file's key; they take the place of those that are tried by themselves.
+        vary: values by the job file's key, in place of the default ones.
     """
-    found = [Named(name="as the job says", family="job", settings=base)]
+    found = [NamedSettings(name="as the job says", family="job", settings=base)]
     longest = (n_cameras - 1) // 2
-    by_itself: dict[str, Iterable[Any]] = {
+    default_values: dict[str, Iterable[Any]] = {
         "reuse.n_r": sorted({0, 1, max(base.n_r, 1), 2 * base.n_r + 1, 2 * (2 * base.n_r + 1)}),
         "reuse.weights": ("average", "balance"),
         "samples.hits": (0.5, 1, 2, 4, 8),
@@ -120,41 +120,43 @@ def to_try(base: Settings, n_cameras: int, vary: Mapping[str, Sequence[Any]]) ->
         "samples.shadow_step": (1, 2, 4, 8),
         "denoise.obscurance": (False, True) if find_spec("pyoidn") else (False,),
     }
-    for key, values in {**by_itself, **vary}.items():
+    for key, values in {**default_values, **vary}.items():
         for value in values:
             changed = replace(base, **{KEYS[key]: value})
             if changed.n_r <= longest and changed != base:
-                found.append(Named(name=f"{KEYS[key]} {_plain(value)}", family=key, settings=changed))
+                found.append(NamedSettings(name=f"{KEYS[key]} {_format_value(value)}", family=key, settings=changed))
     for hits, n_r in ((base.hits / 2, 2 * base.n_r + 1), (base.hits / 4, 4 * base.n_r + 2)):
         if base.n_r and n_r <= longest and hits >= FEWEST_HITS:
             wide = replace(base, hits=hits, n_r=n_r)
-            found.append(Named(name=f"hits {hits:g}, n_r {n_r}", family="hits for n_r", settings=wide))
+            found.append(NamedSettings(name=f"hits {hits:g}, n_r {n_r}", family="hits for n_r", settings=wide))
     return [*found, *baselines(base)]
 
 
-def baselines(base: Settings) -> list[Named]:
-    """Every frame for itself, and every image for itself, with more and more hits a pixel."""
-    alone = replace(base, n_r=0, shadow_step=1, shadow_unbiased=False, weights="average", denoise=False)
+def baselines(base: Settings) -> list[NamedSettings]:
+    """List settings without reuse among frames, with and without reuse among lights, by hits per pixel."""
+    unshared = replace(base, n_r=0, shadow_step=1, shadow_unbiased=False, weights="average", denoise=False)
     shares = (1 / 14, 1 / 7, 2 / 7, 4 / 7, 1.0, 2.0)
-    counts = sorted({max(round(share * base.rests_on), 1) for share in shares})
+    counts = sorted({max(round(share * base.window_hits), 1) for share in shares})
     return [
-        Named(name=f"{family}, {hits} hits", family=family, settings=replace(alone, hits=hits, one_light=one_light))
+        NamedSettings(
+            name=f"{family}, {hits} hits", family=family, settings=replace(unshared, hits=hits, one_light=one_light)
+        )
         for family, one_light in ((LIGHT_REUSE, False), (SCRATCH, True))
         for hits in counts
     ]
 
 
-def _plain(value: Any) -> str:
+def _format_value(value: Any) -> str:
     if isinstance(value, bool):
         return "on" if value else "off"
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def read_vary(option: str, job: Job) -> tuple[str, list[Any]]:
-    """Read an option `samples.hits=1,2,4`.
+    """Parse an option `samples.hits=1,2,4`.
 
     Raises:
-        JobError: not a setting that can be varied, or a value that no job may have.
+        JobError: a report cannot vary the key, or no job may have the value.
     """
     key, _, text = option.partition("=")
     key = key.strip()
@@ -162,22 +164,22 @@ def read_vary(option: str, job: Job) -> tuple[str, list[Any]]:
     if key not in KEYS or not text.strip():
         names = ", ".join(KEYS)
         raise JobError(where, [f"expected one of {names}, an equals sign and values, got {option!r}"])
-    values = [_value(word.strip()) for word in text.split(",")]
+    values = [_parse_value(word.strip()) for word in text.split(",")]
     base, problems = Settings.of(job), []
     for value in values:
         if value == "auto":
             problems.append(f"{key} = {value!r}: expected a value to measure")
             continue
         try:
-            replace(base, **{KEYS[key]: value}).applied(job)
+            replace(base, **{KEYS[key]: value}).apply_to(job)
         except ValueError as error:
-            problems.append(f"{key} = {value!r}: {_reason(error)}")
+            problems.append(f"{key} = {value!r}: {_problem(error)}")
     if problems:
         raise JobError(where, problems)
     return key, values
 
 
-def _value(word: str) -> Any:
+def _parse_value(word: str) -> Any:
     if word in ("true", "false"):
         return word == "true"
     for kind in (int, float):
@@ -188,8 +190,8 @@ def _value(word: str) -> Any:
     return word.strip("\"'")
 
 
-def _reason(error: ValueError) -> str:
-    """What a check of values says, in one line."""
+def _problem(error: ValueError) -> str:
+    """Return the message of a validation error, in one line."""
     details = getattr(error, "errors", None)
     return "; ".join(str(detail["msg"]) for detail in details()) if details else str(error)
 

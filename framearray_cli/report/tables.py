@@ -22,8 +22,8 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def row(one: Measured, report: Report) -> dict[str, Any]:
-    """One line of the tables; what was not measured is left out."""
+def table_row(one: Measured, report: Report) -> dict[str, Any]:
+    """Return one row of the tables, without values that were not measured."""
     values = {
         "name": one.named.name,
         **asdict(one.named.settings),
@@ -45,7 +45,7 @@ def write_tables(report: Report) -> None:
     Raises:
         OutputError: they cannot be written.
     """
-    rows = [row(one, report) for one in report.measured]
+    rows = [table_row(one, report) for one in report.measured]
     with whole_file(report.folder / "table.csv") as part, part.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.DictWriter(stream, COLUMNS, restval="")
         writer.writeheader()
@@ -57,13 +57,13 @@ def write_tables(report: Report) -> None:
         "reference": {"hits": report.reference_hits, "rmse": report.reference_noise},
         "settings": rows,
         "offsets": [asdict(offset) for offset in report.offsets],
-        "advice": [_advice(one, report) for one in report.advice],
+        "advice": [_advice_table(one, report) for one in report.advice],
     }
     with whole_file(report.folder / "table.toml") as part:
         part.write_bytes(tomli_w.dumps(table).encode())
 
 
-def _advice(one: Advice, report: Report) -> dict[str, Any]:
+def _advice_table(one: Advice, report: Report) -> dict[str, Any]:
     found: dict[str, Any] = {"error": one.error}
     if one.best:
         lines: Sequence[str] = one.best.named.settings.lines(Settings.of(report.job))

@@ -5,7 +5,16 @@ import json
 
 from bench.ambient import pathtraced
 from bench.ambient import run as ambient
-from bench.core.cases import FRAME_ARRAY, JOBS, Variant, job_named, opened, variant_named, varied, with_resolution
+from bench.core.cases import (
+    FRAME_ARRAY,
+    JOBS,
+    Variant,
+    job_named,
+    open_case,
+    variant_named,
+    with_resolution,
+    with_settings,
+)
 from bench.core.results import folder, load, save
 from bench.core.steady import steady
 from bench.error import bias, error, reports
@@ -100,9 +109,9 @@ def peak(name: str, variant: Variant, args: argparse.Namespace) -> dict[str, obj
     job = job_named(name, args.quick)
     if args.resolution:
         job = with_resolution(job, (int(args.resolution.split("x")[0]), int(args.resolution.split("x")[1])))
-    with opened(job) as case:
+    with open_case(job) as case:
         before = peak_memory()
-        measured = steady(varied(case, variant), args.frames)
+        measured = steady(with_settings(case, variant.settings), args.frames)
         return {**measured.table(), "peak": peak_memory(), "before": before}
 
 

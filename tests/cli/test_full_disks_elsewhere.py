@@ -102,7 +102,8 @@ def test_a_folder(name, share, array, disk, capsys):
     disk.leave(int(share * taken))
     result = run(capsys, *command)
     assert result.code == 4, result
-    assert result.err.startswith(f"{disk.folder}") and result.err.endswith(f": {FULL}\n") and result.err.count("\n") == 1
+    assert result.err.startswith(f"{disk.folder}") and result.err.endswith(f": {FULL}\n")
+    assert result.err.count("\n") == 1
     after = {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     assert after.items() >= before.items() if name == "cache" else after == before
     assert names(disk.folder) == {name, "ballast"}

@@ -24,7 +24,7 @@ FEW = ("--vary", "samples.hits=2", "--vary", "samples.obscurance=4", "--vary", "
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a job, and its report beside its images."""
+    """Return a folder with a job; reports appear beside its images."""
     folder = tmp_path_factory.mktemp("report")
     write_job(folder, **SMALL)
     return folder
@@ -61,7 +61,7 @@ def test_a_report_has_all_its_parts(made: Path, capsys: pytest.CaptureFixture[st
     assert 0 < table["offsets"][0]["accepted"] < 1
     by_name = {row["name"]: float(row["rmse"]) for row in rows}
     assert by_name["hits 2"] < by_name["as the job says"] < by_name["n_r 0"]
-    assert by_name["from scratch, 3 hits"] == pytest.approx(by_name["light reuse alone, 3 hits"], rel=1e-6)
+    assert by_name["from scratch, 3 hits"] == pytest.approx(by_name["light reuse only, 3 hits"], rel=1e-6)
 
 
 def test_references_are_used_again(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -88,14 +88,14 @@ def test_advice_is_for_the_errors_that_were_asked_for(made: Path, capsys: pytest
         (("--times", "0"), "times"),
     ],
 )
-def test_wrong_wishes(made: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, str], words: str) -> None:
+def test_wrong_options(made: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, str], words: str) -> None:
     result = report(capsys, made, *options)
     assert result.code == 2 and words in result.err
     assert "Traceback" not in result.err
 
 
 def test_one_camera_and_one_light(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """No neighbours to compare, no window: what cannot be shown is left out."""
+    """Without neighbours and window the report leaves flicker and offsets out."""
     still = {"resolution": [40, 30], "keys": tiny.WALK["keys"][:1]}
     changes = SMALL | {"camera": still, "light": {"frames": 1, "sources": [tiny.SUN]}}
     write_job(tmp_path, **changes)

@@ -122,7 +122,8 @@ def test_while_nothing_but_writing_goes_on(tmp_path):
 
 def test_a_stopped_render_can_be_rendered_to_its_end(tmp_path):
     camera = tiny.WALK | {"resolution": [80, 60], "frames": 30}
-    process, _ = start_long_render(tmp_path, ambient={"paths": 64}, camera=camera, light={"frames": 4}, samples={"hits": 4})
+    changes = {"ambient": {"paths": 64}, "light": {"frames": 4}, "samples": {"hits": 4}}
+    process, _ = start_long_render(tmp_path, camera=camera, **changes)
     out = tmp_path / "out"
     wait_for(lambda: len(list(out.glob("*.l[0-9]*.exr"))) > 2, process)
     stop(process, signal.SIGINT)

@@ -1,4 +1,4 @@
-"""The parts of a report that can be checked without a render; tests/cli/test_report.py makes whole ones."""
+"""The parts of a report that need no render; tests/cli/test_report.py makes whole reports."""
 
 from dataclasses import replace
 from typing import Any
@@ -9,34 +9,34 @@ from support import tiny
 
 from framearray_cli.base.errors import JobError, MissingExtraError
 from framearray_cli.report import flip, read_vary
-from framearray_cli.report.crops import _heat, _signed, _worst
-from framearray_cli.report.front import advice, times_faster, worth_trying
+from framearray_cli.report.crops import _heat_map, _signed_map, _worst_crop
+from framearray_cli.report.front import advise, best_front, times_faster
 from framearray_cli.report.measure import Measured
-from framearray_cli.report.probes import probes
+from framearray_cli.report.probes import choose_probes
 from framearray_cli.report.quality import Quality, mean_quality
 from framearray_cli.report.reference import HITS, passes_for
-from framearray_cli.report.settings import LIGHT_REUSE, SCRATCH, Named, Settings, baselines, to_try
+from framearray_cli.report.settings import LIGHT_REUSE, SCRATCH, NamedSettings, Settings, baselines, settings_to_try
 
 JOB = tiny.job(camera=tiny.WALK, reuse={"n_r": 2})
 BASE = Settings.of(JOB)
 
 
 def result(name: str, ms: float, rmse: float, family: str = "job", **changes: Any) -> Measured:
-    """What some settings cost and give, made up."""
+    """Make up the cost and error of some settings."""
     settings = replace(BASE, **({"one_light": True} if family == SCRATCH else {}), **changes)
     numbers = {"rmse": rmse, "flicker_camera": None, "flicker_light": None}
     quality = Quality(**{name: numbers.get(name, 0.0) for name in Quality.__dataclass_fields__})
     return Measured(
-        named=Named(name=name, family=family, settings=settings), ms=ms, quality=quality, hits=(1.0, 1.0),
+        named=NamedSettings(name=name, family=family, settings=settings), ms=ms, quality=quality, hits=(1.0, 1.0),
         example=np.zeros((2, 2, 3), np.float32),
     )  # fmt: skip
 
 
 def test_settings_are_those_of_the_job_and_can_be_applied_to_it() -> None:
     assert (BASE.n_r, BASE.hits, BASE.obscurance, BASE.weights, BASE.shadow_step) == (2, 2, 5, "balance", 1)
-    assert BASE.rests_on == 10
+    assert BASE.window_hits == 10
     other = replace(BASE, n_r=1, weights="average", hits=0.5, shadow_step=4, denoise=True)
-    assert Settings.of(other.applied(JOB)) == other
+    assert Settings.of(other.apply_to(JOB)) == other
     assert Settings.of(JOB) == BASE  # the job itself stays
 
 
@@ -75,8 +75,8 @@ def test_values_that_no_job_may_have_are_refused(option: str, words: str) -> Non
     assert words in str(caught.value) and str(caught.value).startswith("--vary: ")
 
 
-def test_what_is_tried_by_itself() -> None:
-    tried = to_try(BASE, 41, {})
+def test_default_settings_to_try() -> None:
+    tried = settings_to_try(BASE, 41, {})
     assert tried[0].settings == BASE
     assert len({one.name for one in tried}) == len(tried)
     assert len({(one.settings, one.family) for one in tried}) == len(tried)
@@ -85,63 +85,63 @@ def test_what_is_tried_by_itself() -> None:
     assert {one.family for one in tried} >= {LIGHT_REUSE, SCRATCH, "samples.hits", "reuse.weights", "hits for n_r"}
     for one in tried:  # a job may have all of them
         if not one.settings.one_light:
-            one.settings.applied(JOB)
+            one.settings.apply_to(JOB)
 
 
 def test_a_window_is_no_longer_than_the_path() -> None:
-    assert all(2 * one.settings.n_r + 1 <= 6 for one in to_try(BASE, 6, {}))
-    assert all(one.settings.n_r == 0 for one in to_try(replace(BASE, n_r=0), 1, {}))
+    assert all(2 * one.settings.n_r + 1 <= 6 for one in settings_to_try(BASE, 6, {}))
+    assert all(one.settings.n_r == 0 for one in settings_to_try(replace(BASE, n_r=0), 1, {}))
 
 
-def test_wishes_take_the_place_of_what_is_tried_by_itself() -> None:
-    tried = to_try(BASE, 41, {"samples.hits": [3]})
+def test_values_to_vary_replace_the_defaults() -> None:
+    tried = settings_to_try(BASE, 41, {"samples.hits": [3]})
     assert [one.settings.hits for one in tried if one.family == "samples.hits"] == [3]
 
 
-def test_baselines_reach_as_many_hits_as_the_job_rests_on() -> None:
+def test_baselines_reach_the_hits_of_the_window() -> None:
     for family in (LIGHT_REUSE, SCRATCH):
         of_family = [one.settings for one in baselines(BASE) if one.family == family]
-        assert BASE.rests_on in [s.hits for s in of_family]
+        assert BASE.window_hits in [s.hits for s in of_family]
         assert all(s.n_r == 0 and s.one_light == (family == SCRATCH) for s in of_family)
 
 
 def test_probes_come_with_their_neighbours() -> None:
-    found = probes(90, 48)
+    found = choose_probes(90, 48)
     assert found.cameras == ((30, 31), (60, 61))
     assert found.lights == (8, 9, 24, 25, 40, 41)
     assert found.light_pairs == ((0, 1), (2, 3), (4, 5))
 
 
 def test_probes_of_small_arrays() -> None:
-    one = probes(1, 1)
+    one = choose_probes(1, 1)
     assert (one.cameras, one.lights, one.light_pairs) == (((0,),), (0,), ())
-    two = probes(2, 2)
+    two = choose_probes(2, 2)
     assert (two.cameras, two.lights, two.light_pairs) == (((0, 1),), (0, 1), ((0, 1),))
 
 
-def test_probes_that_are_asked_for() -> None:
-    found = probes(90, 48, [89, 5, 5], [47, 3])
+def test_probes_that_the_user_chooses() -> None:
+    found = choose_probes(90, 48, [89, 5, 5], [47, 3])
     assert found.cameras == ((5, 6), (89,))
     assert found.lights == (3, 4, 47) and found.light_pairs == ((0, 1),)
     with pytest.raises(JobError, match="--camera: expected 0 to 89, got 90"):
-        probes(90, 48, [90])
+        choose_probes(90, 48, [90])
     with pytest.raises(JobError, match="--light: expected 0 to 47, got -1"):
-        probes(90, 48, [1], [-1])
+        choose_probes(90, 48, [1], [-1])
 
 
-def test_the_front_is_what_nothing_else_beats() -> None:
+def test_no_settings_beat_the_front() -> None:
     points = [result("a", 2, 0.1), result("b", 1, 0.2), result("c", 3, 0.15), result("d", 4, 0.05), result("e", 2, 0.3)]
-    assert [one.named.name for one in worth_trying(points)] == ["b", "a", "d"]
+    assert [one.named.name for one in best_front(points)] == ["b", "a", "d"]
 
 
 def test_advice_is_the_cheapest_of_those_good_enough() -> None:
     points = [result("a", 2, 0.1), result("b", 1, 0.2), result("d", 4, 0.05), result("s", 0.1, 0.05, SCRATCH)]
-    found = advice(points, [0.2, 0.1, 0.0995, 0.06, 0.01])
+    found = advise(points, [0.2, 0.1, 0.0995, 0.06, 0.01])
     assert [one.best and one.best.named.name for one in found] == ["b", "a", "a", "d", None]
 
 
 def test_speed_up_at_equal_error_follows_the_curve_of_images_from_scratch() -> None:
-    """Noise falls with the root of the hits, and time grows with them: at every error the same 40x."""
+    """Noise falls with the root of the hits, and time grows in proportion: 40x at every error."""
     scratch = [result(f"s{n}", 40.0 * n, n**-0.5, SCRATCH) for n in (1, 2, 8, 14)]
     for n in (0.3, 1, 3, 5, 14, 60):
         one = result("own", float(n), n**-0.5)
@@ -149,10 +149,10 @@ def test_speed_up_at_equal_error_follows_the_curve_of_images_from_scratch() -> N
     assert times_faster(result("own", 1, 0.1), []) is None
 
 
-def test_a_reference_has_the_samples_that_were_asked_for() -> None:
-    for times, rests_on in ((100, 14), (1, 0.5), (7, 10)):
-        hits = 2 * HITS * passes_for(times, rests_on)
-        assert times * rests_on <= hits < times * rests_on + 2 * HITS
+def test_a_reference_has_the_samples_that_the_user_asks_for() -> None:
+    for times, window_hits in ((100, 14), (1, 0.5), (7, 10)):
+        hits = 2 * HITS * passes_for(times, window_hits)
+        assert times * window_hits <= hits < times * window_hits + 2 * HITS
 
 
 def test_means_of_measures() -> None:
@@ -174,7 +174,7 @@ def test_flip_is_0_for_equal_pictures_and_grows_with_the_difference() -> None:
     assert 0 < near.mean() < far.mean() <= 1
 
 
-def test_what_is_missing_is_told_with_the_extra_that_brings_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_libraries_are_reported_with_their_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "jinja2" else object())
     with pytest.raises(MissingExtraError, match=r'needs jinja2.*pip install "framearray\[report\]"'):
         flip.require_extra()
@@ -183,12 +183,12 @@ def test_what_is_missing_is_told_with_the_extra_that_brings_it(monkeypatch: pyte
 def test_the_crop_is_where_the_error_is() -> None:
     error = np.zeros((300, 400), np.float32)
     error[150:160, 250:260] = 1
-    top, left = _worst(error)
+    top, left = _worst_crop(error)
     assert top <= 150 and left <= 250 and top + 96 >= 160 and left + 96 >= 260
-    assert _worst(np.zeros((20, 30), np.float32)) == (0, 0)  # a picture smaller than a crop
+    assert _worst_crop(np.zeros((20, 30), np.float32)) == (0, 0)  # an image smaller than a crop
 
 
 def test_colours_of_maps() -> None:
-    assert _heat(np.float32([[0, 1, 2]])).tolist() == [[[0, 0, 0], [255, 255, 255], [255, 255, 255]]]
-    white, red, blue = _signed(np.float32([[0, 1, -1]]))[0]
+    assert _heat_map(np.float32([[0, 1, 2]])).tolist() == [[[0, 0, 0], [255, 255, 255], [255, 255, 255]]]
+    white, red, blue = _signed_map(np.float32([[0, 1, -1]]))[0]
     assert white.tolist() == [255] * 3 and red[0] > red[2] and blue[2] > blue[0]

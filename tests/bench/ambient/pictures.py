@@ -15,9 +15,9 @@ from bench.speed.speed import tell
 from framearray_cli.base.arrays import Float32, Float64, Image
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.loop import window_of
-from framearray_cli.report.case import Case, planned, under
+from framearray_cli.report.case import Case, plan_case, with_lights
 from framearray_cli.report.metrics import EPSILON
-from framearray_cli.report.reference import noise, reference
+from framearray_cli.report.reference import make_reference, reference_noise
 
 from .levels import METHODS
 from .pathtraced import SMALL
@@ -112,15 +112,15 @@ def measure(probe: Probe, quick: bool, folder: Path) -> Table:
     prepared = probe.prepared()
     for method in METHODS:
         paths = PATHS[method] >> (5 if quick else 0)
-        with planned(under_one(with_ambient(prepared, method, paths), probe.l)) as case:
-            made = reference(case, probe.c, [0], folder, QUICK_PASSES if quick else PASSES)
+        with plan_case(under_one(with_ambient(prepared, method, paths), probe.l)) as case:
+            made = make_reference(case, probe.c, [0], folder, QUICK_PASSES if quick else PASSES)
             level = case.ambient.intensity[0]
             direct, one = made.light.mean(axis=0)[0], made.indirect.mean(axis=0)
             found["model"][method] = {
                 **_both(direct, level * one, total, indirect),
                 "level": level.tolist(),
                 "error": float(case.ambient.standard_error[0]),
-                "noise": noise([made], case, [0]),
+                "noise": reference_noise([made], case, [0]),
             }
         if method in SHOWN:
             shown[method] = np.asarray(direct + level * one, np.float32)
@@ -142,10 +142,10 @@ def along(probe: Probe, means: Table, quick: bool, folder: Path) -> Table:
     found: Table = {**means, "words": probe.words, "methods": {}}
     prepared = under_one(resized(probe.prepared(), SMALL), probe.l)
     for method in METHODS:
-        with planned(with_ambient(prepared, method, PATHS[method] >> (5 if quick else 0))) as case:
+        with plan_case(with_ambient(prepared, method, PATHS[method] >> (5 if quick else 0))) as case:
             level, ours = case.ambient.intensity[0], []
             for c in means["cameras"]:
-                one = reference(case, c, [0], folder, 1).indirect
+                one = make_reference(case, c, [0], folder, 1).indirect
                 ours.append(float((level * one).mean(dtype=np.float64)))
         ratio = float(np.sum(ours) / right.sum())
         found["methods"][method] = {"ratios": (np.array(ours) / right).tolist(), "ratio": ratio}
@@ -168,8 +168,8 @@ def _both(direct: Image, ambient: Image, total: Wanted, indirect: Wanted) -> dic
 
 def _sampled(probe: Probe, method: str, total: Wanted, indirect: Wanted) -> Table:
     """The picture as the job's own settings make it, the number of walks left to the program."""
-    with planned(with_ambient(probe.prepared(), method)) as planned_case:
-        case = under(planned_case, [probe.l])
+    with plan_case(with_ambient(probe.prepared(), method)) as planned_case:
+        case = with_lights(planned_case, [probe.l])
         direct, one = _parts(case, probe.c if not case.prepared.still else 0)
         level = case.ambient.intensity[0]
         return {

@@ -1,13 +1,15 @@
-"""Ways to make the images of a job: the frame array and its options, and what it is compared with."""
+"""Ways to render the images of a job: the frame array with its options, and what it is compared with."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.report.case import Case as Case
-from framearray_cli.report.case import opened as opened
-from framearray_cli.report.case import under as under
-from framearray_cli.report.case import varied as with_settings
+from framearray_cli.report.case import open_case as open_case
+from framearray_cli.report.case import with_lights as with_lights
+from framearray_cli.report.case import with_settings as with_settings
+from framearray_cli.report.settings import Settings
 
 from .results import ROOT
 
@@ -19,61 +21,57 @@ PLACES_OF_LIGHT = (1 / 6, 1 / 2, 5 / 6)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variant:
-    """One way to make the images of a job.
+    """One way to render the images of a job, and what to measure of it.
 
     Attributes:
         name: in results and tables.
-        n_r, hits, obscurance, step, unbiased, balance: as in the job file.
-        denoise: W is denoised.
-        one_light: every image knows one light position alone.
-        frames: cameras of one timed run; 0: only its error is measured, with its time from one short run.
-        floor: whether its rays are replayed through Embree alone.
-        writes: whether it is timed with writing, too.
+        settings: those of a report.
+        frames: cameras of one timed run; 0: measure only its error, and its time from one short run.
+        floor: replay its rays through Embree alone.
+        writes: time it with writing, too.
     """
 
     name: str
-    n_r: int = 3
-    hits: float = 2
-    obscurance: int = 5
-    step: int = 1
-    unbiased: bool = False
-    balance: bool = False
-    denoise: bool = False
-    one_light: bool = False
+    settings: Settings
     frames: int = 0
     floor: bool = False
     writes: bool = False
 
-    @property
-    def rests_on(self) -> float:
-        """Native hits that a pixel would rest on if every frame of its window saw what it sees."""
-        return (2 * self.n_r + 1) * self.hits
+
+USUAL_SETTINGS = Settings(
+    n_r=3, weights="average", hits=2, obscurance=5, shadow_step=1, shadow_unbiased=False, denoise=False
+)
 
 
-FRAME_ARRAY = Variant(name="frame array", frames=4, floor=True, writes=True)
-REDUCED = Variant(name="shadow_step 4", step=4, frames=4, floor=True, writes=True)
-SCRATCH = Variant(name="from scratch", n_r=0, hits=14, one_light=True, frames=4, floor=True, writes=True)
-LIGHT_REUSE = Variant(name="light reuse alone", n_r=0, hits=14, frames=1)
-CAMERA_REUSE = Variant(name="camera reuse alone", one_light=True, frames=3)
+def make_variant(name: str, *, frames: int = 0, floor: bool = False, writes: bool = False, **changes: Any) -> Variant:
+    """Return a variant of the usual settings, with changes."""
+    return Variant(name=name, settings=replace(USUAL_SETTINGS, **changes), frames=frames, floor=floor, writes=writes)
+
+
+FRAME_ARRAY = make_variant("frame array", frames=4, floor=True, writes=True)
+REDUCED = make_variant("shadow_step 4", shadow_step=4, frames=4, floor=True, writes=True)
+SCRATCH = make_variant("from scratch", n_r=0, hits=14, one_light=True, frames=4, floor=True, writes=True)
+LIGHT_REUSE = make_variant("light reuse only", n_r=0, hits=14, frames=1)
+CAMERA_REUSE = make_variant("camera reuse only", one_light=True, frames=3)
 
 VARIANTS: tuple[Variant, ...] = (
     FRAME_ARRAY,
-    Variant(name="weights balance", balance=True, frames=4, floor=True),
-    Variant(name="shadow_step 2", step=2),
+    make_variant("weights balance", weights="balance", frames=4, floor=True),
+    make_variant("shadow_step 2", shadow_step=2),
     REDUCED,
-    Variant(name="shadow_step 8", step=8, frames=4),
-    Variant(name="shadow_step 4, unbiased", step=4, unbiased=True, frames=4),
-    Variant(name="shadow_step 8, unbiased", step=8, unbiased=True),
-    Variant(name="hits 1, n_r 7", hits=1, n_r=7),
-    Variant(name="hits 0.5, n_r 14", hits=0.5, n_r=14, frames=4),
-    Variant(name="hits 0.5, n_r 14, balance, shadow_step 4", hits=0.5, n_r=14, balance=True, step=4),
-    Variant(name="n_r 0", n_r=0),
-    Variant(name="n_r 1", n_r=1),
-    Variant(name="n_r 7", n_r=7),
-    Variant(name="obscurance 1", obscurance=1),
-    Variant(name="obscurance 10", obscurance=10),
-    Variant(name="denoise", denoise=True, frames=4),
-    Variant(name="denoise, obscurance 1", obscurance=1, denoise=True),
+    make_variant("shadow_step 8", shadow_step=8, frames=4),
+    make_variant("shadow_step 4, unbiased", shadow_step=4, shadow_unbiased=True, frames=4),
+    make_variant("shadow_step 8, unbiased", shadow_step=8, shadow_unbiased=True),
+    make_variant("hits 1, n_r 7", hits=1, n_r=7),
+    make_variant("hits 0.5, n_r 14", hits=0.5, n_r=14, frames=4),
+    make_variant("hits 0.5, n_r 14, balance, shadow_step 4", hits=0.5, n_r=14, weights="balance", shadow_step=4),
+    make_variant("n_r 0", n_r=0),
+    make_variant("n_r 1", n_r=1),
+    make_variant("n_r 7", n_r=7),
+    make_variant("obscurance 1", obscurance=1),
+    make_variant("obscurance 10", obscurance=10),
+    make_variant("denoise", denoise=True, frames=4),
+    make_variant("denoise, obscurance 1", obscurance=1, denoise=True),
     LIGHT_REUSE,
     CAMERA_REUSE,
     SCRATCH,
@@ -81,40 +79,25 @@ VARIANTS: tuple[Variant, ...] = (
 
 
 def variant_named(name: str) -> Variant:
-    """The variant of a name."""
-    return next(variant for variant in VARIANTS if variant.name == name)
+    """Return the variant of a name."""
+    return next(one for one in VARIANTS if one.name == name)
 
 
 def job_named(name: str, quick: bool) -> Job:
-    """One of the jobs that come with the project, smaller for a quick run."""
+    """Read a job of the project, with smaller images for a quick run."""
     job = read_job(ROOT / "jobs" / f"{name}.toml")
     return with_resolution(job, QUICK_RESOLUTION) if quick else job
 
 
 def with_resolution(job: Job, resolution: tuple[int, int]) -> Job:
-    """The same job at another resolution."""
+    """Return the job at another resolution."""
     return job.model_copy(update={"camera": job.camera.model_copy(update={"resolution": resolution})})
 
 
-def varied(case: Case, variant: Variant) -> Case:
-    """The same job made another way; every frame counts as an interior one of its path."""
-    settings = replace(
-        case.settings,
-        n_r=variant.n_r,
-        weights="balance" if variant.balance else "average",
-        hits=variant.hits,
-        obscurance=variant.obscurance,
-        shadow_step=variant.step,
-        shadow_unbiased=variant.unbiased,
-        denoise=variant.denoise,
-    )
-    return with_settings(case, settings)
-
-
 def parts_of(case: Case, variant: Variant) -> list[Case]:
-    """The cases that one run of a variant consists of: one, or one a light position where each image has its own."""
-    changed = varied(case, variant)
-    if not variant.one_light:
+    """Return the cases of one run of a variant: one, or one per light position where images share no lights."""
+    changed = with_settings(case, variant.settings)
+    if not variant.settings.one_light:
         return [changed]
     n = case.setup.lights.n_lights
-    return [under(changed, [min(int(share * n), n - 1)]) for share in PLACES_OF_LIGHT]
+    return [with_lights(changed, [min(int(share * n), n - 1)]) for share in PLACES_OF_LIGHT]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bench.core.cases import Case, Variant, job_named, opened, under, varied, with_resolution
+from bench.core.cases import USUAL_SETTINGS, Case, job_named, open_case, with_lights, with_resolution, with_settings
 from bench.core.frames import frames
 from bench.core.machine import busy
 from bench.core.results import Table
@@ -118,11 +118,11 @@ def measure(name: str, camera: str, plan: Plan) -> Table:
     started, sums = time.perf_counter(), Sums()
     job = job_named(name, False)
     job = with_resolution(job, plan.resolution) if plan.resolution else job
-    with opened(job) as case:
+    with open_case(job) as case:
         cameras = [round(place * case.setup.n_frames) for place in plan.places]
         lights = [int(share * case.setup.lights.n_lights) for share in LIGHTS]
         for c in cameras:
-            _add_frame(under(case, lights), c, camera, plan, sums)
+            _add_frame(with_lights(case, lights), c, camera, plan, sums)
             tell(f"{name}, {camera}: camera {c}: {time.perf_counter() - started:.0f} s")
     return {
         "cameras": cameras,
@@ -158,7 +158,7 @@ def reference(case: Case, cams: Cameras, parts: int) -> tuple[Float32, tuple[Flo
     Returns:
         (parts, n_lights, h, w, 3), and normal, depth and reflectivity, see `Layers`.
     """
-    changed = seen_by(varied(case, Variant(name="reference", n_r=0, hits=PART_HITS)), cams)
+    changed = seen_by(with_settings(case, replace(USUAL_SETTINGS, n_r=0, hits=PART_HITS)), cams)
     seeds = range(SEEDS["reference"], SEEDS["reference"] + parts)
     made = frames(changed, MIDDLE, seeds, layers=True)
     layers = made[0].layers
@@ -171,7 +171,7 @@ def runs(case: Case, cams: Cameras, weights: str, hits: int, seeds: Sequence[int
 
     Also the hits of a pixel, (h, w): their mean over those that it has where every eye of the window sees it.
     """
-    changed = seen_by(varied(case, Variant(name=weights, n_r=N_R, hits=hits, balance=weights == "balance")), cams)
+    changed = seen_by(with_settings(case, replace(USUAL_SETTINGS, n_r=N_R, hits=hits, weights=weights)), cams)
     made = frames(changed, MIDDLE, seeds)
     share = np.mean([one.hits for one in made], axis=0) / ((2 * N_R + 1) * hits)
     return np.stack([one.images for one in made]), share.reshape(cams.height, cams.width)
@@ -181,12 +181,12 @@ def costs(name: str, plan: Plan) -> Table:
     """Time an image of a job in its steady state, under all of its lights, by weights and hits."""
     rows, shares = [], []
     job = job_named(name, False)
-    with opened(with_resolution(job, plan.resolution) if plan.resolution else job) as case:
+    with open_case(with_resolution(job, plan.resolution) if plan.resolution else job) as case:
         for hits in plan.hits:
             found: dict[str, list[Table]] = {weights: [] for weights in WEIGHTS}
             for place in TIMED_PLACES:  # in turn, so that what else the machine does meets both
                 for weights in WEIGHTS:
-                    way = varied(case, Variant(name=weights, n_r=N_R, hits=hits, balance=weights == "balance"))
+                    way = with_settings(case, replace(USUAL_SETTINGS, n_r=N_R, hits=hits, weights=weights))
                     found[weights].append(steady(way, TIMED_FRAMES, place=place).table())
             shares.append(busy())
             for weights, tables in found.items():

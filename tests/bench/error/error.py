@@ -18,10 +18,10 @@ from bench.core.cases import (
     Case,
     Variant,
     job_named,
-    opened,
+    open_case,
     parts_of,
-    under,
-    varied,
+    with_lights,
+    with_settings,
 )
 from bench.core.frames import frame
 from bench.core.machine import busy
@@ -31,7 +31,7 @@ from bench.speed.speed import tell
 from framearray_cli.array.images.images import ImageFormat, read_image, write_image
 from framearray_cli.base.arrays import Images
 from framearray_cli.report.metrics import errors, rmse, shadow_edges, squared_bias
-from framearray_cli.report.reference import PASSES, Reference, noise, reference
+from framearray_cli.report.reference import PASSES, Reference, make_reference, reference_noise
 
 PLACE = 0.4  # of the camera path, where two frames in a row are looked at
 LIGHTS = (1 / 8, 3 / 8, 5 / 8, 7 / 8)  # of the light path
@@ -56,21 +56,21 @@ FORMATS = {
 
 def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = VARIANTS) -> Table:
     """Compare every variant of a job with references; `folder` keeps these."""
-    with opened(job_named(name, quick)) as case:
+    with open_case(job_named(name, quick)) as case:
         n_lights = case.setup.lights.n_lights
         l = [min(int(share * n_lights), n_lights - 1) for share in LIGHTS]
         frames = [round(PLACE * case.setup.n_frames) + step for step in (0, 1)]
         references = []
         for c in frames:
             started = time.perf_counter()
-            references.append(reference(case, c, l, folder, 4 if quick else PASSES))
+            references.append(make_reference(case, c, l, folder, 4 if quick else PASSES))
             tell(f"{name}: reference of camera {c}: {time.perf_counter() - started:.0f} s")
         found: dict[str, Table] = {}
         exact = [images(case, FRAME_ARRAY, c, l, SEEDS[0]) for c in frames]
         for variant in variants:
-            if variant in (SCRATCH, CAMERA_REUSE):  # the same pictures as light reuse alone and the frame array
+            if variant in (SCRATCH, CAMERA_REUSE):  # the same pictures as light reuse only and the frame array
                 continue
-            if variant.denoise and find_spec("pyoidn") is None:
+            if variant.settings.denoise and find_spec("pyoidn") is None:
                 tell(f"{name}: {variant.name} is left out: Open Image Denoise is not installed")
                 continue
             pairs = [(images(case, variant, c, l, SEEDS[0]), images(case, variant, c, l, SEEDS[1])) for c in frames]
@@ -85,7 +85,7 @@ def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = 
             "cameras": frames,
             "lights": l,
             "hits": 2 * references[0].hits,
-            "noise": noise(references, case, l),
+            "noise": reference_noise(references, case, l),
             "variants": found,
             "formats": containers(case, frames[0], l),
             "busy": busy(),
@@ -94,9 +94,13 @@ def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = 
 
 def images(case: Case, variant: Variant, c: int, l: Sequence[int], seed: int) -> Images:
     """Frame c made by a variant, under light positions l."""
-    changed = varied(case, variant) if not variant.one_light else under(varied(case, variant), l)
+    changed = (
+        with_settings(case, variant.settings)
+        if not variant.settings.one_light
+        else with_lights(with_settings(case, variant.settings), l)
+    )
     out = frame(changed, c, seed).images
-    return out if variant.one_light else np.ascontiguousarray(out[list(l)])
+    return out if variant.settings.one_light else np.ascontiguousarray(out[list(l)])
 
 
 def compare(
@@ -147,9 +151,7 @@ def added(
 
     That is what fewer shadow rays add; 0 where more than the shadows differ, as noise would be all there is.
     """
-    if replace(variant, step=1, unbiased=False, name="", frames=0, floor=False, writes=False) != replace(
-        FRAME_ARRAY, name="", frames=0, floor=False, writes=False
-    ):
+    if replace(variant.settings, shadow_step=1, shadow_unbiased=False) != FRAME_ARRAY.settings:
         return 0.0
     shares = []
     for pair, other, wanted in zip(pairs, exact, references, strict=True):

@@ -6,7 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.core.cases import Case, Variant, job_named, opened, under, varied, with_resolution
+from bench.core.cases import (
+    Case,
+    Variant,
+    job_named,
+    make_variant,
+    open_case,
+    with_lights,
+    with_resolution,
+    with_settings,
+)
 from bench.core.frames import frame
 from bench.core.markdown import grid, number, percent
 from bench.core.results import DOCS, Table
@@ -16,14 +25,14 @@ from framearray_cli.engine.frames.records import BY_SAMPLE
 from framearray_cli.engine.images.standard_error import square_mean, standard_error
 from framearray_cli.render.prepare import FEWEST_SPLIT
 from framearray_cli.report.metrics import rmse
-from framearray_cli.report.reference import HITS, PASSES, Reference, reference
+from framearray_cli.report.reference import HITS, PASSES, Reference, make_reference
 
 RESOLUTION = (160, 120)
 PLACES = (0.25, 0.6)  # of the camera path
 LIGHTS = (1 / 6, 1 / 2, 5 / 6)  # of the light path
 SEED = 303
 TRIED = tuple(
-    Variant(name=f"{weights}, n_r {n_r}, hits {hits:g}", n_r=n_r, hits=hits, balance=weights == "balance")
+    make_variant(f"{weights}, n_r {n_r}, hits {hits:g}", n_r=n_r, hits=hits, weights=weights)
     for n_r, weights, counts in (
         (0, "average", (2, 8, 32, 224)),
         (3, "average", (0.5, 1, 2, 8, 32)),
@@ -57,13 +66,13 @@ for every light position.
 def measure(name: str, folder: Path) -> list[Table]:
     """For each setting, camera and light position: what is told, and what is true."""
     rows: list[Table] = []
-    with opened(with_resolution(job_named(name, False), RESOLUTION)) as whole:
+    with open_case(with_resolution(job_named(name, False), RESOLUTION)) as whole:
         n_lights = whole.setup.lights.n_lights
         l = [min(int(share * n_lights), n_lights - 1) for share in LIGHTS]
-        case = under(whole, l)
+        case = with_lights(whole, l)
         for place in PLACES:
             c = round(place * case.setup.n_frames)
-            wanted = reference(whole, c, l, folder, PASSES)
+            wanted = make_reference(whole, c, l, folder, PASSES)
             for variant in TRIED:
                 rows += [{"job": name, "variant": variant.name, **row} for row in compare(case, variant, c, wanted)]
                 tell(f"{name}, camera {c}, {variant.name}: told {rows[-1]['told']:.2%}, true {rows[-1]['true']:.2%}")
@@ -72,8 +81,9 @@ def measure(name: str, folder: Path) -> list[Table]:
 
 def compare(case: Case, variant: Variant, c: int, wanted: Reference) -> list[Table]:
     """Each image of frame c made by a variant: what it tells, and how far it is from the reference."""
-    setup = varied(case, variant).setup
-    halves = BY_SAMPLE if variant.hits >= FEWEST_SPLIT or variant.n_r == 0 else frames_per_turn(variant.hits)
+    setup = with_settings(case, variant.settings).setup
+    native, n_r = variant.settings.hits, variant.settings.n_r
+    halves = BY_SAMPLE if native >= FEWEST_SPLIT or n_r == 0 else frames_per_turn(native)
     made = frame(replace(case, setup=replace(setup, halves=halves)), c, SEED)
     assert made.differences is not None
     hits = made.hits.reshape(made.images.shape[1:3])

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.core.cases import SCRATCH, Case, job_named, opened
+from bench.core.cases import SCRATCH, Case, job_named, open_case
 from bench.core.machine import busy
 from bench.core.results import Table
 
@@ -25,7 +25,7 @@ def measure(name: str, quick: bool) -> Table:
         import bpy
     except ImportError:
         return {"skipped": "Blender's module is not installed (pip install bpy)"}
-    with opened(job_named(name, quick)) as case:
+    with open_case(job_named(name, quick)) as case:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         camera, lamps = _scene(bpy, case)
         shares, spent = [busy()], []
@@ -84,7 +84,7 @@ def _scene(bpy: Any, case: Case) -> tuple[Any, list[Any]]:
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = cams.width, cams.height
     scene.render.use_persistent_data = True
-    scene.cycles.device, scene.cycles.samples = "CPU", int(SCRATCH.hits)
+    scene.cycles.device, scene.cycles.samples = "CPU", int(SCRATCH.settings.hits)
     scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
     return camera, lamps
 

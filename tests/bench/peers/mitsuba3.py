@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.core.cases import SCRATCH, Case, job_named, opened, under, varied
+from bench.core.cases import SCRATCH, Case, job_named, open_case, with_lights, with_settings
 from bench.core.machine import busy
 from bench.core.results import Table
 from bench.core.steady import steady
@@ -22,7 +22,7 @@ from bench.speed.speed import FORMATS, WRITTEN
 from framearray_cli.array.images.images import write_image
 from framearray_cli.engine.terms.obscurance import FALLOFFS
 
-HITS, RAYS = int(SCRATCH.hits), SCRATCH.obscurance
+HITS, RAYS = int(SCRATCH.settings.hits), SCRATCH.settings.obscurance
 PLACES = ((0.25, 1 / 6), (0.5, 1 / 2), (0.75, 5 / 6))  # of the camera path and of the light path
 
 
@@ -35,7 +35,7 @@ def measure(name: str, quick: bool) -> Table:
     if sys.platform == "linux" and "llvm_ad_rgb" not in mi.variants():
         return {"skipped": "this Mitsuba has no LLVM variant"}
     mi.set_variant("llvm_ad_rgb")
-    with opened(job_named(name, quick)) as case:
+    with open_case(job_named(name, quick)) as case:
         if case.setup.obscurance.falloff != FALLOFFS["sqrt"]:
             return {"skipped": "the integrator knows the falloff sqrt alone"}
         image = integrator(mi, case)
@@ -52,7 +52,7 @@ def measure(name: str, quick: bool) -> Table:
                     write_image(Path(folder) / f"{i}-{c}-{l}.exr", made, FORMATS[WRITTEN])
                     written.append(time.perf_counter() - started)
                 shares.append(busy())
-        ours = steady(under(varied(case, SCRATCH), [where[0][1]]), 1, place=PLACES[0][0])
+        ours = steady(with_lights(with_settings(case, SCRATCH.settings), [where[0][1]]), 1, place=PLACES[0][0])
         return {
             "version": mi.__version__,
             "ms": 1e3 * float(np.median(spent)),

@@ -9,6 +9,8 @@ from bench.core.results import Table
 
 from .speed import FORMATS, WRITTEN
 
+SCRATCH_HITS, SCRATCH_RAYS = SCRATCH.settings.hits, SCRATCH.settings.obscurance
+
 HEAD = """
 # Speed
 
@@ -79,7 +81,7 @@ shadows are tested at every light position if nothing else is said. Everything i
 time at another place of the camera path; figures are medians.
 
 - *From scratch*: every image alone, by the same kernels and packets, with as many native hits a pixel as a pixel of
-  the frame array rests on: {SCRATCH.hits}, with {SCRATCH.obscurance} obscurance rays each. Columns say how many
+  the frame array rests on: {SCRATCH_HITS}, with {SCRATCH_RAYS} obscurance rays each. Columns say how many
   times as long that takes.
 - *Floor*: the rays of one frame, recorded and replayed through Embree packets on all cores; nothing but Embree's own
   calls is timed. Packets are those that the program makes, idle lanes and all.
@@ -199,10 +201,10 @@ def peers(speed: Mapping[str, Table], mitsuba: Mapping[str, Table], cycles: Mapp
     head = ["", "ms", "to the frame array", "written, ms", "to the frame array, written", "means differ by"]
     about = f"""
 - *Mitsuba*, LLVM backend: a small integrator of the same model on the same triangles, every image from scratch,
-  {SCRATCH.hits} x (1 eye ray + {SCRATCH.obscurance} obscurance rays + 1 shadow ray) a pixel. It is spared mirrors,
+  {SCRATCH_HITS} x (1 eye ray + {SCRATCH_RAYS} obscurance rays + 1 shadow ray) a pixel. It is spared mirrors,
   alpha masks, interpolated normals and texture filtering. The last column compares the mean of one image with the
   program's own.
-- *Cycles*, on the processor: path tracing with {SCRATCH.hits} samples a pixel, not denoised; another model, so another
+- *Cycles*, on the processor: path tracing with {SCRATCH_HITS} samples a pixel, not denoised; another model, so another
   picture. It takes materials and lights as they are, textures as their mean colour, and no mirrors.
 """
     return ["## Other programs", about, *([grid(head, rows)] if rows else []), "\n".join(why)]

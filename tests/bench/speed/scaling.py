@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.core.cases import FRAME_ARRAY, QUICK_RESOLUTION, Case, job_named, opened, varied
+from bench.core.cases import FRAME_ARRAY, QUICK_RESOLUTION, Case, job_named, open_case, with_settings
 from bench.core.machine import busy, describe
 from bench.core.results import Table
 from bench.core.rooms import room
@@ -37,8 +37,8 @@ def measure(quick: bool) -> Table:
     """All sweeps: name -> rows of sizes and what they cost."""
     shares = [busy()]
     found: Table = {"machine": describe(), "job": JOB, "resolution": list(QUICK_RESOLUTION if quick else (400, 300))}
-    with opened(job_named(JOB, quick)) as case:
-        base = varied(case, FRAME_ARRAY)
+    with open_case(job_named(JOB, quick)) as case:
+        base = with_settings(case, FRAME_ARRAY.settings)
         for name, sweep in (("lights", _lights), ("n_r", _n_r), ("threads", _threads), ("cameras", _cameras)):
             found[name] = sweep(base, quick)
             shares.append(busy())
@@ -102,7 +102,7 @@ def _between(values: Float32, at: Float64, axis: int) -> Float32:
 
 
 def _n_r(case: Case, quick: bool) -> list[Table]:
-    return [_row(varied(case, replace(FRAME_ARRAY, n_r=n_r)), quick, n_r=n_r) for n_r in N_R]
+    return [_row(with_settings(case, replace(FRAME_ARRAY.settings, n_r=n_r)), quick, n_r=n_r) for n_r in N_R]
 
 
 def _threads(case: Case, quick: bool) -> list[Table]:
@@ -151,7 +151,7 @@ def _triangles(quick: bool) -> list[Table]:
             setup, ambient = plan_work(prepared, embree)
             settings = Settings.of(prepared.job)
             planned = Case(prepared=prepared, embree=embree, setup=setup, ambient=ambient, settings=settings)
-            case = varied(planned, FRAME_ARRAY)
+            case = with_settings(planned, FRAME_ARRAY.settings)
             row = _row(case, quick, triangles=len(prepared.scene.corners))
         rows.append({**row, "scene_s": scene_seconds, "embree_s": built})
     return rows

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 
-from bench.core.cases import VARIANTS, Case, Variant, job_named, opened, parts_of
+from bench.core.cases import VARIANTS, Case, Variant, job_named, open_case, parts_of
 from bench.core.machine import describe, quiet
 from bench.core.markdown import total
 from bench.core.results import Table, median
@@ -39,7 +39,7 @@ def measure(
     timed = [v for v in variants if v.frames and not (v.denoise and find_spec("pyoidn") is None)]
     found: dict[str, list[Table]] = {variant.name: [] for variant in timed}
     shares: list[float] = []
-    with opened(job_named(name, quick)) as case:
+    with open_case(job_named(name, quick)) as case:
         for place in places_of(1 if quick else runs):
             for variant in timed:
                 shares.append(quiet(patience))
