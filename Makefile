@@ -1,21 +1,21 @@
-# Every target sets up what it needs in .venv first. `make` alone explains itself.
+# Every target sets up what it needs in .venv first. `make` without a target lists them.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 JOB := jobs/kitchen-small.toml
 OUT := out/kitchen-small
-# Side by side, a process for each core; neighbours in one process, as they share what they set up
+# One process per core; neighbours share a process and its fixtures
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 
 .DEFAULT_GOAL := help
 .PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-scaling bench-bias bench-ambient bench-report bench-view fuzz clean
 
-help: ## Show this list
+help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
 $(VENV)/installed: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
-		{ echo "framearray needs Python 3.11 or newer; say make PYTHON=python3.12, for example"; exit 1; }
+		{ echo "framearray needs Python 3.11 or newer: run make PYTHON=python3.12, for example"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[movie]'
 	@touch $@
@@ -31,7 +31,7 @@ $(VENV)/installed-bench: $(VENV)/installed
 
 install: $(VENV)/installed ## Set up the program in .venv
 
-render: $(VENV)/installed ## Render a small kitchen and cut a movie out of it
+render: $(VENV)/installed ## Render a small kitchen and assemble a movie
 	$(BIN)/framearray render $(JOB)
 	$(BIN)/framearray assemble $(OUT) jobs/first-movie.toml --output $(OUT)/first-movie.mp4
 	@echo "pictures: $(OUT)   movie: $(OUT)/first-movie.mp4"
@@ -39,7 +39,7 @@ render: $(VENV)/installed ## Render a small kitchen and cut a movie out of it
 test: $(VENV)/installed-dev ## Run the tests
 	$(PYTEST)
 
-# Embree by its own setting, numba by a processor that has no more
+# Limit Embree by its own setting, numba by the processor it compiles for
 test-avx2: $(VENV)/installed-dev ## Run the tests with no instructions beyond AVX2
 	FRAMEARRAY_EMBREE=isa=avx2 NUMBA_CPU_NAME=x86-64-v3 NUMBA_CPU_FEATURES=+avx2 $(PYTEST)
 
@@ -62,13 +62,13 @@ check: $(VENV)/installed-dev ## Check format, style and types
 docs: $(VENV)/installed-dev ## Write the generated pages of docs/
 	$(BIN)/python -m framearray_cli.job.docs docs/guide/
 
-bench: $(VENV)/installed-bench ## Measure what an image costs, and write docs/measured/speed.md
+bench: $(VENV)/installed-bench ## Measure the cost per image, and write docs/measured/speed.md
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)
 
 bench-scaling: $(VENV)/installed-bench ## Measure time against the size of a job, for docs/measured/speed.md
 	PYTHONPATH=tests $(BIN)/python -m bench scaling $(BENCH)
 
-bench-bias: $(VENV)/installed-bench ## Measure what reuse is off by with both kinds of weights, and write docs/measured/bias.md
+bench-bias: $(VENV)/installed-bench ## Measure the bias of reuse with both kinds of weights, and write docs/measured/bias.md
 	PYTHONPATH=tests $(BIN)/python -m bench bias $(BENCH)
 
 bench-ambient: $(VENV)/installed-bench ## Measure the ambient estimate against path tracing, and write docs/measured/ambient.md
@@ -80,8 +80,8 @@ bench-report: $(VENV)/installed-bench ## Measure speed against error of the thre
 bench-view: $(VENV)/installed-bench ## Measure the page of `framearray view` in Chromium
 	PYTHONPATH=tests $(BIN)/python -m bench view $(BENCH)
 
-fuzz: $(VENV)/installed-dev ## Hand broken files to the program, for ten minutes
+fuzz: $(VENV)/installed-dev ## Feed broken files to the program, for ten minutes
 	PYTHONPATH=tests $(BIN)/python -m fuzz $(FUZZ)
 
-clean: ## Remove what was built and rendered
+clean: ## Remove all builds and renders
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache

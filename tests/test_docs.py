@@ -151,7 +151,7 @@ def test_references_are_listed():
 
 
 def box(file: Path) -> None:
-    """A room of 4 x 2.5 x 6 that README's eyes and lamps are in, with a table."""
+    """Write a room of 4 x 2.5 x 6 around README's eyes and lamps, with a table."""
     corners, faces = [], []
     for low, high in (([-2, 0, -3], [2, 2.5, 3]), ([-0.5, 0, -0.5], [0.5, 0.7, 0.5])):
         first = len(corners)
@@ -165,7 +165,7 @@ def box(file: Path) -> None:
 
 
 def readme_files() -> dict[str, str]:
-    """The files that README tells to save: name -> the TOML block after it."""
+    """Return the files that README asks to save: name -> the TOML block after it."""
     return dict(re.findall(r"`(\w+\.toml)`[^`]*```toml\n(.*?)```", text(ROOT / "README.md"), re.DOTALL))
 
 
@@ -175,7 +175,7 @@ def readme_commands() -> list[str]:
 
 
 def test_the_example_of_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Its files are saved, and its commands typed, as they stand there."""
+    """Save its files and run its commands as they are."""
     files, commands = readme_files(), readme_commands()
     assert list(files) == ["room.toml", "walk.toml"]
     assert [command.split()[1] for command in commands] == ["check", "render", "assemble"]

@@ -1,4 +1,4 @@
-"""The package's shape: rooms import only what their table allows, each library has one door, files stay small."""
+"""The shape of the package: rooms import only what their table allows, each library has one door, files are small."""
 
 import ast
 import re
@@ -18,7 +18,7 @@ GRAPH = import_graph(PACKAGE)
 
 MOST_ENTRIES = 12  # at the top of the package
 
-# Which files may import a library; what is not here may be imported anywhere.
+# The files that may import a library; every file may import a library that is not listed.
 DOORS = {
     "embreex": ("engine/embree/",),
     "llvmlite": ("engine/embree/", "engine/kernels/"),
@@ -41,7 +41,7 @@ DOORS = {
     "pvlib": ("scene/paths/sun",),
     "distributed": ("render/parts/",),
 }
-# What takes long to import, or may be absent: `framearray --help` does without.
+# Libraries that load slowly or may be absent: `framearray --help` does without.
 HEAVY = (
     "numba",
     "llvmlite",
@@ -88,9 +88,9 @@ def test_the_table_gives_an_order() -> None:
 
 
 @pytest.mark.parametrize("name", ROOMS)
-def test_a_room_says_its_purpose_as_the_table_does(name: str) -> None:
-    said = ast.get_docstring(TREES[f"{name}/__init__"]) or ""
-    assert said.splitlines()[0] == f"{ROOMS[name][0]}."
+def test_a_room_states_its_purpose_as_the_table_does(name: str) -> None:
+    docstring = ast.get_docstring(TREES[f"{name}/__init__"]) or ""
+    assert docstring.splitlines()[0] == f"{ROOMS[name][0]}."
 
 
 def test_rooms_import_what_the_table_allows() -> None:
@@ -102,7 +102,7 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
 
 
 def test_an_import_against_the_table_is_seen(tmp_path: Path) -> None:
-    """The test of rooms can fail: one more import, in whatever form, inside a function too."""
+    """The test of rooms can fail: one more import, in any form, also inside a function."""
     for text in (
         "from framearray_cli.render.render import render\n",
         "from ..render import render\n",
@@ -131,13 +131,13 @@ def test_a_circle_inside_a_room_is_seen(tmp_path: Path) -> None:
 
 
 def test_imports_are_seen() -> None:
-    """What the tests above look for is there to be found, in both forms of import."""
+    """The graph holds imports of both forms."""
     assert {"engine/loop", "array/record", "render/writer"} <= GRAPH["render/render"]
     assert {"embreex", "ctypes"} <= libraries(FILES["engine/embree/native"])
 
 
 def test_inside_a_room_imports_are_relative_and_between_rooms_absolute() -> None:
-    """So that a line that begins with the package's name is a door between rooms."""
+    """A line that begins with the package's name is then a door between rooms."""
     wrong = []
     for module, tree in TREES.items():
         for node in ast.walk(tree):

@@ -1,4 +1,4 @@
-"""Signal handlers that the command line sets are put back after each test; tests mean the same under `nohup`."""
+"""Restore the signal handlers that the command line sets after each test, also under `nohup`."""
 
 import signal
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SI
 
 @pytest.fixture(autouse=True)
 def _signals() -> Iterator[None]:
-    if hasattr(signal, "SIGHUP"):  # what is ignored here would be ignored by every program that a test starts
+    if hasattr(signal, "SIGHUP"):  # every program that a test starts would inherit an ignored signal
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
     before = [(number, signal.getsignal(number)) for number in SIGNALS]
     yield

@@ -1,4 +1,4 @@
-"""Jobs that leave n_r and hits open: what `render` and `check` choose is printed, stored, and the same every time."""
+"""Jobs with automatic n_r and hits: `render` and `check` print the choice, store it, and make it again every time."""
 
 import re
 import tomllib
@@ -40,7 +40,7 @@ def test_a_choice_is_printed_and_stored(tmp_path, capsys):
 
 
 def test_the_numbers_that_were_chosen_give_the_same_array(tmp_path, capsys):
-    """Whatever the threads; and a job that says them finds its own array in the folder."""
+    """With any number of threads; a job with these numbers recognises its own array in the folder."""
     assert run(capsys, "render", "-q", write_job(tmp_path, **BOTH)).code == 0
     stored, first = manifest(tmp_path / "out"), images(tmp_path / "out")
     numbers = {"reuse": {"n_r": stored["job"]["reuse"]["n_r"]}, "samples": {"hits": stored["job"]["samples"]["hits"]}}

@@ -1,4 +1,4 @@
-"""`render --dask`: workers that somebody started, which die, lack something, or lose their scheduler."""
+"""`render --dask`: workers that the user started, which die, lack libraries, or lose their scheduler."""
 
 import json
 import os
@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from support.handed import JOB, N, begun_again, finished, same
+from support.handed import JOB, N, finished, restarted, same
 from support.program import PACKAGE_PARENT, finish, is_prompt, start, wait_for, write_job
 
 import framearray_cli
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 ther
 
 
 class Cluster:
-    """A scheduler of its own process, and workers that are started one by one, without anybody who replaces them."""
+    """A scheduler in a process, and workers that tests start one by one and nothing replaces."""
 
     def __init__(self, folder: Path) -> None:
         self._file, self._log = folder / "scheduler.json", (folder / "log").open("wb")
@@ -38,7 +38,7 @@ class Cluster:
         command = [sys.executable, "-m", f"distributed.cli.dask_{what}", "--scheduler-file", str(self._file), *options]
         path = os.pathsep.join([str(python_path), os.environ.get("PYTHONPATH", "")])
         environment = os.environ | {"PYTHONPATH": path}
-        # Python looks for modules where it is started, first of all
+        # Python looks for modules first in the folder where it starts
         return subprocess.Popen(command, stdout=self._log, stderr=self._log, env=environment, cwd=self._file.parent)
 
     def start_worker(self, python_path: Path = PACKAGE_PARENT) -> subprocess.Popen[bytes]:
@@ -66,15 +66,15 @@ def cluster(folder: Path, workers: int = 2) -> Iterator[Cluster]:
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a job, and with its array rendered in one run."""
+    """Return a folder with a job and its array, rendered in one run."""
     folder = tmp_path_factory.mktemp("dask")
     job = write_job(folder, **JOB)
     assert finish(start("render", "-q", job, "-o", folder / "whole")).code == 0
     return folder
 
 
-def test_a_worker_that_dies_is_not_missed(place, tmp_path):
-    """The other one renders the rest; then one comes that was not there at the beginning."""
+def test_other_workers_take_over_from_one_that_dies(place, tmp_path):
+    """The other one renders the rest; then one joins that was not there at the start."""
     out = tmp_path / "out"
     with cluster(tmp_path) as dask:
         process = start("render", "-q", place / "job.toml", "--dask", dask.address, "--chunk", 4, "-o", out)
@@ -86,7 +86,7 @@ def test_a_worker_that_dies_is_not_missed(place, tmp_path):
     assert same(out, place / "whole")
     times = finished(out)
     assert len(times) == N and set(times.values()) == {1}
-    assert sum(begun_again(out).values()) <= 1
+    assert sum(restarted(out).values()) <= 1
     assert not list((out / "records").glob(".parts-*"))
 
 
@@ -128,7 +128,7 @@ def test_a_scheduler_that_goes_away(place, tmp_path):
 
 @pytest.mark.slow
 def test_a_worker_without_the_program(place, tmp_path):
-    """Something of that name is installed there, of another version."""
+    """The worker has another version of the package."""
     (tmp_path / "old/framearray_cli").mkdir(parents=True)
     (tmp_path / "old/framearray_cli/__init__.py").write_text('__version__ = "0.0.1"\n')
     with cluster(tmp_path, workers=1) as dask:
@@ -140,7 +140,7 @@ def test_a_worker_without_the_program(place, tmp_path):
     assert len(result.err.splitlines()) == 1
 
 
-def test_what_says_that_the_program_is_not_there():
+def test_errors_that_mean_a_missing_program():
     from framearray_cli.render.parts.queue import lacks_program
 
     words = RuntimeError("Error during deserialization of the task")

@@ -1,4 +1,4 @@
-"""Disks that are full or cannot be written to, also for what is printed."""
+"""Disks that are full or read-only, also as standard output."""
 
 import os
 import shutil
@@ -16,7 +16,7 @@ FULL = Path("/dev/full")
 
 @pytest.fixture
 def disk(tmp_path: Path) -> Iterator[Path]:
-    """A disk of 2 MB."""
+    """Mount a disk of 2 MB."""
     folder = tmp_path / "disk"
     folder.mkdir()
     mount = shutil.which("mount")
@@ -47,11 +47,11 @@ def test_a_disk_that_becomes_full(file_format, disk, tmp_path):
     assert lines[2].startswith(f"{images} of {3 * N} images were written to {out}; ")
     summary = tomllib.loads((out / "manifest.toml").read_text())["summary"]
     assert summary["finished"] is False
-    # where no space is left for a new manifest the one from the start stays
+    # without space for a new manifest the one from the start stays
     assert summary["images"] % 3 == 0 and summary["images"] <= images
 
 
-N = 20  # with three lights and layers more than the disk holds
+N = 20  # frames; with three lights and layers more than the disk holds
 
 
 def test_a_render_goes_on_once_there_is_space(disk, tmp_path):

@@ -1,4 +1,4 @@
-"""How errors end a command: what is printed, and the exit code; the same for all commands."""
+"""How errors end a command: message and exit code, the same for all commands."""
 
 import importlib
 
@@ -39,7 +39,7 @@ def test_errors_end_all_commands_alike(command: str, error: BaseException, lines
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_job_error_lists_its_problems_and_what_came_of_them(command: str) -> None:
+def test_a_job_error_lists_its_problems_and_their_outcome(command: str) -> None:
     outcome = "written" if command in ("assemble", "init", "export", "sheet") else "rendered"
     one = ending(JobError("a.toml", ["x: expected\ny"]), command)
     assert one == (["a.toml: x: expected\\ny", f"1 problem; nothing was {outcome}."], 2)

@@ -1,4 +1,4 @@
-"""What `check` foretells, against what `render` takes."""
+"""The estimates of `check` against the measurements of `render`."""
 
 import os
 import re
@@ -57,7 +57,7 @@ def test_memory_and_disk(changes, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("camera", [WALK | {"frames": 24}, REST | {"frames": 120}], ids=["walk", "rest"])
 def test_time(camera, tmp_path):
-    """The best of five: others may use the machine while either of the two runs."""
+    """Take the best of five: others may use the machine during either of the two."""
     file = job(tmp_path, camera=camera, reuse={"n_r": 2})
     run("check", file)  # compiles
     ratios = []

@@ -1,4 +1,4 @@
-"""A disk that fails in ways that cannot be had for real here: a C library makes calls that write return an error.
+"""A disk with simulated faults: a C library makes calls that write return an error.
 
 `tests/cli/faults.c` stands between the program and the system's own functions.
 """
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux" or not shutil.which("cc"
 
 N = 8
 WALK = tiny.WALK | {"frames": N, "resolution": [60, 45]}
-# Calls that write in an unbroken render, at least; those that OpenEXR makes are not seen, the renaming of its files is.
+# Minimum number of calls that write in a whole render; the library sees OpenEXR rename its files, but not write them.
 CALLS = {"exr": 50, "png": 85}
 
 
@@ -37,7 +37,7 @@ def contents(out: Path) -> dict[str, bytes]:
 
 
 def faulty(library: Path, number: int, after: int, out: Path, job: Path) -> Result:
-    """Render while calls that write into a folder fail, from one of them on."""
+    """Render while calls that write into a folder fail, from some call on."""
     faults = {"FAULT_FOLDER": str(out), "FAULT_AFTER": str(after), "FAULT_ERRNO": str(number)}
     with pytest.MonkeyPatch.context() as patch:
         for name, value in {"LD_PRELOAD": str(library), **faults}.items():
@@ -68,7 +68,7 @@ def fail_and_go_on(
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [errno.EIO, errno.ESTALE])
 def test_a_disk_that_fails(number, library, tmp_path, capsys):
-    """As one that is broken, or a folder of a server that has gone."""
+    """Like a broken disk, or a folder of a server that is down."""
     fail_and_go_on(library, "png", number, 30, tmp_path, capsys)
 
 

@@ -1,4 +1,4 @@
-"""A disk that becomes full at any point: one message, what is finished stays whole, and the same command goes on."""
+"""A disk that becomes full at any point: one message, finished files stay whole, and the same command continues."""
 
 import random
 import tomllib
@@ -19,8 +19,8 @@ KINDS: dict[str, dict[str, Any]] = {
     "png": {"output": {"format": "png"}},
     "groups": {"output": {"format": "exr"}, **GROUPS},
 }
-# What runs took; all else in a manifest is decided by the job.
-TOLD = ("seconds", "peak_memory", "rays", "rays_per_pixel_image")
+# Keys of the summary that differ between runs; the job decides all others.
+EFFORT = ("seconds", "peak_memory", "rays", "rays_per_pixel_image")
 
 
 @pytest.fixture
@@ -39,21 +39,21 @@ def contents(out: Path) -> dict[str, bytes]:
 
 
 def manifest(out: Path) -> dict[str, Any]:
-    """Its table, without what the machine took and where it lies."""
+    """Return the table of a manifest without times, memory and folder."""
     table = tomllib.loads((out / "manifest.toml").read_text())
-    table["summary"] = {key: value for key, value in table["summary"].items() if key not in TOLD}
+    table["summary"] = {key: value for key, value in table["summary"].items() if key not in EFFORT}
     del table["job"]["output"]["directory"]
     return table
 
 
 def whole(folder: Path, kind: str, capsys: pytest.CaptureFixture[str]) -> Path:
-    """The array that an unbroken render gives."""
+    """Render an array without interruption."""
     assert run(capsys, "render", "-q", job(folder, kind, "whole")).code == 0
     return folder / "whole"
 
 
 def check_failure(result: Result, out: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """One message; no half file under its own name, and all that is there whole."""
+    """Check that there is one message, and that all images are whole."""
     assert (result.code, result.out) == (4, "")
     first, *rest = result.err.splitlines()
     assert first.startswith(f"{out}") and first.endswith("No space left on device"), first
@@ -67,7 +67,7 @@ def check_failure(result: Result, out: Path, capsys: pytest.CaptureFixture[str])
 
 
 def fill_and_go_on(disk: SmallDisk, kind: str, space: int, right: Path, capsys: pytest.CaptureFixture[str]) -> bool:
-    """Render with little space, then with enough; whether the space was too little."""
+    """Render with little space, then with enough; return whether the space was too little."""
     out, file = disk.folder / "out", job(disk.folder.parent, kind, "disk/out")
     disk.leave(space)
     result = run(capsys, "render", "-q", file)
@@ -87,7 +87,7 @@ def fill_and_go_on(disk: SmallDisk, kind: str, space: int, right: Path, capsys: 
 
 
 def size_of(out: Path) -> int:
-    """Bytes of a disk that an array takes."""
+    """Return the bytes that an array takes on a disk."""
     return sum(-(-file.stat().st_size // PAGE) * PAGE for file in out.rglob("*") if file.is_file())
 
 
@@ -101,8 +101,8 @@ def test_a_disk_that_becomes_full_on_the_way(kind, share, disk, tmp_path, capsys
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(4))
 def test_a_disk_that_becomes_full_at_random_points(kind, seed, disk, tmp_path, capsys):
-    """Anywhere; within the first 40 KiB, where locks, the manifest and records are made; within the last, where the
-    manifest is written again.
+    """Anywhere; in the first 40 KiB, where the render makes locks, manifest and records; in the last, where it writes
+    the manifest again.
     """
     right, rng = whole(tmp_path, kind, capsys), random.Random(seed)
     most = size_of(right)

@@ -1,4 +1,4 @@
-"""Commands that read an array, and write to a disk that is full: one message, and the former file stays."""
+"""Commands that read an array and write to a full disk: one message, and the old file stays."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +10,7 @@ from support.smalldisk import PAGE, SmallDisk, mounted
 
 WALK = tiny.WALK | {"resolution": [60, 45]}
 FULL = "No space left on device"
-# What is written, and the command but for the array or job.
+# The file that a command writes, and the command without its array or job.
 FILES = {
     "movie.mp4": ["assemble", "OUT", "--walk", "-o"],
     "movie.webm": ["assemble", "OUT", "--walk", "-o"],
@@ -50,7 +50,7 @@ def array(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def words(command: list[str], array: Path, place: Path) -> list[str]:
-    """A command with its files filled in; those in lower case that end it lie on the disk."""
+    """Return a command with its files filled in; lower-case names at its end are on the disk."""
     known = {
         "OUT": array,
         "SCENE": array.parent / "tiny.glb",

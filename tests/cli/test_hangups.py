@@ -1,4 +1,4 @@
-"""A terminal that is closed, a reader that has gone, signals that come twice, or at the very end of a render."""
+"""A closed terminal, a reader that has gone, signals that come twice, or at the very end of a render."""
 
 import os
 import signal
@@ -35,7 +35,7 @@ def images(out: Path) -> int:
 
 @pytest.fixture
 def terminal() -> Iterator[tuple[int, int]]:
-    """Both ends of a terminal: the screen, and what the program sees."""
+    """Open a terminal: the screen, and the program's end."""
     screen, program = pty.openpty()
     yield screen, program
     for end in (screen, program):
@@ -44,7 +44,7 @@ def terminal() -> Iterator[tuple[int, int]]:
 
 
 def test_a_terminal_that_is_closed(terminal, tmp_path):
-    """The render ends as if it was asked to, though nobody can read why."""
+    """The render ends as after Ctrl-C, though nobody can read the message."""
     screen, program = terminal
     job = write_job(tmp_path, **LONG)
 
@@ -77,7 +77,7 @@ def test_a_terminal_that_is_closed(terminal, tmp_path):
     assert not [file for file in out.rglob(".*") if file.name != ".guard"]
 
 
-def test_nohup_is_heeded(monkeypatch):
+def test_nohup_is_obeyed(monkeypatch):
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     interrupts.listen()
     assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
@@ -131,7 +131,7 @@ def test_a_reader_that_has_gone(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_that_comes_twice(number, tmp_path):
-    """The second ends the process at once; what it left is no image, and does not disturb the next run."""
+    """The second ends the process at once; it leaves no half image, and does not disturb the next run."""
     job = write_job(tmp_path, **(LONG | {"camera": tiny.WALK | {"resolution": [80, 60], "frames": 30}}))
     out = tmp_path / "out"
     for _ in range(5):

@@ -1,4 +1,4 @@
-"""Help, version and schema; and that docs/guide/cli.md tells every command, option and exit code."""
+"""Help, version and schema; docs/guide/cli.md documents every command, option and exit code."""
 
 import inspect
 import json
@@ -17,12 +17,12 @@ COMMANDS = ["assemble", "check", "export", "init", "openjd", "render", "report",
 
 
 def section(page: str, command: str) -> str:
-    """What a page says of a command: from its heading to the next."""
+    """Return the section of a page about a command: from its heading to the next."""
     return page.split(f"\n## framearray {command}\n")[1].split("\n## ")[0]
 
 
 def options(capsys: pytest.CaptureFixture[str], command: str) -> set[str]:
-    """All options of a command, as its help lists them."""
+    """Return all options of a command, as its help lists them."""
     shown = run(capsys, command, "--help").out
     return set(re.findall(r"(?<![\w-])--?[a-z][\w-]*", shown.split("Options:")[1])) - {"--help"}
 

@@ -1,4 +1,4 @@
-"""kill -9 at random moments of a render, resumed each time: the same bytes as an unbroken one."""
+"""kill -9 at random moments of a render, resumed each time: the same bytes as an uninterrupted one."""
 
 import os
 import random
@@ -29,12 +29,12 @@ def job(folder: Path) -> Path:
 
 
 def lines(out: Path) -> int:
-    """Lines of all records: one more when a run begins to render, and one more for each frame."""
+    """Count the lines of all records: a run adds one when it starts to render, and one per frame."""
     return sum(file.read_bytes().count(b"\n") for file in out.glob("records/*.jsonl"))
 
 
 def until_it_renders(folder: Path) -> subprocess.Popen[str]:
-    """A render that has looked at what is there, and begins with the rest, if there is any."""
+    """Start a render and wait until it has read the folder and renders the rest, if there is any."""
     before = lines(folder / "out")
     process = start("render", "-q", job(folder))
     while process.poll() is None and lines(folder / "out") == before:
@@ -43,8 +43,8 @@ def until_it_renders(folder: Path) -> subprocess.Popen[str]:
 
 
 def killed_and_resumed(folder: Path, whole: dict[str, bytes], seconds: float, kills: int, seed: int) -> list[int]:
-    """Kill a job so many times, at moments spread over the time in which it writes images; whenever it comes to its
-    end it is compared, and begun anew. Returns how many images each run wrote before it was killed.
+    """Kill a job a number of times, at moments spread over the time in which it writes images. Whenever it reaches its
+    end, compare its files and start anew. Return the number of images that each killed run wrote.
     """
     rng, out, found = random.Random(seed), folder / "out", list[int]()
     while len(found) < kills:
@@ -68,9 +68,9 @@ def test_a_render_that_is_killed_ends_with_the_same_bytes(kills, tmp_path):
     for name in ("whole", "killed"):
         (tmp_path / name).mkdir()
     process = until_it_renders(tmp_path / "whole")
-    began = time.monotonic()
+    started = time.monotonic()
     assert finish(process).code == 0
-    seconds, whole = time.monotonic() - began, contents(tmp_path / "whole/out")
+    seconds, whole = time.monotonic() - started, contents(tmp_path / "whole/out")
     found = killed_and_resumed(tmp_path / "killed", whole, seconds, kills, seed=os.getpid())
     assert contents(tmp_path / "killed/out") == whole
     assert len(whole) == N * (LIGHTS + 1)  # with layers

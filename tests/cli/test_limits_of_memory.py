@@ -1,4 +1,4 @@
-"""Less memory, address space or threads than a job takes: said before anything is rendered; no process is killed."""
+"""Too little memory, address space or threads for a job: a message before the render; nothing kills a process."""
 
 import os
 import signal
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of other
 
 MIB = 2**20
 LARGE = {"camera": tiny.WALK | {"resolution": [240, 180]}, "light": {"frames": 24}, "reuse": {"n_r": 3}}
-# Renders without asking what is free: what becomes of the same job then.
+# Renders without checking the free memory, to show what happens to the same job then.
 BLIND = """
 import sys
 from framearray_cli.job.read import read_job
@@ -33,7 +33,7 @@ render.render(read_job(Path(sys.argv[1])))
 
 @pytest.fixture
 def group() -> Iterator[Path]:
-    """A control group below that of the tests."""
+    """Make a control group below that of the tests."""
     own = {line.split(":", 2)[1]: line.split(":", 2)[2] for line in Path("/proc/self/cgroup").read_text().splitlines()}
     if "memory" not in own:
         pytest.skip("no control groups of version 1 here")
@@ -50,7 +50,7 @@ def group() -> Iterator[Path]:
 
 
 def joined(group: Path, most: int) -> Callable[[], object]:
-    """What a process does first, to be bound by the group."""
+    """Return the function with which a process joins the group."""
     (group / "memory.limit_in_bytes").write_text(str(most))
     return lambda: (group / "cgroup.procs").write_text(str(os.getpid()))
 
@@ -61,8 +61,8 @@ def rendered(job: Path, out: Path, **options: object) -> Result:
     return result
 
 
-def test_a_group_that_is_too_small_is_told_beforehand(group, tmp_path):
-    """And the very job is killed where nobody asks."""
+def test_a_group_that_is_too_small_is_reported_beforehand(group, tmp_path):
+    """The same job is killed if it does not check."""
     job = write_job(tmp_path, output={"format": "exr"}, **LARGE)
     result = rendered(job, tmp_path / "out", preexec_fn=joined(group, 300 * MIB))
     assert result.code == 2
@@ -110,7 +110,7 @@ def test_a_job_that_does_not_fit_into_the_address_space(tmp_path):
 
 
 def test_threads_that_cannot_be_started(tmp_path, monkeypatch, capsys):
-    """Simulated: who runs as root has no such limit."""
+    """Simulated: root has no such limit."""
     from support.program import run
 
     from framearray_cli.cli import main as cli

@@ -1,15 +1,15 @@
-"""Names that the system refuses to look up: a message, whatever the name is for."""
+"""Names that the system refuses to look up: a message for every kind of name."""
 
 import pytest
 from support.program import names, run, write_job
 
-LONG = "x" * 300  # characters; file systems take 255
+LONG = "x" * 300  # characters; file systems allow 255
 OUT, OTHER = "out", "other.png"
 
 
 @pytest.fixture(scope="module")
 def rendered(tmp_path_factory):
-    """A folder with a job, and its frame array in `out`."""
+    """Return a folder with a job, and its frame array in `out`."""
     from framearray_cli.job.read import read_job
     from framearray_cli.render.render import render
 
@@ -46,7 +46,7 @@ def rendered(tmp_path_factory):
     ],
     ids=lambda value: " ".join(value).replace(LONG, "LONG") if isinstance(value, list) else None,
 )
-def test_a_long_name_is_told(arguments, code, rendered, capsys, monkeypatch):
+def test_a_long_name_is_reported(arguments, code, rendered, capsys, monkeypatch):
     monkeypatch.chdir(rendered)
     before = names(rendered)
     result = run(capsys, *arguments)
@@ -56,7 +56,7 @@ def test_a_long_name_is_told(arguments, code, rendered, capsys, monkeypatch):
     assert names(rendered) == before
 
 
-def test_a_long_name_in_a_job_is_told(tmp_path, capsys):
+def test_a_long_name_in_a_job_is_reported(tmp_path, capsys):
     result = run(capsys, "check", write_job(tmp_path, scene={"file": f"{LONG}.glb"}))
     assert (result.code, result.out) == (3, "")
     assert result.err.endswith(f"{LONG}.glb: cannot be read: File name too long\n")

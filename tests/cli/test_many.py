@@ -1,4 +1,4 @@
-"""Twenty thousand images in one job: neither memory nor time an image grows with what was rendered before."""
+"""Twenty thousand images in one job: neither memory nor time per image grows with the number of images."""
 
 import statistics
 import time
@@ -16,7 +16,7 @@ MEMORY_GROWTH, TIME_GROWTH = 1.02, 1.05
 
 
 class Marks(RenderEvents):
-    """Memory, and processor time since the mark before, after each block of images."""
+    """Memory, and processor time since the last mark, after each block of images."""
 
     def __init__(self) -> None:
         self.memory: list[int] = []
@@ -36,7 +36,7 @@ class Marks(RenderEvents):
 
 
 @pytest.mark.slow
-def test_memory_and_time_an_image_are_flat(tmp_path):
+def test_memory_and_time_per_image_are_flat(tmp_path):
     tiny.save_glb(tiny.room_meshes(), tmp_path / "tiny.glb")
     first, last = tiny.WALK["keys"]
     source = tiny.TABLE["light"]["sources"][0]
@@ -56,7 +56,7 @@ def test_memory_and_time_an_image_are_flat(tmp_path):
     memory = [mark / 2**20 for mark in marks.memory]
     ms = [1000 * seconds / BLOCK for seconds in marks.seconds]
     print(
-        f"MiB {memory[0]:.1f} to {memory[-1]:.1f}; processor ms an image: {', '.join(f'{value:.2f}' for value in ms)}"
+        f"MiB {memory[0]:.1f} to {memory[-1]:.1f}; processor ms per image: {', '.join(f'{value:.2f}' for value in ms)}"
     )
     assert max(memory) <= MEMORY_GROWTH * memory[0]
     assert statistics.median(ms[-4:]) <= TIME_GROWTH * statistics.median(ms[:4])

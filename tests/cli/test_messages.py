@@ -15,7 +15,7 @@ def test_exit_codes_are_those_of_the_documentation():
 
 
 @pytest.mark.parametrize("command", ["render", "check"])
-def test_problems_of_a_job_are_told_at_once(command, tmp_path, capsys):
+def test_problems_of_a_job_are_reported_at_once(command, tmp_path, capsys):
     job = write_job(tmp_path, samples={"hits": 2, "obscurence": 5}, camera={"fov": "wide"})
     result = run(capsys, command, job)
     assert result.code == 2
@@ -188,7 +188,7 @@ def test_all_problems_are_counted_at_the_end(tmp_path, capsys):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="such names are none there")
-def test_names_cannot_command_the_terminal(tmp_path, capsys, monkeypatch):
+def test_names_cannot_control_the_terminal(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = run(capsys, "check", "a\x1b[31m\u202eb\n.toml")
     assert result.err == "a\\x1b[31m\\u202eb\\n.toml: no such file\n1 problem; nothing was rendered.\n"
@@ -196,7 +196,7 @@ def test_names_cannot_command_the_terminal(tmp_path, capsys, monkeypatch):
     assert "\x1b" not in run(capsys, "check", job).err
 
 
-def test_a_long_name_of_a_material_is_told_shortly(tmp_path, capsys):
+def test_a_long_name_of_a_material_is_shortened(tmp_path, capsys):
     result = run(capsys, "check", write_job(tmp_path, scene={"materials": {"x" * 5000: {"specular": 0.5}}}))
     assert result.code == 3
     assert '"' + "x" * 100 + '...": no such material' in result.err

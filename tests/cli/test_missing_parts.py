@@ -1,4 +1,4 @@
-"""A library, an encoder or a typeface that is not there: said before anything is made."""
+"""A missing library, encoder or typeface: a message before any work."""
 
 import os
 import subprocess
@@ -14,7 +14,7 @@ from support.program import PACKAGE_PARENT, names, run, write_job
 from framearray_cli.array.images import exr as exrtiff
 from framearray_cli.tools.movie import label, video
 
-# Runs the command line where some libraries cannot be found.
+# Runs the command line with some libraries hidden.
 HIDING = """
 import sys
 import importlib.util as util
@@ -38,16 +38,16 @@ def array(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
 
 
 def hiding(library: str, *arguments: str | Path) -> tuple[int, str]:
-    """Exit code and errors of a command without a library."""
+    """Run a command without a library; return exit code and errors."""
     environment = os.environ | {"PYTHONPATH": str(PACKAGE_PARENT)}
     command = [sys.executable, "-c", HIDING, library, *map(str, arguments)]
-    errors = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
-    return errors.returncode, errors.stderr
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    return done.returncode, done.stderr
 
 
 @pytest.mark.slow
 def test_libraries_that_are_not_installed(array, tmp_path):
-    """Every extra, each where it is needed; and the one that images need."""
+    """Every extra where a command needs it, and the library that images need."""
     sun = {"type": "sun", "date": "2026-06-21", "start": "06:00", "stop": "20:00", "irradiance": 3.0}
     place = {"latitude": 52.52, "longitude": 13.405, "timezone": "Europe/Berlin"}
     sunny = write_job(tmp_path, "sun.toml", light={"frames": 2, "sources": [sun | place]})
@@ -74,7 +74,7 @@ def test_libraries_that_are_not_installed(array, tmp_path):
 @pytest.mark.parametrize(("suffix", "change"), [(".mp4", {"codec": "none"}), (".mov", {"format": "none"})])
 def test_an_encoder_that_is_missing(suffix, change, array, tmp_path, monkeypatch, capsys):
     pytest.importorskip("av")
-    (array / "tiny.c0000.l000.exr").unlink()  # not even looked for
+    (array / "tiny.c0000.l000.exr").unlink()  # not even searched
     monkeypatch.setitem(video.VIDEOS, suffix, replace(video.VIDEOS[suffix], **change))
     result = run(capsys, "assemble", array, "--light", "-o", tmp_path / f"a{suffix}")
     assert result.code == 2
@@ -110,7 +110,7 @@ def test_formats_that_a_library_was_built_without(array, tmp_path, monkeypatch, 
     monkeypatch.delattr(PIL.Image.core, "jpeg_encoder")
     monkeypatch.setitem(sys.modules, "PIL._webp", None)
     job = write_job(tmp_path, "jpg.toml", output={"format": "jpg", "directory": "other"})
-    for command, said in (
+    for command, start in (
         (["render", "-q", job], "Pillow is built without JPG here; "),
         (["sheet", array, "-o", tmp_path / "a.jpg"], "Pillow is built without JPG here; "),
         (["assemble", array, "--light", "-o", tmp_path / "a.##.jpg"], "Pillow is built without JPG here; "),
@@ -123,7 +123,7 @@ def test_formats_that_a_library_was_built_without(array, tmp_path, monkeypatch, 
     ):
         result = run(capsys, *command)
         assert (result.code, result.err.count("\n")) == (2, 1), result
-        assert result.err.startswith(said)
+        assert result.err.startswith(start)
     assert not list((tmp_path / "other").glob("tiny.*"))
 
 

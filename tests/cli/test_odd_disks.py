@@ -1,4 +1,4 @@
-"""Disks and folders with a quota, without inodes, read-only, of somebody else, or with names that lead nowhere."""
+"""Disks and folders with a quota, without inodes, read-only, of another user, or with dangling links."""
 
 import os
 import re
@@ -33,7 +33,7 @@ def array(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
 
 @pytest.fixture
 def quota(tmp_path: Path) -> Iterator[Path]:
-    """A folder that may hold 8 MB, on a disk with more space than that: a Btrfs subvolume."""
+    """Make a folder that may hold 8 MB, on a larger disk: a Btrfs subvolume."""
     if not (shutil.which("mkfs.btrfs") and shutil.which("btrfs")):
         pytest.skip("no tools for Btrfs here")
     image, disk = tmp_path / "image", tmp_path / "btrfs"
@@ -159,8 +159,8 @@ def test_an_array_on_a_disk_that_is_read_only(array, tmp_path, capsys):
 @pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("setpriv") or os.geteuid() != 0, reason="who is not root cannot become another")
 def test_a_folder_of_somebody_else(array):
-    """As another user, who may read the program wherever it is, and write nothing of ours."""
-    with tempfile.TemporaryDirectory() as name:  # pytest's own folders are closed to others
+    """Run as another user, who may read the program anywhere, and write none of our files."""
+    with tempfile.TemporaryDirectory() as name:  # other users may not enter pytest's own folders
         Path(name).chmod(0o755)
         shutil.copytree(array, Path(name) / "out")
         _somebody_else(Path(name))
@@ -171,13 +171,13 @@ def _somebody_else(folder: Path) -> None:
     rights = ["--inh-caps", "-all,+dac_read_search", "--ambient-caps", "+dac_read_search"]
     become = ["setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups", *rights, "--"]
 
-    def ran(*command: str | Path) -> Result:
+    def run_as_nobody(*command: str | Path) -> Result:
         words = [*become, sys.executable, "-m", "framearray_cli", *map(str, command)]
         environment = os.environ | {"PYTHONPATH": str(ROOT)}
         return finish(subprocess.Popen(words, stdout=-1, stderr=-1, text=True, env=environment))
 
-    assert ran("verify", "-q", array).code == 0
-    sheet = ran("sheet", "-q", array, "-o", folder / "a.png")
+    assert run_as_nobody("verify", "-q", array).code == 0
+    sheet = run_as_nobody("sheet", "-q", array, "-o", folder / "a.png")
     assert (sheet.code, sheet.err) == (4, f"{folder / 'a.png'}: cannot be written: Permission denied\n")
-    page = ran("view", array)
+    page = run_as_nobody("view", array)
     assert page.code == 4 and page.err.startswith(f"{array / '.view'}: cannot make the folder: Permission denied\n")

@@ -1,4 +1,4 @@
-"""Open Job Description: the template that `framearray openjd` writes, checked and run by openjd-cli."""
+"""Open Job Description: openjd-cli checks and runs the template that `framearray openjd` writes."""
 
 import json
 import os
@@ -19,7 +19,7 @@ JOB = {"camera": tiny.WALK, "reuse": {"n_r": 1}, "ambient": {"paths": 64}, "outp
 
 
 def openjd(folder: Path, *arguments: str | Path) -> str:
-    """Run openjd-cli where `framearray` is the program under test."""
+    """Run openjd-cli with `framearray` as the program under test."""
     assert OPENJD is not None
     command = folder / "framearray"
     command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m framearray_cli "$@"\n')
@@ -49,7 +49,7 @@ def test_what_is_written(tmp_path, capsys, monkeypatch):
     job = write_job(tmp_path, **(JOB | {"render": {"threads": 2, "memory": "3 GiB"}}))
     result = run(capsys, "openjd", job, "--chunk", "3")
     assert (result.code, result.err) == (0, "")
-    # frames 0 and 5 count twice, for those that are missing beyond the ends; each half finds one of the other
+    # frames 0 and 5 count twice, for the missing frames beyond the ends; each half traces one frame of the other
     assert result.out.splitlines()[0] == "2 chunks of 3 frames; halos add 25% to the hits"
     template = written(tmp_path / "job.openjd.json")
     defaults = {"JobFile": "job.toml", "SceneFile": "tiny.glb", "OutputFolder": "out", "ChunkSize": 3, "Threads": 2}
@@ -120,8 +120,8 @@ def test_a_farm_renders_the_same_bytes(n_r, tmp_path, capsys):
     assert run(capsys, "openjd", job, "--chunk", "4", "-o", template).code == 0
     assert run(capsys, "render", job, "-o", tmp_path / "whole", "-q").code == 0
     openjd(tmp_path, "check", template)
-    said = openjd(tmp_path, "run", template)
-    assert "Cameras(CHUNK[INT]) = 0-2" in said and "24 files of tiny are whole" in said
+    printed = openjd(tmp_path, "run", template)
+    assert "Cameras(CHUNK[INT]) = 0-2" in printed and "24 files of tiny are whole" in printed
     files = {file.name: file.read_bytes() for file in (tmp_path / "whole").glob("tiny.*")}
     assert {file.name: file.read_bytes() for file in (tmp_path / "out").glob("tiny.*")} == files
     assert len(files) == N * 4

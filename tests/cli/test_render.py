@@ -1,4 +1,4 @@
-"""`render` and `check` of a small job: what they print, what they write, and whose folder it is."""
+"""`render` and `check` of a small job: output, files, and the array that owns the folder."""
 
 import re
 import tomllib
@@ -20,7 +20,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {file.name: file.read_bytes() for file in folder.glob("*.*g")}
 
 
-def test_a_render_says_what_it_did(tmp_path, capsys):
+def test_a_render_prints_what_it_did(tmp_path, capsys):
     result = run(capsys, "render", write_job(tmp_path))
     assert (result.code, result.err) == (0, "")
     lines = [line for line in result.out.splitlines() if not line.startswith("compiling")]
@@ -35,8 +35,8 @@ def test_a_render_says_what_it_did(tmp_path, capsys):
     assert tomllib.loads((tmp_path / "out" / "manifest.toml").read_text())["summary"]["finished"] is True
 
 
-def test_each_note_is_told_once(tmp_path, capsys):
-    floor = tiny.quad((-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9))  # nothing for walks to meet
+def test_each_note_is_printed_once(tmp_path, capsys):
+    floor = tiny.quad((-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9))  # no surface for walks to hit
     material = tiny.Material(name="Floor", reflectivity=(0.5, 0.5, 0.5))
     part = tiny.Part(material=0, corners=floor)
     meshes = tiny.Meshes(parts=(part,), materials=(material,), textures=(), dropped={}, notes=())
@@ -198,7 +198,7 @@ def test_the_installed_command_and_the_module_are_the_same(tmp_path):
 
 @pytest.mark.parametrize(("irradiance", "kinds"), [(3.0, {"half"}), (3e5, {"half", "float"})])
 def test_images_are_halves_unless_they_are_too_bright(tmp_path, capsys, irradiance, kinds):
-    """Halves are composed as they are written; a frame too bright for them is composed again."""
+    """Frames are composed in halves; one that is too bright for them is composed again."""
     keys = [{"frame": k, "direction": [-0.6, -1.0, -0.3], "irradiance": [i] * 3} for k, i in ((0, 3), (1, irradiance))]
     light = {"frames": 2, "sources": [{"type": "directional", "keys": keys}]}
     found = {}

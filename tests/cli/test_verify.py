@@ -1,4 +1,4 @@
-"""`verify`: finds whatever is missing or changed, and mends it."""
+"""`verify` finds and repairs all files that are missing or changed."""
 
 import random
 from pathlib import Path
@@ -28,7 +28,7 @@ def test_a_whole_array(array, capsys):
     assert run(capsys, "verify", "-q", array / "manifest.toml").out == ""
 
 
-def test_every_flipped_byte_is_found_and_mended(array, capsys):
+def test_every_flipped_byte_is_found_and_repaired(array, capsys):
     before, rng = contents(array), random.Random(5)
     names = rng.sample(sorted(before), 6)
     for name in names[:5]:
@@ -56,7 +56,7 @@ def test_an_unfinished_array_is_finished(array, capsys, tmp_path):
     assert contents(tmp_path / "part") == contents(array)
 
 
-def test_without_records_images_are_looked_at(array, capsys):
+def test_without_records_images_are_read(array, capsys):
     for file in (array / "records").iterdir():
         file.unlink()
     result = run(capsys, "verify", array)

@@ -1,4 +1,4 @@
-"""Jobs that say an error instead of hits: what is printed, stored, refused, and the same every time."""
+"""Jobs with an error instead of hits: output, manifest, refused values, and the same result every time."""
 
 import re
 import tomllib
@@ -14,7 +14,7 @@ LINE += r"are expected to give ([\d.]+)$"
 
 
 def wanting(folder: Path, name: str = "job.toml", **samples: Any) -> Path:
-    """A job file with some [samples] in place of a number of hits."""
+    """Write a job file with some [samples] in place of a number of hits."""
     file = write_job(folder, name, camera=tiny.WALK, reuse={"n_r": 2})
     table = tomllib.loads(file.read_text())
     table["samples"] = {"obscurance": table["samples"]["obscurance"], **samples}
@@ -31,7 +31,7 @@ def images(folder: Path) -> dict[str, bytes]:
     return {file.name: file.read_bytes() for file in folder.glob("*.*") if file.suffix != ".toml"}
 
 
-def test_what_it_takes_is_printed_and_stored(tmp_path, capsys):
+def test_the_allotted_hits_are_printed_and_stored(tmp_path, capsys):
     job = wanting(tmp_path, error=0.2, halves=True)
     result = run(capsys, "render", job)
     assert (result.code, result.err) == (0, "")
@@ -43,14 +43,14 @@ def test_what_it_takes_is_printed_and_stored(tmp_path, capsys):
     assert (target["error"], round(target["hits"], 1)) == (0.2, hits)
     assert float(f"{target['expected']:.3g}") == expected
     assert summary["rays"]["target"] == target["pilot_rays"] > 0
-    # a picture of 24 x 18 pixels has 9 blocks: that is about right
+    # an image of 24 x 18 pixels has only 9 blocks, so the bounds are wide
     assert 0.5 < summary["standard_error"]["relative"] / 0.2 < 1.5
     checked = run(capsys, "check", job)
     assert (checked.code, checked.err) == (0, "")
     assert re.search(LINE, checked.out, re.MULTILINE).group() == re.search(LINE, result.out, re.MULTILINE).group()
 
 
-def test_the_array_is_the_same_whatever_the_threads(tmp_path, capsys):
+def test_the_array_does_not_depend_on_threads(tmp_path, capsys):
     job = wanting(tmp_path, error=0.3)
     assert run(capsys, "render", "-q", job).code == 0
     first = images(tmp_path / "out")
@@ -63,7 +63,7 @@ def test_another_error_is_another_array(tmp_path, capsys):
     assert run(capsys, "render", "-q", wanting(tmp_path, error=0.4)).code == 4
 
 
-def test_too_few_hits_are_told(tmp_path, capsys):
+def test_too_few_hits_are_reported(tmp_path, capsys):
     result = run(capsys, "render", wanting(tmp_path, error=0.001, most_hits=2))
     assert result.code == 0
     note = "  note: 100.0% of all places have as many hits as samples.most_hits allows, too few for this error"

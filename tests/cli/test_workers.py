@@ -1,4 +1,4 @@
-"""`render --workers`: the bytes of the whole, also when workers are killed, and clear ends when something is wrong."""
+"""`render --workers`: the bytes of one run, also when workers are killed, and clear errors."""
 
 import random
 import signal
@@ -10,7 +10,7 @@ from pathlib import Path
 import psutil
 import pytest
 from support import tiny
-from support.handed import JOB, WALK, N, begun_again, finished, lines, manifest, same
+from support.handed import JOB, WALK, N, finished, lines, manifest, restarted, same
 from support.program import finish, is_prompt, run, start, wait_for, write_job
 from support.smalldisk import mounted
 
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 ther
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a job, and with its array rendered in one run."""
+    """Return a folder with a job and its array, rendered in one run."""
     folder = tmp_path_factory.mktemp("workers")
     job = write_job(folder, **JOB)
     assert finish(start("render", "-q", job, "-o", folder / "whole")).code == 0
@@ -28,7 +28,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def workers_of(process: subprocess.Popen[str]) -> list[psutil.Process]:
-    """The worker processes of a render, in no order."""
+    """Return the worker processes of a render, in no order."""
     try:
         children = psutil.Process(process.pid).children(recursive=True)
         return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
@@ -60,9 +60,9 @@ def test_the_bytes_are_those_of_the_whole(changes, tmp_path, monkeypatch):
     parts = finish(start("render", job, "--workers", 2, "--chunk", 7, "-o", tmp_path / "parts"))
     assert (whole.code, parts.code, parts.err) == (0, 0, "")
     assert same(tmp_path / "parts", tmp_path / "whole")
-    assert len(finished(tmp_path / "parts")) == N and not begun_again(tmp_path / "parts")
-    said = [line for line in whole.out.splitlines() if line.startswith(("ambient", "automatic", "error"))]
-    assert said and set(said) <= set(parts.out.splitlines())
+    assert len(finished(tmp_path / "parts")) == N and not restarted(tmp_path / "parts")
+    printed = [line for line in whole.out.splitlines() if line.startswith(("ambient", "automatic", "error"))]
+    assert printed and set(printed) <= set(parts.out.splitlines())
 
 
 def test_a_difference_is_found(place, tmp_path):
@@ -97,19 +97,19 @@ def test_a_killed_worker_costs_its_chunk(seed, kills, place, tmp_path):
     assert same(out, place / "whole")
     times = finished(out)
     assert len(times) == N and set(times.values()) == {1}, "what was finished was not rendered anew"
-    again = begun_again(out)
+    again = restarted(out)
     assert sum(again.values()) <= kills
-    print(f"{kills} kills; chunks begun again: {again}")
+    print(f"{kills} kills; chunks restarted: {again}")
 
 
 @pytest.mark.slow
 def test_a_chunk_that_kills_all_workers_is_given_up(place, tmp_path, monkeypatch):
-    """Dask gives it up at the first death here; then it is tried again for as long as it gets further."""
+    """Dask gives up a chunk at the first death here; the program tries again as long as it makes progress."""
     monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "0")
     out = tmp_path / "out"
     process = start("render", "-q", place / "job.toml", "--workers", 1, "--chunk", N, "-o", out)
-    for kill in range(3):  # each once it has planned, and before its first image
-        wait_for(lambda kill=kill: sum(begun_again(out).values()) + bool(lines(out)) > kill, process)
+    for kill in range(3):  # kill each after planning and before its first image
+        wait_for(lambda kill=kill: sum(restarted(out).values()) + bool(lines(out)) > kill, process)
         workers_of(process)[0].kill()
     result = finish(process)
     assert (result.code, result.out) == (4, "")
@@ -122,7 +122,7 @@ def test_a_chunk_that_kills_all_workers_is_given_up(place, tmp_path, monkeypatch
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_all_workers(number, place, tmp_path):
-    """Sent to all processes, as a terminal does with Ctrl-C."""
+    """Send it to all processes, as a terminal does with Ctrl-C."""
     out = tmp_path / "out"
     process = start("render", place / "job.toml", "--workers", 2, "--chunk", 6, "-o", out, start_new_session=True)
     wait_for(lambda: len(finished(out)) >= 4, process)
@@ -144,7 +144,7 @@ def test_a_signal_ends_all_workers(number, place, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_full_disk_is_told_as_without_workers(place, tmp_path):
+def test_a_full_disk_is_reported_as_without_workers(place, tmp_path):
     for disk in mounted(tmp_path / "disk", "size=1m"):
         out = disk.folder / "out"
         result = finish(start("render", "-q", place / "job.toml", "-o", out, "--workers", 2, "--chunk", 6))
@@ -161,7 +161,7 @@ def test_a_full_disk_is_told_as_without_workers(place, tmp_path):
 
 def test_memory_is_shared(tmp_path):
     job = write_job(tmp_path, **(JOB | {"render": {"memory": "1 GiB"}}))
-    result = finish(start("render", job, "--workers", 8))  # tests that ran before would count as memory of the program
+    result = finish(start("render", job, "--workers", 8))  # earlier tests would count as memory of the program
     assert result.code == 2
     assert "8 workers share 1.0 GiB, fewer have more each" in result.err
     assert not (tmp_path / "out/manifest.toml").exists()

@@ -1,4 +1,4 @@
-"""What several tests share: tiny scenes and jobs, hand-made arrays, the slow twin, the program as a process."""
+"""Helpers of several tests: tiny scenes and jobs, hand-made arrays, the slow twin, the program as a process."""
 
 from pathlib import Path
 

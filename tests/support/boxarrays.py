@@ -1,4 +1,4 @@
-"""Frame arrays made by hand: a box whose inside is computed in closed form, without the renderer.
+"""Frame arrays in closed form, without the renderer: images of the inside of a box.
 
 The box reaches from LOW to HIGH. Each point of its sides has one colour; the eye, the depth along its axis and the
 colour of each pixel follow from the crossing of one ray with six planes, in the middle of the pixel.
@@ -118,7 +118,7 @@ def colour_at(points: np.ndarray) -> np.ndarray:
 
 
 def see(manifest: Manifest, c: int, at: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[np.ndarray, np.ndarray]:
-    """What eye c sees through the middle of each pixel: depth along its axis (h, w), and colour (h, w, 3)."""
+    """Return what eye c sees through pixel centres: depth along its axis (h, w), and colour (h, w, 3)."""
     width, height = manifest.resolution
     matrix = manifest.cameras[c].matrix
     tan = np.tan(np.radians(manifest.cameras[c].fov) / 2)
@@ -132,7 +132,7 @@ def see(manifest: Manifest, c: int, at: Sequence[float] = (0.0, 0.0, 0.0)) -> tu
 
 
 def write_array(manifest: Manifest, at: Sequence[float] = (0.0, 0.0, 0.0)) -> Manifest:
-    """All files of an array without groups; image [c, l] is the colours, a little darker for each l."""
+    """Write an array without groups; image [c, l] holds the colours, a little darker for each l."""
     suffix: Extension = manifest.images.rpartition(".")[2]  # type: ignore[assignment]
     for c in range(manifest.n_cameras):
         depth, colour = see(manifest, c, at)
@@ -146,7 +146,7 @@ def write_array(manifest: Manifest, at: Sequence[float] = (0.0, 0.0, 0.0)) -> Ma
 
 
 def write_groups(manifest: Manifest) -> Manifest:
-    """All files of an array with groups: R W is the colours, direct light of a group is a share of them."""
+    """Write an array with groups: R W holds the colours, direct light of a group is a share of them."""
     for c in range(manifest.n_cameras):
         depth, colour = see(manifest, c)
         files = {manifest.directory / manifest.ambient_images.format(camera=c): colour}

@@ -19,13 +19,13 @@ DESKTOP, PHONE = (1280, 800), (390, 844)
 
 
 def executable() -> str | None:
-    """Where Chromium is."""
+    """Return the path of Chromium."""
     return next((found for name in ("chromium", "chromium-browser") if (found := shutil.which(name))), None)
 
 
 @contextmanager
 def browser() -> Iterator[Any]:
-    """A running browser; the test is skipped where there is none."""
+    """Start a browser; skip the test where there is none."""
     playwright = pytest.importorskip("playwright.sync_api", reason="needs Playwright: pip install playwright")
     if executable() is None:
         pytest.skip("needs Chromium: apt-get install chromium")
@@ -36,17 +36,20 @@ def browser() -> Iterator[Any]:
 
 
 class Shown:
-    """A page on an array, and what went wrong on it.
+    """A page on an array, and its errors.
 
     Attributes:
         page: Playwright's.
         errors: messages of the console, and exceptions.
-        requests: addresses that the page asked for.
+        requests: addresses that the page requested.
     """
 
     def __init__(self, page: Any, url: str) -> None:
         self.page, self.errors, self.requests = page, [], []
-        page.on("console", lambda said: self.errors.append(said.text) if said.type in ("error", "warning") else None)
+        page.on(
+            "console",
+            lambda message: self.errors.append(message.text) if message.type in ("error", "warning") else None,
+        )
         page.on("pageerror", lambda error: self.errors.append(str(error)))
         page.on("request", lambda request: self.requests.append(request.url))
         page.goto(url)
@@ -56,7 +59,7 @@ class Shown:
         return self.page.evaluate(expression)
 
     def wait(self, expression: str) -> None:
-        """Wait until an expression is true; not by Playwright, which needs eval, which the page forbids."""
+        """Wait until an expression is true, without Playwright's own wait: it needs eval, which the page forbids."""
         end = time.monotonic() + PATIENCE_S
         while not self.get(f"Boolean({expression})"):
             note = self.get("document.getElementById('note').textContent")
@@ -64,12 +67,12 @@ class Shown:
             time.sleep(0.01)
 
     def settle(self) -> None:
-        """Wait until the picture is there in full size."""
+        """Wait until the full-size picture is there."""
         self.page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
         self.wait("framearray.level === 2 && !framearray.isDirty")
 
     def all_loaded(self) -> None:
-        """Wait until there is nothing left to load."""
+        """Wait until everything is loaded."""
         time.sleep(0.1)  # until the page is calm
         self.wait("!framearray.store.inFlight.size && framearray.store.next >= framearray.store.wanted.length")
 
@@ -80,14 +83,14 @@ class Shown:
         return c, l
 
     def pixels(self) -> Bytes:
-        """What is drawn, (h, w, 3)."""
+        """Return the drawn pixels, (h, w, 3)."""
         self.settle()
         width, height = self.get("framearray.array.resolution")
         text = self.get("btoa(framearray.picture.pixels().reduce((all, x) => all + String.fromCharCode(x), ''))")
         return np.frombuffer(b64decode(text), np.uint8).reshape(height, width, 4)[..., :3]
 
     def on_pad(self, c: float, l: float) -> tuple[float, float]:
-        """Where a place is on the screen."""
+        """Return the position of a place on the screen."""
         box = self.page.locator("#pad").bounding_box()
         n_c, n_l = self.get("[framearray.array.nCameras, framearray.array.main.n]")
         return box["x"] + (c + 0.5) / n_c * box["width"], box["y"] + (l + 0.5) / n_l * box["height"]
@@ -102,7 +105,7 @@ class Shown:
         mouse.up()
 
     def check(self, base: str) -> None:
-        """Nothing went wrong, and everything came from one place."""
+        """Check that there were no errors, and that all requests went to one server."""
         assert self.errors == [], self.errors[:3]
         assert [url for url in self.requests if not url.startswith((base, "blob:"))] == []
 

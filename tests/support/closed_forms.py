@@ -1,8 +1,8 @@
-"""Right answers that need no renderer, each with its derivation.
+"""Right answers in closed form, each with its derivation.
 
-Notation: P is the point that is looked at, Q what a ray from it meets, d their distance, mu the cosine between ray and
+Notation: P is the shaded point, Q the hit of a ray from it, d their distance, mu the cosine between ray and
 normal. Cosine-distributed directions have the density 2 mu in mu; seen from above they are spread evenly over the unit
-disc. x = d / d_max is what a falloff rho takes; R is the reflectivity of what is met, R_avg the job's average one.
+disc. x = d / d_max is the argument of a falloff rho; R is the reflectivity at Q, R_avg the average one of the job.
 """
 
 import math
@@ -18,7 +18,7 @@ TAU = 3.0  # the default steepness of "exponential"
 
 
 def rho(falloff: str, x: float, tau: float = TAU) -> float:
-    """The falloff curve at x = d / d_max: what [obscurance] of a job file promises; 1 from x = 1 on."""
+    """The falloff curve at x = d / d_max, as documented for [obscurance] of a job file; 1 from x = 1 on."""
     if x >= 1:
         return 1.0
     curves: dict[str, Callable[[], float]] = {
@@ -64,7 +64,7 @@ def sphere_obscurance_numerically(falloff: str, reflectivity: float, k: float, t
 
 
 def wall_share(s: float) -> float:
-    """Share of the rays beside a high wall at distance h that meet it within d_max, s = h / d_max.
+    """Share of the rays from a point beside a high wall at distance h that hit it within d_max, s = h / d_max.
 
     Seen from above the directions fill the unit disc evenly; the wall x = h is met at d = h / x for x > 0, so within
     d_max for x > s: a segment of the disc, of area acos(s) - s sqrt(1 - s^2).
@@ -118,14 +118,14 @@ def disc_obscurance_linear(disc: float, average: float, radius: float, height: f
 def furnace_irradiance(reflectivity: float, power: float = 4 * math.pi, area: float = 4 * math.pi) -> float:
     """Mean irradiance, all bounces, inside a closed body of one reflectivity: power / (area (1 - R)).
 
-    Of the power that arrives the share R is sent out and arrives again: E = power / area * (1 + R + R^2 + ...). In a
-    sphere all bounces but the first spread evenly, because a point of it gives every other point the same irradiance.
+    The share R of arriving power is reflected and arrives again: E = power / area * (1 + R + R^2 + ...). In a
+    sphere all bounces but the first spread evenly, because each point gives every other point the same irradiance.
     """
     return power / (area * (1 - reflectivity))
 
 
 def furnace_indirect(reflectivity: float) -> float:
-    """Radiance that a point of the furnace sends out, less what direct light makes: R / pi * R E (see above)."""
+    """Radiance that leaves a point of the furnace, without that of direct light: R / pi * R E (see above)."""
     return reflectivity / math.pi * reflectivity * furnace_irradiance(reflectivity)
 
 

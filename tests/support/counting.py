@@ -1,4 +1,4 @@
-"""Rays in closed rooms, each with a known answer, through the program's own kernels; and how many got the other one.
+"""Rays in closed rooms, each with a known answer, through the program's own kernels; and the number of wrong ones.
 
 Shadow rays: a lamp inside a room reaches every point of its walls, and one outside none. Visibility rays: the same
 with eyes. Rays of obscurances and of eyes: from inside, each meets the wall that the formula of a plane says, where it
@@ -30,7 +30,7 @@ from support.rooms import INSIDE, ON_WALLS, OUTSIDE, TURN, WIDTH, planes
 from support.staging import Stage, facing, staged
 
 FAR_OFF = np.array([(1, 1, 1), (1.1, 1, 1), (1, 1.1, 1)]) * 1e10
-NOTHING = tiny.scene_of(np.stack([FAR_OFF, -FAR_OFF]))  # in nobody's way
+NOTHING = tiny.scene_of(np.stack([FAR_OFF, -FAR_OFF]))  # hides nothing
 # A shadow ray ends 1e-4 of its length before its lamp, so the lamp's own wall may hide it from what is lower above that
 # wall than this; and a lamp shines through a wall that it is nearer to than 1e-4 of the distance to a point.
 LOWEST, FAR_SHARE = 2e-3, 1.0 - float(FAR_END)
@@ -41,7 +41,7 @@ GRAZING = 0.01
 
 @dataclass(frozen=True)
 class Count:
-    """Rays whose answer is known, and how many of them gave the other one."""
+    """The number of rays with a known answer, and of wrong answers among them."""
 
     rays: int
     wrong: int
@@ -138,7 +138,7 @@ def eyes_on_walls_lose(stage: Stage) -> Count:
 
 
 def taken_over(stage: Stage, positions: Any) -> tuple[Any, Any]:
-    """(six eyes a place, n_hits) which hits face an eye and lie in its image, and which of them it takes over."""
+    """(six eyes per place, n_hits) which hits face an eye and lie in its image, and which of them it takes over."""
     with EmbreeScene(NOTHING) as empty:
         return _pixels(stage, positions, empty) != HIDDEN, _pixels(stage, positions, stage.embree) != HIDDEN
 

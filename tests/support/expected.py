@@ -1,4 +1,4 @@
-"""What the page must show, computed from the tiles by numpy, with how far the browser may be off."""
+"""The pixels that the page must show, computed from the tiles by numpy, with bounds for the browser."""
 
 import numpy as np
 
@@ -26,5 +26,5 @@ def bounds(tiles: Tiles, c: int, parts: list[Part], exposure: float = 0.0) -> tu
 
 
 def outside(pixels: Bytes, low: Float64, high: Float64) -> float:
-    """Share of values that are not within bounds."""
+    """Return the share of values outside bounds."""
     return float(np.mean((pixels < low) | (pixels > high)))

@@ -1,4 +1,4 @@
-"""Arrays whose parts were handed out: whether they are the whole, and how often their parts were begun."""
+"""Arrays rendered in parts: compare them with whole ones, and count how often their chunks were started."""
 
 import tomllib
 from collections import Counter
@@ -19,17 +19,17 @@ JOB: dict[str, Any] = {
     "samples": {"hits": 8},
     "render": {"threads": 1},
 }
-# keys of the manifest's summary that tell how the work went, not what came of it
+# keys of the manifest's summary that differ between runs
 EFFORT = {"seconds", "rays", "rays_per_pixel_image", "peak_memory"}
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """All files of the array but the manifest."""
+    """Return all files of the array except the manifest."""
     return {file.name: file.read_bytes() for file in folder.glob("tiny.*")}
 
 
 def manifest(folder: Path) -> dict[str, Any]:
-    """All that a manifest says of the array."""
+    """Return the table of a manifest without effort and folder."""
     table = tomllib.loads((folder / "manifest.toml").read_text())
     table["summary"] = {key: value for key, value in table["summary"].items() if key not in EFFORT}
     del table["job"]["output"]["directory"]
@@ -37,7 +37,7 @@ def manifest(folder: Path) -> dict[str, Any]:
 
 
 def same(part: Path, whole: Path) -> bool:
-    """Whether two folders hold the same array, to the last bit; shows the first that differs if not."""
+    """Return whether two folders hold the same array, to the last bit; if not, print the first file that differs."""
     found, wanted = contents(part), contents(whole)
     different = sorted(name for name in found.keys() | wanted.keys() if found.get(name) != wanted.get(name))
     if different:
@@ -46,7 +46,7 @@ def same(part: Path, whole: Path) -> bool:
 
 
 def lines(folder: Path) -> list[tuple[str, dict[str, Any]]]:
-    """All lines of all records that are whole, each with the name of its record."""
+    """Return all whole lines of all records, each with the name of its record."""
     return [
         (file.stem, line)
         for file in record_files(folder)
@@ -56,11 +56,11 @@ def lines(folder: Path) -> list[tuple[str, dict[str, Any]]]:
 
 
 def finished(folder: Path) -> Counter[tuple[int, ...]]:
-    """How often each camera under each block of lights was finished."""
+    """Count how often each camera was finished, per block of lights."""
     return Counter((line["c"], *line["lights"]) for _, line in lines(folder) if "c" in line)
 
 
-def begun_again(folder: Path) -> dict[str, int]:
-    """How often chunks were begun again."""
+def restarted(folder: Path) -> dict[str, int]:
+    """Count how often chunks were restarted."""
     times = Counter(name for name, line in lines(folder) if "fingerprint" in line)
     return {name: n - 1 for name, n in times.items() if n > 1}

@@ -1,4 +1,4 @@
-"""Hits for tests: all that an eye finds, or as many as wanted at one place."""
+"""Hits for tests: all native hits of an eye, or any number at one place."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from framearray_cli.engine.kernels.simd import LANES
 
 
 def native(setup: FrameSetup, c: int, per_pixel: int, batch: int = 2048) -> Hits:
-    """All native hits of a frame, found in batches."""
+    """Find all native hits of a frame, in batches."""
     n, packets, parts = setup.n_pixels * per_pixel, room_for_hits(batch).packets, []
     for first in range(0, n, batch):
         hits, m = empty_hits(batch), min(batch, n - first)
@@ -24,7 +24,7 @@ def native(setup: FrameSetup, c: int, per_pixel: int, batch: int = 2048) -> Hits
 
 
 def points(n: int, position: Any, normal: Any) -> Hits:
-    """n hits at one place of one orientation, each with its own stream."""
+    """Make n hits at one place of one orientation, each with its own stream."""
     hits = empty_hits(n)
     hits.kind[:] = SURFACE
     hits.position[:], hits.geometric[:], hits.shading[:] = position, normal, normal
@@ -36,7 +36,7 @@ def points(n: int, position: Any, normal: Any) -> Hits:
 
 
 def lit_packets(irradiance: Any) -> Any:
-    """Which packets of light positions are not all zero, (n,): a bit for each, or for as many as share one."""
+    """Return which packets of light positions are not all zero, (n,): one bit per packet or shared by several."""
     n_packets = -(-irradiance.shape[2] // LANES)
     shared = 1
     while n_packets > shared * LIT_BITS:

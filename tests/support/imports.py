@@ -1,4 +1,4 @@
-"""Who imports whom in a package, read from its source files: the graph that tests of the layout judge."""
+"""The graph of imports in a package, read from its source files, for the tests of the layout."""
 
 import ast
 from collections.abc import Iterator, Mapping
@@ -20,7 +20,7 @@ def import_graph(package: Path) -> Graph:
 
 
 def _imported(package: str, name: str, files: Mapping[str, Path]) -> Iterator[str]:
-    """Each module that one module imports; a name that a package exports counts as that package's `__init__`."""
+    """List the modules that one module imports; a name that a package exports counts as its `__init__`."""
     for node in ast.walk(ast.parse(files[name].read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             targets = [alias.name.split(".") for alias in node.names]
@@ -40,7 +40,7 @@ def _imported(package: str, name: str, files: Mapping[str, Path]) -> Iterator[st
 
 
 def libraries(file: Path) -> set[str]:
-    """Find the libraries that a file imports, wherever in it."""
+    """Find the libraries that a file imports, also inside functions."""
     found = set()
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
@@ -51,7 +51,7 @@ def libraries(file: Path) -> set[str]:
 
 
 def room(module: str) -> str:
-    """Name the room that a module stands in; the package's own files are in none: ""."""
+    """Return the room of a module; "" for the package's own files."""
     return module.split("/")[0] if "/" in module else ""
 
 

@@ -1,7 +1,7 @@
-"""Which instructions Embree runs with, and how tests force it to run with fewer.
+"""The instructions that Embree runs with, and a way to force fewer.
 
-`make test-avx2` sets FRAMEARRAY_EMBREE to Embree's own words for it, `isa=avx2`. The program hands them to each device
-that it makes. embreex makes its devices itself, without any; it gets one of ours here.
+`make test-avx2` sets FRAMEARRAY_EMBREE to Embree's own words for it, `isa=avx2`. The program passes them to each device
+that it makes. embreex makes its devices without any options; it gets one of ours here.
 """
 
 import ctypes
@@ -17,7 +17,7 @@ _NATIVE_RAY16_SUPPORTED = 34  # RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED: pack
 FORCED = os.environ.get("FRAMEARRAY_EMBREE", "")
 
 _scene_of = rtcore_scene.EmbreeScene
-assert mesh_construction  # it takes the class of scenes as it is loaded, and needs the true one
+assert mesh_construction  # on loading it takes the class of scenes, and needs the true one
 
 
 def has_packets_of_16(device: int) -> bool:
@@ -37,7 +37,7 @@ def library() -> Any:
 def forced_device() -> Any:
     """An embreex device that runs with the forced instructions.
 
-    embreex has no argument for it, so the pointer in its object is exchanged for that of another device.
+    embreex has no argument for it, so exchange the pointer in its object for that of another device.
     """
     device = rtcore.EmbreeDevice()
     pointer = device_pointer(device)

@@ -13,7 +13,7 @@ _held: set[str] = set()  # source files of kernels that this process compiles
 
 
 def compile_in_turn() -> None:
-    """Have numba look for a kernel on the disk, compile and keep it while no other process does so."""
+    """Have numba load, compile and cache each kernel under a lock, in one process at a time."""
     if sys.platform == "win32":
         return
     compile_at_once: Any = Dispatcher.compile
@@ -27,7 +27,7 @@ def compile_in_turn() -> None:
 
 @contextmanager
 def _locked(source: str) -> Iterator[None]:
-    """Hold a source file alone of all processes. Sources import each other in one direction: none waits for ever."""
+    """Lock a source file against other processes. Sources import in one direction, so none waits for ever."""
     import fcntl
 
     if source in _held or not Path(source).is_file():

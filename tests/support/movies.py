@@ -109,7 +109,7 @@ class Decoded:
         frames: (h, w, 3) codes of each, 8 bits.
         luma: of each frame of a video, as its codec keeps it.
         times: when each frame begins, seconds.
-        rate: frames a second, as the file says; None where a format has only delays.
+        rate: frames per second of the file; None where a format has only delays.
         length: seconds in all, where the format says so.
         pixels: the pixel format.
     """

@@ -10,7 +10,7 @@ from framearray_cli.scene.scene import Scene
 
 
 def nasty_files(scenes: Path) -> list[str]:
-    """Names of the set, from its index; none where the set is absent."""
+    """Return the names of the set, from its index; none where the set is absent."""
     index = scenes / "nasty" / "INDEX.json"
     return [entry["file"] for entry in json.loads(index.read_text())] if index.is_file() else []
 

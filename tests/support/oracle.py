@@ -1,8 +1,8 @@
-"""The slow twin of the engine: one image of a job, written to be believed.
+"""The slow twin of the engine: single images of a job, as plain as possible.
 
 It shares no code with the kernels, only their definitions: the job, the scene's arrays, the eyes and lights in
 float64, the measured ambient light, and which random number is for what. There is no packet, batch, window or
-sorting: rays go through embreex's own API, which calls Embree once a ray; all else is numpy in float64, one line a
+sorting: rays go through embreex's own API, which calls Embree once per ray; the rest is numpy in float64, one line per
 formula. Reuse is done by brute force: every hit of every eye of the window is projected into the frame and weighed.
 
     image[c, l] = sum w L / sum w + what mirrors show / their native hits,    L = R (E[l] / pi + I_A[l] W + S)
@@ -45,7 +45,7 @@ class Oracle:
             np.add.at(weights, pixel[used], weight[used])
             np.add.at(count, pixel[used], 1)
         holes = self.samples(c, np.flatnonzero(count == 0), rnd.HOLE)
-        if len(holes):  # a pixel that nobody reaches gets one hit of its own
+        if len(holes):  # a pixel without hits gets one of its own
             total[holes.pixel], weights[holes.pixel], count[holes.pixel] = self.radiance(holes, l), 1, 1
         self.count = count
         picture = total / weights[:, None]
@@ -66,13 +66,13 @@ class Oracle:
         return [k for k in range(self.n_c) if abs(k - c) <= self.n_r]
 
     def per_pixel(self, k: int) -> float:
-        """Native hits a pixel of frame k: the path goes on beyond its ends, back along itself."""
+        """Native hits per pixel of frame k: the path continues beyond its ends, mirrored."""
         there_and_back = [*range(self.n_c), *reversed(range(self.n_c))]
         beyond = range(-self.n_r, self.n_c + self.n_r)
         return self.job.samples.hits * sum(there_and_back[v % len(there_and_back)] == k for v in beyond)
 
     def sparse_pixels(self, k: int) -> Any:
-        """Pixels that get one hit more than the others where hits a pixel are no whole number: n of every m pixels,
+        """Pixels with one hit more than the others where hits per pixel are no whole number: n of every m pixels,
         shifted by some pixels from row to row and by one from frame to frame."""
         share = Fraction(self.per_pixel(k)).limit_denominator(8) % 1
         n, m = share.numerator, share.denominator
@@ -109,7 +109,7 @@ class Oracle:
         origins, dirs = self.rays_through(k, corner + rnd.points(shared, sample, rnd.sequence()))
         return self.model.look(origins, dirs, rnd.keys(self.job.seed, k, pixel, sample), pixel)
 
-    # -- what a hit shows
+    # -- radiance of hits
 
     def radiance(self, hits: Points, l: int) -> Any:
         """(n, 3): R (E[l] / pi + I_A[l] W + S), or the background where a ray left the scene."""
@@ -119,7 +119,7 @@ class Oracle:
         return np.where(hits.surface[:, None], seen, self.background)
 
     def irradiance(self, hits: Points, l: int) -> Any:
-        """(n, 3) E[l]: every source, where it is in front of both normals and nothing is in between."""
+        """(n, 3) E[l]: every source, where it is in front of both normals and nothing blocks it."""
         result = np.zeros((len(hits), 3))
         for source in self.inputs.lights.sources:
             if source.kind == "point":

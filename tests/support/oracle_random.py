@@ -1,4 +1,4 @@
-"""Random numbers of the slow twin: the same as the program's by definition, by other code.
+"""Random numbers of the slow twin: the definition of the program's, in other code.
 
 One number is a function of (seed, c, pixel, sample, dimension):
 
@@ -17,7 +17,7 @@ import numpy as np
 
 PIXEL, HEMISPHERE = 0, 1  # dimensions
 WHOLE_PIXEL = 65535  # the "sample" whose bits all samples of a pixel share
-HOLE = 65534  # the sample of a pixel that no other hit reaches
+HOLE = 65534  # the sample of a pixel without other hits
 GOLDEN = (isqrt(5 * 2**128) - 2**64) // 2
 MASK = 2**64 - 1
 

@@ -12,7 +12,7 @@ OFFSET = 16 * 2.0**-23  # a ray starts this share of its triangle's largest coor
 
 @dataclass
 class Points:
-    """What n rays found; rows of `surface` False left the scene, and only `incoming` and the keys count there."""
+    """First hits of n rays; where `surface` is False a ray left the scene, and only `incoming` and the keys count."""
 
     surface: Any
     position: Any
@@ -80,7 +80,7 @@ class Model:
         return out["primID"], np.stack([out["u"], out["v"]], axis=1).astype(np.float64), out["tfar"].astype(np.float64)
 
     def blocked(self, origins: Any, dirs: Any, far: Any) -> Any:
-        """Whether anything lies within `far` lengths of the direction."""
+        """Whether a surface lies within `far` lengths of the direction."""
         if not len(origins):
             return np.zeros(0, bool)
         return self._run(origins, dirs, far, "OCCLUDED", 0) == 0

@@ -47,7 +47,7 @@ class PathTracer:
         self._mesh = TriangleMesh(self._scene, corners.astype(np.float32))
 
     def first_hits(self, start: Array, way: Array) -> tuple[Points, NDArray[np.bool_]]:
-        """Follow rays; returns the places of those that met something, and which did."""
+        """Follow rays; return the places of those that hit a surface, and which did."""
         out = self._scene.run(start.astype(np.float32), way.astype(np.float32), query="INTERSECT", output=1)
         met = out["primID"] >= 0
         triangle = out["primID"][met]
@@ -68,7 +68,7 @@ class PathTracer:
         return way / np.linalg.norm(way, axis=1, keepdims=True)
 
     def bounce(self, points: Points) -> tuple[Points, NDArray[np.bool_]]:
-        """What cosine-distributed rays from points meet."""
+        """Find the first hits of cosine-distributed rays from points."""
         return self.first_hits(points.position + NEAR * points.normal, self.cosine_ways(points.normal))
 
     def sunlight(self, points: Points) -> Array:
@@ -92,7 +92,7 @@ class PathTracer:
         return total
 
     def seen(self, eye: list[float], target: list[float], fov: float, aspect: float, n: int) -> Points:
-        """What n rays of an eye meet."""
+        """Find the first hits of n rays of an eye."""
         forward = np.subtract(target, eye) / np.linalg.norm(np.subtract(target, eye))
         right = np.cross(forward, [0, 1, 0]) / np.linalg.norm(np.cross(forward, [0, 1, 0]))
         up = np.cross(right, forward)
@@ -106,7 +106,7 @@ class PathTracer:
         return self.bounce(self.seen(eye, target, fov, aspect, n))[0]
 
     def fitted(self, points: Points, d_max: float, groups: int) -> Array:
-        """Irradiance that makes obscurances of falloff `sqrt` as bright as the light at some points: one a group.
+        """Irradiance that makes obscurances of falloff `sqrt` as bright as the light at some points: one per group.
 
         A group is the ratio of the sums of R(P) R(Q) E(Q) and of R(P) R(Q) rho(d), with the average reflectivity where
         nothing is met within d_max.

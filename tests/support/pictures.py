@@ -1,4 +1,4 @@
-"""Whole pictures of the tiny room, of any size and place, and how much two of them differ."""
+"""Whole images of the tiny room, at any size and place, and the difference of two of them."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,8 +10,8 @@ from support import tiny
 SMALL = {"resolution": [96, 72]}
 
 
-# A picture of another unit of length or place differs where a ray passes an edge, or a corner of a texel, on its other
-# side: one sample of a pixel, in less than one pixel of a hundred. All else differs by roundings.
+# In another unit of length or at another place a ray may pass an edge, or a corner of a texel, on its other side: one
+# sample of a pixel, in less than one pixel of a hundred. All other values differ by roundings.
 ROUNDING, FLIPPED = 1e-3, 0.01
 
 

@@ -23,6 +23,7 @@ LOADING = 0.6  # seconds that importing the renderer takes on an idle machine
 IDLE = 60.0  # seconds without progress after which a command counts as hanging
 WAKEFUL = 0.05  # seconds of processor time that are progress
 
+
 @dataclass(frozen=True)
 class Result:
     """How a command ended, and what it printed."""

@@ -20,13 +20,13 @@ RESOLUTION = (200, 150)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Levels:
-    """How bright a scene must be lit to show on a screen; chosen by looking at its pictures.
+    """Levels of light that suit a screen, chosen from pictures.
 
     Attributes:
         sun: irradiance of the directional source, W/m2.
         lamp: intensity of the point source, W/sr.
         sky: radiance of the background.
-        height: of a room, scene units, where the bounds of the file tell another.
+        height: of a room, scene units, where the bounds of the file are wrong.
     """
 
     sun: float

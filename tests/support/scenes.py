@@ -1,4 +1,4 @@
-"""Real scenes that lie beside the checkout (or where FRAMEARRAY_SCENES says), and small GLB files made on the spot."""
+"""Real scenes beside the checkout (or in FRAMEARRAY_SCENES), and small GLB files that tests make."""
 
 import io
 import json
@@ -31,7 +31,7 @@ def scenes_folder() -> Path:
 
 
 def shared_scene(name: str) -> Path:
-    """A file in the folder of real scenes; the test is skipped where there is none."""
+    """Return a file in the folder of real scenes; skip the test where there is none."""
     file = scenes_folder() / name
     if not file.is_file():
         pytest.skip(f"no real scene {name}; set FRAMEARRAY_SCENES to the folder of scenes")
@@ -108,7 +108,7 @@ class Glb:
 
 
 def check_shapes(scene: Scene) -> None:
-    """What kernels rely on, whatever the file."""
+    """Check what kernels rely on, for every file."""
     n, m = len(scene.corners), len(scene.material_names)
     assert scene.corners.shape == (n, 3, 3)
     assert n == scene.report.triangles > 0

@@ -1,4 +1,4 @@
-"""A small disk that is real: a tmpfs with a file on it that takes the rest of its space."""
+"""A small real disk: a tmpfs with a file on it that takes the rest of its space."""
 
 import os
 import shutil
@@ -18,7 +18,7 @@ class SmallDisk:
         self.folder, self._ballast = folder, folder / "ballast"
 
     def leave(self, n_bytes: int) -> None:
-        """Fill it up but for so many bytes."""
+        """Fill it up except for some bytes."""
         self._ballast.unlink(missing_ok=True)
         disk = os.statvfs(self.folder)
         fill = disk.f_bavail * disk.f_frsize // PAGE - -(-n_bytes // PAGE)
@@ -27,7 +27,7 @@ class SmallDisk:
                 file.write(bytes(PAGE))
 
     def free(self) -> None:
-        """Take the ballast away."""
+        """Remove the ballast."""
         self._ballast.unlink()
 
     def remount(self, options: str) -> None:
@@ -35,7 +35,7 @@ class SmallDisk:
 
 
 def mounted(folder: Path, options: str = "size=64m") -> Iterator[SmallDisk]:
-    """Mount one while a test runs; skips the test where this user may not."""
+    """Mount one while a test runs; skip the test where this user may not."""
     folder.mkdir()
     mount = shutil.which("mount")
     command = [str(mount), "-t", "tmpfs", "-o", options, "tmpfs", str(folder)]

@@ -1,4 +1,4 @@
-"""Cameras, lights and their animations in GLB files that are made on the spot, and the matrices they should have."""
+"""Cameras, lights and their animations in GLB files that tests make, and the matrices they should have."""
 
 import math
 from typing import Any
@@ -27,7 +27,7 @@ def animate(glb: Glb, node: int, path: str, times: Any, values: Any, interpolati
 
 
 def light(glb: Glb, kind: str = "point", **more: Any) -> dict[str, Any]:
-    """What a node says that carries a light."""
+    """The part of a node that refers to a light."""
     table = glb.tree.setdefault("extensions", {}).setdefault("KHR_lights_punctual", {"lights": []})
     table["lights"].append({"type": kind} | more)
     glb.tree["extensionsUsed"] = ["KHR_lights_punctual"]

@@ -65,7 +65,7 @@ def disc(material: str, centre: Vector, radius: float, n: int = 720) -> Part:
 
 
 def mirrored(part: Part) -> Part:
-    """A part as a mirror in the plane z = 0 shows it."""
+    """Mirror a part in the plane z = 0."""
     return Part(material=part.material, points=part.points * [1, 1, -1], faces=part.faces[:, ::-1], uvs=part.uvs)
 
 
@@ -95,17 +95,17 @@ def write_scene(folder: Path, parts: Sequence[Part], textures: Mapping[str, NDAr
 
 
 def dark() -> list[dict[str, Any]]:
-    """A light that gives none, where only the ambient light matters."""
+    """A light of no intensity, for tests of only the ambient light."""
     return [{"type": "point", "keys": [{"frame": 0, "position": [0.0, 0.0, 0.0], "intensity": 0.0}]}]
 
 
 def point(position: Vector, intensity: float | Vector = 1.0) -> dict[str, Any]:
-    """A point source that stays as it is."""
+    """A constant point source."""
     return {"type": "point", "keys": [{"frame": 0, "position": list(position), "intensity": intensity}]}
 
 
 def sun(direction: Vector, irradiance: float | Vector = 1.0) -> dict[str, Any]:
-    """A directional source that stays as it is."""
+    """A constant directional source."""
     return {"type": "directional", "keys": [{"frame": 0, "direction": list(direction), "irradiance": irradiance}]}
 
 
@@ -121,7 +121,7 @@ def make_job(
     background: float | Vector = 0.0,
     **tables: dict[str, Any],
 ) -> Job:
-    """A job without reuse, whose EXR files hold float; `tables` and `camera` replace what stands here.
+    """A job without reuse, whose EXR files hold float; `tables` and `camera` replace its values.
 
     Args:
         materials: name -> reflectivity, or the whole table of an override.
@@ -161,7 +161,7 @@ def repeats(eye: Vector, target: Vector, n: int, fov: float, size: float = 1.0) 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Result:
-    """What a render left: images (n_c, n_l, h, w, 3) as read from the files, and its ambient estimate."""
+    """The results of a render: images (n_c, n_l, h, w, 3) as read from the files, and the ambient estimate."""
 
     images: Array
     ambient: Ambient

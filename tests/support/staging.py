@@ -17,7 +17,7 @@ from framearray_cli.scene.scene import Scene
 from support import tiny
 from support.rooms import ROOMS, TURN, WIDTH, plain, planes
 
-HERE, BETWEEN = np.array([0.11, 0.0, -0.17]), np.array([2.1, 1.9, 1.7])  # from where the points of a room are seen
+HERE, BETWEEN = np.array([0.11, 0.0, -0.17]), np.array([2.1, 1.9, 1.7])  # where the eye sees the points of a room from
 # How far from its wall a ray may end: roundings of corners, origin and distance, of coordinates up to 1.7.
 NEAR_WALL = 16 * ULP
 
@@ -51,9 +51,9 @@ class Stage:
         return np.asarray(points - self.scene.centre, np.float32)
 
     def right_distance(self, origins: Any, ways: Any) -> tuple[Any, Any]:
-        """How far along its way each ray meets the room's wall, and the cosine there; by the planes of the room.
+        """Return the distance of each ray to the room's wall, and the cosine there, from the planes of the room.
 
-        A plane that a ray leaves is not met, wherever its origin was rounded to.
+        A ray does not hit the plane that it leaves, however its origin was rounded.
         """
         normals, distances = planes(self.name)
         normals, far, cosine = normals @ TURN, np.empty(len(ways)), np.empty(len(ways))
@@ -68,7 +68,7 @@ class Stage:
         return self.size * far, cosine
 
     def wrong_ends(self, origins: Any, ways: Any, distance: Any) -> Any:
-        """Which rays do not end at the wall that they should meet; lengths of unit directions."""
+        """Return which rays do not end at the right wall; lengths of unit directions."""
         right, cosine = self.right_distance(origins, ways)
         return ~(abs(distance - right) <= NEAR_WALL * self.size / cosine)
 
@@ -104,7 +104,7 @@ def _shoot(origin: Any, way: Any, packets: Any) -> None:
 
 
 def _seen(arrays: Surfaces, embree: EmbreeScene, eye: Any, n: int) -> Hits:
-    """What n rays in all directions meet: it must be a wall, whatever the direction."""
+    """Find the hits of n rays in all directions; each must be a wall."""
     way = np.random.default_rng(3).normal(size=(n, 3)).astype(np.float32)
     packets, hits = room_for_hits(n).packets, empty_hits(n)
     _shoot(eye, way, packets)

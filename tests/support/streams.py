@@ -42,7 +42,7 @@ def program(seed: int, c: int, pixel: Any, sample: int, dimension: int) -> Any:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """Where words are taken: moves away from the pixels 0 to N - 1 of a frame, sample and dimension."""
+    """The place of a set of words: an offset from pixels 0 to N - 1 of a frame, sample and dimension."""
 
     pixel: int = 0
     c: int = 5
@@ -52,7 +52,7 @@ class Place:
 
 
 def pairs() -> dict[str, tuple[Place, Place]]:
-    """Pairs of places whose words must know nothing of each other, by name."""
+    """Pairs of places whose words must be independent, by name."""
     here = Place()
     found = {
         "next pixel": (here, Place(pixel=1)),
@@ -103,7 +103,7 @@ def _chi2(cells: Any, n_cells: int) -> float:
 
 
 def chances(words: Words, a: Place, b: Place) -> dict[str, float]:
-    """By test, the chance that independent words look as dependent as those at two places do."""
+    """By test, the chance that independent words look as dependent as those at two places."""
     found = {}
     left, right = taken(words, a), taken(words, b)
     for i, j in product(range(2), range(2)):

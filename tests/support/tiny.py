@@ -218,7 +218,7 @@ def job(**changes: Any) -> Job:
 
 
 def prepared(job: Job, scene: Scene | None = None) -> Prepared:
-    """What `prepare` gives, with a scene that is in no file."""
+    """Return the result of `prepare` for a scene without a file."""
     return prepared_from(job, scene or room(), eyes(job), lights(job))
 
 
@@ -231,7 +231,7 @@ def planned(inputs: Prepared, engine: Engine = "auto") -> Iterator[tuple[FrameSe
 
 @dataclass(frozen=True)
 class Rendered:
-    """All frames that were found and composed, one for a camera that stands still."""
+    """All traced and composed frames; one for a camera that stands still."""
 
     composed: list[Composed]
     ambient: Ambient

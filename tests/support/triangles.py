@@ -1,4 +1,4 @@
-"""Everything that a ray finds on a triangle, one point at a time; compiled once for all tests."""
+"""All quantities at a hit on a triangle, one point at a time; compiled once for all tests."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Comparisons of estimates: z-tests with errors from independent values, and what "within the errors" means."""
+"""Comparisons of estimates: z-tests with errors from independent values, and the meaning of "within the errors"."""
 
 import math
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class Estimate:
 
 
 def estimate(values: NDArray[np.floating]) -> Estimate:
-    """Mean of independent values, of any shape, with the standard error that their spread tells."""
+    """Mean of independent values, of any shape, with the standard error from their spread."""
     flat = np.asarray(values, np.float64).ravel()
     return Estimate(mean=float(flat.mean()), error=float(flat.std(ddof=1) / math.sqrt(flat.size)))
 
