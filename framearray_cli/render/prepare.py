@@ -34,7 +34,11 @@ LEAST_SCENE_MEMORY = 64 * 2**20
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Prepared:
-    """A job whose inputs were read and checked; no ray was cast yet. See `prepared_from`."""
+    """A job whose inputs were read and checked; no ray was cast yet. See `prepared_from`.
+
+    Attributes:
+        still: the camera never moves; its hits are found once and serve all frames [FA section 3.2].
+    """
 
     job: Job
     scene: Scene
@@ -42,11 +46,7 @@ class Prepared:
     lights: Lights
     light_arrays: LightArrays
     surfaces: Surfaces
-
-    @property
-    def still(self) -> bool:
-        """Whether the camera never moves; its hits are found once then and serve all frames [FA section 3.2]."""
-        return self.eyes.at_rest
+    still: bool
 
     @property
     def n_cameras(self) -> int:
@@ -87,6 +87,7 @@ def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepare
         lights=lights,
         light_arrays=light_arrays(lights, scene.centre),
         surfaces=surfaces(scene),
+        still=eyes.at_rest,
     )
 
 

@@ -18,7 +18,7 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.scene.scene import load_scene
-from framearray_cli.starter import Start, Wishes, init
+from framearray_cli.starter import Start, Wishes, expose, init
 from framearray_cli.starter.expose import CLIPPED, LUMINANCE, ROOM, solved
 from framearray_cli.starter.model import table_of
 
@@ -251,6 +251,28 @@ def test_exposure_makes_the_mean_right_and_spares_highlights() -> None:
     harsh = np.where(np.arange(1000)[:, None] < 100, 30.0, 1.0) * even  # a tenth lies in the sun
     clipped = ((solved(harsh, none, ROOM) * harsh).max(axis=1) > 1).mean()
     assert 0.5 * CLIPPED < clipped <= CLIPPED or mean(solved(harsh, none, ROOM), harsh, none) < 0.301
+
+
+@pytest.mark.parametrize(("seconds", "eyes_tried"), [(None, 1), (1.0, expose.PICTURES)])
+def test_an_animated_camera_at_rest_is_exposed_from_several_pictures(
+    seconds: float | None, eyes_tried: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Their mean has less noise than one of them; a camera without animation has one eye."""
+    glb = room()
+    shot = glb.node(camera=glb.add("cameras", dict(LENS)), translation=[0.0, 1.5, 1.0])
+    if seconds is not None:
+        animate(glb, shot, "translation", [0.0, seconds], [[0.0, 1.5, 1.0]] * 2)
+    pixels = []
+
+    def record(lit: Any, dark: Any, levels: expose.Levels) -> float:
+        pixels.append(len(lit))
+        return solved(lit, dark, levels)
+
+    monkeypatch.setattr(expose, "solved", record)
+    _, job = started(glb, tmp_path, Wishes(lights=1))
+    assert eyes(job).at_rest
+    width, height = expose.SIZE
+    assert pixels == [eyes_tried * width * height]  # walls are all around
 
 
 def test_a_file_that_is_there_stays(tmp_path: Path) -> None:
