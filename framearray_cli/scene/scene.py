@@ -11,9 +11,9 @@ from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Float
 from framearray_cli.base.errors import SceneError
 
 from .cleaning import finite, has_area, repeated
-from .files import Material, Meshes, Notes, override_materials, read_meshes
+from .files import Material, Meshes, Notes, read_meshes
 from .merge import Merged, merge, near_uvs, unit_normals, untextured_variants
-from .overrides import Override
+from .overrides import Override, override_materials
 
 # Sizes between which tracing was measured to be right; far below, float32 falls into denormals, above, nothing is hit.
 SMALLEST_SCENE, LARGEST_SCENE = 1e-12, 1e12
