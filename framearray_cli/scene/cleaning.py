@@ -13,7 +13,7 @@ Keys = NDArray[np.uint64]
 SLIVER = 2.0**-23
 
 
-def finite(corners: Float64) -> Mask:
+def is_finite(corners: Float64) -> Mask:
     """(n,) whether all corners of a triangle are finite."""
     return np.asarray(np.isfinite(corners).all(axis=(1, 2)))
 
@@ -40,7 +40,7 @@ def _largest(vectors: Float64) -> Float64:
     return np.asarray(np.maximum(np.maximum(x, y), z))
 
 
-def repeated(corners: Corners, group: NDArray[np.integer]) -> Mask:
+def is_repeated(corners: Corners, group: NDArray[np.integer]) -> Mask:
     """(n,) whether an earlier triangle of the same group has the same three corners, in any order.
 
     Args:

@@ -13,7 +13,7 @@ from .files.model import Material, Notes, Part
 FAR_UV = 16.0  # float32 texture coordinates beyond it lose texels: whole repeats are subtracted
 
 
-def untextured_variants(
+def add_untextured_variants(
     parts: Sequence[Part], materials: Sequence[Material], notes: Notes
 ) -> tuple[list[Part], list[Material]]:
     """Give each part without texture coordinates a variant of its material without textures."""
@@ -67,7 +67,7 @@ def merge(parts: Sequence[Part]) -> Merged:
     for part, end, count in zip(parts, ends, counts, strict=True):
         rows = slice(end - count, end)
         if normals is not None and part.normals is not None:
-            normals[rows] = _bounded(part.normals)
+            normals[rows] = _scale_normals(part.normals)
             has_normals[rows] = True
         if uvs is not None and part.uvs is not None:
             uvs[rows] = part.uvs
@@ -83,7 +83,7 @@ def merge(parts: Sequence[Part]) -> Merged:
     )
 
 
-def _bounded(normals: Float64) -> Float64:
+def _scale_normals(normals: Float64) -> Float64:
     """Scale normals so that their largest component is 1: float32 would round those of a tiny node to 0."""
     with np.errstate(all="ignore"):
         return np.asarray(normals / np.abs(normals).max(axis=-1, keepdims=True))
@@ -120,7 +120,7 @@ def geometric_normals(corners: Corners) -> Corners:
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True), dtype=np.float32)
 
 
-def near_uvs(uvs: Float64, notes: Notes) -> CornerUvs:
+def wrap_uvs(uvs: Float64, notes: Notes) -> CornerUvs:
     """Convert texture coordinates to float32; move far ones back by whole repeats, as textures repeat."""
     bad = np.asarray(~np.isfinite(uvs).all(axis=-1))
     if bad.any():

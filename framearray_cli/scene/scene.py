@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Float64, Int32, Rgb
 from framearray_cli.base.errors import SceneError
 
-from .cleaning import finite, has_area, repeated
+from .cleaning import has_area, is_finite, is_repeated
 from .files import Material, Meshes, Notes, read_meshes
-from .merge import Merged, merge, near_uvs, unit_normals, untextured_variants
+from .merge import Merged, add_untextured_variants, merge, unit_normals, wrap_uvs
 from .overrides import Override, override_materials
 
 # Sizes between which tracing was measured to be right; far below, float32 falls into denormals, above, nothing is hit.
@@ -116,20 +116,20 @@ def load_scene(
 def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
     """Turn what a file holds into the arrays that kernels read."""
     notes = Notes()
-    parts, materials = untextured_variants(meshes.parts, meshes.materials, notes)
+    parts, materials = add_untextured_variants(meshes.parts, meshes.materials, notes)
     materials = override_materials(materials, overrides, notes)
     plain = {name for name, override in overrides.items() if override.reflectivity is not None}
     parts = [replace(p, colours=None) if materials[p.material].name in plain else p for p in parts]
     merged = merge(parts)
     dropped = dict(meshes.dropped)
-    keep, centre, corners = _kept(merged, materials, dropped, meshes.notes)
+    keep, centre, corners = _select_triangles(merged, materials, dropped, meshes.notes)
     material = merged.material[keep]
-    normals, uvs, colours = _none(3), _none(2), _none(3)
+    normals, uvs, colours = _empty(3), _empty(2), _empty(3)
     if merged.normals is not None and merged.has_normals[keep].any():
         normals = unit_normals(merged.normals[keep], merged.has_normals[keep], corners, notes)
     textured = max((max(m.texture, m.specular_texture, m.alpha_texture) for m in materials), default=-1) >= 0
     if merged.uvs is not None and textured:
-        uvs = near_uvs(merged.uvs[keep], notes)
+        uvs = wrap_uvs(merged.uvs[keep], notes)
     if merged.colours is not None:
         colours = merged.colours[keep]
     cutoff = np.array([m.alpha_cutoff for m in materials], dtype=np.float32)
@@ -164,11 +164,11 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
     )
 
 
-def _none(width: int) -> Float32:
+def _empty(width: int) -> Float32:
     return np.zeros((0, 3, width), dtype=np.float32)
 
 
-def _kept(
+def _select_triangles(
     merged: Merged, materials: Sequence[Material], dropped: dict[str, int], notes: Sequence[str]
 ) -> tuple[NDArray[np.int64], Float64, Corners]:
     """Decide which triangles stay, and centre them.
@@ -186,7 +186,7 @@ def _kept(
         SceneError: nothing stays, or a size that cannot be traced.
     """
     rows = np.arange(len(merged.corners))
-    rows = _drop(rows, ~finite(merged.corners), "non-finite", dropped)
+    rows = _drop(rows, ~is_finite(merged.corners), "non-finite", dropped)
     for reason in sorted({material.left_out for material in materials} - {""}):
         absent = np.array([material.left_out == reason for material in materials])
         rows = _drop(rows, absent[merged.material[rows]], reason, dropped)
@@ -209,7 +209,7 @@ def _kept(
     order = np.argsort(masked, kind="stable")
     rows, corners, masked = rows[order], corners[order], masked[order]
     # opaque triangles hide one another whatever their material; a cut-out one shows what coincides with it
-    again = repeated(corners, np.where(masked, merged.material[rows] + 1, 0))
+    again = is_repeated(corners, np.where(masked, merged.material[rows] + 1, 0))
     rows, corners = _drop(rows, again, "duplicate", dropped), corners[~again]
     _check_left(rows, dropped, notes)
     return rows, centre, corners

@@ -12,7 +12,7 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.render.prepare import plan_work, prepared_from
-from framearray_cli.scene.paths.paths import LightPath, eyes, lights, shining_together
+from framearray_cli.scene.paths.paths import LightPath, eyes, lights, lights_without_groups
 from framearray_cli.scene.scene import Scene
 
 from .model import Start, checked, table_of
@@ -98,7 +98,7 @@ def _pictures(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[Float64,
     job_eyes, job_lights = eyes(job), lights(job)
     some = _spread(job_eyes.n)
     few_eyes = replace(job_eyes, position=job_eyes.position[some], world_from_camera=job_eyes.world_from_camera[some])
-    few_lights = shining_together([_and_none(source, _spread(job_lights.n)) for source in job_lights.sources])
+    few_lights = lights_without_groups([_and_none(source, _spread(job_lights.n)) for source in job_lights.sources])
     # several eyes are rendered even where they are one place: their mean has less noise
     prepared = replace(prepared_from(job, scene, few_eyes, few_lights), still=few_eyes.n == 1)
     setup, ambient = plan_work(prepared, embree)

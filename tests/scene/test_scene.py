@@ -9,7 +9,7 @@ import pytest
 from support.scenes import QUAD, QUAD_FACES, QUAD_UVS, Glb, check_shapes, png, shared_scene
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.scene.cleaning import has_area, repeated
+from framearray_cli.scene.cleaning import has_area, is_repeated
 from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.scene import Scene, build_scene, load_scene, scene_report_lines
 
@@ -105,8 +105,8 @@ def test_duplicates_in_any_order_and_of_either_zero():
     flipped = np.where(a[::-1] == 0, -0.0, a[::-1])
     other = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 1e-3]])
     corners = np.array([a, other, turned, flipped], dtype=np.float32)
-    assert repeated(corners, np.zeros(4, dtype=int)).tolist() == [False, False, True, True]
-    assert repeated(corners, np.array([0, 0, 1, 1])).tolist() == [False, False, False, True]
+    assert is_repeated(corners, np.zeros(4, dtype=int)).tolist() == [False, False, True, True]
+    assert is_repeated(corners, np.array([0, 0, 1, 1])).tolist() == [False, False, False, True]
 
 
 def test_repeated_agrees_with_a_set():
@@ -118,7 +118,7 @@ def test_repeated_agrees_with_a_set():
         key = tuple(sorted(map(tuple, triangle)))
         expected.append(key in seen)
         seen.add(key)
-    assert repeated(corners, np.zeros(500, dtype=int)).tolist() == expected
+    assert is_repeated(corners, np.zeros(500, dtype=int)).tolist() == expected
 
 
 def test_nothing_left_is_an_error_that_says_why():

@@ -24,7 +24,7 @@ from framearray_cli.engine.inputs.surfaces import nearest
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.direct import FAR_END, direct
 from framearray_cli.engine.terms.obscurance import SQRT, ObscuranceSettings, _aim
-from framearray_cli.scene.paths.paths import LightPath, shining_together
+from framearray_cli.scene.paths.paths import LightPath, lights_without_groups
 from support import tiny
 from support.rooms import INSIDE, ON_WALLS, OUTSIDE, TURN, WIDTH, planes
 from support.staging import Stage, facing, staged
@@ -79,7 +79,7 @@ def lamps_reach(stage: Stage, places: Any) -> Any:
 def _lit(stage: Stage, lamps: Any) -> Any:
     power = np.full((len(lamps), 3), float(stage.size) ** 2)
     source = LightPath(kind="point", vector=lamps, intensity=power)
-    lights = light_arrays(shining_together([source]), stage.scene.centre)
+    lights = light_arrays(lights_without_groups([source]), stage.scene.centre)
     out = np.empty((stage.n, 1, len(lamps)), np.float32)
     direct(stage.hits, stage.n, lights, stage.embree.tracer, room_for_tests(4096, len(lamps)), out)
     return out[:, 0] > 0

@@ -1,4 +1,4 @@
-"""Mesh files -> triangles, materials and textures. The only door to trimesh."""
+"""Scene files -> triangles, materials, textures, cameras and lights. The only door to trimesh."""
 
 from .gltf.stage import Stage, StageCamera, StageLight
 from .model import Material, Meshes, Notes, Part

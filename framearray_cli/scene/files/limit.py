@@ -36,7 +36,7 @@ class Limit:
             )
 
     @contextmanager
-    def lent(self, kind: str, size: int) -> Iterator[None]:
+    def lend(self, kind: str, size: int) -> Iterator[None]:
         """Count bytes that are returned at the end."""
         self.take(kind, size)
         try:

@@ -12,7 +12,7 @@ from .assets import AssetError, Assets
 from .headers import check_headers, one_solid
 from .materials import blended_opacity, clean_colours, default_material, make_material
 from .model import Material, Meshes, Notes, Part
-from .placing import file_normals, instances, place
+from .placing import file_normals, instances, place_mesh
 from .textures import TextureTable
 
 BYTE = 255.0
@@ -85,7 +85,7 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
         inside = ((faces >= 0) & (faces < len(vertices))).all(axis=1)
         outside += int((~inside).sum())
         parts.append(
-            place(
+            place_mesh(
                 vertices,
                 faces[inside],
                 world_from_mesh[None],

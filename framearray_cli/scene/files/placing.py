@@ -22,7 +22,7 @@ def instances(scene: Any) -> Iterator[tuple[Any, Float64]]:
             yield mesh, np.array(world_from_mesh, dtype=np.float64)
 
 
-def place(
+def place_mesh(
     vertices: Float64,
     faces: NDArray[np.int64],
     world_from_mesh: Float64,
@@ -56,16 +56,16 @@ def place(
             sign = np.where(mirrored, -1.0, 1.0)[:, None, None]
             normals = normals @ (cofactors(linear) * sign).transpose(0, 2, 1)
 
-    def turned(rows: NDArray[Any]) -> NDArray[Any]:
+    def join_places(rows: NDArray[Any]) -> NDArray[Any]:
         """Reshape (n, f, 3, k) to (n f, 3, k), the corners of mirrored places in reverse order."""
         if mirrored.any():
             rows = rows.copy()
             rows[mirrored] = rows[mirrored][:, :, ::-1]
         return rows.reshape(-1, *rows.shape[2:])
 
-    def everywhere(rows: NDArray[Any]) -> NDArray[Any]:
+    def repeat_at_places(rows: NDArray[Any]) -> NDArray[Any]:
         """Repeat (f, 3, k) at all places."""
-        return turned(np.broadcast_to(rows, (len(linear), *rows.shape)))
+        return join_places(np.broadcast_to(rows, (len(linear), *rows.shape)))
 
     if colours is None and face_colours is not None:
         at_corners: Float32 | None = np.repeat(face_colours[:, None], 3, axis=1)
@@ -73,10 +73,10 @@ def place(
         at_corners = None if colours is None else colours[faces]
     return Part(
         material=material,
-        corners=turned(world[:, faces]),
-        normals=None if normals is None else turned(normals[:, faces]),
-        uvs=None if uvs is None else everywhere(uvs[faces]),
-        colours=None if at_corners is None else everywhere(at_corners),
+        corners=join_places(world[:, faces]),
+        normals=None if normals is None else join_places(normals[:, faces]),
+        uvs=None if uvs is None else repeat_at_places(uvs[faces]),
+        colours=None if at_corners is None else repeat_at_places(at_corners),
     )
 
 

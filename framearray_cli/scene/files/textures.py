@@ -157,7 +157,7 @@ def decode_opened(image: Any, label: str, limit: Limit) -> Bytes:
         raise AssetError(
             f"{label}: expected a PNG or JPEG, got {image.format} of {image.width} x {image.height} pixels"
         )
-    with limit.lent(f"an image of {image.width} x {image.height} pixels", (KEPT + DECODING) * texels):
+    with limit.lend(f"an image of {image.width} x {image.height} pixels", (KEPT + DECODING) * texels):
         try:
             return rgba(image)
         except MemoryError:

@@ -17,7 +17,7 @@ def unit(vectors: Float64) -> Float64:
     return np.asarray(scaled / np.linalg.norm(scaled, axis=-1, keepdims=True))
 
 
-def directions_between(frames: Sequence[int], directions: Sequence[Sequence[float]], n: int) -> Float64:
+def interpolate_directions(frames: Sequence[int], directions: Sequence[Sequence[float]], n: int) -> Float64:
     """Interpolate key directions to frames 0 .. n - 1.
 
     Edge cases: one key is constant; equal neighbours stay equal to the last bit; before the first and after

@@ -17,9 +17,9 @@ from framearray_cli.job.camera import CameraKey
 from framearray_cli.job.job import Job
 from framearray_cli.job.light import DirectionalKey, PointKey, SunSource
 
-from .directions import directions_between, unit
-from .planes import Plane, pictures, planes_of_groups
-from .sun import NEVER, daylight, sun_between, to_sun
+from .directions import interpolate_directions, unit
+from .planes import Plane, group_planes, picture_planes
+from .sun import NEVER, daylight, directions_to_sun, sun_path
 
 # Look and up closer to parallel than this (radians) leave no digits to tell what is right of the picture.
 PARALLEL = 1e-6
@@ -85,7 +85,7 @@ class LightGroup:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Lights:
-    """All sources; those of one image plane shine together. See `shining_together` for those without groups.
+    """All sources; those of one image plane shine together. See `lights_without_groups` for those without groups.
 
     Attributes:
         sources: n positions each; where a plane is not lit, they are dark.
@@ -108,9 +108,9 @@ class Lights:
         return tuple(plane for plane in self.planes if not plane.lit)
 
 
-def shining_together(sources: Sequence[LightPath]) -> Lights:
+def lights_without_groups(sources: Sequence[LightPath]) -> Lights:
     """Sources without groups: a picture for each light position."""
-    return Lights(sources=tuple(sources), planes=pictures(len(sources[0].vector)))
+    return Lights(sources=tuple(sources), planes=picture_planes(len(sources[0].vector)))
 
 
 def eyes(job: Job) -> Eyes:
@@ -121,8 +121,8 @@ def eyes(job: Job) -> Eyes:
     """
     keys = job.camera.keys
     frames = [key.frame for key in keys]
-    position = between_keys(frames, [key.eye for key in keys], job.camera.frames)
-    target = between_keys(frames, [key.target for key in keys], job.camera.frames)
+    position = interpolate_keys(frames, [key.eye for key in keys], job.camera.frames)
+    target = interpolate_keys(frames, [key.target for key in keys], job.camera.frames)
     look_vec = target - position
     if (met := np.flatnonzero(np.linalg.norm(look_vec, axis=1) <= _rounding(position))).size:
         problem = f"camera.keys: expected a target away from the eye, got the same point at frame {met[0]}; move a key"
@@ -147,19 +147,19 @@ def lights(job: Job) -> Lights:
     """
     table = job.light
     if not table.groups:
-        return shining_together([_placed(job, i, table.frames) for i in range(len(table.sources))])
-    planes = planes_of_groups(sum(group.n for group in table.groups), background=any(job.scene.background))
+        return lights_without_groups([_place_source(job, i, table.frames) for i in range(len(table.sources))])
+    planes = group_planes(sum(group.n for group in table.groups), background=any(job.scene.background))
     groups, found, first = [], {}, 0
     for group in table.groups:
         positions = range(first, first + group.n)
         groups.append(LightGroup(name=group.name, axis=group.axis, positions=positions, sources=group.sources))
         for i in group.sources:
-            found[i] = _within(_placed(job, i, group.n), positions, len(planes))
+            found[i] = _confine(_place_source(job, i, group.n), positions, len(planes))
         first = positions.stop
     return Lights(sources=tuple(found[i] for i in sorted(found)), groups=tuple(groups), planes=planes)
 
 
-def _within(path: LightPath, positions: range, n: int) -> LightPath:
+def _confine(path: LightPath, positions: range, n: int) -> LightPath:
     """The same source at some of n image planes; at the others it does not shine."""
     own = np.clip(np.arange(n) - positions.start, 0, len(positions) - 1)
     intensity = np.zeros((n, 3))
@@ -168,15 +168,15 @@ def _within(path: LightPath, positions: range, n: int) -> LightPath:
     return LightPath(kind=path.kind, vector=path.vector[own], intensity=intensity, notes=notes)
 
 
-def _placed(job: Job, i: int, n: int) -> LightPath:
+def _place_source(job: Job, i: int, n: int) -> LightPath:
     """Place and set source i at n light positions."""
     source = job.light.sources[i]
     if isinstance(source, SunSource):
-        return _sun_path(source, job, f"light.sources[{i}]", n)
-    return _light_path(source.type, source.keys, n)
+        return _place_sun(source, job, f"light.sources[{i}]", n)
+    return _place_light(source.type, source.keys, n)
 
 
-def _sun_path(source: SunSource, job: Job, name: str, n: int) -> LightPath:
+def _place_sun(source: SunSource, job: Job, name: str, n: int) -> LightPath:
     """Place the sun."""
     up_dir = np.array([0.0, 0.0, 1.0] if job.scene.up == "z" else [0.0, 1.0, 0.0])
     north_vec = unit(np.array(source.north or ((0.0, 1.0, 0.0) if job.scene.up == "z" else (0.0, 0.0, -1.0))))
@@ -185,7 +185,7 @@ def _sun_path(source: SunSource, job: Job, name: str, n: int) -> LightPath:
         problem = f'{name}.north: expected a direction that is not up, got the up axis of the scene, "{job.scene.up}"'
         raise JobError(job.file or job.name, [problem])
     place = (source.latitude, source.longitude)
-    sun = sun_between(source.date, source.start, source.stop, source.timezone, place, n)
+    sun = sun_path(source.date, source.start, source.stop, source.timezone, place, n)
     if not sun.is_up.any():
         hours = daylight(source.date, source.timezone, place)
         when = "it does not rise on that day" if hours == NEVER else f"on {source.date} it is up from {hours}"
@@ -193,7 +193,7 @@ def _sun_path(source: SunSource, job: Job, name: str, n: int) -> LightPath:
         raise JobError(job.file or job.name, [problem])
     return LightPath(
         kind="directional",
-        vector=-to_sun(sun, up_dir, unit(north_vec)),
+        vector=-directions_to_sun(sun, up_dir, unit(north_vec)),
         intensity=sun.is_up[:, None] * np.array(source.irradiance),
         notes=tuple(
             {"azimuth": round(azimuth, 4), "elevation": round(elevation, 4), "time": time.isoformat(timespec="seconds")}
@@ -204,20 +204,20 @@ def _sun_path(source: SunSource, job: Job, name: str, n: int) -> LightPath:
     )
 
 
-def _light_path(
+def _place_light(
     kind: Literal["point", "directional"], keys: Sequence[PointKey | DirectionalKey], n_lights: int
 ) -> LightPath:
     """Place and set one source."""
     frames = [key.frame for key in keys]
     places = [key.position if isinstance(key, PointKey) else key.direction for key in keys]
     powers = [key.intensity if isinstance(key, PointKey) else key.irradiance for key in keys]
-    vector = (between_keys if kind == "point" else directions_between)(frames, places, n_lights)
+    vector = (interpolate_keys if kind == "point" else interpolate_directions)(frames, places, n_lights)
     colors = [key.color if key.color is not None else (1.0, 1.0, 1.0) for key in keys]
-    intensity = between_keys(frames, powers, n_lights) * between_keys(frames, colors, n_lights)
+    intensity = interpolate_keys(frames, powers, n_lights) * interpolate_keys(frames, colors, n_lights)
     return LightPath(kind=kind, vector=vector, intensity=intensity)
 
 
-def between_keys(frames: Sequence[int], values: Sequence[Sequence[float]], n: int) -> Float64:
+def interpolate_keys(frames: Sequence[int], values: Sequence[Sequence[float]], n: int) -> Float64:
     """Interpolate key values to frames 0 .. n - 1.
 
     Edge cases: one key is constant, two are a straight line; equal neighbours stay equal to the last bit.
@@ -262,7 +262,7 @@ def _smooth(frames: Sequence[int], keyed: Float64, at: Float64) -> Float64:
 def _ups(keys: Sequence[CameraKey], job: Job) -> Float64:
     """Find the up direction of each frame, (n_c, 3): of the keys, else of the scene."""
     axis = (0.0, 0.0, 1.0) if job.scene.up == "z" else (0.0, 1.0, 0.0)
-    return directions_between([key.frame for key in keys], [key.up or axis for key in keys], job.camera.frames)
+    return interpolate_directions([key.frame for key in keys], [key.up or axis for key in keys], job.camera.frames)
 
 
 def _right(look_dir: Float64, up_dir: Float64, up_is_axis: bool) -> Float64:

@@ -34,12 +34,12 @@ class Plane(Enum):
         return self in (Plane.PICTURE, Plane.BACKGROUND)
 
 
-def pictures(n_lights: int) -> tuple[Plane, ...]:
+def picture_planes(n_lights: int) -> tuple[Plane, ...]:
     """The planes of an array without groups."""
     return (Plane.PICTURE,) * n_lights
 
 
-def planes_of_groups(n_lights: int, *, background: bool) -> tuple[Plane, ...]:
+def group_planes(n_lights: int, *, background: bool) -> tuple[Plane, ...]:
     """The planes of an array with groups.
 
     Args:

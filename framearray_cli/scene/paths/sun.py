@@ -72,7 +72,7 @@ def sun_at(times: Sequence[datetime], latitude: float, longitude: float) -> SunP
     return SunPath(times=tuple(times), azimuth_deg=azimuth, elevation_deg=elevation)
 
 
-def sun_between(date: str, start: str, stop: str, timezone: str | float, place: tuple[float, float], n: int) -> SunPath:
+def sun_path(date: str, start: str, stop: str, timezone: str | float, place: tuple[float, float], n: int) -> SunPath:
     """Find the sun at n moments, evenly spaced from start to stop; one moment is the start.
 
     Args:
@@ -107,7 +107,7 @@ def _minutes(date: str, zone: tzinfo) -> list[datetime]:
     return [(first + timedelta(minutes=k)).astimezone(zone) for k in range(count)]
 
 
-def to_sun(sun: SunPath, up_dir: Float64, north_dir: Float64) -> Float64:
+def directions_to_sun(sun: SunPath, up_dir: Float64, north_dir: Float64) -> Float64:
     """Turn angles into unit directions from the scene to the sun, (n, 3).
 
     Args:

@@ -17,7 +17,7 @@ from framearray_cli.engine.inputs.lights import DIRECTIONAL, LightArrays, padded
 from framearray_cli.render.prepare import open_embree, plan_work
 from framearray_cli.report.settings import Settings
 from framearray_cli.scene.paths.paths import Eyes
-from framearray_cli.scene.paths.planes import pictures
+from framearray_cli.scene.paths.planes import picture_planes
 
 from .processes import asked
 from .speed import tell
@@ -65,7 +65,7 @@ def _with_lights(case: Case, n: int) -> Case:
     at = np.linspace(0, lights.n_lights - 1, n) if n > 1 else np.array([(lights.n_lights - 1) / 2])
     return replace(
         case,
-        setup=replace(case.setup, lights=resampled(lights, at), kept=range(n), planes=pictures(n)),
+        setup=replace(case.setup, lights=resampled(lights, at), kept=range(n), planes=picture_planes(n)),
         ambient=replace(
             case.ambient,
             intensity=np.ascontiguousarray(_between(intensity, at, 0)),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from framearray_cli.engine.inputs.lights import DIRECTIONAL, POINT, light_arrays
-from framearray_cli.scene.paths.paths import LightPath, shining_together
+from framearray_cli.scene.paths.paths import LightPath, lights_without_groups
 
 WHITE = np.array([1.0, 1.0, 1.0])
 
@@ -16,7 +16,7 @@ def source(intensity: Any, kind: Any = "point", vector: Any = ((0, 0, 0), (1, 2,
 
 
 def arrays(*sources: LightPath, centre: Any = (0, 0, 0)) -> Any:
-    return light_arrays(shining_together(sources), np.asarray(centre, np.float64))
+    return light_arrays(lights_without_groups(sources), np.asarray(centre, np.float64))
 
 
 @pytest.mark.parametrize(

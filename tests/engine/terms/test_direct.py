@@ -14,7 +14,7 @@ from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
-from framearray_cli.scene.paths.paths import LightPath, shining_together
+from framearray_cli.scene.paths.paths import LightPath, lights_without_groups
 from framearray_cli.scene.scene import Scene
 
 UP = (0.0, 1.0, 0.0)
@@ -37,7 +37,7 @@ def suns(directions: Any, irradiance: Any = (1.0, 1.0, 1.0)) -> LightPath:
 
 
 def arrays(*sources: LightPath) -> LightArrays:
-    return light_arrays(shining_together(sources), np.zeros(3))
+    return light_arrays(lights_without_groups(sources), np.zeros(3))
 
 
 def lit(scene: Scene, hits: Hits, lights: LightArrays, room: int = 4096) -> tuple[Any, int]:

@@ -266,7 +266,7 @@ def test_a_jpeg_of_very_many_scans_is_left_out(folder: Path) -> None:
 
 def test_what_was_lent_is_given_back() -> None:
     limit = Limit(most=100)
-    with limit.lent("an image", 90):
+    with limit.lend("an image", 90):
         pass
     limit.take("textures", 100)
     with pytest.raises(SceneError, match="0 MiB of memory or more"):

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
-from framearray_cli.scene.paths.directions import directions_between, slerp, turn, unit
-from framearray_cli.scene.paths.paths import between_keys, eyes, lights
+from framearray_cli.scene.paths.directions import interpolate_directions, slerp, turn, unit
+from framearray_cli.scene.paths.paths import eyes, interpolate_keys, lights
 
 FEW = settings(max_examples=60, deadline=None)
 numbers = st.floats(-1e6, 1e6)
@@ -40,7 +40,7 @@ def fixed(eye, target, **more):
 def test_numbers_pass_through_keys_and_stay_between_neighbours(frames, data):
     values = np.array(data.draw(st.lists(vectors, min_size=len(frames), max_size=len(frames))))
     n = frames[-1] + 5
-    curve = between_keys(frames, values, n)
+    curve = interpolate_keys(frames, values, n)
     assert curve.shape == (n, 3)
     assert (curve[frames] == values).all()
     assert (curve[: frames[0]] == values[0]).all()
@@ -52,18 +52,18 @@ def test_numbers_pass_through_keys_and_stay_between_neighbours(frames, data):
 
 
 def test_equal_neighbours_stay_equal_bit_for_bit():
-    curve = between_keys([0, 7, 19, 30], [[0.1], [0.7], [0.7], [0.3]], 31)
+    curve = interpolate_keys([0, 7, 19, 30], [[0.1], [0.7], [0.7], [0.3]], 31)
     assert (curve[7:20] == 0.7).all()
     assert len(np.unique(curve[:8])) == 8
 
 
 def test_two_keys_are_a_straight_line():
-    curve = between_keys([2, 12], [[0.0, 5.0], [1.0, -5.0]], 13)[:, 0]
+    curve = interpolate_keys([2, 12], [[0.0, 5.0], [1.0, -5.0]], 13)[:, 0]
     np.testing.assert_allclose(curve[2:], np.linspace(0, 1, 11), rtol=0, atol=1e-15)
 
 
 def test_a_path_through_keys_has_no_corner():
-    curve = between_keys([0, 100, 250], [[0.0], [1.0], [4.0]], 251)[:, 0]
+    curve = interpolate_keys([0, 100, 250], [[0.0], [1.0], [4.0]], 251)[:, 0]
     steps = np.diff(curve)
     assert np.abs(np.diff(steps)).max() < 0.05 * steps.max()  # a broken line would jump by half of its largest step
 
@@ -72,14 +72,14 @@ def test_a_path_through_keys_has_no_corner():
 @given(frames=frame_lists, seed=st.integers(0, 2**32 - 1))
 def test_directions_pass_through_keys_and_stay_unit(frames, seed):
     keys = np.random.default_rng(seed).normal(size=(len(frames), 3))
-    path = directions_between(frames, keys, frames[-1] + 4)
+    path = interpolate_directions(frames, keys, frames[-1] + 4)
     np.testing.assert_allclose(np.linalg.norm(path, axis=1), 1, rtol=0, atol=1e-12)
     assert (path[frames] == unit(keys)).all()
     assert (path[frames[-1] :] == path[frames[-1]]).all()
 
 
 def test_two_directions_turn_at_constant_speed():
-    path = directions_between([0, 10], [[1, 0, 0], [-1, 1e-3, 0]], 11)
+    path = interpolate_directions([0, 10], [[1, 0, 0], [-1, 1e-3, 0]], 11)
     whole = np.pi - 1e-3
     angles = np.arctan2(path[:, 1], path[:, 0])
     np.testing.assert_allclose(angles, np.linspace(0, whole, 11), rtol=0, atol=1e-6)
@@ -89,13 +89,13 @@ def test_two_directions_turn_at_constant_speed():
 def test_directions_on_a_great_circle_stay_on_it_without_turning_back():
     angles = np.array([0.0, 0.2, 0.3, 1.7, 1.8])
     keys = np.stack([np.cos(angles), np.zeros(5), np.sin(angles)], axis=1)
-    path = directions_between([0, 20, 25, 60, 90], keys, 91)
+    path = interpolate_directions([0, 20, 25, 60, 90], keys, 91)
     np.testing.assert_allclose(path[:, 1], 0, atol=1e-15)
     assert (np.diff(np.arctan2(path[:, 2], path[:, 0])) > 0).all()
 
 
 def test_direction_path_has_no_corner_at_a_key():
-    path = directions_between([0, 200, 400], [[1, 0, 0], [0.6, 0.7, 0.2], [0, 0.2, 1]], 401)
+    path = interpolate_directions([0, 200, 400], [[1, 0, 0], [0.6, 0.7, 0.2], [0, 0.2, 1]], 401)
     steps = turn(path[:-1], path[1:])
     length = np.linalg.norm(steps, axis=1)
     bend = np.linalg.norm(np.diff(steps, axis=0), axis=1)
@@ -103,7 +103,7 @@ def test_direction_path_has_no_corner_at_a_key():
 
 
 def test_equal_directions_of_any_length_rest():
-    path = directions_between([0, 5, 9, 12], [[0, -1, 0.3], [1, -1, 0], [3, -3, 0], [1, 0, 0]], 13)
+    path = interpolate_directions([0, 5, 9, 12], [[0, -1, 0.3], [1, -1, 0], [3, -3, 0], [1, 0, 0]], 13)
     assert (path[5:10] == path[5]).all()
     assert not (path[4] == path[5]).all()
 
@@ -111,8 +111,8 @@ def test_equal_directions_of_any_length_rest():
 def test_directions_do_not_depend_on_axes():
     rotation = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     keys = np.array([[1, 0.1, 0], [0.2, 1, 0.4], [-1, 0.3, 1], [-1, -1, 1]])
-    plain = directions_between([0, 4, 11, 20], keys, 21)
-    turned = directions_between([0, 4, 11, 20], keys @ rotation.T, 21)
+    plain = interpolate_directions([0, 4, 11, 20], keys, 21)
+    turned = interpolate_directions([0, 4, 11, 20], keys @ rotation.T, 21)
     np.testing.assert_allclose(turned, plain @ rotation.T, rtol=0, atol=1e-12)
 
 

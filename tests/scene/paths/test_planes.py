@@ -15,7 +15,7 @@ from framearray_cli.render.names import array_names
 from framearray_cli.render.prepare import image_ambient
 from framearray_cli.render.writer import array_target
 from framearray_cli.scene.paths.paths import lights
-from framearray_cli.scene.paths.planes import Plane, first_with_background, pictures, planes_of_groups
+from framearray_cli.scene.paths.planes import Plane, first_with_background, group_planes, picture_planes
 
 LAMP = {**tiny.TABLE["light"]["sources"][0], "group": "lamps", "axis": "lamps"}
 SKY, NIGHT = [0.3, 0.4, 0.5], [0.0, 0.0, 0.0]
@@ -30,7 +30,7 @@ def job(background: Any, sources: Any = (LAMP, tiny.RED)) -> Any:
 
 def test_without_groups_each_light_position_has_a_picture() -> None:
     found = lights(tiny.job(scene={"background": SKY}))
-    assert found.planes == (Plane.PICTURE,) * 3 == pictures(3)
+    assert found.planes == (Plane.PICTURE,) * 3 == picture_planes(3)
     assert found.unlit == () and found.n == 3
 
 
@@ -39,7 +39,7 @@ def test_without_groups_each_light_position_has_a_picture() -> None:
 )
 def test_planes_of_groups_end_with_those_that_no_source_lights(background: Any, unlit: Any) -> None:
     found = lights(job(background))
-    assert found.planes == GROUPS + unlit == planes_of_groups(4, background=any(background))
+    assert found.planes == GROUPS + unlit == group_planes(4, background=any(background))
     assert (found.unlit, found.n) == (unlit, 4 + len(unlit))
     for source in found.sources:
         assert len(source.vector) == len(source.intensity) == found.n
@@ -78,12 +78,12 @@ def test_ambient_light_multiplies_the_plane_of_its_own_and_no_other() -> None:
 @pytest.mark.parametrize(
     ("planes", "first"),
     [
-        (pictures(3), 0),
-        (planes_of_groups(4, background=True), 5),
-        (planes_of_groups(4, background=False), 5),
-        (planes_of_groups(4, background=True)[2:4], 2),
-        (planes_of_groups(4, background=True)[4:], 1),
-        (planes_of_groups(4, background=True)[5:], 0),
+        (picture_planes(3), 0),
+        (group_planes(4, background=True), 5),
+        (group_planes(4, background=False), 5),
+        (group_planes(4, background=True)[2:4], 2),
+        (group_planes(4, background=True)[4:], 1),
+        (group_planes(4, background=True)[5:], 0),
     ],
 )
 def test_the_background_is_in_all_planes_from_one_on(planes: Any, first: int) -> None:

@@ -91,7 +91,7 @@ def open_gltf(data: bytes, assets: Assets) -> Gltf:
         AssetError: a buffer file is missing.
     """
     text, binary = _split_glb(data) if data[:4] == MAGIC else (data, None)
-    tree = _parsed(text)
+    tree = _parse_json(text)
     asset = tree.get("asset")
     version = str(asset.get("version", "2.0")) if isinstance(asset, dict) else "2.0"
     if not version.startswith("2"):
@@ -110,7 +110,7 @@ def open_gltf(data: bytes, assets: Assets) -> Gltf:
     return Gltf(tree, b"".join(blocks))
 
 
-def _parsed(text: bytes) -> Tree:
+def _parse_json(text: bytes) -> Tree:
     """Parse the JSON of a glTF file, without keys whose value is null."""
     try:
         tree = json.loads(text.decode("utf-8-sig"), object_hook=_without_null if b"null" in text else None)

@@ -95,7 +95,7 @@ class Motion:
         return matrix
 
 
-def at_rest(node: Tree) -> Float64:
+def rest_transform(node: Tree) -> Float64:
     """(4, 4) transform of a node in its parent, unanimated; a rotation is normalised to length 1."""
     if node.get("matrix") is not None:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T

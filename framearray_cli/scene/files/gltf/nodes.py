@@ -11,7 +11,7 @@ from ..limit import Limit
 from ..model import Notes
 from .container import Gltf
 from .materials import KNOWN, SILENT
-from .motion import AT_REST, PATHS, at_rest, rotations
+from .motion import AT_REST, PATHS, rest_transform, rotations
 from .triangles import triangle_count
 from .values import Tree
 
@@ -109,7 +109,7 @@ def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64]]:
             continue
         seen.add(index)
         node = nodes[index]
-        world_from_node = world_from_parent @ at_rest(node)
+        world_from_node = world_from_parent @ rest_transform(node)
         waiting += [(child, world_from_node) for child in reversed(node.get("children") or [])]
         mesh = node.get("mesh")
         if mesh is None:

@@ -3,7 +3,7 @@
 from ..assets import Assets
 from ..materials import default_material
 from ..model import Material, Meshes, Notes, Part
-from ..placing import place
+from ..placing import place_mesh
 from ..textures import TextureTable
 from .container import open_gltf
 from .materials import read_materials
@@ -36,7 +36,7 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
     for mesh, places in placed:
         for found in primitives[mesh]:
             parts.append(
-                place(
+                place_mesh(
                     found.vertices,
                     found.faces,
                     places,

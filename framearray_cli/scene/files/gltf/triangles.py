@@ -108,7 +108,7 @@ def _arrays(gltf: Gltf, primitive: Tree, names: tuple[str, ...]) -> tuple[Attrib
     indices: NDArray[Any] | None = None
     draco = (primitive.get("extensions") or {}).get(DRACO)
     if draco is not None:
-        packed, indices = _unpacked(gltf, draco, attributes)
+        packed, indices = _decode_draco(gltf, draco, attributes)
     elif "indices" in primitive:
         indices = gltf.read_accessor(primitive["indices"])
     found = {
@@ -119,7 +119,7 @@ def _arrays(gltf: Gltf, primitive: Tree, names: tuple[str, ...]) -> tuple[Attrib
     return found, None if indices is None else indices.reshape(-1).astype(np.int64)
 
 
-def _unpacked(gltf: Gltf, draco: Tree, attributes: Mapping[str, int]) -> tuple[Attributes, NDArray[Any]]:
+def _decode_draco(gltf: Gltf, draco: Tree, attributes: Mapping[str, int]) -> tuple[Attributes, NDArray[Any]]:
     """Decode the attributes and indices of a primitive that is compressed with Draco."""
     import DracoPy
 
