@@ -8,8 +8,8 @@ from framearray_cli.base.arrays import Corners, Float64
 Mask = NDArray[np.bool_]
 Keys = NDArray[np.uint64]
 
-# Relative to its longest side, a triangle lower than this is narrower than float32 can place its corners:
-# its normal would be noise.
+# A triangle lower than this share of its longest side is narrower than float32 resolves its corners: its normal would
+# be noise.
 SLIVER = 2.0**-23
 
 
@@ -19,7 +19,7 @@ def is_finite(corners: Float64) -> Mask:
 
 
 def has_area(corners: Float64 | Corners) -> Mask:
-    """(n,) whether a triangle is more than a line, whatever the scale of the scene.
+    """(n,) whether a triangle is more than a line, at any scale of the scene.
 
     Args:
         corners: (n, 3, 3) finite positions.

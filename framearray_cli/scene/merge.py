@@ -90,7 +90,7 @@ def _scale_normals(normals: Float64) -> Float64:
 
 
 def unit_normals(normals: Corners, has_normals: NDArray[np.bool_], corners: Corners, notes: Notes) -> Corners:
-    """Compute unit shading normals; geometric ones where the file has none, zero, or not a number.
+    """Compute unit shading normals; geometric ones replace those that are missing, zero or not numbers.
 
     Args:
         normals: (n, 3, 3) of any length.

@@ -28,7 +28,7 @@ class Override(Protocol):
 def override_materials(
     materials: Sequence[Material], overrides: Mapping[str, Override], notes: Notes
 ) -> list[Material]:
-    """Apply the job's values. Glass with an override is shown: whoever sets its colour wants to see it."""
+    """Apply the values of the job. Glass with an override is shown, since its colour was set on purpose."""
     names = sorted({material.name for material in materials})
     unknown = [name for name in overrides if name not in names]
     if unknown:
@@ -55,11 +55,11 @@ def _rgb(values: Sequence[float]) -> tuple[float, float, float]:
 
 
 def _unknown_material(name: str, names: Sequence[str]) -> str:
-    """Word the error: it lists the materials of the scene, the nearest name first."""
+    """The error message; it lists the materials of the scene, the most similar name first."""
 
     def likeness(known: str) -> float:
         return difflib.SequenceMatcher(None, name.lower(), known.lower()).ratio()
 
-    nearest = sorted(names, key=likeness, reverse=True)
+    similar = sorted(names, key=likeness, reverse=True)
     short = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
-    return f'scene.materials."{short}": no such material in the scene; it has {join_names(nearest, NAMES_IN_AN_ERROR)}'
+    return f'scene.materials."{short}": no such material in the scene; it has {join_names(similar, NAMES_IN_AN_ERROR)}'

@@ -1,4 +1,4 @@
-"""Scene: plain arrays, centred in float64 and only then float32; what the kernels read."""
+"""Scene: the plain arrays that kernels read, centred in float64 before they become float32."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,17 +15,17 @@ from .files import Material, Meshes, Notes, read_meshes
 from .merge import Merged, add_untextured_variants, merge, unit_normals, wrap_uvs
 from .overrides import Override, override_materials
 
-# Sizes between which tracing was measured to be right; far below, float32 falls into denormals, above, nothing is hit.
+# Between these sizes tracing was measured to be right. Far below, float32 is denormal; far above, rays hit nothing.
 SMALLEST_SCENE, LARGEST_SCENE = 1e-12, 1e12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SceneReport:
-    """What a scene file held, for the line that the user sees.
+    """What was read from a scene file, as reported to the user.
 
     Attributes:
         dropped: reason -> number of triangles left out, e.g. "degenerate", "non-finite", "duplicate", "transmissive".
-        notes: whatever was not understood or was approximated, one sentence each.
+        notes: what was not understood or was approximated, one sentence each.
     """
 
     triangles: int
@@ -44,7 +44,7 @@ class Scene:
     Attributes:
         centre: (3,) float64; scene coordinates = file coordinates - centre.
         corners: (n, 3, 3) corner positions, centred.
-        normals: (n, 3, 3) unit shading normals a corner, or (0, 3, 3) where no mesh has them.
+        normals: (n, 3, 3) unit shading normals per corner, or (0, 3, 3) where no mesh has them.
         uvs: (n, 3, 2) texture coordinates, v upwards, or (0, 3, 2) where nothing is textured.
         colours: (n, 3, 3) linear corner colours that multiply the reflectivity, or (0, 3, 3).
         material: (n,) index into the material tables.
@@ -98,8 +98,8 @@ def load_scene(
     Args:
         file: any format that trimesh reads.
         overrides: by material name; a value replaces factor, texture and corner colours of that part.
-        folders: that files named by the scene may lie in, beside its own.
-        memory: bytes that reading may take; None: what is free.
+        folders: where files that the scene names may lie, beside its own folder.
+        memory: bytes that reading may allocate; None: all free memory.
 
     Raises:
         SceneError: a file that cannot be read, holds nothing to render, or lacks an overridden material.
@@ -114,7 +114,7 @@ def load_scene(
 
 
 def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
-    """Turn what a file holds into the arrays that kernels read."""
+    """Make the arrays that kernels read from the contents of a file."""
     notes = Notes()
     parts, materials = add_untextured_variants(meshes.parts, meshes.materials, notes)
     materials = override_materials(materials, overrides, notes)
@@ -171,12 +171,12 @@ def _empty(width: int) -> Float32:
 def _select_triangles(
     merged: Merged, materials: Sequence[Material], dropped: dict[str, int], notes: Sequence[str]
 ) -> tuple[NDArray[np.int64], Float64, Corners]:
-    """Decide which triangles stay, and centre them.
+    """Select the triangles that stay, and centre them.
 
     Args:
         merged: all triangles of the file.
-        materials: what `merged.material` points to.
-        dropped: reasons are added, with the numbers of triangles.
+        materials: indexed by `merged.material`.
+        dropped: gets the reasons and numbers of triangles left out.
         notes: repeated in the error when nothing stays.
 
     Returns:
@@ -208,7 +208,7 @@ def _select_triangles(
     masked = cutoff[merged.material[rows]] > 0
     order = np.argsort(masked, kind="stable")
     rows, corners, masked = rows[order], corners[order], masked[order]
-    # opaque triangles hide one another whatever their material; a cut-out one shows what coincides with it
+    # of coinciding opaque triangles one hides the others, of any material; a cut-out one lets others show
     again = is_repeated(corners, np.where(masked, merged.material[rows] + 1, 0))
     rows, corners = _drop(rows, again, "duplicate", dropped), corners[~again]
     _check_left(rows, dropped, notes)
@@ -233,7 +233,7 @@ def _dropped_text(dropped: Mapping[str, int]) -> str:
 
 
 def scene_report_lines(report: SceneReport, file: Path | str) -> list[str]:
-    """What the user sees of a scene: one line of numbers, then a line a note."""
+    """The report on a scene: one line of numbers, then one line per note."""
     left_out = f"; left out: {_dropped_text(report.dropped)}" if report.dropped else ""
     numbers = f"{report.triangles:,} triangles, {report.materials} materials, {report.textures} textures"
     return [f"{file}: {numbers}{left_out}", *(f"  note: {note}" for note in report.notes)]

@@ -1,4 +1,4 @@
-"""Whatever a scene file holds: arrays that can be rendered, or one error of one line that names the file."""
+"""Any scene file gives arrays that can be rendered, or one error of one line that names the file."""
 
 import json
 import tempfile
@@ -28,7 +28,7 @@ TEXTS = [seed for seed in MADE.values() if seed.suffix in (".obj", ".off", ".ply
 
 
 def scene_or_error(files: dict[str, bytes]) -> Scene | None:
-    """Read the first of some files; check what comes of it."""
+    """Read the first of some files and check the result."""
     with tempfile.TemporaryDirectory() as folder:
         for name, data in files.items():
             (Path(folder) / name).write_bytes(data)
@@ -46,7 +46,7 @@ def scene_or_error(files: dict[str, bytes]) -> Scene | None:
 
 
 def check(scene: Scene) -> None:
-    """Whether kernels can read a scene without looking at what they read."""
+    """Assert that kernels can read a scene without checks of their own."""
     n, m = len(scene.corners), len(scene.material_names)
     assert n > 0
     for array in (
@@ -73,7 +73,7 @@ def check(scene: Scene) -> None:
 
 @pytest.mark.parametrize("name", MADE)
 def test_seeds_are_whole(name: str) -> None:
-    """What mutations begin with is read: otherwise they would only ever break what is broken."""
+    """The seeds can be read: otherwise mutations would only break what is broken already."""
     seed = MADE[name]
     assert scene_or_error({f"scene{seed.suffix}": seed.data, **seed.beside}) is not None
 

@@ -52,10 +52,10 @@ def interpolate_directions(frames: Sequence[int], directions: Sequence[Sequence[
 
 
 def _tangents(keyed: Float64, span: Float64) -> Float64:
-    """Choose the angular velocity at each key, (n_keys, 3), normal to the key's direction, radians a frame.
+    """Choose the angular velocity at each key, (n_keys, 3), normal to the key's direction, radians per frame.
 
-    As PCHIP does, with vectors for numbers: it lies between the velocities of the spans on both sides, is at most
-    twice the slower, and vanishes where the path rests on one side or turns back.
+    As in PCHIP, but with vectors: it lies between the velocities of the spans on both sides, is at most twice the
+    slower one, and is zero where the path rests on one side or turns back.
     """
     after = turn(keyed[:-1], keyed[1:]) / span[:, None]  # velocity in which each span leaves its first key
     arriving = -turn(keyed[1:], keyed[:-1]) / span[:, None]  # and in which it reaches its second
@@ -89,7 +89,7 @@ def _move(start: Float64, turn_vec: Float64) -> Float64:
 def slerp(start: Float64, end: Float64, t: Float64) -> Float64:
     """Turn from start to end, (n, 3) unit directions, by the share t, (n, 1), of the angle between them.
 
-    Edge case: opposite directions turn over an axis of their own choice, always the same one.
+    Edge case: opposite directions turn about an axis that depends only on the start.
     """
     angle = _angle(start, end)
     sine = np.sin(angle)

@@ -1,8 +1,8 @@
 """Key frames -> eyes[c] and lights[l], in float64 and in the scene file's own coordinates.
 
 Numbers and positions follow monotone cubic curves (PCHIP): they pass through their keys, never leave the span
-between two neighbouring keys, and rest where two keys are equal. Directions follow the like of it on the sphere.
-Before the first and after the last key everything rests.
+between two neighbouring keys, and rest where two keys are equal. Directions follow the same kind of curve on the
+sphere. Before the first and after the last key everything rests.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from .directions import interpolate_directions, unit
 from .planes import Plane, group_planes, picture_planes
 from .sun import NEVER, daylight, directions_to_sun, sun_path
 
-# Look and up closer to parallel than this (radians) leave no digits to tell what is right of the picture.
+# If look and up are closer to parallel than this (radians), rounding decides what is right in the picture.
 PARALLEL = 1e-6
 
 
@@ -58,7 +58,7 @@ class LightPath:
         kind: "point" or "directional".
         vector: (n, 3) position in scene units, or unit direction in which the light travels.
         intensity: (n, 3) linear RGB, times the source's colour: W/sr of a point, W/m2 of a directional source.
-        notes: what else the manifest says of each position, n tables; or none.
+        notes: n tables with what else the manifest records of each position; or none.
     """
 
     kind: Literal["point", "directional"]
@@ -69,12 +69,12 @@ class LightPath:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LightGroup:
-    """Sources whose light is computed and stored by itself.
+    """Sources whose light is computed and stored separately.
 
     Attributes:
         axis: light axis that they move along.
-        positions: image planes at which they alone shine.
-        sources: their places in `Lights.sources`.
+        positions: image planes at which these sources shine, and no others.
+        sources: their indices in `Lights.sources`.
     """
 
     name: str
@@ -88,8 +88,8 @@ class Lights:
     """All sources; those of one image plane shine together. See `lights_without_groups` for those without groups.
 
     Attributes:
-        sources: n positions each; where a plane is not lit, they are dark.
-        groups: each has planes of its own, one behind the other.
+        sources: n positions each; their intensity is 0 at planes that they do not light.
+        groups: each has consecutive planes of its own.
         planes: what each image of a frame holds.
     """
 
@@ -109,7 +109,7 @@ class Lights:
 
 
 def lights_without_groups(sources: Sequence[LightPath]) -> Lights:
-    """Sources without groups: a picture for each light position."""
+    """Lights without groups: one picture per light position."""
     return Lights(sources=tuple(sources), planes=picture_planes(len(sources[0].vector)))
 
 
@@ -117,15 +117,17 @@ def eyes(job: Job) -> Eyes:
     """Place the camera at every frame of a job.
 
     Raises:
-        JobError: between two keys the eye comes to where it looks.
+        JobError: the eye meets its target between two keys.
     """
     keys = job.camera.keys
     frames = [key.frame for key in keys]
     position = interpolate_keys(frames, [key.eye for key in keys], job.camera.frames)
     target = interpolate_keys(frames, [key.target for key in keys], job.camera.frames)
     look_vec = target - position
-    if (met := np.flatnonzero(np.linalg.norm(look_vec, axis=1) <= _rounding(position))).size:
-        problem = f"camera.keys: expected a target away from the eye, got the same point at frame {met[0]}; move a key"
+    if (meeting := np.flatnonzero(np.linalg.norm(look_vec, axis=1) <= _rounding(position))).size:
+        problem = (
+            f"camera.keys: expected a target away from the eye, got the same point at frame {meeting[0]}; move a key"
+        )
         raise JobError(job.file or job.name, [problem])
     look_dir = unit(look_vec)
     right_dir = _right(look_dir, _ups(keys, job), job.camera.keys[0].up is None)
@@ -139,7 +141,7 @@ def eyes(job: Job) -> Eyes:
 
 
 def lights(job: Job) -> Lights:
-    """Place and set every source at every image plane of a job.
+    """Compute position and intensity of every source at every image plane of a job.
 
     Raises:
         JobError: a sun that never shines, or whose north points up.
@@ -160,7 +162,7 @@ def lights(job: Job) -> Lights:
 
 
 def _confine(path: LightPath, positions: range, n: int) -> LightPath:
-    """The same source at some of n image planes; at the others it does not shine."""
+    """Extend a source to n image planes; it shines only at its positions."""
     own = np.clip(np.arange(n) - positions.start, 0, len(positions) - 1)
     intensity = np.zeros((n, 3))
     intensity[positions.start : positions.stop] = path.intensity
@@ -169,7 +171,7 @@ def _confine(path: LightPath, positions: range, n: int) -> LightPath:
 
 
 def _place_source(job: Job, i: int, n: int) -> LightPath:
-    """Place and set source i at n light positions."""
+    """Compute position and intensity of source i at n light positions."""
     source = job.light.sources[i]
     if isinstance(source, SunSource):
         return _place_sun(source, job, f"light.sources[{i}]", n)
@@ -177,7 +179,7 @@ def _place_source(job: Job, i: int, n: int) -> LightPath:
 
 
 def _place_sun(source: SunSource, job: Job, name: str, n: int) -> LightPath:
-    """Place the sun."""
+    """Compute directions and irradiance of a sun at n light positions."""
     up_dir = np.array([0.0, 0.0, 1.0] if job.scene.up == "z" else [0.0, 1.0, 0.0])
     north_vec = unit(np.array(source.north or ((0.0, 1.0, 0.0) if job.scene.up == "z" else (0.0, 0.0, -1.0))))
     north_vec = north_vec - (north_vec @ up_dir) * up_dir
@@ -207,7 +209,7 @@ def _place_sun(source: SunSource, job: Job, name: str, n: int) -> LightPath:
 def _place_light(
     kind: Literal["point", "directional"], keys: Sequence[PointKey | DirectionalKey], n_lights: int
 ) -> LightPath:
-    """Place and set one source."""
+    """Interpolate the keys of a point or directional source."""
     frames = [key.frame for key in keys]
     places = [key.position if isinstance(key, PointKey) else key.direction for key in keys]
     powers = [key.intensity if isinstance(key, PointKey) else key.irradiance for key in keys]
@@ -237,7 +239,7 @@ def interpolate_keys(frames: Sequence[int], values: Sequence[Sequence[float]], n
     before = np.searchsorted(frames, at, side="right").clip(max=len(frames) - 1) - 1  # (n,) key before each frame
     ends = np.stack([keyed[before], keyed[before + 1]])
     curve = _smooth(frames, keyed, at) if len(frames) > 2 else _straight(frames, keyed, at)
-    curve = np.clip(curve, ends.min(axis=0), ends.max(axis=0))  # the last bits, too, stay between the keys
+    curve = np.clip(curve, ends.min(axis=0), ends.max(axis=0))  # rounding must not leave the span between two keys
     for key, frame in enumerate(frames):
         curve[at == frame] = keyed[key]
     return curve
@@ -251,25 +253,25 @@ def _straight(frames: Sequence[int], keyed: Float64, at: Float64) -> Float64:
 
 
 def _smooth(frames: Sequence[int], keyed: Float64, at: Float64) -> Float64:
-    """A curve through the keys that turns only at keys."""
-    from scipy.interpolate import PchipInterpolator  # a quarter of a second, which two keys need not cost
+    """The PCHIP curve through the keys; it rises or falls between two keys, and turns back only at keys."""
+    from scipy.interpolate import PchipInterpolator  # the import takes 0.25 s, which two keys do not need
 
-    with np.errstate(over="ignore"):  # the inverse of a slope below 1e-308 is infinite, its own inverse 0, as it should
+    with np.errstate(over="ignore"):  # a slope below 1e-308 has an infinite inverse, whose inverse is 0, as wanted
         curve: Float64 = PchipInterpolator(frames, keyed, axis=0)(at)
     return curve
 
 
 def _ups(keys: Sequence[CameraKey], job: Job) -> Float64:
-    """Find the up direction of each frame, (n_c, 3): of the keys, else of the scene."""
+    """Find the up direction of each frame, (n_c, 3): that of the keys, else that of the scene."""
     axis = (0.0, 0.0, 1.0) if job.scene.up == "z" else (0.0, 1.0, 0.0)
     return interpolate_directions([key.frame for key in keys], [key.up or axis for key in keys], job.camera.frames)
 
 
 def _right(look_dir: Float64, up_dir: Float64, up_is_axis: bool) -> Float64:
-    """Find what is right in the picture, (n, 3) unit vectors normal to the look.
+    """Find the right direction of each picture, (n, 3) unit vectors normal to the look.
 
-    A frame that looks along up takes its right from the nearest frame that does not, so that a camera that tilts
-    to the zenith arrives without a turn. Where there is none, right is x, or for a given up some axis normal to it.
+    A frame that looks along up gets the right of the nearest frame that does not, so that a camera that tilts to the
+    zenith arrives without a turn. If all frames look along up, right is x, or for an up of the keys an axis across it.
     """
     right_vec = np.cross(look_dir, up_dir)
     steep = np.linalg.norm(right_vec, axis=1) <= PARALLEL
@@ -284,5 +286,5 @@ def _right(look_dir: Float64, up_dir: Float64, up_is_axis: bool) -> Float64:
 
 
 def _rounding(position: Float64) -> Float64:
-    """Distance below which two points cannot be told apart, (n,): some last bits of the largest coordinate."""
+    """(n,) distance below which two points count as one: some last bits of the largest coordinate."""
     return np.asarray(16 * np.finfo(np.float64).eps * np.abs(position).max(axis=1))

@@ -1,7 +1,7 @@
 """Image planes: what each of the images of one frame holds.
 
-The images of a frame lie one behind the other. Without groups there is a picture for each light position. With groups
-every group has a plane for each of its light positions, and one or two planes follow at which no source shines.
+Without groups a frame has one picture per light position. With groups it has one plane per group and light position,
+and then one or two planes at which no source shines.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ class Plane(Enum):
         PICTURE: all light at one light position.
         LIGHT: direct light of one group at one of its light positions.
         INDIRECT: R W, which I_A multiplies when a picture is made.
-        BACKGROUND: what comes from outside the scene, the same at every light position.
+        BACKGROUND: light from outside the scene, the same at every light position.
     """
 
     PICTURE = "picture"
@@ -30,7 +30,7 @@ class Plane(Enum):
 
     @property
     def holds_background(self) -> bool:
-        """Whether it holds what is the same at every light position."""
+        """Whether this plane holds light from outside the scene, which is the same at every light position."""
         return self in (Plane.PICTURE, Plane.BACKGROUND)
 
 
@@ -44,7 +44,7 @@ def group_planes(n_lights: int, *, background: bool) -> tuple[Plane, ...]:
 
     Args:
         n_lights: light positions of all groups together.
-        background: whether anything comes from outside the scene.
+        background: whether light comes from outside the scene.
     """
     return (Plane.LIGHT,) * n_lights + (Plane.INDIRECT,) + (Plane.BACKGROUND,) * background
 

@@ -1,6 +1,6 @@
-"""Where the sun stands: the door to pvlib, and from its angles to directions in a scene.
+"""The position of the sun: the door to pvlib, and its angles as directions in a scene.
 
-Elevations are apparent: the air bends sunlight, so the sun shines from above where it stands, by half a degree at the
+Elevations are apparent: the air bends sunlight, so the sun appears higher than it stands, by half a degree at the
 horizon and a fiftieth of a degree halfway up. Azimuths run from north over east. See docs/decisions/sun.md.
 """
 
@@ -76,21 +76,21 @@ def sun_path(date: str, start: str, stop: str, timezone: str | float, place: tup
     """Find the sun at n moments, evenly spaced from start to stop; one moment is the start.
 
     Args:
-        date, start, stop, timezone: as a job has them; clocks of that zone.
+        date, start, stop, timezone: as in a job; clock times of that zone.
         place: latitude and longitude, degrees.
 
     Raises:
         MissingExtraError: pvlib is not installed.
     """
     zone = zone_of(timezone)
-    first = moment(date, start, zone).astimezone(UTC)  # spaced in UTC: a clock that is changed on the way does not jump
+    first = moment(date, start, zone).astimezone(UTC)  # spaced in UTC, so that a clock change causes no jump
     span = moment(date, stop, zone).astimezone(UTC) - first
     times = [(first + span * (k / max(n - 1, 1))).astimezone(zone) for k in range(n)]
     return sun_at(times, *place)
 
 
 def daylight(date: str, timezone: str | float, place: tuple[float, float]) -> str:
-    """Say when the sun is up on a day, "06:12 to 18:05", to the minute; or that it never is."""
+    """The hours at which the sun is up on a day, "06:12 to 18:05", to the minute; or NEVER."""
     zone = zone_of(timezone)
     minutes = _minutes(date, zone)
     sun = sun_at(minutes, *place)
@@ -100,7 +100,7 @@ def daylight(date: str, timezone: str | float, place: tuple[float, float]) -> st
 
 
 def _minutes(date: str, zone: tzinfo) -> list[datetime]:
-    """All minutes of a day as clocks of a zone show it."""
+    """All minutes of a day, in the clock time of a zone."""
     first = moment(date, "00:00:00", zone).astimezone(UTC)
     last = moment(date, "23:59:00", zone).astimezone(UTC)
     count = int((last - first).total_seconds()) // 60 + 1

@@ -48,7 +48,7 @@ ELSEWHERE = (
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder for a scene: links in it lead out of it, and a picture beside it is not to be read."""
+    """A folder for a scene: links in it lead out of it, and a picture beside it must not be read."""
     folder = tmp_path / "scene"
     (folder / "tex").mkdir(parents=True)
     (folder / "tex" / "a b.png").write_bytes(IMAGE)
@@ -132,7 +132,7 @@ def test_the_texture_of_a_ply_elsewhere_is_refused(folder: Path) -> None:
     assert "texture left out, gone.png: no such file beside the scene" in read_meshes(file).notes
 
 
-def test_every_file_that_is_refused_is_told_once(folder: Path) -> None:
+def test_every_refused_file_is_reported_once(folder: Path) -> None:
     file = obj(folder, "../secret.png")
     (folder / "a.mtl").write_text("newmtl Paint\nmap_Kd ../secret.png\nmap_d ../other.png\n")
     with pytest.raises(SceneError, match=r"t\.png, \.\./other\.png: they lie .* copy them .* their folders"):
@@ -180,7 +180,7 @@ def test_names_that_are_no_names(folder: Path, name: str) -> None:
 
 
 def huge_png(width: int, height: int, rows: int | None = None) -> bytes:
-    """A PNG of one colour, one bit a pixel; cut short after some rows."""
+    """A PNG of one colour, one bit per pixel; cut short after some rows."""
 
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
@@ -246,7 +246,7 @@ def encoded(kind: str) -> bytes:
 
 @pytest.mark.parametrize("kind", ["PNG", "JPEG", "WEBP", "TGA", "BMP", "TIFF", "GIF", "PPM"])
 def test_images_that_scenes_come_with(folder: Path, kind: str) -> None:
-    (folder / "image.png").write_bytes(encoded(kind))  # whatever it is called
+    (folder / "image.png").write_bytes(encoded(kind))  # of any name
     assert len(read_meshes(obj(folder, "image.png")).textures) == 1
 
 
@@ -264,7 +264,7 @@ def test_a_jpeg_of_very_many_scans_is_left_out(folder: Path) -> None:
     assert "at most 100 scans, got 201" in "\n".join(read_meshes(obj(folder, "image.jpg")).notes)
 
 
-def test_what_was_lent_is_given_back() -> None:
+def test_lent_memory_is_returned() -> None:
     limit = Limit(most=100)
     with limit.lend("an image", 90):
         pass

@@ -1,4 +1,4 @@
-"""glTF files that say something else than they may: told with the place, before any of it is used."""
+"""glTF files that break the format: reported with the place, before any of it is used."""
 
 import json
 import time
@@ -72,7 +72,7 @@ def changed(glb: Glb, place: str, value: Any) -> Glb:
         ("asset", 3, "asset: expected an object, got 3"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_told_with_its_place(tmp_path: Path, place: str, value: Any, message: str) -> None:
+def test_an_error_is_reported_with_its_place(tmp_path: Path, place: str, value: Any, message: str) -> None:
     file = changed(quad(), place, value).save(tmp_path / "a.glb")
     for read in (read_meshes, read_stage):
         with pytest.raises(SceneError) as caught:
@@ -82,7 +82,7 @@ def test_what_is_wrong_is_told_with_its_place(tmp_path: Path, place: str, value:
         assert "\n" not in str(caught.value)
 
 
-def test_the_first_problems_are_told(tmp_path: Path) -> None:
+def test_the_first_problems_are_reported(tmp_path: Path) -> None:
     glb = quad()
     glb.tree["nodes"] += [{"mesh": 9}] * 9
     with pytest.raises(SceneError, match=r"nodes\[1\].*; nodes\[2\].*; nodes\[3\].*; and more; export it anew"):
@@ -159,7 +159,7 @@ def test_a_graph_that_doubles_at_each_level_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_deep_graph_takes_no_longer_than_a_wide_one(tmp_path: Path) -> None:
-    """Each of 3,000 nodes below the one before, a step to the side; in float64, as ever."""
+    """Each of 3,000 nodes is a child of the one before, one step to the side; in float64."""
     glb = Glb()
     mesh = glb.mesh()
     glb.node(mesh)
@@ -174,7 +174,7 @@ def test_a_deep_graph_takes_no_longer_than_a_wide_one(tmp_path: Path) -> None:
 
 
 def test_rotations_that_are_no_rotations(tmp_path: Path) -> None:
-    """Of length 2 as of length 1; of length 0 as none."""
+    """A quaternion of length 2 counts as its unit quaternion, one of length 0 as no rotation."""
     scenes = []
     for rotation in ([0, 0.6, 0, 0.8], [0, 1.2, 0, 1.6], [0, 0, 0, 0], [0, 0, 0, 1]):
         glb = quad()

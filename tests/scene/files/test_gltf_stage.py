@@ -84,7 +84,7 @@ def test_a_cubic_spline_follows_its_tangents(tmp_path: Path) -> None:
 
 
 def test_scale_is_animated_too_and_animations_add_up(tmp_path: Path) -> None:
-    """Blender writes an animation for each object; all of them count."""
+    """Blender writes one animation per object; all of them count."""
     glb = Glb()
     shot = camera(glb, translation=[1.0, 0.0, 0.0])
     root = glb.node(children=[shot])
@@ -126,17 +126,17 @@ def test_an_orthographic_camera_is_noted(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("times", "values", "said"),
+    ("times", "values", "message"),
     [
         ([0.0, 0.0], [[0, 0, 0], [1, 0, 0]], "do not rise"),
         ([0.0, 1.0], [[0, 0, 0]], "2 times and 1 values"),
         ([0.0, math.nan], [[0, 0, 0], [1, 0, 0]], "do not rise, or are not finite"),
     ],
 )
-def test_broken_animations_are_told(times: Any, values: Any, said: str, tmp_path: Path) -> None:
+def test_broken_animations_are_reported(times: Any, values: Any, message: str, tmp_path: Path) -> None:
     glb = Glb()
     shot = camera(glb)
     glb.tree["scenes"][0]["nodes"].append(shot)
     animate(glb, shot, "translation", times, values)
-    with pytest.raises(SceneError, match=said):
+    with pytest.raises(SceneError, match=message):
         read_stage(glb.save(tmp_path / "a.glb"))

@@ -1,4 +1,4 @@
-"""Triangles of glTF files: what trimesh finds too, which reads them in another way; and forms that it does not read."""
+"""Triangles of glTF files: against trimesh, which reads them in another way; and forms that it does not read."""
 
 import time
 from pathlib import Path
@@ -23,7 +23,7 @@ def corners(meshes: Meshes) -> Any:
 
 
 def in_order(triangles: Any) -> Any:
-    """(n, 9), sorted, for sets of triangles that two readers give in another order."""
+    """(n, 9), sorted, to compare triangles that two readers return in different orders."""
     rows = np.round(triangles.reshape(len(triangles), 9), 4) + 0.0
     return rows[np.lexsort(rows.T)]
 
@@ -44,7 +44,7 @@ def test_trimesh_finds_the_same_triangles(name: str) -> None:
     ]
     found, expected = in_order(corners(read_meshes(file))), in_order(np.concatenate(theirs))
     assert found.shape == expected.shape
-    # rounding to 4 digits may put a triangle elsewhere in the order; sums tell the rest
+    # rounding to 4 digits may put a triangle elsewhere in the order; sums show the rest
     np.testing.assert_allclose(found.sum(axis=0), expected.sum(axis=0), rtol=1e-6)
     assert (np.abs(found - expected).max(axis=1) < 1e-3).mean() > 0.99
 
@@ -80,7 +80,7 @@ def test_parts_come_in_the_order_of_the_file(tmp_path: Path) -> None:
 
 
 def test_small_primitives_of_a_large_block_of_vertices(tmp_path: Path) -> None:
-    """Each takes its own vertices alone; a triangle of which one is not there is left out and counted."""
+    """Each copies only its own vertices; a triangle with a missing vertex is left out and counted."""
     glb, rng = Glb(), np.random.default_rng(3)
     positions = rng.normal(size=(500, 3)).astype(np.float32)
     shared = glb.accessor(positions)
@@ -117,7 +117,7 @@ def test_draco(tmp_path: Path) -> None:
 
 
 def test_a_million_places_are_filled_at_once(tmp_path: Path) -> None:
-    """One after the other they would take a minute; and mirrored ones are turned, each by itself."""
+    """One after the other they would take a minute; only mirrored ones are turned."""
     glb, n = Glb(), 1_000_000
     scale = np.ones((n, 3), np.float32)
     scale[1::2, 0] = -1
@@ -136,7 +136,7 @@ def test_a_million_places_are_filled_at_once(tmp_path: Path) -> None:
 
 
 def test_half_a_letter_in_a_name_is_replaced(tmp_path: Path) -> None:
-    """JSON can hold what no file can; the name goes into the manifest."""
+    """JSON can hold half a surrogate pair, UTF-8 cannot; the name goes into the manifest."""
     glb = Glb()
     glb.node(glb.mesh(glb.material("a\ud800b")))
     assert read_meshes(glb.save(tmp_path / "scene.glb")).materials[0].name == "a?b"

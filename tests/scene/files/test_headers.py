@@ -1,4 +1,4 @@
-"""What PLY, STL, OFF and packed files say of themselves, where it cannot be."""
+"""Headers of PLY, STL, OFF and packed files that claim the impossible."""
 
 import io
 import time

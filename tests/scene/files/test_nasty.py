@@ -1,4 +1,4 @@
-"""The nasty set: every file is a scene or one clear error; where its note says what is right, it is right."""
+"""The nasty set: every file is a scene or one clear error; where its note says what is in it, that is what is read."""
 
 import json
 from importlib.util import find_spec

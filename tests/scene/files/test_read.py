@@ -1,4 +1,4 @@
-"""Reading of files: what each format holds becomes parts, materials, textures and notes."""
+"""Scene files of each format become parts, materials, textures and notes."""
 
 import json
 import subprocess
@@ -20,7 +20,7 @@ IMAGE = [[RED, GREEN], [BLUE, WHITE]]  # row 0 is the top
 
 
 def shown(meshes: Meshes, point: list[float]) -> list[int]:
-    """The nearest texel at a place of the one textured quad, as the renderer would look it up."""
+    """The nearest texel at a point of the only textured quad, as the renderer would look it up."""
     part = meshes.parts[0]
     texels = meshes.textures[meshes.materials[part.material].texture]
     corners, uvs = part.corners.reshape(-1, 3), part.uvs.reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""Files that somebody else wrote: records, manifests and images in their place that have no end, or lie elsewhere."""
+"""Files that somebody else wrote: records, manifests and images in their place that never end, or lie elsewhere."""
 
 import os
 from pathlib import Path
@@ -61,7 +61,7 @@ def test_a_line_that_no_render_writes_does_not_count(tmp_path: Path, wrong: dict
 @pytest.mark.parametrize(
     "wrong", [{"rays": [1]}, {"rays": {"native": "x"}}, {"seconds": "x"}, {"seconds": []}, {"seconds": float("nan")}]
 )
-def test_what_a_session_took_counts_where_it_is_told(tmp_path: Path, wrong: dict) -> None:
+def test_rays_and_seconds_of_a_session_count_where_they_are_recorded(tmp_path: Path, wrong: dict) -> None:
     write(tmp_path, GOOD | wrong)
     records = read_records(tmp_path, PRINT)
     assert len(records.entries) == 1
@@ -109,7 +109,7 @@ def test_what_has_no_end_is_not_read(tmp_path: Path, kind: str) -> None:
 
 
 def test_a_whole_array_is_read(tmp_path: Path) -> None:
-    """The checks above let pass what they should."""
+    """The checks above pass a good array."""
     manifest = movies.plain(tmp_path, 1, 1, "exr")
     assert read_manifest(tmp_path) == manifest
     check_image(tmp_path / "tiny.c0000.l000.exr", manifest.resolution)

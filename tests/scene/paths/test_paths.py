@@ -17,7 +17,7 @@ frame_lists = st.lists(st.integers(0, 60), min_size=1, max_size=6, unique=True).
 
 
 def job_of(camera_keys, *, scene=None, light=None, frames=None):
-    """Make a job around some camera keys."""
+    """Make a job with these camera keys."""
     camera = {"keys": camera_keys} if frames is None else {"keys": camera_keys, "frames": frames}
     lamp = {"type": "point", "keys": [{"frame": 0, "position": [0, 2, 0], "intensity": 1}]}
     table = {
@@ -31,7 +31,7 @@ def job_of(camera_keys, *, scene=None, light=None, frames=None):
 
 
 def fixed(eye, target, **more):
-    """Place one camera and give its matrix."""
+    """Return the matrix of a fixed camera."""
     return eyes(job_of([{"frame": 0, "eye": eye, "target": target, **more}])).world_from_camera[0]
 
 
@@ -213,7 +213,7 @@ def test_far_from_the_origin_the_eye_keeps_its_digits():
     np.testing.assert_array_equal(near[:3, :3], far[:3, :3])
 
 
-def test_an_eye_that_meets_its_target_is_told():
+def test_an_eye_that_meets_its_target_is_an_error():
     keys = [{"frame": 0, "eye": [0, 0, 0], "target": [2, 0, 0]}, {"frame": 4, "eye": [2, 0, 0], "target": [0, 0, 0]}]
     with pytest.raises(JobError, match="got the same point at frame 2"):
         eyes(job_of(keys))

@@ -37,7 +37,7 @@ def test_without_groups_each_light_position_has_a_picture() -> None:
 @pytest.mark.parametrize(
     ("background", "unlit"), [(SKY, (Plane.INDIRECT, Plane.BACKGROUND)), (NIGHT, (Plane.INDIRECT,))]
 )
-def test_planes_of_groups_end_with_those_that_no_source_lights(background: Any, unlit: Any) -> None:
+def test_group_planes_end_with_those_that_no_source_lights(background: Any, unlit: Any) -> None:
     found = lights(job(background))
     assert found.planes == GROUPS + unlit == group_planes(4, background=any(background))
     assert (found.unlit, found.n) == (unlit, 4 + len(unlit))

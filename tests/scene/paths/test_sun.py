@@ -1,4 +1,4 @@
-"""The sun: against published angles, in scenes, and what is said of a sun that cannot be had."""
+"""The sun: against published angles, in scenes, and the errors of a sun that never shines."""
 
 import builtins
 import math
@@ -75,7 +75,7 @@ def test_the_sun_stands_where_it_was_published(case: tuple[str, float, float, fl
 
 
 def test_true_elevations_would_fail() -> None:
-    """The published values of a low sun tell refraction from none, and an hour from another."""
+    """The published values of a low sun distinguish refraction from none, and one hour from the next."""
     when, latitude, longitude, azimuth, zenith = NREL_PROGRAM[3]
     moment = datetime.fromisoformat(f"{when}+00:00")
     refraction = 0.355  # degrees, at an elevation of 1.4 [Reda04, eq. 42]
@@ -84,7 +84,7 @@ def test_true_elevations_would_fail() -> None:
     assert angle(float(sun.azimuth_deg[1]), azimuth) > WANTED
 
 
-def test_positions_are_evenly_spaced_in_time_whatever_clocks_do() -> None:
+def test_positions_are_evenly_spaced_in_time_across_a_clock_change() -> None:
     place = (52.52, 13.405)
     sun = sun_path("2026-03-29", "00:00:00", "12:00:00", "Europe/Berlin", place, 12)  # clocks jump from 2 to 3
     steps = [b.timestamp() - a.timestamp() for a, b in zip(sun.times, sun.times[1:], strict=False)]
@@ -128,7 +128,7 @@ def test_the_sun_rises_in_the_east_and_is_highest_in_the_south() -> None:
     assert highest[2] > 0 and abs(highest[0]) < 0.1  # z is south
 
 
-def test_below_the_horizon_it_shines_nothing() -> None:
+def test_below_the_horizon_it_does_not_shine() -> None:
     path = lights(job(start="00:00", stop="12:00", frames=13)).sources[0]
     elevation = np.array([note["elevation"] for note in path.notes])
     assert (elevation < 0).sum() == 5  # it rises at 4:46
@@ -141,7 +141,7 @@ def test_a_day_has_its_published_length() -> None:
     """Almanacs say 04:43 to 21:33 for Berlin, from and to the upper rim of the disc.
 
     Here it is the centre that shines, 0.267 degrees lower. The sun climbs 15 cos(latitude) sin(azimuth) = 6.9 degrees
-    an hour, so that is 2.3 minutes; whole minutes within that are 04:46 to 21:30.
+    per hour, so that is 2.3 minutes; whole minutes within that are 04:46 to 21:30.
     """
     assert daylight("2026-06-21", "Europe/Berlin", (52.52, 13.405)) == "04:46 to 21:30"
     assert daylight("2026-12-21", 1, (78.22, 15.65)) == "never"
@@ -156,7 +156,7 @@ def test_a_sun_that_is_down_all_the_time_is_refused_with_the_hours_of_the_day() 
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"latitude": 91.0}, "latitude: expected a number from -90 to 90, got 91"),
         ({"date": "2026-02-30"}, "date: expected a date that the calendar has"),
@@ -173,7 +173,7 @@ def test_a_sun_that_is_down_all_the_time_is_refused_with_the_hours_of_the_day() 
         ({"north": [0.0, 2.0, 0.0]}, "north: expected a direction that is not up"),
     ],
 )
-def test_messages(changes: dict[str, Any], said: str, tmp_path: Path) -> None:
+def test_messages(changes: dict[str, Any], message: str, tmp_path: Path) -> None:
     sun = {"type": "sun", "date": "2026-06-21", "start": "06:00", "stop": "20:00"} | BERLIN | changes
     frames = {"frames": sun.pop("frames")} if "frames" in sun else {"frames": 4}
     light = {"sources": [{k: v for k, v in sun.items() if v is not None}]} | {k: v for k, v in frames.items() if v}
@@ -181,7 +181,7 @@ def test_messages(changes: dict[str, Any], said: str, tmp_path: Path) -> None:
     file.write_text(tomli_w.dumps(tiny.table() | {"light": light}))
     with pytest.raises(JobError) as caught:
         lights(read_job(file))
-    assert said in str(caught.value)
+    assert message in str(caught.value)
     assert len(caught.value.problems) == 1
 
 
@@ -216,7 +216,7 @@ def test_without_the_library_it_is_named() -> None:
 
 
 @pytest.mark.parametrize("group", [None, "sun"])
-def test_an_array_tells_where_the_sun_stood_and_is_dark_before_it_rises(group: str | None, tmp_path: Path) -> None:
+def test_an_array_records_the_sun_and_is_dark_before_it_rises(group: str | None, tmp_path: Path) -> None:
     tiny.save_glb(tiny.room_meshes(), tmp_path / "tiny.glb")
     wanted = job(
         3, scene={"file": str(tmp_path / "tiny.glb")}, start="02:00", stop="12:00", group=group, irradiance=6.0

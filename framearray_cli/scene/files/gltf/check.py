@@ -172,7 +172,7 @@ def _accessors(tree: Tree) -> Iterator[str]:
 
 
 def _primitives(tree: Tree) -> Iterator[str]:
-    """Find attributes and indices of triangles whose type no reader takes."""
+    """Find attributes and indices of triangles whose type no reader supports."""
     accessors = tree.get("accessors") or []
     for m, mesh in enumerate(tree.get("meshes") or []):
         for p, primitive in enumerate(mesh["primitives"]):

@@ -61,7 +61,7 @@ class Motion:
         return found
 
     def span(self, nodes: Sequence[int]) -> tuple[float, float] | None:
-        """First and last key time, in seconds, of the channels that move any of some nodes; None without any."""
+        """First and last key time, in seconds, of the channels that move any of the nodes; None if none does."""
         links = {link for node in nodes for link in self.chain(node)}
         times = [channel.times for (node, _), channel in self.channels.items() if node in links]
         if not times:

@@ -48,7 +48,7 @@ class Stage:
 
     Attributes:
         motion: None for a format without animations.
-        notes: what the file has and cannot be used.
+        notes: what the file holds that cannot be used.
     """
 
     cameras: tuple[StageCamera, ...] = ()
@@ -62,7 +62,7 @@ class Stage:
         return self.motion.world_from_node(node, times)
 
     def span(self, nodes: list[int]) -> tuple[float, float] | None:
-        """First and last time, in seconds, of what moves any of some nodes."""
+        """First and last key time, in seconds, of what moves any of the nodes; None if nothing does."""
         return self.motion.span(nodes) if self.motion else None
 
 

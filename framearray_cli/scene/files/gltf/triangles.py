@@ -62,7 +62,7 @@ def read_triangles(gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], n
     Args:
         materials: those of the file. The two indices behind them stand for no material: without and with vertex
             colours.
-        notes: takes what is left out.
+        notes: gets what is left out.
     """
     mode = primitive.get("mode", LIST)
     if mode not in TRIANGLES:

@@ -1,4 +1,4 @@
-"""MTL text -> materials. trimesh does not read them: it ignores map options, Windows paths, `d` and `illum`."""
+"""MTL text -> materials. trimesh is not used: it ignores map options, Windows paths, `d` and `illum`."""
 
 import shlex
 from collections.abc import Mapping

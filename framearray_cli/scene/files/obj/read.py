@@ -1,6 +1,6 @@
 """OBJ text -> parts.
 
-trimesh does not read them: it takes relative indices from the end of the file, skips "v<TAB>x", reads only the first
+trimesh is not used: it takes relative indices from the end of the file, skips "v<TAB>x", reads only the first
 material library, splits concave polygons into fans, and drops colours and normals that only some lines have.
 """
 
