@@ -1,4 +1,4 @@
-"""How strong the lights must be: a few small pictures with and without them, and the factor that makes them right."""
+"""The strength of the lights: render a few small pictures with and without them, and solve for the factor."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -15,25 +15,25 @@ from framearray_cli.render.prepare import plan_work, prepared_from
 from framearray_cli.scene.paths.paths import LightPath, eyes, lights, lights_without_groups
 from framearray_cli.scene.scene import Scene
 
-from .model import Start, checked, table_of
+from .model import Start, table_of, validate_job
 
-PICTURES = 3  # eyes, and light positions, that are tried
+PICTURES = 3  # eyes and light positions that are rendered, at most
 SIZE = (64, 48)  # pixels
-WALKS = 4096  # of the ambient light; it is known to some hundredths
-HITS = 8  # of a pixel; the mean of three pictures is then known to a hundredth
-CLIPPED = 0.03  # largest share of surface pixels that are clipped
-LEAST, MOST = 1e-12, 1e12  # factors that are looked between
+WALKS = 4096  # for the ambient light, which is then known to some hundredths
+HITS = 8  # per pixel; the mean of three pictures is then known to a hundredth
+CLIPPED = 0.03  # largest share of surface pixels that may clip
+LEAST, MOST = 1e-12, 1e12  # bounds of the factor
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of Rec. 709
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Levels:
-    """What pictures are to be: means of their surfaces, sRGB encoded.
+    """Target levels of pictures: means over surface pixels, sRGB encoded.
 
     Attributes:
-        mean: wanted.
-        darkest: kept even if more pixels clip then.
-        shade: without the lights, at most; the sky is darkened where it alone gives more.
+        mean: with the lights.
+        darkest: lowest mean; kept even if more pixels clip then.
+        shade: highest mean without the lights; a sky that gives more is darkened.
     """
 
     mean: float
@@ -41,47 +41,44 @@ class Levels:
     shade: float
 
 
-# A room is as bright as those of the jobs that come with the project. A thing under the sky needs the sun to stand out.
+# A room is as bright as in the jobs that come with the project. For a thing under the sky, the sun must stand out.
 ROOM, THING = Levels(mean=0.42, shade=0.28), Levels(mean=0.50, shade=0.18)
 
 
-def factors_for(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[float, float] | None:
-    """Find what all intensities, and the background, are to be multiplied with.
-
-    None where the lights light nothing that is seen.
-    """
-    lit, dark = _pictures(start, scene, embree)
+def find_factors(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[float, float] | None:
+    """Find the factors of all intensities and of the background; None where the lights light nothing that is seen."""
+    lit, dark = _render_radiance(start, scene, embree)
     if not len(lit) or lit.mean() <= 0:
         return None
     levels = ROOM if start.inside else THING
-    sky = min(1.0, _largest(lambda factor: _mean(factor * dark) <= levels.shade))
-    return solved(lit, sky * dark, levels), sky
+    sky = min(1.0, _largest_factor(lambda factor: _mean_luminance(factor * dark) <= levels.shade))
+    return solve_exposure(lit, sky * dark, levels), sky
 
 
-def solved(lit: Float64, dark: Float64, levels: Levels) -> float:
-    """The factor for which `factor * lit + dark` is well exposed.
+def solve_exposure(lit: Float64, dark: Float64, levels: Levels) -> float:
+    """Solve for the factor for which `factor * lit + dark` is well exposed.
 
     Args:
-        lit: (n, 3) radiance of surfaces that comes from the lights.
+        lit: (n, 3) radiance of surfaces due to the lights.
         dark: (n, 3) the rest.
     """
 
     def clips(factor: float) -> bool:
         return float(((factor * lit + dark).max(axis=1) > 1).mean()) > CLIPPED
 
-    right = _largest(lambda factor: _mean(factor * lit + dark) <= levels.mean)
+    right = _largest_factor(lambda factor: _mean_luminance(factor * lit + dark) <= levels.mean)
     if not clips(right):
         return right
-    darkest = _largest(lambda factor: _mean(factor * lit + dark) <= levels.darkest)
-    return max(_largest(lambda factor: not clips(factor)), darkest)
+    darkest = _largest_factor(lambda factor: _mean_luminance(factor * lit + dark) <= levels.darkest)
+    return max(_largest_factor(lambda factor: not clips(factor)), darkest)
 
 
-def _mean(radiance: Float64) -> float:
+def _mean_luminance(radiance: Float64) -> float:
     return float((srgb_from_linear(radiance) @ LUMINANCE).mean())
 
 
-def _largest(holds: Callable[[float], bool]) -> float:
-    """The largest factor for which a condition holds that more light breaks."""
+def _largest_factor(holds: Callable[[float], bool]) -> float:
+    """Find the largest factor for which a condition holds, by bisection; more light must break it."""
     low, high = np.log(LEAST), np.log(MOST)
     for _ in range(60):
         middle = (low + high) / 2
@@ -89,17 +86,19 @@ def _largest(holds: Callable[[float], bool]) -> float:
     return float(np.exp(low))
 
 
-def _pictures(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[Float64, Float64]:
-    """Radiance of all pixels that see a surface, (n, 3): what the lights add, and what is there without them."""
+def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[Float64, Float64]:
+    """Render the radiance of all pixels that see a surface, (n, 3): that due to the lights, and the rest."""
     table = table_of(start)
     table["camera"]["resolution"] = list(SIZE)
     table |= {"samples": {"hits": HITS}, "reuse": {"n_r": 0}, "ambient": {"paths": WALKS}}
-    job = checked(table, start.file)
+    job = validate_job(table, start.file)
     job_eyes, job_lights = eyes(job), lights(job)
-    some = _spread(job_eyes.n)
+    some = _spread_indices(job_eyes.n)
     few_eyes = replace(job_eyes, position=job_eyes.position[some], world_from_camera=job_eyes.world_from_camera[some])
-    few_lights = lights_without_groups([_and_none(source, _spread(job_lights.n)) for source in job_lights.sources])
-    # several eyes are rendered even where they are one place: their mean has less noise
+    few_lights = lights_without_groups(
+        [_append_dark(source, _spread_indices(job_lights.n)) for source in job_lights.sources]
+    )
+    # several eyes are rendered even if they coincide: their mean has less noise
     prepared = replace(prepared_from(job, scene, few_eyes, few_lights), still=few_eyes.n == 1)
     setup, ambient = plan_work(prepared, embree)
     shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
@@ -116,13 +115,13 @@ def _pictures(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[Float64,
     return np.maximum(images[:-1] - dark, 0).reshape(-1, 3), dark.reshape(-1, 3)
 
 
-def _spread(n: int) -> list[int]:
+def _spread_indices(n: int) -> list[int]:
     """A few indices from the first to the last."""
     return sorted({round(float(k)) for k in np.linspace(0, n - 1, PICTURES)})
 
 
-def _and_none(source: LightPath, some: list[int]) -> LightPath:
-    """Some positions of a source, and then one at which it does not shine."""
+def _append_dark(source: LightPath, some: list[int]) -> LightPath:
+    """Some positions of a source, followed by one at which it does not shine."""
     vector = np.concatenate([source.vector[some], source.vector[:1]])
     intensity = np.concatenate([source.intensity[some], np.zeros((1, 3))])
     return replace(source, vector=vector, intensity=intensity, notes=())

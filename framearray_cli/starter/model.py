@@ -1,4 +1,4 @@
-"""A first job, before it is text: what was chosen, and why. All places are in the scene file's own coordinates."""
+"""A first job before it is text: what was chosen, and why. All positions are in the scene file's own coordinates."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +11,10 @@ from framearray_cli.base.errors import SceneError
 from framearray_cli.base.forms.problems import problems_of
 from framearray_cli.job.job import Job
 
-MOST_PROBLEMS = 3  # that are told of a job; a light that is nowhere has one for every key
+MOST_PROBLEMS = 3  # of a job that one error reports; a light that is nowhere has one per key
 Vector = tuple[float, float, float]
 POWERS = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
-DIGITS = 6  # significant, of positions and directions; a thousandth of a pixel
+DIGITS = 6  # significant digits of positions and directions; an error of a thousandth of a pixel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +44,7 @@ class Camera:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LightKeys:
-    """A light's path: its frames, its places or directions, and its power at each."""
+    """A light's path: its frames, and its position or direction and its power at each."""
 
     kind: Literal["point", "directional"]
     frames: tuple[int, ...]
@@ -68,7 +68,7 @@ class Start:
     """A whole first job.
 
     Attributes:
-        inside: whether the scene was taken for a room.
+        inside: whether the scene counts as a room.
         about: comment lines at the top.
     """
 
@@ -86,18 +86,18 @@ class Start:
 
     @property
     def outside(self) -> str:
-        """Where rays that meet nothing get their light: of a thing under the sky, from the sky."""
+        """The light of rays that meet nothing: average in a room, the sky for a thing under it."""
         return "average" if self.inside else "background"
 
 
-def rounded(values: Any) -> Vector:
-    """Three numbers that read well and mean the same."""
+def round_vector(values: Any) -> Vector:
+    """Round three numbers to few enough digits to read, and enough to mean the same."""
     x, y, z = (float(f"{float(value):.{DIGITS}g}") for value in values)
     return x + 0.0, y + 0.0, z + 0.0  # no -0.0
 
 
-def tidy(points: Float64, size: float) -> list[Vector]:
-    """Points (n, 3) in file coordinates, rounded to a ten-thousandth of the size of the scene."""
+def round_points(points: Float64, size: float) -> list[Vector]:
+    """Round points (n, 3) in file coordinates to a ten-thousandth of the size of the scene."""
     step = 10.0 ** _floor_log10(size * 1e-4)
     return [tuple(float(f"{round(float(v) / step) * step:.12g}") + 0.0 for v in point) for point in points]  # type: ignore[misc]
 
@@ -107,7 +107,7 @@ def _floor_log10(value: float) -> int:
 
 
 def table_of(start: Start) -> dict[str, Any]:
-    """The tables of the job file that says the same."""
+    """The tables of the job file of this job."""
     camera = start.camera
     return {
         "name": start.name,
@@ -129,8 +129,8 @@ def table_of(start: Start) -> dict[str, Any]:
     }
 
 
-def checked(table: dict[str, Any], file: Path) -> Job:
-    """The job of such tables.
+def validate_job(table: dict[str, Any], file: Path) -> Job:
+    """Make the job of some tables.
 
     Raises:
         SceneError: the cameras or lights of the scene file make no job, such as a light that is too far away.
@@ -140,8 +140,8 @@ def checked(table: dict[str, Any], file: Path) -> Job:
     except ValidationError as error:
         problems = problems_of(error, Job)
         more = f"; and {len(problems) - MOST_PROBLEMS} more problems" if len(problems) > MOST_PROBLEMS else ""
-        told = "; ".join(problems[:MOST_PROBLEMS]) + more
-        raise SceneError(f"{file}: its cameras or lights do not make a job: {told}") from error
+        listed = "; ".join(problems[:MOST_PROBLEMS]) + more
+        raise SceneError(f"{file}: its cameras or lights do not make a job: {listed}") from error
 
 
 def source_keys(source: LightKeys) -> list[dict[str, Any]]:

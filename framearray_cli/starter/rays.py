@@ -1,4 +1,4 @@
-"""Rays into a scene from anywhere, for questions such as "what is around this point?"; all in centred coordinates."""
+"""Rays between any points of a scene, for questions such as "what is around this point?"; in centred coordinates."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -25,16 +25,16 @@ from framearray_cli.engine.embree.packets import (
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.scene.scene import Scene
 
-SHORTENED = 1e-4  # of a segment, left out at both of its ends, so that it does not meet what it starts or ends on
+SHORTENED = 1e-4  # share of a segment left out at both ends, so that it misses the surfaces that it starts or ends on
 
 
-class Seen(NamedTuple):
+class ProbeHits(NamedTuple):
     """What n rays met.
 
     Attributes:
         distance: (n,) in lengths of the directions; inf where nothing is met.
         triangle: (n,) -1 where nothing is met.
-        front: (n,) whether it is met from its front, the side its corners run counter-clockwise on.
+        front: (n,) whether the ray meets its front, the side from which its corners run counter-clockwise.
     """
 
     distance: Float64
@@ -49,19 +49,19 @@ class Seen(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Probe:
-    """A scene that rays can be sent into.
+    """A scene to trace rays in.
 
     Attributes:
-        turned: whether the front of a surface is the side that its corners run clockwise on.
+        turned: whether the front of a surface is the side from which its corners run clockwise.
     """
 
     scene: Scene
     embree: EmbreeScene
     turned: bool = False
 
-    def first_hits(self, origins: Any, directions: Any) -> Seen:
+    def trace(self, origins: Any, directions: Any) -> ProbeHits:
         """Trace rays; origins and directions are (n, 3) or (3,)."""
-        packets, n = _filled(HIT_ROWS, origins, directions, np.inf)
+        packets, n = _fill_packets(HIT_ROWS, origins, directions, np.inf)
         intersect(self.embree.tracer, packets, n)
         bits = packets.view(np.int32)
         distance, triangle = _rows(packets, TFAR)[:n], _rows(bits, TRIANGLE)[:n].copy()
@@ -70,7 +70,7 @@ class Probe:
         triangle[missed] = -1
         against = (self.normals(triangle) * np.broadcast_to(directions, (n, 3))).sum(axis=1) < 0
         front = (against != self.turned) & ~missed
-        return Seen(np.where(missed, np.inf, distance.astype(np.float64)), triangle, front)
+        return ProbeHits(np.where(missed, np.inf, distance.astype(np.float64)), triangle, front)
 
     def normals(self, triangle: Int32) -> Float64:
         """(n, 3) normals by winding, not of unit length."""
@@ -81,13 +81,13 @@ class Probe:
         """(n,) whether anything lies between two points, (n, 3) or (3,) each."""
         start, end = np.broadcast_arrays(np.asarray(start, np.float64), np.asarray(end, np.float64))
         step = end - start
-        packets, n = _filled(RAY_ROWS, start + SHORTENED * step, step, 1 - 2 * SHORTENED)
+        packets, n = _fill_packets(RAY_ROWS, start + SHORTENED * step, step, 1 - 2 * SHORTENED)
         occlude(self.embree.tracer, packets, n)
         return np.asarray(_rows(packets, TFAR)[:n] < 0)
 
 
-def _filled(rows: int, origins: Any, directions: Any, tfar: float) -> tuple[Any, int]:
-    """Packets that hold the rays, and how many there are."""
+def _fill_packets(rows: int, origins: Any, directions: Any, tfar: float) -> tuple[Any, int]:
+    """Fill packets with rays; also return the number of rays."""
     origins, directions = np.broadcast_arrays(np.atleast_2d(origins), np.atleast_2d(directions))
     n = len(origins)
     packets = empty_packets(-(-n // LANES), rows)

@@ -1,4 +1,4 @@
-"""Points in a box and directions all around, evenly spread and the same each time."""
+"""Points in a box and directions on a sphere, evenly spread and deterministic."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Cameras and lights that a scene file brings along -> paths of a job, a key for each frame of what moves."""
+"""Cameras and lights of a scene file -> paths of a job, with a key per frame of what moves."""
 
 import numpy as np
 
@@ -6,17 +6,17 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError, SceneError
 from framearray_cli.scene.files import Stage, StageCamera, StageLight
 
-from .model import Camera, EyeKey, LightKeys, rounded
+from .model import Camera, EyeKey, LightKeys, round_vector
 
 FPS = 24.0  # of the job; times of animations are seconds
 HEIGHT = 240  # pixels of a first picture
-ASPECTS = (0.25, 4.0)  # pictures beyond it are taken for a mistake in the file
+ASPECTS = (0.25, 4.0)  # width over height; values beyond are mistakes of the file
 MOST_FRAMES = 1000  # of a camera: forty seconds; longer paths are sampled more coarsely
-MOST_LIGHTS = 48  # positions of lights, as in [FA]; each makes a picture for every frame of the camera
+MOST_LIGHTS = 48  # positions of lights, as in [FA]; each gives a picture per frame of the camera
 
 
-def chosen_camera(stage: Stage, name: str | None, file: object) -> StageCamera | None:
-    """The camera of that name, or the first; None where there is none.
+def choose_camera(stage: Stage, name: str | None, file: object) -> StageCamera | None:
+    """Choose the camera of that name, or the first; None if the file has none.
 
     Raises:
         JobError: no camera has that name.
@@ -31,29 +31,29 @@ def chosen_camera(stage: Stage, name: str | None, file: object) -> StageCamera |
 
 
 def frame_times(span: tuple[float, float] | None, wanted: int | None, most: int) -> list[float]:
-    """The times, in seconds, that frames of a path stand for: each frame of it, or as many as are wanted."""
+    """Times of the frames of a path, seconds: `wanted` ones over its span, or every frame of it, at most `most`."""
     if span is None:
         return [0.0] * (wanted or 1)
     n = wanted or min(round((span[1] - span[0]) * FPS) + 1, most)
     return [float(time) for time in np.linspace(*span, n)]
 
 
-def staged_camera(stage: Stage, camera: StageCamera, wanted: int | None, depth: float) -> Camera:
-    """The path of a camera of the file.
+def convert_camera(stage: Stage, camera: StageCamera, wanted: int | None, depth: float) -> Camera:
+    """Convert a camera of the file to a path.
 
     Args:
-        wanted: number of frames; None: as many as its animation has.
+        wanted: number of frames; None: that of its animation.
         depth: distance from the eye to its target, scene units.
 
     Raises:
-        SceneError: a camera that is flat or nowhere.
+        SceneError: a camera whose node has a scale of 0 or is not finite.
     """
     span = stage.span([camera.node])
     times = frame_times(span, wanted, MOST_FRAMES)
     matrices = stage.world_from(camera.node, times)
-    look, up = _units(-matrices[:, :3, 2], camera.name), _units(matrices[:, :3, 1], camera.name)
+    look, up = _normalize(-matrices[:, :3, 2], camera.name), _normalize(matrices[:, :3, 1], camera.name)
     keys = [
-        EyeKey(frame=frame, eye=rounded(eye), target=rounded(eye + way * depth), up=rounded(above))
+        EyeKey(frame=frame, eye=round_vector(eye), target=round_vector(eye + way * depth), up=round_vector(above))
         for frame, (eye, way, above) in enumerate(zip(matrices[:, :3, 3], look, up, strict=True))
     ]
     low, high = ASPECTS
@@ -72,18 +72,18 @@ def staged_camera(stage: Stage, camera: StageCamera, wanted: int | None, depth: 
     )
 
 
-def staged_lights(stage: Stage, wanted: int | None) -> tuple[tuple[LightKeys, ...], int]:
-    """The paths of the lights of the file that shine, with the file's own strengths; and the number of positions."""
+def convert_lights(stage: Stage, wanted: int | None) -> tuple[tuple[LightKeys, ...], int]:
+    """Convert the lights of the file that shine, at the file's own strengths; also return the number of positions."""
     shining = [light for light in stage.lights if max(light.intensity) > 0]
     span = stage.span([light.node for light in shining])
     times = frame_times(span, wanted, MOST_LIGHTS)
-    return tuple(_source(stage, light, times) for light in shining), len(times)
+    return tuple(_convert_light(stage, light, times) for light in shining), len(times)
 
 
-def _source(stage: Stage, light: StageLight, times: list[float]) -> LightKeys:
+def _convert_light(stage: Stage, light: StageLight, times: list[float]) -> LightKeys:
     matrices = stage.world_from(light.node, times)
     if light.kind == "directional":
-        vectors = _units(-matrices[:, :3, 2], light.name)
+        vectors = _normalize(-matrices[:, :3, 2], light.name)
     else:
         vectors = matrices[:, :3, 3]
         if not np.isfinite(vectors).all():
@@ -97,14 +97,14 @@ def _source(stage: Stage, light: StageLight, times: list[float]) -> LightKeys:
     return LightKeys(
         kind="directional" if light.kind == "directional" else "point",
         frames=tuple(range(n)),
-        vectors=tuple(rounded(vector) for vector in vectors[:n]),
+        vectors=tuple(round_vector(vector) for vector in vectors[:n]),
         powers=(light.intensity,) * n,
         about=tuple(about),
     )
 
 
-def _units(vectors: Float64, name: str) -> Float64:
-    """Directions of length 1."""
+def _normalize(vectors: Float64, name: str) -> Float64:
+    """Scale directions to length 1."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     if not (np.isfinite(vectors).all() and (length > 0).all()):
         raise SceneError(f'"{name}" looks nowhere: its node, or one above it, has a scale of 0')

@@ -1,6 +1,6 @@
-"""A first job as TOML text, with a comment for every key: it is read, and changed, before anything else of the program.
+"""A first job as TOML text with a comment per key, for users who read and edit it before any documentation.
 
-Written by hand, because comments are half of it; a test reads it back and compares.
+The text is formatted here rather than by a TOML library, since half of it are comments; a test reads it back.
 """
 
 import os
@@ -12,15 +12,15 @@ from framearray_cli.base.forms.text import inline, inline_floats, quoted
 
 from .model import Camera, LightKeys, MaterialNote, Start, source_keys
 
-MOST_STEPS_UP = 2  # folders that a relative name of the scene may climb; beyond, it is absolute
-COLUMN = 42  # where comments behind a key start
+MOST_STEPS_UP = 2  # largest number of leading ".." of a relative scene name; beyond, it is absolute
+COLUMN = 42  # of comments behind keys
 
 
 def to_text(start: Start, job_file: Path) -> str:
     """Write a job.
 
     Args:
-        job_file: where it will lie; the scene is named from there.
+        job_file: its file; the scene is named relative to it.
     """
     low = start.about
     return "\n".join(
@@ -62,7 +62,7 @@ def to_text(start: Start, job_file: Path) -> str:
 
 
 def scene_name(file: Path, job_file: Path) -> str:
-    """The scene's name as the job says it: relative where both lie close together."""
+    """The name of the scene in the job: relative where both files are close together."""
     file, folder = Path(os.path.abspath(file)), Path(os.path.abspath(job_file)).parent
     try:
         name = Path(os.path.relpath(file, folder))
@@ -141,7 +141,7 @@ def _comments(lines: Iterable[str]) -> list[str]:
 
 
 def _one_line(text: str) -> str:
-    """Text as it can stand in a comment: no control characters."""
+    """Replace control characters, which a comment must not contain."""
     return "".join(c if c.isprintable() else "?" for c in text)
 
 

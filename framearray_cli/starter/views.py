@@ -1,4 +1,4 @@
-"""How much a view shows: what a person would choose a camera by, as a number."""
+"""Judge how much a view shows, as a person who places a camera would, by a number."""
 
 import numpy as np
 
@@ -6,13 +6,13 @@ from framearray_cli.base.arrays import Float64
 
 from .rays import Probe
 
-COLUMNS, ROWS = 16, 12  # rays of a view
+COLUMNS, ROWS = 16, 12  # rays per view
 FOV_DEG, ASPECT = 60.0, 4 / 3
 BATCH = 2000  # views traced together: 400,000 rays
-NEAR = 0.3  # of the size of the place: what is nearer fills the picture with one thing
-FAR = 8.0  # of the same: what is farther counts no more
-# What a view loses for rays that see nothing, that see a thing from its inner side, and that end near the eye. A view
-# of ten different things at equal shares has a variety of 2.3; these let a fifth of a picture spoil about half of that.
+NEAR = 0.3  # over the size of the place: a nearer thing fills the picture
+FAR = 8.0  # over the same size: greater distances count as this one
+# Penalties for the shares of rays that see nothing, that see the back of a surface, and that end near the eye. A view
+# of ten different things at equal shares has a variety of 2.3; a fifth of a picture spoils about half of that.
 EMPTY, BACKWARDS, CLOSE = 4.0, 6.0, 6.0
 
 
@@ -32,7 +32,7 @@ def view_directions(look_dir: Float64, up_dir: Float64, fov_deg: float = FOV_DEG
     return np.asarray(look_dir[:, None] + a * right[:, None] + b * above[:, None])
 
 
-def view_worth(probe: Probe, eye: Float64, look_dir: Float64, up_dir: Float64, size: float) -> tuple[Float64, Float64]:
+def judge_views(probe: Probe, eye: Float64, look_dir: Float64, up_dir: Float64, size: float) -> tuple[Float64, Float64]:
     """Judge n views: (n,) how much each shows, and (n,) median distance of what it sees.
 
     A view is worth the variety of what is in it (the entropy of its materials and of the ways surfaces face), and the
@@ -45,16 +45,18 @@ def view_worth(probe: Probe, eye: Float64, look_dir: Float64, up_dir: Float64, s
     worths, depths = [], []
     for first in range(0, len(eye), BATCH):
         part = slice(first, first + BATCH)
-        found = _judge(probe, eye[part], look_dir[part], up_dir, size)
+        found = _judge_batch(probe, eye[part], look_dir[part], up_dir, size)
         worths.append(found[0])
         depths.append(found[1])
     return np.concatenate(worths), np.concatenate(depths)
 
 
-def _judge(probe: Probe, eye: Float64, look_dir: Float64, up_dir: Float64, size: float) -> tuple[Float64, Float64]:
+def _judge_batch(
+    probe: Probe, eye: Float64, look_dir: Float64, up_dir: Float64, size: float
+) -> tuple[Float64, Float64]:
     n, rays = len(eye), COLUMNS * ROWS
     directions = view_directions(look_dir, up_dir).reshape(-1, 3)
-    seen = probe.first_hits(np.repeat(eye, rays, axis=0), directions)
+    seen = probe.trace(np.repeat(eye, rays, axis=0), directions)
     length = np.linalg.norm(directions, axis=1)
     distance = np.where(seen.hit, seen.distance * length, np.inf).reshape(n, rays)
     hit, front = seen.hit.reshape(n, rays), seen.front.reshape(n, rays)

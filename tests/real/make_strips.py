@@ -2,7 +2,7 @@
 
     python tests/real/make_strips.py FOLDER STRIPS
 
-takes the arrays that the jobs of `support.real_jobs` left in FOLDER/out, and writes STRIPS/NAME.jpg for every scene.
+reads the arrays that the jobs of `support.real_jobs` left in FOLDER/out, and writes STRIPS/NAME.jpg for every scene.
 """
 
 import sys
@@ -16,7 +16,7 @@ from framearray_cli.array.manifest import image_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.colour import srgb8_from_linear
 
-# kind, camera, light; of a scene with fewer, the last one
+# kind, camera, light; the last one of a scene with fewer
 CHOSEN = (("sun", 0, 0), ("sun", 3, 2), ("lamp", 2, 0), ("lamp", 5, 3))
 
 

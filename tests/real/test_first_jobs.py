@@ -1,4 +1,4 @@
-"""`framearray init` and then `render`, with no edit in between: on real scenes, where they are, and on broken files."""
+"""`framearray init` and then `render`, without an edit in between: on real scenes, if any, and on broken files."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import SceneError
 from framearray_cli.cli.main import main
 from framearray_cli.job.read import read_job
-from framearray_cli.starter import Wishes, init
+from framearray_cli.starter import StartOptions, init
 
 JOBS = ROOT / "jobs"
 KINDS = (".glb", ".obj", ".stl")
@@ -23,8 +23,8 @@ REAL = sorted(file for file in scenes_folder().glob("*/*.*") if file.suffix in K
 OWN = [JOBS / "scenes" / f"{name}.glb" for name in ("cabin", "kitchen", "stairs")]
 NASTY = nasty_files(scenes_folder())
 FEW = ("--frames", "5", "--lights", "3", "--quiet")
-# Of 255. A picture that one can recognise has a mean in the middle of the scale, hardly a pixel without any light, few
-# that clip but for the sky, and contrast: a wall before the eye has a spread of 5 or less.
+# Of 255. A recognisable picture has a mean in the middle of the scale, hardly any pixel without light, few that clip
+# except in the sky, and contrast: a wall in front of the eye has a spread of 5 or less.
 MEAN, BLACK, CLIPPED, SPREAD = (64, 170), 0.10, 0.10, 15
 
 
@@ -41,7 +41,7 @@ def test_a_first_job_gives_pictures_that_one_can_recognise(scene: Path, tmp_path
         depth = read_layers(layers_path(manifest, c))["depth.Z"]
         surface = depth > 0
         assert surface.mean() > 0.2
-        # nothing fills the picture from close by, as where an eye is inside of a thing
+        # nothing nearby fills the picture, as it does if the eye is inside a thing
         assert np.percentile(depth[surface], 50) > 0.5 * read_job(job_file).obscurance.range
         for l in range(3):
             codes = read_codes(image_path(manifest, c, l)).astype(float)[..., :3]
@@ -56,7 +56,7 @@ def test_a_first_job_gives_pictures_that_one_can_recognise(scene: Path, tmp_path
 def test_broken_files_make_a_job_or_one_clear_error(name: str, tmp_path: Path) -> None:
     job_file = tmp_path / "job.toml"
     try:
-        init(scenes_folder() / "nasty" / name, job_file, Wishes(frames=2, lights=2))
+        init(scenes_folder() / "nasty" / name, job_file, StartOptions(frames=2, lights=2))
     except SceneError as error:
         assert str(error).startswith(str(scenes_folder() / "nasty" / name))
         assert "\n" not in str(error)

@@ -1,4 +1,4 @@
-"""Every file of the nasty set, where it is, gives pictures or one clear error; nothing else is ever said."""
+"""Every file of the nasty set, if there is one, gives pictures or one clear error, and no other output."""
 
 import subprocess
 import sys
@@ -18,7 +18,7 @@ from framearray_cli.scene.scene import Scene, load_scene
 
 FILES = nasty_files(scenes_folder())
 RESOLUTION = (40, 30)
-BY_ITSELF = ("trimesh/fuze.obj", "assimp/invalid/OutOfMemory.off")
+AS_A_COMMAND = ("trimesh/fuze.obj", "assimp/invalid/OutOfMemory.off")
 
 
 def scene_of(file: Path) -> Scene | None:
@@ -38,7 +38,7 @@ def write_job(name: str, folder: Path) -> tuple[Path, Scene | None]:
 
 @pytest.mark.skipif(not FILES, reason="no nasty set; set FRAMEARRAY_SCENES to the folder of scenes")
 def test_the_set_is_there():
-    assert set(BY_ITSELF) <= set(FILES)
+    assert set(AS_A_COMMAND) <= set(FILES)
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -65,11 +65,11 @@ def test_pictures_or_a_clear_error(name, tmp_path, capfd):
     assert pictures[1::2].mean() > pictures[::2].mean()
 
 
-@pytest.mark.parametrize("name", [name for name in BY_ITSELF if name in FILES])
+@pytest.mark.parametrize("name", [name for name in AS_A_COMMAND if name in FILES])
 def test_as_a_command(name, tmp_path):
     job, scene = write_job(name, tmp_path)
     command = [sys.executable, "-m", "framearray_cli", "render", str(job)]
-    told = subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=ROOT)
-    assert "Traceback" not in told.stderr
-    assert told.returncode == (3 if scene is None else 0)
-    assert told.stderr.count("\n") == (1 if scene is None else 0)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=ROOT)
+    assert "Traceback" not in done.stderr
+    assert done.returncode == (3 if scene is None else 0)
+    assert done.stderr.count("\n") == (1 if scene is None else 0)

@@ -1,4 +1,4 @@
-"""Real scenes, where they are: what is seen and lit agrees with what was measured beside each, by other means."""
+"""Real scenes, if there are any: what is seen and lit agrees with shares measured by other means."""
 
 import json
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from framearray_cli.job.job import Job
 from framearray_cli.render.render import render
 
 SCENES = real_jobs.scene_names(scenes_folder())
-# The noted shares rest on some thousand rays, so they are known to about one in a hundred.
+# The noted shares were measured with some thousand rays, so they are known to about 0.01.
 NOTED = 0.025
 
 pytestmark = pytest.mark.skipif(not SCENES, reason="no real scenes; set FRAMEARRAY_SCENES to their folder")
@@ -55,7 +55,7 @@ def first_eye(name: str) -> dict[str, Any]:
 
 
 def noted_lights(name: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """One light index for each light that is noted, suns first: the table of a job, and the notes in that order."""
+    """One light position per noted light, suns first: the table of a job, and the notes in that order."""
     found = notes(name)["lights"]
     suns, lamps = found["directional"], found["point"]
     sun = [{"direction": [-x for x in light["to_light"]], "irradiance": 1.0} for light in suns]
@@ -71,7 +71,7 @@ def noted_lights(name: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_what_is_seen_and_lit_is_what_was_noted(name, tmp_path):
-    """One ray a pixel and nothing but direct light, so that each pixel is either lit or not."""
+    """One ray per pixel and only direct light, so that each pixel is either lit or not."""
     light, noted = noted_lights(name)
     plain = {"reuse": {"n_r": 0}, "ambient": {"intensity": 0.0}, "specular": {"depth": 0}, "scene": {"background": 0.0}}
     once = {"samples": {"hits": 1, "obscurance": 1}}
@@ -87,7 +87,7 @@ def test_what_is_seen_and_lit_is_what_was_noted(name, tmp_path):
 
 
 def test_an_obj_and_a_glb_of_one_scene_look_the_same(tmp_path):
-    """Textures the right way up, on the right things, from both."""
+    """Both have textures the right way up and on the right surfaces."""
     small = {"camera": first_eye("modern_hall"), "samples": {"hits": 4, "obscurance": 1}, "reuse": {"n_r": 0}}
     found = []
     for name in ("modern_hall", "modern_hall_obj"):
@@ -121,8 +121,8 @@ def array(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 
 @pytest.mark.slow
-def test_reuse_changes_noise_alone(array, tmp_path):
-    """The job of each scene, against the same without reuse: with as many samples, and with six times as many.
+def test_reuse_changes_only_noise(array, tmp_path):
+    """The job of each scene, against the same without reuse: with as many samples, and with six times that number.
 
     The mean agrees. Noise is that of fewer samples, as the eyes are far apart; the ends of the path have no more of it.
     """

@@ -1,4 +1,4 @@
-"""`framearray init`: what it takes over from a file, what it chooses, and the job that it writes."""
+"""`framearray init`: what it reads from a file, what it chooses, and the job that it writes."""
 
 import math
 from pathlib import Path
@@ -18,11 +18,11 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.scene.scene import load_scene
-from framearray_cli.starter import Start, Wishes, expose, init
-from framearray_cli.starter.expose import CLIPPED, LUMINANCE, ROOM, solved
+from framearray_cli.starter import Start, StartOptions, expose, init
+from framearray_cli.starter.expose import CLIPPED, LUMINANCE, ROOM, solve_exposure
 from framearray_cli.starter.model import table_of
 
-FEW = Wishes(frames=3, lights=2)
+FEW = StartOptions(frames=3, lights=2)
 
 
 def box(low: Any, high: Any, *, inwards: bool = False) -> Any:
@@ -52,28 +52,28 @@ def room(glb: Glb | None = None) -> Glb:
 
 
 def thing(glb: Glb | None = None) -> Glb:
-    """Two boxes on each other, to be looked at."""
+    """Two boxes on top of each other, seen from outside."""
     glb = glb or Glb()
     add(glb, box([-1, 0, -0.5], [1, 1, 0.5]), "Low", [0.7, 0.5, 0.4])
     add(glb, box([-0.3, 1.01, -0.3], [0.3, 2, 0.3]), "High", [0.3, 0.5, 0.7])
     return glb
 
 
-def started(glb: Glb, folder: Path, wishes: Wishes = FEW) -> tuple[Start, Job]:
-    """What `init` chose, and the job that can be read from its file."""
+def started(glb: Glb, folder: Path, options: StartOptions = FEW) -> tuple[Start, Job]:
+    """Run `init`; return its choices and the job read from its file."""
     scene, job_file = glb.save(folder / "scene.glb"), folder / "job.toml"
-    start = init(scene, job_file, wishes)
+    start = init(scene, job_file, options)
     return start, read_job(job_file)
 
 
 def code_of(*arguments: str) -> int:
-    """How a command ends."""
+    """The exit code of a command."""
     with pytest.raises(SystemExit) as ended:
         main(list(arguments))
     return int(ended.value.code or 0)
 
 
-def test_the_text_says_what_was_chosen(tmp_path: Path) -> None:
+def test_the_text_holds_the_choices(tmp_path: Path) -> None:
     start, job = started(room(), tmp_path)
     expected = Job.model_validate(table_of(start) | {"output": {"directory": str(tmp_path / "out" / "scene")}})
     for table in ("camera", "light", "obscurance", "scene", "name"):
@@ -82,7 +82,7 @@ def test_the_text_says_what_was_chosen(tmp_path: Path) -> None:
     assert job.output.directory == tmp_path / "out" / "scene"
 
 
-def test_every_key_has_a_comment_and_every_material_stands_there(tmp_path: Path) -> None:
+def test_every_key_has_a_comment_and_every_material_is_listed(tmp_path: Path) -> None:
     started(room(), tmp_path)
     lines = (tmp_path / "job.toml").read_text().splitlines()
     bare = [line for line in lines if " = " in line and not line.startswith(("#", "  {")) and "#" not in line]
@@ -99,7 +99,7 @@ def test_every_key_has_a_comment_and_every_material_stands_there(tmp_path: Path)
 
 
 def test_a_room_is_walked_through_by_an_eye_that_is_in_no_furniture(tmp_path: Path) -> None:
-    start, job = started(room(), tmp_path, Wishes(frames=9, lights=5))
+    start, job = started(room(), tmp_path, StartOptions(frames=9, lights=5))
     assert start.inside and start.outside == "average"
     assert start.range == pytest.approx(1.25, abs=0.1)  # half the height, but above tables it is lower
     for points, clear in ((eyes(job).position, 0.3 / 2), (lights(job).sources[0].vector, 0.15)):
@@ -113,7 +113,7 @@ def test_a_room_is_walked_through_by_an_eye_that_is_in_no_furniture(tmp_path: Pa
 
 
 def test_a_thing_is_whole_in_every_picture(tmp_path: Path) -> None:
-    start, job = started(thing(), tmp_path, Wishes(frames=7, lights=3))
+    start, job = started(thing(), tmp_path, StartOptions(frames=7, lights=3))
     assert not start.inside and start.outside == "background"
     assert [source.type for source in job.light.sources] == ["directional"]
     corners = load_scene(tmp_path / "scene.glb")
@@ -130,21 +130,21 @@ def test_a_thing_is_whole_in_every_picture(tmp_path: Path) -> None:
     assert (lights(job).sources[0].vector[:, 1] < -0.4).all()  # light comes from above
 
 
-def test_what_the_user_says_counts(tmp_path: Path) -> None:
-    start, job = started(room(), tmp_path, Wishes(frames=2, lights=1, inside=False))
+def test_options_override_choices(tmp_path: Path) -> None:
+    start, job = started(room(), tmp_path, StartOptions(frames=2, lights=1, inside=False))
     assert not start.inside
     assert (job.camera.frames, job.light.frames) == (2, 1)
 
 
-def test_a_room_whose_faces_are_turned_outwards_is_one_where_the_user_says_so(tmp_path: Path) -> None:
+def test_a_room_whose_faces_are_turned_outwards_is_one_with_the_option_inside(tmp_path: Path) -> None:
     glb = Glb()
     add(glb, box([-2.5, 0, -2], [2.5, 2.5, 2]), "Wall", [0.7, 0.7, 0.6])
     (tmp_path / "first").mkdir()
-    start, _ = started(glb, tmp_path / "first", Wishes(frames=2, lights=2))
+    start, _ = started(glb, tmp_path / "first", StartOptions(frames=2, lights=2))
     assert not start.inside
-    # closed from their fronts are the insides of furniture alone, then
+    # then only the insides of furniture are closed from their fronts
     add(glb, box([-2.4, 0.01, -1.9], [-1.6, 2.0, -0.9], inwards=True), "Cupboard", [0.5, 0.3, 0.2])
-    start, job = started(glb, tmp_path, Wishes(frames=2, lights=2, inside=True))
+    start, job = started(glb, tmp_path, StartOptions(frames=2, lights=2, inside=True))
     assert start.inside
     for points in (eyes(job).position, lights(job).sources[0].vector):
         assert (np.abs(points) < [2.5, 2.5, 2]).all()
@@ -157,16 +157,16 @@ def test_nothing_is_closed_around_a_table_top(tmp_path: Path) -> None:
     add(glb, box([-1, 0.7, -1], [1, 0.70001, 1])[:6], "Top", [0.6, 0.5, 0.3])
     add(glb, tiny.quad((-2, 0, 2), (2, 0, 2), (2, 0, -2), (-2, 0, -2)).reshape(-1, 3), "Floor", [0.6, 0.5, 0.3])
     with pytest.raises(SceneError, match="--inside: nothing in it looks like the inside of a room"):
-        started(glb, tmp_path, Wishes(frames=2, lights=1, inside=True))
+        started(glb, tmp_path, StartOptions(frames=2, lights=1, inside=True))
 
 
-def test_an_animated_camera_comes_in_as_it_is(tmp_path: Path) -> None:
-    """Frame by frame the job's matrices are those of the hierarchy, here computed by hand: a turning arm."""
+def test_an_animated_camera_is_converted_frame_by_frame(tmp_path: Path) -> None:
+    """The job's matrices are those of the hierarchy, a turning arm, computed by hand."""
     glb = room()
     shot = camera(glb, translation=[0.0, 1.5, 1.0])
     arm = glb.node(children=[shot])
     animate(glb, arm, "rotation", [0.0, 0.5], [[0, 0, 0, 1], [0, QUARTER, 0, QUARTER]])
-    start, job = started(glb, tmp_path, Wishes(lights=1))
+    start, job = started(glb, tmp_path, StartOptions(lights=1))
     found = eyes(job)
     assert found.n == 13  # half a second of 24 frames, and the last
     assert found.fov_deg == pytest.approx(50, abs=1e-3)
@@ -182,7 +182,7 @@ def test_fewer_frames_are_spread_over_the_same_time(tmp_path: Path) -> None:
     shot = camera(glb, translation=[0.0, 1.5, 0.0])
     glb.tree["scenes"][0]["nodes"].append(shot)
     animate(glb, shot, "translation", [0.0, 4.0], [[-1, 1.5, 0], [1, 1.5, 0]])
-    _, job = started(glb, tmp_path, Wishes(frames=5, lights=1))
+    _, job = started(glb, tmp_path, StartOptions(frames=5, lights=1))
     np.testing.assert_allclose(eyes(job).position[:, 0], [-1, -0.5, 0, 0.5, 1], atol=1e-6)
 
 
@@ -190,15 +190,15 @@ def test_a_camera_is_chosen_by_its_name(tmp_path: Path) -> None:
     glb = room()
     for name, x in (("Left", -1.0), ("Right", 1.0)):
         glb.node(name=name, camera=glb.add("cameras", dict(LENS)), translation=[x, 1.5, 1.5])
-    _, job = started(glb, tmp_path, Wishes(camera="Right", lights=1))
+    _, job = started(glb, tmp_path, StartOptions(camera="Right", lights=1))
     assert eyes(job).position[0].tolist() == [1.0, 1.5, 1.5]
     text = (tmp_path / "job.toml").read_text()
     assert '# the file also has the camera "Left": --camera "Left"' in text
     with pytest.raises(JobError, match='got "Middle"; it has "Left", "Right"'):
-        init(tmp_path / "scene.glb", tmp_path / "other.toml", Wishes(camera="Middle"))
+        init(tmp_path / "scene.glb", tmp_path / "other.toml", StartOptions(camera="Middle"))
 
 
-def test_lights_of_the_file_keep_their_places_and_what_they_are_to_each_other(tmp_path: Path) -> None:
+def test_lights_of_the_file_keep_their_places_and_relative_strengths(tmp_path: Path) -> None:
     glb = room()
     lamp = glb.node(name="Lamp", **light(glb, intensity=1000.0, color=[1.0, 0.5, 0.25]))
     glb.node(name="Beam", translation=[-1.0, 2.0, 1.0], **light(glb, "spot", intensity=500.0))
@@ -206,7 +206,7 @@ def test_lights_of_the_file_keep_their_places_and_what_they_are_to_each_other(tm
     glb.node(name="Sun", **down, **light(glb, "directional", intensity=30.0))
     glb.node(name="Off", **light(glb, intensity=0.0))
     animate(glb, lamp, "translation", [0.0, 1.0], [[-1.5, 2, 1], [1.5, 2, 1]])
-    _, job = started(glb, tmp_path, Wishes(frames=2))
+    _, job = started(glb, tmp_path, StartOptions(frames=2))
     path = lights(job)
     assert path.n == 25  # a second of 24 frames, and the last
     moving, beam, sun = path.sources
@@ -230,7 +230,7 @@ def test_lights_that_light_nothing_give_way_to_chosen_ones(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("place", [[1e13, 0.0, 0.0], [1e300, 1e300, 1e300]])
-def test_lights_that_are_nowhere_are_one_error(tmp_path: Path, place: list[float]) -> None:
+def test_lights_too_far_away_are_one_error(tmp_path: Path, place: list[float]) -> None:
     glb = room()
     glb.node(name="Far", translation=place, **light(glb, intensity=1000.0))
     with pytest.raises(SceneError, match=r"scene\.glb: its cameras or lights do not make a job: light") as caught:
@@ -244,13 +244,13 @@ def test_exposure_makes_the_mean_right_and_spares_highlights() -> None:
 
     rng = np.random.default_rng(1)
     even, none = rng.uniform(0.4, 0.6, (1000, 3)), np.zeros((1000, 3))
-    assert mean(solved(even, none, ROOM), even, none) == pytest.approx(ROOM.mean, abs=1e-4)
-    assert mean(solved(1e-6 * even, none, ROOM), 1e-6 * even, none) == pytest.approx(ROOM.mean, abs=1e-4)
+    assert mean(solve_exposure(even, none, ROOM), even, none) == pytest.approx(ROOM.mean, abs=1e-4)
+    assert mean(solve_exposure(1e-6 * even, none, ROOM), 1e-6 * even, none) == pytest.approx(ROOM.mean, abs=1e-4)
     dark = np.full((1000, 3), 0.05)
-    assert mean(solved(even, dark, ROOM), even, dark) == pytest.approx(ROOM.mean, abs=1e-4)
+    assert mean(solve_exposure(even, dark, ROOM), even, dark) == pytest.approx(ROOM.mean, abs=1e-4)
     harsh = np.where(np.arange(1000)[:, None] < 100, 30.0, 1.0) * even  # a tenth lies in the sun
-    clipped = ((solved(harsh, none, ROOM) * harsh).max(axis=1) > 1).mean()
-    assert 0.5 * CLIPPED < clipped <= CLIPPED or mean(solved(harsh, none, ROOM), harsh, none) < 0.301
+    clipped = ((solve_exposure(harsh, none, ROOM) * harsh).max(axis=1) > 1).mean()
+    assert 0.5 * CLIPPED < clipped <= CLIPPED or mean(solve_exposure(harsh, none, ROOM), harsh, none) < 0.301
 
 
 @pytest.mark.parametrize(("seconds", "eyes_tried"), [(None, 1), (1.0, expose.PICTURES)])
@@ -266,16 +266,16 @@ def test_an_animated_camera_at_rest_is_exposed_from_several_pictures(
 
     def record(lit: Any, dark: Any, levels: expose.Levels) -> float:
         pixels.append(len(lit))
-        return solved(lit, dark, levels)
+        return solve_exposure(lit, dark, levels)
 
-    monkeypatch.setattr(expose, "solved", record)
-    _, job = started(glb, tmp_path, Wishes(lights=1))
+    monkeypatch.setattr(expose, "solve_exposure", record)
+    _, job = started(glb, tmp_path, StartOptions(lights=1))
     assert eyes(job).at_rest
     width, height = expose.SIZE
     assert pixels == [eyes_tried * width * height]  # walls are all around
 
 
-def test_a_file_that_is_there_stays(tmp_path: Path) -> None:
+def test_an_existing_file_stays(tmp_path: Path) -> None:
     scene, job_file = room().save(tmp_path / "scene.glb"), tmp_path / "job.toml"
     job_file.write_text("mine")
     with pytest.raises(OutputError, match=r"job.toml: is there already; give another name with --output, or --force"):
@@ -285,15 +285,15 @@ def test_a_file_that_is_there_stays(tmp_path: Path) -> None:
     assert load_toml(job_file)["name"] == "scene"
 
 
-def test_the_command_says_what_it_did(
+def test_the_command_reports_what_it_did(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     room().save(tmp_path / "my room (1).glb")
     monkeypatch.chdir(tmp_path)
     assert code_of("init", "my room (1).glb", "--frames", "2", "--lights", "3") == 0
-    said = capsys.readouterr().out
-    assert "so it is taken for a room" in said
-    assert "my room (1).toml: 2 eyes x 3 lights = 6 images" in said
+    printed = capsys.readouterr().out
+    assert "so it is taken for a room" in printed
+    assert "my room (1).toml: 2 eyes x 3 lights = 6 images" in printed
     assert read_job(tmp_path / "my room (1).toml").name == "my-room-1"
     assert code_of("init", "none.glb") == 3
     assert "none.glb: no such scene file" in capsys.readouterr().err
@@ -302,7 +302,7 @@ def test_the_command_says_what_it_did(
     assert 'got "Shot"; it has no camera\n1 problem; nothing was written.' in capsys.readouterr().err
 
 
-def test_a_black_scene_is_told(tmp_path: Path) -> None:
+def test_a_black_scene_is_an_error(tmp_path: Path) -> None:
     glb = Glb()
     add(glb, box([-1, 0, -1], [1, 1, 1]), "Coal", [0.0, 0.0, 0.0])
     with pytest.raises(SceneError, match="no light reaches what the camera sees"):

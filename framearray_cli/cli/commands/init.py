@@ -42,12 +42,12 @@ def init(
     job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else output_path(target)
     with Screen(out, quiet=quiet) as screen:
         screen.wait("exploring the scene")
-        from framearray_cli.starter import Wishes
+        from framearray_cli.starter import StartOptions
         from framearray_cli.starter import init as run
 
         with compile_clock(screen.compiling):
-            wishes = Wishes(camera=camera, frames=frames, lights=lights, inside=inside)
-            start = run(scene, job_file, wishes, force=force)
+            options = StartOptions(camera=camera, frames=frames, lights=lights, inside=inside)
+            start = run(scene, job_file, options, force=force)
     if not quiet:
         images = start.camera.frames * start.light_frames
         size = f"{start.camera.frames} eyes x {start.light_frames} lights = {images} images"
