@@ -196,3 +196,27 @@ def test_the_example_of_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert 20 < first.mean() < 235, "neither black nor burnt out"
     assert np.abs(first - last).mean() > 2, "the lamp moved"
     assert (tmp_path / "walk.mp4").stat().st_size > 10_000
+
+
+def test_python_files_that_pages_name_exist():
+    """A bare name, or the end of a path, belongs to some file of the tree."""
+    files = [
+        f"/{file.relative_to(ROOT).as_posix()}"
+        for top in (PACKAGE, ROOT / "tests", ROOT / "jobs")
+        for file in top.rglob("*.py")
+    ]
+    named = {(page.name, name) for page in PAGES for name in re.findall(r"[\w/]*\w\.py\b", text(page))}
+    assert ("tour.md", "framearray_cli/engine/loop.py") in named
+    assert sorted(pair for pair in named if not any(file.endswith(f"/{pair[1]}") for file in files)) == []
+
+
+def test_the_tour_names_functions_where_they_are():
+    rows = re.findall(r"^\|[^|`]*\| (`.+) \| (`.+`) \|$", text(DOCS / "develop" / "tour.md"), re.MULTILINE)
+    assert len(rows) > 20
+    missing = []
+    for functions, files in rows:
+        code = "\n".join(text(ROOT / file) for file in re.findall(r"`([^`]+)`", files))
+        for name in re.findall(r"`([\w.]+)`", functions):
+            if not all(re.search(rf"^ *(?:def|class) {part}\b", code, re.MULTILINE) for part in name.split(".")):
+                missing.append((name, files))
+    assert missing == []
