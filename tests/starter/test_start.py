@@ -59,7 +59,7 @@ def thing(glb: Glb | None = None) -> Glb:
     return glb
 
 
-def started(glb: Glb, folder: Path, options: StartOptions = FEW) -> tuple[Start, Job]:
+def init_job(glb: Glb, folder: Path, options: StartOptions = FEW) -> tuple[Start, Job]:
     """Run `init`; return its choices and the job read from its file."""
     scene, job_file = glb.save(folder / "scene.glb"), folder / "job.toml"
     start = init(scene, job_file, options)
@@ -74,7 +74,7 @@ def code_of(*arguments: str) -> int:
 
 
 def test_the_text_holds_the_choices(tmp_path: Path) -> None:
-    start, job = started(room(), tmp_path)
+    start, job = init_job(room(), tmp_path)
     expected = Job.model_validate(table_of(start) | {"output": {"directory": str(tmp_path / "out" / "scene")}})
     for table in ("camera", "light", "obscurance", "scene", "name"):
         assert getattr(job, table) == getattr(expected, table)
@@ -83,7 +83,7 @@ def test_the_text_holds_the_choices(tmp_path: Path) -> None:
 
 
 def test_every_key_has_a_comment_and_every_material_is_listed(tmp_path: Path) -> None:
-    started(room(), tmp_path)
+    init_job(room(), tmp_path)
     lines = (tmp_path / "job.toml").read_text().splitlines()
     bare = [line for line in lines if " = " in line and not line.startswith(("#", "  {")) and "#" not in line]
     assert bare == []
@@ -99,7 +99,7 @@ def test_every_key_has_a_comment_and_every_material_is_listed(tmp_path: Path) ->
 
 
 def test_a_room_is_walked_through_by_an_eye_that_is_in_no_furniture(tmp_path: Path) -> None:
-    start, job = started(room(), tmp_path, StartOptions(frames=9, lights=5))
+    start, job = init_job(room(), tmp_path, StartOptions(frames=9, lights=5))
     assert start.inside and start.outside == "average"
     assert start.range == pytest.approx(1.25, abs=0.1)  # half the height, but above tables it is lower
     for points, clear in ((eyes(job).position, 0.3 / 2), (lights(job).sources[0].vector, 0.15)):
@@ -113,7 +113,7 @@ def test_a_room_is_walked_through_by_an_eye_that_is_in_no_furniture(tmp_path: Pa
 
 
 def test_a_thing_is_whole_in_every_picture(tmp_path: Path) -> None:
-    start, job = started(thing(), tmp_path, StartOptions(frames=7, lights=3))
+    start, job = init_job(thing(), tmp_path, StartOptions(frames=7, lights=3))
     assert not start.inside and start.outside == "background"
     assert [source.type for source in job.light.sources] == ["directional"]
     corners = load_scene(tmp_path / "scene.glb")
@@ -131,7 +131,7 @@ def test_a_thing_is_whole_in_every_picture(tmp_path: Path) -> None:
 
 
 def test_options_override_choices(tmp_path: Path) -> None:
-    start, job = started(room(), tmp_path, StartOptions(frames=2, lights=1, inside=False))
+    start, job = init_job(room(), tmp_path, StartOptions(frames=2, lights=1, inside=False))
     assert not start.inside
     assert (job.camera.frames, job.light.frames) == (2, 1)
 
@@ -140,11 +140,11 @@ def test_a_room_whose_faces_are_turned_outwards_is_one_with_the_option_inside(tm
     glb = Glb()
     add(glb, box([-2.5, 0, -2], [2.5, 2.5, 2]), "Wall", [0.7, 0.7, 0.6])
     (tmp_path / "first").mkdir()
-    start, _ = started(glb, tmp_path / "first", StartOptions(frames=2, lights=2))
+    start, _ = init_job(glb, tmp_path / "first", StartOptions(frames=2, lights=2))
     assert not start.inside
     # then only the insides of furniture are closed from their fronts
     add(glb, box([-2.4, 0.01, -1.9], [-1.6, 2.0, -0.9], inwards=True), "Cupboard", [0.5, 0.3, 0.2])
-    start, job = started(glb, tmp_path, StartOptions(frames=2, lights=2, inside=True))
+    start, job = init_job(glb, tmp_path, StartOptions(frames=2, lights=2, inside=True))
     assert start.inside
     for points in (eyes(job).position, lights(job).sources[0].vector):
         assert (np.abs(points) < [2.5, 2.5, 2]).all()
@@ -157,7 +157,7 @@ def test_nothing_is_closed_around_a_table_top(tmp_path: Path) -> None:
     add(glb, box([-1, 0.7, -1], [1, 0.70001, 1])[:6], "Top", [0.6, 0.5, 0.3])
     add(glb, tiny.quad((-2, 0, 2), (2, 0, 2), (2, 0, -2), (-2, 0, -2)).reshape(-1, 3), "Floor", [0.6, 0.5, 0.3])
     with pytest.raises(SceneError, match="--inside: nothing in it looks like the inside of a room"):
-        started(glb, tmp_path, StartOptions(frames=2, lights=1, inside=True))
+        init_job(glb, tmp_path, StartOptions(frames=2, lights=1, inside=True))
 
 
 def test_an_animated_camera_is_converted_frame_by_frame(tmp_path: Path) -> None:
@@ -166,7 +166,7 @@ def test_an_animated_camera_is_converted_frame_by_frame(tmp_path: Path) -> None:
     shot = camera(glb, translation=[0.0, 1.5, 1.0])
     arm = glb.node(children=[shot])
     animate(glb, arm, "rotation", [0.0, 0.5], [[0, 0, 0, 1], [0, QUARTER, 0, QUARTER]])
-    start, job = started(glb, tmp_path, StartOptions(lights=1))
+    start, job = init_job(glb, tmp_path, StartOptions(lights=1))
     found = eyes(job)
     assert found.n == 13  # half a second of 24 frames, and the last
     assert found.fov_deg == pytest.approx(50, abs=1e-3)
@@ -182,7 +182,7 @@ def test_fewer_frames_are_spread_over_the_same_time(tmp_path: Path) -> None:
     shot = camera(glb, translation=[0.0, 1.5, 0.0])
     glb.tree["scenes"][0]["nodes"].append(shot)
     animate(glb, shot, "translation", [0.0, 4.0], [[-1, 1.5, 0], [1, 1.5, 0]])
-    _, job = started(glb, tmp_path, StartOptions(frames=5, lights=1))
+    _, job = init_job(glb, tmp_path, StartOptions(frames=5, lights=1))
     np.testing.assert_allclose(eyes(job).position[:, 0], [-1, -0.5, 0, 0.5, 1], atol=1e-6)
 
 
@@ -190,7 +190,7 @@ def test_a_camera_is_chosen_by_its_name(tmp_path: Path) -> None:
     glb = room()
     for name, x in (("Left", -1.0), ("Right", 1.0)):
         glb.node(name=name, camera=glb.add("cameras", dict(LENS)), translation=[x, 1.5, 1.5])
-    _, job = started(glb, tmp_path, StartOptions(camera="Right", lights=1))
+    _, job = init_job(glb, tmp_path, StartOptions(camera="Right", lights=1))
     assert eyes(job).position[0].tolist() == [1.0, 1.5, 1.5]
     text = (tmp_path / "job.toml").read_text()
     assert '# the file also has the camera "Left": --camera "Left"' in text
@@ -206,7 +206,7 @@ def test_lights_of_the_file_keep_their_places_and_relative_strengths(tmp_path: P
     glb.node(name="Sun", **down, **light(glb, "directional", intensity=30.0))
     glb.node(name="Off", **light(glb, intensity=0.0))
     animate(glb, lamp, "translation", [0.0, 1.0], [[-1.5, 2, 1], [1.5, 2, 1]])
-    _, job = started(glb, tmp_path, StartOptions(frames=2))
+    _, job = init_job(glb, tmp_path, StartOptions(frames=2))
     path = lights(job)
     assert path.n == 25  # a second of 24 frames, and the last
     moving, beam, sun = path.sources
@@ -224,7 +224,7 @@ def test_lights_of_the_file_keep_their_places_and_relative_strengths(tmp_path: P
 def test_lights_that_light_nothing_give_way_to_chosen_ones(tmp_path: Path) -> None:
     glb = room()
     glb.node(name="Outside", translation=[0.0, 50.0, 0.0], **light(glb, intensity=1000.0))
-    start, job = started(glb, tmp_path)
+    start, job = init_job(glb, tmp_path)
     assert "The lights of the file light nothing that its pictures show, so others were chosen." in start.about
     assert np.abs(lights(job).sources[0].vector).max() < 3
 
@@ -234,7 +234,7 @@ def test_lights_too_far_away_are_one_error(tmp_path: Path, place: list[float]) -
     glb = room()
     glb.node(name="Far", translation=place, **light(glb, intensity=1000.0))
     with pytest.raises(SceneError, match=r"scene\.glb: its cameras or lights do not make a job: light") as caught:
-        started(glb, tmp_path)
+        init_job(glb, tmp_path)
     assert "\n" not in str(caught.value)
 
 
@@ -269,7 +269,7 @@ def test_an_animated_camera_at_rest_is_exposed_from_several_pictures(
         return solve_exposure(lit, dark, levels)
 
     monkeypatch.setattr(expose, "solve_exposure", record)
-    _, job = started(glb, tmp_path, StartOptions(lights=1))
+    _, job = init_job(glb, tmp_path, StartOptions(lights=1))
     assert eyes(job).at_rest
     width, height = expose.SIZE
     assert pixels == [eyes_tried * width * height]  # walls are all around
@@ -306,4 +306,4 @@ def test_a_black_scene_is_an_error(tmp_path: Path) -> None:
     glb = Glb()
     add(glb, box([-1, 0, -1], [1, 1, 1]), "Coal", [0.0, 0.0, 0.0])
     with pytest.raises(SceneError, match="no light reaches what the camera sees"):
-        started(glb, tmp_path)
+        init_job(glb, tmp_path)
