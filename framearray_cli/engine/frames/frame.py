@@ -196,13 +196,14 @@ def _find_outer(
     """Find the pixel of each frame that sees native hits 0 to n - 1 of eye c, and the weights of the hits there.
 
     Args:
-        pixel, weight: (n_frames, n) overwritten; row r is of frame frames[r]. Rows of `seen` and `density` are of eyes.
+        pixel, weight: (n_frames, n) overwritten; row r is of frame frames[r].
     """
     if setup.n_r == 0:  # nothing to project: a hit belongs to its own pixel
         pixel[0] = scratch.hits.pixel[:n]
         weight[:] = 1.0
         return
     started = perf_counter()
+    # balance needs p_k of all eyes k of the windows of these frames; row r of seen and density is of eye eyes[r]
     eyes = setup.frames_around(c, 2 * setup.n_r) if setup.balance else frames
     seen = scratch.pixel[: len(eyes)]
     density = scratch.density[: len(eyes)]

@@ -88,27 +88,27 @@ def _add_light(band: Band, i: int, n: int, channels: int, n_lights: int, fresh: 
     """Add the direct light of the n waiting hits to pixel i of the band; each sum is read and written once."""
     # --- loop state ---
     stride = band.direct.shape[2]  # from channel to channel of a pixel
-    any_lit = 0  # LIT of all hits together: packets of light positions with light of any of them
-    for k in range(n):
-        any_lit |= band.lit[k]
+    any_lit = 0  # LIT of all hits q of the queue together: packets of light positions with light for any of them
+    for q in range(n):
+        any_lit |= band.lit[q]
 
     for l in range(0, n_lights, LANES):
         # 1. Sum w R / pi E[l] of the hits lit by light positions l to l + 15, in registers.
         at, bit = 3 * i * stride + l, lit_bit(n_lights, l)
         red = green = blue = reals(lane_numbers()) * np.float32(0.0)
-        for k in range(n if (any_lit >> bit) & 1 else 0):
-            if (band.lit[k] >> bit) & 1 == 0:
+        for q in range(n if (any_lit >> bit) & 1 else 0):
+            if (band.lit[q] >> bit) & 1 == 0:
                 continue
-            place = band.places[k] + 4 * l
+            place = band.places[q] + 4 * l
             if channels == 1:
                 e = lanes_from(place)
-                red = red + e * band.shares[k, 0]
-                green = green + e * band.shares[k, 1]
-                blue = blue + e * band.shares[k, 2]
+                red = red + e * band.shares[q, 0]
+                green = green + e * band.shares[q, 1]
+                blue = blue + e * band.shares[q, 2]
             else:
-                red = red + lanes_from(place) * band.shares[k, 0]
-                green = green + lanes_from(place + 4 * n_lights) * band.shares[k, 1]
-                blue = blue + lanes_from(place + 8 * n_lights) * band.shares[k, 2]
+                red = red + lanes_from(place) * band.shares[q, 0]
+                green = green + lanes_from(place + 4 * n_lights) * band.shares[q, 1]
+                blue = blue + lanes_from(place + 8 * n_lights) * band.shares[q, 2]
 
         # 2. Only then add the sum before: in a sum of a million hits each single one would lose its last digits.
         if not fresh:
@@ -136,9 +136,9 @@ def _fetch(source: Addresses, entry: int, last: int, channels: int, n_lights: in
 @inlined
 def _scale(band: Band, i: int, n: int, n_lights: int, fresh: bool, factor: Real) -> None:
     """Multiply the shares of the n waiting hits, and the direct sums of pixel i of the band unless they are fresh."""
-    for k in range(n):
+    for q in range(n):
         for channel in range(3):
-            band.shares[k, channel] *= factor
+            band.shares[q, channel] *= factor
     if not fresh:
         for channel in range(3):
             for l in range(n_lights):
