@@ -1,0 +1,95 @@
+"""Attributes of image files: camera matrices, names, types and frame rates."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+
+from framearray_cli.array.images.attributes import exr_camera_from_world, exr_ndc_from_world, frame_attributes
+from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.base.units import frame_rate
+
+
+def noisy(height: int = 12, width: int = 17, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(0, 1.5, (height, width, 3)).astype(np.float32)
+
+
+def looking_down_x() -> np.ndarray:
+    """A camera at (10, 2, 3) that looks along +x, y up: its -z is x, so its x is z."""
+    world_from_camera = np.eye(4)
+    world_from_camera[:3, 0] = [0, 0, 1]
+    world_from_camera[:3, 1] = [0, 1, 0]
+    world_from_camera[:3, 2] = [-1, 0, 0]
+    world_from_camera[:3, 3] = [10, 2, 3]
+    return world_from_camera
+
+
+def test_world_to_camera_is_left_handed_along_plus_z() -> None:
+    camera_from_world = exr_camera_from_world(looking_down_x())
+    # 5 ahead, 1 to the right, 2 up
+    np.testing.assert_allclose(camera_from_world @ [15, 4, 4, 1], [1, 2, 5, 1], atol=1e-12)
+    assert np.linalg.det(camera_from_world[:3, :3]) == pytest.approx(-1)
+
+
+@pytest.mark.parametrize("corner", [(0, 0), (1, 0), (0, 1), (1, 1), (0.5, 0.5)])
+def test_world_to_ndc_finds_the_corners_of_the_image(corner: tuple[float, float]) -> None:
+    ndc_from_world = exr_ndc_from_world(looking_down_x(), 60.0, 400, 300)
+    half_height = np.tan(np.radians(30))
+    half_width = half_height * 400 / 300
+    x, y = 2 * corner[0] - 1, 1 - 2 * corner[1]  # NDC has y downwards
+    for distance in (0.5, 20):
+        point = looking_down_x() @ [distance * x * half_width, distance * y * half_height, -distance, 1]
+        ndc = ndc_from_world @ point
+        np.testing.assert_allclose(ndc[:2] / ndc[3], corner, atol=1e-12)
+        assert ndc[3] == pytest.approx(distance)
+
+
+def test_exr_attributes_have_standard_names_types_and_row_vectors(tmp_path: Path) -> None:
+    attributes = frame_attributes(
+        world_from_camera=looking_down_x(), fov_deg=60, resolution=(17, 12), fps=23.976, c=3, l=5
+    )
+    attributes["framearray:ambient"] = (0.1, 0.2, 0.3)
+    write_image(tmp_path / "a.exr", noisy(), ImageFormat(), attributes)
+    spec = oiio.ImageInput.open(str(tmp_path / "a.exr")).spec()
+    kept = {item.name: (str(item.type), item.value) for item in spec.extra_attribs}
+    kind, rate = kept["framesPerSecond"]
+    assert kind.startswith("rational")  # older releases print it as rational2i
+    assert rate == (24000, 1001)
+    assert kept["framearray:camera"] == ("int", 3)
+    assert kept["framearray:light"] == ("int", 5)
+    assert kept["framearray:fov"] == ("float", 60)
+    assert kept["framearray:ambient"][1] == pytest.approx((0.1, 0.2, 0.3))
+    kind, rows = kept["worldToCamera"]
+    assert kind == "matrix"
+    point = np.array([15, 4, 4, 1]) @ np.reshape(rows, (4, 4))  # rows from the left, as Imath does
+    np.testing.assert_allclose(point, [1, 2, 5, 1], atol=1e-5)
+    kind, rows = kept["worldToNDC"]
+    assert kind == "matrix"
+    np.testing.assert_allclose(
+        np.reshape(rows, (4, 4)).T, exr_ndc_from_world(looking_down_x(), 60, 17, 12), rtol=1e-6, atol=1e-5
+    )
+
+
+@pytest.mark.parametrize(
+    ("fps", "expected"),
+    [
+        (24, "24"),
+        (25.0, "25"),
+        (23.976, "24000/1001"),
+        (23.98, "24000/1001"),
+        (29.97, "30000/1001"),
+        (59.94, "60000/1001"),
+        (12.5, "25/2"),
+        (Fraction(24000, 1001), "24000/1001"),
+    ],
+)
+def test_frame_rates_are_exact(fps: float, expected: str) -> None:
+    assert frame_rate(fps) == Fraction(expected)
+
+
+@pytest.mark.parametrize("fps", [0, -24, float("nan"), float("inf")])
+def test_impossible_frame_rates_are_refused(fps: float) -> None:
+    with pytest.raises(ValueError, match="positive"):
+        frame_rate(fps)
