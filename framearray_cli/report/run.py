@@ -104,7 +104,7 @@ def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEv
             events.done()
         measured: list[Measured] = []
         for named in tried:
-            measured.append(_measure(case, named, chosen, references, measured))
+            measured.append(_measure_one(case, named, chosen, references, measured))
             events.done()
         first, own = references[frames[0]], measured[0]
         right = first.image(0, case.ambient.intensity[chosen.lights[0]])
@@ -126,7 +126,7 @@ def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEv
         )
 
 
-def _measure(
+def _measure_one(
     case: Case, named: NamedSettings, chosen: Probes, references: dict[int, Reference], others: Sequence[Measured]
 ) -> Measured:
     """Measure some settings; `others` were measured before, with reuse among lights before without it."""

@@ -173,7 +173,7 @@ def read_vary(option: str, job: Job) -> tuple[str, list[Any]]:
         try:
             replace(base, **{KEYS[key]: value}).apply_to(job)
         except ValueError as error:
-            problems.append(f"{key} = {value!r}: {_problem(error)}")
+            problems.append(f"{key} = {value!r}: {_error_text(error)}")
     if problems:
         raise JobError(where, problems)
     return key, values
@@ -190,7 +190,7 @@ def _parse_value(word: str) -> Any:
     return word.strip("\"'")
 
 
-def _problem(error: ValueError) -> str:
+def _error_text(error: ValueError) -> str:
     """Return the message of a validation error, in one line."""
     details = getattr(error, "errors", None)
     return "; ".join(str(detail["msg"]) for detail in details()) if details else str(error)
