@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Iterator, Sequence
 
-from .frames.frame import find_hits
+from .frames.frame import find_frame
 from .frames.setup import FrameSetup
 from .frames.threads import TracePool
 from .images.window import Window
@@ -21,7 +21,7 @@ def ready_frames(window: Window, setup: FrameSetup, wanted: Sequence[int], pool:
     """
     waiting = deque(wanted)
     for c in setup.eyes_for(wanted):
-        window.add(find_hits(setup, c, pool))
+        window.add(find_frame(setup, c, pool))
         while waiting and setup.eyes_of(waiting[0])[-1] <= c:
             j = waiting.popleft()
             window.fill_holes(j)

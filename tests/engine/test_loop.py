@@ -31,7 +31,7 @@ def callers(name: str) -> list[str]:
 
 
 def test_one_function_of_the_package_finds_hits() -> None:
-    assert callers("find_hits") == ["loop.ready_frames"]
+    assert callers("find_frame") == ["loop.ready_frames"]
 
 
 def test_the_loop_is_short_enough_to_be_quoted() -> None:

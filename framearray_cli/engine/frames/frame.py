@@ -67,7 +67,7 @@ class FrameHits:
             arrays.give(name, array)
 
 
-def find_hits(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
+def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
     """Find the native hits of eye c, estimate their terms, and find the pixels of the frames around that see them."""
     parts = setup.passes(c)
     n = sum(part.n for part in parts)

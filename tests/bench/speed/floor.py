@@ -35,7 +35,7 @@ from framearray_cli.engine.embree.packets import (
     _trace,
     empty_packets,
 )
-from framearray_cli.engine.frames.frame import find_hits
+from framearray_cli.engine.frames.frame import find_frame
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.kernels.kernel import keep_on_disk
 from framearray_cli.engine.kernels.simd import LANES
@@ -105,7 +105,7 @@ def record(case: Case, c: int, expected: float) -> Recording:
     marks = _Marks(state)
     with TracePool(case.setup, 1) as pool:
         pool._all[0].rays = marks
-        find_hits(replace(case.setup, tracer=watched), c, pool)
+        find_frame(replace(case.setup, tracer=watched), c, pool)
     n = int(state[0])
     lanes = int((rays[:n, TFAR] >= 0).sum())
     if n > capacity or lanes != sum(marks.values()):

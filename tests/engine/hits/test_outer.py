@@ -10,7 +10,7 @@ from support.hits import native
 from support.oracle import Oracle
 from support.tiny import WALK
 
-from framearray_cli.engine.frames.frame import find_hits
+from framearray_cli.engine.frames.frame import find_frame
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.hits import SURFACE
 from framearray_cli.engine.hits.outer import balance_weights, outer_hits, sort_by_pixel
@@ -140,7 +140,7 @@ def test_weights_of_a_frame_sum_to_one_a_pixel_in_the_mean(walk: Any, c: int) ->
     with tiny.planned(walk) as (setup, _), TracePool(setup, 1) as pool:
         total = np.zeros(setup.n_pixels)
         for k in setup.frames_around(c, setup.n_r):
-            frame = find_hits(setup, k, pool)
+            frame = find_frame(setup, k, pool)
             place, weight = frame.places[c], frame.weights[c]
             used = place.order[: place.start[-1]]
             np.add.at(total, np.repeat(np.arange(setup.n_pixels), np.diff(place.start)), weight[used])

@@ -12,7 +12,7 @@ from support.tiny import WALK
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.engine.frames.blocks import Allotment, blocks_of
-from framearray_cli.engine.frames.frame import find_hits
+from framearray_cli.engine.frames.frame import find_frame
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.hits import empty_hits
 from framearray_cli.engine.hits.native import Samples, native_hits
@@ -67,7 +67,7 @@ def test_frames_have_the_hits_allotted(weights: str) -> None:
         assert target.frames[0] <= target.hits <= target.frames[1]
         with TracePool(setup, 1) as pool:
             for c in range(setup.n_frames):
-                frame = find_hits(setup, c, pool)
+                frame = find_frame(setup, c, pool)
                 own, counts = np.diff(frame.places[c].start), setup.allotment.counts(c)
                 np.testing.assert_array_equal(own, counts)
 

@@ -10,7 +10,7 @@ from support import tiny
 from framearray_cli.array.manifest import array_files
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.render.identity import identity_of
-from framearray_cli.render.manifest import describe
+from framearray_cli.render.manifest import initial_manifest
 from framearray_cli.render.names import array_names
 from framearray_cli.render.prepare import image_ambient
 from framearray_cli.render.writer import array_target
@@ -128,4 +128,4 @@ def test_files_that_are_written_are_those_that_a_manifest_lists(sources: Any, ba
     written = {target.directory / image.file(c) for image in target.names.images for c in range(3)}
     written |= {target.directory / target.names.layers_file(c) for c in range(3)}
     assert len(written) == 3 * (n + 1)
-    assert written == set(array_files(describe(prepared, estimate, identity_of(prepared), None, None)))
+    assert written == set(array_files(initial_manifest(prepared, estimate, identity_of(prepared), None, None)))
