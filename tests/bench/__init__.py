@@ -1,25 +1,25 @@
-"""Measures what an image costs and how far it is from right. Not part of the tests.
+"""Measurements of the cost and the error of images. Not part of the tests.
 
 `make bench` runs `python -m bench`, `make bench-scaling` runs `python -m bench scaling`; likewise `make bench-bias`,
 `make bench-ambient` and `make bench-report`.
 
-    core/     what all share
+    core/     shared by all
         cases.py       ways to make the images of a job: the frame array, its options, baselines
         steady.py      the frame loop in its steady state, under a clock
         frames.py      one frame for one seed
         rooms.py       generated scenes of any number of triangles
-        machine.py     what all this ran on, and how busy that was
+        machine.py     the machine, and how busy it was
         results.py     results on the disk
         markdown.py    numbers and tables as text
         plots.py       results -> docs/plots/
-    speed/    what an image costs
-        floor.py       the same rays through Embree alone
+    speed/    the cost of an image
+        floor.py       the same rays, only traced by Embree
         speed.py       the program, its options, its floor and its baselines in turn, several times
         processes.py   start-up time and peak memory, each in a process of its own
         scaling.py     time per image against the size of a job
         parts.py, page.py   results -> docs/measured/speed.md
-    error/    how far images are from right
-        error.py       how far each way is from a reference
+    error/    the error of images
+        error.py       the distance of each variant from a reference
         squares.py     squared bias without noise, and its standard error
         regions.py     silhouettes, textures, disocclusions and other parts of a picture
         camera_paths.py   cameras that move as a job says, fast, or close to a surface
@@ -30,6 +30,6 @@
         scenes.py, levels.py, pictures.py   levels against walks, pictures against path-traced ones
         pathtraced.py  pictures by Mitsuba's path tracer
         run.py, page.py, plots.py   results -> docs/measured/ambient.md
-    peers/    what images cost in other programs: mitsuba3.py, cycles.py
+    peers/    the cost of images in other programs: mitsuba3.py, cycles.py
     view/     the page of `framearray view` in Chromium
 """

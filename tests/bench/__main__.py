@@ -17,9 +17,8 @@ from bench.core.cases import (
 )
 from bench.core.results import folder, load, save
 from bench.core.steady import steady
-from bench.error import bias, error, reports
+from bench.error import bias, error, reported, reports
 from bench.error import bias_page as biaspage
-from bench.error import reported as told
 from bench.peers import cycles, mitsuba3, peers
 from bench.speed import page as table
 from bench.speed import processes, scaling, speed
@@ -28,13 +27,13 @@ from bench.view import page as viewpage
 PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
 PARTS = ("speed", "error", "peers", "memory", "startup")
 TRACES = ("trace", "trace-means")
-OTHERS = ("scaling", "report", "bias", "told", "page", "peak", "view", *TRACES, *ambient.PARTS)
+OTHERS = ("scaling", "report", "bias", "reported", "page", "peak", "view", *TRACES, *ambient.PARTS)
 
 
 def main() -> None:
-    """Measure what is asked for, and write the page."""
+    """Measure the parts asked for, and write the page."""
     parser = argparse.ArgumentParser(
-        prog="bench", description="Measure what an image costs, and write docs/measured/speed.md."
+        prog="bench", description="Measure the cost of an image, and write docs/measured/speed.md."
     )
     parser.add_argument("what", nargs="?", default="all", choices=("all", *OTHERS, *PROGRAMS, *PARTS))
     parser.add_argument("jobs", nargs="*", help="some of the jobs, of the scenes of `ambient`, or arrays for `view`")
@@ -67,10 +66,10 @@ def main() -> None:
         print(json.dumps(PROGRAMS[args.what](args.jobs[0], args.quick)))
         return
     out, jobs = folder(args.quick), args.jobs or list(JOBS)
-    if args.what == "told":
+    if args.what == "reported":
         for name in jobs:
-            save(out, f"told-{name}", {"rows": told.measure(name, out)})
-        told.write([row for name in JOBS if (kept := load(out, f"told-{name}")) for row in kept["rows"]])
+            save(out, f"reported-{name}", {"rows": reported.measure(name, out)})
+        reported.write([row for name in JOBS if (kept := load(out, f"reported-{name}")) for row in kept["rows"]])
         return
     if args.what == "report":
         for name in jobs:

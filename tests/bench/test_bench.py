@@ -30,12 +30,12 @@ def test_a_report_as_a_page():
         {"error": 0.01},
     ]}  # fmt: skip
     text = reports.summary(table)
-    assert "5 ms an image with an error of 10 %" in text and "**40x**" in text and "55x, `hits 8`" in text
+    assert "5 ms per image with an error of 10 %" in text and "**40x**" in text and "55x, `hits 8`" in text
     lines = reports.rows(table).splitlines()
     assert lines[2].startswith("| **as the job says** | 5 | 10 % | 1 % | 9 % | 0.05 | 2 % | 13 | 40x |")
     assert "| hits 8 | 20 | 4 % | 0 % | 4 % | 0.02 | 1 %, 3 % | 52 | 55x |" in lines
     said = reports.advice(table)
-    assert "```toml\n[samples]\nhits = 8\n```" in said and "nothing that was tried reaches it" in said
+    assert "```toml\n[samples]\nhits = 8\n```" in said and "no tried setting reaches it" in said
 
 
 def flat(value: float, shape: tuple[int, int] = (40, 60)) -> np.ndarray:
@@ -79,7 +79,7 @@ def test_errors_that_go_together_in_blocks_count_as_one():
     assert block_mean(np.ones((5, 5)))[1] == np.inf
 
 
-def test_shadow_edges_are_where_irradiance_alone_jumps():
+def test_shadow_edges_are_where_only_irradiance_jumps():
     irradiance, depth = np.ones((20, 30), np.float32), np.full((20, 30), 4.0, np.float32)
     normal = np.tile(np.array([0, 0, 1], np.float32), (20, 30, 1))
     irradiance[:, :10] = 0  # a shadow

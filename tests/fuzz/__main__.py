@@ -14,7 +14,7 @@ from . import page
 from .run import run
 from .warm import warm
 
-# What is mutated, and the module that does it.
+# Kinds of input, and the module that mutates each.
 KINDS = {
     "jobs": "jobfiles",
     "scenes": "scenefiles",
@@ -26,7 +26,7 @@ RESULTS = ROOT / "out" / "fuzz"  # git ignores it
 
 
 def main() -> None:
-    """Run cases of one kind or of all, and keep what came of them; or write the page."""
+    """Run cases of one kind or of all, and keep their results; or write the page."""
     parser = argparse.ArgumentParser(
         prog="fuzz", description="Break input by the thousand; write docs/measured/fuzzing.md."
     )
@@ -45,11 +45,11 @@ def main() -> None:
         warm(Path(name))
         bad = [fuzz(kind, args, 60 * args.minutes / len(kinds), Path(name) / kind) for kind in kinds]
     sys.stdout.flush()
-    os._exit(any(bad))  # libraries would tell what they leave behind
+    os._exit(any(bad))  # libraries would report what they leave behind
 
 
 def fuzz(kind: str, args: argparse.Namespace, seconds: float, scratch: Path) -> int:
-    """Run cases of one kind; returns how many were bad."""
+    """Run cases of one kind; returns the number of bad ones."""
     scratch.mkdir()
     kept = RESULTS / f"{kind}-{args.seed}"
     cases = importlib.import_module(f"fuzz.{KINDS[kind]}").cases

@@ -1,4 +1,4 @@
-"""A case: one broken or extreme input, and the command that meets it."""
+"""A case: one broken or extreme input, and the command that reads it."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -22,9 +22,9 @@ class Case:
     Attributes:
         arguments: of the program: a command and what follows it.
         mutation: what was done to the input, in a few words; cases are counted by it.
-        folder: holds whatever the case reads and writes; removed when the case ended well, kept when it did not.
+        folder: holds all files that the case reads and writes; removed when the case ended well, kept when it did not.
         before: called in the process of the command, first; for limits, or another working directory.
-        alone: whether it needs a process of its own; others share one with those that follow.
+        isolated: whether it needs a process of its own; others share one with those that follow.
         accepted: called after a case that was accepted: what was done, in a word.
         wrong: called afterwards, however the command ended: what else is wrong, or None.
     """
@@ -33,11 +33,11 @@ class Case:
     mutation: str
     folder: Path
     before: Callable[[], None] = lambda: None
-    alone: bool = True
+    isolated: bool = True
     accepted: Callable[[], str] = lambda: "accepted"
     wrong: Callable[[Outcome], str | None] = _nothing
 
 
 # Each kind of input is a module with `cases(rng, folder)`: it yields cases one by one, each with a folder of its own
-# below `folder`, for as long as it is asked. A case that is to run alone has run before the next one is made.
+# below `folder`, for as long as it is asked. An isolated case has run before the next one is made.
 Cases: TypeAlias = Callable[[Random, Path], Iterator[Case]]

@@ -1,4 +1,4 @@
-"""Jobs that are allowed, at the ends of what is allowed: what a person writes by mistake, or to see what happens."""
+"""Jobs that are allowed, at the ends of what is allowed: as a person may write them by mistake, or out of curiosity."""
 
 import copy
 from collections.abc import Callable, Mapping
@@ -51,7 +51,7 @@ def _along_up(rng: Random, job: Table) -> None:
 
 
 def _through_target(rng: Random, job: Table) -> None:
-    """The eye comes to where it looks, or passes it closely."""
+    """The eye reaches its target, or passes close to it."""
     off = rng.choice((0.0, 1e-17, 1e-12, 1e-7, 1e-3))
     a, b = {"frame": 0, "eye": [0, 1, 1], "target": [0, 1, off]}, {"frame": 4, "eye": [0, 1, -1], "target": [0, 1, off]}
     job["camera"] |= {"frames": 5, "keys": [a, b]}

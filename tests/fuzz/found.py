@@ -1,19 +1,23 @@
-"""What broken input brought to light, for the page: what happened, what happens now, and the test of it."""
+"""Defects that broken input revealed, for the page: the old behaviour, the present one, and its test."""
 
 FOUND: tuple[tuple[str, str, str], ...] = (
     (
-        "A name of more than 255 letters, in a job or on the command line: a traceback where it was only looked up",
+        "A name of more than 255 letters, in a job or on the command line: a traceback while looking it up",
         "a message; names in a job have at most 1000 letters",
         "cli/test_long_names.py",
     ),
     ("`samples.hits = inf`, or of 400 digits: a traceback", "a message", "job/test_read.py"),
     ("Numbers of more than 308 digits in a manifest or a path: a traceback", "a message", "array/test_manifest.py"),
-    ("4 MB of unknown keys: a minute and more", "3 s: 50 problems are told, the rest counted", "job/test_read.py"),
+    (
+        "4 MB of unknown keys: a minute and more",
+        "3 s: a message lists 50 problems and counts the rest",
+        "job/test_read.py",
+    ),
     ("A key of 100,000 parts, `x.a.a.a...`: all memory of the machine", "a message", "job/test_read.py"),
-    ("A key of 5000 letters: a message of as many", "a key in a message has at most 100", "job/test_read.py"),
+    ("A key of 5000 letters: a message of the same length", "a key in a message has at most 100", "job/test_read.py"),
     ("Likewise the name of a material", "likewise", "cli/test_messages.py"),
     (
-        "A manifest with such a key: 13 s; one with a key of 100,000 letters: a message of as many",
+        "A manifest with such a key: 13 s; one with a key of 100,000 letters: a message of the same length",
         "as in a job",
         "array/test_manifest.py",
     ),
@@ -64,7 +68,7 @@ FOUND: tuple[tuple[str, str, str], ...] = (
         "scene/files/test_gltf_triangles.py",
     ),
     (
-        "Values of options, and keys of movie paths, of 5000 letters: messages of as many",
+        "Values of options, and keys of movie paths, of 5000 letters: messages of the same length",
         "at most 100 of them",
         "cli/test_navigation.py",
     ),

@@ -60,7 +60,7 @@ def replace(file: Path, data: bytes) -> None:
 
 
 def with_secrets(own: Path) -> None:
-    """Files beside an array that no command has to do with."""
+    """Files beside an array that no command may touch."""
     for place in (own / "outside", own / "outside" / "deep"):
         place.mkdir()
         for name in ("secret.txt", "manifest.toml.bak", "c0000.exr"):
@@ -68,7 +68,7 @@ def with_secrets(own: Path) -> None:
 
 
 def secrets_lost(own: Path) -> str | None:
-    """What happened to them, if anything did."""
+    """The damage to them, or None."""
     files = sorted((own / "outside").rglob("*"))
     texts = [file.read_bytes().decode(errors="replace") for file in files if file.is_file()]
     return None if texts == [SECRET] * 6 and len(files) == 7 else "changed a file outside of its folder"

@@ -50,7 +50,7 @@ def cases(rng: Random, folder: Path) -> Iterator[Case]:
             mutation=f"{kind}: {name}",
             folder=own,
             before=render_small(own),
-            alone=False,
+            isolated=False,
             accepted=partial(done, own),
         )
 

@@ -1,4 +1,4 @@
-"""Job files that are right, to be broken: small ones that say everything a job can say, and those of `jobs/`."""
+"""Job files that are right, to be broken: small ones that use every key of a job, and those of `jobs/`."""
 
 import re
 from pathlib import Path

@@ -34,7 +34,7 @@ PATTERNS = ("images", "layers", "ambient_images", "background_images")
 
 
 def cases(rng: Random, folder: Path) -> Iterator[Case]:
-    """Arrays of which something is broken, for ever, and any command that reads them; a third are rendered on."""
+    """Arrays of which something is broken, for ever, and any command that reads them; a third are rendered further."""
     arrays = make_arrays(folder)
     for k in count():
         own = folder / f"{k:06d}"

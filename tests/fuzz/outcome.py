@@ -1,4 +1,4 @@
-"""One command in a process of its own, and whether it ended as the program may end.
+"""One command in a process of its own, and whether its end is an allowed one.
 
 The process is a copy of this one, in which the program is loaded already, so a case costs hundredths of a second.
 """
@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 SECONDS = 10.0  # of processor time; a case that takes longer hangs
-PATIENCE = 30.0  # seconds that a case is waited for, whatever else the machine does
+PATIENCE = 30.0  # seconds to wait for a case, however busy the machine is
 MEMORY = 6 << 30  # bytes of address space beyond what the program has when it starts
-LONGEST, WIDEST = 60, 1000  # lines of a message, and characters of a line, that somebody still reads
+LONGEST, WIDEST = 60, 1000  # most lines of a message, and characters of a line, that a person reads
 CODES = (0, 2, 3, 4, 5)
 
 
@@ -73,13 +73,13 @@ def outcomes_of(
     child = os.fork()
     if child == 0:
         _limit_itself()
-        with done.open("w") as told:
+        with done.open("w") as results:
             for (arguments, before), log in zip(commands, logs, strict=True):
                 started = time.process_time()
                 _redirected(log)
                 code = _code_of(arguments, before)
-                told.write(f"{code} {time.process_time() - started}\n")
-                told.flush()
+                results.write(f"{code} {time.process_time() - started}\n")
+                results.flush()
         os._exit(0)
     _wait(child, PATIENCE + len(commands))
     lines = done.read_text().splitlines()
@@ -96,7 +96,7 @@ def _outcome(code: int | None, seconds: float, log: Path) -> Outcome:
 
 
 def _limit_itself() -> None:
-    """What a new process does first."""
+    """Prepare a new process."""
     os.setpgid(0, 0)
     os.dup2(os.open(os.devnull, os.O_RDWR), 0)
     os.dup2(os.open(os.devnull, os.O_RDWR), 1)

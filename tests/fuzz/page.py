@@ -20,27 +20,27 @@ thousand and hands each to a command of the program: `tests/fuzz/` says how. A c
 crash, a warning of a library, an exit code that is not in [the list](../guide/cli.md#errors), no message, a message of
 more than 60 lines or with a line of more than 1000 letters, more than {SECONDS:.0f} s of processor time, no end within
 {PATIENCE:.0f} s, or more than {MEMORY >> 30} GiB.
-Cases run in a process of their own, or 25 in one; those of which one ends badly run again, alone. What runs
-found is listed at the end.
+Cases run in a process of their own, or 25 in one; if one of these ends badly, all of them run again, each in its own
+process. The end of the page lists the defects that the runs found.
 """
 KINDS = {
     "jobs": """
 ## Job files
 
 Small jobs that use every key, and those of `jobs/`, changed in four ways: their tables (any value at any place, keys
-missing, added, renamed or moved), their bytes, extreme values that are allowed, and things that stand where a file
-should. An accepted job is rendered where that takes a moment; every value of every image must then be finite, the
-manifest readable, and `verify` content. One that takes up to ten times as much is checked (`framearray check`, with
-smaller probes), a larger one prepared: its scene is read, its memory estimated.
+missing, added, renamed or moved), their bytes, extreme values that are allowed, and other things in place of a
+file. The run renders an accepted job if that takes a moment; every value of every image must then be finite, the
+manifest readable, and `verify` content. It checks one that takes up to ten times as long (`framearray check`, with
+smaller probes), and prepares a larger one: it reads the scene and estimates the memory.
 
-One case of the run of November 2026 counts as bad that is none: 9,285 hits a pixel under 300 lamps, 1.2 million rays a
-pixel. The render ended well after 18 s of processor time. Such jobs are no longer rendered here: lamps are counted.
+One case of the run of November 2026 counts as bad but is not: 9,285 hits per pixel under 300 lamps, 1.2 million rays
+per pixel. The render ended well after 18 s of processor time. Runs no longer render such jobs: they count the lamps.
 """,
     "scenes": """
 ## Scene files
 
-Scenes of every format, with one of everything that a format has, changed in their bytes and in their structure; real
-ones, too, where they are at hand.
+Scenes of every format, with every feature of the format, changed in their bytes and in their structure; real ones, too,
+where they are installed.
 """,
     "paths": """
 ## Paths of movies, and options
@@ -52,16 +52,15 @@ Path files for `assemble`, changed like job files; and odd values of the options
 ## Manifests and images
 
 Manifests, changed like job files; file patterns that lead out of the folder; images that are damaged, missing, another
-one, a link, or no file. Any command that reads an array follows, or a render that goes on. Files beside the array must
-stay as they were. Manifests have at most 4 MB: Python's reader of TOML takes 14 s for 10 MB, and nothing is done about
-that.
+one, a link, or no file. Then any command that reads an array runs, or a render that continues. Files beside the array
+must stay as they were. Manifests have at most 4 MB: Python's reader of TOML takes 14 s for 10 MB, which we accept.
 """,
     "records": """
 ## Records
 
-The lists of what was finished: bytes and lines changed, also by somebody who knows their checksums, and other things in
-their folder. A render goes on, or `verify` looks. Where a render ends well after damage, all images must have the bytes
-of one that was never stopped.
+The lists of finished files: bytes and lines changed, also by somebody who knows their checksums, and other things in
+their folder. A render continues, or `verify` runs. Where a render ends well after damage, all images must have the
+bytes of one that was never stopped.
 """,
 }
 CODES = ("exit code 2", "exit code 3", "exit code 4", "exit code 5")
@@ -89,7 +88,7 @@ def counts(tables: Sequence[Table]) -> dict[str, Counter[str]]:
 
 
 def summary(tables: Sequence[Table]) -> str:
-    """A row a kind."""
+    """One row per kind."""
     rows = []
     for kind in KINDS:
         own = [table for table in tables if table["kind"] == kind]
@@ -109,7 +108,7 @@ def summary(tables: Sequence[Table]) -> str:
 
 
 def by_mutation(tables: Sequence[Table]) -> str:
-    """A row a mutation, with the ways of ending that there were."""
+    """One row per mutation, with the ways of ending that occurred."""
     found = counts(tables)
     ends = sum(found.values(), Counter())
     columns = sorted(set(ends) - set(CODES)) + [code for code in CODES if code in ends]

@@ -1,4 +1,4 @@
-"""Broken and extreme paths of movies, and what else the commands that read an array are told on the command line."""
+"""Broken and extreme paths of movies, and odd options of the commands that read an array."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -21,7 +21,7 @@ from .texts import mutated_bytes
 from .values import TEXTS
 
 SHARES = {"table": 0.5, "text": 0.2, "option": 0.3}
-MOST_FRAMES = 300  # of a movie; more are refused as too many, instead of a million
+MOST_FRAMES = 300  # of a movie; more are refused, instead of a million
 
 SEGMENTS: tuple[dict[str, Any], ...] = (
     {"segments": [{"frames": 5, "camera": ["first", "last"]}]},
@@ -116,7 +116,7 @@ def cases(rng: Random, folder: Path) -> Iterator[Case]:
             mutation=f"{kind}: {name}",
             folder=own,
             before=partial(_within, own),
-            alone=False,
+            isolated=False,
         )
 
 
@@ -134,7 +134,7 @@ def _options(rng: Random, array: Path, path: Path) -> tuple[str, Arguments]:
     odd: dict[str, Callable[[], Arguments]] = {
         "where a movement stays": lambda: ("assemble", array, "--walk", "--at", place, "-o", "a.gif"),
         "seconds": lambda: ("assemble", array, "--diagonal", "--seconds", rng.choice(NUMBERS), "-o", "a.gif"),
-        "frames a second": lambda: ("assemble", array, "--walk", "--fps", rng.choice(NUMBERS), "-o", "a.gif"),
+        "frames per second": lambda: ("assemble", array, "--walk", "--fps", rng.choice(NUMBERS), "-o", "a.gif"),
         "exposure": lambda: ("assemble", array, "--walk", "--exposure", rng.choice(NUMBERS), "-o", "a.gif"),
         "view": lambda: ("assemble", array, "--walk", "--view", rng.choice(TEXTS).replace("\0", ""), "-o", "a.gif"),
         "file to write": lambda: ("assemble", array, rng.choice((path, "--walk")), "-o", rng.choice(TARGETS)),

@@ -1,4 +1,4 @@
-"""Broken records of finished frames, and what else lies in the folder that they are in."""
+"""Broken records of finished frames, and other things in their folder."""
 
 import json
 import os

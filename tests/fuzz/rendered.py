@@ -1,4 +1,4 @@
-"""Renders of broken jobs, within limits: of little work, in the folder of the case, and looked at afterwards."""
+"""Renders of broken jobs, within limits: little work, in the folder of the case, and examined afterwards."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +15,7 @@ from framearray_cli.render import render
 from framearray_cli.render.automatic.choose import require_least_memory
 from framearray_cli.render.prepare import prepare
 
-# A job is rendered where it takes at most so much, checked up to FAR_MORE times as much, and beyond that only prepared:
+# A job that takes at most this long is rendered, up to FAR_MORE times as long checked, and beyond that only prepared:
 # read, with its scene, and its memory estimated.
 MOST_IMAGES, MOST_LIGHTS, MOST_PIXELS, MOST_RAYS, MOST_WALKS, MOST_THREADS = 300, 60, 100_000, 3_000_000, 2_000_000, 64
 FAR_MORE = 10
@@ -24,7 +24,7 @@ DONE = "done"  # a file in the folder of a case that says which of these it was
 
 
 def render_small(folder: Path) -> Callable[[], None]:
-    """What is called in the process of the case: what would take long is cut short from then on.
+    """Limit the process of a case: long work is cut short from then on.
 
     Args:
         folder: where images may be written.
@@ -58,13 +58,13 @@ def render_small(folder: Path) -> Callable[[], None]:
 
 
 def done(folder: Path) -> str:
-    """What was done with a job that was accepted: rendered, checked or prepared."""
+    """The treatment of an accepted job: rendered, checked or prepared."""
     file = folder / DONE
     return file.read_text() if file.is_file() else "accepted"
 
 
 def size(job: Any) -> float:
-    """How much of what is rendered in a moment a job takes."""
+    """The work of a job, relative to the largest that is rendered."""
     groups = job.light.groups
     lights = sum(group.n for group in groups) + 2 if groups else job.light.frames
     hits = {"auto": 16}.get(job.samples.hits, job.samples.hits) if job.samples.error is None else job.samples.most_hits
@@ -83,7 +83,7 @@ def size(job: Any) -> float:
 
 
 def look_at(job: Any) -> None:
-    """Read everything that was written.
+    """Read all written files.
 
     Raises:
         AssertionError: a value is not finite.

@@ -14,11 +14,11 @@ from .outcome import Outcome, outcome_of, outcomes_of
 
 MESSAGES = 400  # that are kept to be read, the latest of them
 SLOWEST = 5
-TOGETHER = 25  # cases that share a process: what starting one costs is half of most cases
+TOGETHER = 25  # cases that share a process: starting one takes half of the time of most cases
 
 
 def run(cases: Iterable[Case], n: int, seconds: float, kept: Path, scratch: Path) -> Table:
-    """Run at most n cases for at most so long.
+    """Run at most n cases for at most a given time.
 
     Args:
         kept: folder for what belongs to cases that ended badly; emptied first.
@@ -57,12 +57,12 @@ def run(cases: Iterable[Case], n: int, seconds: float, kept: Path, scratch: Path
 def all_judged(cases: Iterable[Case], scratch: Path) -> Iterator[tuple[Case, Outcome, str]]:
     """Run cases: how each ended, and the verdict with what else is wrong.
 
-    Those that may share a process do, until one of them ends badly; then each of them runs again, alone.
+    Those that may share a process do, until one of them ends badly; then each of them runs again in its own process.
     """
     waiting: list[Case] = []
     for case in cases:
         waiting.append(case)
-        if case.alone or len(waiting) == TOGETHER:
+        if case.isolated or len(waiting) == TOGETHER:
             yield from _judged(waiting, scratch)
             waiting = []
 
@@ -78,14 +78,14 @@ def _judged(cases: Sequence[Case], scratch: Path) -> Iterator[tuple[Case, Outcom
 
 
 def _column(case: Case, outcome: Outcome, verdict: str) -> str:
-    """What a case counts as: what `accepted` says, an exit code, or a verdict."""
+    """The class of a case: the answer of `accepted`, an exit code, or a verdict."""
     if verdict == "accepted":
         return case.accepted()
     return f"exit code {outcome.code}" if verdict == "refused" else verdict
 
 
 def _keep(case: Case, outcome: Outcome, verdict: str, place: Path) -> Table:
-    """Move the files of a case to where they stay."""
+    """Keep the files of a case."""
     place.parent.mkdir(parents=True, exist_ok=True)
     command = shlex.join(str(argument) for argument in case.arguments)
     if case.folder.exists():
@@ -97,7 +97,7 @@ def _keep(case: Case, outcome: Outcome, verdict: str, place: Path) -> Table:
 
 
 def remove(folder: Path) -> None:
-    """Remove a folder whatever the case did to it."""
+    """Remove a folder, in any state that the case left it."""
     if not folder.exists():
         return
     for place in (folder, *(p for p in folder.rglob("*") if p.is_dir() and not p.is_symlink())):

@@ -68,7 +68,7 @@ def cases(rng: Random, folder: Path) -> Iterator[Case]:
 
 
 def _load_program(folder: Path, seed: Seed) -> None:
-    """Render and begin a job in this process, so that no case has to load what is compiled."""
+    """Render and begin a job in this process, so that no case has to load kernels."""
     from framearray_cli.cli.main import main
 
     own = folder / "first"
@@ -85,7 +85,7 @@ def _load_program(folder: Path, seed: Seed) -> None:
 
 
 def case_of(rng: Random, mutation: str, own: Path, files: dict[str, bytes]) -> Case:
-    """Write files of a scene, itself first, and choose the command that meets them; most often `render`."""
+    """Write files of a scene, itself first, and choose the command that reads them; most often `render`."""
     for name, data in files.items():
         (own / name).write_bytes(data)
     scene = next(iter(files))
@@ -103,13 +103,13 @@ def case_of(rng: Random, mutation: str, own: Path, files: dict[str, bytes]) -> C
 
 
 def refused(outcome: Outcome) -> str | None:
-    """Whether a scene that wants files elsewhere was told so."""
-    told = outcome.code == 3 and "refused" in outcome.message
-    return None if told else "a file elsewhere was not refused"
+    """The verdict on a scene that wants files elsewhere: it must be refused."""
+    refused = outcome.code == 3 and "refused" in outcome.message
+    return None if refused else "a file elsewhere was not refused"
 
 
 def finite(out: Path) -> Callable[[Outcome], str | None]:
-    """Whether what was rendered is pictures: four, of numbers that are not negative."""
+    """The verdict on the images: four, without negative numbers."""
 
     def wrong(outcome: Outcome) -> str | None:
         if outcome.verdict != "accepted":
@@ -126,7 +126,7 @@ def finite(out: Path) -> Callable[[Outcome], str | None]:
 
 
 def _mutated(rng: Random, seed: Seed, other: Seed) -> tuple[str, dict[str, bytes]]:
-    """What was done, and all files of the scene."""
+    """The mutation, and all files of the scene."""
     files = {f"scene{seed.suffix}": seed.data, **seed.beside}
     target = rng.choice([*files, f"scene{seed.suffix}", f"scene{seed.suffix}"])
     data = files[target]

@@ -11,7 +11,7 @@ from framearray_cli.base.forms.table import Place
 from . import values
 
 Table: TypeAlias = dict[str, Any]
-# Changes a copy of a file's tables, and says what it did.
+# Changes a copy of a file's tables, and returns the name of the change.
 Mutation: TypeAlias = Callable[[Random, Table, Schema], str]
 
 

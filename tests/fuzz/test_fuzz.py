@@ -58,21 +58,21 @@ def test_each_way_to_end_is_told(name, tmp_path, monkeypatch):
     assert outcome.outcome_of(["schema"], tmp_path / "log.txt", before=before).verdict == verdict
 
 
-def cases_of(folder: Path, ways: list[str], *, alone: bool) -> list[Case]:
+def cases_of(folder: Path, ways: list[str], *, isolated: bool) -> list[Case]:
     found = []
     for k, way in enumerate(ways):
         (folder / str(k)).mkdir(parents=True)
         found.append(
-            Case(arguments=("schema",), mutation=way, folder=folder / str(k), before=WAYS[way][0], alone=alone)
+            Case(arguments=("schema",), mutation=way, folder=folder / str(k), before=WAYS[way][0], isolated=isolated)
         )
     return found
 
 
-@pytest.mark.parametrize("alone", [True, False])
-def test_cases_that_share_a_process_end_as_they_do_alone(alone, tmp_path, monkeypatch):
+@pytest.mark.parametrize("isolated", [True, False])
+def test_cases_that_share_a_process_end_as_isolated_ones_do(isolated, tmp_path, monkeypatch):
     monkeypatch.setattr("fuzz.run.TOGETHER", 3)
     ways = ["accepted", "refused", "refused", "traceback", "accepted", "code", "refused", "silence", "refused"]
-    cases = cases_of(tmp_path / "cases", ways, alone=alone)
+    cases = cases_of(tmp_path / "cases", ways, isolated=isolated)
     table = run(cases, len(ways), 60.0, tmp_path / "kept", tmp_path)
     assert table["cases"] == len(ways)
     assert table["mutations"] == {
@@ -88,7 +88,7 @@ def test_cases_that_share_a_process_end_as_they_do_alone(alone, tmp_path, monkey
 
 
 def test_what_else_is_wrong_counts(tmp_path):
-    [case] = cases_of(tmp_path, ["accepted"], alone=True)
+    [case] = cases_of(tmp_path, ["accepted"], isolated=True)
     wrong = Case(**{**case.__dict__, "wrong": lambda outcome: "lost a file"})
     table = run([wrong], 1, 60.0, tmp_path / "kept", tmp_path)
     assert table["mutations"] == {"accepted": {"lost a file": 1}}
@@ -102,7 +102,7 @@ def test_a_rendered_value_that_is_not_finite_is_found(tmp_path, monkeypatch):
 
     manifest = movies.plain(tmp_path, 1, 1, "tif")
     job = type("Job", (), {"output": type("Output", (), {"directory": tmp_path})})
-    with pytest.raises(AssertionError, match="unknown=1"):  # no record tells of it
+    with pytest.raises(AssertionError, match="unknown=1"):  # no record contains it
         rendered.look_at(job)
     monkeypatch.setattr("framearray_cli.array.images.images._largest", lambda label, values: 1.0)
     file = tmp_path / manifest.images.format(camera=0, light=0)

@@ -1,4 +1,4 @@
-"""What the processes of all cases share: the program with its kernels, loaded before the first case."""
+"""Shared by the processes of all cases: the program with its kernels, loaded before the first case."""
 
 import gc
 import importlib
@@ -47,7 +47,7 @@ def warm(folder: Path) -> None:
 
 
 def _refused(folder: Path) -> None:
-    """Meet what is loaded for messages alone; they go nowhere."""
+    """Load the modules that only messages need; discard the messages."""
     job = folder / "warm.toml"
     job.write_text("a = 1\nname = 5\n[camera]\nfov = 500\nfof = 1\nkeys = 3\n[light]\nsources = [{}, { type = 'x' }]\n")
     stderr = os.dup(2)

@@ -2,7 +2,7 @@
 
     PYTHONPATH=tests python tests/pictures/make_page_pictures.py
 
-Three of the jobs are rendered into out/page-pictures/, unless they are there.
+It renders three of the jobs into out/page-pictures/, unless they are there.
 """
 
 import io
@@ -22,12 +22,12 @@ from framearray_cli.tools.view.run import open_server, open_tiles, prepare_all
 PICTURES = ROOT / "docs" / "pictures"
 ARRAYS = ROOT / "out" / "page-pictures"
 QUALITY = 82  # of JPEG
-TALL = (1280, 860)  # pixels; all that groups bring
+TALL = (1280, 860)  # pixels; room for the controls of groups
 THREADS = 2
 
 
 def array(name: str) -> Path:
-    """Render jobs/NAME.toml, unless that was done."""
+    """Render jobs/NAME.toml, unless it is there."""
     folder = ARRAYS / name
     if not (folder / FILE_NAME).is_file():
         job = read_job(ROOT / "jobs" / f"{name}.toml")

@@ -2,8 +2,8 @@
 
     PYTHONPATH=tests python tests/pictures/make_pictures.py
 
-Each picture comes from a job of this project, cut down to the eyes and light positions that are shown. An eye keeps
-the N_r eyes before and after it, so that it has the samples that it would have in the whole array.
+Each picture comes from a job of this project, cut down to the eyes and light positions in the picture. An eye keeps
+the N_r eyes before and after it, so that it has the same samples as in the whole array.
 """
 
 import tempfile
@@ -59,7 +59,7 @@ def cut(job: Job, cameras: Sequence[int], light_positions: Sequence[int], folder
 
 
 def shown_eye(i: int, n_r: int = 3) -> int:
-    """Where eye i of those given to `cut` stands in the cut job."""
+    """The place in the cut job of eye i of those given to `cut`."""
     return i * (2 * n_r + 1) + n_r
 
 
@@ -100,7 +100,7 @@ def array_sheet(
 
 
 def terms(width: int, folder: Path) -> Image.Image:
-    """What an image is made of: reflectivity, obscurance W, indirect light I_A R W, and the image."""
+    """The terms of an image: reflectivity, obscurance W, indirect light I_A R W, and the image."""
     rendered = array("kitchen", [150], [14], folder)
     c = shown_eye(0)
     layers = read_layers(layers_path(rendered, c))
@@ -114,7 +114,7 @@ def terms(width: int, folder: Path) -> Image.Image:
 
 
 def reuse(width: int, folder: Path) -> Image.Image:
-    """The same two native hits a pixel without and with the hits of the neighbours; a detail, enlarged."""
+    """The same two native hits per pixel without and with the hits of the neighbours; a detail, enlarged."""
     parts = []
     for n_r in (0, 3):
         rendered = array("kitchen", [150], [14], folder / str(n_r), n_r)
@@ -125,7 +125,7 @@ def reuse(width: int, folder: Path) -> Image.Image:
 
 
 def contact_sheet(width: int, folder: Path) -> Image.Image:
-    """What `framearray sheet` draws of the whole small kitchen."""
+    """The sheet that `framearray sheet` draws of the whole small kitchen."""
     job = read_job(ROOT / "jobs" / "kitchen-small.toml")
     render(job.model_copy(update={"output": job.output.model_copy(update={"directory": folder / "array"})}))
     make_sheet(folder / "array", folder / "sheet.png", columns=6, rows=4, width=width)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bench.core.results import Table
-from bench.speed.speed import tell
+from bench.speed.speed import log
 from framearray_cli.base.arrays import Float64
 from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.render.prepare import Prepared, open_embree, plan_work
@@ -70,7 +70,7 @@ def measure(probe: Probe, quick: bool) -> Table:
             many = MANY[method] >> (6 if quick else 0)
             mean, error = _estimate(prepared, embree, method, many, MANY_SEED)
             found["methods"][method] = {"rows": rows, "many": {"paths": many, "mean": mean, "error": error}}
-            tell(f"{probe.name}: {method}: I_A = {mean:.5g} +- {error:.2g}")
+            log(f"{probe.name}: {method}: I_A = {mean:.5g} +- {error:.2g}")
     return found
 
 

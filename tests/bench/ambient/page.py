@@ -18,16 +18,16 @@ from .scenes import SMALLER, probes
 HEAD = """
 # Ambient light, measured
 
-How I_A depends on the number of walks or particles, whether the error that is reported with it is honest, and how far
-pictures are from path-traced ones: by the model, and by sampling. `make bench-ambient` measures and writes this page;
-`tests/bench/` says how. What follows from it is in the [decision](../decisions/ambient.md).
+How I_A depends on the number of walks or particles, whether its reported error is right, and how far pictures are from
+path-traced ones: because of the model, and because of sampling. `make bench-ambient` measures and writes this page;
+`tests/bench/` says how. The [decision](../decisions/ambient.md) has the conclusions.
 """
-# Chance that any of the ratios of a page is marked though all reported errors are right: that of 3 standard errors.
+# Chance that any ratio of a page is marked although all reported errors are right: that of 3 standard errors.
 CHANCE = 2 * norm.sf(3.0)
 
 
 def write(quick: bool) -> None:
-    """Write the page from whatever was measured; quick results go beside themselves."""
+    """Write the page from all results there are; quick results go beside themselves."""
     page = site_for(quick).pages / "ambient.md"
     page.write_text(render(folder(quick), site_for(quick)), encoding="utf-8")
     print(page)
@@ -64,9 +64,9 @@ def walks(levels: Mapping[str, Table], drawn: Mapping[str, str]) -> list[str]:
     about = f"""
 One light position of each scene: the middle of the light path. I_A is the mean of its channels, over {seeds}
 independent seeds; *spread* is the standard deviation of one estimate over its mean, *reported* the standard error that
-the program gives with it, *ms* processor time of one estimate. "eye" and "fit" walk from the eyes; "light" sends
-particles, and measures the area that light reaches, at the same price however few they are. The last row is one
-estimate of its own; the furnace's right value is known.
+the program reports with it, *ms* the processor time per estimate. "eye" and "fit" walk from the eyes; "light" sends
+particles, and measures the area that light reaches, at a cost that does not depend on their number. The last row is
+a separate estimate. The right value of the furnace is known.
 """
     parts = ["## Walks and error", about]
     if "walks" in drawn:
@@ -103,7 +103,7 @@ def _capital(words: str) -> str:
 
 
 def honest_range(freedom: int, chance: float) -> tuple[float, float]:
-    """Between which ratios of spread to reported error honest errors stay, but for a chance."""
+    """The range of ratios of spread to reported error that right errors leave only by a given chance."""
     low, high = np.sqrt(chi2.ppf([chance / 2, 1 - chance / 2], freedom) / freedom)
     return float(low), float(high)
 
@@ -127,9 +127,9 @@ def honesty(levels: Mapping[str, Table]) -> list[str]:
     for method in METHODS:
         head += [f"`{method}`", "by number of walks"]
     about = f"""
-Spread over reported standard error, from all rows of a table above together, and from each. Honest errors give
-{low:.2f} to {high:.2f} in all of them at once, but for the chance of 3 standard errors. Above 1 an error is larger than
-reported; below 1 it is smaller, as walks are spread more evenly than independent ones would be.
+Spread over reported standard error, from all rows of a table above together, and from each. Right errors give
+{low:.2f} to {high:.2f} in all of them at once, except by the chance of 3 standard errors. Above 1 an error is larger
+than reported; below 1 it is smaller, because walks are spread more evenly than independent ones would be.
 """
     parts = ["## Reported errors", about, grid(head, rows)]
     return [*parts, r"\* outside of that."] if marked else parts
@@ -140,12 +140,12 @@ def level(pictures: Mapping[str, Table], drawn: Mapping[str, str]) -> list[str]:
     traced = next(iter(pictures.values()))["traced"]
     about = f"""
 One picture of each scene (of the jobs at 0.4 of the camera path and the middle of the light path), path-traced by
-Mitsuba {traced["version"]}'s `path` integrator with {traced["samples"]:,} samples a pixel: the same triangles, normals,
-textures, mirrors, lights and background; paths end by chance alone. Indirect light is what is left of it without
-the light that comes straight from a source or the background, or by mirrors alone. Mean indirect light over the
-path-traced mean, channels and pixels together; I_A comes from so many walks that its own error is small. The jobs' I_A
-is for all their cameras, so that one picture may be off where the mean over the cameras is not. The generated scenes
-have one camera alone: there "fit" must come out as 1, but for the standard errors of both, which follow it with z.
+Mitsuba {traced["version"]}'s `path` integrator with {traced["samples"]:,} samples per pixel: the same triangles,
+normals, textures, mirrors, lights and background; paths end only by chance. Indirect light is all light except that
+which comes from a source or the background directly or only by mirrors. The table has the mean indirect light over the
+path-traced mean, channels and pixels together. I_A comes from many walks, so that its own error is small. The jobs' I_A
+is for all their cameras, so one picture may be wrong where the mean over the cameras is right. The generated scenes
+have only one camera: there "fit" must be 1 within the standard errors of both; the last columns have these, and z.
 """
     rows = []
     for name, table in pictures.items():
@@ -190,16 +190,17 @@ def errors(pictures: Mapping[str, Table], shown: Mapping[str, str]) -> list[str]
     """Distances from the path-traced pictures, by scene."""
     epsilon = next(iter(pictures.values()))["epsilon"]
     about = f"""
-*Model*: with little noise, so that what is left is what obscurances get wrong. *{_capital(OWN_LEVEL)}*: with the I_A
-that makes this one picture's indirect light right on average, which no method can know; what it leaves is wrong in
-single places. *Own settings*: the picture that the job's own numbers of hits, rays and walks give: error of model and
-sampling. RMSE and *mean off* (mean of I - R) are over the mean of the path-traced part that they are of; relMSE is the
-mean of (I - R)^2 / (R^2 + {epsilon}), R below the line the mean of the 24 pixels around. The noise of the path-traced
-picture is in none of them: errors against two independent halves are multiplied.
+*Model*: with little noise, so that the error of obscurances remains. *{_capital(OWN_LEVEL)}*: with the I_A
+that makes this one picture's indirect light right on average, which no method can know; the remaining error is in
+single places. *Own settings*: the picture from the job's own numbers of hits, rays and walks: error of model and
+sampling. RMSE and *mean error* (mean of I - R) are relative to the mean of their path-traced part; relMSE is the
+mean of (I - R)^2 / (R^2 + {epsilon}), with R below the line the mean of the 24 pixels around. None of them contains
+the noise of the path-traced picture: errors against two independent halves are multiplied.
 """
     parts = ["## Whole pictures", about]
     head = [
-        "", "I_A", "standard error", "indirect: mean off", "RMSE", "relMSE", "all light: mean off", "RMSE", "relMSE",
+        "", "I_A", "standard error", "indirect: mean error", "RMSE", "relMSE", "all light: mean error", "RMSE",
+        "relMSE",
     ]  # fmt: skip
     for name, table in pictures.items():
         rows = [_row(f"model, {method}", row) for method, row in table["model"].items()]
@@ -209,10 +210,10 @@ picture is in none of them: errors against two independent halves are multiplied
         where += f"{percent(noise['whole'], 2)}, of its indirect light {percent(noise['indirect'], 2)}."
         parts += [f"### Picture: {name}", f"{_capital(table['words'])}. {where}"]
         if name in shown:
-            parts.append(f"![{name}: eye, fit, path traced, and what is wrong]({shown[name]})")
+            parts.append(f"![{name}: eye, fit, path traced, and the errors]({shown[name]})")
             parts.append(
                 "*`eye`, `fit`, path traced; then `eye` and `fit` minus path traced: red is too bright, blue too dark, "
-                "full colour is off by the mean of the picture.*"
+                "full colour is an error of the mean of the picture.*"
             )
         parts.append(grid(head, rows))
     return parts
@@ -229,9 +230,9 @@ def _row(name: str, row: Table) -> list[str]:
 def same_light(pictures: Mapping[str, Table]) -> list[str]:
     """Both programs see the same scene."""
     about = """
-Light straight from the sources and the background, mirrors included, is no matter of obscurances: both programs must
-give the same. Mean of ours over Mitsuba's, its standard error as far as Mitsuba's noise goes, and the RMSE without
-Mitsuba's noise; ours is still in it, at shadow edges. In the stairs Mitsuba lets its rays start 1 mm and more above a
+Light directly from the sources and the background, mirrors included, does not involve obscurances: both programs must
+agree. The table has the mean of ours over Mitsuba's, its standard error from Mitsuba's noise, and the RMSE without
+Mitsuba's noise; it contains our own noise, at shadow edges. On the stairs Mitsuba's rays start 1 mm and more above a
 surface, so that some light gets below the edges of steps.
 """
     rows = []

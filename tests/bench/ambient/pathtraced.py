@@ -1,7 +1,7 @@
-"""Path-traced pictures from Mitsuba 3, where it is installed: what a job would look like without obscurances.
+"""Path-traced pictures from Mitsuba 3, where it is installed: a job without obscurances.
 
 The same triangles, interpolated normals, textures, mirrors, lights and background, one camera and one light position,
-by Mitsuba's own `path` integrator. Beside it the part that the program does not approximate, light that comes straight
+by Mitsuba's own `path` integrator. Beside it the part that the program does not approximate, light that comes directly
 from a source or the background, by mirrors or not: it shows that both programs see the same scene.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from bench.core.results import Table
 from bench.speed.processes import asked
-from bench.speed.speed import tell
+from bench.speed.speed import log
 from framearray_cli.base.arrays import Float32, Float64, Image
 from framearray_cli.engine.inputs.lights import DIRECTIONAL
 from framearray_cli.render.prepare import Prepared
@@ -23,16 +23,16 @@ from framearray_cli.scene.scene import Scene
 from .scenes import Probe, probe_named, resized
 
 COMPILED, SCALAR = "llvm_ad_rgb", "scalar_rgb"  # variants of Mitsuba: by LLVM, and one path at a time
-SAMPLES, QUICK_SAMPLES = 1024, 32  # of a pixel, in all
-# Of small pictures along the camera path, whose mean alone counts.
+SAMPLES, QUICK_SAMPLES = 1024, 32  # per pixel, in all
+# Of small pictures along the camera path, of which only the mean counts.
 CAMERAS, SMALL, SMALL_SAMPLES = 12, (80, 60), 128
-PASSES = 16  # independent ones, whose spread tells the error
+PASSES = 16  # independent ones, whose spread gives the error
 ROULETTE = 16  # vertices before a path may end by chance; there is no other end
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Traced:
-    """Pictures of one probe, (PASSES, h, w, 3): all light, and that which comes straight from sources or background."""
+    """Pictures of one probe, (PASSES, h, w, 3): all light, and that which comes directly from sources or background."""
 
     total: Float32
     light: Float32
@@ -59,7 +59,7 @@ def _error(passes: Float32) -> float:
 
 
 def measure(what: str, name: str, quick: bool) -> Table:
-    """Do what `trace` or `trace_means` does to a probe; {"skipped": why} where that cannot be had.
+    """Do what `trace` or `trace_means` does to a probe; {"skipped": why} where that is impossible.
 
     In a process of its own: older LLVMs cannot compile Mitsuba's integrator, and end the process. Then the variant
     without a compiler is tried, which takes several times as long.
@@ -72,7 +72,7 @@ def measure(what: str, name: str, quick: bool) -> Table:
             break
         except subprocess.CalledProcessError as error:
             table = {"skipped": f"Mitsuba ended with status {error.returncode}"}
-    tell(f"{name}: " + (f"not traced: {table['skipped']}" if "skipped" in table else "traced"))
+    log(f"{name}: " + (f"not traced: {table['skipped']}" if "skipped" in table else "traced"))
     return table
 
 
@@ -109,7 +109,7 @@ def _mitsuba(variant: str) -> tuple[Any, str]:
 
 
 def trace_means(name: str, quick: bool, variant: str = COMPILED) -> Table:
-    """Trace small pictures of some cameras of a path in this process; {"skipped": why} where that cannot be had.
+    """Trace small pictures of some cameras of a path in this process; {"skipped": why} where that is impossible.
 
     Returns:
         cameras; indirect: (n,) mean of their indirect light over pixels and channels; error: (n,) its standard error.
@@ -141,7 +141,7 @@ def unknown(scene: Scene) -> str:
 
 
 def pictures(mi: Any, prepared: Prepared, probe: Probe, samples: int, variant: str) -> Traced:
-    """Trace a probe with so many samples a pixel in all."""
+    """Trace a probe with a number of samples per pixel in all."""
     each = max(samples // PASSES, 1)
     mi.set_variant(COMPILED)
     dark, sensor = scene_of(mi, prepared, probe, sky=False), sensor_of(mi, prepared, probe.c)
@@ -183,7 +183,7 @@ def sensor_of(mi: Any, prepared: Prepared, c: int) -> Any:
 
 
 def scene_of(mi: Any, prepared: Prepared, probe: Probe, sky: bool) -> Any:
-    """The scene under the probe's light position, a mesh a material; the probe's eye is the origin.
+    """The scene under the probe's light position, one mesh per material; the probe's eye is the origin.
 
     Mitsuba starts rays 1500 units in the last place of the largest coordinate above a surface. About the middle of the
     stairs that is 3 mm, which misses what the carpet's edge shades; about the eye it is a third of that.

@@ -1,6 +1,6 @@
 """Whole pictures with the ambient light of each method, against path-traced ones.
 
-With so many samples that little noise is left, what remains is the error of the model: obscurances are no path tracing.
+With enough samples, little noise is left, and the rest is the error of the model: obscurances are no path tracing.
 Beside it stands the picture that the job's own settings give, whose error is that of the model and of sampling.
 """
 
@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter
 
 from bench.core.results import Table, load
-from bench.speed.speed import tell
+from bench.speed.speed import log
 from framearray_cli.base.arrays import Float32, Float64, Image
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.loop import window_of
@@ -24,7 +24,7 @@ from .pathtraced import SMALL
 from .scenes import Probe, resized, under_one, with_ambient
 
 PATHS = {"eye": 1 << 18, "light": 1 << 17, "fit": 1 << 18}  # of the pictures with little noise
-PASSES, QUICK_PASSES = 6, 1  # of each half: 28 hits a pixel each, see `reference.py`
+PASSES, QUICK_PASSES = 6, 1  # of each half: 28 hits per pixel each, see `reference.py`
 SHOWN = ("eye", "fit")  # methods whose pictures are kept
 SMOOTH = 5  # pixels
 OWN_LEVEL = "picture"  # stands for the I_A that makes the mean of this one picture right
@@ -63,7 +63,7 @@ def against(image: Image, wanted: Wanted) -> Table:
         rmse: over the mean of the reference.
         relmse: mean of (I - R)^2 / (R^2 + EPSILON); the R below the line is the mean of the pixels around,
             whose noise does not go together with that above it.
-        ratio: mean of the image to that of the reference; `ratio_error` is that of the reference alone.
+        ratio: mean of the image to that of the reference; `ratio_error` is that of only the reference.
     """
     product = (image - wanted.halves[0]).astype(np.float64) * (image - wanted.halves[1])
     squares = np.square(around(wanted.image))
@@ -129,7 +129,7 @@ def measure(probe: Probe, quick: bool, folder: Path) -> Table:
             found["model"][OWN_LEVEL] = {**_both(direct, level * one, total, indirect), "level": level.tolist()}
             found["direct"] = {**against(direct, light), "noise": light.noise}
         found["own"][method] = _sampled(probe, method, total, indirect)
-        tell(f"{probe.name}: {method}: indirect light is {found['model'][method]['indirect']['ratio']:.3f} of right")
+        log(f"{probe.name}: {method}: indirect light is {found['model'][method]['indirect']['ratio']:.3f} of right")
     np.savez(folder / f"ambient-shown-{probe.name}.npz", **shown)
     return found
 
@@ -149,7 +149,7 @@ def along(probe: Probe, means: Table, quick: bool, folder: Path) -> Table:
                 ours.append(float((level * one).mean(dtype=np.float64)))
         ratio = float(np.sum(ours) / right.sum())
         found["methods"][method] = {"ratios": (np.array(ours) / right).tolist(), "ratio": ratio}
-        tell(f"{probe.name}: {method}: indirect light of {len(ours)} cameras is {ratio:.3f} of right")
+        log(f"{probe.name}: {method}: indirect light of {len(ours)} cameras is {ratio:.3f} of right")
     return found
 
 

@@ -11,12 +11,12 @@ from . import pathtraced
 from . import pictures as ambient_pictures
 from .scenes import FURNACE, SMALLER, probes
 
-# All of it, or one part; the parts keep their results, so that each can be made again alone.
+# All of it, or one part; the parts keep their results, so that each can be made again separately.
 PARTS = ("ambient", "ambient-levels", "ambient-traced", "ambient-pictures", "ambient-along", "ambient-page")
 
 
 def run(what: str, names: Sequence[str], quick: bool) -> None:
-    """Measure a part of it, or all, in some of the scenes, or all; then write the page from whatever was measured."""
+    """Measure a part of it, or all, in some of the scenes, or all; then write the page from all results there are."""
     out = folder(quick)
     for probe in probes():
         if names and probe.name not in names:

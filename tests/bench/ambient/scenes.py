@@ -1,7 +1,6 @@
-"""What the ambient estimate is measured in: a furnace, a closed room, a room with a window, open land, and the jobs.
+"""Scenes for the ambient estimate: a furnace, a closed room, a room with a window, open land, and the jobs.
 
-The generated ones are seen by one camera at rest, so that what is right on average over their one picture is known from
-path tracing it.
+One camera at rest sees each of the generated ones, so path tracing its one picture gives the right mean.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,7 +20,7 @@ from framearray_cli.render.prepare import Prepared, prepare
 from framearray_cli.scene.files import Material
 from framearray_cli.scene.files.model import Part
 
-# Places of the camera path and of the light path that a job's picture is taken at.
+# Places of the camera path and of the light path of a job's picture.
 PLACE = 0.4, 0.5
 
 
@@ -61,7 +60,7 @@ def with_ambient(prepared: Prepared, method: str, paths: int | None = None, seed
 
 
 def under_one(prepared: Prepared, l: int) -> Prepared:
-    """The same with the ambient light of position l alone, as position 0."""
+    """The same with the ambient light of only position l, as position 0."""
     sources = tuple(
         replace(path, vector=path.vector[l : l + 1], intensity=path.intensity[l : l + 1])
         for path in prepared.lights.sources
@@ -108,7 +107,7 @@ WALLS, BOX, GROUND = 0, 1, 2
 
 
 def _window() -> Prepared:
-    """A room of 5 x 3 x 4 m with one window that the sun shines in by, and a box; outside is the sky."""
+    """A room of 5 x 3 x 4 m with one window that the sun shines through, and a box; outside is the sky."""
     x, y, z = 5.0, 3.0, 4.0
     walls = [
         _quad((0, 0, 0), (x, 0, 0), (0, 0, z)),

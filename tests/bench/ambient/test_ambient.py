@@ -24,7 +24,7 @@ def runs(error: float, reported: float, n: int = 400) -> Runs:
     return Runs(found=found, errors=np.full(n, reported))
 
 
-def test_honest_errors_are_told_from_others():
+def test_right_errors_are_distinguished_from_others():
     for reported, honest in ((0.1, True), (0.07, False), (0.14, False)):
         made = runs(0.1, reported)
         low, high = ambient_page.honest_range(len(made.found) - 1, 0.003)
@@ -133,7 +133,7 @@ def test_the_page_shows_what_there_is(tmp_path: Path):
     image = np.full(SHAPE, 0.3, np.float32)
     np.savez(tmp_path / "ambient-shown-kitchen.npz", eye=image, fit=image, traced=image)
     page = ambient_page.render(tmp_path, site_in(tmp_path))
-    assert "2 *" in page and "1 *" not in page  # the dishonest errors alone are marked
+    assert "2 *" in page and "1 *" not in page  # only the wrong errors are marked
     assert "| kitchen | 60 % | 0.8 | 2 | 1.01 | 0.010 |  |" in page
     assert "| kitchen | 0.9 | 0.75 to 1.50 | 0.9 | 0.75 to 1.50 | 0.9 | 0.75 to 1.50 | 1 % |" in page
     assert "cabin: Mitsuba is not installed" in page

@@ -1,1 +1,1 @@
-"""What all measurements share: cases of jobs, the machine, results, tables and plots."""
+"""Shared by all measurements: cases of jobs, the machine, results, tables and plots."""

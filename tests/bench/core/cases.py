@@ -15,7 +15,7 @@ from .results import ROOT
 
 JOBS = ("kitchen", "stairs", "cabin")
 QUICK_RESOLUTION = (160, 120)
-# Light positions, as shares of the path, that images of one light are measured at.
+# Light positions, as shares of the path, at which images of one light are measured.
 PLACES_OF_LIGHT = (1 / 6, 1 / 2, 5 / 6)
 
 

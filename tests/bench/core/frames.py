@@ -1,4 +1,4 @@
-"""One frame of a case for one seed, of its whole window: what is compared with references."""
+"""One frame of a case for one seed, from its whole window, to compare with references."""
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -26,7 +26,7 @@ def frame(case: Case, c: int, seed: int, *, layers: bool = False, threads: int |
 
 
 def frames(case: Case, c: int, seeds: Sequence[int], *, layers: bool = False) -> list[Composed]:
-    """Frame c for many seeds, each by one thread: small pictures keep no two threads busy.
+    """Frame c for many seeds, each on one thread: small pictures cannot keep two threads busy.
 
     Args:
         layers: of the first seed.
@@ -35,6 +35,6 @@ def frames(case: Case, c: int, seeds: Sequence[int], *, layers: bool = False) ->
     def one(i: int) -> Composed:
         return frame(case, c, seeds[i], layers=layers and i == 0, threads=1)
 
-    first = one(0)  # whatever is not compiled yet is compiled once
+    first = one(0)  # compile once what is not compiled yet
     with ThreadPoolExecutor(case.threads) as pool:
         return [first, *pool.map(one, range(1, len(seeds)))]

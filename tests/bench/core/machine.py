@@ -1,4 +1,4 @@
-"""What the measurements ran on, and how busy that was with other things."""
+"""The machine of the measurements, and how busy other programs kept it."""
 
 import os
 import platform
@@ -63,12 +63,12 @@ def _spin(n: int) -> float:
 
 
 _STEPS = 60_000_000  # about a fifth of a second
-# Where others take less of the cores than this, nobody works on the machine.
+# The machine counts as quiet if other programs take less of the cores than this.
 QUIET = 0.1
 
 
 def busy() -> float:
-    """The share of all cores that other programs take just now: what a loop on every core does not get."""
+    """The share of all cores that other programs take now: that which a loop on every core does not get."""
     _spin(1)
     shares: list[float] = []
 
@@ -86,7 +86,7 @@ def busy() -> float:
 
 
 def quiet(patience: float) -> float:
-    """Wait until the machine has nothing else to do, or for `patience` seconds; returns what `busy` found last."""
+    """Wait until the machine is quiet, or for `patience` seconds; returns the last result of `busy`."""
     started = time.perf_counter()
     while (share := busy()) > QUIET and time.perf_counter() - started < patience:
         time.sleep(2.0)

@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 
 from .results import Table
 
-# What each plot shows: sweep, file, label of the axis, and how to find its value.
+# The plots: sweep, file, label of the axis, and how to find its value.
 PLOTS: tuple[tuple[str, str, str, Callable[[Table], float]], ...] = (
     ("lights", "lights.svg", "light positions N_l", lambda r: r["lights"]),
     ("n_r", "reuse.svg", "frames before and after that share hits N_r", lambda r: r["n_r"]),
@@ -54,7 +54,7 @@ def _plot(file: Path, label: str, sizes: list[float], ms: list[float], logarithm
     try:
         axes.plot(sizes, ms, "o-", color="#2b6cb0", markersize=4)
         axes.set_xlabel(label)
-        axes.set_ylabel("ms an image")
+        axes.set_ylabel("ms per image")
         if logarithmic:
             axes.set_xscale("log")
         if logarithmic and max(ms) > 10 * min(ms):
@@ -90,7 +90,7 @@ def draw_bias(found: Mapping[tuple[str, str], Mapping[str, Sequence[Point]]], fo
             for (job, of), curves in found.items():
                 for weights, curve in curves.items() if of == camera else ():
                     _curve(axes, curve, colours[job], LINES[weights], f"{job}, {weights}")
-            axes.set(xscale="log", yscale="log", title=camera, xlabel="hits a pixel a frame")
+            axes.set(xscale="log", yscale="log", title=camera, xlabel="hits per pixel and frame")
             axes.xaxis.set_major_formatter(tick)
             axes.xaxis.set_minor_formatter("")
             axes.grid(alpha=0.3)

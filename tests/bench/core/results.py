@@ -1,4 +1,4 @@
-"""Results on the disk: one JSON file a part a job, so that pages can be written again without measuring again."""
+"""Results on the disk: one JSON file per part and job, so that pages can be written without another measurement."""
 
 import json
 import os
@@ -24,7 +24,7 @@ class Site:
     pictures: Path
 
     def link(self, file: Path) -> str:
-        """Where a page finds a plot or a picture."""
+        """The link from a page to a plot or a picture."""
         return Path(os.path.relpath(file, self.pages)).as_posix()
 
 

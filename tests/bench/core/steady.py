@@ -1,7 +1,7 @@
 """Runs the frame loop in its steady state, and measures it.
 
 A run takes some cameras from the job's path. The window is filled before the clock starts and nothing is compiled
-while it runs, so that what is measured is the cost of an interior frame.
+while it runs, so the result is the cost of an interior frame.
 """
 
 import tempfile
@@ -34,15 +34,15 @@ WITHIN_MIRROR = ("mirror obscurance", "mirror shadow")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measured:
-    """What a steady run cost.
+    """The cost of a steady run.
 
     Attributes:
         images: that were made while the clock ran.
-        ms: wall time an image, and `cpu_ms`: time of all threads an image.
-        stages: thread time an image by stage, ms; "rest" is what threads did else, waiting included. Of "writing" it
+        ms: wall time per image, and `cpu_ms`: time of all threads per image.
+        stages: thread time per image by stage, ms; "rest" is all other time of the threads, with waiting. "writing"
             is processor time; it runs beside the others.
-        rays: rays a pixel an image, by kind.
-        hits: accepted hits a pixel of a frame: mean and 1st percentile.
+        rays: rays per pixel and image, by kind.
+        hits: accepted hits per pixel of a frame: mean and 1st percentile.
     """
 
     images: int
@@ -107,14 +107,14 @@ def steady(case: Case, frames: int, image_format: ImageFormat | None = None, pla
         window = Window(setup, case.ambient, pool)
         ready = ready_frames(window, setup, range(first, first + 1 + frames), pool)
         with _writer(case, Path(), None) as nothing:
-            _compose(window, islice(ready, 1), nothing)  # fills the window, and compiles what is not
+            _compose(window, islice(ready, 1), nothing)  # fills the window, and compiles the kernels
         return _measured(case, window, ready, pool, image_format)
 
 
 def _measured(
     case: Case, window: Window, ready: Iterator[int], pool: TracePool, image_format: ImageFormat | None
 ) -> Measured:
-    """Put the clock to the frames that are left."""
+    """Time the remaining frames."""
     setup = case.setup
     with tempfile.TemporaryDirectory() as folder, _writer(case, Path(folder), image_format) as writer:
         rays, seconds = pool.rays(), pool.seconds()
@@ -149,7 +149,7 @@ def _compose(window: Window, ready: Iterator[int], writer: TimedWriter) -> list[
 
 
 def steady_mean(cases: Sequence[Case], frames: int, formats: Sequence[ImageFormat | None], place: float) -> list[Table]:
-    """Run every case once a format, with the same cameras.
+    """Run every case once per format, with the same cameras.
 
     Returns:
         for each format, the mean over the cases, which all make the same number of images.
@@ -181,7 +181,7 @@ def _writer(case: Case, folder: Path, image_format: ImageFormat | None) -> Timed
         case.threads,
         writes=image_format is not None,
     )
-    for block in [writer.block() for _ in range(BLOCKS)]:  # memory that was never written costs a page at a time
+    for block in [writer.block() for _ in range(BLOCKS)]:  # the first write to memory costs time per page
         block.fill(0)
         writer.give_back(block)
     return writer

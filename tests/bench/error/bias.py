@@ -16,7 +16,7 @@ from bench.core.frames import frames
 from bench.core.machine import busy
 from bench.core.results import Table
 from bench.core.steady import mean, steady
-from bench.speed.speed import tell
+from bench.speed.speed import log
 from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.engine.inputs.cameras import Cameras
 
@@ -30,7 +30,7 @@ WEIGHTS = ("average", "balance")
 PART_HITS = 28  # of a pixel in one part of a reference
 SEEDS = {"average": 10_000, "balance": 20_000, "reference": 2_000_000_000}
 EPSILON = 0.01  # of relative squares: (I - R)^2 / (R^2 + EPSILON)
-USUAL = 2  # native hits a pixel a frame, as jobs have them
+USUAL = 2  # native hits per pixel and frame, as in jobs
 # Times as many runs as the cabin needs: patches of sunlight make most of the noise.
 MORE = {"kitchen": 9, "stairs": 2, "cabin": 1}
 # Parts of a picture beside those of `regions`: all of it, and all of it with relative squares.
@@ -44,7 +44,7 @@ class Plan:
     Attributes:
         resolution: of all pictures, or None: the job's own.
         places: frames, as shares of the path.
-        hits: native hits a pixel a frame.
+        hits: native hits per pixel and frame.
         runs: by weights, with one hit; with more hits less noise, so fewer runs.
         parts: of a reference.
         fewest: runs in any case.
@@ -123,7 +123,7 @@ def measure(name: str, camera: str, plan: Plan) -> Table:
         lights = [int(share * case.setup.lights.n_lights) for share in LIGHTS]
         for c in cameras:
             _add_frame(with_lights(case, lights), c, camera, plan, sums)
-            tell(f"{name}, {camera}: camera {c}: {time.perf_counter() - started:.0f} s")
+            log(f"{name}, {camera}: camera {c}: {time.perf_counter() - started:.0f} s")
     return {
         "cameras": cameras,
         "lights": lights,
@@ -135,13 +135,13 @@ def measure(name: str, camera: str, plan: Plan) -> Table:
 
 
 def _add_frame(case: Case, c: int, camera: str, plan: Plan, sums: Sums) -> None:
-    """Render frame c of a camera in all ways, and add what comes of it."""
+    """Render frame c of a camera in all ways, and add the results."""
     cams = CAMERAS[camera](case, c)
     right, geometry = reference(case, cams, plan.parts)
     scale = right.mean(axis=(0, 2, 3, 4))[:, None, None, None]  # the mean of each picture
     dark = 1 / np.sqrt(np.square(right.mean(axis=0)) + EPSILON)
     masks: Mapping[str, Mask] = {}
-    for hits in sorted(plan.hits, key=lambda hits: hits != USUAL):  # that one says first which pixels rest on few hits
+    for hits in sorted(plan.hits, key=lambda hits: hits != USUAL):  # it shows first which pixels rest on few hits
         for weights in reversed(WEIGHTS):
             images, share = runs(case, cams, weights, hits, plan.seeds(weights, hits))
             masks = masks or regions(*geometry, share, cams, MIDDLE, N_R)
@@ -153,7 +153,7 @@ def _add_frame(case: Case, c: int, camera: str, plan: Plan, sums: Sums) -> None:
 
 
 def reference(case: Case, cams: Cameras, parts: int) -> tuple[Float32, tuple[Float32, Float32, Float32]]:
-    """Independent pictures of the middle frame without reuse, and what it shows of geometry.
+    """Independent pictures of the middle frame without reuse, and its geometry.
 
     Returns:
         (parts, n_lights, h, w, 3), and normal, depth and reflectivity, see `Layers`.
@@ -169,7 +169,7 @@ def reference(case: Case, cams: Cameras, parts: int) -> tuple[Float32, tuple[Flo
 def runs(case: Case, cams: Cameras, weights: str, hits: int, seeds: Sequence[int]) -> tuple[Float32, Float64]:
     """Independent pictures of the middle frame, (k, n_lights, h, w, 3).
 
-    Also the hits of a pixel, (h, w): their mean over those that it has where every eye of the window sees it.
+    Also the hits of a pixel, (h, w): their mean, relative to the hits of a pixel that every eye of the window sees.
     """
     changed = seen_by(with_settings(case, replace(USUAL_SETTINGS, n_r=N_R, hits=hits, weights=weights)), cams)
     made = frames(changed, MIDDLE, seeds)
@@ -178,13 +178,13 @@ def runs(case: Case, cams: Cameras, weights: str, hits: int, seeds: Sequence[int
 
 
 def costs(name: str, plan: Plan) -> Table:
-    """Time an image of a job in its steady state, under all of its lights, by weights and hits."""
+    """Time the images of a job in its steady state, under all of its lights, by weights and hits."""
     rows, shares = [], []
     job = job_named(name, False)
     with open_case(with_resolution(job, plan.resolution) if plan.resolution else job) as case:
         for hits in plan.hits:
             found: dict[str, list[Table]] = {weights: [] for weights in WEIGHTS}
-            for place in TIMED_PLACES:  # in turn, so that what else the machine does meets both
+            for place in TIMED_PLACES:  # in turn, so that other programs disturb both equally
                 for weights in WEIGHTS:
                     way = with_settings(case, replace(USUAL_SETTINGS, n_r=N_R, hits=hits, weights=weights))
                     found[weights].append(steady(way, TIMED_FRAMES, place=place).table())
@@ -192,5 +192,5 @@ def costs(name: str, plan: Plan) -> Table:
             for weights, tables in found.items():
                 both = mean(tables)
                 rows.append({"weights": weights, "hits": hits, "ms": both["ms"], "cpu_ms": both["cpu_ms"]})
-                tell(f"{name}, {weights}, {hits} hits: {both['ms']:.2f} ms an image")
+                log(f"{name}, {weights}, {hits} hits: {both['ms']:.2f} ms per image")
     return {"found": rows, "busy": shares}

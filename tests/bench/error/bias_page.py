@@ -18,47 +18,47 @@ ALLOWED = 3  # standard errors that a bound leaves to chance
 HEAD = f"""
 # Bias of reuse
 
-Written by `make bench-bias`. What is a frame off by, however many runs of it are averaged? Weights `average` and
+Written by `make bench-bias`. Which error of a frame remains in the mean of any number of runs? Weights `average` and
 `balance` ([note](../decisions/weights.md)) with N_r = {N_R}, against references without reuse and with other seeds.
 
 - *Squared bias*: mean((mean of runs - reference)^2) - variance / runs - variance of the reference, over all pixels,
   channels and pictures of a row, each picture over its own mean; in millionths. 2,500 is 5 % of the mean, root mean
   square. Noise may make it negative.
-- *+-*: its standard error, by leaving out each run and each part of the reference in turn. Where there is no bias that
+- *+-*: its standard error, by leaving out each run and each part of the reference in turn. Where there is no bias, it
   is up to sqrt 2 too large (`tests/bench/error/squares.py`).
 - *At most*: how large `balance` may be beside `average`: (its squared bias, or 0, + {ALLOWED} standard errors) over
   that of `average`.
 - Cameras. *slow*: as the job has it. *fast*: every {SPEED}th of its frames, so that the window shears; the picture in
-  the middle is the same. *close*: an eye that goes straight to what that picture shows in its middle, {CLOSE:g} m away
+  the middle is the same. *close*: an eye that approaches the surface in the middle of that picture, {CLOSE:g} m away
   from it and {1 - NEARER:.0%} nearer with each frame; the eyes of its window are {CLOSE / NEARER**N_R:.2f} to
   {CLOSE * NEARER**N_R:.2f} m away.
 
-Ambient light, average reflectivity and light positions are the same in runs and references: reuse is all that differs.
+Ambient light, average reflectivity and light positions are the same in runs and references: they differ only in reuse.
 """
 
 BY_PART = f"""
 With {USUAL} hits. *Silhouettes*: inverse depth bends by 5 % or normals part by 18 degrees between neighbours.
 *Textures*: reflectivity steps by 0.03. *Grazing angles*: more than 75.5 degrees from the normal. *Frame edges*: where
-the picture of another eye of the window ends. None of these three is counted at silhouettes. *Disocclusions*: pixels
-that rest on fewer than 70 % of the hits that they would have if every eye of the window saw them, silhouettes or not.
+the picture of another eye of the window ends. These three exclude silhouettes. *Disocclusions*: pixels that rest on
+fewer than 70 % of the hits that they would have if every eye of the window saw them; they may be silhouettes.
 *Share*: of the pixels.
 """
 
 BY_HITS = """
-All of the picture. `balance` is the ratio sum(w L) / sum(w), whose bias is O(1 / n): its squared bias falls to a
-quarter where hits double, until nothing is left to see. That of `average` stays.
+The whole picture. `balance` is the ratio sum(w L) / sum(w), whose bias is O(1 / n): its squared bias falls to a
+quarter where hits double, until it is not measurable. That of `average` stays.
 """
 
 TIME = f"""
 At the jobs' own size, one camera, {len(LIGHTS)} light positions. *RMSE* is of one run, without the noise of
-the reference; *relative*: root of mean((I - R)^2 / (R^2 + {EPSILON})), which a few bright pixels do not rule. Time is
-that of all threads together in the steady state, under all 48 light positions, not written. *At equal time*: what
-`average` has left after the time that `balance` takes, between the rows of `average`.
+the reference; *relative*: root of mean((I - R)^2 / (R^2 + {EPSILON})), which a few bright pixels do not dominate. Time
+is that of all threads together in the steady state, under all 48 light positions, not written. *At equal time*: the
+error of `average` after the time that `balance` takes, interpolated between the rows of `average`.
 """
 
 
 def write(quick: bool) -> None:
-    """Write the page and its plot from whatever was measured; quick results go beside themselves."""
+    """Write the page and its plot from all results there are; quick results go beside themselves."""
     page = site_for(quick).pages / "bias.md"
     page.write_text(render(folder(quick), site_for(quick)), encoding="utf-8")
     print(page)
@@ -106,7 +106,7 @@ def _beside(balance: Table, average: Table) -> str:
 
 
 def _root(row: Table) -> str:
-    """Root of a squared bias, or of what it is below."""
+    """Root of a squared bias, or of its upper bound."""
     if row["bias"] < ALLOWED * row["error"]:
         return f"below {percent(math.sqrt(max(row['bias'], 0.0) + ALLOWED * row['error']), 2)}"
     return percent(math.sqrt(row["bias"]), 2)
@@ -125,7 +125,7 @@ def _summary(found: Mapping[tuple[str, str], Table]) -> list[str]:
         rows.append([f"{job}, {camera}", *cells, _beside(balance, average)])
     first = next(iter(found.values()))
     about = f"""
-Two frames of each path; {USUAL} hits a pixel a frame; references of {first["reference"]:,} hits a pixel.
+Two frames of each path; {USUAL} hits per pixel and frame; references of {first["reference"]:,} hits per pixel.
 """
     head = ["", "pixels", "lights", "runs", "`average`", "z", "root", "runs", "`balance`", "root", "at most"]
     return ["## Three jobs, three cameras", about, grid(head, rows)]
@@ -190,7 +190,7 @@ def _equal_time(own: Mapping[str, Table], spent: Mapping[str, Table]) -> list[st
 
 
 def _cost_curve(own: Table, spent: Table, weights: str) -> dict[int, tuple[float, float, float]]:
-    """By hits: processor ms an image, RMSE and relative RMSE."""
+    """By hits: processor ms per image, RMSE and relative RMSE."""
     found = {}
     for hits in OWN.hits:
         ms = next(r["cpu_ms"] for r in spent["found"] if (r["weights"], r["hits"]) == (weights, hits))

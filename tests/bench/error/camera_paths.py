@@ -11,11 +11,11 @@ from bench.core.frames import frame
 from framearray_cli.engine.inputs.cameras import Cameras
 
 N_R = 3
-MIDDLE = 2 * N_R  # the frame that is looked at; its window's eyes all have whole windows
+MIDDLE = 2 * N_R  # the measured frame; all eyes of its window have whole windows
 STEPS = np.arange(-2 * N_R, 2 * N_R + 1)
-# How many frames of the job a fast camera takes at a time.
+# The number of frames of the job per step of a fast camera.
 SPEED = 8
-# The eye that comes close is so far from the surface that it looks at, in scene units, and a fifth nearer each frame.
+# Distance of the close eye from the surface that it looks at, in scene units; it is a fifth nearer in each frame.
 CLOSE, NEARER = 0.3, 0.8
 
 
@@ -25,15 +25,15 @@ def slow(case: Case, c: int) -> Cameras:
 
 
 def fast(case: Case, c: int) -> Cameras:
-    """Every so many-th eye of the path; the same picture in the middle."""
+    """Every SPEED-th eye of the path; the same picture in the middle."""
     return _some(case, c + SPEED * STEPS)
 
 
 def close(case: Case, c: int) -> Cameras:
-    """An eye that goes to what frame c shows in the middle of its picture, and looks where frame c does."""
+    """An eye that approaches the surface in the middle of frame c, in the direction of frame c."""
     cams = _some(case, np.full(len(STEPS), c))
-    alone = seen_by(replace(case, setup=replace(case.setup, n_r=0)), cams)
-    layers = frame(alone, MIDDLE, seed=0, layers=True).layers
+    single = seen_by(replace(case, setup=replace(case.setup, n_r=0)), cams)
+    layers = frame(single, MIDDLE, seed=0, layers=True).layers
     assert layers is not None
     depth = layers.depth[cams.height // 2, cams.width // 2]
     met = cams.position[0] + depth * cams.forward[0]

@@ -1,4 +1,4 @@
-"""How far each variant's images are from the reference, beside what they cost."""
+"""The distance of each variant's images from the reference, beside their cost."""
 
 import tempfile
 import time
@@ -27,16 +27,16 @@ from bench.core.frames import frame
 from bench.core.machine import busy
 from bench.core.results import Table
 from bench.core.steady import mean, steady
-from bench.speed.speed import tell
+from bench.speed.speed import log
 from framearray_cli.array.images.images import ImageFormat, read_image, write_image
 from framearray_cli.base.arrays import Images
 from framearray_cli.report.metrics import errors, rmse, shadow_edges, squared_bias
 from framearray_cli.report.reference import PASSES, Reference, make_reference, reference_noise
 
-PLACE = 0.4  # of the camera path, where two frames in a row are looked at
+PLACE = 0.4  # of the camera path, where two frames in a row are measured
 LIGHTS = (1 / 8, 3 / 8, 5 / 8, 7 / 8)  # of the light path
 SEEDS = (101, 202)  # of the two runs that are compared with the two halves
-# Containers for images: file format, and how many bits a channel.
+# Containers for images: file format, and the bits per channel.
 FORMATS = {
     "EXR half, none": ImageFormat(compression="none", half="always"),
     "EXR half, zip:1": ImageFormat(compression="zip:1", half="always"),
@@ -64,14 +64,14 @@ def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = 
         for c in frames:
             started = time.perf_counter()
             references.append(make_reference(case, c, l, folder, 4 if quick else PASSES))
-            tell(f"{name}: reference of camera {c}: {time.perf_counter() - started:.0f} s")
+            log(f"{name}: reference of camera {c}: {time.perf_counter() - started:.0f} s")
         found: dict[str, Table] = {}
         exact = [images(case, FRAME_ARRAY, c, l, SEEDS[0]) for c in frames]
         for variant in variants:
             if variant in (SCRATCH, CAMERA_REUSE):  # the same pictures as light reuse only and the frame array
                 continue
             if variant.settings.denoise and find_spec("pyoidn") is None:
-                tell(f"{name}: {variant.name} is left out: Open Image Denoise is not installed")
+                log(f"{name}: {variant.name} is left out: Open Image Denoise is not installed")
                 continue
             pairs = [(images(case, variant, c, l, SEEDS[0]), images(case, variant, c, l, SEEDS[1])) for c in frames]
             found[variant.name] = compare(case, l, pairs, references)
@@ -79,7 +79,7 @@ def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = 
             found[variant.name]["added"] = added(variant, pairs, exact, references, case, l)
             if not variant.frames:
                 found[variant.name]["ms"] = _time(case, variant)
-            tell(f"{name}: {variant.name}: RMSE {found[variant.name]['rmse']:.2%}")
+            log(f"{name}: {variant.name}: RMSE {found[variant.name]['rmse']:.2%}")
         return {
             "epsilon": 0.01,
             "cameras": frames,
@@ -189,7 +189,7 @@ def containers(case: Case, c: int, l: Sequence[int]) -> dict[str, Table]:
 
 
 def _wall(made: Images, image_format: ImageFormat, folder: Path, threads: int) -> float:
-    """Seconds an image where all threads write at once."""
+    """Seconds per image where all threads write at once."""
     n = 4 * len(made)
     with ThreadPoolExecutor(threads) as pool:
         started = time.perf_counter()

@@ -1,4 +1,4 @@
-"""Where in a picture errors of reuse are looked for: parts of it, found from what a reference says of its geometry."""
+"""Parts of a picture where errors of reuse may occur, found from the geometry in a reference."""
 
 from typing import TypeAlias
 
@@ -17,7 +17,7 @@ BEND, COSINE = 0.05, 0.95
 STEP = 0.03
 GRAZING = 0.25  # cosine between normal and direction to the eye, below which a surface is seen at a grazing angle
 BORDER = 1.5  # pixels from where another eye's picture ends
-FEW = 0.7  # of the hits that a pixel would rest on if every eye of its window saw what it sees
+FEW = 0.7  # of the hits that a pixel would rest on if every eye of its window saw its surface
 
 
 def regions(
@@ -25,7 +25,7 @@ def regions(
 ) -> dict[str, Mask]:
     """Parts of frame c by name, (h, w) each.
 
-    Disocclusions may overlap with the parts before; the last part is what is in none of the others.
+    Disocclusions may overlap with the parts before; the last part holds the pixels that are in none of the others.
 
     Args:
         normal: (h, w, 3), depth: (h, w), reflectivity: (h, w, 3); see `Layers`.
@@ -53,7 +53,7 @@ def _looks(cams: Cameras, c: int) -> Float64:
 
 
 def _ends(depth: Float32, look_vec: Float64, cams: Cameras, c: int, n_r: int) -> Mask:
-    """What lies where the picture of another eye of the window ends."""
+    """Surfaces where the picture of another eye of the window ends."""
     found = np.zeros(depth.shape, bool)
     for k in range(max(c - n_r, 0), min(c + n_r + 1, len(cams.position))):
         if k == c:

@@ -19,7 +19,7 @@ from bench.core.cases import (
 from bench.core.frames import frame
 from bench.core.markdown import grid, number, percent
 from bench.core.results import DOCS, Table
-from bench.speed.speed import tell
+from bench.speed.speed import log
 from framearray_cli.engine.frames.passes import frames_per_turn
 from framearray_cli.engine.frames.records import BY_SAMPLE
 from framearray_cli.engine.images.standard_error import square_mean, standard_error
@@ -42,29 +42,29 @@ TRIED = tuple(
 )
 
 PAGE = """
-# The error that images tell of themselves
+# The error that images report
 
-`[samples] halves = true` keeps the hits of every pixel apart in two halves, and what these differ by tells the
-standard error of every pixel without a reference (`framearray_cli/engine/images/standard_error.py`). Here it is
-held against the error that the images have: the root mean square over a picture of what is told, and the RMSE from
-a reference of {hits:,} hits a pixel, whose own error is taken off; both over the mean of the reference. {width} x
-{height} pixels, {cameras} cameras under {lights} light positions of each job. Written by `python -m bench told`,
-from the folder `tests`.
+`[samples] halves = true` divides the hits of every pixel into two halves, whose difference gives the standard error of
+every pixel without a reference (`framearray_cli/engine/images/standard_error.py`). This page compares it with the true
+error of the images: *reported* is the root mean square of the standard error over a picture, *true* the RMSE from a
+reference of {hits:,} hits per pixel, whose own error is subtracted; both relative to the mean of the reference.
+{width} x {height} pixels, {cameras} cameras under {lights} light positions of each job. Written by
+`python -m bench reported`, from the folder `tests`.
 
-![Told against true](../plots/standard-error.svg)
+![Reported against true](../plots/standard-error.svg)
 
 {table}
 
-What is told is sampling error alone. The error that `average` makes where frames see a place differently is the same
-in both halves: with many hits, where noise is small, true errors of `average` stay above what is told. `balance` has no
-such error. With fewer than four hits in a frame, whole frames make the halves, and part of what they see differently is
-told as noise. The error of I_A, which all pixels share, is not in it; the manifest has it
-for every light position.
+The reported error is only the sampling error. The error of `average` where frames see a place differently is the same
+in both halves: with many hits, where noise is small, true errors of `average` stay above the reported ones. `balance`
+has no such error. With fewer than four hits per frame, whole frames form the halves, and a part of the difference
+between frames is reported as noise. The error of I_A, which all pixels share, is not included; the manifest has it for
+every light position.
 """
 
 
 def measure(name: str, folder: Path) -> list[Table]:
-    """For each setting, camera and light position: what is told, and what is true."""
+    """For each setting, camera and light position: the reported error, and the true one."""
     rows: list[Table] = []
     with open_case(with_resolution(job_named(name, False), RESOLUTION)) as whole:
         n_lights = whole.setup.lights.n_lights
@@ -75,7 +75,8 @@ def measure(name: str, folder: Path) -> list[Table]:
             wanted = make_reference(whole, c, l, folder, PASSES)
             for variant in TRIED:
                 rows += [{"job": name, "variant": variant.name, **row} for row in compare(case, variant, c, wanted)]
-                tell(f"{name}, camera {c}, {variant.name}: told {rows[-1]['told']:.2%}, true {rows[-1]['true']:.2%}")
+                last = rows[-1]
+                log(f"{name}, camera {c}, {variant.name}: reported {last['reported']:.2%}, true {last['true']:.2%}")
     return rows
 
 
@@ -94,8 +95,9 @@ def compare(case: Case, variant: Variant, c: int, wanted: Reference) -> list[Tab
         mean = float(right.mean(dtype=np.float64))
         apart = rmse(wanted.half(0, k, ambient), wanted.half(1, k, ambient)) / 2  # of the reference itself
         true = max(rmse(image, right) ** 2 - apart**2, 0.0) ** 0.5
-        told = square_mean(standard_error(made.differences[k], hits)) ** 0.5
-        rows.append({"camera": c, "light": k, "told": told / mean, "true": true / mean, "reference": apart / mean})
+        found = square_mean(standard_error(made.differences[k], hits)) ** 0.5
+        relative = {"reported": found / mean, "true": true / mean, "reference": apart / mean}
+        rows.append({"camera": c, "light": k, **relative})
     return rows
 
 
@@ -107,12 +109,13 @@ def write(rows: Sequence[Table]) -> None:
         cells = [variant.name]
         for job in dict.fromkeys(row["job"] for row in rows):
             some = [row for row in rows if row["job"] == job and row["variant"] == variant.name]
-            told, true = (float(np.sqrt(np.mean([row[key] ** 2 for row in some]))) for key in ("told", "true"))
-            cells += [percent(told), percent(true), number(told / true)]
+            means = (float(np.sqrt(np.mean([row[key] ** 2 for row in some]))) for key in ("reported", "true"))
+            found, true = means
+            cells += [percent(found), percent(true), number(found / true)]
         table.append(cells)
     head = ["setting"]
     for job in dict.fromkeys(row["job"] for row in rows):
-        head += [f"{job}, told", "true", "ratio"]
+        head += [f"{job}, reported", "true", "ratio"]
     text = PAGE.format(
         hits=2 * PASSES * HITS, width=RESOLUTION[0], height=RESOLUTION[1], cameras=len(PLACES), lights=len(LIGHTS),
         table=grid(head, table),
@@ -123,7 +126,7 @@ def write(rows: Sequence[Table]) -> None:
 
 
 def draw(rows: Sequence[Table], file: Path) -> None:
-    """Told against true, a point an image."""
+    """Reported against true, one point per image."""
     import matplotlib
 
     matplotlib.use("svg")
@@ -137,12 +140,12 @@ def draw(rows: Sequence[Table], file: Path) -> None:
                 some = [row for row in rows if row["variant"].startswith(weights) and reuse in row["variant"]]
                 if some:
                     label = "no reuse" if marker == "x" else f"{weights}, n_r 3"
-                    axes.plot([r["true"] for r in some], [r["told"] for r in some], marker, color=colour,
+                    axes.plot([r["true"] for r in some], [r["reported"] for r in some], marker, color=colour,
                               markersize=3.5, alpha=0.7, label=label)  # fmt: skip
         ends = np.array([min(row["true"] for row in rows), max(row["true"] for row in rows)])
         axes.plot(ends, ends, "-", color="#444", linewidth=0.8)
         axes.fill_between(ends, 0.8 * ends, 1.2 * ends, color="#888", alpha=0.2, linewidth=0, label="within 20 %")
-        axes.set(xscale="log", yscale="log", xlabel="RMSE from the reference / mean", ylabel="told / mean")
+        axes.set(xscale="log", yscale="log", xlabel="RMSE from the reference / mean", ylabel="reported / mean")
         axes.legend(fontsize=8)
         axes.grid(alpha=0.3)
         file.parent.mkdir(parents=True, exist_ok=True)

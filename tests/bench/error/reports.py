@@ -12,7 +12,7 @@ from bench.core.cases import job_named
 from bench.core.machine import describe
 from bench.core.markdown import grid, number, percent, times
 from bench.core.results import DOCS, RESULTS, Table, load, save
-from bench.speed.speed import tell
+from bench.speed.speed import log
 from framearray_cli.report import ReportOptions, make_report, write_report
 from framearray_cli.report.crops import draw_crops
 
@@ -22,11 +22,11 @@ QUALITY = 88  # of the crops' JPG
 PAGE = """
 # Speed against error: {name}
 
-What each setting of a job buys and costs: the report of `framearray report jobs/{name}.toml`, as
+The cost and the error of each setting of a job: the report of `framearray report jobs/{name}.toml`, as
 `python -m bench report {name}` wrote it, from the folder `tests`. {cameras} cameras under {lights} light positions, at
-{width} x {height} pixels, against references of {reference_hits:,} hits a pixel, which are themselves off by
-{reference_noise}. RMSE over the mean of the reference; ms an image before writing, of all {n_lights} light positions.
-Machine: {machine}.
+{width} x {height} pixels, against references of {reference_hits:,} hits per pixel, whose own error is
+{reference_noise}. RMSE relative to the mean of the reference; ms per image before writing, of all
+{n_lights} light positions. Machine: {machine}.
 
 {summary}
 
@@ -40,9 +40,9 @@ Machine: {machine}.
 
 {table}
 
-*Times faster*: than images from scratch with the same RMSE, which lie on the line through those that were measured,
-both axes logarithmic. *Flicker*: RMSE of the difference of neighbours along the camera and along the light path.
-In bold: on the front, where nothing that was tried is both quicker and more exact.
+*Times faster*: than images from scratch with the same RMSE, on the line through the measured ones, both axes
+logarithmic. *Flicker*: RMSE of the difference of neighbours along the camera and along the light path.
+In bold: the front, where no tried setting is both faster and more exact.
 
 {advice}
 
@@ -63,7 +63,7 @@ def measure(name: str) -> None:
         {"machine": describe(), "resolution": list(job.camera.resolution), "n_lights": job.light.frames},
     )
     save(folder, "captions", {"captions": [crop.caption for crop in draw_crops(report)]})
-    tell(f"{folder / 'index.html'}")
+    log(f"{folder / 'index.html'}")
 
 
 def write(name: str) -> None:
@@ -96,25 +96,25 @@ def write(name: str) -> None:
     )
     page = DOCS.pages / f"report-{name}.md"
     page.write_text(words.rstrip() + "\n", encoding="utf-8")
-    tell(str(page))
+    log(str(page))
 
 
 def summary(table: Table) -> str:
-    """The job's own settings in a sentence, and the best that was found against images from scratch."""
+    """The job's own settings in a sentence, and the best factor against images from scratch."""
     own = table["settings"][0]
-    alone = [row for row in table["settings"] if not row["one_light"]]
-    best = max(alone, key=lambda row: row.get("times_faster_than_scratch", 0.0))
+    reused = [row for row in table["settings"] if not row["one_light"]]
+    best = max(reused, key=lambda row: row.get("times_faster_than_scratch", 0.0))
     gain, most = (times(one["times_faster_than_scratch"]) for one in (own, best))
     return (
-        f"As the job says: {number(own['ms'])} ms an image with an error of {percent(own['rmse'])}. Images from "
-        f"scratch with that error take **{gain}** as long. The most that was found is {most}, `{best['name']}`: "
+        f"As the job says: {number(own['ms'])} ms per image with an error of {percent(own['rmse'])}. Images from "
+        f"scratch with that error take **{gain}** as long. The largest factor is {most}, `{best['name']}`: "
         f"{number(best['ms'])} ms, {percent(best['rmse'])}."
     )
 
 
 def rows(table: Table) -> str:
-    """What every setting costs and gives."""
-    head = ("", "ms", "RMSE", "bias", "noise", "FLIP", "flicker", "hits a pixel", "times faster")
+    """The time and the error of every setting."""
+    head = ("", "ms", "RMSE", "bias", "noise", "FLIP", "flicker", "hits per pixel", "times faster")
     return grid(head, [_row(row) for row in table["settings"]])
 
 
@@ -133,7 +133,7 @@ def advice(table: Table) -> str:
     found = []
     for one in table["advice"]:
         if "settings" not in one:
-            found.append(f"For an error of {percent(one['error'])}: nothing that was tried reaches it.")
+            found.append(f"For an error of {percent(one['error'])}: no tried setting reaches it.")
             continue
         lines = "\n".join(one["lines"]) or "# as the job is"
         found.append(

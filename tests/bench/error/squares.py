@@ -1,13 +1,13 @@
 """Squared bias from independent runs and independent parts of a reference, with its standard error.
 
-Runs x_i and parts r_m are vectors of n values; x and r are what they tend to. The mean of (x - r)^2 over the values
-is estimated by products of different runs and parts alone, so that no noise is in it:
+Runs x_i and parts r_m are vectors of n values; x and r are their limits. The mean of (x - r)^2 over the values
+is estimated by products of only different runs and parts, so that it contains no noise:
 
     mean of x_i . x_j (i != j) - 2 mean of x_i . r_m + mean of r_m . r_n (m != n),    . the mean of products
 
 which is mean((mean of runs - mean of parts)^2) - variance / runs - variance of the reference. Noise may make it
 negative. Its standard error is that of the jackknife: each run, and each part, is left out once. Where there is no
-bias that is too large by a factor of up to sqrt 2, never too small.
+bias, it is too large by a factor of up to sqrt 2, never too small.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Squares:
-    """What runs are off by, per value.
+    """The error of runs, per value.
 
     Attributes:
         bias, error: squared bias and its standard error.
@@ -40,7 +40,7 @@ class Squares:
 def products(runs: NDArray[np.floating], parts: NDArray[np.floating]) -> tuple[Array, int]:
     """Products of all runs (k, n) and parts (m, n) with each other, (k + m, k + m), summed over n values; and n.
 
-    The mean of the parts is taken off first, which changes no difference and keeps digits. Sums of several pictures
+    The mean of the parts is subtracted first, which changes no difference and keeps digits. Sums of several pictures
     add up.
     """
     together = np.concatenate([runs, parts]).astype(np.float64)

@@ -1,8 +1,8 @@
 """The same images from Mitsuba 3, where it is installed: every image from scratch, the same number of the same rays.
 
-14 eye rays a pixel, at each hit 5 rays over the hemisphere, as long as the range of the obscurances, and one shadow
-ray a light source; everything in one compiled pass of the LLVM backend, on the same triangles. It is spared what the
-program does besides: mirrors, alpha masks, interpolated normals and texture filtering.
+14 eye rays per pixel, at each hit 5 rays over the hemisphere, as long as the range of the obscurances, and one shadow
+ray per light source; everything in one compiled pass of the LLVM backend, on the same triangles. It does without the
+rest of the program: mirrors, alpha masks, interpolated normals and texture filtering.
 """
 
 import sys
@@ -37,7 +37,7 @@ def measure(name: str, quick: bool) -> Table:
     mi.set_variant("llvm_ad_rgb")
     with open_case(job_named(name, quick)) as case:
         if case.setup.obscurance.falloff != FALLOFFS["sqrt"]:
-            return {"skipped": "the integrator knows the falloff sqrt alone"}
+            return {"skipped": "the integrator knows only the falloff sqrt"}
         image = integrator(mi, case)
         n_c, n_l = case.setup.n_frames, case.setup.lights.n_lights
         where = [(int(a * n_c), int(b * n_l)) for a, b in PLACES]

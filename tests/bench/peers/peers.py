@@ -4,14 +4,14 @@ import subprocess
 
 from bench.core.results import Table
 from bench.speed.processes import asked
-from bench.speed.speed import tell
+from bench.speed.speed import log
 
 
 def measure(program: str, name: str, quick: bool) -> Table:
-    """What an image of a job costs in another program, or {"skipped": why}."""
+    """The cost of an image of a job in another program, or {"skipped": why}."""
     try:
         table = asked(program, name, *(["--quick"] if quick else []))
     except subprocess.CalledProcessError as error:
         table = {"skipped": f"it ended with status {error.returncode}"}
-    tell(f"{name}: {program}: " + (f"left out: {table['skipped']}" if "skipped" in table else f"{table['ms']:.0f} ms"))
+    log(f"{name}: {program}: " + (f"left out: {table['skipped']}" if "skipped" in table else f"{table['ms']:.0f} ms"))
     return table

@@ -1,1 +1,1 @@
-"""What an image costs, beside the floor that Embree sets, and as a job grows."""
+"""The cost of an image, beside the floor that Embree sets, and as a job grows."""

@@ -1,9 +1,9 @@
-"""The floor: the rays of a frame, recorded and then traced by Embree and nothing else.
+"""The floor: the rays of a frame, recorded and then only traced by Embree.
 
 A recording holds every packet that the program hands to Embree, in its order, as it is: with its idle lanes and with
 the flag that says whether its rays stay together. A replay copies a few packets at a time to where they are in the
-cache, and times the calls alone. What is left out is everything the program does itself: making rays, looking up
-what they met, shading, sorting, composing.
+cache, and times only the calls. Left out is all work of the program itself: making rays, looking up hits, shading,
+sorting, composing.
 """
 
 import ctypes
@@ -42,7 +42,9 @@ from framearray_cli.engine.kernels.simd import LANES
 
 Indices = NDArray[np.int64]
 
-KEPT_ROWS = TFAR + 1  # rows of a ray: origin, tnear, direction, time, tfar; what follows is the same in every packet
+KEPT_ROWS = (
+    TFAR + 1
+)  # rows of a ray: origin, tnear, direction, time, tfar; the rows after them are the same in every packet
 PIECE = 256  # packets of a copy: the program, too, traces up to 4096 rays at a time
 TASK = 32  # pieces that one thread takes at a time: about a batch of the program
 _INTERSECT, _OCCLUDED, _COHERENT = 0, 1, 2  # bits of a packet's flags
@@ -89,7 +91,7 @@ def record(case: Case, c: int, expected: float) -> Recording:
     """Record the rays of frame c; it runs on one thread.
 
     Args:
-        expected: about how many rays there will be; room for a quarter more is made.
+        expected: approximate number of rays; there is room for a quarter more.
 
     Raises:
         RuntimeError: Embree's own functions cannot be reached, or rays were missed.
@@ -164,7 +166,7 @@ def _replay(
     tracer: Tracer, rays: Float32, flags: Bytes, pieces: Indices, hit_room: Float32, test_room: Float32,
     clock: int, clocks: Any, spec: Any, seconds: Float64,
 ) -> None:  # fmt: skip
-    """Trace some pieces; adds wall and processor time of the calls alone to seconds, (n_kinds, 2)."""
+    """Trace some pieces; adds wall and processor time of only the calls to seconds, (n_kinds, 2)."""
     for piece in range(pieces.shape[0]):
         start, stop, kind = pieces[piece, 0], pieces[piece, 1], pieces[piece, 2]
         tests = (flags[start] & _OCCLUDED) != 0
@@ -189,13 +191,13 @@ def _replay(
 def replay(
     recording: Recording, tracer: Tracer, threads: int, rays: Mapping[str, float]
 ) -> dict[str, dict[str, float]]:
-    """Trace a recording on all threads; returns ms an image by kind, as wall time (`ms`) and of threads (`cpu_ms`).
+    """Trace a recording on all threads; returns ms per image by kind, as wall time (`ms`) and of threads (`cpu_ms`).
 
-    The wall time is that of a machine whose threads do nothing but trace: the traced time of all, over their number.
+    The wall time is that of a machine whose threads only trace: the traced time of all, over their number.
 
     Args:
-        rays: rays a pixel an image by kind, of the run whose floor this is. It has a few cameras, the recording one
-            of them: what a ray costs is taken from the recording, how many there are from the run.
+        rays: rays per pixel and image by kind, of the run whose floor this is. It has a few cameras, the recording
+            one of them: the cost of a ray comes from the recording, the number of rays from the run.
     """
     clock = ctypes.cast(ctypes.CDLL(None).clock_gettime, ctypes.c_void_p).value or 0
     clocks = np.array([time.CLOCK_MONOTONIC, time.CLOCK_THREAD_CPUTIME_ID], np.int64)

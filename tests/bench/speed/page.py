@@ -10,7 +10,7 @@ from . import parts as pages
 
 
 def write(quick: bool) -> None:
-    """Write the page and its plots from whatever was measured; quick results go beside themselves."""
+    """Write the page and its plots from all results there are; quick results go beside themselves."""
     page = site_for(quick).pages / "speed.md"
     page.write_text(render(folder(quick), site_for(quick)), encoding="utf-8")
     print(page)

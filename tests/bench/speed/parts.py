@@ -14,8 +14,8 @@ SCRATCH_HITS, SCRATCH_RAYS = SCRATCH.settings.hits, SCRATCH.settings.obscurance
 HEAD = """
 # Speed
 
-What an image costs, how that compares with what Embree alone takes for the same rays and with rendering every image
-from scratch, and how far the images are from right. `make bench` and `make bench-scaling` measure and write this page;
+The cost of an image, beside the time that Embree needs only to trace the same rays and beside rendering every image
+from scratch, and the error of the images. `make bench` and `make bench-scaling` measure and write this page;
 `tests/bench/` says how. Times are those of one machine: compare the ratios.
 """
 
@@ -70,14 +70,14 @@ def summary(speed: Mapping[str, Table], mitsuba: Mapping[str, Table]) -> list[st
             ]
         )
     head = [
-        "job", "ms an image", "to the floor", "from scratch takes", "same, to `shadow_step` 4",
+        "job", "ms per image", "to the floor", "from scratch takes", "same, to `shadow_step` 4",
         "written, ms", "from scratch, written", "Mitsuba, written",
     ]  # fmt: skip
     runs = min(len(tables) for table in speed.values() for tables in table["runs"].values())
     about = f"""
 The three jobs of the size that the paper used, in the steady state: some cameras from the middle of the path, with the
 window filled before the clock starts, so that reading, ambient light and path ends are left out. Weights are `average`,
-shadows are tested at every light position if nothing else is said. Everything is measured in turn, {runs} times, each
+and shadows are tested at every light position, unless a row says otherwise. Variants take turns, {runs} times, each
 time at another place of the camera path; figures are medians.
 
 - *From scratch*: every image alone, by the same kernels and packets, with as many native hits a pixel as a pixel of
@@ -103,8 +103,8 @@ def _sizes(speed: Mapping[str, Table]) -> str:
 def cost(speed: Mapping[str, Table]) -> list[str]:
     """Every variant that was timed, by job."""
     about = """
-*Hits* are accepted hits a pixel: mean and 1st percentile. *Processor* is the time of all threads together: where other
-programs share the machine, the ratios that rest on it are the ones to trust.
+*Hits* are accepted hits per pixel: mean and 1st percentile. *Processor* is the time of all threads together: where
+other programs share the machine, trust the ratios of processor time.
 """
     parts = ["## Cost of an image", about]
     for name, table in speed.items():
@@ -129,7 +129,7 @@ programs share the machine, the ratios that rest on it are the ones to trust.
                 ]
             )
         head = [
-            "", "ms", "from scratch takes", "processor, ms", "from scratch, processor", "hits", "rays a pixel",
+            "", "ms", "from scratch takes", "processor, ms", "from scratch, processor", "hits", "rays per pixel",
             "floor, ms", "ratio", "ratio, processor",
         ]  # fmt: skip
         parts += [f"### {name}", grid(head, rows)]
@@ -139,9 +139,9 @@ programs share the machine, the ratios that rest on it are the ones to trust.
 def stages(speed: Mapping[str, Table]) -> list[str]:
     """Where the time goes: thread time by stage, beside the floor and the rays."""
     about = """
-Thread time an image, ms; below it what Embree alone takes for the rays of the stage, and their number a pixel. *Mirror*
-counts all that follows mirrors, their obscurance and shadow rays too. *Rest* is sorting, waiting and what is not timed
-by stage.
+Thread time per image, ms; below it the time that Embree needs only to trace the rays of the stage, and their number
+per pixel. *Mirror* includes everything behind mirrors, also obscurance and shadow rays. *Rest* is sorting, waiting and
+all work that is not timed by stage.
 """
     parts = ["## Stages", about]
     head = ["", *STAGES, "compose", "rest"]
@@ -153,8 +153,8 @@ by stage.
             floor, rays = by_stage(t["floor"]["cpu_ms"]), by_stage(t["rays"])
             other = [number(spent.get("compose", 0.0)), number(spent["rest"])]
             rows.append([variant, *[number(spent.get(stage, 0.0)) for stage in STAGES], *other])
-            rows.append(["Embree alone", *[number(floor[stage]) for stage in STAGES], "", ""])
-            rows.append(["rays a pixel", *[number(rays[stage]) for stage in STAGES], "", ""])
+            rows.append(["Embree only", *[number(floor[stage]) for stage in STAGES], "", ""])
+            rows.append(["rays per pixel", *[number(rays[stage]) for stage in STAGES], "", ""])
         parts += [f"### Stages: {name}", grid(head, rows)]
     return parts
 
@@ -214,18 +214,19 @@ def errors(error: Mapping[str, Table], speed: Mapping[str, Table]) -> list[str]:
     """Error beside time, by job."""
     first = next(iter(error.values()))
     about = f"""
-Against references with reuse off, other seeds and {first["hits"]} native hits a pixel, made in two halves. Ambient
-light is the same for all. Relative to the mean of the reference, averaged over {len(first["lights"])} light positions:
+Against references with reuse off, other seeds and {first["hits"]} native hits per pixel, made in two halves. Ambient
+light is the same for all. Errors are relative to the mean of the reference, averaged over
+{len(first["lights"])} light positions:
 
-- *RMSE*; *relMSE*: mean of (I - R)^2 / (R^2 + {first["epsilon"]}); *mean off*: mean of I - R.
-- *At shadow edges*: RMSE and largest error where irradiance jumps and neither normal nor depth does.
-- *Bias*: root of the squared bias, from two runs and the two halves, whose noise does not go together: no noise is in
-  it. Where the squared bias is less than twice its standard error, "below" that.
+- *RMSE*; *relMSE*: mean of (I - R)^2 / (R^2 + {first["epsilon"]}); *mean error*: mean of I - R.
+- *At shadow edges*: RMSE and largest error where irradiance jumps, but neither normal nor depth.
+- *Bias*: root of the squared bias, from two runs and the two halves, whose noise is independent: it contains no
+  noise. Where the squared bias is less than twice its standard error, "below" that.
 - *Added*: RMSE of the difference to exact shadows with the same random numbers.
-- *Flicker*: RMSE of the change of the error from one frame of the camera path to the next, over sqrt 2: the same as
-  *RMSE* where the errors of two frames have nothing to do with each other.
+- *Flicker*: RMSE of the change of the error from one frame of the camera path to the next, over sqrt 2: equal to
+  *RMSE* where the errors of two frames are independent.
 """
-    head = ["", "ms", "RMSE", "relMSE", "mean off", "edges, RMSE", "edges, most", "bias", "added", "flicker"]
+    head = ["", "ms", "RMSE", "relMSE", "mean error", "edges, RMSE", "edges, most", "bias", "added", "flicker"]
     parts = ["## Error beside time", about]
     for name, table in error.items():
         rows = []
@@ -270,8 +271,8 @@ def containers(error: Mapping[str, Table]) -> list[str]:
         ]
         for stored, t in table["formats"].items()
     ]
-    head = ["", "one thread, processor ms", "all threads, ms an image", "KiB", "RMSE added"]
-    return ["## Containers", f"An image of {name}, written alone.", grid(head, rows)]
+    head = ["", "one thread, processor ms", "all threads, ms per image", "KiB", "RMSE added"]
+    return ["## Containers", f"An image of {name}, with no other work.", grid(head, rows)]
 
 
 def memory(found: Table) -> list[str]:
@@ -302,8 +303,8 @@ def scaling(found: Table, drawn: Mapping[str, str]) -> list[str]:
     width, height = found["resolution"]
     about = f"""
 `jobs/{found["job"]}.toml` at {width} x {height}, weights `average`, all shadows tested, nothing written; one number
-changes at a time. The cameras are those of the middle of the path, where mirrors make images dearer than the medians
-above say. Other programs took {percent(statistics.median(found["busy"]), 2)} of the cores (median).
+changes at a time. The cameras are those of the middle of the path, where mirrors make images more expensive than
+the medians above. Other programs took {percent(statistics.median(found["busy"]), 2)} of the cores (median).
 """
     parts = ["## Scaling", about]
     for name, title, text, head, cells in SWEEPS:
@@ -311,17 +312,17 @@ above say. Other programs took {percent(statistics.median(found["busy"]), 2)} of
         parts.append(f"### {title}")
         if name in drawn:
             parts.append(f"![{title}]({drawn[name]})")
-        parts += [text, grid([*head, "ms an image", "rays a pixel an image"], rows)]
+        parts += [text, grid([*head, "ms per image", "rays per pixel and image"], rows)]
     return parts
 
 
 # A sweep: its name, title, explanation, columns that say how large the job was, and their cells.
 SWEEPS: tuple[tuple[str, str, str, list[str], Callable[[Table], list[str]]], ...] = (
-    ("lights", "Light positions", "The path of the light stays, its steps get shorter.", ["N_l"],
+    ("lights", "Light positions", "The path of the light stays; its steps get shorter.", ["N_l"],
      lambda r: [str(r["lights"])]),
-    ("n_r", "Frames that share hits", "With 2 native hits a pixel a frame; more frames, more hits a pixel.",
-     ["N_r", "hits a pixel"], lambda r: [str(r["n_r"]), f"{r['hits'][0]:.1f}"]),
-    ("threads", "Threads", "As many as cores, and fewer.", ["threads"], lambda r: [str(r["threads"])]),
+    ("n_r", "Frames that share hits", "With 2 native hits per pixel and frame; more frames, more hits per pixel.",
+     ["N_r", "hits per pixel"], lambda r: [str(r["n_r"]), f"{r['hits'][0]:.1f}"]),
+    ("threads", "Threads", "One per core, and fewer.", ["threads"], lambda r: [str(r["threads"])]),
     ("cameras", "Cameras", "The camera path there and back, several times over.", ["N_c"],
      lambda r: [str(r["cameras"])]),
     ("triangles", "Triangles", "A generated room with 50 spheres of more and more triangles. *Scene*: cleaning and "

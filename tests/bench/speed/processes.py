@@ -1,4 +1,4 @@
-"""Start-up time and peak memory: what only a process of its own can tell."""
+"""Start-up time and peak memory, each measured in a process of its own."""
 
 import json
 import os
@@ -17,11 +17,11 @@ from bench.core.machine import busy
 from bench.core.results import ROOT, Table
 from framearray_cli.job.read import job_table
 
-from .speed import tell
+from .speed import log
 
 REPEATS = 5
 PROGRAM = (sys.executable, "-m", "framearray_cli")
-# Traces one ray, and then everything before the first frame; says when each is done.
+# Traces one ray, then does everything before the first frame, and reports the end of each.
 FIRST_RAYS = """
 import sys
 from pathlib import Path
@@ -65,10 +65,10 @@ def start_up(quick: bool) -> Table:
         found["warm"] = {mark: _median([run[mark] for run in warm]) for mark in warm[0]}
         fresh = environment(NUMBA_CACHE_DIR=str(folder / "fresh"))
         found["cold"]["job"] = _seconds(render, fresh)
-        tell(f"start-up: cold {found['cold']['job']:.1f} s in all")
+        log(f"start-up: cold {found['cold']['job']:.1f} s in all")
         found["warm"]["job"] = _median([_seconds((*render, "--restart"), fresh) for _ in range(repeats)])
     warmed = found["warm"]
-    tell(f"start-up: help {found['help']:.2f} s, first ray {warmed['ray']:.2f} s, job {warmed['job']:.2f} s")
+    log(f"start-up: help {found['help']:.2f} s, first ray {warmed['ray']:.2f} s, job {warmed['job']:.2f} s")
     return found
 
 
@@ -110,5 +110,5 @@ def memory(quick: bool, jobs: Sequence[str] = JOBS) -> Table:
         found[name] = {}
         for variant in ("frame array", "weights balance"):
             found[name][variant] = asked("peak", name, "--variant", variant, *(["--quick"] if quick else []))
-            tell(f"{name}: {variant}: {found[name][variant]['peak'] / 2**30:.2f} GiB at most")
+            log(f"{name}: {variant}: {found[name][variant]['peak'] / 2**30:.2f} GiB at most")
     return found

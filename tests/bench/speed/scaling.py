@@ -1,4 +1,4 @@
-"""Time an image against the size of a job, one size at a time; the rest is the frame array of the kitchen."""
+"""Time per image against the size of a job, one size at a time; the rest is the frame array of the kitchen."""
 
 import os
 import time
@@ -20,7 +20,7 @@ from framearray_cli.scene.paths.paths import Eyes
 from framearray_cli.scene.paths.planes import picture_planes
 
 from .processes import asked
-from .speed import tell
+from .speed import log
 
 Indices = NDArray[np.int64]
 
@@ -29,12 +29,12 @@ LIGHTS = (1, 3, 6, 12, 24, 48, 96, 192)
 N_R = (0, 1, 2, 3, 4, 6, 8, 12, 16)
 TRIANGLES = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 RESOLUTIONS = ((200, 150), (400, 300), (800, 600), (1280, 960), (1920, 1080))
-PATHS = (1, 4, 16)  # how many times as long the camera path is
+PATHS = (1, 4, 16)  # factors on the length of the camera path
 FRAMES = 3
 
 
 def measure(quick: bool) -> Table:
-    """All sweeps: name -> rows of sizes and what they cost."""
+    """All sweeps: name -> rows of sizes and costs."""
     shares = [busy()]
     found: Table = {"machine": describe(), "job": JOB, "resolution": list(QUICK_RESOLUTION if quick else (400, 300))}
     with open_case(job_named(JOB, quick)) as case:
@@ -42,8 +42,8 @@ def measure(quick: bool) -> Table:
         for name, sweep in (("lights", _lights), ("n_r", _n_r), ("threads", _threads), ("cameras", _cameras)):
             found[name] = sweep(base, quick)
             shares.append(busy())
-    for name, sweep_alone in (("triangles", _triangles), ("resolution_sweep", _resolutions)):
-        found[name] = sweep_alone(quick)
+    for name, sweep_of_its_own in (("triangles", _triangles), ("resolution_sweep", _resolutions)):
+        found[name] = sweep_of_its_own(quick)
         shares.append(busy())
     found["busy"] = shares
     return found
@@ -51,7 +51,7 @@ def measure(quick: bool) -> Table:
 
 def _row(case: Case, quick: bool, **size: float) -> Table:
     measured = steady(case, 1 if quick else FRAMES)
-    tell(f"{size}: {measured.ms:.2f} ms an image")
+    log(f"{size}: {measured.ms:.2f} ms per image")
     return {**size, **measured.table()}
 
 
@@ -131,7 +131,7 @@ def _cameras(case: Case, quick: bool) -> list[Table]:
         # the same cameras every time: those of the middle of the first turn
         place = 0.5 / times
         measured = steady(replace(case, setup=setup, prepared=prepared), 1 if quick else FRAMES, place=place)
-        tell(f"{len(at)} cameras: {measured.ms:.2f} ms an image")
+        log(f"{len(at)} cameras: {measured.ms:.2f} ms per image")
         rows.append({"cameras": len(at), **measured.table()})
     return rows
 
@@ -162,6 +162,6 @@ def _resolutions(quick: bool) -> list[Table]:
     rows = []
     for width, height in RESOLUTIONS[:2] if quick else RESOLUTIONS:
         row = asked("peak", JOB, "--resolution", f"{width}x{height}", "--frames", "1" if quick else "2")
-        tell(f"{width} x {height}: {row['ms']:.2f} ms an image, {row['peak'] / 2**30:.2f} GiB")
+        log(f"{width} x {height}: {row['ms']:.2f} ms per image, {row['peak'] / 2**30:.2f} GiB")
         rows.append({"width": width, "height": height, **row})
     return rows

@@ -19,12 +19,12 @@ FORMATS = {
     "zip:1": ImageFormat(compression="zip:1", half="always"),
     "none": ImageFormat(compression="none", half="always"),
 }
-WRITTEN = "none"  # as jobs write that say nothing
+WRITTEN = "none"  # the default of jobs
 RUNS = 3
 
 
 def places_of(runs: int) -> list[float]:
-    """Where on the path, 0 to 1, each run takes its cameras."""
+    """The place on the path, 0 to 1, of each run's cameras."""
     return [(r + 1) / (runs + 1) for r in range(runs)]
 
 
@@ -34,7 +34,7 @@ def measure(
     """Measure a job: variant -> medians of its runs; variants without `frames` are left out.
 
     Args:
-        patience: seconds to wait, before each measurement, for other programs to leave the cores alone.
+        patience: seconds to wait, before each measurement, for other programs to free the cores.
     """
     timed = [v for v in variants if v.frames and not (v.denoise and find_spec("pyoidn") is None)]
     found: dict[str, list[Table]] = {variant.name: [] for variant in timed}
@@ -45,7 +45,7 @@ def measure(
                 shares.append(quiet(patience))
                 table = measure_once(case, replace(variant, frames=2) if quick else variant, place)
                 found[variant.name].append(table)
-                tell(f"{name}: {variant.name}: {table['ms']:.2f} ms an image, others take {shares[-1]:.0%}")
+                log(f"{name}: {variant.name}: {table['ms']:.2f} ms per image, others take {shares[-1]:.0%}")
         setup, job = case.setup, case.prepared.job
         about = {
             "triangles": len(setup.surfaces.corners),
@@ -80,6 +80,6 @@ def measure_once(case: Case, variant: Variant, place: float) -> Table:
     return table
 
 
-def tell(text: str) -> None:
-    """Say what was measured, at once."""
+def log(text: str) -> None:
+    """Report a measurement at once."""
     print(text, file=sys.stderr, flush=True)

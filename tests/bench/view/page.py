@@ -52,7 +52,7 @@ def synthesised(folder: Path) -> Path:
         width, height = SIZE
         y, x = np.mgrid[0:height, 0:width].astype(np.float32)
         for c in range(N_C):
-            detail = rng.normal(1.0, 0.06, (height, width, 3)).astype(np.float32)  # that of 14 hits a pixel, about
+            detail = rng.normal(1.0, 0.06, (height, width, 3)).astype(np.float32)  # about that of 14 hits per pixel
             stripes = 0.35 + 0.25 * np.sin((x + 5 * c) / 9) * np.cos(y / 13)
             for l in range(N_L):
                 lamp = 1 / (1 + ((x - 8 * l) ** 2 + (y - 150) ** 2) / 8000)
@@ -66,7 +66,7 @@ def run(places: Sequence[str], patience: float, quick: bool) -> None:
 
     Args:
         patience: seconds to wait for a busy machine, before each measurement.
-        quick: take tiles that are beside the images, and measure the page alone.
+        quick: take tiles that are beside the images, and measure only the page.
     """
     for out in [Path(place) for place in places] or [synthesised(ROOT / "out" / "bench" / "page-array")]:
         print(f"\n{out}\n")
@@ -137,7 +137,7 @@ def _first_picture(chromium: Any, tiles: Tiles) -> float:
 
 
 def _walk(manifest: Manifest, most: int) -> list[tuple[int, int]]:
-    """A wandering drag with steps of at most so many places."""
+    """A wandering drag with steps of at most a given number of places."""
     rng = random.Random(5)
     n_c, n_l = manifest.n_cameras, manifest.n_lights
     places = [(n_c // 2, n_l // 2)]
@@ -194,7 +194,7 @@ def _steps(page: Shown, patience: float, name: str, move: Callable[[], None]) ->
     overtaken = len(steps) - len(drawn)
     yield [*_row(f"{name}, {len(steps)} steps, {overtaken} overtaken before they were drawn, ms", drawn), share()]
     yield [*_row(f"{name}, in full size ({len(full)} of them), ms", full), ""]
-    yield [*_one(f"{name}, processor time of Chromium a step, ms", f"{spent / len(steps):.0f}"), ""]
+    yield [*_one(f"{name}, processor time of Chromium per step, ms", f"{spent / len(steps):.0f}"), ""]
 
 
 def _memory(page: Shown) -> Iterator[list[str]]:
@@ -232,7 +232,7 @@ def _processor_ms() -> float:
 
 @contextmanager
 def _others(patience: float) -> Iterator[Callable[[], str]]:
-    """Wait for a quiet machine; afterwards the function tells what other programs took before and after."""
+    """Wait for a quiet machine; afterwards the function returns the share of other programs before and after."""
     shares = [quiet(patience)]
     yield lambda: percent(max(shares), 2)
     shares.append(quiet(0.0))
