@@ -102,7 +102,7 @@ def main() -> None:
 
 
 def peak(name: str, variant: Variant, args: argparse.Namespace) -> dict[str, object]:
-    """Run a variant for a moment; what it cost, and the peak memory of this process."""
+    """Run a variant for a moment; returns its cost, and the peak memory of this process."""
     from framearray_cli.base.memory import peak_memory
 
     job = job_named(name, args.quick)

@@ -17,7 +17,7 @@ from .scenes import FURNACE, FURNACE_LEVEL, Probe, under_one, with_ambient
 METHODS = ("eye", "light", "fit")
 PATHS = (256, 1024, 4096, 16384, 65536)
 SEEDS, QUICK_SEEDS = 16, 4
-MANY = {"eye": 1 << 20, "light": 1 << 19, "fit": 1 << 20}  # for what the estimates tend to
+MANY = {"eye": 1 << 20, "light": 1 << 19, "fit": 1 << 20}  # for the limit of the estimates
 MANY_SEED = 1_000_000
 
 
@@ -55,7 +55,7 @@ class Runs:
 
 
 def measure(probe: Probe, quick: bool) -> Table:
-    """Method -> rows of numbers of walks and what came of them; and what the estimates tend to."""
+    """Method -> rows of numbers of walks and their results; and the limit of the estimates."""
     prepared = under_one(probe.prepared(), probe.l)
     found: Table = {"words": probe.words, "light": probe.l, "methods": {}}
     if probe.name == FURNACE:

@@ -38,7 +38,7 @@ class Traced:
     light: Float32
 
     def save(self, file: Path) -> None:
-        """Keep them, half by half, with what the spread of all passes says of the means.
+        """Keep them, half by half, with the standard errors of the means from the spread of all passes.
 
         The standard errors are of the mean over picture and channels.
         """
@@ -186,7 +186,7 @@ def scene_of(mi: Any, prepared: Prepared, probe: Probe, sky: bool) -> Any:
     """The scene under the probe's light position, one mesh per material; the probe's eye is the origin.
 
     Mitsuba starts rays 1500 units in the last place of the largest coordinate above a surface. About the middle of the
-    stairs that is 3 mm, which misses what the carpet's edge shades; about the eye it is a third of that.
+    stairs that is 3 mm, which misses the shadow of the carpet's edge; about the eye it is a third of that.
 
     Args:
         sky: whether the background shines.
@@ -260,7 +260,7 @@ def _reflectance(mi: Any, scene: Scene, m: int, scale: float) -> dict[str, Any]:
 
 
 def _light(mi: Any, scene: Any, sensor: Any, prepared: Prepared, samples: int, seed: int) -> Image:
-    """Light straight from the sources and the background to what the eye sees, directly or by mirrors."""
+    """Direct light of the sources and the background on the surfaces that the eye sees, directly or by mirrors."""
     import drjit as dr
 
     width, height = prepared.job.camera.resolution

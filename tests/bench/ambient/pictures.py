@@ -181,7 +181,7 @@ def _sampled(probe: Probe, method: str, total: Wanted, indirect: Wanted) -> Tabl
 
 
 def _parts(case: Case, c: int) -> tuple[Image, Image]:
-    """Frame c with its neighbours' hits: without ambient light, and what an ambient light of 1 adds."""
+    """Frame c with its neighbours' hits: without ambient light, and the share of an ambient light of 1."""
     setup = replace(case.setup, layers=False)
     images = np.empty((2, 1, setup.cams.height, setup.cams.width, 3), np.float32)
     with TracePool(setup, case.threads) as pool:

@@ -19,7 +19,7 @@ WIDTH, GAP, QUALITY = 240, 4, 80  # of one picture and between two, pixels; of J
 
 
 def draw(levels: Mapping[str, Table], pictures: Mapping[str, Table], folder: Path) -> dict[str, Path]:
-    """Draw what was measured; returns plot -> its file. Without matplotlib there are none."""
+    """Draw the results; returns plot -> its file. Without matplotlib there are none."""
     if not ready(folder):
         return {}
     found = {}

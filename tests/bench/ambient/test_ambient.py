@@ -51,7 +51,7 @@ def test_the_noise_of_a_reference_is_no_part_of_an_error():
     # each value's product has variance 0.4^4 + 2 * 0.4^2 * (0.2 R)^2
     spread = np.sqrt((0.4**4 + 2 * 0.4**2 * square) / n)
     assert abs((found["rmse"] * wanted.mean) ** 2 - square) < 4 * spread
-    assert np.mean((1.2 * right - wanted.image) ** 2) - square > 40 * spread  # what the test would not pass
+    assert np.mean((1.2 * right - wanted.image) ** 2) - square > 40 * spread  # the test would fail
     assert found["ratio"] == pytest.approx(1.2, abs=4 * 1.2 * 0.4 / np.sqrt(2 * n))
     assert found["ratio_error"] == pytest.approx(1.2 * 0.02, rel=0.01)
     weight = 1 / (right**2 + 0.01)

@@ -35,6 +35,6 @@ def frames(case: Case, c: int, seeds: Sequence[int], *, layers: bool = False) ->
     def one(i: int) -> Composed:
         return frame(case, c, seeds[i], layers=layers and i == 0, threads=1)
 
-    first = one(0)  # compile once what is not compiled yet
+    first = one(0)  # compiles all kernels once
     with ThreadPoolExecutor(case.threads) as pool:
         return [first, *pool.map(one, range(1, len(seeds)))]

@@ -68,7 +68,7 @@ class Plan:
 SMALL = Plan(resolution=(128, 96))
 OWN = Plan(resolution=None, places=PLACES[:1], hits=(1, 2, 4), runs={"average": 4, "balance": 4}, parts=8)
 QUICK = Plan(resolution=(48, 36), runs={"average": 6, "balance": 8}, parts=6)
-# What is measured of a job: a camera of `CAMERAS` in small, the job as it is at its own size, and time.
+# Measurements of a job: a camera of `CAMERAS` in small, the unchanged job at its own size, and time.
 MEASURES = (*CAMERAS, "own-size", "time")
 TIMED_PLACES = (1 / 3, 2 / 3)  # of the camera path
 TIMED_FRAMES = 2
@@ -91,7 +91,7 @@ class Sums:
         self._runs[key] = len(images)
 
     def table(self) -> list[Table]:
-        """A row for each: what the runs are off by."""
+        """One row each: the error of the runs."""
         rows = []
         for key, gram in self._grams.items():
             weights, hits, part = key

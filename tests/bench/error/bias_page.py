@@ -83,7 +83,7 @@ def render(results: Path, site: Site) -> str:
 
 
 def row_of(table: Table, weights: str, hits: int, part: str) -> Table | None:
-    """One row of what was found, if there is one."""
+    """One row of the results, if there is one."""
     wanted = (weights, hits, part)
     return next((r for r in table["found"] if (r["weights"], r["hits"], r["part"]) == wanted), None)
 

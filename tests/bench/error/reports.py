@@ -52,7 +52,7 @@ In bold: the front, where no tried setting is both faster and more exact.
 
 
 def measure(name: str) -> None:
-    """Make the report of a job in out/bench, or what is missing of its references, and write its page."""
+    """Make the report of a job in out/bench, or only its missing references, and write its page."""
     folder = RESULTS / f"report-{name}"
     job = job_named(name, False)
     report = make_report(job, folder, ReportOptions())

@@ -64,6 +64,6 @@ def test_frame_edges_are_where_the_picture_of_another_eye_ends():
     middles = np.arange(W) + 0.5
     assert np.flatnonzero(found[H // 2]).tolist() == np.flatnonzero(np.abs(middles - 10.25) < 1.5).tolist()
     assert not found[H // 2, 20:].any()
-    depth[:] = 0  # what is infinitely far lies in one direction from both
+    depth[:] = 0  # an infinitely far point lies in one direction from both
     found = regions(normal, depth, reflectivity, np.ones((H, W)), cams, 0, 1)["frame edges"]
     assert np.flatnonzero(found[H // 2]).tolist() == [0, W - 1]

@@ -1,6 +1,6 @@
 """The same views in Blender Cycles, where its Python module `bpy` is installed: path tracing, every image from scratch.
 
-Cycles computes another model, all light by paths, so this says what an image of about the same number of samples costs
+Cycles computes another model, all light by paths, so this is the cost of an image of about the same number of samples
 there, not that pictures are the same: 14 samples a pixel on the processor, no denoising, its own default bounces,
 diffuse materials with the mean colour of their texture.
 """

@@ -42,7 +42,7 @@ def by_stage(table: Mapping[str, float]) -> dict[str, float]:
 
 
 def machine(speed: Table, shares: Sequence[float]) -> list[str]:
-    """What it ran on, and how busy that was."""
+    """The machine, and how busy it was."""
     rows = [[name, value] for name, value in speed["machine"].items()]
     idle = f"Other programs took {percent(statistics.median(shares), 2)} of the cores while this was measured"
     worst = f"{percent(max(shares), 2)} at the worst"
@@ -231,7 +231,7 @@ light is the same for all. Errors are relative to the mean of the reference, ave
     for name, table in error.items():
         rows = []
         for variant, t in table["variants"].items():
-            timed = speed.get(name, {}).get("median", {}).get(variant, {})  # only what was timed with the same cameras
+            timed = speed.get(name, {}).get("median", {}).get(variant, {})  # only if timed with the same cameras
             rows.append(
                 [
                     variant,

@@ -1,6 +1,6 @@
 """The page of `framearray view` on an array of the paper's size: `python -m bench view`, from the folder `tests`.
 
-Prints: time and size of what is prepared, time to the first picture, times of drag steps and keys, memory; and the
+Prints: time and size of the prepared files, time to the first picture, times of drag steps and keys, memory; and the
 share of the cores that other programs took just before and after.
 """
 
@@ -215,7 +215,7 @@ def _memory(page: Shown) -> Iterator[list[str]]:
 
 
 def _chromium() -> list[psutil.Process]:
-    """Its processes; what has ended meanwhile is left out."""
+    """Its running processes."""
     found = []
     for process in psutil.Process().children(recursive=True):
         with suppress(psutil.NoSuchProcess):
@@ -225,7 +225,7 @@ def _chromium() -> list[psutil.Process]:
 
 
 def _processor_ms() -> float:
-    """What all processes of Chromium have spent, ms; unlike times, it does not depend on what others do."""
+    """Processor time of all processes of Chromium, ms; unlike wall time, it does not depend on other programs."""
     times = [process.cpu_times() for process in _chromium()]
     return 1e3 * sum(one.user + one.system for one in times)
 
