@@ -17,7 +17,7 @@
         speed.py       the program, its options, its floor and its baselines in turn, several times
         processes.py   start-up time and peak memory, each in a process of its own
         scaling.py     time per image against the size of a job
-        parts.py, page.py   results -> docs/measured/speed.md
+        parts.py, sweeps.py, page.py   results -> docs/measured/speed.md
     error/    the error of images
         error.py       the distance of each variant from a reference
         squares.py     squared bias without noise, and its standard error

@@ -7,6 +7,7 @@ from bench.core.cases import JOBS
 from bench.core.results import Site, folder, load, site_for
 
 from . import parts as pages
+from . import sweeps
 
 
 def write(quick: bool) -> None:
@@ -38,6 +39,6 @@ def render(results: Path, site: Site) -> str:
     if startup:
         parts += pages.startup(startup)
     if scaling:
-        drawn = {sweep: site.link(file) for sweep, file in plots.draw(scaling, site.plots).items()}
-        parts += pages.scaling(scaling, drawn)
+        drawn = {name: site.link(file) for name, file in plots.draw(scaling, site.plots).items()}
+        parts += sweeps.scaling(scaling, drawn)
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
