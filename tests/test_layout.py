@@ -17,6 +17,8 @@ TREES = {name: ast.parse(file.read_text(encoding="utf-8")) for name, file in FIL
 GRAPH = import_graph(PACKAGE)
 
 MOST_ENTRIES = 12  # at the top of the package
+MOST_LINES = 300
+MOST_FUNCTION_LINES = 60
 
 # The files that may import a library; every file may import a library that is not listed.
 DOORS = {
@@ -149,6 +151,17 @@ def test_inside_a_room_imports_are_relative_and_between_rooms_absolute() -> None
             if room(module) and (same or (node.level and not within)):
                 wrong.append(f"{module}: {ast.unparse(node)}")
     assert not wrong
+
+
+def test_files_and_functions_stay_small() -> None:
+    long = {module: n for module, file in FILES.items() if (n := len(file.read_text().splitlines())) > MOST_LINES}
+    assert not long
+    functions = {}
+    for module, tree in TREES.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef) and node.end_lineno:
+                functions[f"{module}.{node.name}"] = node.end_lineno - node.lineno + 1
+    assert {name: n for name, n in functions.items() if n > MOST_FUNCTION_LINES} == {}
 
 
 @pytest.mark.parametrize("library", DOORS)
