@@ -15,12 +15,13 @@ from framearray_cli.engine.images.denoise import require_denoiser
 from framearray_cli.engine.inputs.cameras import Cameras, cameras
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.random import lattice_steps
-from framearray_cli.engine.inputs.surfaces import Surfaces, nearest, surfaces
+from framearray_cli.engine.inputs.surfaces import Surfaces, near_depth, surfaces
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.engine.terms.ambient.fitted import ObscuranceCurve, ambient_by_fit
 from framearray_cli.engine.terms.ambient.from_eyes import EyeWalks, ambient_by_eye, fixed_ambient
 from framearray_cli.engine.terms.ambient.from_lights import LightWalks, ambient_by_light
-from framearray_cli.engine.terms.obscurance import FALLOFFS, ObscuranceSettings
+from framearray_cli.engine.terms.falloff import FALLOFFS
+from framearray_cli.engine.terms.obscurance import ObscuranceSettings
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Eyes, Lights, eyes, lights
 from framearray_cli.scene.paths.planes import Plane
@@ -183,7 +184,7 @@ def _halves(job: Job, *, still: bool) -> int:
 
 def eye_cameras(prepared: Prepared) -> Cameras:
     """Return all eyes as kernels take them; an eye sees nothing nearer than the ray offset from surfaces."""
-    near = nearest(prepared.surfaces)
+    near = near_depth(prepared.surfaces)
     return cameras(prepared.eyes, prepared.job.camera.resolution, prepared.scene.centre, near)
 
 

@@ -9,7 +9,7 @@ import pytest
 from support import tiny
 
 from framearray_cli.engine.images.band import HITS_AT_ONCE
-from framearray_cli.engine.inputs.cameras import OUTSIDE, Cameras, project
+from framearray_cli.engine.inputs.cameras import OUTSIDE, Cameras, project_to_pixel
 from framearray_cli.engine.kernels.kernel import kernel
 from framearray_cli.scene.files import Material
 
@@ -17,7 +17,7 @@ from framearray_cli.scene.files import Material
 @kernel
 def _project(cams: Cameras, vectors: Any, pixels: Any) -> None:
     for i in range(vectors.shape[0]):
-        pixels[i], _ = project(cams, 0, vectors[i, 0], vectors[i, 1], vectors[i, 2])
+        pixels[i], _ = project_to_pixel(cams, 0, vectors[i, 0], vectors[i, 1], vectors[i, 2])
 
 
 def eye(width: int = 8, height: int = 4, focal: float = 4.0) -> Cameras:

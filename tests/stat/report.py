@@ -19,7 +19,7 @@ from support import closed_forms as forms
 from support.stages import write_scene
 from support.ztests import Estimate, chi2_bounds, difference, differing, estimate
 
-from framearray_cli.engine.terms.obscurance import FALLOFFS
+from framearray_cli.engine.terms.falloff import FALLOFFS
 
 HEAD = """# Accuracy
 

@@ -20,10 +20,11 @@ from framearray_cli.engine.inputs.cameras import OUTSIDE as HIDDEN
 from framearray_cli.engine.inputs.cameras import Cameras
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.engine.inputs.random import lattice_steps
-from framearray_cli.engine.inputs.surfaces import nearest
+from framearray_cli.engine.inputs.surfaces import near_depth
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.direct import FAR_END, direct
-from framearray_cli.engine.terms.obscurance import SQRT, ObscuranceSettings, _aim
+from framearray_cli.engine.terms.falloff import SQRT
+from framearray_cli.engine.terms.obscurance import ObscuranceSettings, _write_obscurance_rays
 from framearray_cli.scene.paths.paths import LightPath, lights_without_groups
 from support import tiny
 from support.rooms import INSIDE, ON_WALLS, OUTSIDE, TURN, WIDTH, planes
@@ -95,7 +96,7 @@ def hemisphere_rays(stage: Stage, n_rays: int = 5) -> Count:
         d_max=stage.size, falloff=SQRT, tau=1.0, n_rays=n_rays, step_x=step_x, step_y=step_y, sky=True,
         average=nothing, background=nothing,
     )  # fmt: skip
-    traced = LANES * _aim(stage.hits, rays, stage.n, 0, n_rays, settings)
+    traced = LANES * _write_obscurance_rays(stage.hits, rays, stage.n, 0, n_rays, settings)
     intersect(stage.embree.tracer, rays.packets, traced)
     row = rays.packets.transpose(0, 2, 1).reshape(-1, rays.packets.shape[1])[:traced]
     row = row[row[:, TFAR] >= 0]  # but for lanes that stand for no hit
@@ -117,7 +118,7 @@ def all_round(stage: Stage, positions: Any) -> Cameras:
         focal=size / 2 / np.tan(np.radians(46)),
         width=size,
         height=size,
-        near=nearest(stage.surfaces),
+        near=near_depth(stage.surfaces),
     )
 
 
@@ -171,7 +172,7 @@ def eyes_on_walls(
         position=np.ascontiguousarray(position), right=np.asarray(right, np.float32),
         up=np.asarray(np.cross(right, forward), np.float32), forward=np.ascontiguousarray(forward),
         focal=size / 2 / np.tan(np.radians(fov / 2)), width=size, height=size,
-        near=nearest(stage.surfaces) if near is None else near,
+        near=near_depth(stage.surfaces) if near is None else near,
     )  # fmt: skip
     order, n = pixel_order(size, size), size * size
     packets, hits, cosine, wrong = room_for_hits(n).packets, empty_hits(n), [], []

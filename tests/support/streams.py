@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2, norm
 
-from framearray_cli.engine.inputs.random import CHOICE, HEMISPHERE, PIXEL, PIXEL_SAMPLE, STEPS, stream, word
+from framearray_cli.engine.inputs.random import CHOICE, HEMISPHERE, PIXEL, PIXEL_SAMPLE, STEPS, random_word, stream
 from framearray_cli.engine.kernels.kernel import kernel
 from support.ztests import CHANCE, sidak
 
@@ -30,7 +30,7 @@ Words = Callable[[int, int, Any, int, int], Any]
 @kernel
 def _fill(seed: int, c: int, pixel: Any, sample: int, dimension: int, out: Any) -> None:
     for i in range(out.shape[0]):
-        out[i] = word(stream(seed, c, pixel[i], sample), dimension)
+        out[i] = random_word(stream(seed, c, pixel[i], sample), dimension)
 
 
 def program(seed: int, c: int, pixel: Any, sample: int, dimension: int) -> Any:

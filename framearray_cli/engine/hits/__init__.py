@@ -1,1 +1,1 @@
-"""Rays -> hits: native ones of an eye, and the pixels of other eyes that see them."""
+"""Rays -> hits: native hits of an eye, and the pixels of other eyes that see them."""

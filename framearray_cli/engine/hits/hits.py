@@ -1,6 +1,6 @@
-"""Hits: the surface points that terms are estimated at, and what traced rays tell of them.
+"""Hits: the surface points at which the terms are estimated, and how traced rays become hits.
 
-A batch of hits is a few thousand points in arrays that stay in the cache while every term is computed from them.
+A batch of hits is a few thousand points in arrays that stay in the cache while every term is computed.
 """
 
 from typing import NamedTuple
@@ -18,19 +18,19 @@ ESCAPED, SURFACE = 0, 1
 
 
 class Hits(NamedTuple):
-    """Room for n hits.
+    """Arrays of n hits.
 
     Attributes:
         kind: (n,) SURFACE, or ESCAPED for a ray that left the scene.
         position: (n, 3) the point, centred; for an escaped ray its unit direction.
         geometric: (n, 3) unit normal of the triangle, on the viewer's side: offsets, reprojection, sides.
         shading: (n, 3) unit interpolated normal on that same side: direct light, hemisphere, mirror.
-        offset: (n,) how far rays start above the triangle.
-        reflectivity, specular: (n, 3) diffuse and mirror part; specular is left alone in scenes without mirrors.
+        offset: (n,) height above the triangle at which rays start.
+        reflectivity, specular: (n, 3) diffuse and mirror part; specular is not written in scenes without mirrors.
         incoming: (n, 3) direction of the ray that found the hit, not normalised.
         key: (n,) random stream.
         pixel: (n,) the pixel of the eye that found the hit.
-        half: (n,) which half of its pixel's samples a hit belongs to, 0 or 1.
+        half: (n,) half of its pixel's samples that a hit belongs to, 0 or 1.
     """
 
     kind: Bytes
@@ -47,16 +47,16 @@ class Hits(NamedTuple):
 
 
 class World(NamedTuple):
-    """What rays meet: the surfaces of a scene, and how to trace rays through it."""
+    """The surfaces of a scene, and the tracer that finds them."""
 
     surfaces: Surfaces
     tracer: Tracer
 
 
 def empty_hits(n: int) -> Hits:
-    """Room for n hits; contents are arbitrary.
+    """Allocate n hits with arbitrary contents.
 
-    Behind each array there is room to the end of a packet of rays: hits are written a packet at a time.
+    Each array has memory to the end of a packet, because kernels read and write whole packets of hits.
     """
     whole = -(-n // LANES) * LANES
 
@@ -80,14 +80,14 @@ def empty_hits(n: int) -> Hits:
 
 @inlined
 def reflects(hits: Hits, i: int) -> bool:
-    """Whether hit i is on a surface that reflects diffusely; elsewhere no light needs to be known."""
+    """Whether hit i is on a surface that reflects diffusely; other hits need no light."""
     r = hits.reflectivity
     return bool(hits.kind[i] == SURFACE and (r[i, 0] > 0.0 or r[i, 1] > 0.0 or r[i, 2] > 0.0))
 
 
 @inlined
-def reflecting(hits: Hits, i: int, n: int) -> bool:
-    """`reflects` of hits i to i + 15, of which those from n on do not count."""
+def reflects_in_lanes(hits: Hits, i: int, n: int) -> bool:
+    """`reflects` of hits i to i + 15; False from hit n on."""
     red, green, blue = triples_at(hits.reflectivity, i)
     of_any = (red > np.float32(0.0)) | (green > np.float32(0.0)) | (blue > np.float32(0.0))
     surface = load(hits.kind, i) == np.uint8(SURFACE)
@@ -97,28 +97,28 @@ def reflecting(hits: Hits, i: int, n: int) -> bool:
 
 @inlined
 def lift(hits: Hits, i: int) -> Triple:
-    """From hit i to where rays that leave it start: above the triangle, on the viewer's side."""
+    """Vector from hit i to the start of its rays: above the triangle, on the viewer's side."""
     g, e = hits.geometric, hits.offset[i]
     return e * g[i, 0], e * g[i, 1], e * g[i, 2]
 
 
 @inlined
 def ray_origin(hits: Hits, i: int) -> Triple:
-    """Where rays that leave hit i start."""
+    """Point at which rays from hit i start."""
     p, (x, y, z) = hits.position, lift(hits, i)
     return p[i, 0] + x, p[i, 1] + y, p[i, 2] + z
 
 
 @inlined
 def triple(array: Float32, i: int) -> Triple:
-    """Row i of an (n, 3) array, or rows of it for lanes."""
+    """Row i of an (n, 3) array, or one row per lane."""
     at = i * np.int32(3)
     return gather(array, at), gather(array, at + np.int32(1)), gather(array, at + np.int32(2))
 
 
 @inlined
 def decode_hits(tracer: Tracer, packets: Float32, i: int) -> tuple[bool, int, Real, Real]:
-    """Whether rays i to i + 15 met nothing, and the triangles and places (u, v) that they met, else 0."""
+    """Whether rays i to i + 15 missed, and the triangle and the place (u, v) that each met, 0 after a miss."""
     bits, at = packets.view(np.int32), (i >> 4) * packets.shape[1] * LANES
     triangle = load(bits, at + TRIANGLE * LANES)
     missed = triangle < np.int32(0)
@@ -129,15 +129,21 @@ def decode_hits(tracer: Tracer, packets: Float32, i: int) -> tuple[bool, int, Re
 
 @kernel
 def record_hits(world: World, packets: Float32, n: int, mirrors: bool, hits: Hits) -> None:
-    """Turn traced rays 0 to n - 1 into hits; key and pixel are left alone."""
+    """Turn traced rays 0 to n - 1 into hits; does not write key, pixel and half.
+
+    Args:
+        mirrors: whether to write `specular`.
+    """
     surfaces, tracer = world
     packet = packets.shape[1] * LANES
     for i in range(0, n, LANES):
+        # Read everything before the first write, so that the compiler loads shared values once.
+        # direction, triangle and place (u, v)
         at = (i >> 4) * packet
         dx, dy = load(packets, at + DIRECTION * LANES), load(packets, at + (DIRECTION + 1) * LANES)
         dz = load(packets, at + (DIRECTION + 2) * LANES)
         missed, triangle, u, v = decode_hits(tracer, packets, i)
-        # all is read before anything is written: the compiler then reads what is needed twice only once
+        # point P, normals on the viewer's side, and R
         x, y, z = position_at(surfaces, triangle, u, v)
         length = sqrt(dx * dx + dy * dy + dz * dz)
         gx, gy, gz = geometric_normal(surfaces, triangle, dx, dy, dz)
@@ -149,6 +155,7 @@ def record_hits(world: World, packets: Float32, n: int, mirrors: bool, hits: Hit
             put_triples(
                 hits.specular, i, select(missed, 0.0, s_red), select(missed, 0.0, s_green), select(missed, 0.0, s_blue)
             )
+        # a miss is a hit without reflectivity whose position is the unit direction
         put_triples(hits.incoming, i, dx, dy, dz)
         x, y, z = select(missed, dx / length, x), select(missed, dy / length, y), select(missed, dz / length, z)
         put_triples(hits.position, i, x, y, z)

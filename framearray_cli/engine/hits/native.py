@@ -1,4 +1,4 @@
-"""Eye rays and the hits that they find: native ones, those that only mirror pixels have, and a look for mirrors."""
+"""Native hits of an eye c, additional ones for mirror pixels, and the rays that detect mirrors."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from framearray_cli.base.arrays import Bytes, Float32, Int32, Real
 
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, intersect
 from ..inputs.cameras import Cameras, corner_of, eye_ray
-from ..inputs.random import OTHER_HALF, PIXEL, PIXEL_SAMPLE, r2, stream, word
+from ..inputs.random import OTHER_HALF, PIXEL, PIXEL_SAMPLE, r2, random_word, stream
 from ..inputs.surfaces import specular_at
 from ..kernels.kernel import inlined, keep_on_disk, kernel
 from ..kernels.simd import LANES, doubles, floor, gather, integers, lane_numbers, put_triples, select, store
@@ -17,12 +17,13 @@ from .hits import Hits, World, decode_hits, record_hits
 
 
 class Samples(NamedTuple):
-    """Which samples of which pixels are taken.
+    """The samples of some pixels.
 
     Attributes:
-        seed: of the job.
-        pixels: (n,) of the image.
-        per_pixel: samples of each of them, numbered from `first` on.
+        seed: seed of the job.
+        pixels: (n,) pixels of the image.
+        per_pixel: number of samples per pixel.
+        first: number of a pixel's first sample.
         halves: whether even and odd samples of a pixel are independent of each other.
     """
 
@@ -36,7 +37,7 @@ class Samples(NamedTuple):
 @keep_on_disk
 @nb.njit()
 def pixel_order(width: int, height: int) -> Int32:
-    """All pixels, in 4 x 4 blocks within 32 x 32 tiles.
+    """All pixels, ordered by 4 x 4 blocks within 32 x 32 tiles.
 
     16 neighbours make a coherent packet, and a tile's triangles stay in the cache.
     """
@@ -54,15 +55,17 @@ def pixel_order(width: int, height: int) -> Int32:
 
 
 @inlined
-def _numbers(i: int, n: int) -> int:
-    """The numbers i to i + 15, but none above n - 1."""
+def _lane_numbers_below(i: int, n: int) -> int:
+    """The numbers i to i + 15, clamped to n - 1."""
     number = lane_numbers() + np.int32(i)
     kept: int = select(number < np.int32(n), number, np.int32(n - 1))
     return kept
 
 
 @inlined
-def _shoot(cams: Cameras, c: int, pixel: int, jx: Real, jy: Real, i: int, packets: Float32, hits: Hits) -> None:
+def _write_eye_rays(
+    cams: Cameras, c: int, pixel: int, jx: Real, jy: Real, i: int, packets: Float32, hits: Hits
+) -> None:
     """Write eye rays i to i + 15, through (jx, jy) within the boxes of pixels."""
     x, y = corner_of(cams, pixel)
     dx, dy, dz = eye_ray(cams, c, x + doubles(jx), y + doubles(jy))
@@ -78,21 +81,21 @@ def _shoot(cams: Cameras, c: int, pixel: int, jx: Real, jy: Real, i: int, packet
 
 
 @inlined
-def _shoot_samples(
+def _write_sample_rays(
     cams: Cameras, c: int, samples: Samples, pixel: int, sample: int, i: int, packets: Float32, hits: Hits
 ) -> None:
-    """Write the eye rays of 16 samples; the samples of a pixel are spread by the golden ratio sequence.
+    """Write the eye rays of 16 samples, placed within their pixels by the golden ratio sequence.
 
-    Where they are taken in two halves, even and odd ones are spread each by a sequence of its own.
+    With `halves` even and odd samples follow two independent sequences.
     """
     key, number = stream(samples.seed, c, pixel, PIXEL_SAMPLE), sample
-    random = word(key, PIXEL)
+    random = random_word(key, PIXEL)
     odd = (sample & np.int32(1)) == np.int32(1)
     store(hits.half, i, select(odd, np.uint8(1), np.uint8(0)))
     if samples.halves:
-        random, number = select(odd, word(key, OTHER_HALF), random), integers(sample >> np.int32(1))
+        random, number = select(odd, random_word(key, OTHER_HALF), random), integers(sample >> np.int32(1))
     jx, jy = r2(random, number)
-    _shoot(cams, c, pixel, jx, jy, i, packets, hits)
+    _write_eye_rays(cams, c, pixel, jx, jy, i, packets, hits)
     store(hits.key, i, stream(samples.seed, c, pixel, sample))
 
 
@@ -110,21 +113,23 @@ def native_hits(
 ) -> None:
     """Find native hits first to first + n - 1 of eye c.
 
-    They are numbered by groups of 16 pixels, within a group by sample, then by pixel.
+    Hits are numbered by groups of 16 pixels, within a group by sample, then by pixel.
 
     Args:
-        mirrors: whether the scene has any; else the hits' `specular` is left alone.
+        mirrors: whether the scene has mirrors; otherwise the hits' `specular` is not written.
     """
-    # a frame may have more hits than an int32 counts; the quotients of such numbers are exact in float64
+    # in float64: a frame may have more hits than an int32 counts, and the quotients of such numbers are exact
     n_pixels, of_group = np.float64(samples.pixels.shape[0]), np.float64(16 * samples.per_pixel)
     for i in range(0, n, LANES):
-        number = doubles(_numbers(i, n)) + np.float64(first)
+        # number = 16 per_pixel group + members sample + index of the pixel; the last group may have fewer members
+        number = doubles(_lane_numbers_below(i, n)) + np.float64(first)
         group = floor(number / of_group)
         rest, left = number - group * of_group, n_pixels - group * 16.0
         members = select(left < 16.0, left, 16.0)
         sample = floor(rest / members)
         pixel = gather(samples.pixels, integers(group * 16.0 + rest - sample * members))
-        _shoot_samples(cams, c, samples, pixel, integers(sample) + np.int32(samples.first), i, packets, hits)
+        _write_sample_rays(cams, c, samples, pixel, integers(sample) + np.int32(samples.first), i, packets, hits)
+    # trace from the depth at which eyes begin to see
     intersect(world.tracer, packets, n, True, cams.near)
     record_hits(world, packets, n, mirrors, hits)
 
@@ -133,12 +138,15 @@ def native_hits(
 def extra_hits(
     cams: Cameras, c: int, samples: Samples, first: int, n: int, world: World, packets: Float32, hits: Hits
 ) -> None:
-    """Find additional native hits of some pixels of eye c: numbers first to first + n - 1, counted pixel by pixel."""
+    """Find the additional native hits of mirror pixels of eye c: numbers first to first + n - 1.
+
+    Hits are numbered by pixel, within a pixel by sample.
+    """
     for i in range(0, n, LANES):
-        number = doubles(_numbers(i, n)) + np.float64(first)
+        number = doubles(_lane_numbers_below(i, n)) + np.float64(first)
         at = floor(number / np.float64(samples.per_pixel))
         sample = integers(number - at * np.float64(samples.per_pixel)) + np.int32(samples.first)
-        _shoot_samples(cams, c, samples, gather(samples.pixels, integers(at)), sample, i, packets, hits)
+        _write_sample_rays(cams, c, samples, gather(samples.pixels, integers(at)), sample, i, packets, hits)
     intersect(world.tracer, packets, n, True, cams.near)
     record_hits(world, packets, n, True, hits)
 
@@ -147,12 +155,12 @@ def extra_hits(
 def pilot_hits(
     cams: Cameras, c: int, order: Int32, first: int, n: int, world: World, packets: Float32, hits: Hits
 ) -> None:
-    """Look through the centres of pixels order[first : first + n] for mirrors; of the hits only `specular` is known.
+    """Find mirrors through the centres of pixels order[first : first + n]; writes only `specular` of the hits.
 
-    What they show decides how many samples a pixel gets; no sample's place depends on them, so that is unbiased.
+    The result decides how many samples a pixel gets. No sample's place depends on it, so the image stays unbiased.
     """
     for i in range(0, n, LANES):
-        _shoot(cams, c, gather(order, _numbers(i, n) + np.int32(first)), 0.5, 0.5, i, packets, hits)
+        _write_eye_rays(cams, c, gather(order, _lane_numbers_below(i, n) + np.int32(first)), 0.5, 0.5, i, packets, hits)
     surfaces, tracer = world
     intersect(tracer, packets, n, True, cams.near)
     for i in range(0, n, LANES):
@@ -163,7 +171,7 @@ def pilot_hits(
 
 @kernel
 def flag_mirrors(hits: Hits, n: int, width: int, height: int, flags: Bytes) -> None:
-    """Flag the pixels of mirror hits and their neighbours: a mirror's edge may pass beside the one ray that looked.
+    """Flag the pixels of mirror hits and their neighbours, because a mirror's edge may pass beside the pilot ray.
 
     Args:
         flags: (n_pixels,) set to 1 where a mirror may be seen.

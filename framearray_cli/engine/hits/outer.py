@@ -1,15 +1,16 @@
-"""Camera reuse: native hits become outer hits of neighbour eyes (reproject, test visibility, weigh).
+"""Camera reuse: native hits become outer hits of neighbour eyes (reproject, test visibility, weight) [FA alg. 1].
 
 Notation of the kernels: a hit P of eye c is used in frame j where eye j sees it. The density of the hits of eye k
 at P, per pixel sample, is
 
     p_k = cos(theta_k) f^2 / (d_k^2 cos(alpha_k)^3) = f^2 (N . (O_k - P)) / z_k^3
 
-with z_k the depth of P along the axis of eye k (cos(alpha_k) = z_k / d_k); for an escaped ray of unit direction it is
-f^2 / z_k^3, the d_k being 1. It is zero where P is hidden from k, behind it, outside its image or seen from its back.
+with z_k the depth of P along the axis of eye k (cos(alpha_k) = z_k / d_k). For an escaped ray of unit direction it is
+f^2 / z_k^3, because d_k is 1. It is zero where P is hidden from eye k, behind it, outside its image or seen from its
+back.
 
-`average` [FA] weighs every hit of a frame alike. `balance` weighs a hit of any eye, used in frame j, with
-p_j / sum of n_k p_k over the eyes k of the window of j (balance heuristic, [Veach95]).
+`average` [FA] gives every hit of a frame the weight 1. `balance` gives a hit of any eye, used in frame j, the weight
+p_j / sum of n_k p_k over the eyes k of [j - N_r, j + N_r] (balance heuristic, [Veach95]).
 """
 
 import numpy as np
@@ -17,48 +18,49 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Int32, Real
 
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, is_blocked, occlude
-from ..inputs.cameras import OUTSIDE, Cameras, project
+from ..inputs.cameras import OUTSIDE, Cameras, project_to_pixel
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, compress, doubles, gather, lane_numbers, load, popcount, select, store, triples_at
 from .hits import SURFACE, Hits, triple
-from .rays import Rays
+from .rays import NO_RAYS, Rays
 
-# Visibility rays end this many times as far before an eye as it sees from: their directions are rounded, and an eye
-# that stands on a surface would lose what it sees at less than two degrees above it.
+# Visibility rays end this multiple of `Cameras.near` before an eye. Their directions are rounded: an eye on a surface
+# would otherwise lose what it sees less than two degrees above that surface.
 EYE_END = np.float32(8.0)
 
 
 @inlined
-def _seen(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[int, Real, Real]:
-    """The pixel of eye k that hits i to i + 15 fall into, were nothing in between (OUTSIDE if none).
+def _project_hits(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[int, Real, Real]:
+    """The pixels of eye k into which hits i to i + 15 project, OUTSIDE if none, before any test of visibility.
 
-    Also what the density p_k is made of: how far the surface faces the eye, and the hit's depth.
+    Also the two parts of the density p_k: N . (O_k - P), and the depth z_k.
     """
     o = cams.position
     x, y, z = triples_at(hits.position, i)
     gx, gy, gz = triples_at(hits.geometric, i)
     surface = load(hits.kind, i) == np.uint8(SURFACE)
-    # what is infinitely far lies in one direction from all eyes
+    # P - O_k; an escaped ray has the same direction from all eyes
     from_eye = select(surface, np.float32(1.0), np.float32(0.0))
     dx, dy, dz = x - from_eye * o[k, 0], y - from_eye * o[k, 1], z - from_eye * o[k, 2]
     facing = -(doubles(dx) * doubles(gx) + doubles(dy) * doubles(gy) + doubles(dz) * doubles(gz))
     facing = select(surface, facing, 1.0)
-    pixel, depth = project(cams, k, dx, dy, dz)
+    pixel, depth = project_to_pixel(cams, k, dx, dy, dz)
     return select(facing > 0.0, pixel, np.int32(OUTSIDE)), facing, doubles(depth)
 
 
 @kernel
-def _aim(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays, n: int) -> None:
-    """Write the queued visibility rays between hits and eyes; for an escaped ray, from the eye out of the scene.
+def _write_visibility_rays(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays, n: int) -> None:
+    """Write the n queued visibility rays: from a hit to an eye, or for an escaped ray from the eye out of the scene.
 
-    Eyes see from the depth `cams.near` on, as where they look for hits of their own: rays start there, or end a little
-    before.
+    An eye sees from the depth `cams.near` on, as for its native hits: rays start at that depth, or end near it.
     """
     packet, one, nothing = rays.packets.shape[1] * LANES, np.float32(1.0), np.float32(0.0)
     near, f = np.float32(cams.near), cams.forward
+    # fill the last packet with copies of the last ray
     for ray in range(n, (n + LANES - 1) // LANES * LANES):
         rays.place[ray], rays.number[0, ray] = rays.place[n - 1], rays.number[0, n - 1]
     for first in range(0, n, LANES):
+        # hit i and row of its eye; eye O, point P or direction, geometric normal N
         place = load(rays.place, first)
         row = load(rays.number, first)
         i = place - row * np.int32(stride)
@@ -67,32 +69,36 @@ def _aim(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays, n: 
         px, py, pz = triple(hits.position, i)
         gx, gy, gz = triple(hits.geometric, i)
         e, at = gather(hits.offset, i), (first >> 4) * packet
+        # origin: slightly above P, or O for an escaped ray
         x, y, z = px + e * gx, py + e * gy, pz + e * gz
         store(rays.packets, at + ORIGIN * LANES, select(surface, x, ox))
         store(rays.packets, at + (ORIGIN + 1) * LANES, select(surface, y, oy))
         store(rays.packets, at + (ORIGIN + 2) * LANES, select(surface, z, oz))
+        # direction: to O, or that of the escaped ray
         dx, dy, dz = select(surface, ox - x, px), select(surface, oy - y, py), select(surface, oz - z, pz)
         store(rays.packets, at + DIRECTION * LANES, dx)
         store(rays.packets, at + (DIRECTION + 1) * LANES, dy)
         store(rays.packets, at + (DIRECTION + 2) * LANES, dz)
+        # depth along the optical axis, and cams.near as a fraction of it
         fx, fy, fz = triple(f, row + np.int32(first_eye))
         along = dx * fx + dy * fy + dz * fz
         depth = select(surface, -along, along)
         beyond = depth > near
         share = near / select(beyond, depth, one)
-        end = select(beyond, one - EYE_END * share, -one)  # a hit that is too near is hidden
+        # the ray starts or ends near that depth; a hit nearer than that is hidden
+        end = select(beyond, one - EYE_END * share, -one)
         store(rays.packets, at + TNEAR * LANES, select(surface, nothing, share))
         store(rays.packets, at + TFAR * LANES, select(surface, end, np.float32(np.inf)))
 
 
 @kernel
-def _confirm(
+def _drop_hidden(
     cams: Cameras, first_eye: int, hits: Hits, tracer: Tracer, rays: Rays, n: int, pixel: Int32, density: Float64
 ) -> None:
-    """Trace the queued visibility rays; what is hidden is forgotten."""
+    """Trace the n queued visibility rays; hidden hits become OUTSIDE, with density 0."""
     if n == 0:
         return
-    _aim(cams, first_eye, hits, pixel.shape[1], rays, n)
+    _write_visibility_rays(cams, first_eye, hits, pixel.shape[1], rays, n)
     occlude(tracer, rays.packets, n, True)
     flat_pixel, flat_density = pixel.reshape(pixel.size), density.reshape(density.size)
     for ray in range(n):
@@ -100,7 +106,7 @@ def _confirm(
             flat_pixel[rays.place[ray]] = OUTSIDE
             if density.size > 0:
                 flat_density[rays.place[ray]] = 0.0
-    for first in range(0, n, LANES):  # shadow rays take the same packets, and start at 0
+    for first in range(0, n, LANES):  # shadow rays use the same packets, and start at 0
         store(rays.packets, (first >> 4) * rays.packets.shape[1] * LANES + TNEAR * LANES, np.float32(0.0))
 
 
@@ -116,38 +122,44 @@ def outer_hits(
     pixel: Int32,
     density: Float64,
 ) -> int:
-    """Find where eyes first_eye, first_eye + 1, ... see native hits 0 to n - 1 of eye c, and how densely they do.
+    """Find the pixels in which eyes first_eye, first_eye + 1, ... see native hits 0 to n - 1 of eye c, and p_k.
 
     Args:
         pixel: (n_eyes, >= n, a multiple of LANES) overwritten: the pixel of each eye that sees the hit, or OUTSIDE.
-        density: of the same shape, overwritten: p_k, pixel samples per area; or (0, 0) where nobody asks.
+        density: of the same shape, overwritten: p_k, pixel samples per area; or (0, 0) if it is not needed.
 
     Returns:
         number of visibility rays.
     """
     capacity, stride = rays.packets.shape[0] * LANES, pixel.shape[1]
-    waiting = total = 0
+    # Loop state
+    waiting = NO_RAYS  # rays in the queue
+    total = NO_RAYS  #   rays traced
     for row in range(pixel.shape[0]):
         k = first_eye + row
         for i in range(0, n, LANES):
-            seen, facing, depth = _seen(cams, k, hits, i)
-            if k == c:  # the eye that found the hit sees it, whatever rounding says of borders and grazing angles
+            # conditions 1 and 2 of an outer hit: P faces eye k and projects into its image
+            seen, facing, depth = _project_hits(cams, k, hits, i)
+            # eye c sees its own hits, even where rounding at borders and grazing angles disagrees
+            if k == c:
                 seen = gather(hits.pixel, lane_numbers() + np.int32(i))
             store(pixel, row * stride + i, seen)
             wanted = (seen >= np.int32(0)) & (lane_numbers() < np.int32(n - i))
+            # p_k = f^2 N . (O_k - P) / z_k^3
             if density.size > 0:
                 p = select(seen >= np.int32(0), cams.focal * cams.focal * facing / (depth * depth * depth), 0.0)
                 if k == c:
                     p = select(p > 1e-30, p, 1e-30)
                 store(density, row * stride + i, p)
+            # queue a visibility ray for condition 3, nothing between P and O_k
             if k != c:
                 if waiting > capacity - LANES:
-                    _confirm(cams, first_eye, hits, tracer, rays, waiting, pixel, density)
+                    _drop_hidden(cams, first_eye, hits, tracer, rays, waiting, pixel, density)
                     total, waiting = total + waiting, 0
                 compress(wanted, lane_numbers() + np.int32(row * stride + i), rays.place, waiting)
                 store(rays.number, waiting, np.int32(row))
                 waiting += popcount(wanted)
-    _confirm(cams, first_eye, hits, tracer, rays, waiting, pixel, density)
+    _drop_hidden(cams, first_eye, hits, tracer, rays, waiting, pixel, density)
     return total + waiting
 
 
@@ -162,21 +174,23 @@ def balance_weights(
     density: Float64,
     weight: Float32,
 ) -> None:
-    """Balance-heuristic weights of hits 0 to n - 1 in each frame they are used in.
+    """Compute balance-heuristic weights of hits 0 to n - 1 in each frame that uses them [Veach95].
 
     Args:
-        per_pixel: (n_c,) native hits a pixel n_k of every eye.
+        per_pixel: (n_c,) number n_k of native hits per pixel of every eye.
         pixel, density: (n_eyes, >= n) from `outer_hits`, for all eyes of the windows of all frames of `weight`.
-        weight: (n_frames, >= n) overwritten: frame first_frame + row; 0 where the frame does not see the hit.
+        weight: (n_frames, >= n) overwritten; row r is frame first_frame + r; 0 where the frame does not see the hit.
     """
     last_eye = first_eye + pixel.shape[0] - 1
     for row in range(weight.shape[0]):
         j = first_frame + row
         for i in range(n):
+            # frame j does not see hit i
             weight[row, i] = 0.0
             if pixel[j - first_eye, i] == OUTSIDE:
                 continue
-            total = 0.0
+            # w = p_j / sum of n_k p_k over the window of j
+            total = 0.0  # the sum so far
             for k in range(max(j - n_r, first_eye), min(j + n_r, last_eye) + 1):
                 total += per_pixel[k] * density[k - first_eye, i]
             weight[row, i] = density[j - first_eye, i] / total
@@ -186,12 +200,12 @@ def balance_weights(
 def scale_by_expected_hits(
     hits: Float32, of_pixel: Int32, first_eye: int, n: int, pixel: Int32, density: Float64
 ) -> None:
-    """Make densities of hits of those of a hit a pixel: n_k p_k of p_k, where n_k differs from place to place.
+    """Multiply each density p_k by n_k, the number of native hits per pixel of the block it falls in.
 
     Args:
-        hits: (n_c, n_blocks) native hits a pixel of every eye.
-        of_pixel: (n_pixels,) the block of a pixel.
-        pixel, density: (n_eyes, >= n) from `outer_hits`; densities of hits 0 to n - 1 are changed.
+        hits: (n_c, n_blocks) native hits per pixel, of every eye.
+        of_pixel: (n_pixels,) the block of each pixel.
+        pixel, density: (n_eyes, >= n) from `outer_hits`; changes the densities of hits 0 to n - 1.
     """
     for row in range(pixel.shape[0]):
         for i in range(n):
@@ -201,12 +215,12 @@ def scale_by_expected_hits(
 
 @kernel
 def divide_by_own_hits(hits: Float32, of_pixel: Int32, first_frame: int, n: int, pixel: Int32, weight: Float32) -> None:
-    """Make weights of one hit of those of the n_j hits that frame j's own eye finds there.
+    """Divide each weight by n_j, the number of native hits per pixel that eye j has in the block it falls in.
 
     Args:
         hits, of_pixel: as for `scale_by_expected_hits`.
-        pixel: (n_frames, >= n) that see each hit.
-        weight: (n_frames, >= n) changed.
+        pixel: (n_frames, >= n) the pixel of each frame that sees the hit, or OUTSIDE.
+        weight: (n_frames, >= n) changed in place.
     """
     for row in range(pixel.shape[0]):
         for i in range(n):
@@ -216,36 +230,40 @@ def divide_by_own_hits(hits: Float32, of_pixel: Int32, first_frame: int, n: int,
 
 @kernel
 def sort_by_pixel(pixel: Int32, first: int, last: int, start: Int32, order: Int32) -> None:
-    """Counting sort of the hits that fall into pixels first to last - 1; hits of one pixel stay in their order.
+    """Sort the hits that fall into pixels first to last - 1 by pixel; hits of one pixel keep their order.
 
-    Ranges of pixels may be sorted at the same time: each writes its own part of `start` and `order`.
+    A counting sort. Threads may sort disjoint ranges of pixels at once: each writes its part of `start` and `order`.
 
     Args:
-        pixel: (n,) a pixel or OUTSIDE.
+        pixel: (n,) pixel or OUTSIDE of each hit.
         start: (n_pixels + 1,) written from first to last - 1, and at n_pixels if that is `last`: hits
             order[start[p] : start[p + 1]] fall into pixel p.
         order: (n,) written from start[first] to start[last] - 1.
     """
+    # count the hits of each pixel in `start`
     for p in range(first, last):
         start[p] = 0
-    before = 0
+    before = 0  # hits in pixels below `first`
     for i in range(pixel.shape[0]):
         p = pixel[i]
         if first <= p < last:
             start[p] += 1
         elif OUTSIDE < p < first:
             before += 1
-    end = before
+    # counts -> index of each pixel's first hit
+    end = before  # hits in pixels below p
     for p in range(first, last):
         count = start[p]
         start[p] = end
         end += count
+    # write the hits in order; start[p] moves to the end of pixel p
     for i in range(pixel.shape[0]):
         p = pixel[i]
         if first <= p < last:
             order[start[p]] = i
             start[p] += 1
-    for p in range(last - 1, first, -1):  # each start has moved to its pixel's end, which is the next one's start
+    # the end of a pixel is the start of the next
+    for p in range(last - 1, first, -1):
         start[p] = start[p - 1]
     if first < last:
         start[first] = before

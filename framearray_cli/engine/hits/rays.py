@@ -1,6 +1,6 @@
-"""Rays that wait to be traced together, and what each stands for."""
+"""Queues of rays that kernels trace together, with the hit or light position that each ray belongs to."""
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -11,14 +11,14 @@ from ..kernels.simd import LANES
 
 
 class Rays(NamedTuple):
-    """Room for rays of one kind.
+    """Arrays for rays of one kind.
 
     Attributes:
         packets: (n_packets, rows, 16).
-        place: (n_rays + LANES,) what a ray belongs to: an index, by use.
-        value: (3, n_rays + LANES) what a ray carries if it arrives.
-        number: (2, n_rays + LANES) integers, by use.
-        row: (ROWS, n_rays + LANES) rays number by number, before they become packets: see `terms/direct.py`.
+        place: (n_rays + LANES,) what a ray belongs to: an index, whose meaning depends on the kernel.
+        value: (3, n_rays + LANES) what a ray carries if nothing blocks it.
+        number: (2, n_rays + LANES) further integers, whose meaning depends on the kernel.
+        row: (ROWS, n_rays + LANES) rays as one array per component, before they become packets: see `terms/direct.py`.
     """
 
     packets: Float32
@@ -30,9 +30,12 @@ class Rays(NamedTuple):
 
 # Origin, direction, tfar.
 ROWS = 7
+# Kernels start their counts of rays from this, not from the literal 0: numba would compile every kernel that takes the
+# count a second time, for the constant 0.
+NO_RAYS = cast(int, np.int64(0))
 
 
-def _room(n_rays: int, rows: int, queue: int) -> Rays:
+def _empty_rays(n_rays: int, rows: int, queue: int) -> Rays:
     n_packets = -(-n_rays // LANES)
     capacity = n_packets * LANES
     return Rays(
@@ -45,10 +48,10 @@ def _room(n_rays: int, rows: int, queue: int) -> Rays:
 
 
 def room_for_hits(n_rays: int) -> Rays:
-    """Room for rays that look for first hits."""
-    return _room(n_rays, HIT_ROWS, 0)
+    """Allocate packets for n rays that find first hits."""
+    return _empty_rays(n_rays, HIT_ROWS, 0)
 
 
 def room_for_tests(n_rays: int, n_lights: int) -> Rays:
-    """Room for rays that are only tested for being blocked, from points to up to n_lights lights."""
-    return _room(n_rays, RAY_ROWS, max(-(-n_rays // LANES) * LANES, n_lights) + LANES)
+    """Allocate packets for shadow rays from a batch of points to at most n_lights lights."""
+    return _empty_rays(n_rays, RAY_ROWS, max(-(-n_rays // LANES) * LANES, n_lights) + LANES)

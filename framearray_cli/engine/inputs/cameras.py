@@ -1,6 +1,6 @@
-"""Eye rays through pixels, and their inverse: points to pixels of an eye.
+"""Eye rays through pixels, and their inverse, from points to pixels of an eye.
 
-A pixel's filter is its own box. Pixel (0, 0) is the top left one; images are (height, width).
+A pixel's filter is the box of the pixel. Pixel (0, 0) is the top left one; images are (height, width).
 """
 
 from typing import NamedTuple
@@ -24,7 +24,7 @@ class Cameras(NamedTuple):
         right, up, forward: (n_c, 3) unit axes of each eye.
         focal: focal length in pixels.
         width, height: resolution in pixels.
-        near: depth along the optical axis from which on an eye sees, scene units; see `surface.nearest`.
+        near: depth along the optical axis at which an eye begins to see, scene units; see `near_depth`.
     """
 
     position: Points
@@ -38,7 +38,7 @@ class Cameras(NamedTuple):
 
 
 def cameras(eyes: Eyes, resolution: tuple[int, int], centre: Float64, near: float = 0.0) -> Cameras:
-    """Gather what kernels read of the eyes; the cast to float32 happens here, after centring."""
+    """Make the arrays of all eyes that kernels read: centred, then cast to float32."""
     world_from_camera = eyes.world_from_camera
     width, height = resolution
     return Cameras(
@@ -74,7 +74,7 @@ def corner_of(cams: Cameras, pixel: int) -> tuple[float, float]:
 
 
 @inlined
-def project(cams: Cameras, k: int, x: Real, y: Real, z: Real) -> tuple[int, Real]:
+def project_to_pixel(cams: Cameras, k: int, x: Real, y: Real, z: Real) -> tuple[int, Real]:
     """The pixel of eye k that sees the vector (x, y, z) from the eye, and the vector's length along the optical axis.
 
     The pixel is OUTSIDE where the vector points behind the eye or out of the image. Takes numbers or lanes.

@@ -1,7 +1,7 @@
-"""Lights as kernels take them: where they are, how strong, and the irradiance they give at a point.
+"""Positions and strengths of all lights, in the form that kernels read.
 
-Light reuse keeps one number a hit and a light position where it can. All sources of a light position often share one
-colour; then a hit stores a scalar irradiance and the colour is multiplied in once a pixel. Only where sources of
+Light reuse stores one number per hit and light position if possible. Often all sources of a light position share one
+colour. Then a hit stores a scalar irradiance, and the colour is multiplied in once per pixel. Only where sources of
 different colours shine together does a hit store three channels.
 """
 
@@ -17,14 +17,14 @@ POINT, DIRECTIONAL = 0, 1
 
 
 class LightArrays(NamedTuple):
-    """All sources of a job for kernels; they read it a packet of light positions at a time, see `padded`.
+    """All sources of a job for kernels, which read packets of light positions; see `pad_lights`.
 
     Attributes:
         kind: (n_sources,) POINT or DIRECTIONAL.
         vector: (n_sources, 3, n_lights) position, centred, or the unit direction that light travels.
         strength: (n_sources, channels, n_lights) W/sr or W/m2 in units of `colour`; 1 or 3 channels.
-        lit: (n_sources, n_lights) 1 where a source shines at all, else 0.
-        colour: (n_lights, 3) what a stored irradiance is multiplied with; ones where there are 3 channels.
+        lit: (n_sources, n_lights) 1 where a source shines, else 0.
+        colour: (n_lights, 3) factor of a stored irradiance; ones if there are 3 channels.
     """
 
     kind: Int32
@@ -44,8 +44,8 @@ class LightArrays(NamedTuple):
         return int(self.vector.shape[2])
 
 
-def padded(lights: LightArrays) -> LightArrays:
-    """The same lights, with room behind each array for what a kernel reads beyond its end, and ignores."""
+def pad_lights(lights: LightArrays) -> LightArrays:
+    """Copy the lights, with memory behind each array: kernels read whole packets and ignore what is behind the end."""
 
     def copied(array: Any) -> Any:
         room = with_room(array.shape, array.dtype, fill=1)
@@ -56,7 +56,7 @@ def padded(lights: LightArrays) -> LightArrays:
 
 
 def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
-    """Gather what kernels read of the lights, and find out whether one channel does."""
+    """Make the arrays of all lights that kernels read, with one channel if that suffices."""
     intensity = np.stack([source.intensity for source in lights.sources])  # (n_sources, n_lights, 3)
     vector = np.stack(
         [source.vector - centre if source.kind == "point" else source.vector for source in lights.sources]
@@ -77,11 +77,11 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
         lit=np.asarray((intensity > 0).any(axis=-1), np.float32),
         colour=np.asarray(colour, np.float32),
     )
-    return padded(found)
+    return pad_lights(found)
 
 
 def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
-    """Some of the light positions, in the same units."""
+    """The lights at some of their positions, in the same units."""
     some = list(at)
     found = LightArrays(
         kind=lights.kind,
@@ -90,4 +90,4 @@ def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
         lit=lights.lit[:, some],
         colour=lights.colour[some],
     )
-    return padded(found)
+    return pad_lights(found)

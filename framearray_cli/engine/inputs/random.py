@@ -1,7 +1,7 @@
 """Random numbers keyed by (seed, camera, pixel, sample, dimension), and the maps from them to directions.
 
-A number depends on its key alone, never on order: images are the same for any number of threads and any split of the
-job. Lights are not part of the key, so that all lights share hits and directions and movies do not flicker.
+A number depends only on its key, never on order: images are the same for any number of threads and any split of the
+job. The light position is not part of the key, so that all lights share hits and directions and movies do not flicker.
 
 The maps take numbers or lanes of numbers.
 """
@@ -15,10 +15,10 @@ from framearray_cli.base.arrays import Real, Triple
 from ..kernels.kernel import inlined
 from ..kernels.simd import integers, reals, select, sqrt, words
 
-# Dimensions: one stream a purpose.
+# Dimensions: one stream per purpose.
 PIXEL, HEMISPHERE, CHOICE, STEPS, OTHER_HALF = 0, 1, 2, 3, 4
-PIXEL_SAMPLE = (1 << 16) - 1  # the sample index, which no hit has, of what all samples of a pixel share
-HOLE_SAMPLE = (1 << 16) - 2  # that of the hit of a pixel that no other hit reaches
+PIXEL_SAMPLE = (1 << 16) - 1  # sample index, used by no hit, of numbers that all samples of a pixel share
+HOLE_SAMPLE = (1 << 16) - 2  # sample index of the hit of a pixel that no other hit reaches
 
 # The two-dimensional golden ratio sequence (Roberts 2018): multiples of (1/g, 1/g^2), g = 1.3247..., in units of 2^-32.
 R2_X = np.uint32(3242174889)
@@ -43,13 +43,13 @@ def stream(seed: int, c: int, pixel: int, sample: int) -> np.uint64:
 
 
 @inlined
-def word(key: np.uint64, dimension: int) -> np.uint64:
+def random_word(key: np.uint64, dimension: int) -> np.uint64:
     """64 random bits: dimension `dimension` of a stream."""
     return mix(key + np.uint64(dimension) * np.uint64(0x9E3779B97F4A7C15))
 
 
 @inlined
-def shifted(bits: np.uint64, i: int, step_x: int | np.uint32, step_y: int | np.uint32) -> tuple[Real, Real]:
+def lattice_point(bits: np.uint64, i: int, step_x: int | np.uint32, step_y: int | np.uint32) -> tuple[Real, Real]:
     """Point i of a lattice, shifted by the random bits: uniform in [0, 1)^2; steps in units of 2^-32."""
     x = integers(bits) + integers(i) * np.int32(np.uint32(step_x))
     y = integers(bits >> np.uint64(32)) + integers(i) * np.int32(np.uint32(step_y))
@@ -59,12 +59,12 @@ def shifted(bits: np.uint64, i: int, step_x: int | np.uint32, step_y: int | np.u
 
 @inlined
 def r2(bits: np.uint64, i: int) -> tuple[Real, Real]:
-    """Point i of the golden ratio sequence, shifted by the random bits: well spread however many follow."""
-    return shifted(bits, i, R2_X, R2_Y)
+    """Point i of the golden ratio sequence, shifted by the random bits; evenly spread for any number of points."""
+    return lattice_point(bits, i, R2_X, R2_Y)
 
 
 def lattice_steps(n: int) -> tuple[int, int]:
-    """Steps of a lattice of n points for `shifted`: better spread than n points of the golden ratio sequence.
+    """Steps of a lattice of n points for `lattice_point`, spread more evenly than n of the golden ratio sequence.
 
     Point i is (i / n, a i / n) mod 1, with a next to n / golden ratio and coprime to n (a Korobov lattice). The
     variance of a mean over 5 points is about half of that of 5 points of the sequence.
@@ -78,7 +78,7 @@ def lattice_steps(n: int) -> tuple[int, int]:
 def disc(u: Real, v: Real) -> tuple[Real, Real]:
     """Uniform point of the unit disc by Shirley and Chiu's concentric map.
 
-    Its angles stay within pi/4, so short series do for cosine and sine.
+    Its angles stay within pi/4, so short series suffice for cosine and sine.
     """
     one = np.float32(1.0)
     a, b = np.float32(2.0) * u - one, np.float32(2.0) * v - one
@@ -116,9 +116,9 @@ def cosine_direction(nx: Real, ny: Real, nz: Real, u: Real, v: Real) -> Triple:
 
 @inlined
 def above(x: Real, y: Real, z: Real, gx: Real, gy: Real, gz: Real) -> Triple:
-    """A direction mirrored into the half-space of g where it points below the surface.
+    """The direction (x, y, z), mirrored into the half-space of the normal g if it points below the surface.
 
-    Interpolated normals tilt the hemisphere; what falls below the triangle would only meet the triangle itself.
+    Interpolated normals tilt the hemisphere; a ray below the triangle would only meet the triangle itself.
     """
     height = x * gx + y * gy + z * gz
     twice = select(height < np.float32(0.0), np.float32(2.0) * height, np.float32(0.0))

@@ -1,8 +1,8 @@
-"""What a ray finds where it meets a triangle: point, normals, reflectivity, opacity.
+"""Point, normals, reflectivity and opacity where a ray meets a triangle.
 
-The functions take one triangle with numbers u and v, or sixteen with lanes of them.
+The functions take one triangle with barycentric numbers u and v, or sixteen in lanes.
 
-`Surfaces` is `Scene` as kernels take it; an array of length 0 stands for a feature that the scene does not use.
+`Surfaces` is `Scene` in the form that kernels read; an array of length 0 is a feature that the scene does not use.
 """
 
 from typing import NamedTuple
@@ -16,17 +16,17 @@ from framearray_cli.scene.scene import Scene
 from ..kernels.kernel import inlined
 from ..kernels.simd import doubles, floor, gather, integers, popcount, reals, select, sqrt
 
-# Ray offsets: 16 units in the last place of the largest coordinate of the triangle. Of the rules tried it alone had
-# no self-hits and no leaks at every scale (docs/decisions/ray-offsets.md).
+# Ray offsets: 16 units in the last place of the largest coordinate of the triangle. Of the rules tried, this is the
+# only one without self-hits and leaks at every scale (docs/decisions/ray-offsets.md).
 OFFSET_ULPS = 16.0
 ULP = 2.0**-23
 
 
 class Surfaces(NamedTuple):
-    """Arrays of `Scene` for kernels, plus what is derived from them once.
+    """Arrays of `Scene` for kernels, and arrays derived from them once.
 
     Attributes:
-        offset: (n,) how far a ray that leaves a triangle starts above it, scene units.
+        offset: (n,) height above the triangle at which rays that leave it start, scene units.
         linear: (256,) sRGB code value -> linear value.
         plain: (n_materials,) whether a material looks the same everywhere on its triangles.
         total: (n_materials, 3) diffuse and mirror reflectivity of a plain material together; 1 of others.
@@ -53,7 +53,7 @@ class Surfaces(NamedTuple):
 
 
 def surfaces(scene: Scene) -> Surfaces:
-    """Gather what kernels read of a scene; shares memory with it."""
+    """Gather the arrays of a scene that kernels read; they share memory with it."""
     largest = np.abs(scene.corners).max(axis=(1, 2), initial=0.0)
     arrays = {name: np.ascontiguousarray(getattr(scene, name)) for name in Surfaces._fields if hasattr(scene, name)}
     textured = (scene.reflectivity_texture >= 0) | (scene.specular_texture >= 0)
@@ -67,10 +67,10 @@ def surfaces(scene: Scene) -> Surfaces:
     )
 
 
-def nearest(s: Surfaces) -> float:
-    """The depth from which on eyes see a scene: the largest ray offset, scene units.
+def near_depth(s: Surfaces) -> float:
+    """The depth at which eyes begin to see a scene: the largest ray offset, scene units.
 
-    An eye exactly on a surface sees nothing of it, whichever side float32 rounds it to.
+    An eye exactly on a surface sees nothing of it, no matter to which side float32 rounds it.
     """
     return float(s.offset.max(initial=0.0))
 
@@ -88,7 +88,7 @@ def _texel(s: Surfaces, texel: int, weight: Real) -> tuple[Real, Real, Real, Rea
 
 
 @inlined
-def _place_in(s: Surfaces, texture: int) -> tuple[int, int, int]:
+def _texture_extent(s: Surfaces, texture: int) -> tuple[int, int, int]:
     """First texel, width and height of a texture."""
     at = texture * np.int32(3)
     return gather(s.textures, at), gather(s.textures, at + np.int32(1)), gather(s.textures, at + np.int32(2))
@@ -97,11 +97,11 @@ def _place_in(s: Surfaces, texture: int) -> tuple[int, int, int]:
 @inlined
 def texture_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real, Real, Real]:
     """Bilinear, repeating look-up: linear red, green, blue, and alpha; texel centres at half-integers, v upwards."""
-    first, width, height = _place_in(s, texture)
+    first, width, height = _texture_extent(s, texture)
     u, v = doubles(u), doubles(v)
     x = (u - floor(u)) * doubles(width) - 0.5
     y = (1.0 - (v - floor(v))) * doubles(height) - 0.5
-    finite = (x * x < 1e18) & (y * y < 1e18)  # a non-finite coordinate has no texel; the first stands in
+    finite = (x * x < 1e18) & (y * y < 1e18)  # the first texel replaces that of a non-finite coordinate
     x, y = select(finite, x, 0.0), select(finite, y, 0.0)
     one, fx, fy = np.float32(1.0), reals(x - floor(x)), reals(y - floor(y))
     left, top = integers(floor(x)), integers(floor(y))  # -1 to the last
@@ -119,10 +119,10 @@ def texture_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real,
 
 @inlined
 def nearest_texel_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real, Real, Real, Real]:
-    """The texel that a place lies in, as `texture_at` gives it half-way between neighbours."""
-    first, width, height = _place_in(s, texture)
+    """The texel that contains a place; equal to `texture_at` at the texel's centre."""
+    first, width, height = _texture_extent(s, texture)
     x, y = (u - floor(u)) * reals(width), (v - floor(v)) * reals(height)
-    # what rounding moved to the far border is the next repetition's first; so is what is not finite
+    # a coordinate that rounds to the far border, or is not finite, belongs to the first texel of the next repetition
     x = select((x >= np.float32(0.0)) & (x < reals(width)), x, np.float32(0.0))
     y = select((y >= np.float32(0.0)) & (y < reals(height)), y, np.float32(0.0))
     row = height - np.int32(1) - integers(y)
@@ -131,8 +131,8 @@ def nearest_texel_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real,
 
 
 @inlined
-def _between(corners: Float32, triangle: int, stride: int, axis: int, u: Real, v: Real, w: Real) -> Real:
-    """One coordinate of what stands at the corners of a triangle, at barycentric (u, v), w = 1 - u - v."""
+def _interpolate(corners: Float32, triangle: int, stride: int, axis: int, u: Real, v: Real, w: Real) -> Real:
+    """One component of corner values, interpolated at barycentric (u, v), w = 1 - u - v."""
     at = triangle * np.int32(3 * stride) + np.int32(axis)
     a, b, c = gather(corners, at), gather(corners, at + np.int32(stride)), gather(corners, at + np.int32(2 * stride))
     mixed: Real = w * a + u * b + v * c
@@ -140,14 +140,14 @@ def _between(corners: Float32, triangle: int, stride: int, axis: int, u: Real, v
 
 
 @inlined
-def _tinted(
+def _multiply_texture(
     s: Surfaces, red: Real, green: Real, blue: Real, texture: int, triangle: int, u: Real, v: Real, blended: bool
 ) -> Triple:
-    """A material's factor times texture, blended between texels or not, and corner colour."""
+    """A material's factor times its texture times the corner colour; `blended`: between texels."""
     w = np.float32(1.0) - u - v
     textured = texture >= np.int32(0)
     if popcount(textured) > 0:
-        tu, tv = _between(s.uvs, triangle, 2, 0, u, v, w), _between(s.uvs, triangle, 2, 1, u, v, w)
+        tu, tv = _interpolate(s.uvs, triangle, 2, 0, u, v, w), _interpolate(s.uvs, triangle, 2, 1, u, v, w)
         texture = select(textured, texture, np.int32(0))
         r, g, b, _ = texture_at(s, texture, tu, tv) if blended else nearest_texel_at(s, texture, tu, tv)
         red, green, blue = (
@@ -156,9 +156,9 @@ def _tinted(
             select(textured, blue * b, blue),
         )
     if s.colours.shape[0] > 0:
-        red = red * _between(s.colours, triangle, 3, 0, u, v, w)
-        green = green * _between(s.colours, triangle, 3, 1, u, v, w)
-        blue = blue * _between(s.colours, triangle, 3, 2, u, v, w)
+        red = red * _interpolate(s.colours, triangle, 3, 0, u, v, w)
+        green = green * _interpolate(s.colours, triangle, 3, 1, u, v, w)
+        blue = blue * _interpolate(s.colours, triangle, 3, 2, u, v, w)
     return red, green, blue
 
 
@@ -169,7 +169,7 @@ def reflectivity_at(s: Surfaces, triangle: int, u: Real, v: Real, blended: bool 
     at = m * np.int32(3)
     red, green = gather(s.reflectivity, at), gather(s.reflectivity, at + np.int32(1))
     blue = gather(s.reflectivity, at + np.int32(2))
-    return _tinted(s, red, green, blue, gather(s.reflectivity_texture, m), triangle, u, v, blended)
+    return _multiply_texture(s, red, green, blue, gather(s.reflectivity_texture, m), triangle, u, v, blended)
 
 
 @inlined
@@ -181,15 +181,15 @@ def specular_at(s: Surfaces, triangle: int, u: Real, v: Real, blended: bool = Tr
     blue = gather(s.specular, at + np.int32(2))
     if popcount((red > nothing) | (green > nothing) | (blue > nothing)) > 0:
         texture = gather(s.specular_texture, m)
-        red, green, blue = _tinted(s, red, green, blue, texture, triangle, u, v, blended)
+        red, green, blue = _multiply_texture(s, red, green, blue, texture, triangle, u, v, blended)
     return red, green, blue
 
 
 @inlined
 def total_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
-    """Diffuse and mirror reflectivity together, of the nearest texel: what an average over many places takes.
+    """Diffuse plus mirror reflectivity of the nearest texel, for averages over many places.
 
-    Blending between texels would cost three times as much and leave the average as it is.
+    Blending between texels would cost three times as much without changing the average.
     """
     red, green, blue = reflectivity_at(s, triangle, u, v, False)
     s_red, s_green, s_blue = specular_at(s, triangle, u, v, False)
@@ -203,25 +203,25 @@ def is_cut_out(s: Surfaces, triangle: int, u: Real, v: Real) -> bool:
     alpha = s.alpha[m]
     if s.alpha_texture[m] >= 0:
         w = np.float32(1.0) - u - v
-        tu, tv = _between(s.uvs, triangle, 2, 0, u, v, w), _between(s.uvs, triangle, 2, 1, u, v, w)
+        tu, tv = _interpolate(s.uvs, triangle, 2, 0, u, v, w), _interpolate(s.uvs, triangle, 2, 1, u, v, w)
         alpha *= texture_at(s, s.alpha_texture[m], tu, tv)[3]
     return bool(alpha < s.alpha_cutoff[m])
 
 
 @inlined
 def position_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
-    """The point itself, from the corners: nearer to the triangle than origin + t * direction is."""
+    """The point, interpolated between the corners: closer to the triangle than origin + t * direction."""
     u64, v64 = doubles(u), doubles(v)
     w64 = 1.0 - u64 - v64
     return (
-        reals(_weighed(s.corners, triangle, 0, u64, v64, w64)),
-        reals(_weighed(s.corners, triangle, 1, u64, v64, w64)),
-        reals(_weighed(s.corners, triangle, 2, u64, v64, w64)),
+        reals(_interpolate_point(s.corners, triangle, 0, u64, v64, w64)),
+        reals(_interpolate_point(s.corners, triangle, 1, u64, v64, w64)),
+        reals(_interpolate_point(s.corners, triangle, 2, u64, v64, w64)),
     )
 
 
 @inlined
-def _weighed(corners: Corners, triangle: int, axis: int, u: Real, v: Real, w: Real) -> Real:
+def _interpolate_point(corners: Corners, triangle: int, axis: int, u: Real, v: Real, w: Real) -> Real:
     at = triangle * np.int32(9) + np.int32(axis)
     a, b, c = gather(corners, at), gather(corners, at + np.int32(3)), gather(corners, at + np.int32(6))
     mixed: Real = w * doubles(a) + u * doubles(b) + v * doubles(c)
@@ -249,12 +249,12 @@ def geometric_normal(s: Surfaces, triangle: int, dx: Real, dy: Real, dz: Real) -
 
 @inlined
 def shading_normal(s: Surfaces, triangle: int, u: Real, v: Real, gx: Real, gy: Real, gz: Real) -> Triple:
-    """Interpolated unit normal on the side of the geometric normal (gx, gy, gz), or that one where there is none."""
+    """Interpolated unit normal on the side of the geometric normal (gx, gy, gz), or (gx, gy, gz) if there is none."""
     if s.normals.shape[0] == 0:
         return gx, gy, gz
     w, k = np.float32(1.0) - u - v, s.normals
-    x, y = _between(k, triangle, 3, 0, u, v, w), _between(k, triangle, 3, 1, u, v, w)
-    z = _between(k, triangle, 3, 2, u, v, w)
+    x, y = _interpolate(k, triangle, 3, 0, u, v, w), _interpolate(k, triangle, 3, 1, u, v, w)
+    z = _interpolate(k, triangle, 3, 2, u, v, w)
     square = x * x + y * y + z * z
     none = square < np.float32(1e-12)  # corner normals that cancel give no direction
     scale = np.float32(1.0) / sqrt(select(none, np.float32(1.0), square))

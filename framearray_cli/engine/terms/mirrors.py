@@ -1,7 +1,7 @@
-"""Mirrors: what native hits see by reflection, followed to a depth; never reused.
+"""Mirrors: what native hits see by reflection, followed to a depth. Outer hits never have this part.
 
-A reflected hit is a hit like any other, seen through a tint: it gets direct light of all light positions and its
-obscurance. So what a mirror pixel needs is a list of reflected hits, each with throughput times reflectivity.
+A reflected hit is a hit like any other, seen through a tint t: it gets direct light of all light positions and its own
+W. So a mirror pixel needs a list of reflected hits, each with the product of reflectivities along its path.
 """
 
 import numpy as np
@@ -10,6 +10,7 @@ from framearray_cli.base.arrays import Float32, Rgb
 
 from ..embree.packets import intersect, set_ray
 from ..hits.hits import SURFACE, Hits, World, record_hits
+from ..hits.rays import NO_RAYS
 from ..inputs.random import mix
 from ..kernels.kernel import inlined, kernel
 
@@ -33,35 +34,40 @@ def count_mirrors(hits: Hits, n: int) -> int:
 def reflect(
     hits: Hits, n: int, throughput: Rgb, world: World, packets: Float32, reflected: Hits, reflected_throughput: Rgb
 ) -> int:
-    """Follow hits 0 to n - 1 one mirror bounce; those that are no mirror end here.
+    """Follow hits 0 to n - 1 through one mirror bounce; paths at hits that are no mirror end.
 
     Args:
-        throughput: (n, 3) what the path so far lets through.
-        reflected: overwritten with the hits (or escapes) behind the mirrors, in order; random streams move on.
-        reflected_throughput: (n, 3) overwritten: throughput times the mirror's reflectivity.
+        throughput: (n, 3) tint t of each path so far.
+        reflected: overwritten with the hits (or escapes) behind the mirrors, in order, with their next random streams.
+        reflected_throughput: (n, 3) overwritten: t times the mirror's reflectivity.
 
     Returns:
-        number of reflected hits, which is that of rays.
+        number of reflected hits, which is the number of rays.
     """
-    m = 0
+    # Loop state
+    m = NO_RAYS  # reflected rays
     for i in range(n):
         if not _is_mirror(hits, i):
             continue
+        # mirror the direction d at the shading normal s
         d, g, s, p = hits.incoming[i], hits.geometric[i], hits.shading[i], hits.position[i]
         along = np.float32(2.0) * (d[0] * s[0] + d[1] * s[1] + d[2] * s[2])
         x, y, z = d[0] - along * s[0], d[1] - along * s[1], d[2] - along * s[2]
-        if not x * g[0] + y * g[1] + z * g[2] > 0.0:  # the interpolated normal reflects into the surface: use the other
+        # where that points into the surface, mirror it at the geometric normal g
+        if not x * g[0] + y * g[1] + z * g[2] > 0.0:
             along = np.float32(2.0) * (d[0] * g[0] + d[1] * g[1] + d[2] * g[2])
             x, y, z = d[0] - along * g[0], d[1] - along * g[1], d[2] - along * g[2]
+        # the reflected ray starts slightly above the mirror
         e = hits.offset[i]
         ox, oy, oz = p[0] + e * g[0], p[1] + e * g[1], p[2] + e * g[2]
         set_ray(packets, m, ox, oy, oz, x, y, z, np.float32(np.inf))
+        # its tint, random stream, pixel and half
         for channel in range(3):
             reflected_throughput[m, channel] = throughput[i, channel] * hits.specular[i, channel]
         reflected.key[m] = mix(hits.key[i])
         reflected.pixel[m] = hits.pixel[i]
         reflected.half[m] = hits.half[i]
         m += 1
-    intersect(world.tracer, packets, m, True)
+    intersect(world.tracer, packets, m, True, 0.0)
     record_hits(world, packets, m, True, reflected)
     return m

@@ -13,7 +13,7 @@ from bench.core.results import Table
 from bench.core.rooms import room
 from bench.core.steady import steady
 from framearray_cli.base.arrays import Float32, Float64
-from framearray_cli.engine.inputs.lights import DIRECTIONAL, LightArrays, padded
+from framearray_cli.engine.inputs.lights import DIRECTIONAL, LightArrays, pad_lights
 from framearray_cli.render.prepare import open_embree, plan_work
 from framearray_cli.report.settings import Settings
 from framearray_cli.scene.paths.paths import Eyes
@@ -87,7 +87,7 @@ def resampled(lights: LightArrays, at: Float64) -> LightArrays:
         lit=np.ceil(_between(lights.lit, at, 1)),
         colour=_between(lights.colour, at, 0),
     )
-    return padded(found)
+    return pad_lights(found)
 
 
 def _between(values: Float32, at: Float64, axis: int) -> Float32:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import tiny
 
-from framearray_cli.engine.inputs.cameras import OUTSIDE, Cameras, cameras, eye_ray, project
+from framearray_cli.engine.inputs.cameras import OUTSIDE, Cameras, cameras, eye_ray, project_to_pixel
 from framearray_cli.engine.kernels.kernel import kernel
 from framearray_cli.scene.paths.paths import Eyes, eyes
 
@@ -16,13 +16,15 @@ def there_and_back(cams: Cameras, c: int, jitter: Any, length: float, pixels: An
     """Project a point on the eye ray through each pixel, at a depth."""
     for p in range(cams.width * cams.height):
         x, y, z = eye_ray(cams, c, p % cams.width + jitter[p, 0], p // cams.width + jitter[p, 1])
-        pixels[p], depths[p] = project(cams, c, np.float32(x * length), np.float32(y * length), np.float32(z * length))
+        pixels[p], depths[p] = project_to_pixel(
+            cams, c, np.float32(x * length), np.float32(y * length), np.float32(z * length)
+        )
 
 
 @kernel
 def project_all(cams: Cameras, c: int, vectors: Any, pixels: Any) -> None:
     for i in range(vectors.shape[0]):
-        pixels[i], _ = project(cams, c, vectors[i, 0], vectors[i, 1], vectors[i, 2])
+        pixels[i], _ = project_to_pixel(cams, c, vectors[i, 0], vectors[i, 1], vectors[i, 2])
 
 
 def some_cameras(resolution: tuple[int, int] = (400, 300), fov: float = 60.0) -> Cameras:

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2, norm
 from support import oracle_random as twin
 
-from framearray_cli.engine.inputs.random import above, cosine_direction, disc, lattice_steps, r2, stream, word
+from framearray_cli.engine.inputs.random import above, cosine_direction, disc, lattice_steps, r2, random_word, stream
 from framearray_cli.engine.kernels.kernel import kernel
 
 # Chance that a right generator fails one test; with some hundred tests here, 1e-6 makes it 1e-4 for all of them.
@@ -27,7 +27,7 @@ def fill_keys(seed: int, c: int, n_pixels: int, n_samples: int, out: Any) -> Non
 def fill_points(keys: Any, dimension: int, i: int, out: Any) -> None:
     """Point i of a dimension of each key."""
     for k in range(keys.shape[0]):
-        out[k, 0], out[k, 1] = r2(word(keys[k], dimension), i)
+        out[k, 0], out[k, 1] = r2(random_word(keys[k], dimension), i)
 
 
 @kernel

@@ -9,7 +9,7 @@ import pytest
 from support import tiny
 from support.triangles import everything, find_numbers
 
-from framearray_cli.engine.inputs.cameras import OUTSIDE, Cameras, project
+from framearray_cli.engine.inputs.cameras import OUTSIDE, Cameras, project_to_pixel
 from framearray_cli.engine.inputs.random import above, cosine_direction, disc
 from framearray_cli.engine.inputs.surfaces import Surfaces, nearest_texel_at, surfaces, texture_at
 from framearray_cli.engine.kernels.kernel import kernel
@@ -476,14 +476,14 @@ def test_what_lanes_find_on_triangles_is_what_numbers_find() -> None:
 @kernel
 def project_numbers(cams: Cameras, k: int, points: Any, pixel: Any, depth: Any) -> None:
     for i in range(points.shape[1]):
-        pixel[i], depth[i] = project(cams, k, points[0, i], points[1, i], points[2, i])
+        pixel[i], depth[i] = project_to_pixel(cams, k, points[0, i], points[1, i], points[2, i])
 
 
 @kernel
 def project_lanes(cams: Cameras, k: int, points: Any, pixel: Any, depth: Any) -> None:
     n = points.shape[1]
     for i in range(0, n, LANES):
-        seen, far = project(cams, k, load(points, i), load(points, n + i), load(points, 2 * n + i))
+        seen, far = project_to_pixel(cams, k, load(points, i), load(points, n + i), load(points, 2 * n + i))
         store(pixel, i, seen)
         store(depth, i, far)
 

@@ -1,1 +1,1 @@
-"""The ambient light I_A, by each method."""
+"""The ambient intensity I_A, by each method."""

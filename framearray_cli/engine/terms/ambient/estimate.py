@@ -1,8 +1,8 @@
-"""Average ambient intensity I_A[l] = E[l] / pi, found before the first frame [FA eq. 2].
+"""Average ambient intensity I_A[l] = E[l] / pi, estimated before the first frame [FA eq. 2].
 
-E[l] is the average irradiance, all bounces counted, over the surface sides that light on its way to the eye comes
-from. Here is what all methods share: the estimate, batches of walks and their errors. `method = "eye"` is in
-`ambient_eye.py`, `method = "light"` in `ambient_light.py`, `method = "fit"` in `ambient_fit.py`.
+E[l] is the average irradiance, all bounces counted, over the surface sides from which light comes to the eye. This
+module has what all methods share: the estimate, batches of walks and their errors. `method = "eye"` is in
+`from_eyes.py`, `method = "light"` in `from_lights.py`, `method = "fit"` in `fitted.py`.
 """
 
 import math
@@ -24,9 +24,9 @@ from ..direct import direct
 from .walks import DIFFUSE, Walkers, advance, choose_step, deposit, empty_walkers
 
 BATCH = 4096
-# Automatic number of walks: as many batches as it takes to reach this standard error, within bounds.
+# Automatic number of walks: batches are added until the standard error is this small, within bounds.
 TARGET_ERROR = 0.01
-FEWEST, MOST = BATCH, 64 * BATCH
+MIN_WALKS, MAX_WALKS = BATCH, 64 * BATCH
 # No walk of a frame uses this camera index, so that ambient walks are independent of every frame's samples.
 AMBIENT_STREAM = (1 << 20) - 1
 
@@ -40,9 +40,9 @@ class Ambient:
         standard_error: (n_lights,) of I_A, relative to it, of the mean of the channels; 0 where I_A is 0 or given.
         reflectivity: (3,) average reflectivity over the surfaces that E averages; where there are none, over those
             that the eyes see.
-        paths: walks or particles a light position that were spent.
-        rays: rays that were traced.
-        notes: what the user should know, e.g. that the target error was not reached.
+        paths: number of walks, or of particles per light position.
+        rays: number of rays traced.
+        notes: messages for the user, e.g. that the estimate missed its target error.
     """
 
     intensity: Rgb
@@ -53,20 +53,20 @@ class Ambient:
     notes: tuple[str, ...] = ()
 
     def for_lights(self, block: range) -> "Ambient":
-        """The estimate of some light positions."""
+        """The estimate of a block of light positions."""
         span = slice(block.start, block.stop)
         return replace(self, intensity=self.intensity[span], standard_error=self.standard_error[span])
 
 
 class Workspace:
-    """Arrays for one batch of walks, kept from batch to batch."""
+    """Arrays for one batch of walks, reused from batch to batch."""
 
     def __init__(self, lights: LightArrays) -> None:
         self.hit_packets = room_for_hits(BATCH).packets
         self.test_rays = room_for_tests(BATCH, lights.n_lights)
         self.hits = [empty_hits(BATCH), empty_hits(BATCH)]
         self.walkers = [empty_walkers(BATCH), empty_walkers(BATCH)]
-        self.leaves = np.zeros((BATCH, 3), np.float32)  # whole packets, as all that kernels read of hits
+        self.leaves = np.zeros((BATCH, 3), np.float32)  # whole packets, because kernels read hits in packets
         self.irradiance = np.empty((BATCH, lights.channels, lights.n_lights), np.float32)
         self.sums = np.empty((BATCH, 3, lights.n_lights), np.float32)
         self.rays = 0
@@ -80,27 +80,27 @@ class Workspace:
         return n
 
     def diffuse_direct(self, n: int, lights: LightArrays, tracer: Tracer) -> Float32:
-        """Direct irradiance at the first n current hits, (n, channels, n_lights); 0 where no walk goes on diffusely."""
+        """Direct irradiance at the n current hits, (n, channels, n_lights); 0 where no walk leaves diffusely."""
         self.leaves[:n] = self.walkers[0].step[:n, None] == DIFFUSE
         hits = self.hits[0]._replace(reflectivity=self.leaves)
         self.rays += direct(hits, n, lights, tracer, self.test_rays, self.irradiance)
         return self.irradiance[:n]
 
-    def gather(self, n: int, lights: LightArrays, tracer: Tracer) -> None:
+    def add_direct(self, n: int, lights: LightArrays, tracer: Tracer) -> None:
         """Add the direct irradiance at every current hit that its walk leaves diffusely to the walk's sums."""
         deposit(self.walkers[0], n, self.diffuse_direct(n, lights, tracer), lights.colour, self.sums)
 
 
 @kernel
-def choose_all(hits: Hits, walkers: Walkers, n: int, must_go_on: bool) -> None:
+def choose_steps(hits: Hits, walkers: Walkers, n: int, must_go_on: bool) -> None:
     """Choose the next step of walks 0 to n - 1; see `choose_step`."""
     for i in range(n):
         choose_step(hits, walkers, i, must_go_on)
 
 
 @kernel
-def see_background(hits: Hits, walkers: Walkers, n: int, background: Rgb, sums: Float32) -> None:
-    """A walk that leaves the scene brings the background's irradiance: pi times its radiance."""
+def add_background(hits: Hits, walkers: Walkers, n: int, background: Rgb, sums: Float32) -> None:
+    """Add the background's irradiance, pi times its radiance, to the sums of walks that left the scene."""
     for i in range(n):
         if hits.kind[i] == ESCAPED:
             for channel in range(3):
@@ -109,14 +109,14 @@ def see_background(hits: Hits, walkers: Walkers, n: int, background: Rgb, sums: 
                     sums[walkers.walk[i], channel, l] += light
 
 
-class Sum(Protocol):
-    """What a batch of walks found, and what several did together."""
+class Sums(Protocol):
+    """Sums over a batch of walks, which add up to those of several batches."""
 
-    def and_then(self, other: Self) -> Self:
-        """Both together."""
+    def plus(self, other: Self) -> Self:
+        """Sums over the walks of both."""
 
 
-S = TypeVar("S", bound=Sum)
+S = TypeVar("S", bound=Sums)
 
 
 def walk_until(
@@ -125,16 +125,16 @@ def walk_until(
     paths: int | None,
     lights: LightArrays,
     threads: int,
-    most: int = MOST,
+    most: int = MAX_WALKS,
 ) -> S:
-    """Walk batch after batch, as many at once as there are threads; what lies behind the last one is forgotten.
+    """Walk batches in order, one per thread at a time, until they are enough; later batches do not count.
 
     So the result is the same for any number of threads.
 
     Args:
-        batch: walks a number of walks from a first one on.
-        enough: whether what the batches so far have found will do.
-        paths: the number of walks; None: `most`.
+        batch: follows n walks from number `first` on, given (work, first, n).
+        enough: whether the sums so far suffice.
+        paths: largest number of walks; None: `most`.
     """
     limit, found = paths or most, None
     workspaces = [Workspace(lights) for _ in range(threads)]
@@ -143,7 +143,7 @@ def walk_until(
             starts = range(group, min(group + threads * BATCH, limit), BATCH)
             sizes = [min(BATCH, limit - first) for first in starts]
             for walked in pool.map(batch, workspaces, starts, sizes):
-                found = found.and_then(walked) if found else walked
+                found = found.plus(walked) if found else walked
                 if enough(found):
                     return found
     assert found
@@ -158,14 +158,16 @@ def relative_error(total: Float64, squares: Float64, count: int) -> Float64:
     return error
 
 
-def summarise(mean: Float64, error: Float64, reflectivity: Float64, spent: int, rays: int, automatic: bool) -> Ambient:
-    """Put an estimate together, and note where it missed its target.
+def make_ambient(
+    mean: Float64, error: Float64, reflectivity: Float64, spent: int, rays: int, automatic: bool
+) -> Ambient:
+    """Make an estimate of means, with a note if it missed its target error.
 
     Args:
         mean: (3, n_lights) irradiance.
-        error: (n_lights,) its relative standard error.
+        error: (n_lights,) relative standard error.
         reflectivity: (3,) average.
-        automatic: whether the number of walks was left to the program.
+        automatic: whether the program chose the number of walks.
     """
     notes: tuple[str, ...] = ()
     if automatic and error.max() > TARGET_ERROR:

@@ -1,16 +1,16 @@
-"""I_A[l] as the value that makes obscurances as bright as path tracing, on average over what the eyes see.
+"""I_A[l] that makes obscurances as bright as path tracing, on average over what the eyes see: `method = "fit"`.
 
-At a diffuse point P that an eye sees, the model says that indirect light is R(P) I_A[l] W(P); walks from P find what it
-is: R(P) G(P, l), G the mean radiance that arrives, all bounces and mirrors counted. Both are means over cosine
-distributed directions, and each walk from P gives one direction of either:
+At a diffuse point P that an eye sees, the model's indirect light is R(P) I_A[l] W(P) [FA eq. 2]. Walks from P estimate
+the true one, R(P) G(P, l), with G the mean radiance that arrives, all bounces and mirrors counted. Both are means over
+cosine-distributed directions, and each walk from P gives one direction of either:
 
-    W:  R(Q) rho(d) for the first point Q that the walk meets within d_max, the average reflectivity else
+    W:  R(Q) rho(d) for the first point Q that the walk meets within d_max, otherwise the average reflectivity
     G:  the radiance that leaves Q towards P, or the background's
 
     I_A[l] = sum of R(P) G(P, l) / sum of R(P) W(P), over all walks, channel by channel
 
-So what obscurances get wrong (light does not arrive alike from everywhere) is wrong in single places, not in the mean
-over the pictures. With `outside = "background"` what escapes is known exactly, and counts on neither side.
+So the error of obscurances (light does not arrive uniformly from all directions) affects single places, not the mean
+over the images. With `outside = "background"` the light of escaping rays is known exactly, and counts on neither side.
 """
 
 from dataclasses import dataclass, fields
@@ -20,14 +20,14 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64
 
 from ...kernels.kernel import kernel
-from ..obscurance import rho
-from .estimate import FEWEST, TARGET_ERROR, Ambient, Workspace, choose_all, summarise, walk_until
-from .from_eyes import EyeWalks, Steps, start_at_eyes, to_first_vertices, total_reflectivity
+from ..falloff import rho
+from .estimate import MIN_WALKS, TARGET_ERROR, Ambient, Workspace, choose_steps, make_ambient, walk_until
+from .from_eyes import DiffuseSteps, EyeWalks, start_at_eyes, total_reflectivity, walk_to_first_vertices
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ObscuranceCurve:
-    """The falloff of the job's obscurances; see `ObscuranceSettings`."""
+    """Range and falloff of the job's obscurances; see `ObscuranceSettings`."""
 
     d_max: float
     falloff: int
@@ -42,16 +42,17 @@ def _rho_of(falloff: int, tau: float, x: Float32, out: Float32) -> None:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Fitted:
+class _FitSums:
     """Sums over walks.
 
     Attributes:
-        spent, rays: walks that were started, and rays.
-        count, reflectivity: first vertices, and the sum of their reflectivities, (3,).
+        spent, rays: number of walks and of rays.
+        count, reflectivity: number of first vertices, and the sum of their reflectivities, (3,).
         light: (3, n_lights) sum of R(P) G, as irradiance: times pi.
         near, far: (3,) sums of R(P) R(Q) rho(d) over walks that meet something within d_max, of R(P) over the others.
-        squares, products: (n_lights,) sums of y^2 and x y, and `own`, of x^2: y and x a walk's share in `light` and in
+        squares, products: (n_lights,) sums of y^2 and of x y. y and x are the terms of one walk in `light` and in
             near + far, as means over the channels, with the average reflectivity of the batch.
+        own: sum of x^2.
     """
 
     spent: int
@@ -65,13 +66,13 @@ class _Fitted:
     products: Float64
     own: float
 
-    def and_then(self, other: "_Fitted") -> "_Fitted":
-        """Both together."""
-        return _Fitted(**{f.name: getattr(self, f.name) + getattr(other, f.name) for f in fields(self)})
+    def plus(self, other: "_FitSums") -> "_FitSums":
+        """Sums over the walks of both."""
+        return _FitSums(**{f.name: getattr(self, f.name) + getattr(other, f.name) for f in fields(self)})
 
     @property
     def average(self) -> Float64:
-        """Reflectivity that stands in for what is not met within d_max, (3,)."""
+        """Average reflectivity, (3,), which stands in for R(Q) where a walk meets nothing within d_max."""
         average: Float64 = self.reflectivity / max(self.count, 1)
         return average
 
@@ -90,7 +91,7 @@ class _Fitted:
 
     @property
     def error(self) -> Float64:
-        """(n_lights,) standard error of the mean of the channels, relative to it: that of a ratio of means."""
+        """(n_lights,) relative standard error of the mean of the channels, as that of a ratio of means."""
         w, y = self.obscurance.mean(), self.light.mean(axis=0)
         ratio = y / w if w > 0 else np.zeros_like(y)
         square = np.maximum(self.squares - 2 * ratio * self.products + ratio**2 * self.own, 0.0)
@@ -99,16 +100,16 @@ class _Fitted:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Fit:
-    """Walks that are compared with obscurances."""
+class _FitWalks:
+    """Walks from the eyes, and the obscurances that they are compared with."""
 
     walks: EyeWalks
     curve: ObscuranceCurve
 
-    def batch(self, work: Workspace, first: int, n: int) -> _Fitted:
-        """Walk walks first to first + n - 1 to their ends."""
+    def batch(self, work: Workspace, first: int, n: int) -> _FitSums:
+        """Follow walks first to first + n - 1 to their ends."""
         walks, rays = self.walks, work.rays
-        steps = Steps(
+        steps = DiffuseSteps(
             reflectivity=np.zeros((n, 3), np.float32),
             position=np.zeros((n, 3), np.float32),
             distance=np.full(n, np.nan, np.float32),
@@ -116,7 +117,7 @@ class _Fit:
         hits, walkers = work.hits[0], work.walkers[0]
         start_at_eyes(walks.cams, walks.seed, first, n, walks.world, work.hit_packets, hits, walkers)
         work.rays += n
-        left = to_first_vertices(work, n, walks.world, steps)
+        left = walk_to_first_vertices(work, n, walks.world, steps)
         hits, walkers = work.hits[0], work.walkers[0]
         met = np.zeros((n, 3))  # R(Q) of each walk
         walk = walkers.walk[:left].copy()
@@ -124,19 +125,18 @@ class _Fit:
         count, reflectivity = left, total_reflectivity(hits, left)
         work.sums[:] = 0.0
         walkers.throughput[:left] = 1.0
-        choose_all(hits, walkers, left, False)  # Q may be a mirror: what leaves it is followed, not guessed
+        choose_steps(hits, walkers, left, False)  # Q may be a mirror, which the walk follows too
         walks.follow(work, left)
         return self._sums(work.sums[:n].astype(np.float64), steps, met, count, reflectivity, n, work.rays - rays)
 
     def _sums(
-        self, gathered: Float64, steps: Steps, met: Float64, count: int, reflectivity: Float64, n: int, rays: int
-    ) -> _Fitted:
-        """Put a batch together.
+        self, gathered: Float64, steps: DiffuseSteps, met: Float64, count: int, reflectivity: Float64, n: int, rays: int
+    ) -> _FitSums:
+        """Sum a batch.
 
         Args:
-            gathered: (n, 3, n_lights) irradiance that each walk brings to its first vertex's own place: pi times the
-                radiance that leaves the vertex.
-            met: (n, 3) reflectivity of first vertices.
+            gathered: (n, 3, n_lights) pi times the radiance that leaves the first vertex of each walk.
+            met: (n, 3) reflectivity R(Q) of first vertices.
         """
         curve, source = self.curve, steps.reflectivity.astype(np.float64)
         escaped = np.isinf(steps.distance)
@@ -158,7 +158,7 @@ class _Fit:
         average = reflectivity / max(count, 1)
         x = (source * (share + np.where(far[:, None], average, 0.0))).mean(axis=1)
         y = light.mean(axis=1)
-        return _Fitted(
+        return _FitSums(
             spent=n,
             rays=rays,
             count=count,
@@ -173,14 +173,14 @@ class _Fit:
 
 
 def ambient_by_fit(walks: EyeWalks, curve: ObscuranceCurve, threads: int = 1) -> Ambient:
-    """Estimate I_A[l] so that indirect light is right on average over the pictures."""
+    """Estimate I_A[l] so that indirect light is right on average over the images."""
 
-    def enough(found: _Fitted) -> bool:
-        if walks.paths is not None or found.spent < FEWEST or not found.count:
+    def enough(found: _FitSums) -> bool:
+        if walks.paths is not None or found.spent < MIN_WALKS or not found.count:
             return False
         return bool(found.error.max() <= TARGET_ERROR)
 
-    found = walk_until(_Fit(walks=walks, curve=curve).batch, enough, walks.paths, walks.lights, threads)
-    return summarise(
+    found = walk_until(_FitWalks(walks=walks, curve=curve).batch, enough, walks.paths, walks.lights, threads)
+    return make_ambient(
         found.irradiance, found.error, found.average, found.spent, found.rays, walks.paths is None and found.count > 0
     )

@@ -1,7 +1,7 @@
 """I_A by walks from the eyes [FA eq. 2]: `method = "eye"`.
 
-E[l] is its mean over the vertex after the eye hit of walks that start at eyes of the whole camera path: those are the
-places that obscurance rays see. The same walks serve every light position, so I_A does not flicker.
+Walks start at eyes of the whole camera path. E[l] is the mean irradiance at the vertex after the eye hit, the places
+that obscurance rays see. The same walks serve every light position l, so I_A does not flicker.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -16,18 +16,18 @@ from ...embree.packets import intersect, set_ray
 from ...hits.hits import SURFACE, Hits, World, record_hits
 from ...inputs.cameras import Cameras, eye_ray
 from ...inputs.lights import LightArrays
-from ...inputs.random import CHOICE, PIXEL, PIXEL_SAMPLE, r2, stream, word
+from ...inputs.random import CHOICE, PIXEL, PIXEL_SAMPLE, r2, random_word, stream
 from ...kernels.kernel import kernel
 from .estimate import (
     AMBIENT_STREAM,
-    FEWEST,
+    MIN_WALKS,
     TARGET_ERROR,
     Ambient,
     Workspace,
-    choose_all,
+    add_background,
+    choose_steps,
+    make_ambient,
     relative_error,
-    see_background,
-    summarise,
     walk_until,
 )
 from .walks import DIFFUSE, MAX_BOUNCES, MIRROR, Walkers
@@ -44,19 +44,22 @@ def start_at_eyes(
     hits: Hits,
     walkers: Walkers,
 ) -> None:
-    """Shoot eye rays first to first + n - 1, spread over all images of the camera path by the golden ratio sequence."""
+    """Trace eye rays first to first + n - 1, spread over all images of the camera path by the golden ratio sequence."""
+    # shifts of the sequences, the same for all walks
     key = stream(seed, AMBIENT_STREAM, 0, PIXEL_SAMPLE)
-    start = word(key, PIXEL)
-    turn, _ = r2(word(key, CHOICE), 0)
+    start = random_word(key, PIXEL)
+    turn, _ = r2(random_word(key, CHOICE), 0)
     n_c = cams.position.shape[0]
     for i in range(n):
+        # place (a, b) in the image, and eye c by the golden section, a third sequence independent of the other two
         a, b = r2(start, first + i)
-        # which eye: the golden section, a third sequence that does not march in step with the other two
         e = (turn + (first + i) * 0.6180339887498949) % 1.0
         c = min(int(e * n_c), n_c - 1)
+        # the eye ray
         dx, dy, dz = eye_ray(cams, c, a * cams.width, b * cams.height)
         o = cams.position
         set_ray(packets, i, o[c, 0], o[c, 1], o[c, 2], dx, dy, dz, np.float32(np.inf))
+        # its random stream and number; throughput 1
         hits.key[i] = stream(seed, AMBIENT_STREAM, (first + i) & ((1 << 28) - 1), 0)
         walkers.walk[i] = i
         for channel in range(3):
@@ -66,51 +69,54 @@ def start_at_eyes(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Steps:
-    """The diffuse step of each walk, from what an eye sees to the first vertex; by number of the walk.
+class DiffuseSteps:
+    """The diffuse step of each walk, from the point that an eye sees to the first vertex; rows are walks.
 
     Attributes:
-        reflectivity: (n, 3) where the step starts.
-        position: (n, 3) the same place.
-        distance: (n,) to the first vertex; inf where there is none, NaN for walks that saw no diffuse surface.
+        reflectivity: (n, 3) R of the point where the step starts.
+        position: (n, 3) that point.
+        distance: (n,) distance to the first vertex; inf if there is none, NaN if the eye sees no diffuse surface.
     """
 
     reflectivity: Rgb
     position: Points
     distance: Float32
 
-    def begin(self, hits: Hits, walkers: Walkers, n: int) -> None:
-        """Note where diffuse steps of walks 0 to n - 1 start."""
+    def record_start(self, hits: Hits, walkers: Walkers, n: int) -> None:
+        """Record where diffuse steps of walks 0 to n - 1 start."""
         leaves = walkers.step[:n] == DIFFUSE
         walk = walkers.walk[:n][leaves]
         self.reflectivity[walk], self.position[walk] = hits.reflectivity[:n][leaves], hits.position[:n][leaves]
 
-    def end(self, hits: Hits, walkers: Walkers, n: int) -> None:
-        """Note where they end."""
+    def record_end(self, hits: Hits, walkers: Walkers, n: int) -> None:
+        """Record how far diffuse steps of walks 0 to n - 1 went."""
         came = walkers.step[:n] == DIFFUSE
         walk, surface = walkers.walk[:n][came], hits.kind[:n][came] == SURFACE
         away = np.linalg.norm(hits.position[:n][came] - self.position[walk], axis=-1)
         self.distance[walk] = np.where(surface, away, np.inf)
 
 
-def to_first_vertices(work: Workspace, n: int, world: World, steps: Steps | None = None) -> int:
-    """From eye hits, through mirrors, to the diffuse hit that the eye sees, and on to the vertex after it.
+def walk_to_first_vertices(work: Workspace, n: int, world: World, steps: DiffuseSteps | None = None) -> int:
+    """Move walks from eye hits through mirrors to the diffuse hit that the eye sees, and to the vertex after it.
 
-    Walks that wait there while others still pass mirrors are set aside.
+    Walks that arrive early are set aside until the others have passed their mirrors.
 
     Args:
-        steps: is told of the last, diffuse step.
+        steps: records the last, diffuse step.
+
+    Returns:
+        number of walks that arrived.
     """
     done_hits, done_walkers, found = [], [], 0
     for _ in range(MAX_BOUNCES):
         hits, walkers = work.hits[0], work.walkers[0]
-        choose_all(hits, walkers, n, True)
+        choose_steps(hits, walkers, n, True)
         if steps:
-            steps.begin(hits, walkers, n)
+            steps.record_start(hits, walkers, n)
         n = work.advance(n, world)
         hits, walkers = work.hits[0], work.walkers[0]
         if steps:
-            steps.end(hits, walkers, n)
+            steps.record_end(hits, walkers, n)
         arrived = (walkers.step[:n] == DIFFUSE) & (hits.kind[:n] == SURFACE)
         done_hits.append(Hits(*(a[:n][arrived] for a in hits)))
         done_walkers.append(Walkers(*(a[:n][arrived] for a in walkers)))
@@ -130,14 +136,14 @@ def to_first_vertices(work: Workspace, n: int, world: World, steps: Steps | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Walked:
-    """What a batch of walks from the eyes found.
+class _EyeSums:
+    """Sums over a batch of walks from the eyes.
 
     Attributes:
-        spent, rays: walks that were started, and rays.
-        seen, seen_reflectivity: surfaces that the eyes saw, and the sum of their reflectivities, (3,).
-        count, reflectivity: first vertices that E averages, and the sum of their reflectivities, (3,).
-        total, squares: (3, n_lights) and (n_lights,) sums over walks of E, and of the square of its channels' mean.
+        spent, rays: number of walks and of rays.
+        seen, seen_reflectivity: number of surfaces that the eyes saw, and the sum of their reflectivities, (3,).
+        count, reflectivity: number of first vertices, over which E averages, and the sum of their reflectivities, (3,).
+        total, squares: (3, n_lights) sum of E over walks, and (n_lights,) sum of the squared mean of its channels.
     """
 
     spent: int
@@ -149,17 +155,17 @@ class _Walked:
     total: Float64
     squares: Float64
 
-    def and_then(self, other: "_Walked") -> "_Walked":
-        """Both together."""
-        return _Walked(**{f.name: getattr(self, f.name) + getattr(other, f.name) for f in fields(self)})
+    def plus(self, other: "_EyeSums") -> "_EyeSums":
+        """Sums over the walks of both."""
+        return _EyeSums(**{f.name: getattr(self, f.name) + getattr(other, f.name) for f in fields(self)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class EyeWalks:
-    """Where walks from the eyes start and what they meet; arguments of `ambient_by_eye`.
+    """Start, scene and lights of walks from the eyes; arguments of `ambient_by_eye`.
 
     Attributes:
-        paths: number of walks; None: as many as a standard error of 1 % takes, at most `MOST`.
+        paths: number of walks; None: enough for a standard error of 1 %, at most `MAX_WALKS`.
         background: (3,) radiance outside the scene; it lights the surfaces too.
     """
 
@@ -170,14 +176,14 @@ class EyeWalks:
     lights: LightArrays
     background: Rgb
 
-    def batch(self, work: Workspace, first: int, n: int) -> _Walked:
-        """Walk walks first to first + n - 1 to their ends."""
+    def batch(self, work: Workspace, first: int, n: int) -> _EyeSums:
+        """Follow walks first to first + n - 1 to their ends."""
         rays = work.rays
         hits, walkers = work.hits[0], work.walkers[0]
         start_at_eyes(self.cams, self.seed, first, n, self.world, work.hit_packets, hits, walkers)
         work.rays += n
         seen, seen_reflectivity = int((hits.kind[:n] == SURFACE).sum()), total_reflectivity(hits, n)
-        left = to_first_vertices(work, n, self.world)
+        left = walk_to_first_vertices(work, n, self.world)
         work.sums[:] = 0.0
         hits, walkers = work.hits[0], work.walkers[0]
         reflectivity = total_reflectivity(hits, left)
@@ -186,7 +192,7 @@ class EyeWalks:
         walks = walkers.walk[:left].copy()
         self.follow(work, left)
         gathered = work.sums[walks].astype(np.float64)  # (n_walks, 3, n_lights)
-        return _Walked(
+        return _EyeSums(
             spent=n,
             rays=work.rays - rays,
             seen=seen,
@@ -198,13 +204,13 @@ class EyeWalks:
         )
 
     def follow(self, work: Workspace, n: int) -> None:
-        """Walk the current walks to their ends, and gather the light of every vertex in `work.sums`."""
+        """Follow the n current walks to their ends, and add the light at every vertex to `work.sums`."""
         for _ in range(MAX_BOUNCES):
-            work.gather(n, self.lights, self.world.tracer)
+            work.add_direct(n, self.lights, self.world.tracer)
             n = work.advance(n, self.world)
             if self.background.any():
-                see_background(work.hits[0], work.walkers[0], n, self.background, work.sums)
-            choose_all(work.hits[0], work.walkers[0], n, False)
+                add_background(work.hits[0], work.walkers[0], n, self.background, work.sums)
+            choose_steps(work.hits[0], work.walkers[0], n, False)
             if n == 0:
                 break
 
@@ -212,25 +218,25 @@ class EyeWalks:
 def ambient_by_eye(walks: EyeWalks, threads: int = 1) -> Ambient:
     """Estimate I_A[l] and the average reflectivity by walks from the eyes; the same for any number of threads."""
 
-    def enough(found: _Walked) -> bool:
-        if walks.paths is not None or found.spent < FEWEST or not found.count:
+    def enough(found: _EyeSums) -> bool:
+        if walks.paths is not None or found.spent < MIN_WALKS or not found.count:
             return False
         return bool(relative_error(found.total, found.squares, found.count).max() <= TARGET_ERROR)
 
     found = walk_until(walks.batch, enough, walks.paths, walks.lights, threads)
     if found.count == 0:
         reflectivity = found.seen_reflectivity / max(found.seen, 1)
-        dark = summarise(found.total, found.squares, reflectivity, found.spent, found.rays, False)
+        dark = make_ambient(found.total, found.squares, reflectivity, found.spent, found.rays, False)
         note = "ambient: no walk from the eyes met a second surface, so the ambient intensity is 0"
         return replace(dark, notes=(note,))
     error = relative_error(found.total, found.squares, found.count)
     mean, reflectivity = found.total / found.count, found.reflectivity / found.count
-    return summarise(mean, error, reflectivity, found.spent, found.rays, walks.paths is None)
+    return make_ambient(mean, error, reflectivity, found.spent, found.rays, walks.paths is None)
 
 
 def fixed_ambient(walks: EyeWalks, intensity: Rgb, threads: int = 1) -> Ambient:
-    """Take I_A from the job, (3,); only the average reflectivity is estimated, by a few walks."""
-    walked = ambient_by_eye(replace(walks, paths=walks.paths or FEWEST), threads)
+    """Take I_A from the job, (3,), and estimate only the average reflectivity, by a few walks."""
+    walked = ambient_by_eye(replace(walks, paths=walks.paths or MIN_WALKS), threads)
     n_lights = walks.lights.n_lights
     return replace(walked, intensity=np.tile(intensity, (n_lights, 1)), standard_error=np.zeros(n_lights), notes=())
 

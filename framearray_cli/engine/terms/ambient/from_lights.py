@@ -2,8 +2,7 @@
 
     E[l] = (power deposited, all bounces) / (area of the surface sides that light of position l reaches)
 
-In a house the sunlit roof and facade count too, which makes E[l] too large indoors; `method = "eye"` does not have
-that fault.
+In a house the sunlit roof and facade count too, which makes E[l] too large indoors. `method = "eye"` avoids that.
 """
 
 from dataclasses import dataclass, field
@@ -16,22 +15,22 @@ from framearray_cli.base.arrays import Float32, Float64, Real, Rgb, Triple
 from ...embree.packets import intersect, set_ray
 from ...hits.hits import SURFACE, Hits, World, record_hits
 from ...inputs.lights import DIRECTIONAL, LightArrays
-from ...inputs.random import PIXEL, cosine_direction, r2, stream, word
+from ...inputs.random import PIXEL, cosine_direction, r2, random_word, stream
 from ...kernels.kernel import inlined, kernel
-from .estimate import AMBIENT_STREAM, BATCH, TARGET_ERROR, Ambient, Workspace, choose_all, summarise, walk_until
-from .lit_area import KEPT_BOUNCES, Pool, empty_pool, keep, reached_area
+from .estimate import AMBIENT_STREAM, BATCH, TARGET_ERROR, Ambient, Workspace, choose_steps, make_ambient, walk_until
+from .lit_area import KEPT_BOUNCES, VertexPool, empty_vertices, keep_vertices, measure_lit_area
 from .walks import MAX_BOUNCES, Walkers
 
-# Particles a light position, unless the job says.
-MOST = 32 * BATCH
-# Particles are spread so well that their mean errs less than independent ones would. So they are dealt to groups of
-# independent random numbers, and the groups' means tell the error, to 1 in sqrt(2 (GROUPS - 1)).
+# Particles per light position, unless the job sets ambient.paths.
+MAX_PARTICLES = 32 * BATCH
+# Particles are spread so evenly that their mean errs less than that of independent ones. So they are divided into
+# groups with independent random numbers. The spread of the groups' means gives the error, to 1 in sqrt(2 (GROUPS - 1)).
 GROUPS = 32
-_PARTICLES, _STARTS = 1, 3  # sample numbers of the walks, and of where they start
+_PARTICLES, _STARTS = 1, 3  # sample numbers of the walks, and of their starting points
 
 
 @inlined
-def _on_sphere(a: Real, b: Real) -> Triple:
+def _sphere_direction(a: Real, b: Real) -> Triple:
     """Uniform unit direction."""
     z = 1.0 - 2.0 * b
     r, angle = np.sqrt(np.maximum(0.0, 1.0 - z * z)), 2.0 * np.pi * a
@@ -39,7 +38,7 @@ def _on_sphere(a: Real, b: Real) -> Triple:
 
 
 @inlined
-def _across(x: Real, y: Real, z: Real, a: Real, b: Real) -> Triple:
+def _disc_point(x: Real, y: Real, z: Real, a: Real, b: Real) -> Triple:
     """Uniform point of the unit disc normal to the unit vector (x, y, z)."""
     sx, sy = (0.0, 1.0) if x * x > 0.25 else (1.0, 0.0)
     ux, uy, uz = -z * sy, z * sx, x * sy - y * sx
@@ -50,9 +49,9 @@ def _across(x: Real, y: Real, z: Real, a: Real, b: Real) -> Triple:
 
 
 class Emitter(NamedTuple):
-    """What sends particles: source s at light position l, in a scene of some radius.
+    """Source s at light position l, which emits particles into a scene of some radius.
 
-    The source after the last is the background.
+    The number after that of the last source stands for the background.
     """
 
     lights: LightArrays
@@ -65,40 +64,43 @@ class Emitter(NamedTuple):
 def _emit(
     emitter: Emitter, seed: int, first: int, n: int, world: World, packets: Float32, hits: Hits, walkers: Walkers
 ) -> None:
-    """Send particles first to first + n - 1; their random numbers are the same for every light position.
+    """Emit particles first to first + n - 1; their random numbers are the same for every light position.
 
-    A directional source sends them through a disc as wide as the scene, placed before it, and the background through a
+    A directional source emits them from a disc as wide as the scene, in front of it; the background emits them from a
     sphere around the scene.
     """
     lights, s, l, radius = emitter
     for i in range(n):
+        # random point (a, b) of the group's sequence, and the particle's stream
         group, place = (first + i) % GROUPS, (first + i) // GROUPS
-        a, b = r2(word(stream(seed, AMBIENT_STREAM, group, _STARTS), PIXEL), place)
+        a, b = r2(random_word(stream(seed, AMBIENT_STREAM, group, _STARTS), PIXEL), place)
         key = stream(seed, AMBIENT_STREAM, (first + i) & ((1 << 28) - 1), _PARTICLES)
+        # origin o and direction d: background, directional source, point source
         if s == lights.kind.shape[0]:
-            x, y, z = _on_sphere(a, b)
+            x, y, z = _sphere_direction(a, b)
             ox, oy, oz = radius * x, radius * y, radius * z
-            a, b = r2(word(key, PIXEL), 0)
+            a, b = r2(random_word(key, PIXEL), 0)
             dx, dy, dz = cosine_direction(np.float32(-x), np.float32(-y), np.float32(-z), a, b)
         elif lights.kind[s] == DIRECTIONAL:
             dx, dy, dz = lights.vector[s, 0, l], lights.vector[s, 1, l], lights.vector[s, 2, l]
-            x, y, z = _across(dx, dy, dz, a, b)
+            x, y, z = _disc_point(dx, dy, dz, a, b)
             ox, oy, oz = radius * (x - 2.0 * dx), radius * (y - 2.0 * dy), radius * (z - 2.0 * dz)
         else:
             ox, oy, oz = lights.vector[s, 0, l], lights.vector[s, 1, l], lights.vector[s, 2, l]
-            dx, dy, dz = _on_sphere(a, b)
+            dx, dy, dz = _sphere_direction(a, b)
         set_ray(packets, i, ox, oy, oz, dx, dy, dz, np.float32(np.inf))
+        # the walk, with throughput 1
         hits.key[i] = key
         walkers.walk[i] = i
         for channel in range(3):
             walkers.throughput[i, channel] = 1.0
-    intersect(world.tracer, packets, n, False)
+    intersect(world.tracer, packets, n, False, 0.0)
     record_hits(world, packets, n, True, hits)
 
 
 @kernel
-def _land(hits: Hits, walkers: Walkers, n: int, power: Float32, first: int, last: int, sums: Float32) -> None:
-    """Leave the power of every particle that met a surface with its walk, for light positions first to last - 1."""
+def _deposit_power(hits: Hits, walkers: Walkers, n: int, power: Float32, first: int, last: int, sums: Float32) -> None:
+    """Add the power of every particle that met a surface to its walk, for light positions first to last - 1."""
     for i in range(n):
         if hits.kind[i] == SURFACE:
             for channel in range(3):
@@ -108,15 +110,15 @@ def _land(hits: Hits, walkers: Walkers, n: int, power: Float32, first: int, last
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Landed:
-    """What a batch of particles left.
+class _ParticleSums:
+    """Sums over a batch of particles.
 
     Attributes:
-        spent, rays: particles per light position, and rays.
-        total: (3, n_lights) sum of the power that surfaces took up.
-        groups: (GROUPS, n_lights) sums over groups of particles, of the mean of the channels.
-        reached: of the first batch: the area that light reaches, its relative variance and its reflectivity, see
-            `reached_area`.
+        spent, rays: number of particles per light position, and of rays.
+        total: (3, n_lights) sum of the power that particles deposit.
+        groups: (GROUPS, n_lights) the same per group of particles, as mean of the channels.
+        reached: only in the first batch: the area that light reaches, its relative variance and its reflectivity; see
+            `measure_lit_area`.
     """
 
     spent: int
@@ -125,9 +127,9 @@ class _Landed:
     groups: Float64
     reached: tuple[Float64, Float64, Float64] | None
 
-    def and_then(self, other: "_Landed") -> "_Landed":
-        """Both together."""
-        return _Landed(
+    def plus(self, other: "_ParticleSums") -> "_ParticleSums":
+        """Sums over the particles of both."""
+        return _ParticleSums(
             spent=self.spent + other.spent,
             rays=self.rays + other.rays,
             total=self.total + other.total,
@@ -137,7 +139,7 @@ class _Landed:
 
     @property
     def area(self) -> tuple[Float64, Float64, Float64]:
-        """What the first batch reached."""
+        """The area that light reaches, its relative variance and its reflectivity."""
         assert self.reached is not None
         return self.reached
 
@@ -150,12 +152,12 @@ class _Landed:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LightWalks:
-    """Where particles start and what they meet; arguments of `ambient_by_light`.
+    """Start, scene and lights of particles; arguments of `ambient_by_light`.
 
     Attributes:
-        paths: particles per light position; None: as many as a standard error of 1 % takes, at most `MOST`.
+        paths: particles per light position; None: enough for a standard error of 1 %, at most `MAX_PARTICLES`.
         background: (3,) radiance outside the scene, which lights the surfaces too; None: black.
-        radius: of the scene.
+        radius: radius of the scene about its centre.
     """
 
     seed: int
@@ -169,12 +171,12 @@ class LightWalks:
         corners = self.world.surfaces.corners.reshape(-1, 3).astype(np.float64)
         object.__setattr__(self, "radius", float(np.sqrt((corners**2).sum(axis=1).max())))
 
-    def batch(self, work: Workspace, first: int, n: int) -> _Landed:
+    def batch(self, work: Workspace, first: int, n: int) -> _ParticleSums:
         """Follow particles first to first + n - 1 of every source and light position to their ends."""
         lights, rays = self.lights, work.rays
         n_sources, n_lights = len(lights.kind), lights.n_lights
         sky = self.background is not None and bool(self.background.any())
-        pool = empty_pool(n_lights, n_sources + sky) if first == 0 else None
+        pool = empty_vertices(n_lights, n_sources + sky) if first == 0 else None
         radius = self.radius
         work.sums[:] = 0.0
         for s in range(n_sources):
@@ -186,25 +188,25 @@ class LightWalks:
         if sky and self.background is not None:
             power = 4 * np.pi**2 * radius**2 * self.background
             self._follow(work, Emitter(lights, n_sources, 0, radius), range(n_lights), power, (first, n), pool)
-        reached = reached_area(work, self.seed, self.world, lights, pool, sky) if pool else None
+        reached = measure_lit_area(work, self.seed, self.world, lights, pool, sky) if pool else None
         deposited = work.sums[:n].astype(np.float64)
         groups = np.zeros((GROUPS, n_lights))
         for group in range(min(GROUPS, n)):  # a batch is a multiple of GROUPS
             groups[group] = deposited[group::GROUPS].mean(axis=1).sum(axis=0)
         total = deposited.sum(axis=0)
-        return _Landed(spent=n, rays=work.rays - rays, total=total, groups=groups, reached=reached)
+        return _ParticleSums(spent=n, rays=work.rays - rays, total=total, groups=groups, reached=reached)
 
     def _follow(
         self, work: Workspace, emitter: Emitter, positions: range, power: Float32, batch: tuple[int, int],
-        pool: Pool | None,
+        pool: VertexPool | None,
     ) -> None:  # fmt: skip
-        """Follow particles to their ends, and leave what they deposit in `work.sums`.
+        """Follow particles to their ends, and add what they deposit to `work.sums`.
 
         Args:
-            positions: light positions that the particles count for.
-            power: (3,) of the source, at that position.
+            positions: light positions for which the particles count.
+            power: (3,) power of the source at that position.
             batch: number of the first particle, number of particles.
-            pool: takes in vertices, or None.
+            pool: collects vertices, or None.
         """
         first, n = batch
         carried = power.astype(np.float32)
@@ -212,30 +214,30 @@ class LightWalks:
         work.rays += n
         for bounce in range(MAX_BOUNCES):
             hits, walkers = work.hits[0], work.walkers[0]
-            _land(hits, walkers, n, carried, positions.start, positions.stop, work.sums)
-            choose_all(hits, walkers, n, False)
+            _deposit_power(hits, walkers, n, carried, positions.start, positions.stop, work.sums)
+            choose_steps(hits, walkers, n, False)
             if pool and bounce < KEPT_BOUNCES:
-                keep(pool, hits, walkers, n, positions)
+                keep_vertices(pool, hits, walkers, n, positions)
             n = work.advance(n, self.world)
             if n == 0:
                 break
 
 
 def ambient_by_light(walks: LightWalks, threads: int = 1) -> Ambient:
-    """Estimate I_A[l] and the average reflectivity by particles from the lights [FA]; threads change nothing."""
+    """Estimate I_A[l] and the average reflectivity by particles from the lights [FA], for any number of threads."""
 
-    def enough(found: _Landed) -> bool:
+    def enough(found: _ParticleSums) -> bool:
         return walks.paths is None and bool(found.error.max() <= TARGET_ERROR)
 
-    found = walk_until(walks.batch, enough, walks.paths, walks.lights, threads, MOST)
+    found = walk_until(walks.batch, enough, walks.paths, walks.lights, threads, MAX_PARTICLES)
     area, _, reflectivity = found.area
     per_area = np.divide(1.0, area, out=np.zeros_like(area), where=area > 0)
     mean = found.total / found.spent * per_area
-    return summarise(mean, found.error, reflectivity, found.spent, found.rays, walks.paths is None)
+    return make_ambient(mean, found.error, reflectivity, found.spent, found.rays, walks.paths is None)
 
 
 def _group_variance(groups: Float64, n: int) -> Float64:
-    """Relative variance of the mean of n particles, (n_lights,), from sums (GROUPS, n_lights) over groups of them."""
+    """Relative variance of the mean of n particles, (n_lights,), from sums per group, (GROUPS, n_lights)."""
     size = np.bincount(np.arange(n) % GROUPS, minlength=GROUPS)[:, None]
     whole = groups.sum(axis=0)
     used = min(n, GROUPS)

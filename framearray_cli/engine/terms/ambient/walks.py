@@ -1,6 +1,6 @@
-"""Random walks over the scene: what both ambient estimates are made of.
+"""Random walks over the scene, which all ambient estimates use.
 
-A walk carries an RGB throughput. Where it meets a surface it goes on by the diffuse part, by the mirror part, or ends,
+A walk carries an RGB throughput. At a surface it continues by the diffuse part, continues by the mirror part, or ends,
 with probabilities that keep the throughput at most 1.
 """
 
@@ -12,21 +12,22 @@ from framearray_cli.base.arrays import Float32, Int32, Rgb, Triple
 
 from ...embree.packets import intersect, set_ray
 from ...hits.hits import SURFACE, Hits, World, record_hits
-from ...inputs.random import CHOICE, HEMISPHERE, above, cosine_direction, mix, r2, word
+from ...hits.rays import NO_RAYS
+from ...inputs.random import CHOICE, HEMISPHERE, above, cosine_direction, mix, r2, random_word
 from ...kernels.kernel import inlined, kernel
 
 DIFFUSE, MIRROR, END = 0, 1, 2
-# Walks end here whatever they carry: 0.97^256 is four ten-thousandths. Nearly all end long before by themselves.
+# Largest number of bounces; nearly all walks end by chance long before. 0.97^256 is four ten-thousandths.
 MAX_BOUNCES = 256
 
 
 class Walkers(NamedTuple):
-    """Walks under way; each stands at the hit of the same index.
+    """Unfinished walks; each is at the hit of the same index.
 
     Attributes:
         walk: (n,) number of the walk in its batch.
-        throughput: (n, 3).
-        step: (n,) what the walk does next: DIFFUSE, MIRROR or END.
+        throughput: (n, 3) RGB.
+        step: (n,) the walk's next step: DIFFUSE, MIRROR or END.
     """
 
     walk: Int32
@@ -35,32 +36,36 @@ class Walkers(NamedTuple):
 
 
 def empty_walkers(n: int) -> Walkers:
-    """Room for n walks."""
+    """Allocate n walks."""
     return Walkers(np.empty(n, np.int32), np.empty((n, 3), np.float32), np.empty(n, np.int32))
 
 
 @inlined
 def choose_step(hits: Hits, walkers: Walkers, i: int, must_go_on: bool) -> None:
-    """Choose how walk i leaves its hit, and weigh its throughput accordingly.
+    """Choose how walk i leaves its hit, and divide its throughput by the probability of that choice.
 
     Args:
-        must_go_on: no walk ends but at a black surface, and throughput stays; the choice is by the parts' size.
+        must_go_on: end walks at black surfaces only, choose between the parts by their size, and keep the throughput.
     """
+    # sizes of the parts
     r, s = hits.reflectivity[i], hits.specular[i]
     diffuse, mirror = max(r[0], r[1], r[2]), max(s[0], s[1], s[2])
     total = diffuse + mirror
     if hits.kind[i] != SURFACE or total <= 0.0:
         walkers.step[i] = END
         return
+    # their probabilities; the rest up to 1 is that of an end
     scale = total if must_go_on or total > 1.0 else np.float32(1.0)
     diffuse, mirror = diffuse / scale, mirror / scale
-    a, _ = r2(word(hits.key[i], CHOICE), 0)
+    # the choice
+    a, _ = r2(random_word(hits.key[i], CHOICE), 0)
     if a < diffuse:
         walkers.step[i] = DIFFUSE
     elif a < diffuse + mirror:
         walkers.step[i] = MIRROR
     else:
         walkers.step[i] = END
+    # throughput times reflectivity over probability
     if must_go_on:
         return
     for channel in range(3):
@@ -72,10 +77,10 @@ def choose_step(hits: Hits, walkers: Walkers, i: int, must_go_on: bool) -> None:
 
 @inlined
 def _leave(hits: Hits, i: int, step: int) -> Triple:
-    """Direction in which a walk leaves hit i."""
+    """Direction in which a walk leaves hit i: with density cos(theta) / pi, or mirrored."""
     g, m = hits.geometric[i], hits.shading[i]
     if step == DIFFUSE:
-        a, b = r2(word(hits.key[i], HEMISPHERE), 0)
+        a, b = r2(random_word(hits.key[i], HEMISPHERE), 0)
         x, y, z = cosine_direction(m[0], m[1], m[2], a, b)
         return above(x, y, z, g[0], g[1], g[2])
     d = hits.incoming[i]
@@ -93,21 +98,24 @@ def advance(
     next_hits: Hits,
     next_walkers: Walkers,
 ) -> int:
-    """Move every walk that goes on to its next hit (or escape); returns how many there are."""
-    m = 0
+    """Move every walk that continues to its next hit (or escape); returns their number."""
+    # Loop state
+    m = NO_RAYS  # walks that continue
     for i in range(n):
         if walkers.step[i] == END:
             continue
+        # the ray from slightly above its hit
         x, y, z = _leave(hits, i, walkers.step[i])
         g, e, p = hits.geometric[i], hits.offset[i], hits.position[i]
         set_ray(packets, m, p[0] + e * g[0], p[1] + e * g[1], p[2] + e * g[2], x, y, z, np.float32(np.inf))
+        # its next random stream, number, step and throughput
         next_hits.key[m] = mix(hits.key[i])
         next_walkers.walk[m] = walkers.walk[i]
         next_walkers.step[m] = walkers.step[i]
         for channel in range(3):
             next_walkers.throughput[m, channel] = walkers.throughput[i, channel]
         m += 1
-    intersect(world.tracer, packets, m, False)
+    intersect(world.tracer, packets, m, False, 0.0)
     record_hits(world, packets, m, True, next_hits)
     return m
 
