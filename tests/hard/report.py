@@ -1,5 +1,5 @@
 # ruff: noqa: E501 - rows of tables
-"""Writes docs/measured/hard-cases.md: rays with a known answer in rooms that are hard to trace, and how many were wrong.
+"""Write docs/measured/hard-cases.md: rays with a known answer in rooms that are hard to trace, and the wrong ones.
 
 PYTHONPATH=tests python tests/hard/report.py docs/measured/hard-cases.md
 """
@@ -50,16 +50,16 @@ all of it.
 ROOMS_HEAD = f"""
 ## Rays in closed rooms
 
-Every room is closed and convex: from inside, all of it is in sight, and nothing outside is. So the answer of each ray
+Every room is closed and convex: an inside point sees all of the room and nothing outside. So the answer of each ray
 is known. {HITS:,} points of each room ({FEWER["ball"]:,} of the ball), with
 
 - shadow rays to five lamps inside and five outside;
 - visibility rays of reused hits to five eyes inside and five outside, each of which looks all round;
-- five rays of obscurances a point: each must meet the wall that the formula of a plane says, where it says.
+- five obscurance rays per point: each must meet the wall that the formula of a plane gives, at the place it gives.
 
-A cell gives leaks / rays held up where nothing is; of obscurances, rays that end anywhere else than they must.
+A cell gives leaks / rays blocked where nothing is; for obscurances, rays that end at a wrong place.
 In the wedge, points nearer to its edge than rays start above a surface, divided by the tangent of a degree, lie behind
-the other wall for such a ray: at most {allowed("wedge", 5 * HITS)} of {5 * HITS:,} rays held up are allowed for that, and not one elsewhere.
+the other wall for such a ray: at most {allowed("wedge", 5 * HITS)} of {5 * HITS:,} blocked rays are allowed for that, and none elsewhere.
 """
 
 WALLS_HEAD = f"""
@@ -94,8 +94,8 @@ CASES = f"""
 | equal eyes in a row, with both weights | equal means, which are those without reuse, by z-tests of all pixels | `tests/stat/test_pixels.py` |
 | facing mirrors of reflectivity 1, 16 bounces | nothing brighter than the background | `tests/hard/test_pictures_of_hard_cases.py` |
 | points exactly on borders of pixels and of the image, behind an eye, in its plane | each in one pixel, or none | `tests/hard/test_reprojection.py` |
-| eyes that move by exactly a pixel or an image, turn round, pass a wall, pass things | evenly lit pictures stay even; every pixel that of the slow twin | `tests/hard/test_reprojection.py`, `tests/engine/test_oracle.py` |
-| degenerate, doubled and non-finite triangles, mixed windings | rooms *broken* and *mixed* above; counted and told | `tests/scene/test_scene.py` |
+| eyes that move by exactly one pixel or one image, turn round, pass a wall, pass things | evenly lit pictures stay even; every pixel that of the slow twin | `tests/hard/test_reprojection.py`, `tests/engine/test_oracle.py` |
+| degenerate, doubled and non-finite triangles, mixed windings | rooms *broken* and *mixed* above; counted and reported | `tests/scene/test_scene.py` |
 """
 
 
@@ -110,7 +110,7 @@ def pair(counts: tuple[Count, ...]) -> str:
 
 
 def rooms_section() -> Iterator[str]:
-    """Three tables, one a kind of ray, and all counts together."""
+    """Three tables, one per kind of ray, and all counts together."""
     kinds: dict[str, Callable[[Stage], tuple[Count, ...]]] = {
         "Shadow rays": shadow_rays,
         "Visibility rays": visibility_rays,
@@ -128,7 +128,7 @@ def rooms_section() -> Iterator[str]:
                     leaks += found[0].wrong
                     held_up += sum(c.wrong for c in found[1:])
     yield ROOMS_HEAD
-    yield f"In all {rays:,} rays: {leaks} leaks or wrong ends, {held_up} held up."
+    yield f"In all {rays:,} rays: {leaks} leaks or wrong ends, {held_up} blocked."
     for kind in kinds:
         yield f"\n| {kind} | " + " | ".join(name for name, _, _ in PLACES) + " |"
         yield "|---|" + "---:|" * len(PLACES)
@@ -180,7 +180,7 @@ def streams_section() -> Iterator[str]:
     yield "Scrambles of neighbours in pixels, frames, samples, seeds and dimensions are tested for independence:"
     yield "chi-squared of joint cells, correlation, and the shift between the two (`tests/support/streams.py`), by Holm's"
     yield f"rule over all tests. {len(pairs())} pairs of places, {len(found)} tests: {len(dependent(found))} fail. The smallest chance is {found[worst]:.1e}"
-    yield f"({worst}); of so many, {1 / len(found):.1e} is expected. Bad scrambles do fail:"
+    yield f"({worst}); of that number of tests, {1 / len(found):.1e} is expected. Bad scrambles do fail:"
     yield "\n| Scramble | tests that fail |"
     yield "|---|---:|"
     with np.errstate(over="ignore"):

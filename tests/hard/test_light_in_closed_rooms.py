@@ -75,7 +75,7 @@ def test_rays_of_obscurances_meet_the_walls_of_their_room(name: str) -> None:
 
 @pytest.mark.parametrize("size", [1e-6, 1e6])
 @pytest.mark.parametrize("name", ROOMS)
-def test_whatever_the_unit_of_length(name: str, size: float) -> None:
+def test_any_unit_of_length(name: str, size: float) -> None:
     with staged(name, size=size, n=POINTS.get(name, 8192)) as stage:
         assert_all_right(name, stage)
 
@@ -117,7 +117,7 @@ def test_how_near_to_a_wall_a_lamp_may_be(gap: float, leaks: bool) -> None:
 
 @pytest.mark.parametrize("name", ON_WALLS)
 def test_eyes_on_walls_see_the_room_and_nothing_of_their_wall(name: str) -> None:
-    """Eyes exactly on a wall, as far as float32 can tell, look in; where walls are single ones, they look out too."""
+    """Eyes exactly on a wall, to the precision of float32, look in; where walls are single ones, they look out too."""
     with staged(name) as stage:
         n = 2 if name == "ball" else 64
         inwards, outwards = eyes_on_walls(stage, True, n), eyes_on_walls(stage, False, n)

@@ -38,7 +38,7 @@ def test_another_place_of_the_lamp_would_be_seen(usual: Any) -> None:
 
 @pytest.mark.parametrize("power", [1e-12, 1e-6, 1e6, 1e12])
 def test_light_of_any_strength_gives_the_picture_in_proportion(power: float, usual: Any) -> None:
-    """Every value times the same number, to float32's roundings; a picture of 1e12 needs 32 bits a channel."""
+    """Every value times the same number, to float32's roundings; a picture of 1e12 needs 32 bits per channel."""
     job = walk()
     source = job.light.sources[0]
     keys = [key.model_copy(update={"intensity": tuple(power * x for x in key.intensity)}) for key in source.keys]
@@ -106,7 +106,7 @@ def test_lamps_where_no_lamp_should_be(position: Any) -> None:
         assert images.mean() > 2 * dark.mean()
 
 
-def test_a_sun_parallel_to_a_wall_lights_the_others_alone() -> None:
+def test_a_sun_parallel_to_a_wall_lights_only_the_others() -> None:
     """Straight down: the walls get nothing directly, and the floor below the hole in the roof does."""
     sun = {"type": "directional", "keys": [{"frame": 0, "direction": [0.0, -1.0, 0.0], "irradiance": [3.0, 3.0, 3.0]}]}
     still = {"keys": tiny.WALK["keys"][:1], "frames": 1}

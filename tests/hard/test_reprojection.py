@@ -82,8 +82,8 @@ def wall_job(first: Any, last: Any, **changes: Any) -> Any:
 
 
 def rounding(hits: float, weights: str = "average") -> float:
-    """The most that float32 may lose of a sum of equal hits: one rounding per hit among `HITS_AT_ONCE`, and one per sum
-    of these; beside some dozen roundings of each hit. Weights that are not whole are summed hit by hit."""
+    """The most that float32 may lose of a sum of equal hits: one rounding per hit among `HITS_AT_ONCE`, one for each of
+    those sums, and some dozen roundings of each hit. Weights that are not whole are summed hit by hit."""
     return (hits / HITS_AT_ONCE + HITS_AT_ONCE + 24 + (hits if weights == "balance" else 0)) * 2.0**-24
 
 
@@ -104,7 +104,7 @@ def wall(half: float) -> Any:
     ids=["a pixel aside", "an image aside", "turned round", "behind the wall", "close to the wall"],
 )
 def test_whole_renders_of_points_at_borders_and_behind(first: Any, last: Any, weights: str) -> None:
-    """Eyes that move by exactly a pixel or an image, that turn round, that pass the wall: only what is seen counts."""
+    """Eyes that move by exactly one pixel or image, that turn round, that pass the wall: only what is seen counts."""
     job = wall_job(first, last, reuse={"n_r": 1, "weights": weights})
     one, other = tiny.render_frames(tiny.prepared(job, wall(60.0))).composed
     turned = last[1][2] > last[0][2] or last[0][2] < 0

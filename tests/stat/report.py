@@ -1,4 +1,4 @@
-"""Writes docs/measured/accuracy.md: every closed form, the right answer, that of the program, and their difference.
+"""Write docs/measured/accuracy.md: of every closed form the right answer, that of the program, and their difference.
 
 python tests/stat/report.py docs/measured/accuracy.md
 """
@@ -27,8 +27,8 @@ Written by `python tests/stat/report.py docs/measured/accuracy.md`, from the sam
 `tests/stat/`. Formulas and their derivations: `tests/support/closed_forms.py`.
 
 Standard errors come from independent pixels or independent seeds. z is the difference in standard errors: of
-independent right values, 1 in 20 is beyond 2 and 1 in 370 beyond 3. Rows of one table share random numbers, so that
-their z are alike.
+independent right values, 1 in 20 is beyond 2 and 1 in 370 beyond 3. Rows of one table share random numbers, so their
+z are similar.
 """
 
 
@@ -120,7 +120,7 @@ def ambient_section(folder: Folders) -> Iterator[str]:
     yield from table("method, scene")
     traced = ambient.traced()
     for method in ("eye", "light"):
-        for name, n in (("12 triangles a shell", 1), ("roof and walls 576 times as many", 24)):
+        for name, n in (("12 triangles per shell", 1), ("roof and walls 576 times as many", 24)):
             found = ambient.irradiance(ambient.ambient_of(ambient.house_job(folder(), method, n=n)))
             both = difference(found, traced[method])
             shown = Estimate(mean=traced[method].mean + both.mean, error=both.error)

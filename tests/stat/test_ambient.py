@@ -38,7 +38,7 @@ def pierced(material: str, x: float, low: NDArray[np.float64], high: NDArray[np.
 
 
 def house(n: int = 1) -> list[Part]:
-    """The house; roof and walls of 2 n^2 triangles a side, inside and outside."""
+    """The house; roof and walls of 2 n^2 triangles per side, inside and outside."""
     shells = [("Outside", np.zeros(3), OUTER), ("Inside", np.full(3, WALL), OUTER - WALL)]
     parts = []
     for name, low, high in shells:
@@ -153,7 +153,7 @@ def test_errors_of_a_stopped_estimate_are_honest(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("method", ["eye", "light"])
 def test_white_surfaces_under_a_sky(method: str, tmp_path: Path) -> None:
-    """Where nothing absorbs, all is as bright as the sky: I_A is the sky's radiance, whatever colour the lamps have."""
+    """Where nothing absorbs, all is as bright as the sky: I_A is the sky's radiance, for any colour of the lamps."""
     parts = [quad("Ground", [-3, 0, -3], [0, 0, 6], [6, 0, 0]), quad("Roof", [-3, 1, -3], [6, 0, 0], [0, 0, 6])]
     lamp = point([0, 50, 0], [1e-9, 5e-10, 0.0])  # as good as dark, and orange
     job = make_job(

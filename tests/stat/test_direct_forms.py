@@ -131,7 +131,7 @@ SPOTS = {  # a point of the floor that the table does not shade for either light
 @pytest.mark.parametrize("spot", SPOTS)
 @pytest.mark.parametrize("kind", ["point", "directional"])
 def test_one_spot_through_the_whole_program(kind: str, spot: str, scene: Path, tmp_path: Path) -> None:
-    """A pixel of a ten-thousandth of a degree: its radiance is R / pi E to 1e-4, in each channel by itself."""
+    """A pixel of a ten-thousandth of a degree: its radiance is R / pi E to 1e-4, in each channel separately."""
     place, normal, free = SPOTS[spot]
     colour = [1.0, 0.5, 0.25]
     source = (

@@ -1,4 +1,4 @@
-"""The inside of a sphere: direct plus indirect light is known at every point, wherever the light is.
+"""The inside of a sphere: direct plus indirect light is known at every point, for any position of the light.
 
 jobs/furnace-*.toml through the whole program, for independent seeds: the files are read back, the direct light of
 every pixel is subtracted, and what is left must be the indirect light R / pi R E.
@@ -75,9 +75,9 @@ def test_furnace(reflectivity: float, method: str, tmp_path: Path) -> None:
     by_light, predicted = measured(reflectivity, method, tmp_path)
     right = forms.furnace_indirect(reflectivity)
     whole = expected_direct(reflectivity).mean(axis=(0, 2, 3)) + right
-    for l in range(by_light.shape[1]):  # the same random numbers serve all lights, so each is tested alone
+    for l in range(by_light.shape[1]):  # the same random numbers serve all lights, so each is tested separately
         got = estimate(by_light[:, l])
-        # six seeds tell their spread badly; what the program says of its error is checked below, and serves here
+        # six seeds estimate their spread badly; the error that the program reports is checked below, and serves here
         said = Estimate(mean=got.mean, error=right * float(predicted[:, l].mean()) / SEEDS**0.5)
         assert abs(said.z(right)) < 3
         assert abs(got.mean - right) < 0.01 * whole[l]

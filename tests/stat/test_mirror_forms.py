@@ -117,8 +117,8 @@ def test_facing_mirrors(bounces: int, facing: Path, tmp_path: Path) -> None:
     assert (found == 0).all()  # one bounce more than is followed stays black
 
 
-def test_tints_tell_depths_apart() -> None:
-    """The expected values tell tints and depths apart, so the test above can fail."""
+def test_tints_differ_by_depth() -> None:
+    """The expected values differ by tint and depth, so the test above can fail."""
     tints = [TINTS[0] ** ((b + 1) // 2) * TINTS[1] ** (b // 2) for b in BOUNCES]
     for i, a in enumerate(tints):
         for b in tints[:i]:

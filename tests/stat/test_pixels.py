@@ -52,10 +52,10 @@ def test_a_wide_window_shows_the_same_scene(hits: float, frames: tuple[int, ...]
     """
     some: dict[str, Any] = {"camera": tiny.WALK, "specular": {"hits": 8}}
     shared = runs(tiny.prepared(job(samples={"hits": hits}, reuse={"n_r": 5}, **some)), range(40))
-    alone = runs(tiny.prepared(job(samples={"hits": 16}, reuse={"n_r": 0}, **some)), range(100, 140))
+    unshared = runs(tiny.prepared(job(samples={"hits": 16}, reuse={"n_r": 0}, **some)), range(100, 140))
     for c in frames:
-        assert differing(flat(shared[:, c]), flat(alone[:, c])).max() < 1
-        assert differing(flat(BRIGHTER * shared[:, c]), flat(alone[:, c])).max() > 1
+        assert differing(flat(shared[:, c]), flat(unshared[:, c])).max() < 1
+        assert differing(flat(BRIGHTER * shared[:, c]), flat(unshared[:, c])).max() > 1
 
 
 def resting(first: int, last: int, **changes: Any) -> Any:
@@ -78,10 +78,10 @@ def test_two_equal_eyes_in_a_row_have_the_same_picture(weights: str, first: int,
     assert off(one - other, nothing).max() < 1
     assert off(one - moved, nothing).max() > 1
     assert off(BRIGHTER * one - other, nothing).max() > 1
-    alone = flat(runs(resting(first, last, samples={"hits": 6}, reuse={"n_r": 0}), range(100, 148))[:, 2])
+    unshared = flat(runs(resting(first, last, samples={"hits": 6}, reuse={"n_r": 0}), range(100, 148))[:, 2])
     for shared in (one, other):
-        assert differing(shared, alone).max() < 1
-    assert differing(BRIGHTER * one, alone).max() > 1
+        assert differing(shared, unshared).max() < 1
+    assert differing(BRIGHTER * one, unshared).max() > 1
 
 
 def test_every_pixel_of_a_sphere_with_a_lamp_off_its_middle(tmp_path: Path) -> None:
@@ -113,4 +113,4 @@ def test_every_pixel_of_a_sphere_with_a_lamp_off_its_middle(tmp_path: Path) -> N
     flatness = 1.5 * 1.5 * 4 / (3 * 3**0.5) * 4 * np.pi / 81920
     assert off(found, expected, flatness).max() < 1
     assert off(BRIGHTER * found, expected, flatness).max() > 1
-    assert off(found + 0.02 * reflectivity * indirect, expected, flatness).max() > 1  # 2 % more indirect light alone
+    assert off(found + 0.02 * reflectivity * indirect, expected, flatness).max() > 1  # 2 % more indirect light only

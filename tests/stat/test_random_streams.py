@@ -17,7 +17,7 @@ def found() -> dict[str, float]:
 
 @pytest.mark.parametrize("pair", pairs())
 def test_words_at_two_places_are_independent(pair: str, found: dict[str, float]) -> None:
-    """Corrected for all tests of all pairs, not for those of one pair alone."""
+    """Corrected for all tests of all pairs, not only for those of one pair."""
     assert not [name for name in dependent(found) if name.startswith(pair)]
 
 
@@ -107,7 +107,7 @@ def test_the_twin_is_the_program() -> None:
 
 @pytest.mark.parametrize("words", BAD, ids=[words.__name__ for words in BAD])
 def test_bad_scrambles_are_found(words: Words) -> None:
-    """The tests above can fail, and tell where the fault is."""
+    """The tests above can fail, and name the pair at fault."""
     with np.errstate(over="ignore"):
         failing = dependent(all_chances(words))
     assert any(name.startswith(BAD[words]) for name in failing)

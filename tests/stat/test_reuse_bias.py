@@ -81,7 +81,7 @@ SEEDS = 60
 
 
 def without_reuse(scene: Path, out: Path) -> Array:
-    """A pixel's own hits alone, as many as it has with reuse, for other seeds."""
+    """Only a pixel's own hits, the same number as with reuse, for other seeds."""
     return middle_frames(job_of(scene, out, 24, 0, "balance"), range(1000, 1000 + SEEDS))
 
 
@@ -90,7 +90,7 @@ def right(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Array:
     return without_reuse(scene, tmp_path_factory.mktemp("out"))
 
 
-@pytest.mark.parametrize("hits", [4, 0.5])  # 28 hits a pixel, and 3 or 4
+@pytest.mark.parametrize("hits", [4, 0.5])  # 28 hits per pixel, and 3 or 4
 def test_balance_leaves_the_mean_alone(hits: float, scene: Path, right: Array, tmp_path: Path) -> None:
     found = middle_frames(job_of(scene, tmp_path, hits, N_R, "balance"), range(SEEDS))
     assert differing(found, right).max() < 1

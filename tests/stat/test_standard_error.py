@@ -1,4 +1,4 @@
-"""The standard error that an image tells of itself against the spread of the same image over seeds.
+"""The standard error that an image reports, against the spread of the same image over seeds.
 
 D^2 (`framearray_cli/engine/images/standard_error.py`) averaged over seeds is the variance of a pixel, so
 over pixels and seeds its root mean square is that of the spread. Two light positions, so that sums and differences of
@@ -91,9 +91,9 @@ def over_seeds(job: Job, seeds: int = SEEDS) -> tuple[Array, Array, Array]:
     return np.array(images), np.array(differences), np.array(errors)
 
 
-def told_to_true(images: Array, told: Array) -> float:
-    """Root mean square of what is told over that of the spread."""
-    return float(np.sqrt((told**2).mean() / images.var(axis=0, ddof=1).mean()))
+def reported_to_true(images: Array, reported: Array) -> float:
+    """Root mean square of the reported error over that of the spread."""
+    return float(np.sqrt((reported**2).mean() / images.var(axis=0, ddof=1).mean()))
 
 
 CASES: dict[str, dict[str, dict[str, Any]]] = {
@@ -114,24 +114,26 @@ CASES: dict[str, dict[str, dict[str, Any]]] = {
 @pytest.mark.parametrize("case", CASES)
 def test_what_an_image_tells_of_its_error_is_its_spread(case: str, scene: Path, tmp_path: Path) -> None:
     images, differences, errors = over_seeds(job_of(scene, tmp_path, **CASES[case]))
-    assert abs(told_to_true(images, differences) - 1) < SHARE
-    assert abs(told_to_true(images, errors) - 1) < SHARE  # averaging over neighbours moves errors, and keeps their sum
+    assert abs(reported_to_true(images, differences) - 1) < SHARE
+    assert (
+        abs(reported_to_true(images, errors) - 1) < SHARE
+    )  # averaging over neighbours moves errors, and keeps their sum
 
 
 def test_in_mirrors_too(scene: Path, tmp_path: Path) -> None:
-    """Those pixels alone: what mirrors show rests on samples of one frame."""
+    """Only those pixels: what mirrors show rests on samples of one frame."""
     looks = [over_seeds(job_of(scene, tmp_path, specular={"depth": depth}), 4)[0].mean(axis=0) for depth in (4, 0)]
     shown = abs(looks[0] - looks[1]) > 0.005
     assert 60 < shown.sum() < 0.3 * shown.size
     images, differences, _ = over_seeds(job_of(scene, tmp_path))
-    assert abs(told_to_true(images[:, shown], differences[:, shown]) - 1) < SHARE
+    assert abs(reported_to_true(images[:, shown], differences[:, shown]) - 1) < SHARE
 
 
 def test_a_wrong_error_is_found(scene: Path, tmp_path: Path) -> None:
     """The comparison fails for what is a third too large, and for what is a quarter too small."""
     images, differences, _ = over_seeds(job_of(scene, tmp_path))
     for factor in (4 / 3, 3 / 4):
-        assert abs(told_to_true(images, factor * differences) - 1) > SHARE
+        assert abs(reported_to_true(images, factor * differences) - 1) > SHARE
 
 
 @pytest.mark.parametrize("combine", [lambda a, b: a - b, lambda a, b: 0.3 * a + 2.0 * b], ids=["minus", "sum"])
@@ -140,7 +142,7 @@ def test_images_of_two_lights_combined_tell_their_error(
 ) -> None:
     """Hits are shared by lights, so errors are not independent; differences know that."""
     images, differences = (combine(both[:, 0], both[:, 1]) for both in over_seeds(job_of(scene, tmp_path))[:2])
-    assert abs(told_to_true(images, differences) - 1) < SHARE
+    assert abs(reported_to_true(images, differences) - 1) < SHARE
 
 
 @pytest.mark.parametrize(("error", "weights"), [(0.05, "balance"), (0.1, "balance"), (0.1, "average")])

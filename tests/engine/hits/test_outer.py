@@ -1,4 +1,4 @@
-"""Camera reuse: which pixels of other eyes see a hit, how densely, and how it is weighed there."""
+"""Camera reuse: which pixels of other eyes see a hit, with which density, and with which weight."""
 
 from itertools import pairwise
 from typing import Any
@@ -132,7 +132,7 @@ def test_balance_weights_are_the_formula(walk: Any, n_r: int) -> None:
 
 
 @pytest.mark.parametrize("c", [0, 2, 5])
-def test_weights_of_a_frame_sum_to_one_a_pixel_in_the_mean(walk: Any, c: int) -> None:
+def test_weights_of_a_frame_sum_to_one_per_pixel_in_the_mean(walk: Any, c: int) -> None:
     """The bare sum of weights over a pixel's hits has mean 1: densities, hit counts and visibility agree.
 
     A wrong density, a forgotten escaped ray or hits at the path's ends counted wrongly would all shift it.

@@ -1,4 +1,4 @@
-"""Lights as kernels take them."""
+"""Lights in the form that kernels read."""
 
 from typing import Any
 

@@ -144,7 +144,7 @@ def test_the_sequence_is_exact_however_long(first: int) -> None:
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 7, 8, 16, 70, 1000])
-def test_the_lattice_is_that_of_the_twin_and_has_one_point_a_row_and_column(n: int) -> None:
+def test_the_lattice_is_that_of_the_twin_and_has_one_point_per_row_and_column(n: int) -> None:
     steps = lattice_steps(n)
     assert steps == tuple(step % 2**32 for step in twin.lattice(n))
     points = np.arange(n)[:, None] * np.array(steps, np.uint64) % 2**32 / 2**32

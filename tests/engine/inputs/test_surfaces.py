@@ -1,4 +1,4 @@
-"""What a ray finds on a triangle: texels, colours, normals, points."""
+"""Texels, colours, normals and points where a ray meets a triangle."""
 
 from typing import Any
 
@@ -101,7 +101,7 @@ def test_the_nearest_texel_is_the_one_around_a_place_in_every_repetition(width: 
         np.testing.assert_allclose(out, expected.reshape(-1, 4), rtol=3e-7, atol=0)
 
 
-def test_what_nearest_texels_average_to_is_what_blended_ones_do() -> None:
+def test_nearest_texels_have_the_average_of_blended_ones() -> None:
     """Obscurance takes the nearest texel: each texel counts for its own area, as when it is blended."""
     s = textured(tiny.checks(16))
     places = ((np.arange(512) + 0.5) / 512).astype(np.float32)

@@ -202,7 +202,7 @@ def test_a_hit_at_the_lamp_itself_stays_finite_or_is_zero() -> None:
 
 @pytest.mark.parametrize("n_lights", [1, 3, 16, 48])
 @pytest.mark.parametrize("room", [16, 64, 4096])
-def test_any_room_for_rays_gives_the_same(room: int, n_lights: int) -> None:
+def test_any_number_of_packets_gives_the_same(room: int, n_lights: int) -> None:
     rng, scene = np.random.default_rng(n_lights), tiny.room()
     hits = points(400, -scene.centre, UP)
     hits.position[:] += rng.uniform(-2, 2, (400, 3)).astype(np.float32) * [1, 0, 1]
@@ -263,7 +263,7 @@ def test_steps_in_the_open_need_few_rays(step: int) -> None:
 
 
 def test_thin_bars_are_overlooked_but_not_in_the_mean_if_unbiased() -> None:
-    """Bars that hide the lamp for one position at a time: the mean over many hits is right with the check alone."""
+    """Bars that hide the lamp for one position at a time: the mean over many hits is right only with the check."""
     scene, hits, lights = below_bars(0.05, n=6000)
     expected, _ = lit(scene, hits, lights)
     shadows = expected[:, 0] == 0
@@ -290,7 +290,7 @@ def test_steps_pass_over_what_is_not_in_front() -> None:
 
 
 @pytest.mark.parametrize("room", [16, 64])
-def test_any_room_for_rays_gives_the_same_by_steps(room: int) -> None:
+def test_any_number_of_packets_gives_the_same_by_steps(room: int) -> None:
     scene, hits, lights = below_bars(0.3)
     for unbiased in (False, True):
         expected = lit_by_steps(scene, hits, lights, 4, unbiased)

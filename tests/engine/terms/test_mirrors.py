@@ -107,7 +107,7 @@ def corridor(depth: int) -> Any:
 def test_paths_end_at_the_depth(depth: int) -> None:
     rendered = corridor(depth)
     assert rendered.rays["mirror"] == depth * 2 * 24 * 18
-    assert not rendered.images.any(), "nothing but mirrors: no light, whatever the depth"
+    assert not rendered.images.any(), "nothing but mirrors: no light at any depth"
 
 
 def test_a_mirror_shows_the_background() -> None:
