@@ -52,7 +52,7 @@ def _axes(k: int, sign: int) -> Any:
 
 
 def mixed() -> Any:
-    """Walls of mixed windings, which say nothing about inside and outside."""
+    """Windings that are inconsistent."""
     corners = grid(5)
     turn = np.random.default_rng(2).random(len(corners)) < 0.5
     corners[turn] = corners[turn][:, ::-1]
