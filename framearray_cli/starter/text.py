@@ -42,8 +42,8 @@ def to_text(start: Start, job_file: Path) -> str:
             *_lights(start),
             "",
             "[samples]",
-            _line("hits", "2", "samples of a pixel in a frame; more: less noise, more time"),
-            _line("obscurance", "5", "rays of a sample for its indirect light"),
+            _line("hits", "2", "samples per pixel and frame; more: less noise, more time"),
+            _line("obscurance", "5", "rays per sample for its indirect light"),
             "",
             "[reuse]",
             _line("n_r", "3", "frames before and after that share their samples"),
@@ -55,7 +55,7 @@ def to_text(start: Start, job_file: Path) -> str:
             "[output]",
             _line("directory", quoted(f"out/{start.name}"), "relative to this file"),
             _line("format", '"png"', '"exr" keeps the linear light, for work after the render'),
-            _line("fps", "24", "frames a second of movies"),
+            _line("fps", "24", "frames per second of movies"),
             "",
         ]
     )
@@ -96,7 +96,7 @@ def _camera(camera: Camera) -> list[str]:
 
 
 def _lights(start: Start) -> list[str]:
-    lines = ["[light]", _line("frames", str(start.light_frames), "positions of the light; each gives a picture an eye")]
+    lines = ["[light]", _line("frames", str(start.light_frames), "positions of the light; each gives one picture per eye")]
     for source in start.sources:
         lines += ["", "[[light.sources]]", *_comments(source.about), *_source(source)]
     return lines

@@ -27,7 +27,7 @@ class Variant:
         name: in results and tables.
         settings: those of a report.
         frames: cameras of one timed run; 0: measure only its error, and its time from one short run.
-        floor: replay its rays through Embree alone.
+        floor: replay its rays through Embree only.
         writes: time it with writing, too.
     """
 

@@ -81,7 +81,7 @@ def measure(name: str, folder: Path) -> list[Table]:
 
 
 def compare(case: Case, variant: Variant, c: int, wanted: Reference) -> list[Table]:
-    """Each image of frame c made by a variant: what it tells, and how far it is from the reference."""
+    """Each image of frame c made by a variant: the error that it reports, and how far it is from the reference."""
     setup = with_settings(case, variant.settings).setup
     native, n_r = variant.settings.hits, variant.settings.n_r
     halves = BY_SAMPLE if native >= FEWEST_SPLIT or n_r == 0 else frames_per_turn(native)

@@ -1,7 +1,7 @@
 """The same views in Blender Cycles, where its Python module `bpy` is installed: path tracing, every image from scratch.
 
 Cycles computes another model, all light by paths, so this is the cost of an image of about the same number of samples
-there, not that pictures are the same: 14 samples a pixel on the processor, no denoising, its own default bounces,
+there, not that pictures are the same: 14 samples per pixel on the processor, no denoising, its own default bounces,
 diffuse materials with the mean colour of their texture.
 """
 
@@ -20,7 +20,7 @@ PLACES = ((0.25, 1 / 6), (0.5, 1 / 2), (0.75, 5 / 6))  # of the camera path and 
 
 
 def measure(name: str, quick: bool) -> Table:
-    """Milliseconds an image of Cycles; {"skipped": why} where that cannot be had."""
+    """Milliseconds per image of Cycles; {"skipped": why} where that cannot be had."""
     try:
         import bpy
     except ImportError:

@@ -27,7 +27,7 @@ PLACES = ((0.25, 1 / 6), (0.5, 1 / 2), (0.75, 5 / 6))  # of the camera path and 
 
 
 def measure(name: str, quick: bool) -> Table:
-    """Seconds an image of Mitsuba; {"skipped": why} where that cannot be had."""
+    """Seconds per image of Mitsuba; {"skipped": why} where that cannot be had."""
     try:
         import mitsuba as mi
     except ImportError:
