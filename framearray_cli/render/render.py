@@ -105,7 +105,9 @@ def _render_block(run: "_Run", setup: FrameSetup, ambient: Ambient, lights: rang
         ambient: for all light positions.
     """
     target, still = array_target(run.prepared), run.prepared.still
-    i_a = image_ambient(ambient, run.prepared.lights).for_lights(lights)
+    i_a = image_ambient(ambient, run.prepared.lights)
+    if setup.lights.n_lights < run.prepared.n_lights:  # with shadow steps a block computes all lights
+        i_a = i_a.for_lights(lights)
     with run.open_pool(setup) as pool, run.open_writer(target, lights) as writer:
         window = Window(setup, i_a, pool)
         for j in ready_frames(window, setup, [0] if still else wanted, pool):
