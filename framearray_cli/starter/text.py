@@ -96,7 +96,8 @@ def _camera(camera: Camera) -> list[str]:
 
 
 def _lights(start: Start) -> list[str]:
-    lines = ["[light]", _line("frames", str(start.light_frames), "positions of the light; each gives one picture per eye")]
+    positions = _line("frames", str(start.light_frames), "positions of the light; each gives one picture per eye")
+    lines = ["[light]", positions]
     for source in start.sources:
         lines += ["", "[[light.sources]]", *_comments(source.about), *_source(source)]
     return lines

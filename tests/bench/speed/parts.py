@@ -80,8 +80,8 @@ window filled before the clock starts, so that reading, ambient light and path e
 and shadows are tested at every light position, unless a row says otherwise. Variants take turns, {runs} times, each
 time at another place of the camera path; figures are medians.
 
-- *From scratch*: every image by itself, by the same kernels and packets, with as many native hits per pixel as a pixel of
-  the frame array rests on: {SCRATCH_HITS}, with {SCRATCH_RAYS} obscurance rays each. Columns say how many
+- *From scratch*: every image separately, by the same kernels and packets, with as many native hits per pixel as a
+  pixel of the frame array rests on: {SCRATCH_HITS}, with {SCRATCH_RAYS} obscurance rays each. Columns say how many
   times as long that takes.
 - *Floor*: the rays of one frame, recorded and replayed through Embree packets on all cores; nothing but Embree's own
   calls is timed. Packets are those that the program makes, idle lanes and all.
@@ -201,11 +201,11 @@ def peers(speed: Mapping[str, Table], mitsuba: Mapping[str, Table], cycles: Mapp
     head = ["", "ms", "to the frame array", "written, ms", "to the frame array, written", "means differ by"]
     about = f"""
 - *Mitsuba*, LLVM backend: a small integrator of the same model on the same triangles, every image from scratch,
-  {SCRATCH_HITS} x (1 eye ray + {SCRATCH_RAYS} obscurance rays + 1 shadow ray) a pixel. It is spared mirrors,
+  {SCRATCH_HITS} x (1 eye ray + {SCRATCH_RAYS} obscurance rays + 1 shadow ray) per pixel. It is spared mirrors,
   alpha masks, interpolated normals and texture filtering. The last column compares the mean of one image with the
   program's own.
-- *Cycles*, on the processor: path tracing with {SCRATCH_HITS} samples per pixel, not denoised; another model, so another
-  picture. It takes materials and lights as they are, textures as their mean colour, and no mirrors.
+- *Cycles*, on the processor: path tracing with {SCRATCH_HITS} samples per pixel, not denoised; another model, so
+  another picture. It takes materials and lights as they are, textures as their mean colour, and no mirrors.
 """
     return ["## Other programs", about, *([grid(head, rows)] if rows else []), "\n".join(why)]
 
