@@ -94,7 +94,7 @@ def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[F
     job = validate_job(table, start.file)
     job_eyes, job_lights = eyes(job), lights(job)
     some = _spread_indices(job_eyes.n)
-    few_eyes = replace(job_eyes, position=job_eyes.position[some], world_from_camera=job_eyes.world_from_camera[some])
+    few_eyes = job_eyes.at(some)
     few_lights = lights_without_groups(
         [_append_dark(source, _spread_indices(job_lights.n)) for source in job_lights.sources]
     )

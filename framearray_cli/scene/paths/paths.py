@@ -6,7 +6,7 @@ sphere. Before the first and after the last key everything rests.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -48,6 +48,11 @@ class Eyes:
     def at_rest(self) -> bool:
         """Whether the camera never moves."""
         return bool((self.world_from_camera == self.world_from_camera[:1]).all())
+
+    def at(self, indices: Sequence[int]) -> "Eyes":
+        """Return some of the eyes, in the order of the indices."""
+        rows = list(indices)
+        return replace(self, position=self.position[rows], world_from_camera=self.world_from_camera[rows])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
