@@ -70,8 +70,8 @@ def test_an_error_that_a_signal_led_to_counts_as_the_signal() -> None:
 @pytest.mark.parametrize(
     ("arguments", "function"),
     [
-        ("assemble out --walk -o m.mp4", "tools.movie.assemble.assemble"),
-        ("export out -f colmap -o x", "tools.export.export"),
+        ("assemble out --walk -o m.mp4", "tools.movie.assemble.assemble_movie"),
+        ("export out -f colmap -o x", "tools.export.export_array"),
         ("init scene.glb", "starter.init"),
         ("sheet out -o s.png", "tools.sheet.make_sheet"),
         ("verify out", "array.integrity.verify"),
@@ -89,6 +89,6 @@ def test_commands_as_typed(capsys, monkeypatch, arguments: str, function: str) -
     monkeypatch.setattr(cli, "listen", lambda: None)
     with pytest.raises(SystemExit) as end:
         cli.main(arguments.split())
-    outcome = "written" if name in ("assemble", "export", "init", "make_sheet") else "rendered"
+    outcome = "written" if name in ("assemble_movie", "export_array", "init", "make_sheet") else "rendered"
     assert end.value.code == 2
     assert tuple(capsys.readouterr()) == ("", f"a.toml: x: expected y\n1 problem; nothing was {outcome}.\n")
