@@ -25,8 +25,6 @@ from .names import AMBIENT, ArrayNames, array_names
 from .prepare import Prepared
 from .target.pilot import Target
 
-_KEYS = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
-
 
 def initial_manifest(
     prepared: Prepared, ambient: Ambient, identity: Identity, settings: AutoSettings | None, target: Target | None
@@ -96,11 +94,7 @@ def _lights(
         ManifestLight(
             ambient=tuple(i_a[l].tolist()),
             ambient_error=tuple((i_a[l] * float(ambient.standard_error[l])).tolist()),
-            sources=tuple(
-                {"type": s.kind, _KEYS[s.kind][0]: s.vector[l].tolist(), _KEYS[s.kind][1]: s.intensity[l].tolist()}
-                | (s.notes[l] if s.notes else {})
-                for s in sources
-            ),
+            sources=tuple(source.table(l) for source in sources),
         )
         for l in positions
     )

@@ -14,8 +14,9 @@ from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude
 from ..hits.hits import Hits, lift, ray_origin, reflects, reflects_in_lanes, triple
 from ..hits.rays import NO_RAYS, Rays
 from ..inputs.lights import DIRECTIONAL, LightArrays
+from ..inputs.shapes import vector_and_factor
 from ..kernels.kernel import inlined, kernel
-from ..kernels.simd import LANES, bits, compress, ctz, lane_numbers, load, popcount, select, sqrt, store, triples_at
+from ..kernels.simd import LANES, bits, compress, ctz, lane_numbers, load, popcount, select, store, triples_at
 
 # A shadow ray ends at this fraction of the distance to the light: a surface that the light lies on must not hide it.
 FAR_END = np.float32(1.0 - 1e-4)
@@ -24,32 +25,6 @@ FROM, TO, REACH = 0, 3, 6
 ALL_LANES = (1 << LANES) - 1
 # With at most this many light positions a kernel step takes sixteen hits instead of sixteen positions.
 FEW_LIGHTS = 8
-
-
-@inlined
-def _vector_and_factor(
-    kind: int, x: Real, y: Real, z: Real, p: Triple, g: Triple, m: Triple, lit: Real
-) -> tuple[Real, Real, Real, Real]:
-    """Vectors from points p to a source, and the geometry factors of `_geometry_of_lights`.
-
-    Args:
-        x, y, z: the source's position, or for a directional one the direction in which its light travels.
-        p, g, m: points, geometric and shading normals.
-        lit: 1 where the source shines, else 0.
-    """
-    nothing, one = np.float32(0.0), np.float32(1.0)
-    # the vector to the source: L - P, or against the light's direction
-    sign, from_point = (-one, nothing) if kind == DIRECTIONAL else (one, one)
-    x, y, z = sign * x - from_point * p[0], sign * y - from_point * p[1], sign * z - from_point * p[2]
-    # cos(theta), not yet divided by d; the source counts in front of both normals
-    cosine = x * m[0] + y * m[1] + z * m[2]
-    in_front = (cosine > nothing) & (x * g[0] + y * g[1] + z * g[2] > nothing)
-    factor = cosine * lit
-    # a point source: d cos(theta) / d^3
-    if kind != DIRECTIONAL:
-        square = x * x + y * y + z * z
-        factor = factor / (square * sqrt(square))
-    return x, y, z, select(in_front, factor, nothing)
 
 
 @inlined
@@ -65,7 +40,7 @@ def _geometry_of_lights(hits: Hits, i: int, lights: LightArrays, s: int, l: int)
     x, y = load(lights.vector, at), load(lights.vector, at + n_lights)
     z, lit = load(lights.vector, at + 2 * n_lights), load(lights.lit, s * n_lights + l)
     p, g, m = triple(hits.position, i), triple(hits.geometric, i), triple(hits.shading, i)
-    x, y, z, factor = _vector_and_factor(lights.kind[s], x, y, z, p, g, m, lit)
+    x, y, z, factor = vector_and_factor(lights, s, x, y, z, p, g, m, lit)
     return x, y, z, select(lane_numbers() < np.int32(n_lights - l), factor, np.float32(0.0))
 
 
@@ -175,7 +150,7 @@ def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, ray
                     total, waiting = total + waiting, 0
                 # cos(theta) / d^2 of source s at light position l
                 a, lit = lights.vector, lights.lit[s, l]
-                x, y, z, factor = _vector_and_factor(lights.kind[s], a[s, 0, l], a[s, 1, l], a[s, 2, l], p, g, m, lit)
+                x, y, z, factor = vector_and_factor(lights, s, a[s, 0, l], a[s, 1, l], a[s, 2, l], p, g, m, lit)
                 # queue the rays of hits that the source may reach
                 traced = wanted & (factor > np.float32(0.0))
                 to, from_point = (x, y, z), np.float32(0.0 if lights.kind[s] == DIRECTIONAL else 1.0)

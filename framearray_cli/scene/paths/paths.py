@@ -1,9 +1,4 @@
-"""Key frames -> eyes[c] and lights[l], in float64 and in the scene file's own coordinates.
-
-Numbers and positions follow monotone cubic curves (PCHIP): they pass through their keys, never leave the span
-between two neighbouring keys, and rest where two keys are equal. Directions follow the same kind of curve on the
-sphere. Before the first and after the last key everything rests.
-"""
+"""Key frames -> eyes[c] and lights[l], in float64 and in the scene file's own coordinates."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,12 +12,17 @@ from framearray_cli.job.camera import CameraKey
 from framearray_cli.job.job import Job
 from framearray_cli.job.light import DirectionalKey, PointKey, SunSource
 
+from .curves import interpolate_keys
 from .directions import interpolate_directions, unit
 from .planes import Plane, group_planes, picture_planes
 from .sun import NEVER, daylight, directions_to_sun, sun_path
 
 # If look and up are closer to parallel than this (radians), rounding decides what is right in the picture.
 PARALLEL = 1e-6
+
+
+# What the manifest calls the vector and the strength of a source, by its kind.
+_MANIFEST_KEYS = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,6 +70,12 @@ class LightPath:
     vector: Float64
     intensity: Float64
     notes: tuple[dict[str, Any], ...] = ()
+
+    def table(self, l: int) -> dict[str, Any]:
+        """Describe the source at position l as the manifest does."""
+        vector, strength = _MANIFEST_KEYS[self.kind]
+        values = {"type": self.kind, vector: self.vector[l].tolist(), strength: self.intensity[l].tolist()}
+        return values | (self.notes[l] if self.notes else {})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -222,48 +228,6 @@ def _place_light(
     colors = [key.color if key.color is not None else (1.0, 1.0, 1.0) for key in keys]
     intensity = interpolate_keys(frames, powers, n_lights) * interpolate_keys(frames, colors, n_lights)
     return LightPath(kind=kind, vector=vector, intensity=intensity)
-
-
-def interpolate_keys(frames: Sequence[int], values: Sequence[Sequence[float]], n: int) -> Float64:
-    """Interpolate key values to frames 0 .. n - 1.
-
-    Edge cases: one key is constant, two are a straight line; equal neighbours stay equal to the last bit.
-
-    Args:
-        frames: frame of each key, strictly increasing.
-        values: (n_keys, k) value of each key.
-        n: number of frames.
-
-    Returns:
-        (n, k)
-    """
-    keyed = np.asarray(values, dtype=np.float64)
-    if len(frames) == 1:
-        return np.repeat(keyed, n, axis=0)
-    at = np.clip(np.arange(n, dtype=np.float64), frames[0], frames[-1])
-    before = np.searchsorted(frames, at, side="right").clip(max=len(frames) - 1) - 1  # (n,) key before each frame
-    ends = np.stack([keyed[before], keyed[before + 1]])
-    curve = _smooth(frames, keyed, at) if len(frames) > 2 else _straight(frames, keyed, at)
-    curve = np.clip(curve, ends.min(axis=0), ends.max(axis=0))  # rounding must not leave the span between two keys
-    for key, frame in enumerate(frames):
-        curve[at == frame] = keyed[key]
-    return curve
-
-
-def _straight(frames: Sequence[int], keyed: Float64, at: Float64) -> Float64:
-    """The line through two keys."""
-    share = ((at - frames[0]) / (frames[1] - frames[0]))[:, None]
-    line: Float64 = (1 - share) * keyed[0] + share * keyed[1]
-    return line
-
-
-def _smooth(frames: Sequence[int], keyed: Float64, at: Float64) -> Float64:
-    """The PCHIP curve through the keys; it rises or falls between two keys, and turns back only at keys."""
-    from scipy.interpolate import PchipInterpolator  # the import takes 0.25 s, which two keys do not need
-
-    with np.errstate(over="ignore"):  # a slope below 1e-308 has an infinite inverse, whose inverse is 0, as wanted
-        curve: Float64 = PchipInterpolator(frames, keyed, axis=0)(at)
-    return curve
 
 
 def _ups(keys: Sequence[CameraKey], job: Job) -> Float64:

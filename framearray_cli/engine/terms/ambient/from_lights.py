@@ -10,13 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Float64, Real, Rgb, Triple
+from framearray_cli.base.arrays import Float32, Float64, Rgb
 
 from ...embree.packets import intersect, set_ray
 from ...hits.hits import SURFACE, Hits, World, record_hits
-from ...inputs.lights import DIRECTIONAL, LightArrays
+from ...inputs.lights import LightArrays
 from ...inputs.random import PIXEL, cosine_direction, r2, random_word, stream
-from ...kernels.kernel import inlined, kernel
+from ...inputs.shapes import emitted_power, emitted_ray, sphere_direction
+from ...kernels.kernel import kernel
 from .estimate import AMBIENT_STREAM, BATCH, TARGET_ERROR, Ambient, Workspace, choose_steps, make_ambient, walk_until
 from .lit_area import KEPT_BOUNCES, VertexPool, empty_vertices, keep_vertices, measure_lit_area
 from .walks import MAX_BOUNCES, Walkers
@@ -27,25 +28,6 @@ MAX_PARTICLES = 32 * BATCH
 # groups with independent random numbers. The spread of the groups' means gives the error, to 1 in sqrt(2 (GROUPS - 1)).
 GROUPS = 32
 _PARTICLES, _STARTS = 1, 3  # sample numbers of the walks, and of their starting points
-
-
-@inlined
-def _sphere_direction(a: Real, b: Real) -> Triple:
-    """Uniform unit direction."""
-    z = 1.0 - 2.0 * b
-    r, angle = np.sqrt(np.maximum(0.0, 1.0 - z * z)), 2.0 * np.pi * a
-    return r * np.cos(angle), r * np.sin(angle), z
-
-
-@inlined
-def _disc_point(x: Real, y: Real, z: Real, a: Real, b: Real) -> Triple:
-    """Uniform point of the unit disc normal to the unit vector (x, y, z)."""
-    sx, sy = (0.0, 1.0) if x * x > 0.25 else (1.0, 0.0)
-    ux, uy, uz = -z * sy, z * sx, x * sy - y * sx
-    wx, wy, wz = y * uz - z * uy, z * ux - x * uz, x * uy - y * ux
-    scale, angle = np.sqrt(b / (ux * ux + uy * uy + uz * uz)), 2.0 * np.pi * a
-    p, q = scale * np.cos(angle), scale * np.sin(angle)
-    return p * ux + q * wx, p * uy + q * wy, p * uz + q * wz
 
 
 class Emitter(NamedTuple):
@@ -66,8 +48,7 @@ def _emit(
 ) -> None:
     """Emit particles first to first + n - 1; their random numbers are the same for every light position.
 
-    A directional source emits them from a disc as wide as the scene, in front of it; the background emits them from a
-    sphere around the scene.
+    The background emits them from a sphere around the scene.
     """
     lights, s, l, radius = emitter
     for i in range(n):
@@ -75,19 +56,14 @@ def _emit(
         group, place = (first + i) % GROUPS, (first + i) // GROUPS
         a, b = r2(random_word(stream(seed, AMBIENT_STREAM, group, _STARTS), PIXEL), place)
         key = stream(seed, AMBIENT_STREAM, (first + i) & ((1 << 28) - 1), _PARTICLES)
-        # origin o and direction d: background, directional source, point source
+        # origin o and direction d: background, or source
         if s == lights.kind.shape[0]:
-            x, y, z = _sphere_direction(a, b)
+            x, y, z = sphere_direction(a, b)
             ox, oy, oz = radius * x, radius * y, radius * z
             a, b = r2(random_word(key, PIXEL), 0)
             dx, dy, dz = cosine_direction(np.float32(-x), np.float32(-y), np.float32(-z), a, b)
-        elif lights.kind[s] == DIRECTIONAL:
-            dx, dy, dz = lights.vector[s, 0, l], lights.vector[s, 1, l], lights.vector[s, 2, l]
-            x, y, z = _disc_point(dx, dy, dz, a, b)
-            ox, oy, oz = radius * (x - 2.0 * dx), radius * (y - 2.0 * dy), radius * (z - 2.0 * dz)
         else:
-            ox, oy, oz = lights.vector[s, 0, l], lights.vector[s, 1, l], lights.vector[s, 2, l]
-            dx, dy, dz = _sphere_direction(a, b)
+            ox, oy, oz, dx, dy, dz = emitted_ray(lights, s, l, radius, a, b)
         set_ray(packets, i, ox, oy, oz, dx, dy, dz, np.float32(np.inf))
         # the walk, with throughput 1
         hits.key[i] = key
@@ -180,7 +156,7 @@ class LightWalks:
         radius = self.radius
         work.sums[:] = 0.0
         for s in range(n_sources):
-            flow = np.pi * radius**2 if lights.kind[s] == DIRECTIONAL else 4 * np.pi
+            flow = emitted_power(lights, s, radius)
             for l in range(n_lights):
                 if lights.lit[s, l]:
                     power = flow * lights.strength[s, :, l] * lights.colour[l]
