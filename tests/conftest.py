@@ -2,12 +2,17 @@
 
 import os
 import signal
+from pathlib import Path
 
 import psutil
 import pytest
 
 _MOST_WORKERS = 4
 _WORKER_BYTES = 2 << 30
+# Folders of tests that compile kernels, and the one whose programs need them compiled. Each of two processes begins with
+# one half of the tests: while the first compiles, the second runs tests of the rooms that have no kernels.
+_COMPILING, _COMPILED = ("engine", "stat", "hard", "render", "starter", "report", "bench"), ("cli",)
+_TESTS = Path(__file__).parent
 
 
 def pytest_configure() -> None:
@@ -30,3 +35,13 @@ def pytest_xdist_auto_num_workers() -> int:
     """Return the number of processes of `-n auto`: each needs a core and memory."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(1, min(cores, _MOST_WORKERS, psutil.virtual_memory().available // _WORKER_BYTES))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put tests in an order in which no process waits long for another one's kernels."""
+
+    def turn(item: pytest.Item) -> int:
+        folder = item.path.relative_to(_TESTS).parts[0]
+        return 0 if folder in _COMPILING else 2 if folder in _COMPILED else 1
+
+    items.sort(key=turn)

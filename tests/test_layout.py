@@ -57,6 +57,7 @@ HEAVY = (
     "jinja2",
     "pvlib",
     "distributed",
+    "psutil",
 )
 
 

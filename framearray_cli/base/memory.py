@@ -7,8 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-import psutil
-
 from .errors import LimitError
 
 ROOT, OWN, STATUS = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup"), Path("/proc/self/status")
@@ -160,6 +158,8 @@ def _used(name: str) -> int:
 def peak_memory() -> int:
     """Largest resident size of this process so far, bytes."""
     if sys.platform == "win32":
+        import psutil
+
         return int(psutil.Process().memory_info().peak_wset)
     if sys.platform == "linux":  # getrusage includes the process that started this one
         for line in Path("/proc/self/status").read_text().splitlines():
@@ -173,10 +173,14 @@ def peak_memory() -> int:
 
 def free_memory() -> int:
     """Bytes that this process can still get: free memory and swap, or less where a container or `ulimit` limits it."""
+    import psutil
+
     machine = int(psutil.virtual_memory().available + psutil.swap_memory().free)
     return min([machine, *(left for left in (group_memory(), address_space()) if left is not None)])
 
 
 def resident_memory() -> int:
     """Bytes that this process holds now: the program, the scene, and Embree's tree if it is built."""
+    import psutil
+
     return int(psutil.Process().memory_info().rss)
