@@ -9,8 +9,8 @@ import pytest
 
 _MOST_WORKERS = 4
 _WORKER_BYTES = 2 << 30
-# Folders of tests that compile kernels, and the one whose programs need them compiled. Each of two processes begins with
-# one half of the tests: while the first compiles, the second runs tests of the rooms that have no kernels.
+# Folders of tests that compile kernels, and the one whose programs need them compiled. Each of two processes begins
+# with one half of the tests: while the first compiles, the second runs tests of the rooms that have no kernels.
 _COMPILING, _COMPILED = ("engine", "stat", "hard", "render", "starter", "report", "bench"), ("cli",)
 _TESTS = Path(__file__).parent
 
