@@ -22,12 +22,12 @@ assert mesh_construction  # on loading it takes the class of scenes, and needs t
 
 def has_packets_of_16(device: int) -> bool:
     """Whether a device traces 16 rays at once; with AVX2 it takes them apart."""
-    property_of = library().rtcGetDeviceProperty
+    property_of = loaded_embree().rtcGetDeviceProperty
     property_of.restype, property_of.argtypes = ctypes.c_ssize_t, (ctypes.c_void_p, ctypes.c_int)
     return bool(property_of(device, _NATIVE_RAY16_SUPPORTED))
 
 
-def library() -> Any:
+def loaded_embree() -> Any:
     """Embree's own functions."""
     found = embree_library()
     assert found, "without them no instruction set can be forced"
@@ -41,8 +41,8 @@ def forced_device() -> Any:
     """
     device = rtcore.EmbreeDevice()
     pointer = device_pointer(device)
-    library().rtcReleaseDevice(pointer.value)
-    pointer.value = library().rtcNewDevice(FORCED.encode())
+    loaded_embree().rtcReleaseDevice(pointer.value)
+    pointer.value = loaded_embree().rtcNewDevice(FORCED.encode())
     return device
 
 

@@ -291,7 +291,7 @@ AVX2 = "isa=avx2"
 NATIVE = """
 from support import instructionset, tiny
 from framearray_cli.engine.embree.native import NativeScene
-scene = NativeScene(tiny.scene_of(tiny.box((0, 0, 0), (1, 1, 1))), instructionset.library())
+scene = NativeScene(tiny.scene_of(tiny.box((0, 0, 0), (1, 1, 1))), instructionset.loaded_embree())
 print(instructionset.has_packets_of_16(scene._device))
 """
 
