@@ -17,6 +17,7 @@ from framearray_cli.base.hashing import digest
 from .images.images import read_image, read_layers
 from .manifest import Manifest, array_files
 from .manifest_toml import read_manifest
+from .present import camera_files
 from .record import ArrayRecords, Entry, read_records
 
 NEVER_FINISHED = "was never finished"
@@ -36,6 +37,19 @@ class Verification:
     files: int
     wrong: tuple[tuple[str, str], ...]
     unknown: int
+
+    @property
+    def damaged(self) -> tuple[tuple[str, str], ...]:
+        """(name, problem) of each file that was whole once."""
+        return tuple((name, problem) for name, problem in self.wrong if problem != NEVER_FINISHED)
+
+    def unfinished(self) -> dict[int, int]:
+        """Return the number of files that were never finished, by camera, for cameras that lack any."""
+        lacking = {name for name, problem in self.wrong if problem == NEVER_FINISHED}
+        counts = (
+            (c, sum(name in lacking for name in camera_files(self.manifest, c))) for c in range(self.manifest.n_cameras)
+        )
+        return {c: count for c, count in counts if count} if lacking else {}
 
 
 def verify(out: Path, threads: int, progress: Callable[[int, int], None]) -> Verification:

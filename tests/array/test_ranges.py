@@ -2,7 +2,7 @@
 
 import pytest
 
-from framearray_cli.array.ranges import frames_text, parse_frames
+from framearray_cli.array.ranges import brief_frames_text, frames_text, parse_frames
 
 
 @pytest.mark.parametrize(
@@ -30,3 +30,9 @@ def test_ranges(text: str, frames: tuple[int, ...]) -> None:
 def test_other_texts_are_refused_as_ranges(text: str) -> None:
     with pytest.raises(ValueError, match="expected"):
         parse_frames(text, 10)
+
+
+def test_a_brief_text_is_brief_however_scattered_frames_are() -> None:
+    assert brief_frames_text([*range(5), 7]) == frames_text([*range(5), 7]) == "0-4,7"
+    assert brief_frames_text(range(0, 24, 2)) == frames_text(range(0, 24, 2))
+    assert brief_frames_text(range(0, 999, 2)) == "0,2,4,6,8,10,12,14,16,18,20,...,998"

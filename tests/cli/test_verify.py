@@ -7,6 +7,9 @@ import pytest
 from support import tiny
 from support.program import run, write_job
 
+from framearray_cli.array.integrity import verify
+from framearray_cli.cli.commands.verify import MOST_DAMAGED
+
 WALK = tiny.WALK | {"frames": 4, "keys": [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": 3}]}
 N_FILES = 4 * 3 + 4
 
@@ -51,9 +54,38 @@ def test_an_unfinished_array_is_finished(array, capsys, tmp_path):
     assert run(capsys, "render", "-q", job, "--cameras", "1-2").code == 0
     result = run(capsys, "verify", tmp_path / "part")
     assert result.code == 5
-    assert result.err.count("was never finished") == 2 * (3 + 1)
+    assert result.err.splitlines() == [
+        "cameras 0,3: never begun, 8 of 8 files are left",
+        f"8 of {N_FILES} files were never finished; `framearray render JOB` or "
+        f"`framearray verify --repair {tmp_path / 'part'}` goes on",
+    ]
     assert run(capsys, "verify", "-q", "--repair", tmp_path / "part").code == 0
     assert contents(tmp_path / "part") == contents(array)
+
+
+def test_damage_comes_first_and_few_files_are_named(array, capsys):
+    for c in (0, 2):
+        (array / f"tiny.c000{c}.l001.png").write_bytes(b"")
+    records = array / "records" / "0-3.jsonl"
+    lines = records.read_bytes().splitlines(keepends=True)
+    records.write_bytes(b"".join(line for line in lines if b'"c":3,' not in line and b'"c":1,' not in line))
+    for name in ("tiny.c0001.l000.png", "tiny.layers.c0003.exr", *(f"tiny.c0003.l00{l}.png" for l in range(3))):
+        (array / name).unlink()
+    result = run(capsys, "verify", "-q", array)
+    first, second, begun, finished, note, last = result.err.splitlines()
+    assert first.startswith(f"{array / 'tiny.c0000.l001.png'}: expected ") and "c0002" in second
+    assert begun == "camera 3: never begun, 4 of 4 files are left"
+    assert finished == "camera 1: never finished, 1 of 4 files are left"
+    assert note.startswith("note: 3 files are whole, but have no checksum")
+    assert last.startswith(f"2 of {N_FILES} files are missing or damaged, 5 were never finished; `framearray verify")
+
+
+def test_of_many_damaged_files_some_are_named(array, capsys, monkeypatch):
+    monkeypatch.setattr("framearray_cli.cli.commands.verify.MOST_DAMAGED", 3)
+    for file in array.glob("tiny.c*"):
+        file.write_bytes(b"")
+    lines = run(capsys, "verify", "-q", array).err.splitlines()
+    assert len(lines) == 5 and lines[3] == "9 more files are missing or damaged"
 
 
 def test_without_records_images_are_read(array, capsys):
@@ -90,8 +122,8 @@ def test_one_flipped_byte_in_each_of_a_hundred_images(tmp_path, capsys):
             place = rng.randrange(len(data))
             data[place] = (data[place] + rng.randrange(1, 256)) % 256
             (out / name).write_bytes(data)
+        assert {name for name, _ in verify(out, 1, lambda done, total: None).damaged} == set(names)
         result = run(capsys, "verify", "-q", out)
-        assert result.code == 5
-        assert {line.split(": ")[0] for line in result.err.splitlines()[:-1]} == {str(out / name) for name in names}
+        assert (result.code, len(result.err.splitlines())) == (5, MOST_DAMAGED + 2)
         assert run(capsys, "verify", "-q", "--repair", out).code == 0
         assert contents(out) == before

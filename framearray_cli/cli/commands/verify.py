@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from framearray_cli.array.integrity import Verification
 
 
+MOST_DAMAGED = 20  # files listed by name
+
+
 def verify(
     array: ArrayFolder,
     repair: Annotated[
@@ -49,12 +52,34 @@ def verify(
 
 
 def verified_lines(found: "Verification") -> list[str]:
-    """List the files of an array that are missing or damaged, by name, and sum up."""
-    folder, n = found.manifest.directory, len(found.wrong)
-    lines = [f"{folder / name}: {problem}" for name, problem in found.wrong]
+    """List damaged files by name, then the cameras that are not finished by ranges, and sum up."""
+    from framearray_cli.array.ranges import brief_frames_text
+
+    folder, damaged = found.manifest.directory, found.damaged
+    lines = [f"{folder / name}: {problem}" for name, problem in damaged[:MOST_DAMAGED]]
+    if len(damaged) > MOST_DAMAGED:
+        lines.append(f"{len(damaged) - MOST_DAMAGED:,} more files are missing or damaged")
+    unfinished = found.unfinished()
+    each = found.files // found.manifest.n_cameras
+    for what, cameras in (
+        ("never begun", [c for c, n in unfinished.items() if n == each]),
+        ("never finished", [c for c, n in unfinished.items() if n < each]),
+    ):
+        if cameras:
+            left = sum(unfinished[c] for c in cameras)
+            were = f"camera{'s' if len(cameras) > 1 else ''} {brief_frames_text(cameras)}: {what}"
+            lines.append(f"{were}, {left:,} of {each * len(cameras):,} files are left")
     if found.unknown:
         lines.append(f"note: {found.unknown:,} files are whole, but have no checksum to compare them with")
-    if not n:
-        return [*lines, f"{found.files:,} files of {found.manifest.name} are whole"]
-    advice = "`framearray verify --repair` renders them again"
-    return [*lines, f"{n:,} of {found.files:,} files are missing or damaged; {advice}"]
+    return [*lines, _sum_up(found, len(damaged), sum(unfinished.values()))]
+
+
+def _sum_up(found: "Verification", damaged: int, left: int) -> str:
+    """Word the result in one line, with the remedy."""
+    repair = f"`framearray verify --repair {found.manifest.directory}`"
+    if not damaged and not left:
+        return f"{found.files:,} files of {found.manifest.name} are whole"
+    if not damaged:
+        return f"{left:,} of {found.files:,} files were never finished; `framearray render JOB` or {repair} goes on"
+    more = f", {left:,} were never finished" if left else ""
+    return f"{damaged:,} of {found.files:,} files are missing or damaged{more}; {repair} renders them again"
