@@ -27,7 +27,7 @@ DOORS = {
     "numba": ("engine/embree/", "engine/kernels/", "engine/hits/native"),  # native: one function that allocates
     "trimesh": ("scene/files/",),
     "OpenImageIO": ("array/images/exr", "tools/movie/display"),
-    "PIL": ("scene/files/", "array/images/png", "tools/movie/label", "tools/movie/animation", "tools/sheet"),
+    "PIL": ("scene/files/", "array/images/png", "tools/movie/label", "tools/movie/animation", "tools/drawing"),
     "tomllib": ("base/forms/toml", "array/manifest_toml"),
     "tomli_w": ("base/forms/text", "array/manifest_toml", "report/tables"),
     "matplotlib": ("report/plots",),

@@ -46,7 +46,7 @@ def list_present(manifest: Manifest) -> PresentFiles:
     Raises:
         OutputError: a folder cannot be read.
     """
-    found = set()
+    found: set[str] = set()
     for folder in {name.rpartition("/")[0] for name in _patterns(manifest)}:
         try:
             with os.scandir(manifest.directory / folder) as entries:

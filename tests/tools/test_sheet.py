@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.boxarrays import grouped_manifest, plain_manifest, write_array, write_groups
+from support.sheets import blocks
 
 from framearray_cli.array.images.images import read_image
 from framearray_cli.array.images.png import read_codes
@@ -14,7 +15,8 @@ from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.tools.sheet import GAP, SHEET_GREY, area_mean, make_sheet
+from framearray_cli.tools.drawing import SHEET_GREY
+from framearray_cli.tools.sheet import area_mean, make_sheet
 
 
 @pytest.fixture
@@ -38,18 +40,6 @@ def test_the_mean_of_areas_is_a_plain_mean_where_pixels_fit() -> None:
     expected = image.reshape(3, 2, 4, 2, 3).mean((1, 3))
     np.testing.assert_allclose(area_mean(image, 4, 3), expected, rtol=1e-5)
     np.testing.assert_allclose(area_mean(image[:1, :3], 2, 1)[0, 0], (image[0, 0] + image[0, 1] / 2) / 1.5, rtol=1e-5)
-
-
-def blocks(codes: np.ndarray, tile: tuple[int, int]) -> list[list[np.ndarray]]:
-    """Cut a sheet at its background into images: rows of columns."""
-    # Letters stand above and to the left; the images end at the margins of the right and the bottom.
-    covered = (np.abs(codes.astype(int) - SHEET_GREY) > 12).any(-1)
-    bottom, right = np.flatnonzero(covered.any(1))[-1] + 1, np.flatnonzero(covered.any(0))[-1] + 1
-    found = []
-    for y in range(bottom - tile[1], 70, -tile[1] - GAP):
-        row = [codes[y : y + tile[1], x : x + tile[0]] for x in range(right - tile[0], 60, -tile[0] - GAP)]
-        found.append(row[::-1])
-    return found[::-1]
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg"])
@@ -134,7 +124,7 @@ def test_files_that_cannot_be_written_or_read_are_named(array: Manifest, tmp_pat
         make_sheet(array.directory, tmp_path / "sheet.gif")
     with pytest.raises(OutputError, match=r"exposure changes only PNG and JPEG; \.exr keeps the radiance"):
         make_sheet(array.directory, tmp_path / "sheet.exr", exposure=1.0)
-    image_path(array, 2, 1).unlink()
+    image_path(array, 2, 1).write_bytes(b"")
     with pytest.raises(OutputError, match=r"box\.c0002\.l001\.png: .*"):
         make_sheet(array.directory, tmp_path / "sheet.png")
     assert not list(tmp_path.glob("*sheet*"))

@@ -51,6 +51,8 @@ def export(
             image_format=ImageFormat(format=image_format, exposure=exposure), points=points, copy=copy,
             force=force, progress=screen.counter("exporting", "image"),
         )  # fmt: skip
+        screen.end()
+        screen.say(f"warning: {warning}" for warning in made.warnings)
     if not quiet:
         lights = f"{made.n_lights} light position{'s' if made.n_lights > 1 else ''}"
         points_too = f", {made.n_points:,} points" if kind != "cinema" else ""

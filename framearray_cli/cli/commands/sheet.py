@@ -39,6 +39,8 @@ def sheet(
             array, output_path(target), columns=columns, rows=rows, width=width, exposure=exposure, side=side,
             at=at or (), progress=screen.counter("drawing", "image"),
         )  # fmt: skip
+        screen.end()
+        screen.say(f"warning: {warning}" for warning in made.warnings)
     if not quiet:
         shown = f"{len(made.cameras)} cameras, {len(made.lights)} light positions"
         say(out, [f"{made.target}: {shown}, {made.size[0]} x {made.size[1]} pixels"])

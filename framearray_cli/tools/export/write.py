@@ -1,15 +1,17 @@
 """Write a frame array as a folder that other tools read; all input is the manifest and the images it names."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from framearray_cli.array.images.images import ImageFormat, require_writer
+from framearray_cli.array.manifest import layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures
+from framearray_cli.array.present import list_present, missing_text
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import whole_folder
@@ -36,7 +38,7 @@ class ExportResult:
         target: the folder.
         n_cameras, n_lights: exported cameras, and light positions of each.
         n_points: in the point cloud.
-        notes: for the user.
+        notes, warnings: for the user.
     """
 
     target: Path
@@ -44,6 +46,7 @@ class ExportResult:
     n_lights: int
     n_points: int
     notes: tuple[str, ...]
+    warnings: tuple[str, ...]
 
 
 def export_array(
@@ -60,7 +63,7 @@ def export_array(
     force: bool = False,
     progress: Progress | None = None,
 ) -> ExportResult:
-    """Export a frame array to another tool, as a folder that appears whole or not at all.
+    """Export the cameras that have all their images to another tool, as a folder that appears whole or not at all.
 
     Args:
         out: output folder of a render, or its manifest.
@@ -70,7 +73,7 @@ def export_array(
         light: places along the first light axis; None: all for cinema, the middle one for the others.
         at: "AXIS=PLACES" for the other axes; the default is as for `light`.
         image_format: of the pictures; None: PNG.
-        points: the number of points in the point cloud, at most.
+        points: in the point cloud, at most.
         copy: copy pictures of the array that could be linked.
         force: replace an earlier export.
         progress: called after each picture.
@@ -87,14 +90,14 @@ def export_array(
     )
     if kind not in EXPORT_KINDS:
         raise JobError("--format", [f"expected {', '.join(EXPORT_KINDS)}, got {kind!r}"])
-    target = _full_name(target, kind)
-    image_format = image_format or ImageFormat(format="png")
+    target, image_format = _full_name(target, kind), image_format or ImageFormat(format="png")
     require_writer(image_format.format)
     pictures = Pictures(manifest)
-    replace = find_earlier_export(target, _MARK_FILES[kind], force=force)
-    with whole_folder(target, replace=replace) as folder:
+    has_cloud = kind != "cinema" and bool(manifest.layers)
+    selection, left_out = _split_complete(pictures, selection, layers=has_cloud)
+    replaces = find_earlier_export(target, _MARK_FILES[kind], force=force)
+    with whole_folder(target, replace=replaces) as folder:
         files = _write_pictures(pictures, selection, folder / "images", image_format, copy=copy, progress=progress)
-        has_cloud = kind != "cinema" and bool(manifest.layers)
         cloud = _make_cloud(pictures, selection, image_format.exposure, points) if has_cloud else None
         _write_tables(folder, kind, selection, files, cloud, image_format.exposure)
     n_points = len(cloud.position) if cloud else 0
@@ -104,7 +107,32 @@ def export_array(
         n_lights=len(selection.lights),
         n_points=n_points,
         notes=_notes(kind, bool(manifest.layers), n_points, points),
+        warnings=(f"left out: {left_out}",) if left_out else (),
     )
+
+
+def _split_complete(pictures: Pictures, selection: Selection, *, layers: bool) -> tuple[Selection, str]:
+    """Return the cameras of a selection whose files are all there, and a text about the others; "" if there are none.
+
+    Args:
+        layers: whether the layers of each camera are needed too.
+
+    Raises:
+        OutputError: no camera is complete.
+    """
+    manifest, present = selection.manifest, list_present(selection.manifest)
+
+    def is_complete(c: int) -> bool:
+        more = [layers_path(manifest, c)] if layers else []
+        return present.has(more) and all(present.has(pictures.files(c, lights)) for lights in selection.lights)
+
+    complete = tuple(c for c in selection.cameras if is_complete(c))
+    if len(complete) == len(selection.cameras):
+        return selection, ""
+    text = missing_text(set(selection.cameras) - set(complete), len(selection.cameras))
+    if not complete:
+        raise OutputError(f"{manifest.directory}: {text}")
+    return replace(selection, cameras=complete), text
 
 
 def _full_name(target: Path, kind: ExportKind) -> Path:

@@ -1,6 +1,5 @@
 """Assemble a movie, or a numbered image sequence, along a path; all input is the manifest and the images it names."""
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,6 +14,8 @@ from framearray_cli.array.images.images import format_name, require_writer
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures, Relight
+from framearray_cli.array.present import REMEDY, list_present
+from framearray_cli.array.ranges import brief_frames_text
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import folder_for
 from framearray_cli.base.forms.table import changed
@@ -118,18 +119,20 @@ def _own_suffix(manifest: Manifest) -> str:
 
 
 def _check_images(pictures: Pictures, line: Timeline) -> None:
-    """Check every image before using the first, so that a missing or truncated one is reported at once."""
+    """Check every image before using the first, so that missing and truncated ones are reported at once."""
+    manifest, present = pictures.manifest, list_present(pictures.manifest)
     wanted: dict[Path, Shot] = {}
     for shot in dict.fromkeys(line.shots):
         wanted.update(dict.fromkeys(pictures.files(shot.c, shot.positions), shot))
-    missing = sorted(path for path in wanted if not os.path.isfile(path))
+    missing = sorted(path for path in wanted if not present.has([path]))
     if missing:
-        shot = wanted[missing[0]]
-        lights = zip(pictures.manifest.axes, shot.positions, strict=True)
+        shot, cameras = wanted[missing[0]], {wanted[path].c for path in missing}
+        lights = zip(manifest.axes, shot.positions, strict=True)
         place = ", ".join([f"camera {shot.c}", *(f"{axis} {position:g}" for axis, position in lights)])
+        s = "s" if len(cameras) > 1 else ""
         raise OutputError(
-            f"{missing[0]}: no such file ({place}); "
-            f"{len(missing)} of the {len(wanted)} images on the path are missing; render the rest first"
+            f"{manifest.directory}: {len(missing):,} of the {len(wanted):,} images on the path are missing, "
+            f"of camera{s} {brief_frames_text(cameras)}; the first is {missing[0].name} ({place}); {REMEDY}"
         )
     for path in sorted(wanted):
         check_image(path, pictures.manifest.resolution)

@@ -1,0 +1,93 @@
+"""Draw a contact sheet: small images on a grey ground, with labels."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from framearray_cli.base.arrays import Bytes
+
+from .movie.label import typeface
+
+# sRGB codes, all neutral: a dark grey that neither dazzles nor tints the images on it.
+SHEET_GREY, HEADING, LABEL = 38, 225, 160
+GAP, MARGIN = 4, 24  # pixels
+HEAD_TEXT, LABEL_TEXT = 22, 15  # height of the letters' boxes, pixels
+BLANK, STRIPE = "missing", 12  # an image that is not there: a word, and the distance of stripes in pixels
+
+
+def draw_sheet(tiles: Bytes, cameras: Sequence[int], labels: Sequence[str], heads: Sequence[str], width: int) -> Bytes:
+    """Put small images on a sheet with labels; the head line may widen it to `width`. Return (h, w, 3) sRGB codes."""
+    import PIL.Image
+    import PIL.ImageDraw
+
+    n_rows, n_columns, tile_height, tile_width, _ = tiles.shape
+    left, top = MARGIN + gutter(labels), MARGIN + HEAD_TEXT + 2 * LABEL_TEXT + 12
+    step_x, step_y = tile_width + GAP, tile_height + GAP
+    head_width = 2 * MARGIN + HEAD_TEXT + int(_length(heads[0], HEAD_TEXT) + _length(heads[1])) + 1
+    sheet_width = max(left + n_columns * step_x - GAP + MARGIN, min(head_width, width))
+    height = top + n_rows * step_y - GAP + MARGIN
+    sheet = np.full((height, sheet_width, 3), SHEET_GREY, np.uint8)
+    for j in range(n_rows):
+        for i in range(n_columns):
+            x, y = left + i * step_x, top + j * step_y
+            sheet[y : y + tile_height, x : x + tile_width] = tiles[j, i]
+    picture = PIL.Image.fromarray(sheet)
+    draw = PIL.ImageDraw.Draw(picture)
+    _draw_heads(draw, heads, sheet_width)
+    font, grey = typeface(LABEL_TEXT), (LABEL,) * 3
+    names = [f"camera {c}" for c in cameras]
+    if max(_length(name) for name in names) + LABEL_TEXT > step_x:
+        names = [str(c) for c in cameras]
+    stride = _label_stride(max(_length(name) for name in names) + LABEL_TEXT / 2, step_x)
+    for i in range(0, n_columns, stride):
+        draw.text((left + i * step_x + tile_width / 2, top - 7), names[i], font=font, fill=grey, anchor="ms")
+    for j in range(0, n_rows, _label_stride(LABEL_TEXT, step_y)):
+        y = top + j * step_y + tile_height / 2
+        draw.text((left - LABEL_TEXT, y), labels[j], font=font, fill=grey, anchor="rm")
+    return np.asarray(picture)
+
+
+def _draw_heads(draw: Any, heads: Sequence[str], width: int) -> None:
+    """Draw the name large and the counts beside it, cut where the sheet is too narrow."""
+    base, left, right = MARGIN + HEAD_TEXT - 5, float(MARGIN), width - MARGIN
+    for text, size, code in ((heads[0], HEAD_TEXT, HEADING), (heads[1], LABEL_TEXT, LABEL)):
+        cut = text
+        while cut and left + _length(cut, size) > right:
+            cut = cut.removesuffix("...")[:-1] and f"{cut.removesuffix('...')[:-1]}..."
+        draw.text((left, base), cut, font=typeface(size), fill=(code,) * 3, anchor="ls")
+        left += _length(cut, size) + HEAD_TEXT
+
+
+def _length(text: str, size: int = LABEL_TEXT) -> float:
+    """Return the width of a text, pixels."""
+    return float(typeface(size).getlength(text))
+
+
+def gutter(labels: Sequence[str]) -> int:
+    """Return the width of the labels at the side, pixels."""
+    return int(max(_length(label) for label in labels)) + 1 + LABEL_TEXT
+
+
+def _label_stride(length: float, step: int) -> int:
+    """Return the number of images per label, so that labels do not touch."""
+    return max(1, math.ceil(length / step))
+
+
+def blank_tile(width: int, height: int) -> Bytes:
+    """Draw what stands for an image that is not there: stripes, and a word where it fits; (height, width, 3) codes."""
+    import PIL.Image
+    import PIL.ImageDraw
+
+    y, x = np.mgrid[:height, :width]
+    stripes = np.where((x + y) % STRIPE < STRIPE // 4, SHEET_GREY + 24, SHEET_GREY - 16).astype(np.uint8)
+    picture = PIL.Image.fromarray(np.repeat(stripes[..., None], 3, axis=2))
+    if _length(BLANK) + LABEL_TEXT < width and height > 2 * LABEL_TEXT:
+        draw, box = PIL.ImageDraw.Draw(picture), (_length(BLANK) / 2 + 6, 0.7 * LABEL_TEXT)
+        draw.rectangle(
+            (width / 2 - box[0], height / 2 - box[1], width / 2 + box[0], height / 2 + box[1]),
+            fill=(SHEET_GREY - 16,) * 3,
+        )
+        draw.text((width / 2, height / 2), BLANK, font=typeface(LABEL_TEXT), fill=(LABEL,) * 3, anchor="mm")
+    return np.asarray(picture)

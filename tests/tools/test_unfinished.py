@@ -1,0 +1,82 @@
+"""Commands on an array that a stopped render has left unfinished."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.boxarrays import plain_manifest, write_array
+from support.sheets import blocks
+
+from framearray_cli.array.images.images import read_image
+from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.manifest import Manifest, image_path
+from framearray_cli.array.present import list_present
+from framearray_cli.base.errors import OutputError
+from framearray_cli.tools.export import export_array
+from framearray_cli.tools.sheet import make_sheet
+
+
+@pytest.fixture
+def array(tmp_path: Path) -> Manifest:
+    return write_array(plain_manifest(tmp_path / "out"))
+
+
+def test_files_that_exist_are_listed_without_a_look_at_each(array: Manifest) -> None:
+    assert list_present(array).incomplete() == []
+    (array.directory / "box.layers.c0002.exr").unlink()
+    image_path(array, 0, 2).unlink()
+    present = list_present(array)
+    assert present.incomplete() == [0, 2]
+    assert present.has([image_path(array, 0, 1)]) and not present.has([image_path(array, 0, l) for l in range(3)])
+
+
+def test_cameras_that_lack_images_are_left_out(array: Manifest, tmp_path: Path) -> None:
+    (array.directory / "box.layers.c0002.exr").unlink()
+    image_path(array, 0, 2).unlink()
+    lacks = "lack images: {}; `framearray render JOB` goes on with the rest"
+    for kind, light, left_out, warning in (
+        ("nerfstudio", "1", {2}, f"left out: 1 of 4 cameras {lacks.format(2)}"),
+        ("colmap", "all", {0, 2}, f"left out: 2 of 4 cameras {lacks.format('0,2')}"),
+        ("cinema", "0,1", set(), None),
+        ("cinema", "all", {0}, f"left out: 1 of 4 cameras {lacks.format(0)}"),
+    ):
+        result = export_array(array.directory, tmp_path / "x", kind, light=light, force=True)
+        assert result.warnings == (() if warning is None else (warning,))
+        assert result.n_cameras == 4 - len(left_out)
+        names = {file.name[:5] for file in (result.target / "images").iterdir()}
+        assert names == {f"c{c:04d}" for c in {0, 1, 2, 3} - left_out}
+        shutil.rmtree(result.target)
+    with pytest.raises(OutputError, match=rf"1 of 1 cameras {lacks.format(0)}"):
+        export_array(array.directory, tmp_path / "y", "cinema", cameras="0")
+    assert not list(tmp_path.glob("y*"))
+
+
+def test_a_sheet_shows_what_is_there(array: Manifest, tmp_path: Path) -> None:
+    image_path(array, 1, 2).unlink()
+    for l in range(3):
+        image_path(array, 3, l).unlink()
+    made = make_sheet(array.directory, tmp_path / "s.png")
+    assert made.warnings == (
+        "4 of 12 images of the sheet are missing, of cameras 1,3; `framearray render JOB` goes on with the rest",
+    )
+    shown = blocks(read_codes(tmp_path / "s.png"), array.resolution)
+    for l, row in enumerate(shown):
+        for c, tile in enumerate(row):
+            if c == 3 or (c, l) == (1, 2):
+                np.testing.assert_array_equal(tile, shown[0][3], "all blanks are alike")
+                assert len(np.unique(tile)) == 2 and tile.max() < 100, "dark stripes"
+            else:
+                np.testing.assert_array_equal(tile, read_codes(image_path(array, c, l)))
+    make_sheet(array.directory, tmp_path / "s.exr")
+    assert not read_image(tmp_path / "s.exr")[:, 180:].any()
+    assert read_image(tmp_path / "s.exr")[:, :180].reshape(3, 40, 3, 60, 3).any(axis=(1, 3, 4)).sum() == 8
+
+
+def test_a_sheet_of_nothing_is_refused(array: Manifest, tmp_path: Path) -> None:
+    for c in range(4):
+        for l in range(3):
+            image_path(array, c, l).unlink()
+    with pytest.raises(OutputError, match=r"out: 12 of 12 images of the sheet are missing, of cameras 0-3; `framearr"):
+        make_sheet(array.directory, tmp_path / "s.png")
+    assert not (tmp_path / "s.png").exists()
