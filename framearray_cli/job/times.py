@@ -8,6 +8,7 @@ from zoneinfo import ZoneInfo, available_timezones
 
 from pydantic import PlainValidator, WithJsonSchema
 
+from framearray_cli.base.extras import install_command
 from framearray_cli.base.forms.table import fail
 from framearray_cli.base.forms.words import shown
 
@@ -58,7 +59,8 @@ def _unknown_zone(value: str) -> None:
     """Report an unknown name, and the one that was probably meant."""
     known = available_timezones()
     if not known:  # Windows has no time zone database
-        fail([((), "this machine has no list of time zones; pip install tzdata, or give the hours ahead of UTC")])
+        remedy = f"give the hours ahead of UTC, or install it with: {install_command('tzdata')}"
+        fail([((), f"this machine has no list of time zones; {remedy}")])
     by_city = {name.rpartition("/")[2].lower(): name for name in sorted(known)}
     city = value.strip().rpartition("/")[2].lower().replace(" ", "_")
     close = get_close_matches(city, by_city, n=1, cutoff=0.7)

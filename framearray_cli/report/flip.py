@@ -21,7 +21,7 @@ def require_extra() -> None:
 
     missing = [name for name in EXTRA if find_spec(name) is None]
     if missing:
-        raise not_installed(f"a report needs {', '.join(missing)}", '"framearray[report]"')
+        raise not_installed(f"a report needs {', '.join(missing)}", "[report]")
 
 
 def flip_map(image: Image, reference: Image) -> Float32:

@@ -1,26 +1,141 @@
-"""The error where an optional library is missing."""
+"""The error where an optional library is missing, and the command that installs it, for each way of installation."""
+
+import json
+import shlex
+import sys
+from importlib.metadata import PackageNotFoundError
 
 import pytest
+from packaging.requirements import Requirement
 
+from framearray_cli.base import extras
 from framearray_cli.base.errors import MissingExtraError
-from framearray_cli.base.extras import extra
+from framearray_cli.base.extras import extra, install_command
+
+
+class Installed:
+    """What pip leaves beside an installed program."""
+
+    requires = ("numpy>=2.0", 'av>=13.1; extra == "movie"', "flip>=1; python_version < '3.14' and extra == 'report'")
+
+    def __init__(self, origin: object = None, installer: str = "pip\n") -> None:
+        text = origin if isinstance(origin, str) else json.dumps(origin) if origin is not None else None
+        self._files = {"direct_url.json": text, "INSTALLER": installer}
+
+    def read_text(self, name: str) -> str | None:
+        return self._files[name]
+
+
+@pytest.fixture
+def away(monkeypatch, tmp_path):
+    """The program lies in site-packages, not in a checkout; return a function that says how it got there."""
+    monkeypatch.setattr(extras, "SOURCE", tmp_path / "site-packages")
+    monkeypatch.setattr(sys, "executable", "/opt/env/bin/python")
+
+    def install(*origin: object, **more: str) -> None:
+        monkeypatch.setattr("importlib.metadata.distribution", lambda name: Installed(*origin, **more))
+
+    return install
 
 
 def test_the_message_says_how_to_install_it() -> None:
-    with pytest.raises(MissingExtraError) as error, extra("a sun needs pvlib", '"framearray[sun]"'):
+    with pytest.raises(MissingExtraError) as error, extra("a sun needs pvlib", "[sun]"):
         raise ModuleNotFoundError("No module named 'pvlib'")
-    assert str(error.value) == (
-        'a sun needs pvlib, which is not installed; install it with: pip install "framearray[sun]"'
-    )
+    command = install_command("[sun]")
+    assert str(error.value) == f"a sun needs pvlib, which is not installed; install it with: {command}"
     assert isinstance(error.value.__cause__, ModuleNotFoundError)
 
 
 def test_a_library_that_does_not_load_says_why() -> None:
-    with pytest.raises(MissingExtraError) as error, extra("movies need PyAV", '"framearray[movie]"', reason=True):
+    with pytest.raises(MissingExtraError) as error, extra("movies need PyAV", "[movie]", reason=True):
         raise ImportError("libx.so: no such file")
-    assert str(error.value) == 'movies need PyAV (libx.so: no such file); pip install "framearray[movie]"'
+    command = install_command("[movie]")
+    assert str(error.value) == f"movies need PyAV (libx.so: no such file); install it with: {command}"
 
 
 def test_other_errors_pass() -> None:
     with pytest.raises(ValueError, match="another"), extra("a sun needs pvlib", "x"):
         raise ValueError("another")
+
+
+def test_from_a_checkout(away, monkeypatch, tmp_path) -> None:
+    away()
+    checkout = tmp_path / "my checkout"
+    checkout.mkdir()
+    (checkout / "pyproject.toml").write_text('[project]\nname = "framearray"\n')
+    monkeypatch.setattr(extras, "SOURCE", checkout)
+    expected = f'/opt/env/bin/python -m pip install -e "{checkout}[movie]"'
+    assert install_command("[movie]") == expected
+
+    def missing(name: str) -> None:
+        raise PackageNotFoundError
+
+    monkeypatch.setattr("importlib.metadata.distribution", missing)  # run from its source
+    assert install_command("[movie]") == expected
+
+
+def test_a_foreign_pyproject_is_no_checkout(away, tmp_path) -> None:
+    away()
+    (tmp_path / "site-packages").mkdir()
+    (tmp_path / "site-packages" / "pyproject.toml").write_text('[project]\nname = "another"\n')
+    assert install_command("[movie]") == '/opt/env/bin/python -m pip install "framearray[movie]"'
+
+
+def test_from_an_index(away) -> None:
+    away()
+    assert install_command("[movie]") == '/opt/env/bin/python -m pip install "framearray[movie]"'
+    away("not JSON")
+    assert install_command("[movie]") == '/opt/env/bin/python -m pip install "framearray[movie]"'
+
+
+@pytest.mark.parametrize("name", ["framearray-0.1.0-py3-none-any.whl", "a folder"])
+def test_from_a_wheel_or_a_folder(name, away, tmp_path) -> None:
+    place = tmp_path / name
+    if place.suffix:
+        place.touch()
+    else:
+        place.mkdir()
+    away({"url": place.as_uri(), "dir_info": {}})
+    assert install_command("[movie]") == f'/opt/env/bin/python -m pip install "{place}[movie]"'
+
+
+def test_from_a_wheel_that_has_gone(away, tmp_path) -> None:
+    away({"url": (tmp_path / "framearray-0.1.0-py3-none-any.whl").as_uri(), "archive_info": {}})
+    assert install_command("[movie]") == '/opt/env/bin/python -m pip install "av>=13.1"'
+    assert install_command("[report]") == "/opt/env/bin/python -m pip install \"flip>=1; python_version < '3.14'\""
+
+
+def test_from_a_url(away) -> None:
+    away({"url": "https://host/framearray-0.1.0.tar.gz", "archive_info": {}, "subdirectory": "a/b"})
+    found = '"framearray[movie] @ https://host/framearray-0.1.0.tar.gz#subdirectory=a/b"'
+    assert install_command("[movie]") == f"/opt/env/bin/python -m pip install {found}"
+
+
+@pytest.mark.parametrize(("more", "revision"), [({}, "1f2e"), ({"requested_revision": "main"}, "main")])
+def test_from_a_repository(more, revision, away) -> None:
+    away({"url": "https://host/x.git", "vcs_info": {"vcs": "git", "commit_id": "1f2e", **more}})
+    found = f'"framearray[movie] @ git+https://host/x.git@{revision}"'
+    assert install_command("[movie]") == f"/opt/env/bin/python -m pip install {found}"
+
+
+def test_environments_of_uv_have_no_pip(away) -> None:
+    away(installer="uv\n")
+    assert install_command("[movie]") == 'uv pip install --python /opt/env/bin/python "framearray[movie]"'
+
+
+def test_names_are_quoted(away, monkeypatch, tmp_path) -> None:
+    odd = tmp_path / 'a "b" $c'
+    odd.mkdir()
+    away({"url": odd.as_uri(), "dir_info": {}})
+    monkeypatch.setattr(sys, "executable", "/opt/my env/bin/python")
+    assert install_command("DracoPy") == '"/opt/my env/bin/python" -m pip install DracoPy'
+    assert install_command("[movie]") == f"\"/opt/my env/bin/python\" -m pip install '{odd}[movie]'"
+
+
+def test_a_shell_and_pip_read_the_command(away) -> None:
+    for origin in ({}, {"url": "https://host/x.git", "vcs_info": {"vcs": "git", "commit_id": "1f2e"}}):
+        away(origin)
+        command = shlex.split(install_command("[movie]"))
+        assert command[:4] == ["/opt/env/bin/python", "-m", "pip", "install"]
+        read = Requirement(command[4])
+        assert (read.name, read.extras) == ("framearray", {"movie"})

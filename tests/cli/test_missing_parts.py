@@ -54,11 +54,11 @@ def test_libraries_that_are_not_installed(array, tmp_path):
     smooth = write_job(tmp_path, "smooth.toml", denoise={"obscurance": True}, output={"directory": "other"})
     plain = write_job(tmp_path, "plain.toml", output={"directory": "other"})
     cases = [
-        ("av", ["assemble", array, "--walk", "-o", tmp_path / "a.mp4"], "framearray[movie]"),
-        ("pvlib", ["render", sunny], "framearray[sun]"),
-        ("pyoidn", ["render", smooth], "framearray[denoise]"),
-        ("matplotlib,jinja2", ["report", plain], "framearray[report]"),
-        ("flip_evaluator", ["report", plain], "framearray[report]"),
+        ("av", ["assemble", array, "--walk", "-o", tmp_path / "a.mp4"], "[movie]"),
+        ("pvlib", ["render", sunny], "[sun]"),
+        ("pyoidn", ["render", smooth], "[denoise]"),
+        ("matplotlib,jinja2", ["report", plain], "[report]"),
+        ("flip_evaluator", ["report", plain], "[report]"),
         ("OpenImageIO", ["render", "-q", plain], "pip install OpenImageIO"),
         ("OpenImageIO", ["verify", array], ""),
     ]

@@ -176,7 +176,7 @@ def test_flip_is_0_for_equal_pictures_and_grows_with_the_difference() -> None:
 
 def test_missing_libraries_are_reported_with_their_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "jinja2" else object())
-    with pytest.raises(MissingExtraError, match=r'needs jinja2.*pip install "framearray\[report\]"'):
+    with pytest.raises(MissingExtraError, match=r'needs jinja2.*pip install .*\[report\]"'):
         flip.require_extra()
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from framearray_cli.base.arrays import Bytes, Float32, Image
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import MissingExtraError, OutputError
+from framearray_cli.base.extras import install_command
 from framearray_cli.base.files import write_bytes
 
 from .attributes import Attributes
@@ -85,8 +86,8 @@ def require_writer(name: Extension) -> None:
         good, library = can_encode(name), "Pillow"
     if not good:
         raise MissingExtraError(
-            f"{library} is built without {name.upper()} here; pip install --force-reinstall {library} brings a build "
-            "that has it, or choose another format"
+            f"{library} is built without {name.upper()} here; choose another format, or install a build that has it "
+            f"with: {install_command(f'--force-reinstall {library}')}"
         )
 
 

@@ -19,7 +19,7 @@ def require_denoiser() -> Any:
     Raises:
         MissingExtraError: pyoidn is not installed.
     """
-    with extra("denoise.obscurance needs Open Image Denoise", '"framearray[denoise]"'):
+    with extra("denoise.obscurance needs Open Image Denoise", "[denoise]"):
         import pyoidn
     return pyoidn
 

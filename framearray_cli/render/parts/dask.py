@@ -21,7 +21,7 @@ def require_dask() -> Any:
     Raises:
         MissingExtraError: Dask distributed is not installed.
     """
-    with extra("--workers and --dask need Dask distributed", '"framearray[dask]"'):
+    with extra("--workers and --dask need Dask distributed", "[dask]"):
         import distributed
     for name in list(logging.root.manager.loggerDict):  # this program reports what matters, in its own words
         if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from framearray_cli.base.errors import SceneError
+from framearray_cli.base.extras import install_command
 
 from .assets import AssetError, Assets
 from .gltf.container import open_gltf
@@ -78,7 +79,9 @@ def _scene_errors(file: Path, extension: str) -> Iterator[None]:
         raise SceneError(f"{file}: {error}") from error
     except ImportError as error:
         package = "Pillow" if (error.name or "").startswith("PIL") else error.name
-        raise SceneError(f"{file}: reading it needs {package}; pip install {package}") from error
+        raise SceneError(
+            f"{file}: reading it needs {package}; install it with: {install_command(str(package))}"
+        ) from error
     except MemoryError as error:
         raise SceneError(f"{file}: does not fit into memory, or its header claims more than it holds") from error
     except AssetError as error:

@@ -47,7 +47,7 @@ def require_pvlib() -> Any:
     Raises:
         MissingExtraError: pvlib is not installed.
     """
-    with extra('a source of type "sun" needs pvlib', '"framearray[sun]"'):
+    with extra('a source of type "sun" needs pvlib', "[sun]"):
         from pvlib import spa
     return spa
 

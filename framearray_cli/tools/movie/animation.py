@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes
 from framearray_cli.base.errors import MissingExtraError, OutputError
+from framearray_cli.base.extras import install_command
 from framearray_cli.base.files import whole_file
 
 GIF_UNITS, WEBP_UNITS = 100, 1000  # of time, per second
@@ -47,7 +48,8 @@ def require_animation(suffix: str) -> None:
 
     if suffix == ".webp" and not PIL.features.check("webp"):
         raise MissingExtraError(
-            "Pillow is built without WebP here; pip install --force-reinstall Pillow brings it, or choose another kind"
+            "Pillow is built without WebP here; choose another kind, or install a build that has it with: "
+            + install_command("--force-reinstall Pillow")
         )
 
 

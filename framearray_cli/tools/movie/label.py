@@ -45,7 +45,7 @@ def typeface(size: int) -> Any:
     """
     from PIL import ImageFont
 
-    with extra("labels need Pillow with FreeType", "--force-reinstall Pillow brings it", reason=True):
+    with extra("labels need Pillow with FreeType", "--force-reinstall Pillow", reason=True):
         return ImageFont.load_default(size)
 
 

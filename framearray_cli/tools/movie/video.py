@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.errors import MissingExtraError, OutputError
-from framearray_cli.base.extras import extra
+from framearray_cli.base.extras import extra, install_command
 from framearray_cli.base.files import whole_file
 
 from .yuv import planes_422_10
@@ -68,7 +68,7 @@ def require_av() -> ModuleType:
     Raises:
         MissingExtraError: it is not installed.
     """
-    with extra("movies need PyAV", '"framearray[movie]"', reason=True):
+    with extra("movies need PyAV", "[movie]", reason=True):
         import av
     module: ModuleType = av
     return module
@@ -88,8 +88,8 @@ def require_encoder(suffix: str) -> None:
     others = [other for other in VIDEOS if _can_make(other)]
     choose = f"; {', '.join(others)} can be made here" if others else ""
     raise MissingExtraError(
-        f"{suffix}: PyAV is built without {VIDEOS[suffix].codec} here; pip install --force-reinstall av brings a build "
-        f"that has it{choose}"
+        f"{suffix}: PyAV is built without {VIDEOS[suffix].codec} here; this brings a build that has it: "
+        f"{install_command('--force-reinstall av')}{choose}"
     )
 
 

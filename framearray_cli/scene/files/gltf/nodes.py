@@ -6,6 +6,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import SceneError
+from framearray_cli.base.extras import install_command
 
 from ..limit import Limit
 from ..model import Notes
@@ -35,7 +36,8 @@ def check_readable(gltf: Gltf) -> None:
             raise SceneError(f"the geometry is compressed with {meshopt}, which cannot be read; export without it")
     if "KHR_draco_mesh_compression" in used and importlib.util.find_spec("DracoPy") is None:
         raise SceneError(
-            "the geometry is compressed with Draco; install DracoPy (pip install DracoPy) or export without it"
+            "the geometry is compressed with Draco; export without it, or install DracoPy with: "
+            + install_command("DracoPy")
         )
     if not gltf.items("scenes"):
         raise SceneError("expected a scene in the file, got none; nothing says which nodes to show")
