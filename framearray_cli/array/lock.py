@@ -13,7 +13,7 @@ from filelock import FileLock, Timeout
 from framearray_cli.base.errors import BusyError, OutputError
 from framearray_cli.base.files import make_folder, reason
 
-from .ranges import parse_frames
+from .places import parse_places
 from .record import FOLDER, MOST, record_file
 
 # Seconds that a run waits for the guard.
@@ -97,9 +97,9 @@ class ArrayFolder:
         return held
 
 
-def _cameras_of(lock: Path) -> range | tuple[int, ...]:
+def _cameras_of(lock: Path) -> Sequence[float]:
     """Return the cameras of another run; all, if its range is too long for a file name."""
     try:
-        return parse_frames(lock.stem, MOST)
+        return parse_places(lock.stem, MOST)
     except ValueError:
         return range(MOST)

@@ -27,9 +27,17 @@ Exposure = Annotated[
     float,
     typer.Option("--exposure", min=-MOST_STOPS, max=MOST_STOPS, help="Stops added to PNG and JPEG.", metavar="STOPS"),
 ]
+Cameras = Annotated[
+    str | None,
+    typer.Option("--cameras", help="Camera positions: 0-47, 0-47x3, 5,8-11, last, 50%, all.", metavar="PLACES"),
+]
+Light = Annotated[
+    str | None,
+    typer.Option("--light", help="Light positions: 0-47, 0-47x3, 5,8-11, last, 50%, all.", metavar="PLACES"),
+]
 At = Annotated[
     list[str] | None,
-    typer.Option("--at", help="Place along another axis of light positions: lamps=3.", metavar="AXIS=PLACE"),
+    typer.Option("--at", help="Positions along another light axis: lamps=0-3; may be repeated.", metavar="AXIS=PLACES"),
 ]
 
 
@@ -52,16 +60,6 @@ def with_threads(job: "Job", threads: int | None) -> "Job":
     from framearray_cli.base.forms.table import changed
 
     return changed(job, render=changed(job.render, threads=threads))
-
-
-def parse_cameras(text: str, n: int) -> tuple[int, ...]:
-    """Return the frames that an option `--cameras` names, of a path of n frames."""
-    from framearray_cli.array.ranges import parse_frames
-
-    try:
-        return parse_frames(text, n)
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--cameras") from error
 
 
 def output_path(name: str, option: str = "--output") -> Path:

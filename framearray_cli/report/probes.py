@@ -42,7 +42,7 @@ def choose_probes(
     """
     problems = [
         f"--{name}: expected 0 to {n - 1}, got {index}"
-        for name, n, chosen in (("camera", n_c, cameras), ("light", n_l, lights))
+        for name, n, chosen in (("cameras", n_c, cameras), ("light", n_l, lights))
         for index in chosen
         if not 0 <= index < n
     ]

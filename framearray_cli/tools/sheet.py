@@ -20,6 +20,7 @@ from framearray_cli.array.images.images import (
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures
+from framearray_cli.array.places import MIDDLE_PLACE, read_indices
 from framearray_cli.array.present import REMEDY, list_present
 from framearray_cli.array.ranges import brief_frames_text
 from framearray_cli.base.arrays import Float32, Image
@@ -27,8 +28,8 @@ from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.words import shown
 
+from .axes import LightIndices, evenly_spaced, given_places
 from .drawing import GAP, MARGIN, blank_tile, draw_sheet, gutter
-from .places import MIDDLE_PLACE, LightIndices, evenly_spaced, read_light_indices
 from .progress import Progress
 
 MOST_COLUMNS, MOST_ROWS = 12, 8  # for an array of 192 x 48: 200 pixels per tile, on a sheet that fits a screen
@@ -59,6 +60,8 @@ def make_sheet(
     out: Path,
     target: Path,
     *,
+    cameras: str | None = None,
+    light: str | None = None,
     columns: int = MOST_COLUMNS,
     rows: int = MOST_ROWS,
     width: int = WIDTH,
@@ -75,11 +78,13 @@ def make_sheet(
     Args:
         out: output folder of a render, or its manifest.
         target: a .png, .jpg, .exr or .tif.
-        columns, rows: the number of cameras and light positions, at most; they are evenly spaced.
+        cameras: places along the camera path, one per column; None: a few, evenly spaced.
+        light: places along the first light axis, one per row if that is the axis shown, else one; None: as for `at`.
+        columns, rows: the number of cameras and light positions, at most, where they are not named.
         width: of the sheet, at most, pixels; images are never enlarged.
         exposure: stops added to PNG and JPEG.
         side: axis of light positions from top to bottom; None: the first.
-        at: "AXIS=PLACE" for the other axes; the default is their middle.
+        at: "AXIS=PLACES" for further axes; the default is a few of the shown one, and the middle of all others.
         progress: called after each image.
 
     Raises:
@@ -91,25 +96,25 @@ def make_sheet(
     require_writer(image_format.format)
     manifest = read_manifest(out)
     axis = side if side is not None else next(iter(manifest.axes))
-    fixed = _read_fixed_lights(manifest, axis, at)
-    cameras = evenly_spaced(manifest.n_cameras, columns)
-    lights = evenly_spaced(manifest.axes[axis], rows)
+    lights, fixed = _read_lights(manifest, axis, light, at, rows)
+    n = manifest.n_cameras
+    chosen = evenly_spaced(n, columns) if cameras is None else read_indices("--cameras", cameras, n)
     labels = [f"{axis} {l}" for l in lights] if image_format.format in FOR_SCREENS else []
-    tile = _tile_size(manifest, len(cameras), width, labels)
-    places = _Places(cameras, lights, list(manifest.axes).index(axis), fixed)
+    tile = _tile_size(manifest, len(chosen), width, labels)
+    places = _Places(chosen, lights, list(manifest.axes).index(axis), fixed)
     there, warnings = _find_images(manifest, places)
     tiles = _read_tiles(manifest, places, there, tile, progress)
     if labels:
         shown = srgb8_from_linear(tiles * np.float32(2.0**exposure))
         shown[~there] = blank_tile(*tile)
-        codes = draw_sheet(shown, cameras, labels, _heads(manifest, axis, fixed), width)
+        codes = draw_sheet(shown, chosen, labels, _heads(manifest, axis, fixed), width)
         write_codes(target, codes, image_format)
         size = (codes.shape[1], codes.shape[0])
     else:
         n_rows, n_columns, tile_height, tile_width, _ = tiles.shape
         size = (n_columns * tile_width, n_rows * tile_height)
         write_image(target, tiles.swapaxes(1, 2).reshape(size[1], size[0], 3), image_format)
-    return SheetResult(target=target, cameras=cameras, lights=lights, size=size, warnings=warnings)
+    return SheetResult(target=target, cameras=chosen, lights=lights, size=size, warnings=warnings)
 
 
 class _Places(NamedTuple):
@@ -157,16 +162,26 @@ def _image_format(target: Path, exposure: float) -> ImageFormat:
     return ImageFormat(format=name)  # type: ignore[arg-type]  # just checked
 
 
-def _read_fixed_lights(manifest: Manifest, axis: str, at: Sequence[str]) -> LightIndices:
-    """Read the index along each axis that is not shown; the one along the shown axis is void."""
+def _read_lights(
+    manifest: Manifest, axis: str, light: str | None, at: Sequence[str], rows: int
+) -> tuple[tuple[int, ...], LightIndices]:
+    """Read the rows of the sheet, and the index along each axis that is not shown; that along the shown one is void.
+
+    Args:
+        rows: at most, where neither `light` nor `at` names them.
+    """
     if axis not in manifest.axes:
         raise JobError("--side", [f"expected one of the axes {', '.join(manifest.axes)}, got {shown(axis)}"])
-    if any(text.partition("=")[0] == axis for text in at):
-        raise JobError("--at", [f"expected other axes than {axis}, all of which is shown"])
-    found = read_light_indices(manifest, None, at, MIDDLE_PLACE)
-    if len(found) != 1:
-        raise JobError("--at", ["expected one place for each axis, got several"])
-    return found[0]
+    given = given_places(manifest, light, at)
+    found = {
+        name: read_indices(*given.get(name, (f"--at {name}", MIDDLE_PLACE)), n, name)
+        for name, n in manifest.axes.items()
+    }
+    shown_rows = found[axis] if axis in given else evenly_spaced(manifest.axes[axis], rows)
+    for name, places in found.items():
+        if name != axis and len(places) > 1:
+            raise JobError(given[name][0], [f"expected one place, as the rows are those of {axis}, got {len(places)}"])
+    return shown_rows, tuple(places[0] for places in found.values())
 
 
 def _tile_size(manifest: Manifest, n_columns: int, width: int, labels: Sequence[str]) -> tuple[int, int]:

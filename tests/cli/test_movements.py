@@ -69,8 +69,8 @@ def test_wrong_usage(array: Path, tmp_path: Path, capsys, monkeypatch, options: 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--walk", "--at", "4"], "--at: expected one of 4 lights (0 to 3, or -4 to -1), got 4\n"),
-        (["--light", "--at", "5"], "--at: expected one of 5 cameras (0 to 4, or -5 to -1), got 5\n"),
+        (["--walk", "--at", "4"], "--at: expected one of 4 light positions (0 to 3, or -4 to -1), got 4\n"),
+        (["--light", "--at", "5"], "--at: expected one of 5 camera positions (0 to 4, or -5 to -1), got 5\n"),
         (
             ["--light", "--at", "end"],
             '--at: expected an index, "first", "last" or a percentage such as "50%", got "end"\n',
@@ -94,4 +94,4 @@ def test_a_movement_through_an_array_with_groups(tmp_path: Path, capsys) -> None
     assert run(capsys, "assemble", array, "--light", "-o", tmp_path / "m.mov").code == 0
     assert len(decoded(tmp_path / "m.mov").frames) == 4
     result = run(capsys, "assemble", array, "--walk", "--at", "3", "-o", tmp_path / "n.mov")
-    assert result.err.startswith("--at: expected one of 3 places of lamp (0 to 2, or -3 to -1), got 3\n")
+    assert result.err.startswith("--at: expected one of 3 positions of lamp (0 to 2, or -3 to -1), got 3\n")

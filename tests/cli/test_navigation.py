@@ -72,7 +72,11 @@ def test_notes_are_printed(tmp_path, capsys):
     ("options", "code", "message"),
     [
         (["-f", "usd", "-o", "x"], 2, "usd"),
-        (["-f", "colmap", "-o", "x", "--light", "7"], 2, "--light: expected 0 to 2, or -3 to -1, got 7"),
+        (
+            ["-f", "colmap", "-o", "x", "--light", "7"],
+            2,
+            "--light: expected one of 3 light positions (0 to 2, or -3 to -1), got 7",
+        ),
         (["-f", "colmap", "-o", "x", "--light", "noon"], 2, "nothing was written"),
         (["-f", "colmap", "-o", "x", "--image-format", "exr", "--exposure", "1"], 2, "changes only PNG and JPEG"),
         (["-f", "colmap", "-o", "out"], 4, "holds other files, and no sparse/0/images.txt of an earlier export"),

@@ -102,13 +102,26 @@ def test_groups_are_summed_and_another_axis_may_be_at_the_side(tmp_path: Path) -
         read_image(tmp_path / "t.exr")[40:80, 60:120], Pictures(array).picture(1, (2, 1)), rtol=2e-3
     )
     make_sheet(array.directory, tmp_path / "s.png")
+    with pytest.raises(JobError, match="--at lamps: expected one place, as the rows are those of light, got 2"):
+        make_sheet(array.directory, tmp_path / "u.exr", at=["lamps=all"])
+    with pytest.raises(JobError, match="--light: expected one place, as the rows are those of lamps, got 3"):
+        make_sheet(array.directory, tmp_path / "u.exr", side="lamps", light="0-2")
+
+
+def test_columns_and_rows_may_be_named(array: Manifest, tmp_path: Path) -> None:
+    made = make_sheet(array.directory, tmp_path / "s.exr", cameras="3,0-1", light="last,0", columns=1, rows=1)
+    assert (made.cameras, made.lights) == ((3, 0, 1), (2, 0))
+    corner = read_image(tmp_path / "s.exr")[:40, :60]
+    np.testing.assert_allclose(corner, Pictures(array).picture(3, (2,)), rtol=2e-3)
+    assert make_sheet(array.directory, tmp_path / "t.exr", at=["light=1"]).lights == (1,)
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"side": "lamps"}, '--side: expected one of the axes light, got "lamps"'),
-        ({"at": ["light=1"]}, "--at: expected other axes than light"),
+        ({"at": ["light=3"]}, "--at light: expected one of 3 light positions"),
+        ({"cameras": "0-4"}, "--cameras: expected one of 4 camera positions"),
         ({"at": ["lamps=1"]}, "--at: expected AXIS=PLACES with one of the axes light"),
         ({"width": 100}, "--width: 100 pixels are too few for 4 columns; try fewer --columns"),
     ],

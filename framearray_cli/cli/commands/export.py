@@ -4,7 +4,9 @@ from typing import Annotated, Literal
 
 import typer
 
-from ..options import ArrayFolder, Exposure, Quiet, output_path
+from framearray_cli.array.places import ALL_PLACES
+
+from ..options import ArrayFolder, At, Cameras, Exposure, Light, Quiet, output_path
 from ..screen import Screen, out, say
 
 
@@ -18,18 +20,9 @@ def export(
         str,
         typer.Option("--output", "-o", help="Folder; cinema adds .cdb.", metavar="FOLDER", show_default=False),
     ],
-    light: Annotated[
-        str | None,
-        typer.Option(
-            "--light", help="Light positions: all, or 0,3,last,50%; default: all for cinema, else 50%.",
-            metavar="PLACES",
-        ),
-    ] = None,
-    at: Annotated[
-        list[str] | None,
-        typer.Option("--at", help="Places along another axis of light positions: lamps=0,3.", metavar="AXIS=PLACES"),
-    ] = None,
-    cameras: Annotated[str, typer.Option("--cameras", help="Cameras: all, or 0,5,last.", metavar="PLACES")] = "all",
+    cameras: Cameras = None,
+    light: Light = None,
+    at: At = None,
     image_format: Annotated[
         Literal["png", "jpg", "exr", "tif"], typer.Option("--image-format", help="Of the pictures.")
     ] = "png",
@@ -47,7 +40,7 @@ def export(
         raise typer.BadParameter("changes only PNG and JPEG", param_hint="--exposure")
     with Screen(out, quiet=quiet) as screen:
         made = run(
-            array, output_path(target), kind, cameras=cameras, light=light, at=at or (),
+            array, output_path(target), kind, cameras=cameras or ALL_PLACES, light=light, at=at or (),
             image_format=ImageFormat(format=image_format, exposure=exposure), points=points, copy=copy,
             force=force, progress=screen.counter("exporting", "image"),
         )  # fmt: skip

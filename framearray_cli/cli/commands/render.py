@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from framearray_cli.array.places import read_indices
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.units import MOST_THREADS, size
 from framearray_cli.engine.kernels.clock import compile_clock
@@ -23,7 +24,7 @@ from framearray_cli.render.messages import (
 from framearray_cli.render.parts.progress import PartEvents
 from framearray_cli.render.progress import ambient_figures
 
-from ..options import JobFile, Output, Quiet, Threads, load_job, parse_cameras
+from ..options import Cameras, JobFile, Output, Quiet, Threads, load_job
 from ..screen import Screen, out, say
 
 if TYPE_CHECKING:
@@ -45,10 +46,7 @@ def render(
     job_file: JobFile,
     threads: Threads = None,
     output: Output = None,
-    cameras: Annotated[
-        str | None,
-        typer.Option("--cameras", help="Some frames of the camera path: 0-47, 0-47x3, 5,8-11.", metavar="RANGE"),
-    ] = None,
+    cameras: Cameras = None,
     workers: Annotated[
         int | None,
         typer.Option(
@@ -68,7 +66,7 @@ def render(
 ) -> None:
     """Render every image of a job into a folder, with a manifest; skip those that are there."""
     job = load_job(job_file, threads, output)
-    chosen = None if cameras is None else parse_cameras(cameras, job.camera.frames)
+    chosen = None if cameras is None else sorted(read_indices("--cameras", cameras, job.camera.frames))
     render_on_screen(job, quiet=quiet, restart=restart, cameras=chosen, options=_worker_options(workers, dask, chunk))
 
 

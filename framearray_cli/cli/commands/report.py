@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from framearray_cli.array.manifest import MAIN_AXIS
+from framearray_cli.array.places import CAMERA_AXIS, read_indices
 from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.render.messages import scene_lines
 
@@ -21,10 +23,12 @@ Folder = Annotated[
     typer.Option("--output", "-o", help="Folder of the report; default: beside the images.", metavar="FOLDER"),
 ]
 Cameras = Annotated[
-    list[int] | None, typer.Option("--camera", help="A camera to look at; may be repeated.", metavar="C")
+    list[str] | None,
+    typer.Option("--cameras", "--camera", help="Camera positions to look at: 5, 10-20x5, 50%.", metavar="PLACES"),
 ]
 Lights = Annotated[
-    list[int] | None, typer.Option("--light", help="A light position to look at; may be repeated.", metavar="L")
+    list[str] | None,
+    typer.Option("--light", help="Light positions to look at: 0,last.", metavar="PLACES"),
 ]
 Vary = Annotated[
     list[str] | None,
@@ -46,7 +50,7 @@ Times = Annotated[
 def report(
     job_file: JobFile,
     folder: Folder = None,
-    camera: Cameras = None,
+    cameras: Cameras = None,
     light: Lights = None,
     vary: Vary = None,
     error: Errors = None,
@@ -73,8 +77,8 @@ def report(
                 screen.advance()
 
         options = reporting.ReportOptions(
-            cameras=camera or (),
-            lights=light or (),
+            cameras=_indices("--cameras", cameras, job.camera.frames),
+            lights=_indices("--light", light, job.light.frames, MAIN_AXIS),
             vary=dict(reporting.read_vary(option, job) for option in vary or ()),
             errors=error or (),
             times=times,
@@ -85,6 +89,11 @@ def report(
         reporting.write_report(made)
     if not quiet:
         say(out, report_lines(made))
+
+
+def _indices(option: str, texts: list[str] | None, n: int, axis: str = CAMERA_AXIS) -> tuple[int, ...]:
+    """Return the indices that an option names; it may be repeated."""
+    return read_indices(option, ",".join(texts), n, axis) if texts else ()
 
 
 def report_lines(made: "Report") -> list[str]:

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from ..options import ArrayFolder, At, Exposure, Quiet, output_path
+from ..options import ArrayFolder, At, Cameras, Exposure, Light, Quiet, output_path
 from ..screen import Screen, out, say
 
 MOST_WIDTH = 20_000  # pixels; more is taken for a typing error
@@ -19,6 +19,8 @@ def sheet(
             show_default=False,
         ),
     ],
+    cameras: Cameras = None,
+    light: Light = None,
     columns: Annotated[int, typer.Option("--columns", min=1, help="Cameras, at most.", metavar="N")] = 12,
     rows: Annotated[int, typer.Option("--rows", min=1, help="Light positions, at most.", metavar="N")] = 8,
     width: Annotated[
@@ -36,8 +38,9 @@ def sheet(
 
     with Screen(out, quiet=quiet) as screen:
         made = make_sheet(
-            array, output_path(target), columns=columns, rows=rows, width=width, exposure=exposure, side=side,
-            at=at or (), progress=screen.counter("drawing", "image"),
+            array, output_path(target), cameras=cameras, light=light,
+            columns=columns, rows=rows, width=width, exposure=exposure, side=side, at=at or (),
+            progress=screen.counter("drawing", "image"),
         )  # fmt: skip
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)

@@ -14,7 +14,7 @@ from framearray_cli.array.manifest import Manifest, layers_path
 from framearray_cli.base.arrays import Bytes, Float32, Float64
 from framearray_cli.base.errors import OutputError
 
-from ..places import evenly_spaced
+from ..axes import evenly_spaced
 from .selection import focal_length, rigid_pose
 
 SOURCES = 16  # cameras that points are taken from, evenly along the path; more would add the same surfaces

@@ -12,7 +12,7 @@ from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import OutputError
 
-from ..places import LightIndices
+from ..axes import LightIndices
 
 # A matrix counts as rigid if its columns are orthonormal to within this; matrices written as float32 are.
 RIGID = 1e-5

@@ -11,12 +11,13 @@ from framearray_cli.array.images.images import ImageFormat, require_writer
 from framearray_cli.array.manifest import layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures
+from framearray_cli.array.places import ALL_PLACES, MIDDLE_PLACE, read_indices
 from framearray_cli.array.present import list_present, missing_text
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import whole_folder
 
-from ..places import ALL_PLACES, MIDDLE_PLACE, read_indices, read_light_indices
+from ..axes import read_light_indices
 from ..progress import Progress
 from . import cinema, colmap, nerfstudio
 from .folder import find_earlier_export, put_picture

@@ -9,11 +9,10 @@ from typing import Annotated, Any, TypeAlias
 from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
 
 from framearray_cli.array.pictures import AS_RENDERED, Relight
+from framearray_cli.array.places import percent
 from framearray_cli.base.forms.schema import toml_key
 from framearray_cli.base.forms.table import Float3, Place, Table, fail
 from framearray_cli.base.forms.words import shown
-
-from ..places import percent
 
 STRONGEST = 1e6  # times the rendered light; half floats overflow before that
 LONGEST_S = 1e6  # seconds; a later key frame is a typing error

@@ -13,7 +13,7 @@ from framearray_cli.base.forms.table import Table, fail
 from framearray_cli.base.forms.toml import load_toml
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, frame_rate
 
-from ..places import Span
+from ..spans import Span
 from .curves import LightChange
 from .easing import Ease
 

@@ -1,13 +1,16 @@
 """Movies without a path file: the camera, the light, or both move once from first to last."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
+from framearray_cli.array.places import CAMERA_AXIS, IndexPlace, read_place
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.words import shown
 
-from ..places import IndexPlace, read_place, resolve_span
+from ..axes import axes_of_groups
+from ..spans import resolve_span
 from .pathfile import MoviePath, Segment
 
 SweepKind: TypeAlias = Literal["walk", "light", "diagonal"]
@@ -35,30 +38,33 @@ def sweep_path(sweep: Sweep, manifest: Manifest) -> MoviePath:
         JobError: `at` is no place, or lies outside the array.
     """
     moves: tuple[IndexPlace, ...] = ("first", "last")
-    sizes = {"camera": manifest.n_cameras, **manifest.axes}
-    staying = {"walk": list(manifest.axes), "light": ["camera"], "diagonal": []}[sweep.kind]
-    spans = dict.fromkeys(sizes, moves) | _read_stays(sweep, {name: sizes[name] for name in staying})
+    sizes = {CAMERA_AXIS: manifest.n_cameras, **manifest.axes}
+    staying = {"walk": list(manifest.axes), "light": [CAMERA_AXIS], "diagonal": []}[sweep.kind]
+    stays = _read_stays(sweep, {name: sizes[name] for name in staying}, axes_of_groups(manifest))
+    spans = dict.fromkeys(sizes, moves) | stays
     n_frames = max(n for name, n in sizes.items() if name not in staying)
     segment = Segment(
         frames=n_frames if sweep.seconds is None else None,
         seconds=sweep.seconds,
-        camera=spans.pop("camera"),
+        camera=spans.pop(CAMERA_AXIS),
         light=spans.pop(MAIN_AXIS, None),
         axes=spans,
     )
     return MoviePath(segments=(segment,))
 
 
-def _read_stays(sweep: Sweep, sizes: dict[str, int]) -> dict[str, tuple[IndexPlace, ...]]:
+def _read_stays(sweep: Sweep, sizes: Mapping[str, int], groups: Mapping[str, str]) -> dict[str, tuple[IndexPlace, ...]]:
     """Read where each axis stays, and check that it has that place.
 
     Args:
         sizes: the number of indices of each axis that stays, by name.
+        groups: the axis of each group of sources, whose name may stand for that of the axis.
     """
     stays: dict[str, IndexPlace] = dict.fromkeys(sizes, "first")
     problems: list[str] = []
     for text in sorted(sweep.at, key=lambda text: "=" in text):  # a place for one axis overrides one for all
         name, equals, place = text.rpartition("=")
+        name = name if name in sizes else groups.get(name, name)
         if equals and name not in sizes:
             problems.append(f"expected PLACE, or AXIS=PLACE with one of {', '.join(sizes)}, got {shown(text)}")
             continue
@@ -67,9 +73,8 @@ def _read_stays(sweep: Sweep, sizes: dict[str, int]) -> dict[str, tuple[IndexPla
         except ValueError as error:
             problems.append(str(error))
     for name, n in sizes.items():
-        noun = f"{name}s" if name in ("camera", MAIN_AXIS) else f"places of {name}"
         found: list[str] = []
-        resolve_span("--at", (stays[name],), n, noun, found)
+        resolve_span("--at", (stays[name],), n, name, found)
         problems += [problem.removeprefix("--at: ") for problem in found]
     if problems:
         raise JobError("--at", problems)

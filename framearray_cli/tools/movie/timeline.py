@@ -7,10 +7,11 @@ from pathlib import Path
 
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.array.pictures import Relight
+from framearray_cli.array.places import CAMERA_AXIS, IndexPlace, nearest_index
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.schema import toml_key
 
-from ..places import IndexPlace, interpolate_span, nearest_index, resolve_span
+from ..spans import interpolate_span, resolve_span
 from .curves import relights
 from .easing import eased_share
 from .pathfile import MOST_FRAMES, MoviePath, Segment, movie_fps
@@ -91,13 +92,15 @@ def _spans(
     """Resolve the spans of a segment: camera first, then each light axis."""
     axes = manifest.axes
     found: list[tuple[float, ...]] = [(here,) for here in now]
-    given: dict[str, Sequence[IndexPlace] | None] = {"camera": segment.camera, MAIN_AXIS: segment.light, **segment.axes}
-    for k, (name, n) in enumerate({"camera": manifest.n_cameras, **axes}.items()):
+    given: dict[str, Sequence[IndexPlace] | None] = {
+        CAMERA_AXIS: segment.camera,
+        MAIN_AXIS: segment.light,
+        **segment.axes,
+    }
+    for k, (name, n) in enumerate({CAMERA_AXIS: manifest.n_cameras, **axes}.items()):
         if (span := given.pop(name, None)) is not None:
-            place, noun = (
-                (name, f"{name}s") if name in ("camera", MAIN_AXIS) else (f"axes.{toml_key(name)}", f"places of {name}")
-            )
-            found[k] = resolve_span(f"{key}.{place}", span, n, noun, problems)
+            place = name if name in (CAMERA_AXIS, MAIN_AXIS) else f"axes.{toml_key(name)}"
+            found[k] = resolve_span(f"{key}.{place}", span, n, name, problems)
     for name, span in given.items():
         if span is not None:
             place = MAIN_AXIS if name == MAIN_AXIS else f"axes.{toml_key(name)}"

@@ -325,8 +325,8 @@ def test_no_points_and_one_camera_are_fine(array: Manifest, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"light": "3"}, "--light: expected 0 to 2"),
-        ({"cameras": "9"}, "--cameras: expected 0 to 3"),
+        ({"light": "3"}, "--light: expected one of 3 light positions"),
+        ({"cameras": "9"}, "--cameras: expected one of 4 camera positions"),
         ({"at": ["lamps=0"]}, "--at: expected AXIS=PLACES"),
     ],
 )

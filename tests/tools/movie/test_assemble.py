@@ -267,7 +267,7 @@ def test_other_targets_are_refused(out: Path, path_file: Path, tmp_path: Path, t
 
 def test_a_path_outside_of_the_array_is_a_job_error(out: Path, path_file: Path, tmp_path: Path) -> None:
     path_file.write_text("[[segments]]\nframes = 2\ncamera = 5\n", encoding="utf-8")
-    with pytest.raises(JobError, match=r"path\.toml: segments\[0\]\.camera: expected one of 5 cameras"):
+    with pytest.raises(JobError, match=r"path\.toml: segments\[0\]\.camera: expected one of 5 camera positions"):
         assemble_movie(out, path_file, tmp_path / "movie.mp4")
 
 

@@ -135,9 +135,9 @@ def test_the_example_of_easing_fits_any_array(size: tuple[int, int]) -> None:
 def test_all_indices_outside_the_array_are_named(tmp_path: Path) -> None:
     text = segments("frames = 2\ncamera = [0, 10]\nlight = -6", "frames = 2\nlight = [5, 2]")
     assert problems_of(tmp_path, text) == [
-        "segments[0].camera: expected one of 10 cameras (0 to 9, or -10 to -1), got 10",
-        "segments[0].light: expected one of 5 lights (0 to 4, or -5 to -1), got -6",
-        "segments[1].light: expected one of 5 lights (0 to 4, or -5 to -1), got 5",
+        "segments[0].camera: expected one of 10 camera positions (0 to 9, or -10 to -1), got 10",
+        "segments[0].light: expected one of 5 light positions (0 to 4, or -5 to -1), got -6",
+        "segments[1].light: expected one of 5 light positions (0 to 4, or -5 to -1), got 5",
     ]
 
 

@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 
 from framearray_cli.array.manifest import Manifest, ManifestCamera, ManifestGroup, ManifestLight
 from framearray_cli.array.names import file_patterns
+from framearray_cli.array.places import read_place
 from framearray_cli.base.errors import JobError
 from framearray_cli.tools.movie.easing import eased_share
 from framearray_cli.tools.movie.pathfile import MoviePath, Segment
 from framearray_cli.tools.movie.sweep import Sweep, sweep_path
 from framearray_cli.tools.movie.timeline import Shot, make_timeline
-from framearray_cli.tools.places import interpolate_span, read_place
+from framearray_cli.tools.spans import interpolate_span
 
 N_C, N_L, N_LAMPS = 20, 9, 5
 LIGHT = ManifestLight(ambient=(0.0,) * 3, ambient_error=(0.0,) * 3, sources=())
@@ -169,8 +170,19 @@ def test_fractional_places() -> None:
     assert shots({"frames": 1, "light": -1.5}, positions="blend") == [Shot(0, (7.5,))]
     assert shots({"frames": 1, "light": 3.25, "camera": 2.5}) == [Shot(3, (3,))]
     assert problems(PLAIN, {"frames": 1, "light": 8.5, "camera": -0.5}) == [
-        "segments[0].camera: expected one of 20 cameras (0 to 19, or -20 to -1), got -0.5",
-        "segments[0].light: expected one of 9 lights (0 to 8, or -9 to -1), got 8.5",
+        "segments[0].camera: expected one of 20 camera positions (0 to 19, or -20 to -1), got -0.5",
+        "segments[0].light: expected one of 9 light positions (0 to 8, or -9 to -1), got 8.5",
+    ]
+
+
+def test_a_text_may_name_several_places_on_the_way() -> None:
+    assert shots({"frames": 4, "camera": "0-3"}) == shots({"frames": 4, "camera": [0, 3]})
+    assert shots({"frames": 3, "light": "first-last"}) == shots({"frames": 3, "light": [0, -1]})
+    assert [shot.c for shot in shots({"frames": 5, "camera": "3,5,3"})] == [3, 4, 5, 4, 3]
+    assert [shot.c for shot in shots({"frames": 3, "camera": ["0-6x3", "9"]})] == [0, 5, 9]
+    assert problems(PLAIN, {"frames": 2, "light": "0-9", "camera": "2-0x1"}) == [
+        'segments[0].camera: expected a step that leads from 2 to 0, got "2-0x1"',
+        "segments[0].light: expected one of 9 light positions (0 to 8, or -9 to -1), got 9",
     ]
 
 
@@ -182,9 +194,9 @@ def test_further_axes() -> None:
 
 def test_all_axes_and_places_that_an_array_lacks_are_named() -> None:
     assert problems(GROUPED, {"frames": 2, "axes": {"lmaps": 1, "lamps": [0, 5]}}, {"frames": 1, "light": 9}) == [
-        "segments[0].axes.lamps: expected one of 5 places of lamps (0 to 4, or -5 to -1), got 5",
+        "segments[0].axes.lamps: expected one of 5 positions of lamps (0 to 4, or -5 to -1), got 5",
         "segments[0].axes.lmaps: no such light axis; the array has light, lamps",
-        "segments[1].light: expected one of 9 lights (0 to 8, or -9 to -1), got 9",
+        "segments[1].light: expected one of 9 light positions (0 to 8, or -9 to -1), got 9",
     ]
     only_lamps = Manifest(**COMMON, groups=GROUPED.groups[:1], ambient_images="a.c{camera}.exr")
     assert problems(only_lamps, {"frames": 2, "light": [0, 1]}) == [
@@ -213,13 +225,14 @@ def test_movements_show_every_image_on_their_way_once() -> None:
     assert swept_shots("walk", GROUPED, at=("50%",))[0] == Shot(0, (4, 2))
     assert swept_shots("walk", GROUPED, at=("lamps=1", "-1"))[0] == Shot(0, (8, 1))
     assert swept_shots("walk", GROUPED, at=("light=3",))[0] == Shot(0, (3, 0))
+    assert swept_shots("walk", GROUPED, at=("sun=3",))[0] == Shot(0, (3, 0)), "a group stands for its axis"
     assert len(swept_shots("walk", seconds=2.0)) == 48
 
 
 @pytest.mark.parametrize(
     ("at", "problem"),
     [
-        ("9", "expected one of 9 lights (0 to 8, or -9 to -1), got 9"),
+        ("9", "expected one of 9 light positions (0 to 8, or -9 to -1), got 9"),
         ("end", 'expected an index, "first", "last" or a percentage such as "50%", got "end"'),
         ("nan", 'expected an index, "first", "last" or a percentage such as "50%", got "nan"'),
         ("lamp=2", 'expected PLACE, or AXIS=PLACE with one of light, got "lamp=2"'),

@@ -1,4 +1,4 @@
-"""Places along an axis, as the command line names them."""
+"""Choices along the axes of an array."""
 
 from itertools import pairwise
 
@@ -6,27 +6,7 @@ import pytest
 from support.boxarrays import grouped_manifest, plain_manifest
 
 from framearray_cli.base.errors import JobError
-from framearray_cli.tools.places import evenly_spaced, read_indices, read_light_indices
-
-
-def test_places_are_read() -> None:
-    assert read_indices("--light", "all", 3) == (0, 1, 2)
-    assert read_indices("--light", "0, -1,first,last,50%", 5) == (0, 4, 2)
-    assert read_indices("--light", "12.5 %", 9) == (1,)
-    assert read_indices("--light", "50%", 4) == (2,)
-    assert read_indices("--light", "50%", 1) == (0,)
-
-
-@pytest.mark.parametrize("text", ["", "x", "1.5", "0,", "101%", "1;2", "all,1"])
-def test_what_is_no_place_is_refused(text: str) -> None:
-    with pytest.raises(JobError, match=r"--light: expected"):
-        read_indices("--light", text, 5)
-
-
-@pytest.mark.parametrize("text", ["5", "-6", "0,7"])
-def test_places_outside_the_axis_are_refused(text: str) -> None:
-    with pytest.raises(JobError, match=r"--light: expected 0 to 4, or -5 to -1, got -?\d"):
-        read_indices("--light", text, 5)
+from framearray_cli.tools.axes import evenly_spaced, read_light_indices
 
 
 def test_evenly_spaced_indices_have_both_ends() -> None:
@@ -52,10 +32,10 @@ def test_light_indices_combine_the_axes() -> None:
 @pytest.mark.parametrize(
     ("light", "at", "message"),
     [
-        (None, ["sun=1"], r"--at: expected AXIS=PLACES with one of the axes light \(0 to 2\), lamps \(0 to 1\)"),
+        (None, ["moon=1"], r"--at: expected AXIS=PLACES with one of the axes light \(0 to 2\), lamps \(0 to 1\)"),
         (None, ["lamps"], "--at: expected AXIS=PLACES"),
         (None, ["lamps=0", "lamps=1"], "--at: .* got twice the same axis"),
-        (None, ["lamps=2"], r"--at lamps: expected 0 to 1, or -2 to -1, got 2"),
+        (None, ["lamps=2"], r"--at lamps: expected one of 2 positions of lamps \(0 to 1, or -2 to -1\), got 2"),
         ("0", ["light=1"], "--light: expected either this or --at light"),
     ],
 )

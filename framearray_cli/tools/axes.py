@@ -1,0 +1,60 @@
+"""Choices along the axes of an array: places as options name them, or a few that are evenly spaced."""
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import TypeAlias
+
+from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.places import read_axes, read_indices
+from framearray_cli.base.errors import JobError
+
+LightIndices: TypeAlias = tuple[int, ...]  # one index per light axis, in the order of `Manifest.axes`
+
+
+def read_light_indices(manifest: Manifest, light: str | None, at: Sequence[str], default: str) -> list[LightIndices]:
+    """Read places along every light axis, and combine them.
+
+    Args:
+        light: places along the first axis; None: `default`.
+        at: "AXIS=PLACES" for other axes, or for the first.
+        default: places along the axes that neither names.
+
+    Raises:
+        JobError: a place or an axis is unknown, or an axis is given twice.
+    """
+    given = given_places(manifest, light, at)
+    chosen = [read_indices(*given.get(axis, (f"--at {axis}", default)), n, axis) for axis, n in manifest.axes.items()]
+    return list(product(*chosen))
+
+
+def given_places(manifest: Manifest, light: str | None, at: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Return the places that options name along light axes: axis -> the option for messages, and the places.
+
+    Args:
+        light: places along the first axis, of `--light`.
+        at: "AXIS=PLACES", of `--at`.
+
+    Raises:
+        JobError: an axis is unknown, or is given twice.
+    """
+    given = read_axes("--at", at, manifest.axes, axes_of_groups(manifest))
+    first = next(iter(manifest.axes))
+    if light is not None:
+        if first in given:
+            raise JobError("--light", [f"expected either this or {given[first][0]}=..., got both"])
+        given[first] = ("--light", light)
+    return given
+
+
+def axes_of_groups(manifest: Manifest) -> Mapping[str, str]:
+    """Return the light axis of each group of sources, by name."""
+    return {group.name: group.axis for group in manifest.groups}
+
+
+def evenly_spaced(n: int, most: int) -> tuple[int, ...]:
+    """Choose at most `most` of n indices, evenly spaced from first to last; the middle one if `most` is 1."""
+    if n <= most:
+        return tuple(range(n))
+    if most == 1:
+        return ((n - 1) // 2,)
+    return tuple(round(k * (n - 1) / (most - 1)) for k in range(most))

@@ -1,0 +1,112 @@
+"""Places along an axis of an array, as people write them."""
+
+import re
+
+import pytest
+
+from framearray_cli.array.places import is_notation, parse_places, read_axes, read_indices
+from framearray_cli.array.ranges import frames_text
+from framearray_cli.base.errors import JobError
+
+
+@pytest.mark.parametrize(
+    ("text", "indices"),
+    [
+        ("0-3", (0, 1, 2, 3)),
+        ("5", (5,)),
+        ("0-9x4", (0, 4, 8)),
+        ("0-9y4", (1, 2, 3, 5, 6, 7, 9)),
+        ("0-3:2", (0, 1, 2, 3)),
+        ("9-0x-4", (9, 5, 1)),
+        ("3-1", (3, 2, 1)),
+        ("8,0-2, 1", (8, 0, 1, 2)),
+        ("7-7", (7,)),
+        ("-1", (9,)),
+        ("7-last", (7, 8, 9)),
+        ("-3--1", (7, 8, 9)),
+        ("first-20%", (0, 1, 2)),
+        ("0-lastx4", (0, 4, 8)),
+        ("first, 50 %,last", (0, 5, 9)),
+        ("12.5 %", (1,)),
+        ("0 - 2 , 9", (0, 1, 2, 9)),
+        (" all ", tuple(range(10))),
+    ],
+)
+def test_places(text: str, indices: tuple[int, ...]) -> None:
+    assert read_indices("--cameras", text, 10) == indices
+    assert is_notation(text)
+    assert read_indices("--cameras", frames_text(indices), 10) == tuple(sorted(indices))
+
+
+def test_an_axis_of_one_place() -> None:
+    for text in ("0", "-1", "first", "last", "50%", "all", "0-last"):
+        assert read_indices("--light", text, 1) == (0,)
+    with pytest.raises(JobError, match="--light: expected 0, the only light position, got 1"):
+        read_indices("--light", "1", 1, "light")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "a",
+        "1..3",
+        "1-2-3",
+        "9" * 50,
+        "x",
+        "0,",
+        "101%",
+        "1;2",
+        "all,1",
+        "0-101%",
+        "5x2",
+        "--2",
+        "-5%",
+        "nan",
+        "1e2",
+    ],
+)
+def test_other_texts_are_refused(text: str) -> None:
+    wanted = "--cameras: expected places such as 5, 0-47, 0-47x3, first, last, 50% or all, with commas between them, "
+    with pytest.raises(JobError, match=re.escape(wanted) + "got "):
+        read_indices("--cameras", text, 10)
+    assert not is_notation(text)
+
+
+def test_fractions_only_where_pictures_are_blended() -> None:
+    assert parse_places("3.25,50%,2-3", 10, fractions=True) == [3.25, 4.5, 2, 3]
+    for text in ("3.25", "1.5-3", "0-2.5"):
+        with pytest.raises(ValueError, match="expected places such as"):
+            parse_places(text, 10)
+
+
+@pytest.mark.parametrize("text", ["3-1x1", "1-3x-1", "0-9x0", "last-firstx2"])
+def test_a_step_that_leads_nowhere_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="expected a step that leads from"):
+        parse_places(text, 10)
+
+
+def test_a_range_that_leaves_all_out_is_refused() -> None:
+    with pytest.raises(ValueError, match="expected at least one place, got "):
+        parse_places("0-9y1", 10)
+
+
+@pytest.mark.parametrize(
+    ("text", "found"), [("10", "10"), ("-11", "-11"), ("0-10", "10"), ("10-0", "10"), ("0,12", "12")]
+)
+def test_places_beyond_the_axis_are_named(text: str, found: str) -> None:
+    wanted = rf"--cameras: expected one of 10 camera positions \(0 to 9, or -10 to -1\), got {found}$"
+    with pytest.raises(JobError, match=wanted):
+        read_indices("--cameras", text, 10)
+    with pytest.raises(JobError, match="expected one of 10 positions of lamps"):
+        read_indices("--at lamps", text, 10, "lamps")
+
+
+def test_an_axis_goes_by_its_name_or_by_that_of_a_group() -> None:
+    axes, groups = {"light": 3, "lamps": 2}, {"sun": "light", "ceiling": "lamps", "rest": "light"}
+    assert read_axes("--at", ["sun=0-1", "lamps=last"], axes, groups) == {
+        "light": ("--at sun", "0-1"),
+        "lamps": ("--at lamps", "last"),
+    }
+    with pytest.raises(JobError, match="got twice the same axis"):
+        read_axes("--at", ["sun=0", "rest=1"], axes, groups)
