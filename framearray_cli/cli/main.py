@@ -25,7 +25,7 @@ from .commands.schema import schema
 from .commands.sheet import sheet
 from .commands.verify import verify
 from .commands.view import view
-from .screen import err, out, say
+from .screen import err, print_result, say
 from .signals import listen
 
 OUT_OF_MEMORY = 2  # the job needs more than the machine has
@@ -47,7 +47,7 @@ for command in (render, check, verify, init, assemble, view, sheet, export, open
 
 def _version(wanted: bool) -> None:
     if wanted:
-        say(out, [f"framearray {__version__}"])
+        print_result([f"framearray {__version__}"])
         raise typer.Exit
 
 

@@ -1,4 +1,7 @@
-"""Progress on the screen: a bar on a terminal, plain lines elsewhere, nothing if quiet."""
+"""What commands print: results to standard output; progress, notes and warnings to standard error.
+
+Progress is a bar on a terminal, plain lines elsewhere, nothing if quiet.
+"""
 
 import os
 import threading
@@ -22,6 +25,7 @@ out, err = Console(), Console(stderr=True)
 
 # Plain lines show in a log file that work goes on, without filling it up.
 SECONDS_BETWEEN_LINES = 5.0
+REMARKS = ("note: ", "warning: ")  # how lines begin that are no results
 
 
 class _Rate(ProgressColumn):
@@ -53,9 +57,10 @@ class Screen:
         self.done = self.total = 0
 
     def say(self, lines: Iterable[str]) -> None:
-        """Print lines above the moving one."""
+        """Print progress, notes or warnings above the moving line."""
         if not self._quiet:
-            say(self._console, lines)
+            with suppress(OutputError):  # a full log is no reason to end a long render
+                say(self._console, lines)
 
     def wait(self, what: str) -> None:
         """Show work of unknown length; only on a terminal."""
@@ -112,8 +117,7 @@ class Screen:
             rate = self.done / (now - self._started)
             left = duration((self.total - self.done) / rate)
             line = f"{self._label}: {self.done} of {self.total} {self._unit}s, {rate:.1f} per second, {left} left"
-        with suppress(OutputError):  # a full log is no reason to end a long render
-            say(self._console, [line])
+        self.say([line])
 
     def end(self) -> None:
         """Remove the moving line; counting has ended."""
@@ -138,6 +142,20 @@ class Screen:
             self.say([f"note: compiled kernels cannot be kept: {why}; NUMBA_CACHE_DIR names another folder for them"])
 
 
+def print_result(lines: Iterable[str]) -> None:
+    """Print the result of a command; its notes and warnings go to standard error.
+
+    Raises:
+        OutputError: the result cannot be printed.
+    """
+    for line in lines:
+        if line.startswith(REMARKS):
+            with suppress(OutputError):
+                say(err, [line])
+        else:
+            say(out, [line])
+
+
 def say(console: Console, lines: Iterable[str]) -> None:
     """Print lines as they are, without wrapping, markup and colours; escape what would control a terminal.
 
@@ -151,7 +169,8 @@ def say(console: Console, lines: Iterable[str]) -> None:
         raise
     except OSError as error:
         _discard(console.file)
-        raise OutputError(f"standard output: cannot be written: {reason(error)}") from error
+        stream = "standard error" if console.stderr else "standard output"
+        raise OutputError(f"{stream}: cannot be written: {reason(error)}") from error
 
 
 def printable(text: str) -> str:

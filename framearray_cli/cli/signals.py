@@ -10,7 +10,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.signals import Stopped
 from framearray_cli.engine.kernels.clock import is_compiling
 
-from .screen import err, out, say
+from .screen import err, say
 
 PATIENCE = 1.0  # seconds that threads have to end after a signal
 # Modules with callbacks from C and optional imports, which catch every exception.
@@ -53,6 +53,6 @@ def _interrupt(signum: int, frame: FrameType | None) -> None:
 def _exit_now(stopped: Stopped) -> None:
     """End the process without waiting for its threads."""
     with suppress(OutputError, OSError):  # a terminal that was closed
-        out.show_cursor()
+        err.show_cursor()
         say(err, [stopped.word])
     os._exit(stopped.exit_code)

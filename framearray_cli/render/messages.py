@@ -67,7 +67,7 @@ def ambient_lines(figures: "AmbientFigures") -> list[str]:
     known = f"standard error at most {error:.1%}, {figures.paths:,} paths" if error > 0 else "fixed, or nothing arrives"
     return [
         f"ambient light: I_A {figures.lowest:.4g} to {figures.highest:.4g} ({known})",
-        *(f"  note: {note}" for note in figures.notes),
+        *(f"note: {note}" for note in figures.notes),
     ]
 
 
@@ -83,7 +83,7 @@ def settings_lines(settings: "AutoSettings") -> list[str]:
         f"{settings.time:.2f} times the time of {default}"
     ]
     if not settings.enough:
-        lines.append("  note: no window reaches the error that is wanted; this one makes the most of its time")
+        lines.append("note: no window reaches the error that is wanted; this one makes the most of its time")
     if settings.seen:
         shares = ", ".join(f"{share:.0%} ({k})" for k, share in settings.seen.items())
         lines.append(f"  hits that are seen that many frames away: {shares}")
@@ -99,7 +99,7 @@ def target_lines(target: "Target") -> list[str]:
     ]
     if target.expected > 1.05 * target.error:
         lines.append(
-            f"  note: {target.capped:.1%} of all places have as many hits as samples.most_hits allows, "
+            f"note: {target.capped:.1%} of all places have as many hits as samples.most_hits allows, "
             "too few for this error"
         )
     return lines

@@ -236,4 +236,4 @@ def scene_report_lines(report: SceneReport, file: Path | str) -> list[str]:
     """The report on a scene: one line of numbers, then one line per note."""
     left_out = f"; left out: {_dropped_text(report.dropped)}" if report.dropped else ""
     numbers = f"{report.triangles:,} triangles, {report.materials} materials, {report.textures} textures"
-    return [f"{file}: {numbers}{left_out}", *(f"  note: {note}" for note in report.notes)]
+    return [f"{file}: {numbers}{left_out}", *(f"note: {note}" for note in report.notes)]

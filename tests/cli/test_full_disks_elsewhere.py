@@ -128,7 +128,7 @@ def test_repairing_on_a_full_disk(disk, tmp_path, capsys):
     result = run(capsys, "verify", "-q", "--repair", out)
     assert result.code == 4
     assert result.err.splitlines()[0].endswith(f": {FULL}")
-    assert run(capsys, "verify", "-q", out).err.count("tiny.c000") == 2, "nothing else was harmed"
+    assert run(capsys, "verify", "-q", out).out.count("tiny.c000") == 2, "nothing else was harmed"
     disk.free()
     assert run(capsys, "verify", "-q", "--repair", out).code == 0
     assert {file.name: file.read_bytes() for file in out.glob("tiny.*")} == before

@@ -65,7 +65,7 @@ def test_notes_are_printed(tmp_path, capsys):
     bare = write_array(plain_manifest(tmp_path / "out", layers=False)).directory
     result = run(capsys, "export", bare, "-f", "colmap", "-o", tmp_path / "x")
     assert result.code == 0
-    assert result.out.splitlines()[1].startswith("no points and no depth: the array was rendered without layers")
+    assert result.err.splitlines()[-1].startswith("note: no points and no depth: the array was rendered without layers")
 
 
 @pytest.mark.parametrize(

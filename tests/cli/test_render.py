@@ -22,8 +22,8 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def test_a_render_prints_what_it_did(tmp_path, capsys):
     result = run(capsys, "render", write_job(tmp_path))
-    assert (result.code, result.err) == (0, "")
-    lines = [line for line in result.out.splitlines() if not line.startswith("compiling")]
+    assert result.code == 0
+    lines = [line for line in (result.err + result.out).splitlines() if not line.startswith("compiling")]
     assert re.fullmatch(r".*tiny\.glb: \d+ triangles, \d+ materials, 1 textures", lines[0])
     assert re.fullmatch(r"ambient light: I_A [\d.]+ to [\d.]+ \(standard error at most .*\)", lines[1])
     assert re.fullmatch(r"3 images in .*: .* ms per image, .* images per second", lines[2])
@@ -43,7 +43,7 @@ def test_each_note_is_printed_once(tmp_path, capsys):
     tiny.save_glb(meshes, tmp_path / "tiny.glb")
     result = run(capsys, "render", write_job(tmp_path))
     assert result.code == 0
-    assert result.out.count("met a second surface") == 1
+    assert result.err.count("met a second surface") == 1
 
 
 def test_quiet_is_silent(tmp_path, capsys):
@@ -74,12 +74,12 @@ def test_the_same_job_may_be_rendered_again(tmp_path, capsys):
     result = run(capsys, "render", job)
     assert result.code == 0
     assert contents(tmp_path / "out") == before
-    assert "damaged: tiny.c0000.l001.png: missing\n" in result.out
-    assert re.search(r"damaged: tiny\.c0000\.l002\.png: expected [\d,]+ bytes, found 7", result.out)
+    assert "damaged: tiny.c0000.l001.png: missing\n" in result.err
+    assert re.search(r"damaged: tiny\.c0000\.l002\.png: expected [\d,]+ bytes, found 7", result.err)
     times = {file: file.stat().st_mtime_ns for file in (tmp_path / "out").glob("*.png")}
     again = run(capsys, "render", job)
     assert again.code == 0
-    assert "3 images are there and whole; nothing is left to do" in again.out
+    assert "3 images are there and whole; nothing is left to do" in again.err
     assert {file: file.stat().st_mtime_ns for file in (tmp_path / "out").glob("*.png")} == times
 
 
@@ -105,8 +105,8 @@ def test_another_array_is_in_the_way(change, tmp_path, capsys):
     assert {file.name: file.read_bytes() for file in (tmp_path / "out").rglob("*.*")} == before
     warned = run(capsys, "check", other)
     assert warned.code == 0
-    assert "warning: " in warned.out
-    assert "holds another frame array" in warned.out
+    assert "warning: " in warned.err and "warning: " not in warned.out
+    assert "holds another frame array" in warned.err
     assert names(tmp_path / "out") == FILES
 
 
@@ -126,8 +126,8 @@ def test_restart_removes_what_the_manifest_lists_and_nothing_else(tmp_path, caps
     (out / "tiny.c0007.l000.png").write_text("not in the array")
     other = write_job(tmp_path, "other.toml", name="other", light={"frames": 4})
     result = run(capsys, "render", other, "--restart")
-    assert (result.code, result.err) == (0, "")
-    assert f"removed {len(FILES)} files of the frame array in {out}" in result.out
+    assert result.code == 0
+    assert f"removed {len(FILES)} files of the frame array in {out}" in result.err
     theirs = {"mine.txt", "tiny.c0007.l000.png"}
     ours = {f"other.c0000.l{l:03d}.png" for l in range(4)} | {"other.layers.c0000.exr", "manifest.toml", "records"}
     assert names(out) == theirs | ours
@@ -181,12 +181,12 @@ def test_an_array_that_leads_out_of_its_folder_is_not_removed(tmp_path, capsys):
 
 def test_check_writes_nothing(tmp_path, capsys):
     result = run(capsys, "check", write_job(tmp_path))
-    assert (result.code, result.err) == (0, "")
+    assert result.code == 0
     text = result.out
     assert "array: 1 cameras x 3 lights = 3 images of 24 x 18" in text
     for line in ("memory: about ", f"disk: about .* in {re.escape(str(tmp_path / 'out'))}", "time: about "):
         assert re.search(f"^{line}", text, re.MULTILINE), text
-    assert "warning" not in text
+    assert "warning" not in result.err
     assert names(tmp_path) == {"job.toml", "tiny.glb"}
 
 

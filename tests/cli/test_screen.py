@@ -9,7 +9,14 @@ from rich.console import Console
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.units import duration, size
 from framearray_cli.cli import screen
-from framearray_cli.cli.screen import Screen, say
+from framearray_cli.cli.screen import Screen, print_result, say
+
+
+class Full(io.StringIO):
+    """A file on a full disk."""
+
+    def write(self, _: str) -> int:
+        raise OSError(28, "No space left on device")
 
 
 class Clock:
@@ -114,10 +121,6 @@ def test_lines_are_printed_as_they_are():
 
 
 def test_a_log_that_cannot_be_written_does_not_end_a_render(clock):
-    class Full(io.StringIO):
-        def write(self, _: str) -> int:
-            raise OSError(28, "No space left on device")
-
     console = Console(file=Full())
     with Screen(console) as shown:
         shown.count("rendering", 8, "image")
@@ -126,6 +129,17 @@ def test_a_log_that_cannot_be_written_does_not_end_a_render(clock):
     assert shown.done == 5
     with pytest.raises(OutputError, match="standard output: cannot be written: No space left on device"):
         say(Console(file=Full()), ["a line"])
+
+
+def test_results_are_separate_from_notes_and_warnings(capsys):
+    print_result(["note: rough", "5 files", "warning: full", "no note: here"])
+    assert tuple(capsys.readouterr()) == ("5 files\nno note: here\n", "note: rough\nwarning: full\n")
+
+
+def test_a_note_that_cannot_be_printed_does_not_end_a_command(monkeypatch, capsys):
+    monkeypatch.setattr(screen, "err", Console(file=Full()))
+    print_result(["note: rough", "5 files"])
+    assert capsys.readouterr().out == "5 files\n"
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def test_a_whole_array(array, capsys):
     result = run(capsys, "verify", array)
-    assert (result.code, result.err) == (0, "")
+    assert result.code == 0
     assert result.out.endswith(f"{N_FILES} files of tiny are whole\n")
     assert run(capsys, "verify", "-q", array / "manifest.toml").out == ""
 
@@ -41,10 +41,10 @@ def test_every_flipped_byte_is_found_and_repaired(array, capsys):
     (array / names[5]).unlink()
     result = run(capsys, "verify", "-q", array)
     assert result.code == 5
-    assert result.err.splitlines()[-1].startswith(f"6 of {N_FILES} files are missing or damaged; ")
-    assert {line.split(": ")[0] for line in result.err.splitlines()[:-1]} == {str(array / name) for name in names}
+    assert result.out.splitlines()[-1].startswith(f"6 of {N_FILES} files are missing or damaged; ")
+    assert {line.split(": ")[0] for line in result.out.splitlines()[:-1]} == {str(array / name) for name in names}
     mended = run(capsys, "verify", "--repair", array)
-    assert (mended.code, mended.err) == (0, "")
+    assert mended.code == 0
     assert contents(array) == before
     assert run(capsys, "verify", "-q", array).code == 0
 
@@ -54,7 +54,7 @@ def test_an_unfinished_array_is_finished(array, capsys, tmp_path):
     assert run(capsys, "render", "-q", job, "--cameras", "1-2").code == 0
     result = run(capsys, "verify", tmp_path / "part")
     assert result.code == 5
-    assert result.err.splitlines() == [
+    assert result.out.splitlines() == [
         "cameras 0,3: never begun, 8 of 8 files are left",
         f"8 of {N_FILES} files were never finished; `framearray render JOB` or "
         f"`framearray verify --repair {tmp_path / 'part'}` goes on",
@@ -72,7 +72,7 @@ def test_damage_comes_first_and_few_files_are_named(array, capsys):
     for name in ("tiny.c0001.l000.png", "tiny.layers.c0003.exr", *(f"tiny.c0003.l00{l}.png" for l in range(3))):
         (array / name).unlink()
     result = run(capsys, "verify", "-q", array)
-    first, second, begun, finished, note, last = result.err.splitlines()
+    first, second, begun, finished, last, note = (result.out + result.err).splitlines()
     assert first.startswith(f"{array / 'tiny.c0000.l001.png'}: expected ") and "c0002" in second
     assert begun == "camera 3: never begun, 4 of 4 files are left"
     assert finished == "camera 1: never finished, 1 of 4 files are left"
@@ -84,7 +84,7 @@ def test_of_many_damaged_files_some_are_named(array, capsys, monkeypatch):
     monkeypatch.setattr("framearray_cli.cli.commands.verify.MOST_DAMAGED", 3)
     for file in array.glob("tiny.c*"):
         file.write_bytes(b"")
-    lines = run(capsys, "verify", "-q", array).err.splitlines()
+    lines = run(capsys, "verify", "-q", array).out.splitlines()
     assert len(lines) == 5 and lines[3] == "9 more files are missing or damaged"
 
 
@@ -93,10 +93,10 @@ def test_without_records_images_are_read(array, capsys):
         file.unlink()
     result = run(capsys, "verify", array)
     assert result.code == 0
-    assert f"{N_FILES} files are whole, but have no checksum" in result.out
+    assert f"{N_FILES} files are whole, but have no checksum" in result.err
     (array / "tiny.c0001.l001.png").write_bytes((array / "tiny.c0001.l001.png").read_bytes()[:-100])
     (array / "tiny.layers.c0002.exr").write_bytes(b"no image")
-    assert run(capsys, "verify", array).err.splitlines()[-1].startswith(f"2 of {N_FILES} files are missing or damaged")
+    assert run(capsys, "verify", array).out.splitlines()[-1].startswith(f"2 of {N_FILES} files are missing or damaged")
 
 
 @pytest.mark.parametrize("cameras", ["0-9", "3-1x1", "x", ""])
@@ -124,6 +124,6 @@ def test_one_flipped_byte_in_each_of_a_hundred_images(tmp_path, capsys):
             (out / name).write_bytes(data)
         assert {name for name, _ in verify(out, 1, lambda done, total: None).damaged} == set(names)
         result = run(capsys, "verify", "-q", out)
-        assert (result.code, len(result.err.splitlines())) == (5, MOST_DAMAGED + 2)
+        assert (result.code, len(result.out.splitlines())) == (5, MOST_DAMAGED + 2)
         assert run(capsys, "verify", "-q", "--repair", out).code == 0
         assert contents(out) == before

@@ -58,11 +58,11 @@ def test_the_bytes_are_those_of_the_whole(changes, tmp_path, monkeypatch):
     job = write_job(tmp_path, **(JOB | {"camera": WALK | {"resolution": [24, 18]}} | changes))
     whole = finish(start("render", job, "-o", tmp_path / "whole"))
     parts = finish(start("render", job, "--workers", 2, "--chunk", 7, "-o", tmp_path / "parts"))
-    assert (whole.code, parts.code, parts.err) == (0, 0, "")
+    assert (whole.code, parts.code) == (0, 0)
     assert same(tmp_path / "parts", tmp_path / "whole")
     assert len(finished(tmp_path / "parts")) == N and not restarted(tmp_path / "parts")
-    printed = [line for line in whole.out.splitlines() if line.startswith(("ambient", "automatic", "error"))]
-    assert printed and set(printed) <= set(parts.out.splitlines())
+    printed = [line for line in whole.err.splitlines() if line.startswith(("ambient", "automatic", "error"))]
+    assert printed and set(printed) <= set(parts.err.splitlines())
 
 
 def test_a_difference_is_found(place, tmp_path):
@@ -135,7 +135,7 @@ def test_a_signal_ends_all_workers(number, place, tmp_path):
     word = "interrupted" if number == signal.SIGINT else "terminated"
     done = sum(finished(out).values()) * 3
     kept = f"{done} of {3 * N} images were written to {out}; the same command goes on with the rest"
-    assert result.err.splitlines() == [word, kept]
+    assert result.err.splitlines()[-2:] == [word, kept]
     assert len(workers) == 2 and not any(worker.is_running() for worker in workers)
     assert manifest(out)["summary"]["images"] == done
     assert not [file for file in out.rglob(".*") if file.name != ".guard"]

@@ -77,7 +77,7 @@ def test_lines_of_the_ambient_light() -> None:
     )
     assert ambient_lines(ambient_figures(estimate)) == [
         "ambient light: I_A 0.2 to 2 (standard error at most 2.0%, 8,192 paths)",
-        "  note: a note",
+        "note: a note",
     ]
 
 

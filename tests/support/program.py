@@ -50,7 +50,7 @@ def start(*arguments: str | Path, **options: Any) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-m", "framearray_cli", *map(str, arguments)],
         stdout=options.pop("stdout", subprocess.PIPE),
-        stderr=subprocess.PIPE,
+        stderr=options.pop("stderr", subprocess.PIPE),
         text=True,
         # buffer the output as for a user, even where the tests run unbuffered
         env={name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
@@ -74,7 +74,7 @@ def finish(process: subprocess.Popen[str], seconds: float = 300.0) -> Result:
                 kill(process)
                 pytest.fail(f"no end after {now - started:.0f} s, {now - woke:.0f} s idle: {process.communicate()}")
         else:
-            return Result(process.returncode, out or "", err)
+            return Result(process.returncode, out or "", err or "")
 
 
 def family(process: subprocess.Popen[str]) -> list[psutil.Process]:

@@ -9,7 +9,7 @@ import typer
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS
 
 from ..options import ArrayFolder, Quiet, output_path
-from ..screen import Screen, out, say
+from ..screen import Screen, err, print_result
 
 PathFile = Annotated[
     Path | None, typer.Argument(metavar="PATH", help="Movie path, TOML; or one of the movements.", show_default=False)
@@ -87,7 +87,7 @@ def assemble(
     choices: dict[SweepKind, bool] = {"walk": walk, "light": light, "diagonal": diagonal}
     kinds = [kind for kind, wanted in choices.items() if wanted]
     _refuse_conflicts(path_file, kinds, at, seconds)
-    with Screen(out, quiet=quiet) as screen:
+    with Screen(err, quiet=quiet) as screen:
         result = run(
             array,
             path_file or Sweep(kind=kinds[0], at=tuple(at or ()), seconds=seconds),
@@ -99,7 +99,7 @@ def assemble(
         )
     if not quiet:
         rate = f"{float(result.fps):g} frames per second"
-        say(out, [f"{result.target}: {result.n_frames} frames from {result.n_images} images, {rate}"])
+        print_result([f"{result.target}: {result.n_frames} frames from {result.n_images} images, {rate}"])
 
 
 def _refuse_conflicts(

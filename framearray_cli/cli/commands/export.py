@@ -7,7 +7,7 @@ import typer
 from framearray_cli.array.places import ALL_PLACES
 
 from ..options import ArrayFolder, At, Cameras, Exposure, Light, Quiet, output_path
-from ..screen import Screen, out, say
+from ..screen import Screen, err, print_result
 
 
 def export(
@@ -38,7 +38,7 @@ def export(
 
     if exposure and image_format not in FOR_SCREENS:
         raise typer.BadParameter("changes only PNG and JPEG", param_hint="--exposure")
-    with Screen(out, quiet=quiet) as screen:
+    with Screen(err, quiet=quiet) as screen:
         made = run(
             array, output_path(target), kind, cameras=cameras or ALL_PLACES, light=light, at=at or (),
             image_format=ImageFormat(format=image_format, exposure=exposure), points=points, copy=copy,
@@ -49,4 +49,9 @@ def export(
     if not quiet:
         lights = f"{made.n_lights} light position{'s' if made.n_lights > 1 else ''}"
         points_too = f", {made.n_points:,} points" if kind != "cinema" else ""
-        say(out, [f"{made.target}: {made.n_cameras} cameras, {lights}{points_too}", *made.notes])
+        print_result(
+            [
+                f"{made.target}: {made.n_cameras} cameras, {lights}{points_too}",
+                *(f"note: {note}" for note in made.notes),
+            ]
+        )

@@ -9,7 +9,7 @@ import typer
 from framearray_cli.engine.kernels.clock import compile_clock
 
 from ..options import Quiet, output_path
-from ..screen import Screen, out, say
+from ..screen import Screen, err, print_result
 
 MOST = 1000  # frames or lights of a first job
 
@@ -40,7 +40,7 @@ def init(
 ) -> None:
     """Write a first job for a scene: camera, lights and exposure are found or chosen."""
     job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else output_path(target)
-    with Screen(out, quiet=quiet) as screen:
+    with Screen(err, quiet=quiet) as screen:
         screen.wait("exploring the scene")
         from framearray_cli.starter import StartOptions
         from framearray_cli.starter import init as run
@@ -48,7 +48,8 @@ def init(
         with compile_clock(screen.compiling):
             options = StartOptions(camera=camera, frames=frames, lights=lights, inside=inside)
             start = run(scene, job_file, options, force=force)
+        screen.say(start.about)
     if not quiet:
         images = start.camera.frames * start.light_frames
         size = f"{start.camera.frames} eyes x {start.light_frames} lights = {images} images"
-        say(out, [*start.about, f"{job_file}: {size}; next: framearray render {shlex.quote(str(job_file))}"])
+        print_result([f"{job_file}: {size}; next: framearray render {shlex.quote(str(job_file))}"])

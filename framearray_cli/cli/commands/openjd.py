@@ -10,7 +10,7 @@ from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.render.messages import chunks_line
 
 from ..options import JobFile, Quiet, load_job, output_path
-from ..screen import Screen, out, say
+from ..screen import Screen, err, print_result
 
 
 def openjd(
@@ -40,7 +40,7 @@ def openjd(
         raise typer.BadParameter(
             f"expected at most {frames}, the frames of the camera, got {chunk}", param_hint="--chunk"
         )
-    with Screen(out, quiet=quiet) as screen:
+    with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the job")
         from framearray_cli.render.parts.chunks import default_size, plan_chunks, resolve_n_r
         from framearray_cli.render.parts.openjd import template, write_template
@@ -51,4 +51,4 @@ def openjd(
         chunks = plan_chunks(range(frames), size, frames, n_r, still=still)
         write_template(file, template(job, job_file, file.parent, size, job.render.threads), force=force)
     if not quiet:
-        say(out, [chunks_line(chunks), f"{file}; next: openjd run {shlex.quote(str(file))}"])
+        print_result([chunks_line(chunks), f"{file}; next: openjd run {shlex.quote(str(file))}"])

@@ -25,7 +25,7 @@ from framearray_cli.render.parts.progress import PartEvents
 from framearray_cli.render.progress import ambient_figures
 
 from ..options import Cameras, JobFile, Output, Quiet, Threads, load_job
-from ..screen import Screen, out, say
+from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk
@@ -94,7 +94,7 @@ def render_on_screen(
     options: "WorkerOptions | None" = None,
 ) -> None:
     """Render, and show the progress on the screen."""
-    with Screen(out, quiet=quiet) as screen:
+    with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the scene")
         from framearray_cli.render.render import render as run
 
@@ -115,7 +115,7 @@ def render_on_screen(
                 error.add_note(f"{done}; the same command goes on with the rest")
             raise
     if not quiet:
-        say(out, summary_lines(summary, events.printed, job))
+        print_result(summary_lines(summary, events.printed, job))
 
 
 class RenderingEvents(PartEvents):

@@ -11,7 +11,7 @@ from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.render.messages import scene_lines
 
 from ..options import JobFile, Quiet, Threads, load_job
-from ..screen import Screen, out, say
+from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
     from framearray_cli.report.case import Case
@@ -60,7 +60,7 @@ def report(
 ) -> None:
     """Measure the effect of each setting of a job on speed and error, as a page with tables and plots."""
     job = load_job(job_file, threads, None)
-    with Screen(out, quiet=quiet) as screen:
+    with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the scene")
         from framearray_cli import report as reporting
 
@@ -88,7 +88,7 @@ def report(
             made = reporting.make_report(job, folder.absolute() if folder else beside, options, MeasuringEvents())
         reporting.write_report(made)
     if not quiet:
-        say(out, report_lines(made))
+        print_result(report_lines(made))
 
 
 def _indices(option: str, texts: list[str] | None, n: int, axis: str = CAMERA_AXIS) -> tuple[int, ...]:

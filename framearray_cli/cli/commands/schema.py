@@ -1,6 +1,6 @@
 """`framearray schema`."""
 
-from ..screen import out, say
+from ..screen import print_result
 
 
 def schema() -> None:
@@ -9,4 +9,4 @@ def schema() -> None:
 
     from framearray_cli.job.schema import job_schema
 
-    say(out, json.dumps(job_schema(), indent=2).splitlines())
+    print_result(json.dumps(job_schema(), indent=2).splitlines())

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from ..options import ArrayFolder, At, Cameras, Exposure, Light, Quiet, output_path
-from ..screen import Screen, out, say
+from ..screen import Screen, err, print_result
 
 MOST_WIDTH = 20_000  # pixels; more is taken for a typing error
 
@@ -36,7 +36,7 @@ def sheet(
     """Draw a contact sheet: cameras from left to right, light positions from top to bottom."""
     from framearray_cli.tools.sheet import make_sheet
 
-    with Screen(out, quiet=quiet) as screen:
+    with Screen(err, quiet=quiet) as screen:
         made = make_sheet(
             array, output_path(target), cameras=cameras, light=light,
             columns=columns, rows=rows, width=width, exposure=exposure, side=side, at=at or (),
@@ -46,4 +46,4 @@ def sheet(
         screen.say(f"warning: {warning}" for warning in made.warnings)
     if not quiet:
         shown = f"{len(made.cameras)} cameras, {len(made.lights)} light positions"
-        say(out, [f"{made.target}: {shown}, {made.size[0]} x {made.size[1]} pixels"])
+        print_result([f"{made.target}: {shown}, {made.size[0]} x {made.size[1]} pixels"])

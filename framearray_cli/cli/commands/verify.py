@@ -8,7 +8,7 @@ from framearray_cli.base.errors import CheckError
 from framearray_cli.base.memory import RENDER_NEEDS, available_cores, require_address_space
 
 from ..options import ArrayFolder, Quiet, Threads, with_threads
-from ..screen import Screen, out, say
+from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import Verification
@@ -28,14 +28,14 @@ def verify(
     """Check that every image of a frame array is there, whole and unchanged."""
     from framearray_cli.array.integrity import verify as run
 
-    with Screen(out, quiet=quiet) as screen:
+    with Screen(err, quiet=quiet) as screen:
         found = run(array, threads or available_cores(), screen.counter("verifying", "file"))
     lines = verified_lines(found)
     if not found.wrong or not repair:
+        if found.wrong or not quiet:
+            print_result(lines)
         if found.wrong:
-            raise CheckError("\n".join(lines))
-        if not quiet:
-            say(out, lines)
+            raise typer.Exit(CheckError.exit_code)
         return
     from framearray_cli.array.manifest import FILE_NAME
     from framearray_cli.job.read import job_of_table
@@ -44,7 +44,7 @@ def verify(
 
     require_address_space(RENDER_NEEDS)
     if not quiet:
-        say(out, lines)
+        print_result(lines)
     folder = found.manifest.directory
     render_on_screen(
         with_threads(job_of_table(found.manifest.job, folder / FILE_NAME, folder.absolute()), threads), quiet=quiet

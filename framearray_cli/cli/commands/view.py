@@ -9,7 +9,7 @@ from framearray_cli.base.signals import Stopped, cancel_alarm
 from framearray_cli.base.units import MOST_THREADS, size
 
 from ..options import ArrayFolder, Quiet, output_path
-from ..screen import Screen, out, say
+from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
     from framearray_cli.base.errors import OutputError
@@ -40,17 +40,20 @@ def view(
 
     workers = threads or available_cores()
     tiles = open_tiles(array, output_path(cache, "--cache") if cache is not None else None, workers)
-    with Screen(out, quiet=quiet) as screen:
+    with Screen(err, quiet=quiet) as screen:
         if target is not None:
             screen.count("preparing", tiles.n_pictures, "picture")
             n_bytes, problems = write_page(
                 tiles, output_path(target, "--export"), threads=workers, progress=screen.advance
             )
-            screen.say([*_warning_lines(problems), f"{target}: the page, {size(n_bytes)}; any web server can show it"])
+            screen.say(_warning_lines(problems))
+            screen.end()
+            if not quiet:
+                print_result([f"{target}: the page, {size(n_bytes)}; any web server can show it"])
             return
 
         def opened(url: str) -> None:
-            say(out, [f"{url}  Ctrl-C ends"])
+            print_result([f"{url}  Ctrl-C ends"])
             screen.count("preparing", tiles.n_pictures, "picture")
 
         def prepared(problems: list["OutputError"]) -> None:

@@ -193,7 +193,7 @@ def test_the_command_serves_until_ctrl_c(tmp_path):
     try:
         url = process.stdout.readline().split()[0]
         assert url.startswith("http://127.0.0.1:")
-        assert "all pictures are prepared" in process.stdout.readline()
+        assert "all pictures are prepared" in process.stderr.readline()
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=10)
         assert (process.returncode, said) == (0, "")
