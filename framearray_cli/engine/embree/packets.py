@@ -84,8 +84,14 @@ def aligned_zeros(n_words: int) -> Float32:
 
 
 def empty_packets(n_packets: int, rows: int) -> Float32:
-    """Allocate packets, (n, rows, 16) float32, with tnear 0 and the mask of all rays."""
-    packets = aligned_zeros(n_packets * rows * LANES).reshape(n_packets, rows, LANES)
+    """Allocate packets, (n, rows, 16) float32, with tnear 0 and the mask of all rays.
+
+    Where Embree has no packets of 16 of its own, it traces their rays singly and writes each back with all rows of a
+    hit, into shadow rays too, which end before those. It writes what it read there; yet if another thread had written
+    in between, that would be lost. So such rows lie behind the last packet as well.
+    """
+    words = n_packets * rows * LANES
+    packets = aligned_zeros(words + max(HIT_ROWS - rows, 0) * LANES)[:words].reshape(n_packets, rows, LANES)
     packets.view(np.int32)[:, MASK] = ALL_RAYS
     return packets
 
