@@ -17,6 +17,7 @@ from framearray_cli.base.forms.schema import toml_key
 
 from .manifest import FILE_NAME, Manifest, array_files
 from .manifest_toml import read_manifest
+from .metadata import JOURNAL, metadata_of
 from .record import FOLDER, record_files
 
 # Number of differences that a message lists, and the longest text of two values.
@@ -93,9 +94,9 @@ def read_array(folder: Path) -> Manifest | None:
 
 
 def differences(old: Manifest, new: Identity) -> list[str]:
-    """List why a job would not produce the files that a manifest lists; empty if it would.
+    """List why a job would not produce the images that a manifest lists; empty if it would.
 
-    The paths of job and scene and the machine that renders are ignored.
+    The paths of job and scene, the machine that renders, and values that change no pixel are ignored.
     """
     found = []
     if old.version != __version__:
@@ -109,9 +110,9 @@ def differences(old: Manifest, new: Identity) -> list[str]:
 
 
 def _relevant(job: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the part of a job's table that files depend on."""
+    """Return the part of a job's table that pixels and file names depend on."""
     table: dict[str, Any] = json.loads(json.dumps({k: v for k, v in job.items() if k != "render"}, default=str))
-    for section, key in (("output", "directory"), ("scene", "file")):
+    for section, key in (("output", "directory"), ("scene", "file"), ("scene", "folders"), *metadata_of(job)):
         table.get(section, {}).pop(key, None)
     return table
 
@@ -172,7 +173,8 @@ def remove_array(old: Manifest) -> int:
         OSError: one of them cannot be removed.
         OutputError: a link in the folder leads out of it; no file is removed.
     """
-    removed, files = 0, (*array_files(old), *record_files(old.directory), old.directory / FILE_NAME)
+    journal = old.directory / FOLDER / JOURNAL
+    removed, files = 0, (*array_files(old), *record_files(old.directory), journal, old.directory / FILE_NAME)
     whole = old.directory.resolve()
     for folder in {file.parent for file in files} - {old.directory}:
         if not folder.resolve().is_relative_to(whole):

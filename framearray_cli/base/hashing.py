@@ -32,6 +32,13 @@ def digest(path: Path) -> tuple[int, str]:
     return size, total.hexdigest()
 
 
+def data_digest(data: bytes) -> tuple[int, str]:
+    """Size and checksum of a file with this content, as `digest` returns them."""
+    import xxhash
+
+    return len(data), xxhash.xxh3_128_hexdigest(data)
+
+
 def line_digest(line: bytes) -> bytes:
     """Digest a line of a record: XXH3 of 64 bits, 16 hexadecimal digits."""
     import xxhash

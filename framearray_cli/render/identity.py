@@ -6,10 +6,15 @@ import numpy as np
 
 from framearray_cli.array.folder import Identity
 from framearray_cli.array.manifest_toml import plain
+from framearray_cli.array.metadata import metadata_of
+from framearray_cli.base.forms.table import Table
 from framearray_cli.base.hashing import fingerprint
+from framearray_cli.job.method import ObscuranceTable, SamplesTable
 from framearray_cli.job.read import job_table
 
 from .prepare import Prepared
+
+_DEFAULTS: dict[str, type[Table]] = {"obscurance": ObscuranceTable, "samples": SamplesTable}
 
 
 def identity_of(prepared: Prepared) -> Identity:
@@ -38,5 +43,7 @@ def job_fingerprint(prepared: Prepared, scene: str | None = None) -> str:
     table = {key: value for key, value in job_table(prepared.job).items() if key not in ("output", "render")}
     for where in ("file", "folders"):
         table["scene"].pop(where, None)
+    for section, key in metadata_of(table):
+        table[section][key] = _DEFAULTS[section].model_fields[key].default
     scene = scene or scene_fingerprint(prepared)
     return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), scene.encode())

@@ -21,6 +21,9 @@ class RenderEvents:
     def removed(self, files: int) -> None:
         """The array in the folder was removed, with that many files."""
 
+    def rewriting(self, files: int) -> None:
+        """The headers of that many files are about to be rewritten: the job has another frame rate."""
+
     def resolved(self, settings: "AutoSettings") -> None:
         """Settings were chosen where the job says "auto"."""
 

@@ -5,10 +5,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
-from framearray_cli.array.folder import Identity, check_folder, claim_folder
+from framearray_cli.array.folder import Identity, check_folder, claim_folder, read_array
 from framearray_cli.array.integrity import OnDisk, scan_output
 from framearray_cli.array.lock import ArrayFolder
 from framearray_cli.array.manifest_toml import read_manifest, write_manifest
+from framearray_cli.array.metadata import metadata_differs, take_over_metadata
 from framearray_cli.array.ranges import frames_text
 from framearray_cli.array.record import RecordedRun
 from framearray_cli.engine.embree import EmbreeScene, Engine
@@ -68,6 +69,7 @@ def open_session(
             if restart:
                 folder.require_no_other_run()
             events.removed(claim_folder(directory, identity, restart=restart))
+            _take_over_metadata(folder, prepared, identity, events)
             held.enter_context(folder.reserve(chosen, run.cameras))
         if settings:
             events.resolved(settings)
@@ -78,6 +80,18 @@ def open_session(
             prepared=prepared, embree=embree, settings=settings, identity=identity, run=run, folder=folder,
             on_disk=on_disk, chosen=chosen, wanted=wanted,
         )  # fmt: skip
+
+
+def _take_over_metadata(folder: ArrayFolder, prepared: Prepared, identity: Identity, events: RenderEvents) -> None:
+    """Write values of the job that change no pixel into the array that is in its folder, if they differ there.
+
+    Raises:
+        OutputError: another run renders into the folder, or a file cannot be rewritten.
+    """
+    old, fps = read_array(prepared.job.output.directory), prepared.job.output.fps
+    if old is not None and metadata_differs(old, identity.job, fps):
+        folder.require_no_other_run()
+        take_over_metadata(old, identity.job, fps, prepared.threads, events.rewriting)
 
 
 def complete_manifest(session: RenderSession, seconds: float) -> Summary:

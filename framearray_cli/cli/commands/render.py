@@ -138,6 +138,11 @@ class RenderingEvents(PartEvents):
         if files:
             self._screen.say([f"removed {files:,} files of the frame array in {self._job.output.directory}"])
 
+    def rewriting(self, files: int) -> None:
+        if files:
+            rate = f"output.fps is {self._job.output.fps:g} now"
+            self._screen.say([f"{rate}: rewriting the headers of {files:,} files, whose pixels stay"])
+
     def resolved(self, settings: "AutoSettings") -> None:
         self._screen.say(settings_lines(settings))
 

@@ -53,6 +53,7 @@ def verify(
 
 def verified_lines(found: "Verification") -> list[str]:
     """List damaged files by name, then the cameras that are not finished by ranges, and sum up."""
+    from framearray_cli.array.metadata import was_interrupted
     from framearray_cli.array.ranges import brief_frames_text
 
     folder, damaged = found.manifest.directory, found.damaged
@@ -69,6 +70,8 @@ def verified_lines(found: "Verification") -> list[str]:
             left = sum(unfinished[c] for c in cameras)
             were = f"camera{'s' if len(cameras) > 1 else ''} {brief_frames_text(cameras)}: {what}"
             lines.append(f"{were}, {left:,} of {each * len(cameras):,} files are left")
+    if was_interrupted(folder):
+        lines.append("note: a change of output.fps was interrupted; the next render completes it")
     if found.unknown:
         lines.append(f"note: {found.unknown:,} files are whole, but have no checksum to compare them with")
     return [*lines, _sum_up(found, len(damaged), sum(unfinished.values()))]

@@ -1,0 +1,131 @@
+"""Values of a job that change no pixel, in an array that exists: its manifest, and the headers of its files.
+
+The frame rate is in the header of every EXR and PNG. A journal beside the records names the rates that files may have
+while headers are rewritten. If that is interrupted, the next run reads it and ends with one rate: a file counts as
+whole if it has the recorded checksum at one of these rates.
+"""
+
+import json
+from collections.abc import Callable, Collection, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import reason, write_bytes
+from framearray_cli.base.hashing import data_digest
+from framearray_cli.base.units import frame_rate
+
+from .images.rates import frame_rate_of, with_frame_rate
+from .manifest import Manifest, array_files
+from .manifest_toml import write_manifest
+from .present import list_present
+from .record import FOLDER, read_records, rewrite_checksums
+
+JOURNAL = "rates.json"  # in the folder of the records, while headers are rewritten
+HOLD_RATE = (".exr", ".png")  # files whose headers hold the frame rate
+
+# Keys that files depend on only if another key of their table has one of these values.
+NEEDS: dict[tuple[str, str], tuple[str, Collection[object]]] = {
+    ("output", "compression"): ("format", ("exr",)),
+    ("output", "half"): ("format", ("exr",)),
+    ("output", "quality"): ("format", ("jpg",)),
+    ("output", "exposure"): ("format", ("png", "jpg")),
+    ("output", "fps"): ("format", ()),  # files hold it, but no pixel depends on it
+    ("obscurance", "tau"): ("falloff", ("exponential",)),
+    ("samples", "shadow_unbiased"): ("shadow_step", range(2, 2**16)),
+}
+
+
+def metadata_of(job: Mapping[str, Any]) -> dict[tuple[str, str], Any]:
+    """Return the values of a job's table that change no pixel: (table, key) -> value."""
+    found = {}
+    for (section, key), (other, values) in NEEDS.items():
+        table = job.get(section)
+        if isinstance(table, Mapping) and key in table and table.get(other) not in values:
+            found[section, key] = table[key]
+    return found
+
+
+def metadata_differs(old: Manifest, job: Mapping[str, Any], fps: float) -> bool:
+    """Return whether an array must take over values of a job, or a run that did so was interrupted."""
+    return old.fps != fps or metadata_of(old.job) != metadata_of(job) or was_interrupted(old.directory)
+
+
+def was_interrupted(folder: Path) -> bool:
+    """Return whether the headers of an array may hold several frame rates."""
+    return (folder / FOLDER / JOURNAL).exists()
+
+
+def take_over_metadata(
+    old: Manifest,
+    job: dict[str, Any],
+    fps: float,
+    threads: int = 1,
+    rewriting: Callable[[int], None] = lambda files: None,
+) -> None:
+    """Write the values of a job that change no pixel into an array; no run may render into it meanwhile.
+
+    Args:
+        rewriting: called with the number of files before the first header is rewritten.
+
+    Raises:
+        OutputError: a file cannot be read or written.
+    """
+    folder = old.directory
+    if old.fps != fps or was_interrupted(folder):
+        journal = folder / FOLDER / JOURNAL
+        rates = _read_rates(journal) | {frame_rate(old.fps), frame_rate(fps)}
+        write_bytes(journal, json.dumps([str(rate) for rate in sorted(rates)]).encode())
+        _rewrite_headers(old, rates, frame_rate(fps), threads, rewriting)
+    write_manifest(folder, replace(old, fps=fps, job=job))
+    with suppress(FileNotFoundError):
+        (folder / FOLDER / JOURNAL).unlink()
+
+
+def _read_rates(journal: Path) -> set[Fraction]:
+    """Read the rates that files may have; none if there is no journal, or it is damaged."""
+    try:
+        return {Fraction(rate) for rate in json.loads(journal.read_bytes())}
+    except (OSError, ValueError, TypeError, ZeroDivisionError, RecursionError):
+        return set()
+
+
+def _rewrite_headers(
+    manifest: Manifest,
+    rates: Collection[Fraction],
+    rate: Fraction,
+    threads: int,
+    rewriting: Callable[[int], None],
+) -> None:
+    """Give all files one rate, then correct the records; damaged files stay as they are."""
+    folder, present = manifest.directory, list_present(manifest)
+    known = read_records(folder, manifest.fingerprint).checksums()
+    files = [file for file in array_files(manifest) if file.suffix in HOLD_RATE and present.has([file])]
+    rewriting(len(files))
+
+    def rewrite(file: Path) -> tuple[str, tuple[int, str]] | None:
+        try:
+            data = file.read_bytes()
+        except OSError as error:
+            raise OutputError(f"{file}: cannot be read: {reason(error)}") from error
+        recorded, own = known.get(file.name), frame_rate_of(data)
+        if own is None:
+            return None
+        if recorded and not any(data_digest(with_frame_rate(data, other)) == recorded for other in (own, *rates)):
+            return None
+        new = with_frame_rate(data, rate)
+        if new != data:
+            write_bytes(file, new)
+        return (file.name, data_digest(new)) if recorded else None
+
+    with ThreadPoolExecutor(threads, thread_name_prefix="headers") as pool:
+        try:
+            found = dict(entry for entry in pool.map(rewrite, files) if entry)
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    rewrite_checksums(folder, found)
