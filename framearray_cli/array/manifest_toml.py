@@ -10,6 +10,7 @@ import numpy as np
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, require_file, write_bytes
+from framearray_cli.base.forms.kinds import mistaken
 from framearray_cli.base.forms.text import inline, inline_floats
 from framearray_cli.base.forms.toml import long_key_problem
 from framearray_cli.base.forms.words import shown
@@ -18,6 +19,8 @@ from .manifest import FILE_NAME, Manifest, ManifestCamera, ManifestGroup, Manife
 
 # Versions of the format; 2 adds groups of sources, which a program for version 1 may not understand.
 FORMAT, FORMAT_OF_GROUPS = 1, 2
+
+MOST_NAMES = 5  # of arrays in a message
 
 _LIGHT_KEYS = ("ambient", "ambient_error", "sources")
 
@@ -43,6 +46,8 @@ def read_manifest(place: Path) -> Manifest:
         OutputError: it is missing, broken, made by a newer program, or names files outside its folder.
     """
     path = place / FILE_NAME if os.path.isdir(place) else place
+    if place.name != FILE_NAME and (problem := mistaken(place, "array")):
+        raise OutputError(f"{place}: {problem}")
     require_file(path)
     try:
         text = path.read_bytes().decode()
@@ -50,9 +55,15 @@ def read_manifest(place: Path) -> Manifest:
             raise OutputError(f"{path}: {problem}")
         table = tomllib.loads(text)
     except FileNotFoundError as error:
-        raise OutputError(f"{path}: no such file; expected the output folder of `framearray render`") from error
+        raise OutputError(
+            f"{path}: no such file; expected the output folder of `framearray render`{_below(place)}"
+        ) from error
     except OSError as error:
         raise OutputError(f"{path}: cannot be read: {reason(error)}") from error
+    except UnicodeDecodeError as error:
+        raise OutputError(
+            f"{path}: expected UTF-8 text, got a binary file; render again, or restore the file"
+        ) from error
     except (ValueError, RecursionError) as error:  # ValueError: not UTF-8, not TOML, or a number with too many digits
         raise OutputError(f"{path}: not valid TOML: {error}; render again, or restore the file") from error
     found = table.get("format")
@@ -64,6 +75,17 @@ def read_manifest(place: Path) -> Manifest:
         return _from_table(table, path.parent)
     except (ValueError, TypeError) as error:
         raise OutputError(f"{path}: {error}") from error
+
+
+def _below(folder: Path) -> str:
+    """Name the arrays right below a folder that is none itself."""
+    try:
+        found = sorted(path.parent for path in folder.glob(f"*/{FILE_NAME}"))
+    except OSError:
+        return ""
+    names = ", ".join(str(path) for path in found[:MOST_NAMES])
+    more = f" and {len(found) - MOST_NAMES} more" if len(found) > MOST_NAMES else ""
+    return f", such as {names}{more}" if found else ""
 
 
 def to_toml(manifest: Manifest) -> str:

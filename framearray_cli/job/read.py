@@ -6,8 +6,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.kinds import load_kind
 from framearray_cli.base.forms.problems import problems_of
-from framearray_cli.base.forms.toml import load_toml
 from framearray_cli.base.forms.words import shown
 
 from .eyefile import EyeFileError, read_eyes
@@ -21,7 +21,7 @@ def read_job(path: Path) -> Job:
     Raises:
         JobError: the file cannot be read or has problems; the error lists all of them.
     """
-    table = load_toml(path)
+    table = load_kind(path, "job")
     job_file = path.absolute()
     table, problems = _with_eyes(table, job_file)
     try:

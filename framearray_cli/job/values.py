@@ -70,6 +70,9 @@ def _file_name(value: object, info: ValidationInfo) -> Path:
     """Check a file name and make it absolute."""
     if not isinstance(value, str | Path) or not str(value).strip() or "\0" in str(value):
         fail([((), f"expected a file name, got {shown(value)}")])
+    if re.match(r"([A-Za-z]:|\\).*[\x00-\x1f]", str(value), re.DOTALL):
+        remedy = "TOML reads a backslash in double quotes as an escape; write / for it, or use single quotes"
+        fail([((), f"expected a file name, got {shown(value)}: {remedy}")])
     if len(str(value)) > LONGEST_PATH:
         fail([((), f"expected a file name of at most {LONGEST_PATH} characters, got one of {len(str(value))}")])
     job_file = (info.context or {}).get("job_file")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from framearray_cli.base.errors import OutputError, SceneError
 from framearray_cli.base.files import write_bytes
+from framearray_cli.base.forms.kinds import mistaken
 
 from .model import Start, table_of, validate_job
 from .plan import StartOptions, plan_start
@@ -28,6 +29,8 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
         JobError: no camera has the name in the options.
         OutputError: the job file exists already, or cannot be written.
     """
+    if problem := mistaken(scene, "scene"):
+        raise SceneError(f"{scene}: {problem}")
     if os.path.exists(job_file) and not force:
         raise OutputError(f"{job_file}: is there already; give another name with --output, or --force to replace it")
     if not os.path.exists(scene):

@@ -200,8 +200,14 @@ def test_missing_and_unreadable_manifests(tmp_path: Path) -> None:
         read_manifest(tmp_path)
     with pytest.raises(OutputError, match="no such file"):
         read_manifest(tmp_path / "nowhere")
+    with pytest.raises(
+        OutputError, match=rf"expected the output folder of `framearray render`, such as {tmp_path}/out$"
+    ):
+        (tmp_path / "out").mkdir()
+        (tmp_path / "out" / "manifest.toml").touch()
+        read_manifest(tmp_path)
     (tmp_path / "manifest.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(OutputError, match="not valid TOML"):
+    with pytest.raises(OutputError, match="expected UTF-8 text, got a binary file"):
         read_manifest(tmp_path)
 
 

@@ -35,7 +35,24 @@ def test_problems_of_a_job_are_reported_at_once(command, tmp_path, capsys):
         ("binary.toml", b"\x00\x01\xff", "binary.toml: expected UTF-8 text, got a binary file"),
         ("broken.toml", b"name = \n", "broken.toml: not valid TOML: Invalid value (at line 1, column 8)"),
         ("empty.toml", b"", "empty.toml: scene: missing; expected a table"),
-        ("scene.glb", b"glTF\x02\x00\x00\x00", "scene.glb: expected UTF-8 text, got a binary file"),
+        ("noise", b"glTF\x02\x00\x00\x00", "noise: expected UTF-8 text, got a binary file"),
+        (
+            "scene.glb",
+            b"glTF\x02\x00\x00\x00",
+            "scene.glb: expected a job file, got a scene; `framearray init scene.glb` writes a job for it",
+        ),
+        ("a b.png", b"", "a b.png: expected a job file, got an image"),
+        (
+            "walk.toml",
+            b"[[segments]]\n",
+            "walk.toml: expected a job file, got a movie path; `framearray assemble ARRAY walk.toml` follows it",
+        ),
+        (
+            "manifest.toml",
+            b"fingerprint = ''\ncameras = []\n",
+            "manifest.toml: expected a job file, got the manifest of a frame array; "
+            "`framearray verify --repair .` renders what the array lacks",
+        ),
         ("folder", "folder", "folder: expected a TOML file, got a folder"),
     ],
 )
@@ -93,13 +110,26 @@ def test_wrong_command_lines(arguments, message, tmp_path, capsys, monkeypatch):
     ("scene", "message"),
     [
         ("nosuch.glb", "nosuch.glb: no such scene file; paths are relative to the job file"),
-        ("job.toml", "job.toml: expected a scene of a known format, got '.toml'; known are "),
+        ("job.toml", "job.toml: expected a scene, got a job file; `framearray render "),
+        ("scene.xcf", "scene.xcf: expected a scene of a known format, got '.xcf'; known are "),
+        ("noname", "noname: expected a scene of a known format, got a name without a suffix; known are "),
+        ("a.blend", "a.blend: .blend files cannot be read; export the scene as GLB: in Blender: File > Export > glTF"),
+        ("a.USDZ", "a.USDZ: .usdz files cannot be read; export the scene as GLB: open Blender, File > Import > Univ"),
+        ("a.vrm", "a.vrm: expected a scene, got a .vrm file; it is a GLB by another name: rename it to .glb"),
+        ("a.dae", "a.dae: reading .dae files needs pycollada; export the scene as GLB, or install it with: "),
+        ("a.png", "a.png: expected a scene, got an image"),
+        (
+            "a\nb.glb",
+            "a\\nb.glb: no such scene file; paths are relative to the job file; in double quotes TOML reads a ",
+        ),
         ("points.obj", "points.obj: expected triangles, got none (points without faces are left out)"),
         ("broken.glb", "broken.glb: broken, or not GLB ("),
     ],
 )
 def test_wrong_scenes(scene, message, tmp_path, capsys):
     (tmp_path / "points.obj").write_text("v 0 0 0\nv 1 0 0\n")
+    for name in ("scene.xcf", "noname", "a.blend", "a.USDZ", "a.vrm", "a.dae", "a.png"):
+        (tmp_path / name).write_bytes(b"x")
     (tmp_path / "broken.glb").write_bytes(b"glTF" + bytes(200))
     result = run(capsys, "render", write_job(tmp_path, scene={"file": scene}))
     assert (result.code, result.out) == (3, "")

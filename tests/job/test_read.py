@@ -49,6 +49,21 @@ BROKEN = [
     (b"name = ", "not valid TOML: Invalid value (at end of document)"),
     (b'a = 1\nb = "x\n', "not valid TOML: Illegal character '\\n' (at line 2, column 7)"),
     (b"a = 1\na = 2\n", "not valid TOML: Cannot overwrite a value (at line 2, column 6)"),
+    (
+        rb'file = "C:\Users\me\room.glb"',
+        'line 1: TOML reads a backslash in double quotes as an escape; write "C:/Users/me/room.glb", or use single '
+        "quotes",
+    ),
+    (
+        rb'file = "\\server\data\room.glb"',
+        'line 1: TOML reads a backslash in double quotes as an escape; write "//server/data/room.glb", or use single '
+        "quotes",
+    ),
+    (
+        b'directory = "C:\\out\\"\nname = "x"\n',
+        'line 1: TOML reads a backslash in double quotes as an escape; write "C:/out/", or use single quotes',
+    ),
+    (b'a = "x\\q"', 'line 1: TOML reads a backslash in double quotes as an escape; write "x/q", or use single quotes'),
     (b'# hello\nname = "caf\xe9"\n', "expected UTF-8 text, got byte 0xe9 in line 2; save the file as UTF-8"),
     ("name = 1".encode("utf-16"), "expected UTF-8 text, got UTF-16; save the file as UTF-8"),
     (b"glTF\x02\0\0\0", "expected UTF-8 text, got a binary file"),
@@ -347,3 +362,14 @@ def test_any_content_gives_a_job_or_a_job_error(data):
 )
 def test_found_values_are_shown_short(value, text):
     assert shown(value) == text
+
+
+@pytest.mark.parametrize("name", [r"C:\new\table.glb", r"\\server\rooms\table.glb"])
+def test_a_windows_path_of_valid_escapes_is_reported(tmp_path, name):
+    path = tmp_path / "job.toml"
+    path.write_text(f'[scene]\nfile = "{name}"\n')
+    found = next(problem for problem in problems(path) if problem.startswith("scene.file: "))
+    remedy = "TOML reads a backslash in double quotes as an escape; write / for it, or use single quotes"
+    assert found.startswith("scene.file: expected a file name, got ") and found.endswith(f": {remedy}")
+    path.write_text(f"[scene]\nfile = '{name}'\n")
+    assert not [problem for problem in problems(path) if problem.startswith("scene.file: ")]

@@ -10,6 +10,8 @@ from ..files import read_at_most
 
 LARGEST_FILE = 4 * 1024 * 1024  # bytes; a job is a thousand times smaller; anything larger is the wrong file
 
+LONGEST_PATH = 300  # characters of a text in a message
+
 # Python's TOML reader takes time and memory in proportion to the square of this number.
 MOST_PARTS = 6  # keys with dots between them; no file of ours has more than 4
 
@@ -40,11 +42,30 @@ def load_toml(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise JobError(path, [f"not valid TOML: {error}"]) from error
+        raise JobError(path, [_backslash_problem(text, str(error)) or f"not valid TOML: {error}"]) from error
     except RecursionError as error:
         raise JobError(path, ["tables or lists are nested too deeply"]) from error
     except ValueError as error:  # a number with more digits than Python reads
         raise JobError(path, ["a number has too many digits"]) from error
+
+
+def _backslash_problem(text: str, message: str) -> str | None:
+    """Describe a backslash in double quotes that begins no escape: most often it is one of a Windows path.
+
+    Args:
+        message: of Python's reader.
+    """
+    if not any(word in message for word in ("hex", "Unescaped", "Escaped", "Illegal character", "Unterminated")):
+        return None
+    lines = text.splitlines()
+    place = re.search(r"\(at line (\d+),", message)
+    number = int(place[1]) if place else len(lines)
+    some = r"[^\"\n]*" if "scape" in message or "hex" in message else "[A-Za-z]:"  # the others have many causes
+    found = re.search(rf'"({some}\\[^"\n]*)"', lines[number - 1])
+    if not found:
+        return None
+    name = re.sub(r"(?<!^)/+", "/", found[1][:LONGEST_PATH].replace("\\", "/"))  # a share keeps its two
+    return f'line {number}: TOML reads a backslash in double quotes as an escape; write "{name}", or use single quotes'
 
 
 def _read_bytes(path: Path) -> bytes:

@@ -9,6 +9,7 @@ from framearray_cli.base.arrays import Float32
 from framearray_cli.base.errors import SceneError
 
 from .assets import AssetError, Assets
+from .formats import missing_package
 from .headers import check_headers, one_solid
 from .materials import blended_opacity, clean_colours, default_material, make_material
 from .model import Material, Meshes, Notes, Part
@@ -16,7 +17,6 @@ from .placing import file_normals, instances, place_mesh
 from .textures import TextureTable
 
 BYTE = 255.0
-HINT = "; install it (for COLLADA: pip install pycollada), or convert the file to GLB"
 
 
 class FolderResolver:
@@ -60,7 +60,7 @@ def read_other(data: bytes, extension: str, assets: Assets) -> Meshes:
     try:
         scene = trimesh.load_scene(io.BytesIO(data), file_type=extension, resolver=folder, process=False)
     except ImportError as error:
-        raise SceneError(f"trimesh needs a further package for this format ({error}){HINT}") from error
+        raise SceneError(missing_package(extension)) from error
     textures = TextureTable(notes, assets.limit)
     materials: list[Material] = []
     numbers: dict[Any, int] = {}

@@ -11,8 +11,10 @@ import numpy as np
 
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
+from framearray_cli.base.forms.kinds import mistaken
 
 from .assets import AssetError, Assets
+from .formats import unknown_format
 from .gltf.container import open_gltf
 from .gltf.nodes import check_readable
 from .gltf.read import read_gltf
@@ -26,6 +28,7 @@ LOGGERS = ("trimesh", "PIL")
 # Not reported: the limit counts what images take, and a note names each texture that is left out.
 SILENT_WARNINGS = ("DeprecationWarning", "DecompressionBombWarning")
 SILENT_MESSAGES = ("unable to load image!",)
+ESCAPED = "; in double quotes TOML reads a backslash as an escape, such as \\n and \\t; write / for it"
 MAX_REASON = 200  # characters of a library's own message that an error repeats
 
 
@@ -73,23 +76,24 @@ def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
 @contextmanager
 def _scene_errors(file: Path, extension: str) -> Iterator[None]:
     """Turn any error of the readers into a SceneError that names the file."""
+    name = str(file).replace("\n", "\\n")
     try:
         yield
     except SceneError as error:
-        raise SceneError(f"{file}: {error}") from error
+        raise SceneError(f"{name}: {error}") from error
     except ImportError as error:
         package = "Pillow" if (error.name or "").startswith("PIL") else error.name
         raise SceneError(
-            f"{file}: reading it needs {package}; install it with: {install_command(str(package))}"
+            f"{name}: reading it needs {package}; install it with: {install_command(str(package))}"
         ) from error
     except MemoryError as error:
-        raise SceneError(f"{file}: does not fit into memory, or its header claims more than it holds") from error
+        raise SceneError(f"{name}: does not fit into memory, or its header claims more than it holds") from error
     except AssetError as error:
-        raise SceneError(f"{file}: {error}") from error
+        raise SceneError(f"{name}: {error}") from error
     except Exception as error:  # broken files make readers raise anything
         kind = "" if type(error) is ValueError and str(error) else f"{type(error).__name__}: "
         reason = " ".join(f"{kind}{error}".split())[:MAX_REASON].rstrip(" :")
-        raise SceneError(f"{file}: broken, or not {extension.upper()} ({reason}); export it anew") from error
+        raise SceneError(f"{name}: broken, or not {extension.upper()} ({reason}); export it anew") from error
 
 
 def _assets(file: Path, folders: Sequence[Path], memory: int | None) -> Assets:
@@ -101,7 +105,10 @@ def _bytes_of(file: Path, limit: Limit) -> bytes:
     """Read the bytes of a scene file; refuse pipes and devices, which may never end."""
     try:
         if not file.exists():
-            raise SceneError("no such scene file; paths are relative to the job file")
+            odd = "" if str(file).isprintable() else ESCAPED
+            raise SceneError(f"no such scene file; paths are relative to the job file{odd}")
+        if problem := mistaken(file, "scene"):
+            raise SceneError(problem)
         if file.is_dir():
             raise SceneError("expected a scene file, got a folder")
         if not file.is_file():
@@ -122,8 +129,7 @@ def _read(data: bytes, extension: str, assets: Assets) -> Meshes:
         return read_obj(data, assets)
     known = readable_formats()
     if extension not in known:
-        formats = ", ".join(sorted(known))
-        raise SceneError(f"expected a scene of a known format, got '.{extension}'; known are {formats}")
+        raise SceneError(unknown_format(extension, known))
     return read_other(data, extension, assets)
 
 

@@ -540,7 +540,8 @@ def test_stl_has_no_normals_of_its_own(tmp_path):
     ("name", "data", "expected"),
     [
         ("gone.glb", None, "no such scene file"),
-        ("a.blend", b"BLENDER", "known format"),
+        ("a.blend", b"BLENDER", "export the scene as GLB: in Blender"),
+        ("a.xcf", b"x", "known format"),
         ("a", b"x", "known format"),
         ("a.obj", b"", "empty file"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\n", "expected triangles"),
