@@ -1,5 +1,6 @@
 """Arguments and options that several commands share."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,6 +23,12 @@ Output = Annotated[
     str | None,
     typer.Option("--output", "-o", help="Folder for the images, instead of the job's.", metavar="FOLDER"),
 ]
+Sets = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", help="Replace a key of the job: camera.resolution=[640,480]; may be repeated.", metavar="KEY=VALUE"
+    ),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors.")]
 Exposure = Annotated[
     float,
@@ -41,12 +48,12 @@ At = Annotated[
 ]
 
 
-def load_job(job_file: Path, threads: int | None, output: str | None) -> "Job":
-    """Read a job file; options replace its keys."""
+def load_job(job_file: Path, threads: int | None, output: str | None, sets: Sequence[str] | None = None) -> "Job":
+    """Read a job file, or standard input for "-"; options replace its keys."""
     from framearray_cli.base.forms.table import changed
     from framearray_cli.job.read import read_job
 
-    job = with_threads(read_job(job_file), threads)
+    job = with_threads(read_job(job_file, sets or ()), threads)
     if output is None:
         return job
     table = job.output.model_copy(update={"directory": output_path(output).absolute()})  # keep links

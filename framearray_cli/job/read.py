@@ -1,5 +1,6 @@
 """Job file -> `Job`, or one error with every problem; and `Job` -> plain tables."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,28 +9,36 @@ from pydantic import ValidationError
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.kinds import load_kind
 from framearray_cli.base.forms.problems import problems_of
+from framearray_cli.base.forms.toml import STDIN, shown_file
 from framearray_cli.base.forms.words import shown
 
 from .eyefile import EyeFileError, read_eyes
 from .job import Job
+from .override import name_settings, put_settings, read_settings
 from .values import absolute
 
 
-def read_job(path: Path) -> Job:
-    """Read a job file; file names in it are relative to its folder.
+def read_job(path: Path, sets: Sequence[str] = ()) -> Job:
+    """Read a job file; file names in it are relative to its folder, those in `sets` to the current one.
+
+    Args:
+        path: the file; "-": standard input, in the current folder.
+        sets: "KEY=VALUE" texts that replace keys of the file before it is checked.
 
     Raises:
         JobError: the file cannot be read or has problems; the error lists all of them.
     """
+    settings = read_settings(sets)
     table = load_kind(path, "job")
-    job_file = path.absolute()
+    put_settings(table, settings)
+    job_file = shown_file(path) if path == STDIN else path.absolute()
     table, problems = _with_eyes(table, job_file)
     try:
         job = Job.model_validate(table, context={"job_file": job_file})
     except ValidationError as error:
         problems = problems_of(error, Job) + problems
     if problems:
-        raise JobError(path, problems)
+        raise JobError(shown_file(path), name_settings(problems, settings))
     return job
 
 

@@ -1,6 +1,7 @@
 """TOML file -> plain tables, or one JobError."""
 
 import re
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -29,13 +30,22 @@ def long_key_problem(text: str) -> str | None:
     return f"line {line}: expected at most {MOST_PARTS} keys with dots between them, got more"
 
 
+STDIN = Path("-")  # in place of a file name: standard input
+
+
+def shown_file(path: Path) -> Path:
+    """Return the name of a file for messages."""
+    return Path("standard input") if path == STDIN else path
+
+
 def load_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file into plain tables.
+    """Read a TOML file, or standard input for "-", into plain tables.
 
     Raises:
         JobError: the file is missing, not a file, too big, not UTF-8, not TOML or nested too deeply.
     """
-    data = _read_bytes(path)
+    data = _read_stdin() if path == STDIN else _read_bytes(path)
+    path = shown_file(path)
     text = _decode(path, data)
     if problem := long_key_problem(text):
         raise JobError(path, [problem])
@@ -66,6 +76,34 @@ def _backslash_problem(text: str, message: str) -> str | None:
         return None
     name = re.sub(r"(?<!^)/+", "/", found[1][:LONGEST_PATH].replace("\\", "/"))  # a share keeps its two
     return f'line {number}: TOML reads a backslash in double quotes as an escape; write "{name}", or use single quotes'
+
+
+def parse_value(text: str) -> Any:
+    """Read one value in TOML's notation: "3", "[1, 2]", '"text"'.
+
+    Raises:
+        ValueError: the text is no such value.
+    """
+    if long_key_problem(text):
+        raise ValueError("too many keys with dots between them")
+    try:
+        table = tomllib.loads(f"value = {text}")
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
+    if table.keys() != {"value"}:
+        raise ValueError("several lines")
+    return table["value"]
+
+
+def _read_stdin() -> bytes:
+    """Read all of standard input, up to the largest that is accepted."""
+    name = shown_file(STDIN)
+    if sys.stdin is None or sys.stdin.isatty():  # typing a file would end in silence
+        raise JobError(name, ["expected a TOML file from a pipe, got a terminal; name a file, or pipe one in"])
+    data = sys.stdin.buffer.read(LARGEST_FILE + 1)
+    if len(data) > LARGEST_FILE:
+        raise JobError(name, [f"expected a TOML file of at most {LARGEST_FILE >> 20} MB, got a bigger one"])
+    return data
 
 
 def _read_bytes(path: Path) -> bytes:

@@ -3,13 +3,13 @@
 from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.render.messages import estimate_lines
 
-from ..options import JobFile, Output, Threads, load_job
+from ..options import JobFile, Output, Sets, Threads, load_job
 from ..screen import Screen, err, print_result
 
 
-def check(job_file: JobFile, threads: Threads = None, output: Output = None) -> None:
+def check(job_file: JobFile, sets: Sets = None, threads: Threads = None, output: Output = None) -> None:
     """Validate a job and its scene, and print its size, memory, disk and time, without rendering it."""
-    job = load_job(job_file, threads, output)
+    job = load_job(job_file, threads, output, sets)
     with Screen(err) as screen:
         screen.wait("reading the scene and rendering a few small frames")
         from framearray_cli.render.estimate import check as run

@@ -24,7 +24,7 @@ from framearray_cli.render.messages import (
 from framearray_cli.render.parts.progress import PartEvents
 from framearray_cli.render.progress import ambient_figures
 
-from ..options import Cameras, JobFile, Output, Quiet, Threads, load_job
+from ..options import Cameras, JobFile, Output, Quiet, Sets, Threads, load_job
 from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ def render(
     job_file: JobFile,
     threads: Threads = None,
     output: Output = None,
+    sets: Sets = None,
     cameras: Cameras = None,
     workers: Annotated[
         int | None,
@@ -65,7 +66,7 @@ def render(
     quiet: Quiet = False,
 ) -> None:
     """Render every image of a job into a folder, with a manifest; skip those that are there."""
-    job = load_job(job_file, threads, output)
+    job = load_job(job_file, threads, output, sets)
     chosen = None if cameras is None else sorted(read_indices("--cameras", cameras, job.camera.frames))
     render_on_screen(job, quiet=quiet, restart=restart, cameras=chosen, options=_worker_options(workers, dask, chunk))
 
