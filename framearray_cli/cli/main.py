@@ -25,6 +25,7 @@ from .commands.schema import schema
 from .commands.sheet import sheet
 from .commands.verify import verify
 from .commands.view import view
+from .help import Command, Group, UsageError, usage_lines
 from .screen import err, print_result, say
 from .signals import listen
 
@@ -36,13 +37,14 @@ WRITING = ("assemble", "init", "export", "sheet")  # commands that write, but re
 app = typer.Typer(
     name="framearray",
     help="Render frame arrays: every image of an animated camera under every position of an animated light.",
+    cls=Group,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
-    add_completion=False,
     rich_markup_mode=None,  # plain text, also in a log file
 )
 
-for command in (render, check, verify, init, assemble, view, sheet, export, openjd, report, schema):
-    app.command()(command)
+for command in (init, check, render, verify, view, assemble, sheet, export, report, openjd, schema):
+    app.command(cls=Command)(command)
 
 
 def _version(wanted: bool) -> None:
@@ -55,7 +57,7 @@ def _version(wanted: bool) -> None:
 def _options(
     context: typer.Context,
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+        bool, typer.Option("--version", "-V", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     context.ensure_object(list).append(context.invoked_subcommand)
@@ -72,7 +74,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arguments = sys.argv[1:] if arguments is None else arguments
     running: list[str] = []  # the command, once it is known
     try:
-        app(list(arguments) or ["--help"], prog_name="framearray", obj=running)
+        code = app(list(arguments) or ["--help"], prog_name="framearray", obj=running, standalone_mode=False)
+        if isinstance(code, int) and code:  # of `typer.Exit`
+            sys.exit(code)
+    except UsageError as error:
+        _exit_with(usage_lines(error), JobError.exit_code)
     except (FrameArrayError, MemoryError, Stopped, RuntimeError) as error:
         lines, exit_code = ending(error, running[0] if running else "")
         _exit_with(lines, exit_code)

@@ -8,6 +8,8 @@ import typer
 
 from framearray_cli.base.units import MOST_STOPS, MOST_THREADS
 
+from .values import number, whole
+
 if TYPE_CHECKING:
     from framearray_cli.job.job import Job
 
@@ -16,7 +18,7 @@ ArrayFolder = Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `r
 Threads = Annotated[
     int | None,
     typer.Option(
-        "--threads", min=1, max=MOST_THREADS, help="Threads; default: the job's, else one per core.", metavar="N"
+        "--threads", parser=whole(1, MOST_THREADS), help="Threads; default: the job's, else one per core.", metavar="N"
     ),
 ]
 Output = Annotated[
@@ -32,7 +34,9 @@ Sets = Annotated[
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors.")]
 Exposure = Annotated[
     float,
-    typer.Option("--exposure", min=-MOST_STOPS, max=MOST_STOPS, help="Stops added to PNG and JPEG.", metavar="STOPS"),
+    typer.Option(
+        "--exposure", parser=number(-MOST_STOPS, MOST_STOPS), help="Stops added to PNG and JPEG.", metavar="STOPS"
+    ),
 ]
 Cameras = Annotated[
     str | None,

@@ -83,17 +83,23 @@ def test_a_name_that_cannot_be_shown(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["rendr"], "No such command 'rendr'"),
-        (["render"], "Missing argument 'JOB'"),
-        (["render", "--foo", "job.toml"], "No such option: --foo"),
-        (["render", "job.toml", "other.toml"], "unexpected extra argument"),
-        (["render", "--threads", "0", "job.toml"], "Invalid value for '--threads'"),
-        (["render", "--threads", "1025", "job.toml"], "Invalid value for '--threads'"),
-        (["render", "--threads", "two", "job.toml"], "Invalid value for '--threads'"),
+        (["rendr"], "no such command rendr; did you mean render?"),
+        (["render"], "Error: missing argument JOB\n"),
+        (["render", "--foo", "job.toml"], "Error: no such option --foo\n"),
+        (["render", "--thread", "2", "job.toml"], "Error: no such option --thread; did you mean --threads?\n"),
+        (["render", "job.toml", "--threads"], "Error: --threads: expected a value, got none\n"),
+        (["render", "--restart=1", "job.toml"], "Error: --restart: expected no value\n"),
+        (["render", "job.toml", "other.toml"], "one argument too many, or more: other.toml"),
+        (["render", "--threads", "0", "job.toml"], "--threads: expected a whole number from 1 to 1024, got 0\n"),
+        (["render", "--threads", "1025", "job.toml"], "--threads: expected a whole number from 1 to 1024, got 1025\n"),
+        (["render", "--threads", "two", "job.toml"], '--threads: expected a whole number from 1 to 1024, got "two"\n'),
         (["render", "job.toml", "-o", ""], "expected a name, got none"),
-        (["assemble", "out", "path.toml"], "Missing option '--output'"),
+        (["assemble", "out", "path.toml"], "Error: missing option --output / -o\n"),
         (["assemble", "out", "path.toml", "-o", " "], "expected a name, got none"),
-        (["assemble", "out", "path.toml", "-o", "a.mp4", "--exposure", "1e9"], "Invalid value for '--exposure'"),
+        (
+            ["assemble", "out", "path.toml", "-o", "a.mp4", "--exposure", "1e9"],
+            "--exposure: expected a number from -64 to 64, got 1000000000.0",
+        ),
     ],
 )
 def test_wrong_command_lines(arguments, message, tmp_path, capsys, monkeypatch):

@@ -10,6 +10,7 @@ from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_ST
 
 from ..options import ArrayFolder, Quiet, output_path
 from ..screen import Screen, err, print_result
+from ..values import number
 
 PathFile = Annotated[
     Path | None, typer.Argument(metavar="PATH", help="Movie path, TOML; or one of the movements.", show_default=False)
@@ -19,7 +20,7 @@ Target = Annotated[
     typer.Option(
         "--output",
         "-o",
-        help="movie.mp4 (.webm, .mkv, .mov, .gif, .webp) or a sequence: frame.####.png",
+        help="Movie: .mp4, .webm, .mkv, .mov, .gif, .webp; or a sequence: frame.####.png.",
         metavar="FILE",
         show_default=False,
     ),
@@ -39,24 +40,26 @@ Seconds = Annotated[
     float | None,
     typer.Option(
         "--seconds",
-        min=0.001,
-        max=MOST_SECONDS,
+        parser=number(0.001, MOST_SECONDS),
         help="Length of a movement; default: one frame per image.",
         metavar="S",
     ),
 ]
 FrameRate = Annotated[
-    float | None, typer.Option("--fps", min=LEAST_FPS, max=MOST_FPS, help="Frames per second.", metavar="RATE")
+    float | None, typer.Option("--fps", parser=number(LEAST_FPS, MOST_FPS), help="Frames per second.", metavar="RATE")
 ]
 Blend = Annotated[bool, typer.Option("--blend", help="Blend between light positions.")]
 Stops = Annotated[
     float,
     typer.Option(
-        "--exposure", min=-MOST_STOPS, max=MOST_STOPS, help="Stops added to movies, PNG and JPEG.", metavar="STOPS"
+        "--exposure",
+        parser=number(-MOST_STOPS, MOST_STOPS),
+        help="Stops added to movies, PNG and JPEG.",
+        metavar="STOPS",
     ),
 ]
 View = Annotated[
-    str, typer.Option("--view", help="srgb, aces, or a view of the configuration in $OCIO.", metavar="VIEW")
+    str, typer.Option("--view", help="Look: srgb, aces, or a view of the configuration in $OCIO.", metavar="VIEW")
 ]
 Label = Annotated[bool, typer.Option("--label", help="Write camera and light index into each picture.")]
 

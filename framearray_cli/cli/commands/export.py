@@ -8,13 +8,17 @@ from framearray_cli.array.places import ALL_PLACES
 
 from ..options import ArrayFolder, At, Cameras, Exposure, Light, Quiet, output_path
 from ..screen import Screen, err, print_result
+from ..values import choice, whole
 
 
 def export(
     array: ArrayFolder,
     kind: Annotated[
         Literal["nerfstudio", "colmap", "cinema"],
-        typer.Option("--format", "-f", help="What the folder is for.", show_default=False),
+        typer.Option(
+            "--format", "-f", help="What the folder is for.", show_default=False,
+            **choice("nerfstudio", "colmap", "cinema"),
+        ),
     ],
     target: Annotated[
         str,
@@ -24,10 +28,13 @@ def export(
     light: Light = None,
     at: At = None,
     image_format: Annotated[
-        Literal["png", "jpg", "exr", "tif"], typer.Option("--image-format", help="Of the pictures.")
+        Literal["png", "jpg", "exr", "tif"],
+        typer.Option("--image-format", help="Of the pictures.", **choice("png", "jpg", "exr", "tif")),
     ] = "png",
     exposure: Exposure = 0.0,
-    points: Annotated[int, typer.Option("--points", min=0, help="Points of the scene, at most.", metavar="N")] = 10_000,
+    points: Annotated[
+        int, typer.Option("--points", parser=whole(0), help="Points of the scene, at most.", metavar="N")
+    ] = 10_000,
     copy: Annotated[bool, typer.Option("--copy", help="Copy images that could be hard links.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier export.")] = False,
     quiet: Quiet = False,

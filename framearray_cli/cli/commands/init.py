@@ -10,6 +10,7 @@ from framearray_cli.engine.kernels.clock import compile_clock
 
 from ..options import Quiet, output_path
 from ..screen import Screen, err, print_result
+from ..values import whole
 
 MOST = 1000  # frames or lights of a first job
 
@@ -25,11 +26,13 @@ def init(
     ] = None,
     frames: Annotated[
         int | None,
-        typer.Option("--frames", min=1, max=MOST, help="Frames of the camera.", metavar="N", show_default=False),
+        typer.Option("--frames", parser=whole(1, MOST), help="Frames of the camera.", metavar="N", show_default=False),
     ] = None,
     lights: Annotated[
         int | None,
-        typer.Option("--lights", min=1, max=MOST, help="Positions of the light.", metavar="N", show_default=False),
+        typer.Option(
+            "--lights", parser=whole(1, MOST), help="Positions of the light.", metavar="N", show_default=False
+        ),
     ] = None,
     inside: Annotated[
         bool | None,

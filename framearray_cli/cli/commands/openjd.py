@@ -11,6 +11,7 @@ from framearray_cli.render.messages import chunks_line
 
 from ..options import JobFile, Quiet, load_job, output_path
 from ..screen import Screen, err, print_result
+from ..values import whole
 
 
 def openjd(
@@ -21,12 +22,17 @@ def openjd(
     ] = None,
     chunk: Annotated[
         int | None,
-        typer.Option("--chunk", min=1, help="Frames per chunk, at most; default: 8 N_r, at least 16.", metavar="N"),
+        typer.Option(
+            "--chunk", parser=whole(1), help="Frames per chunk, at most; default: 8 N_r, at least 16.", metavar="N"
+        ),
     ] = None,
     threads: Annotated[
         int | None,
         typer.Option(
-            "--threads", min=1, max=MOST_THREADS, help="Threads per chunk; default: the machine's cores.", metavar="N"
+            "--threads",
+            parser=whole(1, MOST_THREADS),
+            help="Threads per chunk; default: the machine's cores.",
+            metavar="N",
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing template.")] = False,

@@ -26,6 +26,7 @@ from framearray_cli.render.progress import ambient_figures
 
 from ..options import Cameras, JobFile, Output, Quiet, Sets, Threads, load_job
 from ..screen import Screen, err, print_result
+from ..values import whole
 
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk
@@ -51,7 +52,7 @@ def render(
     workers: Annotated[
         int | None,
         typer.Option(
-            "--workers", min=1, max=MOST_THREADS, help="Processes that render parts side by side.", metavar="N"
+            "--workers", parser=whole(1, MOST_THREADS), help="Processes that render parts side by side.", metavar="N"
         ),
     ] = None,
     dask: Annotated[
@@ -60,7 +61,9 @@ def render(
     ] = None,
     chunk: Annotated[
         int | None,
-        typer.Option("--chunk", min=1, help="Frames per part, at most; with --workers or --dask.", metavar="N"),
+        typer.Option(
+            "--chunk", parser=whole(1), help="Frames per part, at most; with --workers or --dask.", metavar="N"
+        ),
     ] = None,
     restart: Annotated[bool, typer.Option("--restart", help="Remove the frame array in the folder first.")] = False,
     quiet: Quiet = False,

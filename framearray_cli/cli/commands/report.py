@@ -12,6 +12,7 @@ from framearray_cli.render.messages import scene_lines
 
 from ..options import JobFile, Quiet, Threads, load_job
 from ..screen import Screen, err, print_result
+from ..values import number, whole
 
 if TYPE_CHECKING:
     from framearray_cli.report.case import Case
@@ -24,11 +25,13 @@ Folder = Annotated[
 ]
 Cameras = Annotated[
     list[str] | None,
-    typer.Option("--cameras", "--camera", help="Camera positions to look at: 5, 10-20x5, 50%.", metavar="PLACES"),
+    typer.Option(
+        "--cameras", "--camera", parser=whole(0), help="Camera positions to look at: 5, 10-20x5, 50%.", metavar="PLACES"
+    ),
 ]
 Lights = Annotated[
     list[str] | None,
-    typer.Option("--light", help="Light positions to look at: 0,last.", metavar="PLACES"),
+    typer.Option("--light", parser=whole(0), help="Light positions to look at: 0,last.", metavar="PLACES"),
 ]
 Vary = Annotated[
     list[str] | None,
@@ -39,11 +42,15 @@ Vary = Annotated[
 Errors = Annotated[
     list[float] | None,
     typer.Option(
-        "--error", min=1e-6, help="RMSE to find the cheapest settings for: 0.05; may be repeated.", metavar="E"
+        "--error",
+        parser=number(1e-6),
+        help="RMSE to find the cheapest settings for: 0.05; may be repeated.",
+        metavar="E",
     ),
 ]
 Times = Annotated[
-    float, typer.Option("--times", min=1, help="Samples of a reference over those of a picture.", metavar="N")
+    float,
+    typer.Option("--times", parser=number(1), help="Samples of a reference over those of a picture.", metavar="N"),
 ]
 
 

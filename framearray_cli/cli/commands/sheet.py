@@ -6,6 +6,7 @@ import typer
 
 from ..options import ArrayFolder, At, Cameras, Exposure, Light, Quiet, output_path
 from ..screen import Screen, err, print_result
+from ..values import whole
 
 MOST_WIDTH = 20_000  # pixels; more is taken for a typing error
 
@@ -15,16 +16,19 @@ def sheet(
     target: Annotated[
         str,
         typer.Option(
-            "--output", "-o", help="sheet.png or .jpg; .exr, .tif: linear, no labels.", metavar="FILE",
+            "--output", "-o", help="Picture: .png or .jpg; .exr, .tif: linear, no labels.", metavar="FILE",
             show_default=False,
         ),
     ],
     cameras: Cameras = None,
     light: Light = None,
-    columns: Annotated[int, typer.Option("--columns", min=1, help="Cameras, at most.", metavar="N")] = 12,
-    rows: Annotated[int, typer.Option("--rows", min=1, help="Light positions, at most.", metavar="N")] = 8,
+    columns: Annotated[int, typer.Option("--columns", parser=whole(1), help="Cameras, at most.", metavar="N")] = 12,
+    rows: Annotated[int, typer.Option("--rows", parser=whole(1), help="Light positions, at most.", metavar="N")] = 8,
     width: Annotated[
-        int, typer.Option("--width", min=1, max=MOST_WIDTH, help="Of the sheet, at most, pixels.", metavar="PIXELS")
+        int,
+        typer.Option(
+            "--width", parser=whole(1, MOST_WIDTH), help="Of the sheet, at most, pixels.", metavar="PIXELS"
+        ),
     ] = 2400,
     exposure: Exposure = 0.0,
     side: Annotated[

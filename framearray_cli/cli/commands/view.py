@@ -10,6 +10,7 @@ from framearray_cli.base.units import MOST_THREADS, size
 
 from ..options import ArrayFolder, Quiet, output_path
 from ..screen import Screen, err, print_result
+from ..values import whole
 
 if TYPE_CHECKING:
     from framearray_cli.base.errors import OutputError
@@ -23,7 +24,7 @@ def view(
         str | None,
         typer.Option("--export", help="Write the page as files for any web server.", metavar="FOLDER"),
     ] = None,
-    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port; 0: a free one.")] = 0,
+    port: Annotated[int, typer.Option("--port", parser=whole(0, 65535), help="Port; 0: a free one.", metavar="N")] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
     cache: Annotated[
         str | None,
@@ -31,7 +32,7 @@ def view(
     ] = None,
     threads: Annotated[
         int | None,
-        typer.Option("--threads", min=1, max=MOST_THREADS, help="Threads; default: one per core.", metavar="N"),
+        typer.Option("--threads", parser=whole(1, MOST_THREADS), help="Threads; default: one per core.", metavar="N"),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
