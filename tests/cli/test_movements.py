@@ -18,6 +18,9 @@ def array(tmp_path: Path) -> Path:
     ("options", "printed", "rate"),
     [
         (["--walk"], "5 frames from 5 images, 24 frames per second", 24),
+        (["walk"], "5 frames from 5 images, 24 frames per second", 24),
+        (["light", "--at", "50%"], "4 frames from 4 images, 24 frames per second", 24),
+        (["diagonal", "--diagonal"], "5 frames from 5 images, 24 frames per second", 24),
         (["--light", "--at", "50%"], "4 frames from 4 images, 24 frames per second", 24),
         (["--diagonal", "--fps", "12.5"], "5 frames from 5 images, 12.5 frames per second", Fraction(25, 2)),
         (["--light", "--seconds", "1", "--blend", "--label"], "24 frames from 24 images, 24 frames per second", 24),
@@ -48,6 +51,8 @@ def test_a_path_file_with_another_rate_and_blends(array: Path, tmp_path: Path, c
             ["path.toml", "--walk"],
             "expected a path file, --walk, --light or --diagonal; got the path file path.toml and",
         ),
+        (["walk", "--light"], "expected a path file, --walk, --light or --diagonal; got --walk and --light"),
+        (["wlak"], "expected a path file, walk, light or diagonal; got wlak"),
         (["--walk", "--light"], "expected a path file, --walk, --light or --diagonal; got --walk and --light"),
         (["path.toml", "--seconds", "2"], "a path file gives the lengths of its segments"),
         (["path.toml", "--at", "2"], "needs --walk or --light, where the other stays"),

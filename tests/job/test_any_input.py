@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from functools import partial
 from pathlib import Path
 from random import Random
 
@@ -13,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 from support.movies import array_of
+from support.phrases import library_phrase
 
 from framearray_cli.array.manifest_toml import read_manifest, to_toml
 from framearray_cli.array.names import check_pattern
@@ -26,7 +28,7 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.job.schema import job_schema
 from framearray_cli.tools.movie.pathfile import MoviePath, load_movie_path
-from framearray_cli.tools.movie.timeline import MOST_FRAMES, make_timeline
+from framearray_cli.tools.movie.timeline import MOST_FRAMES, array_problems, make_timeline
 
 SEEDS = jobseeds.tables("a.glb")
 SCHEMA = job_schema()
@@ -101,6 +103,7 @@ def test_a_wrong_value_is_reported_with_its_place(data):
             assert ": " in problem
             assert len(problem) < 700
             assert not any(word in problem.lower() for word in ("pydantic", "validat", "traceback"))
+            assert library_phrase(problem) is None
     else:
         assert Job.model_validate(job_table(job)) == job
 
@@ -126,6 +129,7 @@ def test_any_job_file_is_a_job_or_refused(tmp_path, seed):
         assert error.problems
         assert str(error).startswith(f"{file}: ")
         assert len(str(error)) < 20_000
+        assert library_phrase(str(error)) is None
     else:
         assert job.file == file
 
@@ -143,13 +147,14 @@ def test_any_path_file_is_a_movie_or_refused(tmp_path, seed):
         file.write_bytes(rng.choice(list(texts.TEXT.values()))(rng, tomli_w.dumps(table).encode()))
     array = array_of(rng.choice((1, 3)), rng.choice((1, 4)))
     try:
-        movie = load_movie_path(file)
+        movie = load_movie_path(file, partial(array_problems, manifest=array))
         if sum(segment.n_passes for segment in movie.segments) * 1000 < MOST_FRAMES:
             line = make_timeline(file, movie, array)
         else:
             return
     except JobError as error:
         assert str(error).startswith(f"{file}: ")
+        assert library_phrase(str(error)) is None
     else:
         assert all(0 <= shot.c < array.n_cameras for shot in line.shots)
         assert all(0 <= position <= array.n_lights - 1 for shot in line.shots for position in shot.positions)

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 
 from pydantic import BaseModel
 
+from ..units import FARTHEST
 from .table import Place
 from .words import bound_text, range_text
 
@@ -122,7 +123,8 @@ def _range(node: Schema) -> str:
     low = node.get("minimum", float("-inf"))
     high = node.get("maximum", node["exclusiveMaximum"] - 1 if "exclusiveMaximum" in node else float("inf"))
     if "exclusiveMinimum" in node:
-        return f"above {bound_text(node['exclusiveMinimum'])}"
+        above = f"above {bound_text(node['exclusiveMinimum'])}"
+        return above if high >= FARTHEST else f"{above} and at most {bound_text(high)}"
     return range_text(low, high)
 
 

@@ -4,20 +4,46 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Annotated, Any, NoReturn, TypeAlias, TypeVar
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, ModelWrapValidatorHandler, TypeAdapter, ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 Place: TypeAlias = tuple[int | str, ...]  # keys and list positions, from a value down to its problem
 Float3: TypeAlias = tuple[float, float, float]
+_Model = TypeVar("_Model", bound=BaseModel)
 
 
 def fail(problems: Sequence[tuple[Place, str]]) -> NoReturn:
     """Raise every problem of one value at once, each with its place below that value."""
-    details = [
+    raise ValidationError.from_exception_data("job", _details(problems))
+
+
+def _details(problems: Sequence[tuple[Place, str]]) -> list[InitErrorDetails]:
+    return [
         InitErrorDetails(type=PydanticCustomError("job", "{text}", {"text": text}), loc=place, input=None)
         for place, text in problems
     ]
-    raise ValidationError.from_exception_data("job", details)
+
+
+def check_with(
+    problems: Sequence[tuple[Place, str]], value: object, check: ModelWrapValidatorHandler[_Model]
+) -> _Model:
+    """Check a table, and raise its problems together with some that were found before, in a validator that wraps."""
+    try:
+        table = check(value)
+    except ValidationError as error:
+        found = [
+            InitErrorDetails(
+                type=PydanticCustomError("job", "{text}", each["ctx"]) if each["type"] == "job" else each["type"],
+                loc=each["loc"],
+                input=each["input"],
+                ctx=each.get("ctx", {}),
+            )
+            for each in error.errors(include_url=False)
+        ]
+        raise ValidationError.from_exception_data("job", [*found, *_details(problems)]) from error
+    if problems:
+        fail(problems)
+    return table
 
 
 class Table(BaseModel):

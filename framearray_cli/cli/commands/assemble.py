@@ -13,7 +13,8 @@ from ..screen import Screen, err, print_result
 from ..values import number
 
 PathFile = Annotated[
-    Path | None, typer.Argument(metavar="PATH", help="Movie path, TOML; or one of the movements.", show_default=False)
+    Path | None,
+    typer.Argument(metavar="PATH", help="Movie path, TOML; or walk, light or diagonal.", show_default=False),
 ]
 Target = Annotated[
     str,
@@ -88,7 +89,8 @@ def assemble(
     from framearray_cli.tools.movie.sweep import Sweep, SweepKind
 
     choices: dict[SweepKind, bool] = {"walk": walk, "light": light, "diagonal": diagonal}
-    kinds = [kind for kind, wanted in choices.items() if wanted]
+    kinds = [kind for kind, wanted in choices.items() if wanted or str(path_file) == kind]
+    path_file = None if str(path_file) in choices else path_file  # ./walk is a file
     _refuse_conflicts(path_file, kinds, at, seconds)
     with Screen(err, quiet=quiet) as screen:
         result = run(
@@ -113,6 +115,8 @@ def _refuse_conflicts(
     if len(ways) != 1:
         found = " and ".join(ways) or "none of them"
         raise typer.BadParameter(f"expected a path file, --walk, --light or --diagonal; got {found}", param_hint="PATH")
+    if path_file and not path_file.suffix and not path_file.exists():
+        raise typer.BadParameter(f"expected a path file, walk, light or diagonal; got {path_file}", param_hint="PATH")
     if path_file and seconds is not None:
         raise typer.BadParameter("a path file gives the lengths of its segments", param_hint="--seconds")
     if at and kinds in ([], ["diagonal"]):

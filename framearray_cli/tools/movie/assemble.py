@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -27,7 +28,7 @@ from .look import Look, screen_codes, shot_label
 from .pathfile import Mode, MoviePath, load_movie_path
 from .sequence import check_look, sequence_pattern, write_sequence
 from .sweep import Sweep, sweep_path
-from .timeline import Shot, Timeline, make_timeline
+from .timeline import Shot, Timeline, array_problems, make_timeline
 from .video import VIDEOS, open_video, require_encoder
 
 MOVIES = (*VIDEOS, *ANIMATIONS)
@@ -83,7 +84,10 @@ def assemble_movie(
         MissingExtraError: a movie needs PyAV, which is not installed, or an encoder or typeface is missing.
     """
     manifest = read_manifest(out)
-    movie = sweep_path(path, manifest) if isinstance(path, Sweep) else load_movie_path(path)
+    if isinstance(path, Sweep):
+        movie = sweep_path(path, manifest)
+    else:
+        movie = load_movie_path(path, partial(array_problems, manifest=manifest))
     movie = _override(movie, fps, positions)
     line = make_timeline(f"--{path.kind}" if isinstance(path, Sweep) else path, movie, manifest)
     pictures = Pictures(manifest)

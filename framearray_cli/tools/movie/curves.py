@@ -152,9 +152,15 @@ TimedValues: TypeAlias = tuple[list[float], list[Float3]]  # times in seconds, i
 def _timed(key: str, curve: LightCurve, end: float, problems: list[str]) -> TimedValues:
     """Convert times to seconds; a key frame before its predecessor is a problem."""
     seconds = [end * (percent(time) or 0.0) / 100 if isinstance(time, str) else time for time, _ in curve.keys]
+    typed = [
+        f'"{time}", {s:g} s' if isinstance(time, str) else f"{s:g} s"
+        for (time, _), s in zip(curve.keys, seconds, strict=True)
+    ]
     for k, (before, time) in enumerate(pairwise(seconds), start=1):
         if time < before:
-            problems.append(f"{key}[{k}].time: expected at least that of the one before, {before:g} s, got {time:g} s")
+            problems.append(
+                f"{key}[{k}].time: expected at least that of the one before ({typed[k - 1]}), got {typed[k]}"
+            )
     return seconds, [value for _, value in curve.keys]
 
 

@@ -1,16 +1,17 @@
 """The TOML file of a movie's path through a frame array: segments, light; see docs/guide/movies.md."""
 
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ModelWrapValidatorHandler, ValidationError, field_validator, model_validator
 
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.base.errors import JobError
-from framearray_cli.base.forms.problems import problems_of
-from framearray_cli.base.forms.table import Table, fail
-from framearray_cli.base.forms.toml import load_toml
+from framearray_cli.base.forms.kinds import load_kind
+from framearray_cli.base.forms.problems import MOST_PROBLEMS, problems_of
+from framearray_cli.base.forms.table import Place, Table, check_with, fail
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, frame_rate
 
 from ..spans import Span
@@ -46,13 +47,19 @@ class Segment(Table):
     back_and_forth: bool = Field(default=False, description="Every second time it is played the other way round.")
     positions: Mode | None = Field(default=None, description="In place of that of the whole movie.")
 
-    @model_validator(mode="after")
-    def _one_length(self) -> "Segment":
-        if (self.frames is None) == (self.seconds is None):
-            fail([((), f"expected either frames or seconds, got {'neither' if self.frames is None else 'both'}")])
-        if MAIN_AXIS in self.axes:
-            fail([(("axes", MAIN_AXIS), f"expected it outside of axes: {MAIN_AXIS} = ...")])
-        return self
+    @model_validator(mode="wrap")
+    @classmethod
+    def _check_keys_together(cls, value: object, check: ModelWrapValidatorHandler["Segment"]) -> "Segment":
+        """Check what concerns several keys beside the keys themselves, so that all problems are reported at once."""
+        table: dict[str, Any] = value if isinstance(value, dict) else {"frames": 1}
+        problems: list[tuple[Place, str]] = []
+        lengths = [key for key in ("frames", "seconds") if table.get(key) is not None]
+        if len(lengths) == 2 or not (lengths or table.keys() - cls.model_fields.keys()):  # a misspelled key may be one
+            found = "both" if lengths else "neither"
+            problems.append(((), f"expected either frames or seconds, got {found}"))
+        if isinstance(axes := table.get("axes"), dict) and MAIN_AXIS in axes:
+            problems.append((("axes", MAIN_AXIS), f"expected it outside of axes: {MAIN_AXIS} = ..."))
+        return check_with(problems, value, check)
 
     @property
     def n_passes(self) -> int:
@@ -87,16 +94,22 @@ class MoviePath(Table):
         return segments
 
 
-def load_movie_path(file: Path) -> MoviePath:
+def load_movie_path(file: Path, also: Callable[[dict[str, Any]], list[str]] | None = None) -> MoviePath:
     """Read a path file.
+
+    Args:
+        also: finds further problems in the tables of a file that has some, so that all are reported at once.
 
     Raises:
         JobError: the file is missing or broken; the message names every problem.
     """
+    table = load_kind(file, "movie path")
     try:
-        return MoviePath.model_validate(load_toml(file))
+        return MoviePath.model_validate(table)
     except ValidationError as error:
-        raise JobError(file, problems_of(error, MoviePath)) from error
+        problems = problems_of(error, MoviePath, MOST_PROBLEMS)
+        more = also(table) if also and len(problems) <= MOST_PROBLEMS else []
+        raise JobError(file, [*more, *problems]) from error
 
 
 def movie_fps(movie: MoviePath, manifest: Manifest) -> Fraction:

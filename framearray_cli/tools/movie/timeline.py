@@ -1,9 +1,13 @@
 """Find what each frame of a movie shows: eye, light positions, and changes of the light."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
 
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.array.pictures import Relight
@@ -64,12 +68,16 @@ def make_timeline(source: Path | str, movie: MoviePath, manifest: Manifest) -> T
         JobError: the path asks for places that the array lacks; the message names all of them.
     """
     fps = movie_fps(movie, manifest)
-    problems = _light_problems(movie, manifest)
+    now = [0.0] * (1 + len(manifest.axes))  # where the last pass ended: camera, then each light axis
+    problems = _light_problems(movie.groups, bool(movie.ambient), manifest)
     total = sum(segment.n_passes * segment.n_frames(fps) + segment.n_held(fps) for segment in movie.segments)
     if total > MOST_FRAMES:
-        raise JobError(source, [f"segments: expected at most {MOST_FRAMES} frames in all, got {total}", *problems])
+        rate = f"{float(fps):g} frames per second"
+        problems.append(f"segments: expected at most {MOST_FRAMES} frames in all, got {total}, at {rate}")
+        for k, segment in enumerate(movie.segments):
+            _spans(f"segments[{k}]", segment, manifest, now, problems)
+        raise JobError(source, problems)
     shots: list[Shot] = []
-    now = [0.0] * (1 + len(manifest.axes))  # where the last pass ended: camera, then each light axis
     for k, segment in enumerate(movie.segments):
         spans = _spans(f"segments[{k}]", segment, manifest, now, problems)
         blends = (segment.positions or movie.positions) == "blend"
@@ -108,10 +116,30 @@ def _spans(
     return found
 
 
-def _light_problems(movie: MoviePath, manifest: Manifest) -> list[str]:
-    """List changes of the light that the array cannot show."""
+def array_problems(table: Mapping[str, Any], manifest: Manifest) -> list[str]:
+    """List the places and groups in a path file that an array lacks, as far as the file can be read.
+
+    Args:
+        table: of the file, which has other problems as well; they are left out.
+    """
+    problems: list[str] = []
+    segments = table.get("segments")
+    for k, entry in enumerate(segments if isinstance(segments, list) else ()):
+        axes = entry.get("axes") if isinstance(entry, dict) else None
+        given = [{key: entry[key]} for key in ("camera", "light") if key in entry] if isinstance(entry, dict) else []
+        given += [{"axes": {name: span}} for name, span in axes.items()] if isinstance(axes, dict) else []
+        for keys in given:
+            with suppress(ValidationError):
+                segment = Segment.model_validate({"frames": 1, **keys})
+                _spans(f"segments[{k}]", segment, manifest, [0.0] * (1 + len(manifest.axes)), problems)
+    groups = table.get("groups")
+    return problems + _light_problems(groups if isinstance(groups, dict) else {}, "ambient" in table, manifest)
+
+
+def _light_problems(groups: Iterable[str], ambient: bool, manifest: Manifest) -> list[str]:
+    """List changes of the light of groups, by their names, and of ambient light, that the array cannot show."""
     if not manifest.groups:
-        keys = [f"groups.{toml_key(name)}" for name in movie.groups] + (["ambient"] if movie.ambient else [])
+        keys = [f"groups.{toml_key(name)}" for name in groups] + (["ambient"] if ambient else [])
         return [
             f"{key}: this array stores its light all together, so that it cannot be changed; render again with "
             'group = "..." in [[light.sources]]'
@@ -120,7 +148,7 @@ def _light_problems(movie: MoviePath, manifest: Manifest) -> list[str]:
     known = manifest.group_names
     return [
         f"groups.{toml_key(name)}: no such group; the array has {', '.join(known)}"
-        for name in movie.groups
+        for name in groups
         if name not in known
     ]
 

@@ -128,7 +128,7 @@ def test_animations_and_sequences_need_no_pyav(array: Path, tmp_path: Path, monk
     path = path_file(tmp_path, "[[segments]]\nframes = 2\n")
     for name in ("m.gif", "m.webp", "f.#.png"):
         assert assemble_movie(array, path, tmp_path / name).n_frames == 2
-    with pytest.raises(MissingExtraError, match=r"framearray\[movie\]"):
+    with pytest.raises(MissingExtraError, match=r"pip install .*\[movie\]"):
         assemble_movie(array, path, tmp_path / "m.mov")
 
 

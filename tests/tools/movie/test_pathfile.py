@@ -1,4 +1,5 @@
 from fractions import Fraction
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from support.movies import array_of
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.errors import JobError
 from framearray_cli.tools.movie.pathfile import load_movie_path, movie_fps
-from framearray_cli.tools.movie.timeline import make_timeline
+from framearray_cli.tools.movie.timeline import array_problems, make_timeline
 
 JOBS = ROOT / "jobs"
 
@@ -201,3 +202,44 @@ def test_a_place_beyond_all_numbers_is_reported(tmp_path: Path, place: str) -> N
         f'segments[0].{place}[1]: expected an index, "first", "last" or a percentage such as "50%", '
         "got a number beyond 64 bits"
     )
+
+
+def test_all_mistakes_are_reported_at_once(tmp_path: Path) -> None:
+    """Those of keys, those between keys, and places that the array lacks."""
+    text = """
+    fps = 0
+    nonsense = 1
+    [[segments]]
+    frames = 3
+    camera = ["first", 99]
+    ease = "x"
+    [[segments]]
+    light = [0, 77]
+    frames = 0
+    axes = { lamps = 1 }
+    [[segments]]
+    frames = 4
+    seconds = 360000
+    camera = [{}, 5]
+    [groups.x]
+    intensity = -1
+    """
+    file = tmp_path / "path.toml"
+    file.write_text(text, encoding="utf-8")
+    array = array_of(4, 3)
+    with pytest.raises(JobError) as caught:
+        load_movie_path(file, partial(array_problems, manifest=array))
+    assert [problem.partition(": ")[0] for problem in caught.value.problems] == [
+        "segments[0].camera",
+        "segments[1].light",
+        "segments[1].axes.lamps",
+        "groups.x",
+        "fps",
+        "segments[0].ease",
+        "segments[1].frames",
+        "segments[2].seconds",
+        "segments[2].camera[0]",
+        "segments[2]",
+        "groups.x.intensity",
+        "nonsense",
+    ]

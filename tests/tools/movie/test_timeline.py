@@ -206,7 +206,7 @@ def test_all_axes_and_places_that_an_array_lacks_are_named() -> None:
 
 def test_too_many_frames_are_refused_before_they_are_listed() -> None:
     [problem] = problems(PLAIN, {"frames": 1_000_000, "loops": 10_000})
-    assert problem == "segments: expected at most 1000000 frames in all, got 10000000000"
+    assert problem == "segments: expected at most 1000000 frames in all, got 10000000000, at 24 frames per second"
 
 
 # movements without a file
