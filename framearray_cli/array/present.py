@@ -34,6 +34,11 @@ class PresentFiles:
         folder = self.manifest.directory
         return all(file.relative_to(folder).as_posix() in self.names for file in files)
 
+    def count(self) -> int:
+        """Return the number of files of the array that exist."""
+        manifest = self.manifest
+        return sum(name in self.names for c in range(manifest.n_cameras) for name in camera_files(manifest, c))
+
     def incomplete(self) -> list[int]:
         """Return the cameras that lack a file."""
         manifest = self.manifest

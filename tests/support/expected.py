@@ -4,9 +4,11 @@ import numpy as np
 
 from framearray_cli.array.images.png import read_codes
 from framearray_cli.base.arrays import Bytes, Float64
-from framearray_cli.base.colour import srgb_from_linear
+from framearray_cli.base.colour import srgb8_from_linear, srgb_from_linear
 from framearray_cli.tools.view.coding import decode
 from framearray_cli.tools.view.tiles import Tiles
+
+from .handmade import N_C, N_L, soft
 
 Part = tuple[str, int, tuple[float, float, float]]  # key of a stream, position, RGB factor
 
@@ -28,3 +30,12 @@ def bounds(tiles: Tiles, c: int, parts: list[Part], exposure: float = 0.0) -> tu
 def outside(pixels: Bytes, low: Float64, high: Float64) -> float:
     """Return the share of values outside bounds."""
     return float(np.mean((pixels < low) | (pixels > high)))
+
+
+def nearest_place(pixels: Bytes, exposure: float = 0.0) -> tuple[int, int]:
+    """The (c, l) whose image of `handmade.plain` is most like the screen."""
+    places = [(c, l) for c in range(N_C) for l in range(N_L)]
+    errors = [
+        np.abs(srgb8_from_linear(soft(c, l, 6.0) * 2.0**exposure) - pixels.astype(float)).mean() for c, l in places
+    ]
+    return places[int(np.argmin(errors))]

@@ -89,10 +89,14 @@ def encode_png(codes: Bytes, attributes: Attributes) -> memoryview:
     return buffer.getbuffer()
 
 
-def encode_jpeg(codes: Bytes, quality: int) -> memoryview:
-    """Encode (h, w, 3) 8-bit codes as JPEG, in memory, without chroma subsampling, which makes coloured edges bleed."""
+def encode_jpeg(codes: Bytes, quality: int, comment: str = "") -> memoryview:
+    """Encode (h, w, 3) 8-bit codes as JPEG, in memory, without chroma subsampling, which makes coloured edges bleed.
+
+    Args:
+        comment: stands near the beginning of the file.
+    """
     import PIL.Image
 
     buffer = io.BytesIO()
-    PIL.Image.fromarray(codes).save(buffer, "JPEG", quality=quality, subsampling=0)
+    PIL.Image.fromarray(codes).save(buffer, "JPEG", quality=quality, subsampling=0, comment=comment or None)
     return buffer.getbuffer()

@@ -14,6 +14,7 @@ from ..values import whole
 
 if TYPE_CHECKING:
     from framearray_cli.base.errors import OutputError
+    from framearray_cli.tools.view.tiles import Tiles
 
 MOST_PROBLEMS = 5  # named one by one
 
@@ -42,6 +43,7 @@ def view(
     workers = threads or available_cores()
     tiles = open_tiles(array, output_path(cache, "--cache") if cache is not None else None, workers)
     with Screen(err, quiet=quiet) as screen:
+        screen.say(_lacking_lines(tiles, "the page marks them" if target else "the page shows them as they come"))
         if target is not None:
             screen.count("preparing", tiles.n_pictures, "picture")
             n_bytes, problems = write_page(
@@ -59,7 +61,7 @@ def view(
 
         def prepared(problems: list["OutputError"]) -> None:
             screen.end()
-            screen.say([*_warning_lines(problems), f"all pictures are prepared, in {tiles.folder}"])
+            screen.say([*_warning_lines(problems), f"all pictures that are there are prepared, in {tiles.folder}"])
 
         try:
             show_page(
@@ -75,7 +77,15 @@ def view(
             cancel_alarm()
 
 
+def _lacking_lines(tiles: "Tiles", then: str) -> list[str]:
+    """Say which cameras lack images, if any do."""
+    from framearray_cli.array.present import list_present, missing_text
+
+    lacking = list_present(tiles.manifest).incomplete()
+    return [f"warning: {missing_text(lacking, tiles.manifest.n_cameras)}; {then}"] if lacking else []
+
+
 def _warning_lines(problems: list["OutputError"]) -> list[str]:
     rest = len(problems) - MOST_PROBLEMS
-    more = [f"warning: {rest} more images are missing or damaged"] if rest > 0 else []
+    more = [f"warning: {rest} more images are damaged"] if rest > 0 else []
     return [*(f"warning: {problem}" for problem in problems[:MOST_PROBLEMS]), *more]

@@ -1,5 +1,6 @@
 """Export the page and its tiles as a folder of plain files, for any web server."""
 
+import json
 import os
 import shutil
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, whole_folder
 
+from .contents import CONTENTS_FILE
 from .page import page_files
 from .tiles import INDEX_FILE, TILES_FOLDER, Tiles
 
@@ -17,7 +19,7 @@ def check_target(target: Path) -> None:
     Raises:
         OutputError: the folder holds other files, or cannot be read.
     """
-    ours = {INDEX_FILE, TILES_FOLDER, *page_files()}
+    ours = {INDEX_FILE, CONTENTS_FILE, TILES_FOLDER, *page_files()}
     try:
         found = sorted(entry.name for entry in target.iterdir()) if os.path.exists(target) else []
     except OSError as error:
@@ -45,6 +47,7 @@ def export_page(tiles: Tiles, target: Path) -> int:
         for name, data in page_files().items():
             (part / name).write_bytes(data)
         shutil.copyfile(tiles.folder / INDEX_FILE, part / INDEX_FILE)
+        (part / CONTENTS_FILE).write_text(json.dumps(tiles.contents(live=False)))
         _copy_tiles(tiles.folder / TILES_FOLDER, part / TILES_FOLDER)
     return sum(file.stat().st_size for file in target.rglob("*") if file.is_file())
 

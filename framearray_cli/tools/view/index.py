@@ -1,5 +1,6 @@
 """What the page needs to know of an array: `index.json`, and the layout of small pictures in a sheet."""
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -10,10 +11,11 @@ import numpy as np
 from framearray_cli.array.images.images import FOR_SCREENS, format_name
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.arrays import Float32, is_number
+from framearray_cli.base.hashing import line_digest
 
 from .streams import LAYERS, Stream
 
-INDEX_FORMAT = 1  # of the index and the tiles; a new number discards those that exist
+INDEX_FORMAT = 2  # of the index and the tiles; a new number discards those that exist
 SMALL_PIXELS = 100 * 75  # of a small picture, about: a quarter of 400 x 300 per side
 SHEET_PIXELS = 1 << 21  # of a sheet at most: 8 MiB when decoded
 
@@ -65,7 +67,12 @@ def sheet_layout(resolution: tuple[int, int], n: int) -> SheetLayout:
 
 
 def index_table(manifest: Manifest, streams: Sequence[Stream], layout: SheetLayout) -> dict[str, Any]:
-    """Return the content of `index.json`."""
+    """Return the content of `index.json`; `digest` is that of all the rest."""
+    table = _index(manifest, streams, layout)
+    return {**table, "digest": line_digest(json.dumps(table).encode()).decode()}
+
+
+def _index(manifest: Manifest, streams: Sequence[Stream], layout: SheetLayout) -> dict[str, Any]:
     return {
         "format": INDEX_FORMAT,
         "fingerprint": manifest.fingerprint,

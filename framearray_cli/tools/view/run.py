@@ -71,7 +71,7 @@ def show_page(
     Args:
         opened: called with the address.
         progress: called with the number of pictures just prepared.
-        prepared: called once all are, with the errors of missing or damaged images.
+        prepared: called once all that are there are, with the errors of damaged images.
     """
     with open_server(tiles, port) as server:
         opened(server.url)
@@ -87,7 +87,7 @@ def write_page(
     """Prepare all tiles, and export the page.
 
     Returns:
-        The number of bytes written, and the errors of missing or damaged images.
+        The number of bytes written, and the errors of damaged images.
 
     Raises:
         OutputError: the target holds other files or cannot be written.
@@ -105,7 +105,7 @@ def prepare_all(tiles: Tiles, threads: int, progress: Callable[[int], None]) -> 
         progress: called with the number of pictures just prepared.
 
     Returns:
-        The errors of missing or damaged images.
+        The errors of damaged images.
 
     Raises:
         OutputError: a tile cannot be written.

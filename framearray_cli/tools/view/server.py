@@ -3,8 +3,9 @@
 A request never becomes a file name: it names one of the page's files, or is parsed as key, camera and light.
 """
 
+import json
 import re
-from email.utils import formatdate, parsedate_to_datetime
+import threading
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -12,7 +13,9 @@ from urllib.parse import urlsplit
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
+from framearray_cli.base.hashing import line_digest
 
+from .contents import CONTENTS_FILE
 from .page import content_type, page_files
 from .tiles import INDEX_FILE, Tiles
 
@@ -37,7 +40,7 @@ class PageServer(ThreadingHTTPServer):
         Raises:
             OutputError: the port cannot be used.
         """
-        self.tiles, self.page = tiles, page_files()
+        self.tiles, self.page, self._lock = tiles, page_files(), threading.Lock()
         try:
             super().__init__((HOST, port), _Handler)
         except (OSError, OverflowError) as error:
@@ -47,6 +50,16 @@ class PageServer(ThreadingHTTPServer):
     @property
     def url(self) -> str:
         return f"http://{HOST}:{self.server_port}/"
+
+    def contents(self) -> bytes:
+        """Return `contents.json` as of now; renew the tiles if the array has changed too much for them.
+
+        Raises:
+            OutputError: the array cannot be read any more.
+        """
+        with self._lock:
+            self.tiles = self.tiles.renewed()
+            return json.dumps(self.tiles.contents(live=True)).encode()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Report nothing: a browser that leaves closes its connections in the middle of answers."""
@@ -71,46 +84,39 @@ class _Handler(BaseHTTPRequestHandler):
             return
         path = urlsplit(self.path).path
         try:
-            data, kind, time_s = self._find(path)
+            data, kind = self._find(path)
         except (OutputError, OSError) as error:
             self._send(HTTPStatus.NOT_FOUND, f"{error}\n".encode(errors="replace"), "text/plain", body=body)
             return
-        if time_s is not None and self._is_current(time_s):
-            self._send(HTTPStatus.NOT_MODIFIED, b"", kind, time_s, body=False)
+        tag = f'"{line_digest(data).decode()}"'
+        if self.headers.get("If-None-Match") == tag:
+            self._send(HTTPStatus.NOT_MODIFIED, b"", kind, tag, body=False)
         else:
-            self._send(HTTPStatus.OK, data, kind, time_s, body=body)
+            self._send(HTTPStatus.OK, data, kind, tag, body=body)
 
-    def _find(self, path: str) -> tuple[bytes, str, int | None]:
-        """Return content, its type, and, for tiles only, its time in whole seconds."""
+    def _find(self, path: str) -> tuple[bytes, str]:
+        """Return content and its type."""
         tiles = self.server.tiles
         if match := TILE.fullmatch(path):
             key, c, l = match.groups()
             file = tiles.ensure_tile(key, int(c), None if l is None else int(l))
-            return file.read_bytes(), "image/jpeg", int(file.stat().st_mtime)
+            return file.read_bytes(), "image/jpeg"
         if path == f"/{INDEX_FILE}":
-            return (tiles.folder / INDEX_FILE).read_bytes(), "application/json", None
+            return (tiles.folder / INDEX_FILE).read_bytes(), "application/json"
+        if path == f"/{CONTENTS_FILE}":
+            return self.server.contents(), "application/json"
         name = path.removeprefix("/") or "index.html"
         if name not in self.server.page:
             raise OutputError(f"{path}: no such file")
-        return self.server.page[name], content_type(name), None
+        return self.server.page[name], content_type(name)
 
-    def _is_current(self, time_s: int) -> bool:
-        """Return whether the browser has the version of that time."""
-        since = self.headers.get("If-Modified-Since", "")
-        try:
-            return int(parsedate_to_datetime(since).timestamp()) == time_s
-        except (TypeError, ValueError):
-            return False
-
-    def _send(
-        self, status: HTTPStatus, data: bytes, kind: str, time_s: int | None = None, *, body: bool = True
-    ) -> None:
+    def _send(self, status: HTTPStatus, data: bytes, kind: str, tag: str = "", *, body: bool = True) -> None:
         self.send_response(status)
         self.send_header("Content-Type", kind)
         self.send_header("Cache-Control", "no-cache")  # ask each time: the array may have been rendered again
         self.send_header("X-Content-Type-Options", "nosniff")
-        if time_s is not None:
-            self.send_header("Last-Modified", formatdate(time_s, usegmt=True))
+        if tag:
+            self.send_header("ETag", tag)
         if status != HTTPStatus.NOT_MODIFIED:
             self.send_header("Content-Length", str(len(data)))
         self.end_headers()

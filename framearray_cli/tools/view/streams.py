@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from framearray_cli.array.images.images import FOR_SCREENS, format_name, read_image
-from framearray_cli.array.manifest import Manifest, ManifestGroup, image_path, layers_path
+from framearray_cli.array.manifest import Manifest, ManifestGroup
 from framearray_cli.array.names import file_name
 from framearray_cli.base.arrays import Float32, Image
 from framearray_cli.base.errors import OutputError
@@ -81,14 +81,21 @@ def layer_streams(channels: dict[str, Float32]) -> list[Stream]:
     ]
 
 
+def source_name(manifest: Manifest, stream: Stream, c: int, l: int) -> str:
+    """Return the array's file of a picture, relative to its folder."""
+    patterns = {
+        "image": manifest.images,
+        "group": stream.group.images if stream.group else "",
+        "layer": manifest.layers,
+        "ambient": manifest.ambient_images,
+        "background": manifest.background_images,
+    }
+    return file_name(patterns[stream.role], c, l)
+
+
 def source_file(manifest: Manifest, stream: Stream, c: int, l: int) -> Path:
     """Return the array's file of a picture."""
-    if stream.role in ("image", "group"):
-        return image_path(manifest, c, l, stream.group)
-    if stream.role == "layer":
-        return layers_path(manifest, c)
-    pattern = manifest.ambient_images if stream.role == "ambient" else manifest.background_images
-    return manifest.directory / file_name(pattern, c)
+    return manifest.directory / source_name(manifest, stream, c, l)
 
 
 def read_values(manifest: Manifest, stream: Stream, c: int, l: int, read_layers: ReadLayers) -> Float32:

@@ -4,12 +4,11 @@
     tiles/KEY/c0012.jpg       sheet: small pictures of camera 12 under all lights, row by row
     tiles/KEY/c0012.l003.jpg  one picture, full size
 
-A tile has the file time of its image, a sheet that of its newest image. So only tiles of images that were rendered
-again are made again.
+A tile is made again if what it was made from has changed: see `stamps`. An array may still be rendered, so files may be
+missing, and appear at any time and in any order.
 """
 
 import json
-import os
 import shutil
 import threading
 from collections.abc import Sequence
@@ -23,20 +22,20 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.array.images.images import read_layers
-from framearray_cli.array.images.png import encode_jpeg
-from framearray_cli.array.manifest import Manifest, layers_path
-from framearray_cli.base.arrays import Bytes
+from framearray_cli.array.manifest import FILE_NAME, Manifest, layers_path
+from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.present import list_present
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import reason, whole_file, write_bytes
+from framearray_cli.base.files import reason, write_bytes
 
 from .coding import Coding, encode
+from .contents import contents_table, scan_sources
 from .index import index_table, sheet_layout
+from .stamps import Source, is_fresh, source_of, stamp_of, write_tile
 from .streams import Stream, choose_coding, layer_streams, read_values, source_file, streams_of
 
 INDEX_FILE = "index.json"
 TILES_FOLDER = "tiles"
-# 4:4:4. At 90 files are a quarter larger, and the error in a noisy picture is 3.3 codes instead of 4.1.
-QUALITY = 85
 KEPT_LAYER_FILES = 6  # a file holds all layers of a camera; codings are chosen from the same number of files
 
 
@@ -49,26 +48,56 @@ class Tiles:
         streams: of the array, with their codings.
     """
 
-    def __init__(self, manifest: Manifest, folder: Path, threads: int = 1) -> None:
-        """Choose the codings, delete tiles of other codings, and write the index.
+    def __init__(self, manifest: Manifest, folder: Path, threads: int = 1, *, discard: bool = True) -> None:
+        """Choose the codings, and write the index.
+
+        Args:
+            discard: delete tiles of other codings, which nobody may be making meanwhile.
 
         Raises:
             OutputError: the folder cannot be written to.
         """
-        self.manifest, self.folder = manifest, folder
+        self.manifest, self.folder, self._threads = manifest, folder, threads
         self._read_layers = lru_cache(KEPT_LAYER_FILES)(read_layers)
-        self.streams = self._with_codings(threads)
+        self._manifest_source = source_of(manifest.directory / FILE_NAME)
+        self.streams = self._with_codings()
         self.layout = sheet_layout(manifest.resolution, max(stream.n for stream in self.streams))
         self._by_key = {stream.key: stream for stream in self.streams}
         self._locks = {(stream.key, c): threading.Lock() for stream in self.streams for c in range(manifest.n_cameras)}
         self._slots = threading.BoundedSemaphore(threads)
         self.stopping = threading.Event()
+        self._n_sources = list_present(manifest).count()
         table = index_table(manifest, self.streams, self.layout)
-        if _read_index(folder / INDEX_FILE) != table:
+        self._digest: str = table["digest"]
+        old = _read_index(folder / INDEX_FILE)
+        if discard and _without_rate(old) != _without_rate(table):
             _remove(folder / TILES_FOLDER)
+        if old != table:
             write_bytes(folder / INDEX_FILE, json.dumps(table, indent=1).encode())
 
-    def _with_codings(self, threads: int) -> list[Stream]:
+    def contents(self, *, live: bool) -> dict[str, Any]:
+        """Return the table of `contents.json`."""
+        sources = scan_sources(self.manifest, self.streams)
+        return contents_table(self.manifest, self.streams, sources, self._digest, live=live)
+
+    def renewed(self) -> "Tiles":
+        """Return these tiles, or new ones if the array has changed so much that index and codings must be chosen anew.
+
+        That is so if it was rendered again, or if twice as many files are there as when the codings were chosen.
+
+        Raises:
+            OutputError: the manifest cannot be read, or the folder cannot be written to.
+        """
+        manifest, source = self.manifest, source_of(self.manifest.directory / FILE_NAME)
+        if source != self._manifest_source:
+            manifest, self._manifest_source = read_manifest(manifest.directory), source
+        same = replace(manifest, summary={}) == replace(self.manifest, summary={})
+        found, before = list_present(manifest).count(), self._n_sources
+        if same and (found <= before or found < 2 * before):
+            return self
+        return Tiles(manifest, self.folder, self._threads, discard=False)
+
+    def _with_codings(self) -> list[Stream]:
         manifest = self.manifest
         found = streams_of(manifest)
         for c in range(manifest.n_cameras if manifest.layers else 0):
@@ -78,7 +107,7 @@ class Tiles:
         # One task for all layers: they are in the same files.
         pictures = [stream for stream in found if stream.role != "layer"]
         layers = [stream for stream in found if stream.role == "layer"]
-        with ThreadPoolExecutor(threads) as pool:
+        with ThreadPoolExecutor(self._threads) as pool:
             tasks = [pool.submit(self._codings, some) for some in (layers, *([stream] for stream in pictures))]
             codings = {key: coding for task in tasks for key, coding in task.result().items()}
         return [replace(stream, coding=codings[stream.key]) for stream in found]
@@ -107,84 +136,68 @@ class Tiles:
             raise OutputError(f"{self.folder}: no tile {key}, camera {c}, position {l}")
         path = self.tile_path(key, c, l)
         if l is not None:
-            time_ns = self._time(stream, c, l)
-            if not _is_fresh(path, time_ns):
-                self._write_full(stream, c, l, time_ns)
-        elif not self._sheet_is_fresh(stream, c):
+            stamp = self._stamp(stream, [self._source(stream, c, l)])
+            if not is_fresh(path, stamp):
+                values = read_values(self.manifest, stream, c, l, self._read_layers)
+                write_tile(path, encode(values, stream.coding), stamp)
+            return path
+        stamp = self._stamp(stream, self._sources(stream, c))
+        if not stamp:
+            raise OutputError(f"{source_file(self.manifest, stream, c, 0)}: no such file")
+        if not is_fresh(path, stamp):
             with self._slots:
                 problems = self.prepare(stream, c)
-            if len(problems) == stream.n:
+            if problems and not path.exists():
                 raise problems[0]
         return path
 
     def prepare(self, stream: Stream, c: int) -> list[OutputError]:
-        """Make all tiles of one stream and camera that are not up to date.
+        """Make all tiles of one stream and camera that are not up to date, of the images that are there.
 
         Returns:
-            The errors of missing or damaged images; their places in the sheet are black.
+            The errors of damaged images; in the sheet their places, and those of missing images, are black.
         """
         with self._locks[stream.key, c]:
             problems: list[OutputError] = []
-            times = [self._time_or_problem(stream, c, l, problems) for l in range(stream.n)]
-            newest = max(times)
-            fulls = [_is_fresh(self.tile_path(stream.key, c, l), time) for l, time in enumerate(times) if time]
-            if not newest or (all(fulls) and _is_fresh(self.tile_path(stream.key, c, None), newest)):
+            sources = self._sources(stream, c)
+            stamps = [self._stamp(stream, [source]) for source in sources]
+            fulls = [is_fresh(self.tile_path(stream.key, c, l), stamp) for l, stamp in enumerate(stamps) if stamp]
+            sheet_path = self.tile_path(stream.key, c, None)
+            if not fulls or (all(fulls) and is_fresh(sheet_path, self._stamp(stream, sources))):
                 return problems
             sheet = np.zeros((*self.layout.sheet(stream.n), 3), np.uint8)
-            for l, time_ns in enumerate(times):
+            for l, stamp in enumerate(stamps):
                 if self.stopping.is_set():
                     return problems
-                if not time_ns:
+                if not stamp:
                     continue
                 try:
                     values = read_values(self.manifest, stream, c, l, self._read_layers)
                 except OutputError as problem:
                     problems.append(problem)
+                    sources[l] = None  # the sheet is made again when it can be read
                     continue
                 path = self.tile_path(stream.key, c, l)
-                if not _is_fresh(path, time_ns):
-                    _write_tile(path, encode(values, stream.coding), time_ns)
+                if not is_fresh(path, stamp):
+                    write_tile(path, encode(values, stream.coding), stamp)
                 sheet[self.layout.part(l)] = encode(self.layout.reduce(values), stream.coding)
-            _write_tile(self.tile_path(stream.key, c, None), sheet, newest)
+            if any(sources):
+                write_tile(sheet_path, sheet, self._stamp(stream, sources))
             return problems
 
-    def _write_full(self, stream: Stream, c: int, l: int, time_ns: int) -> None:
-        values = read_values(self.manifest, stream, c, l, self._read_layers)
-        _write_tile(self.tile_path(stream.key, c, l), encode(values, stream.coding), time_ns)
+    def _source(self, stream: Stream, c: int, l: int) -> Source | None:
+        return source_of(source_file(self.manifest, stream, c, l))
 
-    def _sheet_is_fresh(self, stream: Stream, c: int) -> bool:
-        times = [self._time_or_problem(stream, c, l, []) for l in range(stream.n)]
-        return any(times) and _is_fresh(self.tile_path(stream.key, c, None), max(times))
+    def _sources(self, stream: Stream, c: int) -> list[Source | None]:
+        return [self._source(stream, c, l) for l in range(stream.n)]
 
-    def _time(self, stream: Stream, c: int, l: int) -> int:
-        path = source_file(self.manifest, stream, c, l)
-        try:
-            return path.stat().st_mtime_ns
-        except OSError as error:
-            raise OutputError(f"{path}: cannot be read: {reason(error)}") from error
-
-    def _time_or_problem(self, stream: Stream, c: int, l: int, problems: list[OutputError]) -> int:
-        """Return the file time of an image; if it is missing, 0, and add a problem."""
-        try:
-            return self._time(stream, c, l)
-        except OutputError as problem:
-            problems.append(problem)
-            return 0
+    def _stamp(self, stream: Stream, sources: Sequence[Source | None]) -> str:
+        return stamp_of(repr((self.manifest.fingerprint, stream.coding, self.layout)), sources)
 
 
-def _write_tile(path: Path, codes: Bytes, time_ns: int) -> None:
-    if codes.shape[2] == 1:
-        codes = np.repeat(codes, 3, axis=2)
-    with whole_file(path) as part:
-        part.write_bytes(encode_jpeg(codes, QUALITY))
-        os.utime(part, ns=(time_ns, time_ns))
-
-
-def _is_fresh(path: Path, time_ns: int) -> bool:
-    try:
-        return path.stat().st_mtime_ns == time_ns
-    except OSError:
-        return False
+def _without_rate(index: Any) -> Any:
+    """Return all of an index that tiles depend on."""
+    return {key: index[key] for key in index if key not in ("fps", "digest")} if isinstance(index, dict) else None
 
 
 def _read_index(path: Path) -> Any:

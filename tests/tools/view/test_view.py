@@ -3,10 +3,12 @@
 import http.client
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from support import ROOT, handmade
 from framearray_cli.array.images.images import ImageFormat, write_image
 from framearray_cli.array.images.png import read_codes
 from framearray_cli.array.manifest import image_path, layers_path
+from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import OutputError
 from framearray_cli.tools.view.coding import MOST_WHITE, Coding, coding_for, data_coding, decode, encode
@@ -103,16 +106,70 @@ def test_other_codings_discard_all_tiles(tmp_path):
     assert not list(tmp_path.rglob("*.jpg"))
 
 
-def test_missing_and_damaged_images_are_reported(tmp_path):
+def test_damaged_images_are_reported_and_missing_ones_are_known(tmp_path):
     manifest = handmade.plain(tmp_path, n_c=2, n_l=3, layers=False)
     image_path(manifest, 0, 1).unlink()
     image_path(manifest, 1, 0).write_bytes(b"no picture")
     tiles = open_tiles(tmp_path, None, 2)
     problems = sorted(map(str, prepare_all(tiles, 2, lambda n: None)))
-    assert len(problems) == 2 and "c0000.l001.exr" in problems[0] and "c0001.l000.exr" in problems[1]
+    assert len(problems) == 1 and "c0001.l000.exr" in problems[0]
     assert tiles.ensure_tile("light", 0, None).is_file(), "the others are there"
     with pytest.raises(OutputError, match=r"c0000\.l001\.exr"):
         tiles.ensure_tile("light", 0, 1)
+    contents = tiles.contents(live=True)
+    assert contents["lacking"] == [1, "0"] and contents["streams"]["light"]["missing"] == {"0": [(1, 1)]}
+
+
+def test_a_sheet_follows_its_sources_whatever_their_times(tmp_path):
+    """Light positions may appear in any order, and a file may come with an older time than those before it."""
+    manifest = handmade.plain(tmp_path / "all", n_c=1, n_l=3, layers=False)
+    write_manifest(tmp_path, replace(manifest, directory=tmp_path))
+
+    def take(l, time_ns, source=None):
+        file = image_path(manifest, 0, l)
+        shutil.copyfile(source or file, tmp_path / file.name)
+        os.utime(tmp_path / file.name, ns=(time_ns, time_ns))
+
+    def shown(l):
+        return read_codes(tiles.ensure_tile("light", 0, None))[tiles.layout.part(l)].mean()
+
+    take(2, 5_000_000_000)
+    tiles = open_tiles(tmp_path, None, 1)
+    tags = [tiles.contents(live=True)["streams"]["light"]["stamps"][0]]
+    assert (shown(0), shown(1)) == (0, 0) and shown(2) > 10
+    for l in (1, 0):
+        take(l, 1_000_000_000)
+        assert shown(l) > 10
+        tags.append(tiles.contents(live=True)["streams"]["light"]["stamps"][0])
+    assert len(set(tags)) == 3 and all(tags)
+    before = shown(1)
+    bright = tmp_path / "bright.exr"
+    write_image(bright, handmade.soft(0, 0, 0.3), ImageFormat(half="never", compression="zip"))
+    take(1, 1_000_000_000, bright)
+    assert abs(shown(1) - before) > 1, "the same time, another file"
+    (tmp_path / image_path(manifest, 0, 2).name).write_bytes(b"half")
+    prepare_all(tiles, 1, lambda n: None)
+    take(2, 1_000_000_000)
+    assert shown(2) > 10, "what could not be read is tried again"
+
+
+def test_the_array_is_looked_at_anew_while_it_grows(tmp_path):
+    manifest = handmade.plain(tmp_path / "all", n_c=4, n_l=2)
+    write_manifest(tmp_path, replace(manifest, directory=tmp_path))
+    tiles = open_tiles(tmp_path, None, 1)
+    assert tiles.contents(live=True)["lacking"] == [4, "0-3"] and len(tiles.streams) == 1
+    assert prepare_all(tiles, 1, lambda n: None) == []
+    for file in manifest.directory.glob("room.*c000[01]*"):
+        shutil.copyfile(file, tmp_path / file.name)
+    new = tiles.renewed()
+    assert new is not tiles and len(new.streams) == 7 and new.streams[0].coding != tiles.streams[0].coding
+    contents = new.contents(live=True)
+    assert contents["lacking"] == [2, "2-3"] and contents["index"] != tiles.contents(live=True)["index"]
+    assert new.renewed() is new
+    write_manifest(tmp_path, replace(manifest, directory=tmp_path, summary={"images": 4}))
+    assert new.renewed() is new, "a summary changes no picture"
+    write_manifest(tmp_path, replace(manifest, directory=tmp_path, fingerprint="sha256:9"))
+    assert new.renewed().manifest.fingerprint == "sha256:9"
 
 
 def test_a_damaged_layer_file_is_reported(tmp_path):
@@ -144,15 +201,15 @@ def ask(server, path, method="GET", **headers):
 def test_the_server_makes_tiles_that_are_asked_for(server):
     answer, body = ask(server, "/tiles/light/c0001.l000.jpg")
     assert (answer.status, answer.headers["Content-Type"], body[:2]) == (200, "image/jpeg", b"\xff\xd8")
-    again, nothing = ask(
-        server, "/tiles/light/c0001.l000.jpg", **{"If-Modified-Since": answer.headers["Last-Modified"]}
-    )
+    again, nothing = ask(server, "/tiles/light/c0001.l000.jpg", **{"If-None-Match": answer.headers["ETag"]})
     assert (again.status, nothing) == (304, b"")
     assert ask(server, "/tiles/light/c0000.jpg?x=1")[0].status == 200
     head, nothing = ask(server, "/", "HEAD")
     assert (head.status, nothing) == (200, b"") and int(head.headers["Content-Length"]) > 1000
     assert ask(server, "/main.js")[0].headers["Content-Type"].startswith("text/javascript")
-    assert json.loads(ask(server, "/index.json")[1])["n_cameras"] == 2
+    index, contents = (json.loads(ask(server, f"/{name}.json")[1]) for name in ("index", "contents"))
+    assert (index["n_cameras"], contents["live"], contents["lacking"]) == (2, True, [0, ""])
+    assert index["digest"] == contents["index"]
 
 
 @pytest.mark.parametrize(
@@ -193,7 +250,7 @@ def test_the_command_serves_until_ctrl_c(tmp_path):
     try:
         url = process.stdout.readline().split()[0]
         assert url.startswith("http://127.0.0.1:")
-        assert "all pictures are prepared" in process.stderr.readline()
+        assert "are prepared" in process.stderr.readline()
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=10)
         assert (process.returncode, said) == (0, "")

@@ -1,16 +1,19 @@
 // A frame array as index.json describes it: its axes, the URLs of its tiles, and the terms of a picture.
 
+import { loadContents } from "./contents.js";
+
 export const WHITE = [1, 1, 1];
 
 export async function loadArray() {
-  const answer = await fetch("index.json", { cache: "no-cache" });
+  const [answer, contents] = await Promise.all([fetch("index.json", { cache: "no-cache" }), loadContents()]);
   if (!answer.ok) throw new Error(`index.json: ${answer.status} ${answer.statusText}`);
-  return new FrameArray(await answer.json());
+  return new FrameArray(await answer.json(), contents);
 }
 
 export class FrameArray {
-  constructor(index) {
-    Object.assign(this, index); // name, resolution, fps, axes, streams, small, exposure, ...
+  constructor(index, contents) {
+    Object.assign(this, index); // name, resolution, fps, axes, streams, small, exposure, digest, ...
+    this.contents = contents;
     this.nCameras = index.n_cameras;
     this.main = index.axes[0]; // along the pad's second side
     this.others = index.axes.slice(1);
@@ -22,11 +25,11 @@ export class FrameArray {
   }
 
   fullUrl(stream, c, l) {
-    return `tiles/${stream.key}/c${pad(c, 4)}.l${pad(l, 3)}.jpg`;
+    return `tiles/${stream.key}/c${pad(c, 4)}.l${pad(l, 3)}.jpg?${this.contents.tag(stream, c)}`;
   }
 
   sheetUrl(stream, c) {
-    return `tiles/${stream.key}/c${pad(c, 4)}.jpg`;
+    return `tiles/${stream.key}/c${pad(c, 4)}.jpg?${this.contents.tag(stream, c)}`;
   }
 
   // Bytes of a decoded tile or sheet.

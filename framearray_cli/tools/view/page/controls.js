@@ -50,8 +50,8 @@ export class Controls {
       input.addEventListener("input", () => changed((view) => (view.places[name] = Number(input.value))));
       this.update.push((view) => {
         input.value = view.places[name];
-        output.value = `${view.places[name] + 1} / ${n}`;
-        input.setAttribute("aria-valuetext", `position ${view.places[name] + 1} of ${n}`);
+        output.value = view.places[name];
+        input.setAttribute("aria-valuetext", `position ${view.places[name]} of 0 to ${n - 1}`);
       });
       box.append(holder);
     }

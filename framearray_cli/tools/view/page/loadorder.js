@@ -5,7 +5,7 @@ const RING = 6; // full pictures around the place, in each direction
 
 // view: gives the place; velocity: [cameras, lights] per step; calm: whether the view has stayed for a moment. Pictures
 // around the place wait until then, as decoding them would delay the picture on the screen.
-// Returns [{ url, bytes, needed }]; a needed tile is loaded even if it exceeds the budget.
+// What is not there yet is left out. Returns [{ url, bytes, needed }]; a needed tile is loaded even if it exceeds the budget.
 export function loadOrder(array, view, velocity, calm) {
   const [dc, dl] = velocity;
   const moving = dc !== 0 || dl !== 0;
@@ -21,13 +21,17 @@ export function loadOrder(array, view, velocity, calm) {
     const c = view.c + offset;
     if (c < 0 || c >= array.nCameras) return;
     for (const stream of streams) {
+      if (!array.contents.has(stream, c, position(stream, dlight))) continue;
       const url = array.fullUrl(stream, c, position(stream, dlight));
       list.push({ url, bytes: array.bytes(stream, false), needed: offset === 0 && dlight === 0 });
     }
   };
   const sheet = (c) => {
     if (c < 0 || c >= array.nCameras) return;
-    for (const stream of streams) list.push({ url: array.sheetUrl(stream, c), bytes: array.bytes(stream, true) });
+    for (const stream of streams) {
+      if (!array.contents.tag(stream, c)) continue;
+      list.push({ url: array.sheetUrl(stream, c), bytes: array.bytes(stream, true) });
+    }
   };
 
   if (moving) sheet(view.c);

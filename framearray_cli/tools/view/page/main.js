@@ -1,6 +1,7 @@
 // The page: connects array, store, picture, pad, path and controls; one loop redraws what changed.
 
 import { loadArray } from "./array.js";
+import { loadContents } from "./contents.js";
 import { Controls } from "./controls.js";
 import { addKeys } from "./keys.js";
 import { loadOrder } from "./loadorder.js";
@@ -16,6 +17,7 @@ import { firstView, fromHash, toHash } from "./view.js";
 const HASH_DELAY = 300; // ms after the last change; browsers refuse more than some hundred addresses per minute
 const STILL_AFTER = 250; // ms without a change: the movement is over
 const CALM_AFTER = 60; // ms without a change: load pictures around the place as well
+const REFRESH = 3000, REFRESH_COMPLETE = 15000; // ms between two looks at what is there
 const RETRY_AFTER = 5000; // ms, if there is no picture
 
 const byId = (id) => document.getElementById(id);
@@ -28,10 +30,7 @@ class Page {
     this.store.want(loadOrder(array, this.view, [0, 0], false));
     this.picture = new Picture(byId("picture"), array.resolution); // takes 0.2 s without a graphics card, while tiles load
     this.map = new ColourMap(array);
-    this.sheets = new Map(); // url of a sheet -> [stream, c]
-    for (const stream of array.streams) {
-      for (let c = 0; c < array.nCameras; c++) this.sheets.set(array.sheetUrl(stream, c), [stream, c]);
-    }
+    this.listSheets();
     this.path = new Path();
     this.isDrawing = false;
     this.velocity = [0, 0];
@@ -47,6 +46,39 @@ class Page {
     this.showNumbers();
     this.viewChanged(performance.now());
     requestAnimationFrame((now) => this.frame(now));
+    if (array.contents.live) setTimeout(() => this.refreshAlways(), REFRESH);
+  }
+
+  listSheets() {
+    const { array } = this;
+    this.sheets = new Map(); // url of a sheet -> [stream, c]
+    for (const stream of array.streams) {
+      for (let c = 0; c < array.nCameras; c++) this.sheets.set(array.sheetUrl(stream, c), [stream, c]);
+    }
+  }
+
+  // Look whether images have come or changed, and show them; load the page again if other tiles are made of all.
+  async refresh() {
+    const contents = await loadContents();
+    if (contents.index !== this.array.digest) location.reload();
+    if (contents.stamp === this.array.contents.stamp) return;
+    this.array.contents = contents;
+    this.listSheets();
+    this.map.changed = true;
+    this.level = 0;
+    this.store.forgetMissing();
+    this.loadTiles(true);
+    this.showNumbers();
+    this.dirty();
+  }
+
+  async refreshAlways() {
+    try {
+      if (document.visibilityState === "visible") await this.refresh();
+    } catch {
+      // the server may be back later
+    }
+    setTimeout(() => this.refreshAlways(), this.array.contents.isComplete ? REFRESH_COMPLETE : REFRESH);
   }
 
   get l() {
@@ -105,9 +137,16 @@ class Page {
     byId("memory").value = `${Math.round((this.store.bytes + this.picture.bytes) / 2 ** 20)} MiB`;
   }
 
-  // Draw the view from full tiles, or else small ones; without either the last drawing stays.
+  // Draw the view from full tiles, or else small ones; without either the last drawing stays. What is not there yet is
+  // drawn as a blank.
   drawPicture() {
     const { array, store, view } = this;
+    if (this.missing().length) {
+      this.picture.blank();
+      this.showNote(`Camera ${view.c}, ${array.main.name} ${this.l}: not rendered yet.`);
+      this.level = 2;
+      return;
+    }
     let level = 2;
     const parts = array.parts(view).map((part) => {
       const url = array.fullUrl(part.stream, view.c, part.l);
@@ -134,12 +173,22 @@ class Page {
   showProblem(parts) {
     const full = parts.map((part) => this.array.fullUrl(part.stream, this.view.c, part.l));
     const wrong = full.map((url) => this.store.missing.get(url)).find((text) => text);
-    byId("note").hidden = !wrong;
-    byId("note").textContent = wrong ? `No picture here. ${wrong}` : "";
+    this.showNote(wrong ? `No picture here. ${wrong}` : "");
     if (wrong) this.retry ??= setTimeout(() => this.retryMissing(), RETRY_AFTER);
   }
 
-  // A render may have continued, or the server may be back.
+  showNote(text) {
+    byId("note").hidden = !text;
+    if (byId("note").textContent !== text) byId("note").textContent = text;
+  }
+
+  // The parts of the view that are not there yet.
+  missing() {
+    const { array, view } = this;
+    return array.parts(view).filter((part) => !array.contents.has(part.stream, view.c, part.l));
+  }
+
+  // A damaged image may have been rendered again, or the server may be back.
   retryMissing() {
     this.retry = undefined;
     this.store.forgetMissing();
@@ -150,7 +199,11 @@ class Page {
   // Show the numbers of the view, and set the controls to it.
   showNumbers() {
     const { array, view } = this;
-    const text = `camera ${view.c + 1} / ${array.nCameras}, ${array.main.name} ${this.l + 1} / ${array.main.n}`;
+    const { nCameras, main } = array;
+    const text = `camera ${view.c} of 0-${nCameras - 1}, ${main.name} ${this.l} of 0-${main.n - 1}`;
+    const [lacking, ranges] = array.contents.lacking;
+    byId("lacking").hidden = !lacking;
+    byId("lacking").textContent = `${lacking} of ${nCameras} cameras lack images: ${ranges}`;
     byId("where").textContent = text;
     byId("pad").setAttribute("aria-label", `Pad: ${text}`);
     byId("picture").setAttribute("aria-label", `Picture of ${array.name}: ${text}`);

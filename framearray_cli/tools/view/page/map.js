@@ -2,6 +2,8 @@
 
 import { decode, srgb } from "./array.js";
 
+const MISSING = [[32, 36, 46], [46, 52, 66]]; // sRGB codes, alternating: no picture has such a pattern
+
 export class ColourMap {
   constructor(array) {
     this.array = array;
@@ -9,6 +11,8 @@ export class ColourMap {
     for (const stream of array.streams) {
       this.means.set(stream.key, new Float32Array(3 * array.nCameras * stream.n).fill(NaN));
     }
+    this.tags = new Map(); // stream key -> per camera, of the sheet whose means are known
+    for (const stream of array.streams) this.tags.set(stream.key, []);
     this.canvas = new OffscreenCanvas(array.nCameras, array.main.n);
     this.small = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
     this.changed = true;
@@ -17,7 +21,9 @@ export class ColourMap {
   // Add the means of a sheet, drawn with one pixel per picture.
   add(stream, c, sheet) {
     const means = this.means.get(stream.key);
-    if (!Number.isNaN(means[3 * c * stream.n])) return;
+    const tags = this.tags.get(stream.key), { contents } = this.array;
+    if (tags[c] === contents.tag(stream, c)) return;
+    tags[c] = contents.tag(stream, c);
     const columns = Math.min(stream.n, this.array.small.columns);
     const rows = Math.ceil(stream.n / columns);
     const { small } = this;
@@ -29,13 +35,14 @@ export class ColourMap {
     for (let l = 0; l < stream.n; l++) {
       for (let i = 0; i < 3; i++) {
         const code = codes[4 * l + i] / 255;
-        means[3 * (c * stream.n + l) + i] = stream.scale ? decode(code, stream) : code;
+        const mean = stream.scale ? decode(code, stream) : code;
+        means[3 * (c * stream.n + l) + i] = contents.has(stream, c, l) ? mean : NaN;
       }
     }
     this.changed = true;
   }
 
-  // Draw the colours of a view, one pixel per camera and light, transparent where unknown; return the canvas.
+  // Draw the colours of a view, one pixel per camera and light, transparent where not loaded yet; return the canvas.
   draw(view) {
     const { array } = this;
     const { width, height } = this.canvas;
@@ -52,6 +59,10 @@ export class ColourMap {
           for (let i = 0; i < 3; i++) sum[i] += factor[i] * means[3 * (c * stream.n + at) + i];
         }
         const start = 4 * (l * width + c);
+        if (!parts.every(({ stream, l: at }) => array.contents.has(stream, c, at))) {
+          shown.data.set([...MISSING[(c + l) % 2], 255], start);
+          continue;
+        }
         for (let i = 0; i < 3; i++) shown.data[start + i] = 255 * (linear ? srgb(sum[i] * gain) : sum[i]);
         shown.data[start + 3] = Number.isNaN(sum[0]) ? 0 : 255;
       }

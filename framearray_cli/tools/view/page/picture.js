@@ -47,6 +47,10 @@ vec3 heat(float t) {  // matplotlib's inferno, to 0.05: black, violet, orange, y
 `;
 
 const LIGHT_MAIN = "void main() {\n  vec3 sum = vec3(0.0);\n#SUM  shown = vec4(srgb(sum * exp2(exposure)), 1.0);\n}";
+const BLANK = `void main() {
+  float stripe = step(mod(gl_FragCoord.x + gl_FragCoord.y, 24.0), 6.0);
+  shown = vec4(vec3(0.10 + 0.08 * stripe), 1.0);
+}`;
 const DATA_MAINS = {
   depth: "shown = vec4(srgb(vec3(0.01 + 0.9 * pow(1.0 - code(image0, part0).r, 2.5))), 1.0);",
   samples: "shown = vec4(heat(code(image0, part0).r), 1.0);",
@@ -90,6 +94,15 @@ export class Picture {
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
     this.forget(parts.length);
+  }
+
+  // Draw stripes: there is no picture here.
+  blank() {
+    const { gl } = this;
+    if (!this.programs.has("blank")) this.programs.set("blank", link(gl, VERTEX, HEAD + BLANK));
+    gl.useProgram(this.programs.get("blank"));
+    gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
   }
 
   // Return the drawn picture: RGBA, row 0 at the top. Waits for the drawing.
