@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from framearray_cli.base.errors import JobError
 from framearray_cli.base.units import MOST_STOPS, MOST_THREADS
 
 from .values import number, whole
@@ -32,6 +33,7 @@ Sets = Annotated[
     ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors.")]
+Strict = Annotated[bool, typer.Option("--strict", help="Warnings are errors.")]
 Exposure = Annotated[
     float,
     typer.Option(
@@ -71,6 +73,16 @@ def with_threads(job: "Job", threads: int | None) -> "Job":
     from framearray_cli.base.forms.table import changed
 
     return changed(job, render=changed(job.render, threads=threads))
+
+
+def refuse_warnings(file: Path | str, warnings: Sequence[str]) -> None:
+    """End a strict command if there are warnings.
+
+    Raises:
+        JobError: there are.
+    """
+    if warnings:
+        raise JobError(file, warnings)
 
 
 def output_path(name: str, option: str = "--output") -> Path:

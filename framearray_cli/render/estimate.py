@@ -21,6 +21,7 @@ from framearray_cli.job.job import Job
 from .automatic.choose import AutoSettings, require_least_memory, resolve_auto
 from .identity import identity_of
 from .memory import ambient_memory, light_blocks, mirror_share, window_memory
+from .pilots.warn import find_warnings
 from .prepare import Prepared, image_ambient, open_embree, plan_work, prepare
 from .target.pilot import Target, allot_hits
 from .writer import ArrayWriter, array_target
@@ -92,6 +93,7 @@ def check(job: Job) -> Estimate:
             prepared, settings = resolve_auto(prepared, embree)
             identity = identity_of(prepared)
             setup, ambient = plan_work(prepared, embree)
+            pilots = find_warnings(prepared, setup, ambient)
             setup, target = allot_hits(prepared, setup, ambient)
             before_frames = time.perf_counter() - started - clock.seconds
             pixels = _probe_pixels(setup)
@@ -117,7 +119,7 @@ def check(job: Job) -> Estimate:
         free=free,
         seconds=before_frames + second.seconds * hits * _repeats(setup, len(blocks)) + second.writing * scale * copies,
         blocks=len(blocks),
-        warnings=_warnings(job, identity, memory_lacks=more > available, disk_lacks=disk > free),
+        warnings=(*pilots, *_warnings(job, identity, memory_lacks=more > available, disk_lacks=disk > free)),
     )
 
 

@@ -27,7 +27,12 @@ from .target.pilot import Target
 
 
 def initial_manifest(
-    prepared: Prepared, ambient: Ambient, identity: Identity, settings: AutoSettings | None, target: Target | None
+    prepared: Prepared,
+    ambient: Ambient,
+    identity: Identity,
+    settings: AutoSettings | None,
+    target: Target | None,
+    warnings: Sequence[str] = (),
 ) -> Manifest:
     """Return the manifest of a render that has not begun."""
     job, report = prepared.job, prepared.scene.report
@@ -36,6 +41,7 @@ def initial_manifest(
     summary |= {"notes": list(ambient.notes)}
     summary |= {"automatic": settings.table()} if settings else {}
     summary |= {"target": target.table()} if target else {}
+    summary |= {"warnings": list(warnings)} if warnings else {}
     return Manifest(
         version=__version__,
         name=job.name,

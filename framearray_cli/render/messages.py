@@ -37,7 +37,6 @@ def estimate_lines(estimate: "Estimate") -> list[str]:
         f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_blocks(estimate.blocks)}",
         f"disk: about {size(estimate.disk)} in {job.output.directory}, {size(estimate.free)} free",
         f"time: about {duration(estimate.seconds)} on this machine",
-        *(f"warning: {warning}" for warning in estimate.warnings),
     ]
 
 
@@ -59,6 +58,11 @@ def scene_lines(prepared: "Prepared") -> list[str]:
     from framearray_cli.scene.scene import scene_report_lines
 
     return scene_report_lines(prepared.scene.report, prepared.job.scene.file)
+
+
+def warning_lines(warnings: Sequence[str]) -> list[str]:
+    """Return a line for each warning."""
+    return [f"warning: {warning}" for warning in warnings]
 
 
 def ambient_lines(figures: "AmbientFigures") -> list[str]:

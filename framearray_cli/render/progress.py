@@ -36,6 +36,9 @@ class RenderEvents:
     def planned(self, ambient: "Ambient") -> None:
         """The ambient light was estimated."""
 
+    def warned(self, warnings: tuple[str, ...]) -> None:
+        """Pilots were rendered; `warnings` are of what would make the array useless. May raise an error."""
+
     def allotted(self, target: "Target") -> None:
         """Native hits were allotted for the error that the job wants."""
 

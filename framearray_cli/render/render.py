@@ -25,6 +25,7 @@ from framearray_cli.job.job import Job
 
 from .manifest import initial_manifest
 from .memory import light_blocks, mirror_share, require_memory
+from .pilots.warn import find_warnings
 from .prepare import Prepared, image_ambient, plan_work
 from .progress import RenderEvents
 from .session import RenderSession, complete_manifest, open_session
@@ -40,6 +41,7 @@ def render(
     engine: Engine = "auto",
     restart: bool = False,
     cameras: Sequence[int] | None = None,
+    pilots: bool = True,
 ) -> Summary:
     """Render a frame array, or some of its cameras; images that lie in the job's folder already are kept.
 
@@ -48,6 +50,7 @@ def render(
     Args:
         restart: first remove the array in the job's folder; otherwise another array there is an error.
         cameras: those to render, in rising order; None: all.
+        pilots: whether to look for what would make the array useless; False for parts of a render that did.
 
     Raises:
         JobError, SceneError: the job cannot be rendered.
@@ -58,7 +61,7 @@ def render(
         prepared, on_disk, directory = session.prepared, session.on_disk, job.output.directory
         if not session.wanted:
             return complete_manifest(session, time.perf_counter() - started)
-        setup, ambient, manifest, rays = _plan(session, events)
+        setup, ambient, manifest, rays = _plan(session, events, pilots=pilots)
         with session.folder.exclusive():
             write_manifest(directory, manifest)
         record_path = record_file(directory, session.run.cameras)
@@ -79,20 +82,33 @@ def render(
     return summary
 
 
-def _plan(session: RenderSession, events: RenderEvents) -> tuple[FrameSetup, Ambient, Manifest, Counter[str]]:
-    """Estimate the ambient light, allot hits, and build the manifest of the whole array; count the rays traced."""
+def _plan(
+    session: RenderSession, events: RenderEvents, *, pilots: bool
+) -> tuple[FrameSetup, Ambient, Manifest, Counter[str]]:
+    """Estimate the ambient light, render pilots, allot hits, and build the manifest; count the rays traced."""
     prepared, output = session.prepared, session.prepared.job.output
     for name in {output.format, "exr"} if output.layers else {output.format}:
         require_writer(name)
     setup, ambient = plan_work(prepared, session.embree)
     events.planned(ambient)
+    warnings = _look(session, setup, ambient, events) if pilots else session.known_warnings()
     setup, target = allot_hits(prepared, setup, ambient)
     rays = Counter({"ambient": ambient.rays})
     if target:
         require_memory(prepared, setup.per_pixel)
         events.allotted(target)
         rays["target"] = target.rays
-    return setup, ambient, initial_manifest(prepared, ambient, session.identity, session.settings, target), rays
+    manifest = initial_manifest(prepared, ambient, session.identity, session.settings, target, warnings)
+    return setup, ambient, manifest, rays
+
+
+def _look(session: RenderSession, setup: FrameSetup, ambient: Ambient, events: RenderEvents) -> tuple[str, ...]:
+    """Return the warnings of pilots, after reporting them; of a part only if it is the first one."""
+    if session.on_disk.records.entries and 0 not in session.chosen:
+        return session.known_warnings()
+    warnings = find_warnings(session.prepared, setup, ambient)
+    events.warned(warnings)
+    return warnings
 
 
 def _render_block(run: "_Run", setup: FrameSetup, ambient: Ambient, lights: range, wanted: Sequence[int]) -> None:

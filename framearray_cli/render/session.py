@@ -44,6 +44,12 @@ class RenderSession:
     chosen: Sequence[int]
     wanted: list[int]
 
+    def known_warnings(self) -> tuple[str, ...]:
+        """Return the warnings in the manifest, if another run or part has written one."""
+        known = read_array(self.prepared.job.output.directory)
+        found = known.summary.get("warnings") if known else None
+        return tuple(text for text in found if isinstance(text, str)) if isinstance(found, list) else ()
+
 
 @contextmanager
 def open_session(

@@ -130,5 +130,5 @@ def with_summary(manifest: Manifest, summary: Summary) -> Manifest:
     }
     if summary.standard_error:
         table["standard_error"] = summary.standard_error
-    table |= {key: manifest.summary[key] for key in ("automatic", "target") if key in manifest.summary}
+    table |= {key: manifest.summary[key] for key in ("automatic", "target", "warnings") if key in manifest.summary}
     return replace(manifest, summary=table)

@@ -1,13 +1,15 @@
 """`framearray check`."""
 
 from framearray_cli.engine.kernels.clock import compile_clock
-from framearray_cli.render.messages import estimate_lines
+from framearray_cli.render.messages import estimate_lines, warning_lines
 
-from ..options import JobFile, Output, Sets, Threads, load_job
-from ..screen import Screen, err, print_result
+from ..options import JobFile, Output, Sets, Strict, Threads, load_job, refuse_warnings
+from ..screen import Screen, err, print_result, say
 
 
-def check(job_file: JobFile, sets: Sets = None, threads: Threads = None, output: Output = None) -> None:
+def check(
+    job_file: JobFile, sets: Sets = None, threads: Threads = None, output: Output = None, strict: Strict = False
+) -> None:
     """Validate a job and its scene, and print its size, memory, disk and time, without rendering it."""
     job = load_job(job_file, threads, output, sets)
     with Screen(err) as screen:
@@ -17,3 +19,6 @@ def check(job_file: JobFile, sets: Sets = None, threads: Threads = None, output:
         with compile_clock(screen.compiling):
             estimate = run(job)
     print_result(estimate_lines(estimate))
+    if strict:
+        refuse_warnings(job_file, estimate.warnings)
+    say(err, warning_lines(estimate.warnings))

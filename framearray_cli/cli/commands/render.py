@@ -19,12 +19,13 @@ from framearray_cli.render.messages import (
     settings_lines,
     summary_lines,
     target_lines,
+    warning_lines,
     workers_text,
 )
 from framearray_cli.render.parts.progress import PartEvents
 from framearray_cli.render.progress import ambient_figures
 
-from ..options import Cameras, JobFile, Output, Quiet, Sets, Threads, load_job
+from ..options import Cameras, JobFile, Output, Quiet, Sets, Strict, Threads, load_job, refuse_warnings
 from ..screen import Screen, err, print_result
 from ..values import whole
 
@@ -65,13 +66,15 @@ def render(
             "--chunk", parser=whole(1), help="Frames per part, at most; with --workers or --dask.", metavar="N"
         ),
     ] = None,
+    strict: Strict = False,
     restart: Annotated[bool, typer.Option("--restart", help="Remove the frame array in the folder first.")] = False,
     quiet: Quiet = False,
 ) -> None:
     """Render every image of a job into a folder, with a manifest; skip those that are there."""
     job = load_job(job_file, threads, output, sets)
     chosen = None if cameras is None else sorted(read_indices("--cameras", cameras, job.camera.frames))
-    render_on_screen(job, quiet=quiet, restart=restart, cameras=chosen, options=_worker_options(workers, dask, chunk))
+    options = _worker_options(workers, dask, chunk)
+    render_on_screen(job, quiet=quiet, strict=strict, restart=restart, cameras=chosen, options=options)
 
 
 def _worker_options(workers: int | None, dask: str | None, chunk: int | None) -> "WorkerOptions | None":
@@ -93,6 +96,7 @@ def render_on_screen(
     job: "Job",
     *,
     quiet: bool,
+    strict: bool = False,
     restart: bool = False,
     cameras: Sequence[int] | None = None,
     options: "WorkerOptions | None" = None,
@@ -102,7 +106,7 @@ def render_on_screen(
         screen.wait("reading the scene")
         from framearray_cli.render.render import render as run
 
-        events = RenderingEvents(screen, job)
+        events = RenderingEvents(screen, job, strict=strict)
         try:
             with compile_clock(screen.compiling):
                 if options is None:
@@ -129,8 +133,8 @@ class RenderingEvents(PartEvents):
         printed: notes that were printed.
     """
 
-    def __init__(self, screen: Screen, job: "Job") -> None:
-        self._screen, self._job = screen, job
+    def __init__(self, screen: Screen, job: "Job", *, strict: bool = False) -> None:
+        self._screen, self._job, self._strict = screen, job, strict
         self._total = 0
         self.printed: tuple[str, ...] = ()
 
@@ -162,6 +166,11 @@ class RenderingEvents(PartEvents):
         self._screen.say(ambient_lines(ambient_figures(ambient)))
         self.printed = ambient.notes
         self._screen.count("rendering", self._total, "image")
+
+    def warned(self, warnings: tuple[str, ...]) -> None:
+        if self._strict:
+            refuse_warnings(self._job.file or self._job.name, warnings)
+        self._screen.say(warning_lines(warnings))
 
     def allotted(self, target: "Target") -> None:
         self._screen.say(target_lines(target))

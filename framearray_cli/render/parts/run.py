@@ -22,7 +22,8 @@ from framearray_cli.job.read import job_table
 
 from ..automatic.choose import require_least_memory
 from ..messages import workers_text
-from ..prepare import Prepared
+from ..pilots.warn import find_warnings
+from ..prepare import Prepared, plan_work
 from ..session import RenderSession, complete_manifest, open_session
 from ..summary import Summary, summarize, with_summary
 from .chunks import Chunks, default_size, plan_chunks
@@ -74,6 +75,8 @@ def render_in_parts(
         with open_session(job, events, restart=restart, cameras=cameras) as session:
             if not session.wanted:
                 return complete_manifest(session, time.perf_counter() - started)
+            warnings = find_warnings(session.prepared, *plan_work(session.prepared, session.embree))
+            events.warned(warnings)
             memory = None if options.address else _memory(session.prepared, options.workers)
         if client is None:
             events.starting_workers()
@@ -93,10 +96,10 @@ def render_in_parts(
                 summary = _summarize(session, queue, time.perf_counter() - started)
                 if missed := summary.there - session.on_disk.images - queue.images:  # images that no message reported
                     events.written(missed)
-                _write_manifest(session, summary)
+                _write_manifest(session, summary, warnings)
             raise
     summary = _summarize(session, queue, time.perf_counter() - started)
-    _write_manifest(session, summary)
+    _write_manifest(session, summary, warnings)
     return summary
 
 
@@ -202,9 +205,11 @@ def _summarize(session: RenderSession, queue: ChunkQueue, seconds: float) -> Sum
     return replace(summary, peak_memory=queue.peak_memory)
 
 
-def _write_manifest(session: RenderSession, summary: Summary) -> None:
+def _write_manifest(session: RenderSession, summary: Summary, warnings: Sequence[str]) -> None:
     """Replace the manifests of the chunks by that of the whole render."""
     folder = session.prepared.job.output.directory
     with session.folder.exclusive():
-        manifest = replace(read_manifest(folder), job=session.identity.job)
+        manifest = read_manifest(folder)
+        known = manifest.summary | ({"warnings": list(warnings)} if warnings else {})
+        manifest = replace(manifest, job=session.identity.job, summary=known)
         write_manifest(folder, with_summary(manifest, summary))

@@ -110,7 +110,7 @@ def render_chunk(common: dict[str, Any], cameras: tuple[int, ...]) -> dict[str, 
         reporter = _Reporter(worker, Common(**common), cameras)
         with reporter.watch_task(), compile_clock(lambda: reporter.send(compiling=True)):
             job = reporter.common.job(worker.state.nthreads)
-            summary = _retry_while_busy(lambda: render(job, reporter, cameras=cameras))
+            summary = _retry_while_busy(lambda: render(job, reporter, cameras=cameras, pilots=False))
         return {"notes": list(reporter.notes), "peak_memory": summary.peak_memory}
     except FrameArrayError as error:
         problems = list(error.problems) if isinstance(error, JobError) else [str(error)]

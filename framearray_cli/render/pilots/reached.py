@@ -1,0 +1,83 @@
+"""Warnings of sources whose light reaches nothing that is seen."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.inputs.lights import POINT
+
+from ..prepare import Prepared
+from .positions import lights_text
+from .rays import Flags, is_inside_solid
+from .seen import bounds, vector
+from .views import Views
+
+
+def light_warnings(views: Views, setup: FrameSetup, prepared: Prepared) -> Iterator[str]:
+    """Find sources that light nothing at any of their positions, and lamps that pass through a solid."""
+    if not views.reflects.any():  # what is black needs no light, and none is traced to it
+        return
+    reached = _reached(views)
+    planes = list(views.positions.planes)
+    on = setup.lights.lit[:, planes] > 0
+    for s in range(len(on)):
+        if not on[s].any() or (reached[s] & on[s]).all():
+            continue
+        name = _name(prepared, s)
+        dark = on[s] & ~reached[s]
+        if not reached[s].any():
+            yield f"{name} reaches nothing that is seen: {_reason(setup, prepared, s, planes[int(dark.argmax())])}"
+        elif buried := [p for p in np.flatnonzero(dark) if _is_buried(setup, prepared, s, planes[p])]:
+            steps = [bool(set(together) & set(buried)) for together in views.positions.together]
+            at = vector(prepared.lights.sources[s].vector[planes[buried[0]]])
+            yield (
+                f"{lights_text(steps, views.positions)}: {name} is inside a solid, and reaches nothing that is seen; "
+                f"move it away from {at}"
+            )
+
+
+def dark_light_positions(views: Views) -> Flags:
+    """Return the light positions at which nothing that is seen is lit, though sources shine, (K,)."""
+    by_plane = np.asarray(views.lit.any(axis=(0, 1)))
+    lit = np.array([by_plane[list(planes)].any() for planes in views.positions.together])
+    return np.asarray(views.positions.bright & ~lit)
+
+
+def _reached(views: Views) -> Flags:
+    """Return whether each source lights anything that is seen at each plane, (n_sources, P)."""
+    if views.reached is not None:
+        return np.asarray(views.reached > 0)
+    return np.asarray(views.lit.any(axis=(0, 1)))[None]
+
+
+def _name(prepared: Prepared, s: int) -> str:
+    group = prepared.job.light.sources[s].group
+    return f"light.sources[{s}]" + (f' of group "{group}"' if group else "")
+
+
+def _is_buried(setup: FrameSetup, prepared: Prepared, s: int, plane: int) -> bool:
+    position = np.asarray(setup.lights.vector[s, :, plane])
+    return bool(setup.lights.kind[s] == POINT) and is_inside_solid(setup, prepared.scene, position)
+
+
+def _reason(setup: FrameSetup, prepared: Prepared, s: int, plane: int) -> str:
+    """Say why a source lights nothing, and the remedy."""
+    values = prepared.lights.sources[s].vector[plane]
+    low, high = bounds(prepared)
+    if setup.lights.kind[s] != POINT:
+        axis = 2 if prepared.job.scene.up == "z" else 1
+        if values[axis] > 0:
+            return (
+                f"its direction {vector(values)} leads upwards, so that it shines from below; direction is the way "
+                f"that light travels: turn it round, to {vector(-values)}"
+            )
+        return "surfaces block it; open the scene towards it, or change its direction"
+    if ((values < low) | (values > high)).any():
+        return (
+            f"the lamp at {vector(values)} is outside the scene, which reaches from {vector(low)} to {vector(high)}; "
+            "move it to where the eyes are"
+        )
+    if _is_buried(setup, prepared, s, plane):
+        return f"the lamp at {vector(values)} is inside a solid; move it into the open"
+    return f"surfaces hide the lamp at {vector(values)} from all that is seen; move it to where the eyes are"

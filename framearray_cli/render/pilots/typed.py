@@ -1,0 +1,66 @@
+"""Warnings of values that are typing errors or mistaken units, found without a ray."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from framearray_cli.job.job import Job
+from framearray_cli.job.light import DirectionalKey, PointKey
+
+# Fields of view up to pi are what radians look like; a telescope's picture is rarely meant.
+RADIANS = math.pi
+# Colours are factors from 0 to 1, some a little above; 100 are per cent, and 255 codes of 8 bits.
+MOST_COLOUR = 10.0
+COLOUR_REMEDY = "expected factors from 0 to 1: divide 8-bit codes by 255, and convert them from sRGB to linear values"
+# Of the size of the scene: where surfaces obscure each other from farther away, all of them are obscured.
+FAR_RANGE = 10.0
+# Of the distance of what is seen: about a pixel of a picture with 300 rows. Closer surfaces cannot be told apart.
+NEAR_RANGE = 1 / 300
+
+
+def typed_warnings(job: Job) -> Iterator[str]:
+    """Find values that were most likely meant in another unit."""
+    fov, degrees = job.camera.fov, math.degrees(job.camera.fov)
+    if fov <= RADIANS:
+        yield (
+            f"camera.fov: {fov:g} degrees is the view of a telescope; if radians were meant, they are {degrees:.3g} "
+            f"degrees: set fov = {degrees:.3g}"
+        )
+    for i, source in enumerate(job.light.sources):
+        colours = {k: key.color for k, key in enumerate(source.keys) if isinstance(key, PointKey | DirectionalKey)}
+        bad = {k: colour for k, colour in colours.items() if colour is not None and max(colour) > MOST_COLOUR}
+        for k, colour in list(bad.items())[:1]:
+            strength = "intensity" if source.type == "point" else "irradiance"
+            more = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
+            values = ", ".join(f"{value:g}" for value in colour)
+            yield (
+                f"light.sources[{i}].keys[{k}].color{more}: [{values}] multiplies the {strength} by up to "
+                f"{max(colour):g}; {COLOUR_REMEDY}"
+            )
+
+
+def range_warnings(job: Job, size: float, distances: "np.ndarray") -> Iterator[str]:
+    """Find a range of obscurance that hides all indirect light, or that no picture can show.
+
+    Args:
+        size: diagonal of the scene.
+        distances: of the surfaces seen.
+    """
+    wanted = job.obscurance.range
+    if wanted > FAR_RANGE * size:
+        yield (
+            f"obscurance.range: {wanted:g} scene units, in a scene of {size:.3g}: everything obscures everything, and "
+            f"indirect light is almost black; about {_good_range(size)} would suit the scene"
+        )
+    elif len(distances) and wanted < NEAR_RANGE * (middle := float(np.median(distances))):
+        yield (
+            f"obscurance.range: {wanted:g} scene units, where surfaces are seen from {middle:.3g} away: obscurance is "
+            f"narrower than a pixel, and indirect light is flat; about {_good_range(min(size, 2 * middle))} would suit "
+            "the scene"
+        )
+
+
+def _good_range(size: float) -> str:
+    """Return about a quarter of a length, with one digit."""
+    return f"{float(f'{size / 4:.1g}'):g}"

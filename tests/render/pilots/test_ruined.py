@@ -1,0 +1,25 @@
+"""Every ruined job is warned of, with number, place and remedy; good jobs are not."""
+
+import pytest
+from support import tiny
+from support.ruined import CASES, Case, case
+
+from framearray_cli.render.pilots.warn import find_warnings
+
+
+def warnings_of(ruined: Case) -> tuple[str, ...]:
+    job, scene = ruined.prepared_from()
+    inputs = tiny.prepared(job, scene)
+    with tiny.planned(inputs) as (setup, ambient):
+        return find_warnings(inputs, setup, ambient)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_ruined_job_is_warned_of(name):
+    found = warnings_of(CASES[name])
+    assert any(all(word in text for word in CASES[name].words) for text in found), found
+    assert len(found) <= 3
+
+
+def test_the_job_that_they_are_made_from_is_good():
+    assert warnings_of(case()) == ()
