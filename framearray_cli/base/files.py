@@ -137,6 +137,18 @@ def require_file(path: Path, remedy: str = "") -> None:
         raise OutputError(f"{path}: expected a file, got a folder or a device{remedy}")
 
 
+def require_new(path: Path, *, force: bool) -> None:
+    """Refuse to write a file where something is; with `force` only where a folder or a device is.
+
+    Raises:
+        OutputError: something is in the way.
+    """
+    if force:
+        require_file(path, "; give another name with --output")
+    elif os.path.lexists(path):
+        raise OutputError(f"{path}: is there already; give another name with --output, or --force to replace it")
+
+
 def read_at_most(path: Path, most: int) -> bytes | None:
     """Read a whole file; None if it holds more than `most` bytes.
 

@@ -25,9 +25,10 @@ from framearray_cli.render.messages import (
 from framearray_cli.render.parts.progress import PartEvents
 from framearray_cli.render.progress import ambient_figures
 
-from ..options import Cameras, JobFile, Output, Quiet, Sets, Strict, Threads, load_job, refuse_warnings
+from ..options import At, Cameras, JobFile, Light, Output, Quiet, Sets, Strict, Threads, load_job, refuse_warnings
 from ..screen import Screen, err, print_result
 from ..values import whole
+from .preview import preview_on_screen, refuse_conflicts
 
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk
@@ -50,6 +51,15 @@ def render(
     output: Output = None,
     sets: Sets = None,
     cameras: Cameras = None,
+    preview: Annotated[
+        bool,
+        typer.Option(
+            "--preview",
+            help="Render only one small picture, within seconds, beside the folder; --cameras and --light choose it.",
+        ),
+    ] = False,
+    light: Light = None,
+    at: At = None,
     workers: Annotated[
         int | None,
         typer.Option(
@@ -68,10 +78,16 @@ def render(
     ] = None,
     strict: Strict = False,
     restart: Annotated[bool, typer.Option("--restart", help="Remove the frame array in the folder first.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="With --preview: replace an existing picture.")] = False,
     quiet: Quiet = False,
 ) -> None:
     """Render every image of a job into a folder, with a manifest; skip those that are there."""
-    job = load_job(job_file, threads, output, sets)
+    others = {"--workers": workers, "--dask": dask, "--chunk": chunk, "--restart": restart, "--strict": strict}
+    refuse_conflicts(preview, others, {"--light": light, "--at": at, "--force": force})
+    job = load_job(job_file, threads, None if preview else output, sets)
+    if preview:
+        preview_on_screen(job, output, cameras=cameras, light=light, at=at or (), force=force, quiet=quiet)
+        return
     chosen = None if cameras is None else sorted(read_indices("--cameras", cameras, job.camera.frames))
     options = _worker_options(workers, dask, chunk)
     render_on_screen(job, quiet=quiet, strict=strict, restart=restart, cameras=chosen, options=options)

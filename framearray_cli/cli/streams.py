@@ -1,0 +1,48 @@
+"""`-` in place of a file to write: standard output; `-.exr` says the format too."""
+
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import reason, require_new
+
+
+def is_stdout(name: str) -> bool:
+    """Return whether an option `--output` names standard output."""
+    return re.fullmatch(r"-(\.[A-Za-z0-9]+)?", name) is not None
+
+
+@contextmanager
+def output_file(target: Path, suffix: str, *, force: bool) -> Iterator[Path]:
+    """Yield the file to write: the target, or one whose bytes go to standard output when it is whole.
+
+    Args:
+        target: "-" and "-.exr" mean standard output.
+        suffix: of what goes there, unless the target says so.
+        force: replace a file that exists.
+
+    Raises:
+        OutputError: the file exists, or standard output is a terminal or cannot be written to.
+    """
+    if not is_stdout(str(target)):
+        require_new(target, force=force)
+        yield target
+        return
+    if sys.stdout.isatty():
+        raise OutputError("standard output: expected a file or a pipe, got a terminal; give a name with --output")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, f"output{target.suffix if target.suffix else suffix}")
+        yield file
+        try:
+            with file.open("rb") as whole:
+                shutil.copyfileobj(whole, sys.stdout.buffer)
+            sys.stdout.buffer.flush()
+        except BrokenPipeError:  # the reader has gone
+            raise
+        except OSError as error:
+            raise OutputError(f"standard output: cannot be written: {reason(error)}") from error

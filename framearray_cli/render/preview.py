@@ -1,0 +1,97 @@
+"""One picture of an array, small and with few hits: a first look at a job, within seconds."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from framearray_cli.base.arrays import Image
+from framearray_cli.base.forms.table import changed
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.loop import ready_frames
+from framearray_cli.job.job import Job
+from framearray_cli.job.light import MAIN_AXIS
+from framearray_cli.job.method import SamplesTable
+from framearray_cli.scene.paths.paths import LightPath, Lights, eyes, lights, lights_without_groups
+
+from .automatic.choose import require_least_memory
+from .prepare import Prepared, open_embree, plan_work, prepare, prepared_from
+
+SHRINK = 4  # of both sides
+LEAST_SIDE = 320  # pixels of the longer side, unless the job has fewer; a smaller picture shows too little
+HITS = 8  # per pixel; without neighbours in a window, noise is then hardly seen at this size
+WALKS = 4096  # for the ambient light, which is then known to some hundredths
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Preview:
+    """One small picture.
+
+    Attributes:
+        image: (h, w, 3) radiance, linear.
+        c: camera position.
+        places: light position along each axis.
+        prepared: job and scene.
+    """
+
+    image: Image
+    c: int
+    places: Mapping[str, int]
+    prepared: Prepared
+
+
+def light_axes(job: Job) -> dict[str, int]:
+    """Return the number of light positions along each axis of a job, the main one first if any source uses it."""
+    groups = job.light.groups
+    used = not groups or any(group.axis == MAIN_AXIS for group in groups)
+    return ({MAIN_AXIS: job.light.frames} if used else {}) | dict(job.light.axes)
+
+
+def render_preview(job: Job, c: int, places: Mapping[str, int]) -> Preview:
+    """Render one picture, a quarter as wide and high as those of the job, without touching the output folder.
+
+    Args:
+        c: camera position.
+        places: light position along each axis of `light_axes`.
+
+    Raises:
+        JobError, SceneError: the job cannot be rendered.
+    """
+    all_eyes, all_lights = eyes(job), lights(job)
+    prepared = prepare(_small(job))
+    chosen = lights_without_groups([_at(all_lights, i, places) for i in range(len(all_lights.sources))])
+    prepared = prepared_from(prepared.job, prepared.scene, all_eyes.at([c]), chosen)
+    require_least_memory(prepared)
+    with open_embree(prepared) as embree:
+        setup, ambient = plan_work(prepared, embree)
+        image = np.empty((1, setup.cams.height, setup.cams.width, 3), np.float32)
+        with TracePool(setup, prepared.threads) as pool:
+            window = Window(setup, ambient, pool)
+            for j in ready_frames(window, setup, [0], pool):
+                window.compose(j, image)
+    return Preview(image=image[0], c=c, places=places, prepared=prepared)
+
+
+def _small(job: Job) -> Job:
+    """Return the job with small pictures and few hits; its settings of noise and reuse are for whole arrays."""
+    width, height = job.camera.resolution
+    shrink = min(max(1 / SHRINK, LEAST_SIDE / max(width, height)), 1.0)
+    resolution = (max(1, round(shrink * width)), max(1, round(shrink * height)))
+    paths = WALKS if job.ambient.paths is None else min(job.ambient.paths, WALKS)
+    return changed(
+        job,
+        camera=changed(job.camera, resolution=resolution),
+        samples=SamplesTable(hits=HITS, obscurance=job.samples.obscurance),
+        reuse=changed(job.reuse, n_r=0),
+        specular=changed(job.specular, hits=min(job.specular.hits, HITS)),
+        ambient=changed(job.ambient, paths=paths),
+    )
+
+
+def _at(lights: Lights, i: int, places: Mapping[str, int]) -> LightPath:
+    """Return source i at one light position."""
+    group = next((group for group in lights.groups if i in group.sources), None)
+    row = places[MAIN_AXIS] if group is None else group.positions.start + places[group.axis]
+    source = lights.sources[i]
+    return replace(source, vector=source.vector[[row]], intensity=source.intensity[[row]], notes=())

@@ -1,0 +1,107 @@
+"""`framearray render --preview`: one small picture, and nothing else."""
+
+import io
+import sys
+from pathlib import Path
+
+import numpy as np
+import PIL.Image
+import pytest
+from support.program import names, run, write_job
+from support.tiny import SUN, TABLE, WALK
+
+from framearray_cli.array.images.images import read_image
+from framearray_cli.job.read import read_job
+from framearray_cli.render.preview import render_preview
+
+LAMP = TABLE["light"]["sources"][0]
+LARGE = WALK | {"resolution": [640, 160]}
+
+
+def read_codes(file: Path | io.BytesIO) -> np.ndarray:
+    return np.asarray(PIL.Image.open(file), np.float64)
+
+
+def test_it_shows_what_the_array_will_show(tmp_path, capsys):
+    job = write_job(tmp_path, camera=WALK, samples={"hits": 16}, output={"format": "exr"})
+    assert run(capsys, "render", "-q", job, "--cameras", "3").code == 0
+    before = names(tmp_path / "out")
+    result = run(capsys, "render", job, "--preview", "--cameras", "3", "--light", "last", "-o", tmp_path / "p.exr")
+    assert (result.code, result.err) == (0, "")
+    width, height = TABLE["camera"]["resolution"]
+    assert result.out == f"{tmp_path / 'p.exr'}: camera 3, light 2, {width} x {height} of {width} x {height} pixels\n"
+    picture, image = read_image(tmp_path / "p.exr"), read_image(tmp_path / "out" / "tiny.c0003.l002.exr")
+    assert abs(picture.mean() / image.mean() - 1) < 0.1
+    assert np.corrcoef(picture.ravel(), image.ravel())[0, 1] > 0.9
+    other = read_image(tmp_path / "out" / "tiny.c0003.l000.exr")
+    assert np.corrcoef(picture.ravel(), other.ravel())[0, 1] < np.corrcoef(picture.ravel(), image.ravel())[0, 1]
+    assert names(tmp_path / "out") == before
+
+
+def test_it_lies_beside_the_folder_and_is_replaced(tmp_path, capsys):
+    job = write_job(tmp_path, camera=LARGE)
+    for _ in range(2):
+        result = run(capsys, "render", job, "--preview")
+        assert result.out.endswith("out-preview.png: camera 3, light 1, 320 x 80 of 640 x 160 pixels\n")
+    assert names(tmp_path) == {"job.toml", "tiny.glb", "out-preview.png"}
+    assert read_codes(tmp_path / "out-preview.png").shape == (80, 320, 3)
+
+
+def test_another_file_is_replaced_only_with_force(tmp_path, capsys):
+    job = write_job(tmp_path)
+    (tmp_path / "p.png").write_bytes(b"mine")
+    result = run(capsys, "render", job, "--preview", "-o", tmp_path / "p.png")
+    assert result.code == 4
+    assert "p.png: is there already; give another name with --output, or --force to replace it" in result.err
+    assert (tmp_path / "p.png").read_bytes() == b"mine"
+    assert run(capsys, "render", job, "--preview", "-o", tmp_path / "p.png", "--force").code == 0
+    assert read_codes(tmp_path / "p.png").shape[2] == 3
+
+
+def test_on_standard_output(tmp_path, capfdbinary, monkeypatch):
+    job = write_job(tmp_path)
+    written = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written, write_through=True))
+    from framearray_cli.cli.main import main
+
+    main(["render", str(job), "--preview", "-o", "-"])
+    assert read_codes(io.BytesIO(written.getvalue())).shape[2] == 3
+    assert names(tmp_path) == {"job.toml", "tiny.glb"}
+
+
+def test_groups_of_sources_shine_at_their_own_positions(tmp_path):
+    both = {"frames": 3, "sources": [SUN, LAMP]}
+    grouped = both | {"sources": [SUN, LAMP | {"group": "lamps", "axis": "lamps"}]}
+    plain = read_job(write_job(tmp_path, light=both, output={"format": "exr"}))
+    job = read_job(write_job(tmp_path, light=grouped, output={"format": "exr"}))
+    n = job.light.axes["lamps"]
+    for l in (0, n - 1):
+        same = render_preview(plain, 0, {"light": l}).image
+        np.testing.assert_array_equal(render_preview(job, 0, {"light": l, "lamps": l}).image, same)
+    mixed = render_preview(job, 0, {"light": 0, "lamps": n - 1}).image
+    assert not np.array_equal(mixed, render_preview(job, 0, {"light": 0, "lamps": 0}).image)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--preview", "--cameras", "0-2"], "--cameras: expected one place for the picture of --preview, got 3"),
+        (["--preview", "--light", "7"], "--light: expected one of 3 light positions (0 to 2, or -3 to -1), got 7"),
+        (["--preview", "--at", "lamps=1"], "--at: expected AXIS=PLACES with one of the axes light (0 to 2)"),
+        (["--preview", "--workers", "2"], "does not go with --preview"),
+        (["--preview", "--restart"], "does not go with --preview"),
+        (["--light", "1"], "needs --preview"),
+        (["--force"], "needs --preview"),
+    ],
+)
+def test_wrong_options(tmp_path, capsys, options, message):
+    result = run(capsys, "render", write_job(tmp_path, camera=WALK), *options)
+    assert (result.code, result.out) == (2, "")
+    assert message in " ".join(result.err.split())
+    assert names(tmp_path) == {"job.toml", "tiny.glb"}
+
+
+def test_a_format_without_pictures_is_refused(tmp_path, capsys):
+    result = run(capsys, "render", write_job(tmp_path), "--preview", "-o", tmp_path / "p.gif")
+    assert result.code == 4
+    assert "p.gif: expected a .png, .jpg, .exr or .tif for the picture of --preview" in result.err
