@@ -1,7 +1,7 @@
 """The frame loop [FA alg. 1]: find the hits of each eye once, and compose each frame as soon as its window is full."""
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from .frames.frame import find_frame
 from .frames.setup import FrameSetup
@@ -10,7 +10,10 @@ from .images.window import Window
 from .terms.ambient.estimate import Ambient
 
 
-def ready_frames(window: Window, setup: FrameSetup, wanted: Sequence[int], pool: TracePool) -> Iterator[int]:
+def ready_frames(
+    window: Window, setup: FrameSetup, wanted: Sequence[int], pool: TracePool,
+    found: Callable[[int], None] = lambda c: None,
+) -> Iterator[int]:  # fmt: skip
     """Find the hits that the wanted frames show, and yield each of these frames as soon as it can be composed.
 
     The caller may compose a frame more than once before it asks for the next one.
@@ -18,10 +21,12 @@ def ready_frames(window: Window, setup: FrameSetup, wanted: Sequence[int], pool:
     Args:
         window: an empty one.
         wanted: frames in rising order.
+        found: called with each eye whose hits were found.
     """
     waiting = deque(wanted)
     for c in setup.eyes_for(wanted):
         window.add(find_frame(setup, c, pool))
+        found(c)
         while waiting and setup.eyes_of(waiting[0])[-1] <= c:
             j = waiting.popleft()
             window.fill_holes(j)

@@ -36,11 +36,20 @@ class RenderEvents:
     def planned(self, ambient: "Ambient") -> None:
         """The ambient light was estimated."""
 
+    def loaded(self) -> None:
+        """All kernels of frames were compiled, or loaded from disk."""
+
     def warned(self, warnings: tuple[str, ...]) -> None:
         """Pilots were rendered; `warnings` are of what would make the array useless. May raise an error."""
 
     def allotted(self, target: "Target") -> None:
         """Native hits were allotted for the error that the job wants."""
+
+    def tracing(self) -> None:
+        """The first frame begins."""
+
+    def expected(self, seconds: float | None) -> None:
+        """The rest is expected to take that long; None: not known yet."""
 
     def written(self, images: int) -> None:
         """That many more images are on disk."""

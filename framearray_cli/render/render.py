@@ -25,12 +25,14 @@ from framearray_cli.job.job import Job
 
 from .manifest import initial_manifest
 from .memory import light_blocks, mirror_share, require_memory
+from .pace import Expected, Pace, block_work, plane_cost, total_work
 from .pilots.warn import find_warnings
 from .prepare import Prepared, image_ambient, plan_work
 from .progress import RenderEvents
 from .session import RenderSession, complete_manifest, open_session
 from .summary import Summary, summarize, with_summary
 from .target.pilot import allot_hits
+from .trial import Trial, eye_hits, load_kernels, writing_cost
 from .writer import ArrayTarget, ArrayWriter, FinishedFiles, array_target
 
 
@@ -61,17 +63,18 @@ def render(
         prepared, on_disk, directory = session.prepared, session.on_disk, job.output.directory
         if not session.wanted:
             return complete_manifest(session, time.perf_counter() - started)
-        setup, ambient, manifest, rays = _plan(session, events, pilots=pilots)
+        setup, ambient, manifest, rays, trial = _plan(session, events, pilots=pilots)
         with session.folder.exclusive():
             write_manifest(directory, manifest)
         record_path = record_file(directory, session.run.cameras)
         with RecordWriter(record_path, session.identity.fingerprint, session.run) as record:
             run = _Run(prepared, record, events, rays, started)
             try:
-                for block in light_blocks(prepared, mirror_share(setup), per_pixel=setup.per_pixel):
-                    wanted = on_disk.missing(session.chosen, block)
-                    if wanted:
-                        _render_block(run, setup.for_lights(block), ambient, block, wanted)
+                blocks = light_blocks(prepared, mirror_share(setup), per_pixel=setup.per_pixel)
+                parts = [(block, wanted) for block in blocks if (wanted := on_disk.missing(session.chosen, block))]
+                run.begin(setup, trial, parts)
+                for block, wanted in parts:
+                    _render_block(run, setup.for_lights(block), ambient, block, wanted)
             except BaseException:
                 with suppress(OutputError), session.folder.exclusive():  # report the first error, not one from here
                     write_manifest(directory, with_summary(manifest, run.summary(on_disk, ambient)))
@@ -84,13 +87,15 @@ def render(
 
 def _plan(
     session: RenderSession, events: RenderEvents, *, pilots: bool
-) -> tuple[FrameSetup, Ambient, Manifest, Counter[str]]:
+) -> tuple[FrameSetup, Ambient, Manifest, Counter[str], Trial]:
     """Estimate the ambient light, render pilots, allot hits, and build the manifest; count the rays traced."""
     prepared, output = session.prepared, session.prepared.job.output
     for name in {output.format, "exr"} if output.layers else {output.format}:
         require_writer(name)
     setup, ambient = plan_work(prepared, session.embree)
     events.planned(ambient)
+    trial = load_kernels(prepared, setup, ambient)
+    events.loaded()
     warnings = _look(session, setup, ambient, events) if pilots else session.known_warnings()
     setup, target = allot_hits(prepared, setup, ambient)
     rays = Counter({"ambient": ambient.rays})
@@ -99,7 +104,7 @@ def _plan(
         events.allotted(target)
         rays["target"] = target.rays
     manifest = initial_manifest(prepared, ambient, session.identity, session.settings, target, warnings)
-    return setup, ambient, manifest, rays
+    return setup, ambient, manifest, rays, trial
 
 
 def _look(session: RenderSession, setup: FrameSetup, ambient: Ambient, events: RenderEvents) -> tuple[str, ...]:
@@ -126,11 +131,12 @@ def _render_block(run: "_Run", setup: FrameSetup, ambient: Ambient, lights: rang
         i_a = i_a.for_lights(lights)
     with run.open_pool(setup) as pool, run.open_writer(target, lights) as writer:
         window = Window(setup, i_a, pool)
-        for j in ready_frames(window, setup, [0] if still else wanted, pool):
+        for j in ready_frames(window, setup, [0] if still else wanted, pool, lambda c: run.found(eye_hits(setup, c))):
             images = writer.block()
             composed = window.compose(j, images)
             if composed.beyond and target.format.half == "auto":  # too bright for halves: some will be floats
                 composed = window.compose(j, np.empty(images.shape, np.float32))
+            run.composed(len(lights))
             writer.write(composed, wanted if still else [j], images)
         writer.finish()
 
@@ -145,6 +151,40 @@ class _Run:
         self._rays, self._stages = rays, Counter[str]()
         self._images, self._done, self._lock = 0, set[int](), Lock()
         self._pool: TracePool | None = None
+        self._pace: Pace | None = None
+
+    def begin(self, setup: FrameSetup, trial: Trial, parts: Sequence[tuple[range, Sequence[int]]]) -> None:
+        """Begin to measure how long the frames take, at some blocks of light positions each."""
+        prepared = self.prepared
+        setups = [(setup.for_lights(block), wanted) for block, wanted in parts]
+        work = total_work(block_work(part, wanted, still=prepared.still) for part, wanted in setups)
+        expected = Expected(
+            plane=plane_cost(setup, len(parts[0][0])) if parts else 0.0,
+            image=writing_cost(prepared, trial.image),
+            busy=prepared.threads,
+        )
+        self._pace = Pace(work, expected)
+        self._events.tracing()
+
+    def found(self, hits: float) -> None:
+        """Count the hits of an eye."""
+        if self._pace:
+            self._pace.found(hits)
+            self._events.expected(self._pace.left())
+
+    def composed(self, planes: int) -> None:
+        """Count the planes of a composed frame."""
+        if self._pace:
+            self._pace.composed(planes)
+            self._events.expected(self._pace.left())
+
+    def _written(self, images: int, seconds: float) -> None:
+        """Count a file; called from any thread."""
+        if self._pace:
+            self._pace.written(images, seconds)
+            self._events.expected(self._pace.left())
+        if images:
+            self._events.written(images)
 
     @contextmanager
     def open_pool(self, setup: FrameSetup) -> Iterator[TracePool]:
@@ -160,7 +200,7 @@ class _Run:
 
     def open_writer(self, target: ArrayTarget, lights: range) -> ArrayWriter:
         """Return a writer that reports images and records finished frames."""
-        return ArrayWriter(target, lights, self.prepared.threads, self._events.written, self._finished)
+        return ArrayWriter(target, lights, self.prepared.threads, self._written, self._finished)
 
     def _finished(self, done: FinishedFiles) -> None:
         """Record that all files of a camera are on disk; called from any thread."""

@@ -1,6 +1,7 @@
 """Write finished frames while the next ones are traced."""
 
 import threading
+import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -123,14 +124,15 @@ class ArrayWriter:
         target: ArrayTarget,
         planes: range,
         threads: int,
-        written: Callable[[int], None] = lambda images: None,
+        written: Callable[[int, float], None] = lambda images, seconds: None,
         finished: Callable[[FinishedFiles], None] = lambda done: None,
     ) -> None:
         """Start the threads.
 
         Args:
             planes: the image planes that frames are composed for.
-            written: called with 1 after each image, from any thread.
+            written: called after each file, with the number of images in it, 1 or 0, and the processor seconds that it
+                took, from any thread.
             finished: called when all files of a camera are on disk, from any thread.
         """
         self._target, self._planes = target, planes
@@ -179,15 +181,18 @@ class ArrayWriter:
 
         left = _Countdown(len(tasks), finish)
 
-        def run(task: Callable[[], Path]) -> None:
+        def run(task: Callable[[], Path], images: int) -> None:
+            started = time.thread_time()
             path = task()
             try:
                 files[path.name] = digest(path)
             except OSError as error:
                 raise OutputError(f"{path}: cannot be read back: {reason(error)}") from error
+            self._written(images, time.thread_time() - started)
             left.count_down()
 
-        for future in [self._pool.submit(run, task) for task in tasks]:
+        images = len(self._planes)
+        for future in [self._pool.submit(run, task, int(i < images)) for i, task in enumerate(tasks)]:
             future.add_done_callback(self._pass_error)
 
     def _pass_error(self, future: Future[None]) -> None:
@@ -209,7 +214,6 @@ class ArrayWriter:
             }
             errors[p] = square_mean(more["error"]), float(image.mean(dtype=np.float64))
         write_image(path, image, target.format, target.attributes(c, stored.light, stored.group), more)
-        self._written(1)
         return path
 
     def _write_layers(self, layers: Layers, c: int) -> Path:

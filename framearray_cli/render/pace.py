@@ -1,0 +1,180 @@
+"""The pace of a render: processor time by kind of work, and from it the time left.
+
+Images come neither evenly nor from the start: the first one waits for the hits of N_r + 1 eyes, then each eye
+completes a frame with all its light positions at once, while threads write the frame before. So the time left is not
+images over images per second. It is the work left, hits to find, planes to compose and images to write, at what each
+has cost in processor time so far, over the number of processors kept busy.
+"""
+
+import math
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from framearray_cli.engine.frames.setup import FrameSetup
+
+from .automatic.cost import ADD, EYE_RAY, LOOK_UP, OBSCURANCE_RAY, SHADOW_RAY, STORE, VISIBILITY_RAY
+
+# Weight of the expected number of busy processors beside the measured one, seconds.
+EXPECTED_SECONDS = 0.1
+# Seconds after which an older measurement of busy processors counts 1 / e: others may use the machine, too.
+MEMORY = 30.0
+# Processor time of composing over that of finding, beyond what the model of `automatic/cost.py` expects: 2.0 to 2.7 in
+# the three jobs.
+COMPOSING = 2.2
+
+
+class Work(NamedTuple):
+    """An amount of work; `hits` native ones to find, `planes` of frames to compose, `images` to write."""
+
+    hits: float
+    planes: float
+    images: float
+
+    def __add__(self, other: "Work") -> "Work":  # type: ignore[override]
+        return Work(*(a + b for a, b in zip(self, other, strict=True)))
+
+    def __sub__(self, other: "Work") -> "Work":
+        return Work(*(max(a - b, 0.0) for a, b in zip(self, other, strict=True)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cost:
+    """What work costs.
+
+    Attributes:
+        each: processor seconds of one hit, one plane and one image.
+        busy: processor seconds per second.
+    """
+
+    each: Work
+    busy: float
+
+    def seconds(self, work: Work) -> float:
+        """Return the expected duration of some work."""
+        return sum(a * b for a, b in zip(self.each, work, strict=True)) / self.busy
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Expected:
+    """What is known of the cost before it is measured.
+
+    Attributes:
+        plane: processor time of composing a plane over that of finding a hit.
+        image: processor seconds of writing an image.
+        busy: processor seconds per second.
+    """
+
+    plane: float
+    image: float
+    busy: float
+
+
+def plane_cost(setup: FrameSetup, n_planes: int) -> float:
+    """Return the approximate time of composing one of n planes, over that of finding a hit at their light positions."""
+    eyes, hits = 2 * setup.n_r + 1, (2 * setup.n_r + 1) * float(setup.per_pixel.mean())
+    pixel = LOOK_UP * eyes / n_planes + ADD * hits + STORE
+    return COMPOSING * pixel * setup.n_pixels / hit_cost(setup, n_planes)
+
+
+def hit_cost(setup: FrameSetup, n_lights: int) -> float:
+    """Return the approximate nanoseconds of finding a hit at that many light positions."""
+    views = (4 if setup.balance else 2) * setup.n_r * VISIBILITY_RAY
+    base = EYE_RAY + OBSCURANCE_RAY * setup.obscurance.n_rays + views
+    return base + SHADOW_RAY * n_lights / setup.shadow_step
+
+
+def block_work(setup: FrameSetup, wanted: Sequence[int], *, still: bool = False) -> Work:
+    """Return the work of rendering the wanted cameras at the light positions of a setup.
+
+    Args:
+        still: the camera never moves: one frame is composed, and written as that of each camera.
+    """
+    frames = [0] if still else wanted
+    hits = float(setup.per_pixel[setup.eyes_for(frames)].sum()) * setup.n_pixels
+    return Work(hits, len(frames) * len(setup.kept), len(wanted) * len(setup.kept))
+
+
+class Clocks(NamedTuple):
+    """Seconds on the clock, and processor seconds of the program."""
+
+    wall: float
+    cpu: float
+
+    @classmethod
+    def now(cls) -> "Clocks":
+        return cls(time.perf_counter(), time.process_time())
+
+
+class Pace:
+    """Measures a render as it goes on, and estimates how long the rest will take. Any thread may call."""
+
+    def __init__(self, work: Work, expected: Expected | None, clocks: Callable[[], Clocks] = Clocks.now) -> None:
+        """Start to measure.
+
+        Args:
+            work: all of the render.
+            expected: for a start; None: there is no estimate before all kinds of work were measured.
+        """
+        self._work, self._expected, self._clocks = work, expected, clocks
+        self._lock = threading.Lock()
+        self._last = self._seen = clocks()
+        weight = EXPECTED_SECONDS if expected else 0.0
+        self._recent = Clocks(weight, weight * expected.busy if expected else 0.0)
+        self._done, self._spent = Work(0, 0, 0), Work(0, 0, 0)
+
+    def found(self, hits: float) -> None:
+        """The hits of an eye were found since the last call."""
+        self._lap(Work(hits, 0, 0))
+
+    def composed(self, planes: int) -> None:
+        """A frame was composed since the last call."""
+        self._lap(Work(0, planes, 0))
+
+    def written(self, images: int, seconds: float) -> None:
+        """Images were written on another thread, in that many processor seconds."""
+        with self._lock:
+            self._done += Work(0, 0, images)
+            self._spent += Work(0, 0, seconds)
+            # not spent on what the main thread is at
+            self._last = self._last._replace(cpu=self._last.cpu + seconds)
+
+    def _lap(self, done: Work) -> None:
+        with self._lock:
+            now = self._clocks()
+            kind = [int(amount > 0) * (now.cpu - self._last.cpu) for amount in done]
+            self._done += done
+            self._spent = Work(*(a + b for a, b in zip(self._spent, kind, strict=True)))
+            self._last = now
+
+    def cost(self) -> Cost | None:
+        """Return the cost per unit so far; None: not known yet, because not even one eye was found."""
+        with self._lock:
+            now, done, spent = self._clocks(), self._done, self._spent
+            wall, cpu = now.wall - self._seen.wall, now.cpu - self._seen.cpu
+            fading = math.exp(-wall / MEMORY)
+            self._recent = Clocks(fading * self._recent.wall + wall, fading * self._recent.cpu + cpu)
+            self._seen, recent = now, self._recent
+        hit, plane, image = (max(s, 0.0) / d if d > 0 else None for s, d in zip(spent, done, strict=True))
+        known = self._expected
+        if known and hit is not None:
+            plane = known.plane * hit if plane is None else plane
+            image = known.image if image is None else image
+        if hit is None or plane is None or image is None or recent.cpu <= 0:
+            return None
+        return Cost(each=Work(hit, plane, image), busy=recent.cpu / recent.wall)
+
+    def left(self) -> float | None:
+        """Return the expected seconds until the end; None: not known yet."""
+        cost = self.cost()
+        return None if cost is None else cost.seconds(self._work - self._done)
+
+
+def total_work(parts: Iterable[Work]) -> Work:
+    """Return all work together."""
+    total = Work(0, 0, 0)
+    for part in parts:
+        total += part
+    return total

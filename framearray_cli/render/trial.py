@@ -1,0 +1,154 @@
+"""Render a few small frames that are discarded: they show what a job costs, and have its kernels loaded or compiled."""
+
+import math
+import tempfile
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from framearray_cli.array.images.images import write_image
+from framearray_cli.base.arrays import Image
+from framearray_cli.base.hashing import digest
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.inputs.lights import some_lights
+from framearray_cli.engine.loop import ready_frames
+from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.scene.paths.few import few_planes, lights_at
+
+from .pace import Cost, Pace, block_work
+from .prepare import Prepared, image_ambient
+from .writer import ArrayWriter, array_target
+
+# Pixels per frame that suffice to have all kernels loaded or compiled, and to show how well pictures compress.
+FEW_PIXELS = 768
+# Copies of a small picture in a large one differ in brightness by up to these shares, from copy to copy and from pixel to
+# pixel, or they would compress better than pictures do.
+BY_COPY, BY_PIXEL = 0.2, 0.03
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """Measured cost of a few small frames.
+
+    Attributes:
+        pixels: per frame.
+        cost: per hit, plane and image of these frames.
+        file_bytes: per frame, all its images and layers.
+        image: (height, width, 3) one of them.
+    """
+
+    pixels: int
+    cost: Cost
+    file_bytes: float
+    image: Image
+
+
+def run_trial(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: int) -> Trial:
+    """Render and write frames of about that many pixels from the middle of the path.
+
+    Args:
+        setup: for all light positions of `prepared`.
+    """
+    small = small_frames(setup, pixels)
+    n, still = small.n_frames, prepared.still
+    with tempfile.TemporaryDirectory() as name, TracePool(small, prepared.threads) as pool:
+        pace = Pace(block_work(small, range(n), still=still), None)
+        folder = Path(name)
+        target = replace(array_target(prepared), directory=folder, resolution=(small.cams.width, small.cams.height))
+        planes = range(prepared.n_lights)
+        with ArrayWriter(target, planes, pool.threads, pace.written) as writer:
+            window = Window(small, image_ambient(ambient, prepared.lights), pool)
+            for j in ready_frames(window, small, range(n), pool, lambda c: pace.found(eye_hits(small, c))):
+                composed = window.compose(j, writer.block())
+                pace.composed(len(planes))
+                writer.write(composed, range(j, j + 1))
+            writer.finish()
+        cost = pace.cost()
+        file_bytes = sum(file.stat().st_size for file in folder.iterdir())
+    assert cost is not None
+    return Trial(pixels=small.n_pixels, cost=cost, file_bytes=file_bytes / n, image=composed.images[0].copy())
+
+
+def with_few_lights(
+    prepared: Prepared, setup: FrameSetup, ambient: Ambient, most: int
+) -> tuple[Prepared, FrameSetup, Ambient]:
+    """Return the same job with fewer light positions; its frames cost less, and need the same kernels."""
+    few = few_prepared(prepared, most)
+    if few is prepared:
+        return prepared, setup, ambient
+    planes = chosen_planes(prepared, most)
+    return (
+        few,
+        replace(setup, lights=few.light_arrays, kept=range(len(planes)), planes=few.lights.planes),
+        replace(ambient, intensity=ambient.intensity[planes], standard_error=ambient.standard_error[planes]),
+    )
+
+
+def few_prepared(prepared: Prepared, most: int) -> Prepared:
+    """Return the same job with at most about `most` light positions; the job itself if it has no more."""
+    planes = chosen_planes(prepared, most)
+    if len(planes) == prepared.n_lights:
+        return prepared
+    return replace(
+        prepared, lights=lights_at(prepared.lights, planes), light_arrays=some_lights(prepared.light_arrays, planes)
+    )
+
+
+def chosen_planes(prepared: Prepared, most: int) -> list[int]:
+    """Return the image planes of `few_prepared`; shadow steps need light positions that follow one another."""
+    return few_planes(prepared.lights, most, consecutive=prepared.job.samples.shadow_step > 1)
+
+
+def eye_hits(setup: FrameSetup, c: int) -> float:
+    """Return the number of native hits of eye c."""
+    return float(setup.per_pixel[c]) * setup.n_pixels
+
+
+def small_frames(setup: FrameSetup, pixels: int) -> FrameSetup:
+    """Return a few frames from the middle of the path, with about that many pixels each."""
+    n = min(2 * setup.n_r + 2, setup.n_frames)
+    first = (setup.n_frames - n) // 2
+    cams, span = setup.cams, slice(first, first + n)
+    shrink = min(math.sqrt(pixels / setup.n_pixels), 1.0)
+    width, height = (max(1, round(side * shrink)) for side in (cams.width, cams.height))
+    return replace(
+        setup,
+        cams=cams._replace(
+            position=cams.position[span],
+            right=cams.right[span],
+            up=cams.up[span],
+            forward=cams.forward[span],
+            focal=cams.focal * height / cams.height,
+            width=width,
+            height=height,
+        ),
+        per_pixel=setup.per_pixel[span],
+        allotment=None,  # of another resolution; `per_pixel` has its means
+    )
+
+
+def load_kernels(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> Trial:
+    """Load the kernels of all frames of a job, or compile them, before the first frame."""
+    return run_trial(*with_few_lights(prepared, setup, ambient, 1), FEW_PIXELS)
+
+
+def writing_cost(prepared: Prepared, image: Image) -> float:
+    """Return the processor seconds of writing an image, measured with one made of copies of a small one."""
+    target, random = array_target(prepared), np.random.default_rng(0)
+    width, height = target.resolution
+    h, w, _ = image.shape
+    down, across = -(-height // h), -(-width // w)
+    copies = np.tile(image.astype(np.float32), (down, across, 1)).reshape(down, h, across, w, 3)
+    copies *= random.uniform(1 - BY_COPY, 1 + BY_COPY, (down, 1, across, 1, 1)).astype(np.float32)
+    copies *= random.uniform(1 - BY_PIXEL, 1 + BY_PIXEL, copies.shape).astype(np.float32)
+    large = np.ascontiguousarray(copies.reshape(down * h, across * w, 3)[:height, :width].astype(image.dtype))
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name) / target.names.images[0].file(0)
+        started = time.thread_time()
+        write_image(path, large, target.format, target.attributes(0, 0), {})
+        digest(path)
+        return time.thread_time() - started
