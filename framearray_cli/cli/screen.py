@@ -6,38 +6,43 @@ Progress is a bar on a terminal, plain lines elsewhere, nothing if quiet.
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from types import TracebackType
 from typing import IO, Self
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.status import Status
 from rich.text import Text
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 from framearray_cli.base.units import duration
-from framearray_cli.engine.kernels.cache import problem
+from framearray_cli.engine.kernels.cache import kept_kernels, problem
+from framearray_cli.engine.kernels.clock import CompileClock, compile_clock
 
 out, err = Console(), Console(stderr=True)
 
 # Plain lines show in a log file that work goes on, without filling it up.
 SECONDS_BETWEEN_LINES = 5.0
+USUAL_KERNELS = 35  # of a render; jobs differ by a few
 REMARKS = ("note: ", "warning: ")  # how lines begin that are no results
 
 
-class _Rate(ProgressColumn):
-    """Print units per second, over the last few seconds."""
+class _Left(ProgressColumn):
+    """Print the time left."""
 
-    def __init__(self, unit: str) -> None:
+    def __init__(self, left: Callable[[], float | None]) -> None:
         super().__init__()
-        self._unit = unit
+        self._left = left
 
     def render(self, task: Task) -> Text:
-        rate = task.finished_speed or task.speed
-        return Text("" if rate is None else f"{rate:.1f} {self._unit}s/s")
+        return Text(_left_text(self._left()))
+
+
+def _left_text(seconds: float | None) -> str:
+    return "" if seconds is None else f"{duration(seconds)} left"
 
 
 class Screen:
@@ -54,6 +59,10 @@ class Screen:
         self._bar: Progress | None = None
         self._label = self._unit = ""
         self._started = self._last = 0.0
+        self._timed = False
+        self._deadline: float | None = None
+        self._clock: CompileClock | None = None
+        self._expected_kernels = 0
         self.done = self.total = 0
 
     def say(self, lines: Iterable[str]) -> None:
@@ -70,28 +79,68 @@ class Screen:
                 self._status.start()
             self._status.update(Text(what))
 
-    def compiling(self) -> None:
-        """Print why the first run on a machine starts slowly."""
-        when = "each time" if problem() else "the first time only"
-        self.say([f"compiling for this machine; that takes up to a minute, {when}"])
+    @contextmanager
+    def compiling(self) -> Iterator[None]:
+        """Show what is compiled within the block as a stage of its own, which `compiled` ends, or the block."""
 
-    def count(self, label: str, total: int, unit: str) -> None:
-        """Start to count up to a total."""
-        self._label, self._unit, self.total = label, unit, total
+        def begin() -> None:
+            self._expected_kernels = max(USUAL_KERNELS - kept_kernels(), 0)
+            keeping = "each time, as they cannot be kept" if problem() else "once"
+            self.say([f"compiling kernels for this machine, {keeping}"])
+            if self._bar is None:
+                self._open_bar("compiling", self._expected_kernels or None)
+
+        def count(kernels: int) -> None:
+            if self._clock is None:  # the stage has ended; a few kernels came late
+                return
+            total = max(self._expected_kernels, kernels)
+            of = f" of {total}" if self._expected_kernels else ""
+            if self._bar is not None:
+                self._bar.update(self._task, completed=kernels, total=total)
+            elif self._is_time():
+                self.say([f"compiling: {kernels}{of} kernels"])
+
+        self._last = time.monotonic()
+        with compile_clock(begin, count) as self._clock:
+            yield
+            self.compiled()
+
+    def compiled(self) -> None:
+        """Report what was compiled, if anything, and end the stage."""
+        if self._clock is not None and self._clock.kernels:
+            self._close_bar()
+            self.report_compiled(self._clock.kernels, self._clock.seconds)
+            self._clock = None
+
+    def report_compiled(self, kernels: int, seconds: float) -> None:
+        """Print the number of kernels compiled, and how long that took."""
+        kept = "not kept" if problem() else "kept for the next run"
+        self.say([f"compiled {kernels} kernels in {duration(seconds)}; {kept}"])
+
+    def count(self, label: str, total: int, unit: str, *, timed: bool = False) -> None:
+        """Start to count up to a total.
+
+        Args:
+            timed: `expect` says how much time is left; otherwise the units finished so far do.
+        """
+        self.compiled()
+        self._label, self._unit, self.total, self._timed = label, unit, total, timed
         self._started = self._last = time.monotonic()
-        self._end_wait()
-        if self._moving:
-            self._bar = Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                MofNCompleteColumn(),
-                _Rate(unit),
-                TimeRemainingColumn(),
-                console=self._console,
-                transient=True,
-            )
-            self._task = self._bar.add_task(label, total=total)
-            self._bar.start()
+        self._open_bar(label, total)
+
+    def expect(self, seconds: float | None) -> None:
+        """Set the time left; None: not known. Any thread may call."""
+        with self._lock:
+            self._deadline = None if seconds is None else time.monotonic() + seconds
+        if seconds is not None:
+            self.advance(0)
+
+    def left(self) -> float | None:
+        """Return the seconds left; None: not known."""
+        now = time.monotonic()
+        if self._timed:
+            return None if self._deadline is None else max(self._deadline - now, 0.0)
+        return (self.total - self.done) * (now - self._started) / self.done if self.done > 0 else None
 
     def counter(self, label: str, unit: str) -> Callable[[int, int], None]:
         """Return a function of (units done, total) that counts one more unit; its first call starts to count."""
@@ -110,21 +159,41 @@ class Screen:
             if self._bar is not None:
                 self._bar.advance(self._task, units)
                 return
-            now = time.monotonic()
-            if self._quiet or self.done <= 0 or now - self._last < SECONDS_BETWEEN_LINES:
+            left = self.left()
+            if left is None or not self._is_time():
                 return
-            self._last = now
-            rate = self.done / (now - self._started)
-            left = duration((self.total - self.done) / rate)
-            line = f"{self._label}: {self.done} of {self.total} {self._unit}s, {rate:.1f} per second, {left} left"
+            line = f"{self._label}: {self.done:,} of {self.total:,} {self._unit}s, {_left_text(left)}"
         self.say([line])
+
+    def _is_time(self) -> bool:
+        """Whether another plain line may be printed."""
+        now = time.monotonic()
+        if self._quiet or self._moving or now - self._last < SECONDS_BETWEEN_LINES:
+            return False
+        self._last = now
+        return True
+
+    def _open_bar(self, label: str, total: int | None) -> None:
+        """Show a bar, on a terminal, in place of what is there."""
+        self._close_bar()
+        self._end_wait()
+        if self._moving:
+            left = _Left(lambda: self.left() if self.total else None)
+            columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), left)
+            self._bar = Progress(*columns, console=self._console, transient=True)
+            self._task = self._bar.add_task(label, total=total)
+            self._bar.start()
+
+    def _close_bar(self) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
 
     def end(self) -> None:
         """Remove the moving line; counting has ended."""
         with suppress(OSError):  # a terminal that was closed
             self._end_wait()
-            if self._bar is not None:
-                self._bar.stop()
+            self._close_bar()
 
     def _end_wait(self) -> None:
         if self._status is not None:

@@ -25,8 +25,8 @@ from .writer import ArrayWriter, array_target
 
 # Pixels per frame that suffice to have all kernels loaded or compiled, and to show how well pictures compress.
 FEW_PIXELS = 768
-# Copies of a small picture in a large one differ in brightness by up to these shares, from copy to copy and from pixel to
-# pixel, or they would compress better than pictures do.
+# Copies of a small picture in a large one differ in brightness by up to these shares, from copy to copy and from pixel
+# to pixel, or they would compress better than pictures do.
 BY_COPY, BY_PIXEL = 0.2, 0.03
 
 

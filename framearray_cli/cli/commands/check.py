@@ -1,6 +1,5 @@
 """`framearray check`."""
 
-from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.render.messages import estimate_lines, warning_lines
 
 from ..options import JobFile, Output, Sets, Strict, Threads, load_job, refuse_warnings
@@ -16,7 +15,7 @@ def check(
         screen.wait("reading the scene and rendering a few small frames")
         from framearray_cli.render.estimate import check as run
 
-        with compile_clock(screen.compiling):
+        with screen.compiling():
             estimate = run(job)
     print_result(estimate_lines(estimate))
     if strict:

@@ -6,8 +6,6 @@ from typing import Annotated
 
 import typer
 
-from framearray_cli.engine.kernels.clock import compile_clock
-
 from ..options import Quiet, output_path
 from ..screen import Screen, err, print_result
 from ..values import whole
@@ -48,7 +46,7 @@ def init(
         from framearray_cli.starter import StartOptions
         from framearray_cli.starter import init as run
 
-        with compile_clock(screen.compiling):
+        with screen.compiling():
             options = StartOptions(camera=camera, frames=frames, lights=lights, inside=inside)
             start = run(scene, job_file, options, force=force)
         screen.say(start.about)

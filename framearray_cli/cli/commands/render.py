@@ -10,7 +10,6 @@ import typer
 from framearray_cli.array.places import read_indices
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.units import MOST_THREADS, size
-from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.render.messages import (
     ambient_lines,
     chunks_line,
@@ -124,7 +123,7 @@ def render_on_screen(
 
         events = RenderingEvents(screen, job, strict=strict)
         try:
-            with compile_clock(screen.compiling):
+            with screen.compiling():
                 if options is None:
                     summary = run(job, events, restart=restart, cameras=cameras)
                 else:
@@ -181,7 +180,17 @@ class RenderingEvents(PartEvents):
     def planned(self, ambient: "Ambient") -> None:
         self._screen.say(ambient_lines(ambient_figures(ambient)))
         self.printed = ambient.notes
-        self._screen.count("rendering", self._total, "image")
+        self._screen.wait("loading kernels")
+
+    def loaded(self) -> None:
+        self._screen.compiled()
+        self._screen.wait("preparing frames")
+
+    def tracing(self) -> None:
+        self._screen.count("rendering", self._total, "image", timed=True)
+
+    def expected(self, seconds: float | None) -> None:
+        self._screen.expect(seconds)
 
     def warned(self, warnings: tuple[str, ...]) -> None:
         if self._strict:
@@ -202,7 +211,7 @@ class RenderingEvents(PartEvents):
 
     def chunked(self, workers: int, chunks: "Chunks") -> None:
         self._screen.say([f"{workers_text(workers)}, {chunks_line(chunks)}"])
-        self._screen.count("rendering", self._total, "image")
+        self._screen.count("rendering", self._total, "image", timed=True)
 
     def ambient_known(self, figures: "AmbientFigures") -> None:
         self._screen.say(ambient_lines(figures))
@@ -211,7 +220,10 @@ class RenderingEvents(PartEvents):
         self._screen.say(target_lines(target))
 
     def compiling(self) -> None:
-        self._screen.compiling()
+        self._screen.say(["workers compile kernels for their machines"])
+
+    def compiled(self, kernels: int, seconds: float) -> None:
+        self._screen.report_compiled(kernels, seconds)
 
 
 def _add_space(error: OutputError, folder: Path) -> None:

@@ -7,7 +7,6 @@ import typer
 
 from framearray_cli.array.manifest import MAIN_AXIS
 from framearray_cli.array.places import CAMERA_AXIS, read_indices
-from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.render.messages import scene_lines
 
 from ..options import JobFile, Quiet, Threads, load_job
@@ -91,7 +90,7 @@ def report(
             times=times,
         )
         beside = job.output.directory.with_name(f"{job.output.directory.name}-report")
-        with compile_clock(screen.compiling):
+        with screen.compiling():
             made = reporting.make_report(job, folder.absolute() if folder else beside, options, MeasuringEvents())
         reporting.write_report(made)
     if not quiet:

@@ -78,6 +78,12 @@ def kernel_folder() -> Path | None:
     return None
 
 
+def kept_kernels() -> int:
+    """Return the number of kernels that are kept for this state of the source."""
+    folder = kernel_folder()
+    return sum(1 for _ in folder.rglob("*.nbi")) if folder else 0
+
+
 def problem() -> str:
     """Why kernels could not be read or written; empty if they could."""
     return _problems[0] if _problems else ""

@@ -29,3 +29,6 @@ class PartEvents(RenderEvents):
 
     def compiling(self) -> None:
         """A worker is compiling kernels."""
+
+    def compiled(self, kernels: int, seconds: float) -> None:
+        """The first worker that compiled kernels has that many, after that time."""

@@ -14,6 +14,7 @@ from ..progress import AmbientFigures
 from ..session import RenderSession
 from ..target.pilot import Target
 from .chunks import Chunks
+from .pace import ChunkPace
 from .progress import PartEvents
 
 # Seconds between two checks for results, and seconds that workers get to stop.
@@ -58,6 +59,7 @@ class ChunkQueue:
         self._at_work: dict[Any, tuple[int, ...]] = {}
         self._left = {chunk[0]: len(chunk) * self._n_lights for chunk in chunks.each}
         self._chunk_ended, self._lock = threading.Event(), threading.Lock()  # set when a chunk ends; guards the counts
+        self._pace = ChunkPace()
         self._deaths: dict[int, tuple[int, int]] = {}  # by chunk: number of deaths, and images left at the last
         self._received: set[str] = set()
         self.notes: tuple[str, ...] = ()
@@ -84,6 +86,7 @@ class ChunkQueue:
 
         future = self._client.submit(render_chunk, self._common, chunk, pure=False)
         self._at_work[future] = chunk
+        self._pace.begin(chunk[0], self._left[chunk[0]])
         future.add_done_callback(lambda _: self._chunk_ended.set())
 
     def _collect(self, future: Any, chunk: tuple[int, ...]) -> None:
@@ -145,6 +148,9 @@ class ChunkQueue:
         message = event[1]
         if "left" in message:
             self._count_written(message["chunk"], message["left"])
+        if message.get("seconds") is not None:
+            self._pace.expect(message["chunk"], message["seconds"])
+            self._events.expected(self._pace.left(self._left))
         if self._first("ambient", message):
             figures = message["ambient"]
             self._events.ambient_known(AmbientFigures(**figures | {"notes": tuple(figures["notes"])}))
@@ -153,6 +159,8 @@ class ChunkQueue:
             self._events.target_known(Target(**message["target"] | {"frames": (least, most)}))
         if self._first("compiling", message):
             self._events.compiling()
+        if self._first("compiled", message):
+            self._events.compiled(*message["compiled"])
 
     def _first(self, kind: str, message: dict[str, Any]) -> bool:
         """Whether this is the first message of a kind that all workers send and only one event reports."""

@@ -18,7 +18,7 @@ from framearray_cli.base.errors import BusyError, FrameArrayError, JobError
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.hashing import digest
 from framearray_cli.base.units import MOST_THREADS
-from framearray_cli.engine.kernels.clock import compile_clock
+from framearray_cli.engine.kernels.clock import CompileClock, compile_clock
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_of_table
@@ -108,7 +108,7 @@ def render_chunk(common: dict[str, Any], cameras: tuple[int, ...]) -> dict[str, 
         if problem := worker_problem(common):
             return {"error": "WorkerError", "problems": [problem], "notes": []}
         reporter = _Reporter(worker, Common(**common), cameras)
-        with reporter.watch_task(), compile_clock(lambda: reporter.send(compiling=True)):
+        with reporter.watch_task(), compile_clock(lambda: reporter.send(compiling=True)) as reporter.clock:
             job = reporter.common.job(worker.state.nthreads)
             summary = _retry_while_busy(lambda: render(job, reporter, cameras=cameras, pilots=False))
         return {"notes": list(reporter.notes), "peak_memory": summary.peak_memory}
@@ -147,6 +147,8 @@ class _Reporter(RenderEvents):
         self._worker, self.common, self._first = worker, common, cameras[0]
         self._key = worker.get_current_task()
         self._lock, self._left, self._last = threading.Lock(), 0, 0.0
+        self._seconds: float | None = None
+        self.clock = CompileClock()
         self._unwanted = False
         self.notes: tuple[str, ...] = ()
 
@@ -190,6 +192,15 @@ class _Reporter(RenderEvents):
         self.notes = ambient.notes
         self.send(ambient=asdict(ambient_figures(ambient)))
 
+    def loaded(self) -> None:
+        if self.clock.kernels:
+            self.send(compiled=[self.clock.kernels, self.clock.seconds])
+
+    def expected(self, seconds: float | None) -> None:
+        first, self._seconds = self._seconds is None, seconds
+        if first and seconds is not None:
+            self.send(left=self._left, seconds=seconds)
+
     def allotted(self, target: Target) -> None:
         self._raise_if_unwanted()
         self.send(target=asdict(target))
@@ -203,7 +214,7 @@ class _Reporter(RenderEvents):
                 return
             self._last = now
             left = self._left
-        self.send(left=left)
+        self.send(left=left, seconds=self._seconds)
 
 
 class IgnoreSignals(WorkerPlugin):
