@@ -115,7 +115,7 @@ class Screen:
     def report_compiled(self, kernels: int, seconds: float) -> None:
         """Print the number of kernels compiled, and how long that took."""
         kept = "not kept" if problem() else "kept for the next run"
-        self.say([f"compiled {kernels} kernels in {duration(seconds)}; {kept}"])
+        self.say([f"compiled {kernels} kernel{'s' if kernels > 1 else ''} in {duration(seconds)}; {kept}"])
 
     def count(self, label: str, total: int, unit: str, *, timed: bool = False) -> None:
         """Start to count up to a total.

@@ -2,6 +2,8 @@
 
 import io
 import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import pytest
 from rich.console import Console
@@ -10,6 +12,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.units import duration, size
 from framearray_cli.cli import screen
 from framearray_cli.cli.screen import Screen, print_result, say
+from framearray_cli.engine.kernels.clock import CompileClock
 
 
 class Full(io.StringIO):
@@ -58,8 +61,27 @@ def test_a_log_gets_a_line_in_five_seconds_at_most(clock):
             shown.advance()
     lines = text(console).splitlines()
     assert lines == [
-        "rendering: 40 of 1200 images, 8.0 per second, 2 min 25 s left",
-        "rendering: 80 of 1200 images, 8.0 per second, 2 min 20 s left",
+        "rendering: 40 of 1,200 images, 2 min 25 s left",
+        "rendering: 80 of 1,200 images, 2 min 20 s left",
+    ]
+
+
+def test_the_time_left_is_what_the_work_expects_and_runs_down_between_two_estimates(clock):
+    console = plain()
+    with Screen(console) as shown:
+        shown.count("rendering", 1200, "image", timed=True)
+        clock.now += 6
+        shown.advance(10)  # nothing is expected yet
+        clock.now += 1
+        shown.expect(90.0)
+        clock.now += 5
+        shown.advance(10)
+        clock.now += 5
+        shown.expect(None)
+        shown.advance(10)
+    assert text(console).splitlines() == [
+        "rendering: 10 of 1,200 images, 1 min 30 s left",
+        "rendering: 20 of 1,200 images, 1 min 25 s left",
     ]
 
 
@@ -70,12 +92,82 @@ def test_a_log_gets_no_waiting(clock):
     assert text(console) == ""
 
 
-def test_compiling_is_printed_unless_quiet(clock):
-    for quiet in (False, True):
-        console = plain()
-        with Screen(console, quiet=quiet) as shown:
-            shown.compiling()
-        assert bool(re.search("compiling .* the first time only", text(console))) is not quiet
+@pytest.fixture
+def compiler(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+    """Replace numba's events: the function returned "compiles" kernels, three seconds each."""
+    told: list[Callable[..., None]] = []
+    found = CompileClock()
+
+    @contextmanager
+    def compile_clock(*calls: Callable[..., None]) -> Iterator[CompileClock]:
+        told[:] = calls
+        yield found
+
+    def compile_kernels(n: int) -> None:
+        begins, compiled = told
+        if not found.kernels:
+            begins()
+        for _ in range(n):
+            screen.time.now += 3.0  # type: ignore[attr-defined]
+            found.kernels, found.seconds = found.kernels + 1, found.seconds + 3.0
+            compiled(found.kernels)
+
+    monkeypatch.setattr(screen, "compile_clock", compile_clock)
+    monkeypatch.setattr(screen, "kept_kernels", lambda: screen.USUAL_KERNELS - 4)
+    return compile_kernels
+
+
+@pytest.mark.parametrize(
+    ("problem", "when", "kept"),
+    [("", "once", "kept for the next run"), ("full", "each time, as they cannot be kept", "not kept")],
+)
+def test_compiling_is_a_stage_with_a_duration(clock, compiler, monkeypatch, problem, when, kept):
+    monkeypatch.setattr(screen, "problem", lambda: problem)
+    console = plain()
+    with Screen(console) as shown, shown.compiling():
+        compiler(5)
+        shown.count("rendering", 8, "image")
+        compiler(1)  # too late for the stage
+    assert [line for line in text(console).splitlines() if not line.startswith("note: ")] == [
+        f"compiling kernels for this machine, {when}",
+        "compiling: 2 of 4 kernels",
+        "compiling: 4 of 4 kernels",
+        f"compiled 5 kernels in 15.0 s; {kept}",
+    ]
+
+
+def test_compiling_is_not_printed_if_quiet(clock, compiler):
+    console = plain()
+    with Screen(console, quiet=True) as shown, shown.compiling():
+        compiler(5)
+    assert text(console) == ""
+
+
+def test_kernels_that_are_loaded_are_not_mentioned(clock, compiler):
+    console = plain()
+    with Screen(console) as shown, shown.compiling():
+        shown.count("rendering", 8, "image")
+    assert text(console) == ""
+
+
+def test_compiling_within_a_command_that_counts_nothing_ends_with_it(clock, compiler):
+    console = plain()
+    with Screen(console) as shown, shown.compiling():
+        compiler(1)
+    assert text(console).splitlines()[-1] == "compiled 1 kernel in 3.0 s; kept for the next run"
+
+
+def test_a_terminal_shows_a_bar_of_kernels(compiler, clock):
+    console = terminal()
+    with Screen(console) as shown, shown.compiling():
+        shown.wait("reading the scene")
+        compiler(3)
+        shown.wait("estimating")  # the bar stays
+        assert "compiling" in text(console)
+        assert re.search(r"3\S*/\S*4", text(console))
+        shown.count("rendering", 8, "image")
+    assert "compiled 3 kernels in 9.0 s" in text(console)
+    assert text(console).count("\x1b[?25l") == text(console).count("\x1b[?25h")
 
 
 def test_quiet_is_silent_on_a_terminal_too(clock):

@@ -16,3 +16,21 @@ def test_each_clock_reports_once_and_measures_its_own_time() -> None:
     before = outer.seconds
     numba.njit(lambda x: x - 1)(1)
     assert outer.seconds == before, "a clock that has ended measures nothing"
+
+
+def test_kernels_count_once_and_functions_of_others_never() -> None:
+    """A kernel that is compiled for two kinds of arguments is one; numba compiles functions of its own, too."""
+    counts: list[int] = []
+
+    def own(x):
+        return x + 1
+
+    own.__module__ = "framearray_cli.made_up"
+    with compile_clock(compiled=counts.append) as clock:
+        numba.njit(lambda x: x + 2)(1)
+        assert clock.kernels == 0
+        kernel = numba.njit(own)
+        kernel(1)
+        kernel(1.5)
+    assert clock.kernels == 1
+    assert counts == [1]

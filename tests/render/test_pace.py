@@ -1,0 +1,128 @@
+"""The time left of a render, on clocks that a test sets."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from framearray_cli.render.pace import Clocks, Expected, Pace, Work, block_work
+
+# Of a render on two cores that are always busy: processor seconds of the hits of an eye, of a frame and of its images.
+EYE, FRAME, IMAGES = 4.0, 1.0, 3.0
+HITS, PLANES = 1000.0, 10
+
+
+@dataclass
+class Time:
+    """Clocks of a machine with two cores."""
+
+    wall: float = 50.0
+    cpu: float = 10.0
+
+    def spend(self, seconds: float, cores: float = 2.0) -> None:
+        self.cpu += seconds
+        self.wall += seconds / cores
+
+    def now(self) -> Clocks:
+        return Clocks(self.wall, self.cpu)
+
+
+def simulate(pace: Pace, time: Time, n: int, n_r: int, blocks: int = 1, cores: float = 2.0) -> list[tuple[float, Any]]:
+    """Render n frames in some blocks; return when the time left was asked for, and the answers."""
+    answers = []
+
+    def ask() -> None:
+        answers.append((time.wall, pace.left()))
+
+    for _ in range(blocks):
+        for c in range(n):
+            time.spend(EYE, cores)
+            pace.found(HITS)
+            ask()
+            ready = [c - n_r] if c >= n_r else []
+            for _ in ready if c < n - 1 else range(min(n_r, c) + 1):  # the last eye completes all frames behind it
+                time.spend(FRAME, cores)
+                pace.composed(PLANES)
+                ask()
+                for _ in range(PLANES):
+                    time.spend(IMAGES / PLANES, cores)
+                    pace.written(1, IMAGES / PLANES)
+                ask()
+    return answers
+
+
+def worst(answers: list[tuple[float, Any]], end: float) -> float:
+    """Return the largest ratio of an answer to the truth, or its inverse, up to 90 % of the time."""
+    start = answers[0][0]
+    ratios = [left / (end - wall) for wall, left in answers if wall < start + 0.9 * (end - start)]
+    return max(max(ratio, 1 / ratio) for ratio in ratios)
+
+
+def whole(n: int, blocks: int = 1) -> Work:
+    return Work(n * HITS * blocks, n * PLANES * blocks, n * PLANES * blocks)
+
+
+def expected(factor: float = 1.0, busy: float = 2.0) -> Expected:
+    return Expected(plane=factor * FRAME / PLANES / (EYE / HITS), image=factor * IMAGES / PLANES, busy=busy)
+
+
+@pytest.mark.parametrize(("n", "n_r", "blocks"), [(40, 3, 1), (12, 3, 3), (20, 0, 1), (6, 16, 1)])
+def test_it_is_right_from_the_first_eye_on(n: int, n_r: int, blocks: int) -> None:
+    """First the window fills, without an image; then there is work of all kinds; at the end, images without eyes."""
+    time = Time()
+    pace = Pace(whole(n, blocks), expected(), time.now)
+    assert pace.left() is None
+    answers = simulate(pace, time, n, n_r, blocks)
+    assert worst(answers, time.wall) < 1.001
+    assert pace.left() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_wrong_expectation_is_forgotten_with_the_first_frame() -> None:
+    time = Time()
+    pace = Pace(whole(40), expected(factor=3.0, busy=8.0), time.now)
+    answers = simulate(pace, time, 40, 3)
+    assert worst(answers, time.wall) > 1.5
+    assert worst([answer for answer in answers if answer[0] > answers[6][0]], time.wall) < 1.1
+
+
+def test_a_machine_that_others_use_takes_longer() -> None:
+    time = Time()
+    pace = Pace(whole(40), expected(), time.now)
+    assert worst(simulate(pace, time, 40, 3, cores=0.5), time.wall) < 1.1
+
+
+def test_a_camera_at_rest_is_all_writing() -> None:
+    """One eye, one frame, and a thousand images of it."""
+    time = Time()
+    pace = Pace(Work(HITS, PLANES, 1000), expected(), time.now)
+    time.spend(EYE)
+    pace.found(HITS)
+    time.spend(FRAME)
+    pace.composed(PLANES)
+    answers = [(time.wall, pace.left())]
+    for _ in range(1000):
+        time.spend(0.3)
+        pace.written(1, 0.3)
+        answers.append((time.wall, pace.left()))
+    assert worst(answers, time.wall) < 1.001
+
+
+def test_without_an_expectation_nothing_is_known_before_all_was_measured() -> None:
+    time = Time()
+    pace = Pace(whole(10), None, time.now)
+    answers = simulate(pace, time, 10, 3)
+    known = [left is not None for _, left in answers]
+    assert known == [False] * 5 + [True] * (len(known) - 5)
+    assert worst(answers[5:], time.wall) < 1.001
+
+
+def test_the_work_of_a_resumed_render_is_that_of_the_missing_frames() -> None:
+    setup: Any = SimpleNamespace(
+        per_pixel=np.array([2.0, 2, 2, 2, 2, 4]), n_pixels=100, kept=range(3),
+        eyes_for=lambda wanted: sorted({c for j in wanted for c in range(max(j - 1, 0), min(j + 1, 5) + 1)}),
+    )  # fmt: skip
+    assert block_work(setup, range(6)) == Work(1400, 18, 18)
+    assert block_work(setup, [4]) == Work(800, 3, 3)
+    assert block_work(setup, range(6), still=True) == Work(400, 3, 18)
