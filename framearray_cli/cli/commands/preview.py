@@ -7,7 +7,6 @@ import typer
 
 from framearray_cli.array.places import MIDDLE_PLACE, read_axes, read_indices
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.engine.kernels.clock import compile_clock
 
 from ..options import output_path
 from ..screen import Screen, err, print_result
@@ -49,7 +48,7 @@ def preview_on_screen(
     places = {axis: _one(option, text, axes[axis], axis) for axis, (option, text) in wanted.items()}
     with output_file(file, ".png", force=force or target is None) as part, Screen(err, quiet=quiet) as screen:
         screen.wait("rendering a preview")
-        with compile_clock(screen.compiling):
+        with screen.compiling():
             made = render_preview(job, c, places)
         exposure = job.output.exposure if name in FOR_SCREENS else 0.0
         write_image(part, made.image, ImageFormat(format=name, exposure=exposure))  # type: ignore[arg-type]
