@@ -8,7 +8,7 @@ import typer
 
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS
 
-from ..options import ArrayFolder, Quiet, output_path
+from ..options import ArrayFolder, Quiet, Strict, output_path, refuse_warnings
 from ..screen import Screen, err, print_result
 from ..values import number
 
@@ -80,6 +80,7 @@ def assemble(
     exposure: Stops = 0.0,
     view: View = "srgb",
     label: Label = False,
+    strict: Strict = False,
     quiet: Quiet = False,
 ) -> None:
     """Cut a movie or an image sequence out of a frame array."""
@@ -93,6 +94,12 @@ def assemble(
     path_file = None if str(path_file) in choices else path_file  # ./walk is a file
     _refuse_conflicts(path_file, kinds, at, seconds)
     with Screen(err, quiet=quiet) as screen:
+
+        def warn(warnings: Sequence[str]) -> None:
+            if strict:
+                refuse_warnings(path_file or array, warnings)
+            screen.say([f"warning: {warning}" for warning in warnings])
+
         result = run(
             array,
             path_file or Sweep(kind=kinds[0], at=tuple(at or ()), seconds=seconds),
@@ -101,6 +108,7 @@ def assemble(
             fps=fps,
             positions="blend" if blend else None,
             progress=screen.counter("assembling", "frame"),
+            warned=warn,
         )
     if not quiet:
         rate = f"{float(result.fps):g} frames per second"

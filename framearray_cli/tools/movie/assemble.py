@@ -1,6 +1,6 @@
 """Assemble a movie, or a numbered image sequence, along a path; all input is the manifest and the images it names."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -11,7 +11,7 @@ from typing import Any, Protocol
 from numpy.typing import NDArray
 
 from framearray_cli.array.images.check import check_image
-from framearray_cli.array.images.images import format_name, require_writer
+from framearray_cli.array.images.images import FOR_SCREENS, format_name, require_writer
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures, Relight
@@ -30,6 +30,7 @@ from .sequence import check_look, sequence_pattern, write_sequence
 from .sweep import Sweep, sweep_path
 from .timeline import Shot, Timeline, array_problems, make_timeline
 from .video import VIDEOS, open_video, require_encoder
+from .warnings import path_warnings, picture_warnings
 
 MOVIES = (*VIDEOS, *ANIMATIONS)
 
@@ -65,6 +66,7 @@ def assemble_movie(
     fps: float | None = None,
     positions: Mode | None = None,
     progress: Progress | None = None,
+    warned: Callable[[Sequence[str]], None] = lambda warnings: None,
 ) -> AssembleResult:
     """Assemble a movie or an image sequence from a frame array; it appears whole or not at all.
 
@@ -77,6 +79,7 @@ def assemble_movie(
         fps: frames per second; None: those of the path or the array.
         positions: "nearest" or "blend"; None: as the path says at its top.
         progress: called after each frame.
+        warned: called once, before the first frame, with what would make the movie useless; may raise an error.
 
     Raises:
         JobError: the path is broken, or asks for places that the array lacks.
@@ -100,12 +103,16 @@ def assemble_movie(
         else:
             require_animation(target.suffix.lower())
         _check_images(pictures, line)
+        warned([*path_warnings(movie, line), *picture_warnings(pictures, line, look)])
         _write_movie(pictures, line, target, look, report)
     else:
         pattern = sequence_pattern(target, _own_suffix(manifest), MOVIES)
         check_look(pattern, look)
         require_writer(format_name(pattern))  # type: ignore[arg-type]  # checked by sequence_pattern
         _check_images(pictures, line)
+        for_screens = format_name(pattern) in FOR_SCREENS
+        levels = picture_warnings(pictures, line, look) if for_screens else ()
+        warned([*path_warnings(movie, line), *levels])
         write_sequence(pictures, line, pattern, look, report)
         target = pattern.parent
     n_images = len(set(line.shots))
