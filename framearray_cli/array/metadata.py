@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import reason, write_bytes
+from framearray_cli.base.files import reason, require_file, write_bytes
 from framearray_cli.base.hashing import data_digest
 from framearray_cli.base.units import frame_rate
 
-from .images.rates import frame_rate_of, with_frame_rate
+from .images.rates import frame_rate_of, read_rate, with_frame_rate
 from .manifest import Manifest, array_files
 from .manifest_toml import write_manifest
 from .present import list_present
@@ -87,9 +87,14 @@ def take_over_metadata(
 
 
 def _read_rates(journal: Path) -> set[Fraction]:
-    """Read the rates that files may have; none if there is no journal, or it is damaged."""
+    """Read the rates that files may have; none if there is no journal, or it is damaged.
+
+    Raises:
+        OutputError: it is no file.
+    """
+    require_file(journal, "; remove it")
     try:
-        return {Fraction(rate) for rate in json.loads(journal.read_bytes())}
+        return {read_rate(rate) for rate in json.loads(journal.read_bytes())}
     except (OSError, ValueError, TypeError, ZeroDivisionError, RecursionError):
         return set()
 

@@ -10,7 +10,7 @@ from support.tiny import WALK
 
 import framearray_cli.array.metadata as metadata
 from framearray_cli.array.images.images import read_image
-from framearray_cli.array.images.rates import frame_rate_of, with_frame_rate
+from framearray_cli.array.images.rates import frame_rate_of, read_rate, with_frame_rate
 from framearray_cli.array.integrity import verify
 from framearray_cli.array.lock import ArrayFolder
 from framearray_cli.array.manifest_toml import read_manifest
@@ -193,3 +193,17 @@ def test_another_run_in_the_folder_comes_first(scene: Path, tmp_path: Path) -> N
 def test_files_without_a_rate_stay(data: bytes) -> None:
     assert frame_rate_of(data) is None
     assert with_frame_rate(data, frame_rate(OTHER)) == data
+
+
+@pytest.mark.parametrize("text", ["", "1e999999999", "-1", "0.5", "1/0", "9" * 10, "1/2/3", "\u0661"])
+def test_texts_that_are_no_rate_are_refused(text: str) -> None:
+    with pytest.raises((ValueError, ZeroDivisionError)):
+        read_rate(text)
+
+
+@pytest.mark.parametrize("journal", [b"", b"[1]", b'["1e999999999"]', b'{"a": 1}', b"[" * 10**5])
+def test_a_broken_journal_is_replaced(scene: Path, tmp_path: Path, journal: bytes) -> None:
+    render(job(scene, tmp_path), cameras=(0,))
+    (tmp_path / "records" / metadata.JOURNAL).write_bytes(journal)
+    assert render(job(scene, tmp_path, fps=OTHER), cameras=(0,)).images == 0
+    assert rates(tmp_path) == {frame_rate(OTHER)} and not metadata.was_interrupted(tmp_path)

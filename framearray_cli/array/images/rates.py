@@ -3,6 +3,7 @@
 The result has the bytes that a render at the new rate writes, as only EXR and PNG keep the rate.
 """
 
+import re
 import struct
 import zlib
 from collections.abc import Iterator
@@ -19,10 +20,21 @@ def frame_rate_of(data: bytes) -> Fraction | None:
         if data.startswith(_EXR):
             return next((Fraction(*_RATIONAL.unpack_from(data, at)) for at in _exr_rates(data)), None)
         if data.startswith(_PNG):
-            return next((Fraction(text.decode("ascii")) for _, _, text in _png_rates(data)), None)
+            return next((read_rate(text.decode("ascii")) for _, _, text in _png_rates(data)), None)
     except (ValueError, ZeroDivisionError, struct.error):
         return None
     return None
+
+
+def read_rate(text: str) -> Fraction:
+    """Read a rate as `str` writes it, "24" or "24000/1001".
+
+    Raises:
+        ValueError, ZeroDivisionError: the text is no such fraction of two numbers of at most nine digits.
+    """
+    if not re.fullmatch(r"\d{1,9}(/\d{1,9})?", text, re.ASCII):
+        raise ValueError(f"expected a rate such as 24000/1001, got {text[:60]!r}")
+    return Fraction(text)
 
 
 def with_frame_rate(data: bytes, rate: Fraction) -> bytes:

@@ -36,6 +36,7 @@ from .streams import Stream, choose_coding, layer_streams, read_values, source_f
 
 INDEX_FILE = "index.json"
 TILES_FOLDER = "tiles"
+TILES_DEPEND_ON = ("format", "fingerprint", "resolution", "n_cameras", "axes", "small", "streams")  # keys of the index
 KEPT_LAYER_FILES = 6  # a file holds all layers of a camera; codings are chosen from the same number of files
 
 
@@ -70,7 +71,7 @@ class Tiles:
         table = index_table(manifest, self.streams, self.layout)
         self._digest: str = table["digest"]
         old = _read_index(folder / INDEX_FILE)
-        if discard and _without_rate(old) != _without_rate(table):
+        if discard and _tile_keys(old) != _tile_keys(table):
             _remove(folder / TILES_FOLDER)
         if old != table:
             write_bytes(folder / INDEX_FILE, json.dumps(table, indent=1).encode())
@@ -195,9 +196,9 @@ class Tiles:
         return stamp_of(repr((self.manifest.fingerprint, stream.coding, self.layout)), sources)
 
 
-def _without_rate(index: Any) -> Any:
+def _tile_keys(index: Any) -> Any:
     """Return all of an index that tiles depend on."""
-    return {key: index[key] for key in index if key not in ("fps", "digest")} if isinstance(index, dict) else None
+    return {key: index.get(key) for key in TILES_DEPEND_ON} if isinstance(index, dict) else None
 
 
 def _read_index(path: Path) -> Any:
