@@ -1,5 +1,6 @@
 """`framearray assemble`."""
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -123,7 +124,7 @@ def _refuse_conflicts(
     if len(ways) != 1:
         found = " and ".join(ways) or "none of them"
         raise typer.BadParameter(f"expected a path file, --walk, --light or --diagonal; got {found}", param_hint="PATH")
-    if path_file and not path_file.suffix and not path_file.exists():
+    if path_file and not path_file.suffix and len(path_file.parts) == 1 and not os.path.exists(path_file):
         raise typer.BadParameter(f"expected a path file, walk, light or diagonal; got {path_file}", param_hint="PATH")
     if path_file and seconds is not None:
         raise typer.BadParameter("a path file gives the lengths of its segments", param_hint="--seconds")
