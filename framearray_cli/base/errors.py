@@ -38,6 +38,12 @@ class OutputError(FrameArrayError):
     exit_code = 4
 
 
+class ReaderGoneError(FrameArrayError):
+    """Nobody reads the output any more, as after `| head`; the exit code is that of a process that SIGPIPE ended."""
+
+    exit_code = 141
+
+
 class CheckError(FrameArrayError):
     """A check that the user asked for failed."""
 

@@ -21,6 +21,7 @@ from typer.core import TyperCommand, TyperGroup
 UsageError = cast("type[Exception]", typer.BadParameter.__mro__[1])
 
 NARROW, WIDE = 50, 100  # columns of a help screen
+SHORTEST_NAME = 4  # columns, where all are wider
 WIDEST_NAME = 24  # columns; the text of a longer one begins on the next line
 SOURCE = Path(__file__).resolve().parents[2]  # the folder of the package: a checkout, or site-packages
 DOCUMENTATION = "share/doc/framearray"  # where a wheel puts the pages, below the prefix of the Python
@@ -161,7 +162,7 @@ def _screen(command: Any, ctx: Any, examples: Any, names: Any = ()) -> list[str]
 
 def _table(rows: list[tuple[str, str]], columns: int) -> Iterator[str]:
     """Set names and texts in two columns."""
-    width = max((len(name) for name, _ in rows if len(name) <= WIDEST_NAME), default=WIDEST_NAME)
+    width = max((len(name) for name, _ in rows if len(name) <= WIDEST_NAME), default=SHORTEST_NAME)
     indent = " " * (width + 4)
     for name, text in rows:
         lines = textwrap.wrap(text, columns, initial_indent=indent, subsequent_indent=indent) or [indent]

@@ -5,12 +5,12 @@ import re
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Annotated, NoReturn
+from typing import Annotated
 
 import typer
 
 from framearray_cli import __version__
-from framearray_cli.base.errors import FrameArrayError, JobError, OutputError
+from framearray_cli.base.errors import FrameArrayError, JobError, OutputError, ReaderGoneError
 from framearray_cli.base.memory import READ_NEEDS, RENDER_NEEDS, require_address_space
 from framearray_cli.base.signals import Stopped, cancel_alarm, stopped_by
 
@@ -25,8 +25,9 @@ from .commands.schema import schema
 from .commands.sheet import sheet
 from .commands.verify import verify
 from .commands.view import view
+from .document import document_text, outcome
 from .help import Command, Group, UsageError, usage_lines
-from .screen import err, print_result, say
+from .screen import err, out, print_result, say
 from .signals import listen
 
 OUT_OF_MEMORY = 2  # the job needs more than the machine has
@@ -71,17 +72,39 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # do not fail on a file name that the terminal cannot show
             stream.reconfigure(errors="backslashreplace")
-    arguments = sys.argv[1:] if arguments is None else arguments
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    outcome.begin(arguments)
     running: list[str] = []  # the command, once it is known
+    lines: list[str] = []
     try:
-        code = app(list(arguments) or ["--help"], prog_name="framearray", obj=running, standalone_mode=False)
-        if isinstance(code, int) and code:  # of `typer.Exit`
-            sys.exit(code)
+        ended = app(arguments or ["--help"], prog_name="framearray", obj=running, standalone_mode=False)
+        exit_code = ended if isinstance(ended, int) else 0  # of `typer.Exit`
+    except SystemExit as end:  # of typer itself
+        if isinstance(end.__context__, BrokenPipeError):
+            sys.exit(ReaderGoneError.exit_code)
+        raise
     except UsageError as error:
-        _exit_with(usage_lines(error), JobError.exit_code)
+        lines, exit_code = usage_lines(error), JobError.exit_code
     except (FrameArrayError, MemoryError, Stopped, RuntimeError) as error:
         lines, exit_code = ending(error, running[0] if running else "")
-        _exit_with(lines, exit_code)
+    with suppress(OutputError, ReaderGoneError, OSError):  # a terminal that was closed
+        say(err, lines)
+    if outcome.wanted and (lines or outcome.result is not None):
+        exit_code = _print_document(running[0] if running else "", exit_code, lines)
+    if exit_code:
+        sys.exit(exit_code)
+
+
+def _print_document(command: str, exit_code: int, lines: Sequence[str]) -> int:
+    """Print the JSON document of a command; return the exit code, another one where it cannot be printed."""
+    problems = [line for line in lines if not re.match(r"[\d,]+ problems?; nothing was|Usage: |`framearray|$", line)]
+    try:
+        say(out, [document_text(command, exit_code, problems)])
+    except FrameArrayError as error:
+        with suppress(OutputError, ReaderGoneError, OSError):
+            say(err, str(error).splitlines())
+        return exit_code or error.exit_code
+    return exit_code
 
 
 def ending(error: BaseException, command: str) -> tuple[list[str], int]:
@@ -116,10 +139,3 @@ def _problem_lines(error: JobError, outcome: str) -> tuple[list[str], int]:
     n = len(error.problems) - 1 + int(more[1]) if more else len(error.problems)
     lines = [f"{error.file}: {problem}".replace("\n", "\\n") for problem in error.problems]
     return [*lines, f"{n:,} problem{'s' if n > 1 else ''}; {outcome}."], error.exit_code
-
-
-def _exit_with(lines: Sequence[str], code: int) -> NoReturn:
-    """Print what is wrong and end the process; the exit code says it where nobody can read the message."""
-    with suppress(OutputError, OSError):  # a terminal that was closed
-        say(err, lines)
-    sys.exit(code)

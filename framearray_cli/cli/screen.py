@@ -16,18 +16,27 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColum
 from rich.status import Status
 from rich.text import Text
 
-from framearray_cli.base.errors import OutputError
+from framearray_cli.base.errors import OutputError, ReaderGoneError
 from framearray_cli.base.files import reason
 from framearray_cli.base.units import duration
 from framearray_cli.engine.kernels.cache import kept_kernels, problem
 from framearray_cli.engine.kernels.clock import CompileClock, compile_clock
 
-out, err = Console(), Console(stderr=True)
+from .document import REMARKS, outcome
+
+
+class _Console(Console):
+    def on_broken_pipe(self) -> None:
+        """Raise an error of our own; rich would end the process."""
+        _discard(self.file)
+        raise ReaderGoneError
+
+
+out, err = _Console(), _Console(stderr=True)
 
 # Plain lines show in a log file that work goes on, without filling it up.
 SECONDS_BETWEEN_LINES = 5.0
 USUAL_KERNELS = 35  # of a render; jobs differ by a few
-REMARKS = ("note: ", "warning: ")  # how lines begin that are no results
 
 
 class _Left(ProgressColumn):
@@ -67,6 +76,8 @@ class Screen:
 
     def say(self, lines: Iterable[str]) -> None:
         """Print progress, notes or warnings above the moving line."""
+        lines = list(lines)
+        outcome.remember(lines)
         if not self._quiet:
             with suppress(OutputError):  # a full log is no reason to end a long render
                 say(self._console, lines)
@@ -211,17 +222,24 @@ class Screen:
             self.say([f"note: compiled kernels cannot be kept: {why}; NUMBA_CACHE_DIR names another folder for them"])
 
 
-def print_result(lines: Iterable[str]) -> None:
+def print_result(lines: Iterable[str], result: object = None, *, quiet: bool = False) -> None:
     """Print the result of a command; its notes and warnings go to standard error.
+
+    Args:
+        result: one of `results.RESULTS`, for `--json`, which prints it at the end in place of the lines.
+        quiet: print nothing, but keep the result.
 
     Raises:
         OutputError: the result cannot be printed.
     """
-    for line in lines:
+    lines = list(lines)
+    outcome.remember(lines)
+    outcome.result = result
+    for line in [] if quiet else lines:
         if line.startswith(REMARKS):
             with suppress(OutputError):
                 say(err, [line])
-        else:
+        elif not outcome.wanted:
             say(out, [line])
 
 
@@ -230,12 +248,14 @@ def say(console: Console, lines: Iterable[str]) -> None:
 
     Raises:
         OutputError: they cannot be printed, for instance into a file on a full disk.
+        ReaderGoneError: nobody reads them any more.
     """
     try:
         for line in lines:
             console.print(printable(line), markup=False, highlight=False, soft_wrap=True, emoji=False)
-    except BrokenPipeError:  # the reader has gone
-        raise
+    except BrokenPipeError as error:  # of rich before 13.8
+        _discard(console.file)
+        raise ReaderGoneError from error
     except OSError as error:
         _discard(console.file)
         stream = "standard error" if console.stderr else "standard output"

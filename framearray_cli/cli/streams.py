@@ -8,8 +8,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import typer
+
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, require_new
+
+from .document import outcome
 
 
 def is_stdout(name: str) -> bool:
@@ -33,6 +37,8 @@ def output_file(target: Path, suffix: str, *, force: bool) -> Iterator[Path]:
         require_new(target, force=force)
         yield target
         return
+    if outcome.wanted:
+        raise typer.BadParameter("expected a file, as --json prints on standard output", param_hint="--output")
     if sys.stdout.isatty():
         raise OutputError("standard output: expected a file or a pipe, got a terminal; give a name with --output")
     with tempfile.TemporaryDirectory() as folder:

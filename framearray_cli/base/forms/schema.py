@@ -15,6 +15,7 @@ from .words import bound_text, range_text
 
 Schema: TypeAlias = dict[str, Any]
 
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
 LONGEST_KEY = 100  # characters of a key in a message
 
 
@@ -26,6 +27,37 @@ def file_schema(model: type[BaseModel]) -> Schema:
     """
     schema: Schema = _without_null(model.model_json_schema())
     return schema
+
+
+def published_schema(model: type[BaseModel], title: str) -> Schema:
+    """Make the JSON Schema (2020-12) of a file as editors read it."""
+    return {"$schema": DIALECT, **_published(file_schema(model)), "title": title}
+
+
+def _published(node: Any) -> Any:
+    """Turn keywords of our own into descriptions, which every editor shows."""
+    if isinstance(node, list):
+        return [_published(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    node = {key: _published(value) for key, value in node.items()}
+    node.pop("x-words", None)
+    if (text := node.pop("x-default", None)) is not None:
+        node["description"] = f"{node['description']} Default: {text}."
+    return node
+
+
+def with_descriptions(definition: Schema) -> Schema:
+    """Move the descriptions of attributes from the docstring of a dataclass to its properties."""
+    text, _, attributes = definition.get("description", "").partition("\n\nAttributes:\n")
+    found = re.findall(r"^    ([\w, ]+): (.*(?:\n {8}.*)*)", attributes, re.MULTILINE)
+    words = {name: " ".join(words.split()) for names, words in found for name in names.split(", ")}
+    properties = {
+        key: {name: item for name, item in value.items() if name != "title"}
+        | ({"description": words[key]} if key in words else {})
+        for key, value in definition.get("properties", {}).items()
+    }
+    return definition | ({"description": text} if text else {}) | ({"properties": properties} if properties else {})
 
 
 def _without_null(node: Any) -> Any:

@@ -9,7 +9,8 @@ import typer
 
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS
 
-from ..options import ArrayFolder, Quiet, Strict, output_path, refuse_warnings
+from ..options import ArrayFolder, Json, Quiet, Strict, output_path, refuse_warnings
+from ..results import AssembleResult
 from ..screen import Screen, err, print_result
 from ..values import number
 
@@ -83,6 +84,7 @@ def assemble(
     label: Label = False,
     strict: Strict = False,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Cut a movie or an image sequence out of a frame array."""
     from framearray_cli.tools.movie.assemble import assemble_movie as run
@@ -101,7 +103,7 @@ def assemble(
                 refuse_warnings(path_file or array, warnings)
             screen.say([f"warning: {warning}" for warning in warnings])
 
-        result = run(
+        made = run(
             array,
             path_file or Sweep(kind=kinds[0], at=tuple(at or ()), seconds=seconds),
             output_path(target),
@@ -111,9 +113,9 @@ def assemble(
             progress=screen.counter("assembling", "frame"),
             warned=warn,
         )
-    if not quiet:
-        rate = f"{float(result.fps):g} frames per second"
-        print_result([f"{result.target}: {result.n_frames} frames from {result.n_images} images, {rate}"])
+    rate = f"{float(made.fps):g} frames per second"
+    result = AssembleResult(path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps))
+    print_result([f"{made.target}: {made.n_frames} frames from {made.n_images} images, {rate}"], result, quiet=quiet)
 
 
 def _refuse_conflicts(

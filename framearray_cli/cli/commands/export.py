@@ -6,7 +6,8 @@ import typer
 
 from framearray_cli.array.places import ALL_PLACES
 
-from ..options import ArrayFolder, At, Cameras, Exposure, Light, Quiet, output_path
+from ..options import ArrayFolder, At, Cameras, Exposure, Json, Light, Quiet, output_path
+from ..results import ExportResult
 from ..screen import Screen, err, print_result
 from ..values import choice, whole
 
@@ -38,6 +39,7 @@ def export(
     copy: Annotated[bool, typer.Option("--copy", help="Copy images that could be hard links.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier export.")] = False,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:  # fmt: skip
     """Export a frame array for other tools: images with cameras, lights, depth and points."""
     from framearray_cli.array.images.images import FOR_SCREENS, ImageFormat
@@ -53,12 +55,10 @@ def export(
         )  # fmt: skip
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
-    if not quiet:
-        lights = f"{made.n_lights} light position{'s' if made.n_lights > 1 else ''}"
-        points_too = f", {made.n_points:,} points" if kind != "cinema" else ""
-        print_result(
-            [
-                f"{made.target}: {made.n_cameras} cameras, {lights}{points_too}",
-                *(f"note: {note}" for note in made.notes),
-            ]
-        )
+    lights = f"{made.n_lights} light position{'s' if made.n_lights > 1 else ''}"
+    points_too = f", {made.n_points:,} points" if kind != "cinema" else ""
+    result = ExportResult(
+        directory=str(made.target), format=kind, cameras=made.n_cameras, lights=made.n_lights, points=made.n_points
+    )
+    lines = [f"{made.target}: {made.n_cameras} cameras, {lights}{points_too}"]
+    print_result([*lines, *(f"note: {note}" for note in made.notes)], result, quiet=quiet)

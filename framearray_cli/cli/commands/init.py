@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from ..options import Quiet, output_path
+from ..describe import init_result
+from ..options import Json, Quiet, output_path
 from ..screen import Screen, err, print_result
 from ..values import whole
 
@@ -38,6 +39,7 @@ def init(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing job file.")] = False,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Write a first job for a scene: camera, lights and exposure are found or chosen."""
     job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else output_path(target)
@@ -50,7 +52,7 @@ def init(
             options = StartOptions(camera=camera, frames=frames, lights=lights, inside=inside)
             start = run(scene, job_file, options, force=force)
         screen.say(start.about)
-    if not quiet:
-        images = start.camera.frames * start.light_frames
-        size = f"{start.camera.frames} eyes x {start.light_frames} lights = {images} images"
-        print_result([f"{job_file}: {size}; next: framearray render {shlex.quote(str(job_file))}"])
+    images = start.camera.frames * start.light_frames
+    size = f"{start.camera.frames} eyes x {start.light_frames} lights = {images} images"
+    lines = [f"{job_file}: {size}; next: framearray render {shlex.quote(str(job_file))}"]
+    print_result(lines, init_result(start, job_file, scene), quiet=quiet)

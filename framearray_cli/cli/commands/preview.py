@@ -9,6 +9,7 @@ from framearray_cli.array.places import MIDDLE_PLACE, read_axes, read_indices
 from framearray_cli.base.errors import JobError, OutputError
 
 from ..options import output_path
+from ..results import PreviewResult
 from ..screen import Screen, err, print_result
 from ..streams import is_stdout, output_file
 
@@ -52,10 +53,12 @@ def preview_on_screen(
             made = render_preview(job, c, places)
         exposure = job.output.exposure if name in FOR_SCREENS else 0.0
         write_image(part, made.image, ImageFormat(format=name, exposure=exposure))  # type: ignore[arg-type]
-    if not quiet and not is_stdout(str(file)):
+    if not is_stdout(str(file)):
         (height, width, _), full = made.image.shape, job.camera.resolution
         shown = ", ".join([f"camera {c}", *(f"{axis} {l}" for axis, l in places.items())])
-        print_result([f"{file}: {shown}, {width} x {height} of {full[0]} x {full[1]} pixels"])
+        lines = [f"{file}: {shown}, {width} x {height} of {full[0]} x {full[1]} pixels"]
+        result = PreviewResult(preview=str(file), camera=c, lights=dict(places), size=(width, height))
+        print_result(lines, result, quiet=quiet)
 
 
 def _one(option: str, text: str, n: int, axis: str) -> int:

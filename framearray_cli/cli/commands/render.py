@@ -24,7 +24,9 @@ from framearray_cli.render.messages import (
 from framearray_cli.render.parts.progress import PartEvents
 from framearray_cli.render.progress import ambient_figures
 
-from ..options import At, Cameras, JobFile, Light, Output, Quiet, Sets, Strict, Threads, load_job, refuse_warnings
+from ..describe import render_result
+from ..options import At, Cameras, JobFile, Json, Light, Output, Quiet, Sets, Strict, Threads, load_job, refuse_warnings
+from ..results import RenderResult
 from ..screen import Screen, err, print_result
 from ..values import whole
 from .preview import preview_on_screen, refuse_conflicts
@@ -79,6 +81,7 @@ def render(
     restart: Annotated[bool, typer.Option("--restart", help="Remove the frame array in the folder first.")] = False,
     force: Annotated[bool, typer.Option("--force", help="With --preview: replace an existing picture.")] = False,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Render every image of a job into a folder, with a manifest; skip those that are there."""
     others = {"--workers": workers, "--dask": dask, "--chunk": chunk, "--restart": restart, "--strict": strict}
@@ -115,8 +118,8 @@ def render_on_screen(
     restart: bool = False,
     cameras: Sequence[int] | None = None,
     options: "WorkerOptions | None" = None,
-) -> None:
-    """Render, and show the progress on the screen."""
+) -> RenderResult:
+    """Render, show the progress on the screen, and print the summary."""
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the scene")
         from framearray_cli.render.render import render as run
@@ -137,8 +140,9 @@ def render_on_screen(
                 done = f"{screen.done:,} of {screen.total:,} images were written to {job.output.directory}"
                 error.add_note(f"{done}; the same command goes on with the rest")
             raise
-    if not quiet:
-        print_result(summary_lines(summary, events.printed, job))
+    result = render_result(summary, job)
+    print_result(summary_lines(summary, events.printed, job), result, quiet=quiet)
+    return result
 
 
 class RenderingEvents(PartEvents):

@@ -1,12 +1,46 @@
 """`framearray schema`."""
 
+from typing import Annotated, Any
+
+import typer
+
 from ..screen import print_result
+from ..values import choice
+
+KINDS = ("job", "path", "manifest", "results")
 
 
-def schema() -> None:
-    """Print the JSON Schema of job files, for editors that complete and check them."""
+def schema(
+    kind: Annotated[
+        str,
+        typer.Argument(
+            help="What to describe: job, path (of `assemble`), manifest, or results (of `--json`).",
+            show_default=False,
+            **choice(*KINDS),
+        ),
+    ] = "job",
+) -> None:
+    """Print a JSON Schema, for editors that complete and check files, and for programs that read them."""
     import json
 
+    print_result(json.dumps(make_schema(kind), indent=2, ensure_ascii=False).splitlines())
+
+
+def make_schema(kind: str) -> dict[str, Any]:
+    """Make one of the published schemas; `kind` is one of `KINDS`."""
+    if kind == "results":
+        from ..document import results_schema
+
+        return results_schema()
+    if kind == "manifest":
+        from framearray_cli.array.manifest_schema import manifest_schema
+
+        return manifest_schema()
+    if kind == "path":
+        from framearray_cli.base.forms.schema import published_schema
+        from framearray_cli.tools.movie.pathfile import MoviePath
+
+        return published_schema(MoviePath, "framearray movie path")
     from framearray_cli.job.schema import job_schema
 
-    print_result(json.dumps(job_schema(), indent=2).splitlines())
+    return job_schema()

@@ -4,7 +4,8 @@ from typing import Annotated
 
 import typer
 
-from ..options import ArrayFolder, At, Cameras, Exposure, Light, Quiet, output_path
+from ..options import ArrayFolder, At, Cameras, Exposure, Json, Light, Quiet, output_path
+from ..results import SheetResult
 from ..screen import Screen, err, print_result
 from ..values import whole
 
@@ -36,6 +37,7 @@ def sheet(
     ] = None,
     at: At = None,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:  # fmt: skip
     """Draw a contact sheet: cameras from left to right, light positions from top to bottom."""
     from framearray_cli.tools.sheet import make_sheet
@@ -48,6 +50,6 @@ def sheet(
         )  # fmt: skip
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
-    if not quiet:
-        shown = f"{len(made.cameras)} cameras, {len(made.lights)} light positions"
-        print_result([f"{made.target}: {shown}, {made.size[0]} x {made.size[1]} pixels"])
+    shown = f"{len(made.cameras)} cameras, {len(made.lights)} light positions"
+    result = SheetResult(file=str(made.target), cameras=made.cameras, lights=made.lights, size=made.size)
+    print_result([f"{made.target}: {shown}, {made.size[0]} x {made.size[1]} pixels"], result, quiet=quiet)

@@ -7,7 +7,8 @@ import typer
 from framearray_cli.base.errors import CheckError
 from framearray_cli.base.memory import RENDER_NEEDS, available_cores, require_address_space
 
-from ..options import ArrayFolder, Quiet, Threads, with_threads
+from ..describe import verify_result
+from ..options import ArrayFolder, Json, Quiet, Threads, with_threads
 from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ def verify(
     ] = False,
     threads: Threads = None,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Check that every image of a frame array is there, whole and unchanged."""
     from framearray_cli.array.integrity import verify as run
@@ -32,8 +34,7 @@ def verify(
         found = run(array, threads or available_cores(), screen.counter("verifying", "file"))
     lines = verified_lines(found)
     if not found.wrong or not repair:
-        if found.wrong or not quiet:
-            print_result(lines)
+        print_result(lines, verify_result(found), quiet=quiet and not found.wrong)
         if found.wrong:
             raise typer.Exit(CheckError.exit_code)
         return
@@ -43,12 +44,10 @@ def verify(
     from .render import render_on_screen
 
     require_address_space(RENDER_NEEDS)
-    if not quiet:
-        print_result(lines)
+    print_result(lines, verify_result(found), quiet=quiet)
     folder = found.manifest.directory
-    render_on_screen(
-        with_threads(job_of_table(found.manifest.job, folder / FILE_NAME, folder.absolute()), threads), quiet=quiet
-    )
+    job = with_threads(job_of_table(found.manifest.job, folder / FILE_NAME, folder.absolute()), threads)
+    print_result([], verify_result(found, render_on_screen(job, quiet=quiet)))
 
 
 def verified_lines(found: "Verification") -> list[str]:

@@ -1,0 +1,167 @@
+"""`--json`: one document on standard output, which the published schema describes, also where a command fails."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+from support import handmade
+from support.program import Result, finish, run, start, write_job
+
+import framearray_cli
+from framearray_cli.cli import document
+from framearray_cli.cli.results import RESULTS
+
+
+def parsed(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> tuple[Result, dict[str, Any]]:
+    """Run a command with `--json`; return how it ended, and its document, once the schema has been compared."""
+    result = run(capsys, *arguments, "--json")
+    return result, valid(result, result.code)
+
+
+def valid(result: Result, code: int) -> dict[str, Any]:
+    """Return the document of a command, which the schema describes."""
+    found = json.loads(result.out)
+    jsonschema.Draft202012Validator(SCHEMA).validate(found)
+    assert (found["framearray"], found["exit_code"]) == (framearray_cli.__version__, code)
+    return found
+
+
+SCHEMA = document.results_schema()
+
+
+@pytest.fixture
+def array(tmp_path: Path) -> Path:
+    handmade.plain(tmp_path / "array", n_c=2, n_l=2)
+    return tmp_path / "array"
+
+
+def test_the_schema_is_one_and_refuses_other_documents():
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    right = json.loads(document.document_text("check", 0, []))
+    validator = jsonschema.Draft202012Validator(SCHEMA)
+    assert validator.is_valid(right)
+    assert not validator.is_valid(right | {"command": "sheet", "result": {"file": "a.png"}})
+    assert not validator.is_valid(right | {"exit_code": "0"})
+    assert not validator.is_valid({key: value for key, value in right.items() if key != "problems"})
+
+
+def test_check_and_render(tmp_path, capsys):
+    job = write_job(tmp_path)
+    result, found = parsed(capsys, "check", job)
+    assert (result.code, found["command"], found["problems"], found["warnings"]) == (0, "check", [], [])
+    estimate = found["result"]
+    assert (estimate["array"]["cameras"], estimate["array"]["images"]) == (1, 3)
+    assert estimate["array"]["resolution"] == [24, 18] and estimate["disk_bytes"] > 100
+    result, found = parsed(capsys, "render", job)
+    assert result.code == 0 and "triangles" in result.err
+    done = found["result"]
+    assert (done["written"], done["there"], done["images"], done["finished"]) == (3, 3, 3, True)
+    assert done["directory"] == str(tmp_path / "out") and Path(done["manifest"]).is_file()
+    other = write_job(tmp_path, "other.toml", seed=9)
+    _, found = parsed(capsys, "check", other)
+    assert len(found["warnings"]) == 1 and "holds another frame array" in found["warnings"][0]
+    result, found = parsed(capsys, "render", "-q", other)
+    assert (result.code, found["result"]) == (4, None)
+    assert found["problems"] == result.err.splitlines()
+
+
+def test_a_preview(tmp_path, capsys):
+    _, found = parsed(capsys, "render", write_job(tmp_path), "--preview", "--light", "1")
+    assert Path(found["result"]["preview"]).is_file()
+    assert (found["result"]["camera"], found["result"]["lights"]) == (0, {"light": 1})
+    result, found = parsed(capsys, "render", tmp_path / "job.toml", "--preview", "-o", "-")
+    assert result.code == 2 and "expected a file, as --json prints" in found["problems"][0]
+
+
+def test_warnings_are_listed_and_strict_ones_are_problems(tmp_path, capsys):
+    job = write_job(tmp_path, camera={"fov": 1.047})  # radians
+    _, found = parsed(capsys, "check", job)
+    assert found["warnings"] and not found["problems"]
+    result, strict = parsed(capsys, "check", job, "--strict")
+    assert result.code == 2 and len(strict["problems"]) == len(found["warnings"]) and strict["result"]
+
+
+def test_verify_and_repair(tmp_path, capsys):
+    out = tmp_path / "out"
+    assert run(capsys, "render", "-q", write_job(tmp_path)).code == 0
+    result, found = parsed(capsys, "verify", out, "-q")
+    assert result.err == "" and found["result"]["whole"] is True and found["result"]["files"] == 4
+    (out / "tiny.c0000.l001.png").unlink()
+    result, found = parsed(capsys, "verify", out, "-q")
+    assert result.code == 5 and found["problems"] == []
+    assert found["result"]["damaged"] == [{"file": "tiny.c0000.l001.png", "problem": "missing"}]
+    result, found = parsed(capsys, "verify", out, "-q", "--repair")
+    assert result.code == 0 and found["result"]["whole"] is False
+    assert found["result"]["repaired"]["finished"] is True
+    assert run(capsys, "verify", out).code == 0
+
+
+def test_what_is_done_with_an_array(array, tmp_path, capsys):
+    _, found = parsed(capsys, "sheet", array, "-o", tmp_path / "sheet.png")
+    assert found["result"]["cameras"] == found["result"]["lights"] == [0, 1]
+    _, found = parsed(capsys, "export", array, "-f", "cinema", "-o", tmp_path / "cinema")
+    assert found["result"]["directory"].endswith("cinema.cdb") and found["result"]["lights"] == 2
+    _, found = parsed(capsys, "assemble", array, "--walk", "-o", tmp_path / "frame.####.png")
+    assert (found["result"]["frames"], found["result"]["images"]) == (2, 2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "problem"),
+    [
+        (["check", "none.toml"], 2, "none.toml: no such file"),
+        (["check"], 2, "Error: missing argument JOB"),
+        (["chek", "a.toml"], 2, "Error: no such command chek; did you mean check?"),
+        (["init", "none.glb"], 3, "none.glb: no such scene file"),
+        (["verify", "none"], 4, "none: no such file"),
+        (["schema"], 2, "Error: no such option --json"),
+    ],
+)
+def test_errors_are_documents_too(arguments, code, problem, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result, found = parsed(capsys, *arguments)
+    assert (result.code, found["result"], len(found["problems"])) == (code, None, 1)
+    assert found["problems"][0].startswith(problem) and found["problems"][0] in result.err
+
+
+def test_all_problems_of_a_job_are_listed(tmp_path, capsys):
+    _, found = parsed(capsys, "check", write_job(tmp_path, camera={"fov": 500.0}, seed=-1))
+    assert [problem.split(": ")[1] for problem in found["problems"]] == ["seed", "camera.fov"]
+
+
+def test_each_command_with_the_option_has_a_result_in_the_schema():
+    from framearray_cli.cli.main import app
+
+    with_option = {
+        command.callback.__name__ for command in app.registered_commands if "json" in command.callback.__annotations__
+    }
+    assert with_option == set(RESULTS)
+
+
+def test_without_the_option_nothing_is_a_document(tmp_path, capsys):
+    """Not even after a command that had it; behind `--` it is a name."""
+    parsed(capsys, "verify", "none")
+    assert run(capsys, "verify", "none").out == ""
+    assert run(capsys, "verify", "--", "--json").out == ""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_document_that_cannot_be_printed(array):
+    with Path("/dev/full").open("w") as full:
+        result = finish(start("verify", "-q", "--json", array, stdout=full))
+    assert result.code == 4 and result.err == "standard output: cannot be written: No space left on device\n"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no such pipes there")
+@pytest.mark.parametrize("arguments", [["check", "none.toml", "--json"], ["--help"], ["-V"], ["schema"]])
+def test_a_reader_that_has_gone_is_an_exit_code(arguments):
+    """That of a program which the signal SIGPIPE ends, as shells expect."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    process = start(*arguments, stdout=writing)
+    os.close(writing)
+    result = finish(process)
+    assert "Traceback" not in result.err
+    assert result.code == (2 if "none.toml" in arguments else 141)
