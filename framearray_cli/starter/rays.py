@@ -22,7 +22,6 @@ from framearray_cli.engine.embree.packets import (
     intersect,
     occlude,
 )
-from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.scene.scene import Scene
 
 SHORTENED = 1e-4  # share of a segment left out at both ends, so that it misses the surfaces that it starts or ends on
@@ -90,12 +89,12 @@ def _fill_packets(rows: int, origins: Any, directions: Any, tfar: float) -> tupl
     """Fill packets with rays; also return the number of rays."""
     origins, directions = np.broadcast_arrays(np.atleast_2d(origins), np.atleast_2d(directions))
     n = len(origins)
-    packets = empty_packets(-(-n // LANES), rows)
+    packets = empty_packets(n, rows)
     for axis in range(3):
         for row, values in ((ORIGIN + axis, origins[:, axis]), (DIRECTION + axis, directions[:, axis])):
-            padded = np.ones(len(packets) * LANES, np.float32)
+            padded = np.ones(packets[:, row].size, np.float32)
             padded[:n] = values
-            packets[:, row] = padded.reshape(-1, LANES)
+            packets[:, row] = padded.reshape(packets[:, row].shape)
     packets[:, TFAR] = tfar
     return packets, n
 

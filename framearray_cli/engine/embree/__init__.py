@@ -3,7 +3,8 @@
 Kernels trace packets through a `Tracer`, which holds only addresses. Therefore compiled kernels can be cached, and two
 engines serve the same kernels:
 
-- `packets`: Embree's C functions `rtcIntersect16` and `rtcOccluded16`, 16 rays per call. The default.
+- `packets`: Embree's C functions `rtcIntersect16` and `rtcOccluded16`, or those of 8 or 4 rays per call where the
+  processor has no wider ones (`library.py`). The default.
 - `embreex`: the public API of embreex, which calls Embree once per ray. The fallback where the symbols cannot be
   reached, and the twin that tests compare packets with.
 """
@@ -14,8 +15,9 @@ from typing import Literal, Self
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.scene import Scene
 
+from ..library import embree_library
 from .fallback import EmbreexScene
-from .native import NativeScene, embree_library
+from .native import NativeScene
 from .packets import Tracer
 
 __all__ = ["EmbreeScene", "Engine", "Tracer"]

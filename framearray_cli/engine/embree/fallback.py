@@ -9,7 +9,7 @@ from framearray_cli.base.arrays import Float32, Int32
 from framearray_cli.scene.scene import Scene
 
 from ..inputs.surfaces import is_cut_out, surfaces
-from ..kernels.simd import LANES
+from ..library import packet_width
 from .packets import (
     DIRECTION,
     GEOMETRY,
@@ -133,14 +133,15 @@ class EmbreexScene:
 
 
 def _view(address: int, n_packets: int, rows: int) -> Float32:
-    """Packets at an address, (n_packets, rows, 16)."""
-    block = (ctypes.c_float * (n_packets * rows * LANES)).from_address(address)
-    return np.ctypeslib.as_array(block).reshape(n_packets, rows, LANES)
+    """Packets at an address, (n_packets, rows, width)."""
+    width = packet_width()
+    block = (ctypes.c_float * (n_packets * rows * width)).from_address(address)
+    return np.ctypeslib.as_array(block).reshape(n_packets, rows, width)
 
 
 def _rays(packets: Float32) -> tuple[Any, tuple[Float32, Float32, Float32, Float32]]:
     """The lanes that are not idle, and their rays: origins, directions, tnear, tfar."""
-    live = packets[:, TFAR] >= 0  # (n_packets, 16)
+    live = packets[:, TFAR] >= 0  # (n_packets, width)
     by_lane = packets.transpose(0, 2, 1)[live]
     origins = np.ascontiguousarray(by_lane[:, ORIGIN : ORIGIN + 3])
     directions = np.ascontiguousarray(by_lane[:, DIRECTION : DIRECTION + 3])

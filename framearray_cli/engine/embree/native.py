@@ -1,8 +1,6 @@
-"""Embree through its C functions, from the library in the embreex wheel."""
+"""Embree through its C functions."""
 
 import ctypes
-import os
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -12,6 +10,7 @@ from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.scene import Scene
 
 from ..kernels.simd import LANES
+from ..library import device_configuration, packet_width
 from .masks import MaskTable
 from .packets import MASKED, OPAQUE, Tracer, aligned_zeros
 
@@ -23,55 +22,12 @@ _ALL_FEATURES = 0xFFFFFFFF
 _ROBUST = 1 << 2  # RTC_SCENE_FLAG_ROBUST: no ray slips between neighbouring triangles
 
 
-@cache
-def embree_library() -> ctypes.CDLL | None:
-    """Load Embree from the embreex wheel; None where its symbols cannot be reached.
-
-    Opening the extension module again resolves every `rtc...` symbol through the module's own dependency, however the
-    wheel names that library.
-    """
-    from embreex import rtcore_scene
-
-    try:
-        library = ctypes.CDLL(rtcore_scene.__file__)
-        for name in _SIGNATURES:
-            getattr(library, name)
-    except (OSError, AttributeError):
-        return None
-    for name, (result, *arguments) in _SIGNATURES.items():
-        function = getattr(library, name)
-        function.restype, function.argtypes = result, arguments
-    return library
-
-
-_POINTER, _UINT, _SIZE, _INT = ctypes.c_void_p, ctypes.c_uint, ctypes.c_size_t, ctypes.c_int
-_SIGNATURES: dict[str, tuple[Any, ...]] = {
-    "rtcNewDevice": (_POINTER, ctypes.c_char_p),
-    "rtcGetDeviceError": (_INT, _POINTER),
-    "rtcReleaseDevice": (None, _POINTER),
-    "rtcNewScene": (_POINTER, _POINTER),
-    "rtcSetSceneFlags": (None, _POINTER, _INT),
-    "rtcCommitScene": (None, _POINTER),
-    "rtcReleaseScene": (None, _POINTER),
-    "rtcNewGeometry": (_POINTER, _POINTER, _INT),
-    "rtcSetSharedGeometryBuffer": (None, _POINTER, _INT, _UINT, _INT, _POINTER, _SIZE, _SIZE, _SIZE),
-    "rtcSetGeometryUserData": (None, _POINTER, _POINTER),
-    "rtcSetGeometryIntersectFilterFunction": (None, _POINTER, _POINTER),
-    "rtcSetGeometryOccludedFilterFunction": (None, _POINTER, _POINTER),
-    "rtcCommitGeometry": (None, _POINTER),
-    "rtcAttachGeometryByID": (None, _POINTER, _POINTER, _UINT),
-    "rtcReleaseGeometry": (None, _POINTER),
-    "rtcIntersect16": (None, _POINTER, _POINTER, _POINTER, _POINTER),
-    "rtcOccluded16": (None, _POINTER, _POINTER, _POINTER, _POINTER),
-}
-
-
 class NativeScene:
     """An Embree device and scene, built and traced through Embree's C functions."""
 
     def __init__(self, scene: Scene, library: ctypes.CDLL) -> None:
         self._library = library
-        self._device = library.rtcNewDevice(_configuration())
+        self._device = library.rtcNewDevice(device_configuration())
         self._scene = library.rtcNewScene(self._device)
         self._kept: list[Any] = [scene]  # memory that Embree points into
         library.rtcSetSceneFlags(self._scene, _ROBUST)
@@ -96,8 +52,8 @@ class NativeScene:
         self._arguments.view(np.uint32)[:2] = _COHERENT, _ALL_FEATURES
         self.tracer = Tracer(
             self._scene,
-            _address(library.rtcIntersect16),
-            _address(library.rtcOccluded16),
+            _address(getattr(library, f"rtcIntersect{packet_width()}")),
+            _address(getattr(library, f"rtcOccluded{packet_width()}")),
             0,
             self._arguments.ctypes.data,
             self._lanes.ctypes.data,
@@ -129,11 +85,6 @@ class NativeScene:
             self._library.rtcReleaseScene(self._scene)
             self._library.rtcReleaseDevice(self._device)
             self._device = None
-
-
-def _configuration() -> bytes | None:
-    """Embree's settings for a device: none, except where tests force an instruction set."""
-    return os.environ.get("FRAMEARRAY_EMBREE", "").encode() or None
 
 
 def _address(function: Any) -> int:

@@ -1,8 +1,9 @@
 """Rays in packets, and how kernels trace them.
 
-Kernels write 16 rays at a time where Embree reads them, in its own layout (RTCRay16, RTCRayHit16). A packet is (rows,
-16) float32: 12 rows of ray (origin xyz, tnear, direction xyz, time, tfar, mask, id, flags) and, for first hits, the hit
-(Ng xyz, u, v, triangle, geometry, instance), then padding. A lane with tfar < 0 is idle.
+Kernels write 16 rays at a time where Embree reads them, in its own layout (RTCRay16, RTCRayHit16, or those of 8 or 4
+rays where the processor has no wider ones). A packet is (rows, width) float32: 12 rows of ray (origin xyz, tnear,
+direction xyz, time, tfar, mask, id, flags) and, for first hits, the hit (Ng xyz, u, v, triangle, geometry, instance),
+then padding. A lane with tfar < 0 is idle.
 """
 
 from typing import Any, NamedTuple
@@ -15,7 +16,8 @@ from numba.extending import intrinsic
 from framearray_cli.base.arrays import Float32, Real
 
 from ..kernels.kernel import inlined, kernel
-from ..kernels.simd import LANES, select
+from ..kernels.simd import LANES, select, store_row, width_of_packets
+from ..library import packet_width
 
 RAY_ROWS = 12
 HIT_ROWS = 24  # RTCRayHit16 has 20 to 22 rows, depending on how Embree was built; the rest is padding
@@ -71,7 +73,7 @@ def _trace(tracer: Tracer, function: int, packets: Float32, n_packets: int, cohe
         _call(function, n_packets, tracer.scene, address, 0)
         return
     arguments = tracer.coherent if coherent else 0
-    size = 4 * LANES * packets.shape[1]
+    size = 4 * width_of_packets() * packets.shape[1]
     for p in range(n_packets):
         _call(function, tracer.lanes, tracer.scene, address + p * size, arguments)
 
@@ -83,23 +85,39 @@ def aligned_zeros(n_words: int) -> Float32:
     return block[start : start + n_words]
 
 
-def empty_packets(n_packets: int, rows: int) -> Float32:
-    """Allocate packets, (n, rows, 16) float32, with tnear 0 and the mask of all rays.
+def empty_packets(n_rays: int, rows: int) -> Float32:
+    """Allocate packets for n rays, (n_packets, rows, width) float32, with tnear 0 and the mask of all rays.
+
+    There are packets for a multiple of 16 rays, because kernels read and write 16 at a time.
 
     Where Embree has no packets of 16 of its own, it traces their rays singly and writes each back with all rows of a
     hit, into shadow rays too, which end before those. It writes what it read there; yet if another thread had written
     in between, that would be lost. So such rows lie behind the last packet as well.
     """
-    words = n_packets * rows * LANES
-    packets = aligned_zeros(words + max(HIT_ROWS - rows, 0) * LANES)[:words].reshape(n_packets, rows, LANES)
+    words = -(-n_rays // LANES) * rows * LANES
+    packets = aligned_zeros(words + max(HIT_ROWS - rows, 0) * LANES)[:words].reshape(-1, rows, packet_width())
     packets.view(np.int32)[:, MASK] = ALL_RAYS
     return packets
 
 
 @inlined
+def room_in(packets: Float32) -> int:
+    """The number of rays that packets have room for."""
+    return packets.shape[0] * width_of_packets()  # type: ignore[no-any-return]
+
+
+@inlined
+def place_in(packets: Float32, i: Any) -> Any:
+    """Where rays i, in lanes, stand in the flat array of packets: in row 0; row k is k times the width further."""
+    width = width_of_packets()
+    packet = i >> np.int32(2 + (width >= 8) + (width >= 16))
+    return packet * np.int32(packets.shape[1] * width) + (i & np.int32(width - 1))
+
+
+@inlined
 def set_ray(packets: Float32, i: int, ox: Real, oy: Real, oz: Real, dx: Real, dy: Real, dz: Real, tfar: Real) -> None:
     """Write ray i of an array of packets; it ends at tfar, in lengths of its direction."""
-    p, lane = i >> 4, i & 15
+    p, lane = i // width_of_packets(), i % width_of_packets()
     packets[p, ORIGIN, lane] = ox
     packets[p, ORIGIN + 1, lane] = oy
     packets[p, ORIGIN + 2, lane] = oz
@@ -111,11 +129,12 @@ def set_ray(packets: Float32, i: int, ox: Real, oy: Real, oz: Real, dx: Real, dy
 
 @inlined
 def _idle_from(packets: Float32, n_rays: int) -> int:
-    """Make the lanes after the last ray idle, and return the number of packets."""
-    n_packets = (n_rays + LANES - 1) // LANES
-    for i in range(n_rays, n_packets * LANES):
+    """Make the lanes after the last ray idle, up to a multiple of 16, and return the number of packets with rays."""
+    width = width_of_packets()
+    n_packets = (n_rays + width - 1) // width
+    for i in range(n_rays, (n_rays + LANES - 1) // LANES * LANES):
         set_ray(packets, i, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0)
-    return n_packets
+    return n_packets  # type: ignore[no-any-return]
 
 
 @kernel
@@ -129,11 +148,10 @@ def intersect(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = Fa
     """
     n_packets = _idle_from(packets, n_rays)
     bits = packets.view(np.int32)
-    for p in range(n_packets):
-        for lane in range(LANES):
-            packets[p, TNEAR, lane] = near
-            bits[p, TRIANGLE, lane] = MISS
-            bits[p, GEOMETRY, lane] = MISS
+    for first in range(0, n_rays, LANES):
+        store_row(packets, first, TNEAR, np.float32(near))
+        store_row(bits, first, TRIANGLE, np.int32(MISS))
+        store_row(bits, first, GEOMETRY, np.int32(MISS))
     _trace(tracer, tracer.intersect, packets, n_packets, coherent)
 
 
@@ -150,7 +168,7 @@ def occlude(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = Fals
 @inlined
 def is_blocked(packets: Float32, i: int) -> bool:
     """Whether something blocks ray i, after `occlude`."""
-    return packets[i >> 4, TFAR, i & 15] < 0.0  # type: ignore[no-any-return]
+    return packets[i // width_of_packets(), TFAR, i % width_of_packets()] < 0.0  # type: ignore[no-any-return]
 
 
 @inlined
@@ -164,5 +182,5 @@ def scene_triangle(tracer: Tracer, triangle: int, geometry: int) -> int:
 def hit_triangle(tracer: Tracer, packets: Float32, i: int) -> int:
     """The index in the scene of the triangle that ray i hit, or MISS, after `intersect`."""
     bits = packets.view(np.int32)
-    p, lane = i >> 4, i & 15
+    p, lane = i // width_of_packets(), i % width_of_packets()
     return scene_triangle(tracer, bits[p, TRIANGLE, lane], bits[p, GEOMETRY, lane])

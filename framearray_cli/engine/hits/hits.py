@@ -12,7 +12,7 @@ from framearray_cli.base.arrays import Bytes, Directions, Float32, Int32, Keys, 
 from ..embree.packets import DIRECTION, GEOMETRY, TRIANGLE, Tracer, U, V, scene_triangle
 from ..inputs.surfaces import Surfaces, geometric_normal, position_at, reflectivity_at, shading_normal, specular_at
 from ..kernels.kernel import inlined, kernel
-from ..kernels.simd import LANES, gather, lane_numbers, load, put_triples, select, sqrt, store, triples_at
+from ..kernels.simd import LANES, gather, lane_numbers, load, load_row, put_triples, select, sqrt, store, triples_at
 
 ESCAPED, SURFACE = 0, 1
 
@@ -119,11 +119,11 @@ def triple(array: Float32, i: int) -> Triple:
 @inlined
 def decode_hits(tracer: Tracer, packets: Float32, i: int) -> tuple[bool, int, Real, Real]:
     """Whether rays i to i + 15 missed, and the triangle and the place (u, v) that each met, 0 after a miss."""
-    bits, at = packets.view(np.int32), (i >> 4) * packets.shape[1] * LANES
-    triangle = load(bits, at + TRIANGLE * LANES)
+    bits = packets.view(np.int32)
+    triangle = load_row(bits, i, TRIANGLE)
     missed = triangle < np.int32(0)
-    triangle = select(missed, 0, scene_triangle(tracer, triangle, load(bits, at + GEOMETRY * LANES)))
-    u, v = load(packets, at + U * LANES), load(packets, at + V * LANES)
+    triangle = select(missed, 0, scene_triangle(tracer, triangle, load_row(bits, i, GEOMETRY)))
+    u, v = load_row(packets, i, U), load_row(packets, i, V)
     return missed, triangle, select(missed, 0.0, u), select(missed, 0.0, v)
 
 
@@ -135,13 +135,11 @@ def record_hits(world: World, packets: Float32, n: int, mirrors: bool, hits: Hit
         mirrors: whether to write `specular`.
     """
     surfaces, tracer = world
-    packet = packets.shape[1] * LANES
     for i in range(0, n, LANES):
         # Read everything before the first write, so that the compiler loads shared values once.
         # direction, triangle and place (u, v)
-        at = (i >> 4) * packet
-        dx, dy = load(packets, at + DIRECTION * LANES), load(packets, at + (DIRECTION + 1) * LANES)
-        dz = load(packets, at + (DIRECTION + 2) * LANES)
+        dx, dy = load_row(packets, i, DIRECTION), load_row(packets, i, DIRECTION + 1)
+        dz = load_row(packets, i, DIRECTION + 2)
         missed, triangle, u, v = decode_hits(tracer, packets, i)
         # point P, normals on the viewer's side, and R
         x, y, z = position_at(surfaces, triangle, u, v)

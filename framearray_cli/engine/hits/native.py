@@ -12,7 +12,7 @@ from ..inputs.cameras import Cameras, corner_of, eye_ray
 from ..inputs.random import OTHER_HALF, PIXEL, PIXEL_SAMPLE, r2, random_word, stream
 from ..inputs.surfaces import specular_at
 from ..kernels.kernel import inlined, keep_on_disk, kernel
-from ..kernels.simd import LANES, doubles, floor, gather, integers, lane_numbers, put_triples, select, store
+from ..kernels.simd import LANES, doubles, floor, gather, integers, lane_numbers, put_triples, select, store, store_row
 from .hits import Hits, World, decode_hits, record_hits
 
 
@@ -69,14 +69,14 @@ def _write_eye_rays(
     """Write eye rays i to i + 15, through (jx, jy) within the boxes of pixels."""
     x, y = corner_of(cams, pixel)
     dx, dy, dz = eye_ray(cams, c, x + doubles(jx), y + doubles(jy))
-    o, at = cams.position, (i >> 4) * packets.shape[1] * LANES
-    store(packets, at + ORIGIN * LANES, o[c, 0])
-    store(packets, at + (ORIGIN + 1) * LANES, o[c, 1])
-    store(packets, at + (ORIGIN + 2) * LANES, o[c, 2])
-    store(packets, at + DIRECTION * LANES, dx)
-    store(packets, at + (DIRECTION + 1) * LANES, dy)
-    store(packets, at + (DIRECTION + 2) * LANES, dz)
-    store(packets, at + TFAR * LANES, np.float32(np.inf))
+    o = cams.position
+    store_row(packets, i, ORIGIN, o[c, 0])
+    store_row(packets, i, ORIGIN + 1, o[c, 1])
+    store_row(packets, i, ORIGIN + 2, o[c, 2])
+    store_row(packets, i, DIRECTION, dx)
+    store_row(packets, i, DIRECTION + 1, dy)
+    store_row(packets, i, DIRECTION + 2, dz)
+    store_row(packets, i, TFAR, np.float32(np.inf))
     store(hits.pixel, i, pixel)
 
 

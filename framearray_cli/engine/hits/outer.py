@@ -17,10 +17,22 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Int32, Real
 
-from ..embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, is_blocked, occlude
+from ..embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, is_blocked, occlude, room_in
 from ..inputs.cameras import OUTSIDE, Cameras, project_to_pixel
 from ..kernels.kernel import inlined, kernel
-from ..kernels.simd import LANES, compress, doubles, gather, lane_numbers, load, popcount, select, store, triples_at
+from ..kernels.simd import (
+    LANES,
+    compress,
+    doubles,
+    gather,
+    lane_numbers,
+    load,
+    popcount,
+    select,
+    store,
+    store_row,
+    triples_at,
+)
 from .hits import SURFACE, Hits, triple
 from .rays import NO_RAYS, Rays
 
@@ -54,7 +66,7 @@ def _write_visibility_rays(cams: Cameras, first_eye: int, hits: Hits, stride: in
 
     An eye sees from the depth `cams.near` on, as for its native hits: rays start at that depth, or end near it.
     """
-    packet, one, nothing = rays.packets.shape[1] * LANES, np.float32(1.0), np.float32(0.0)
+    one, nothing = np.float32(1.0), np.float32(0.0)
     near, f = np.float32(cams.near), cams.forward
     # fill the last packet with copies of the last ray
     for ray in range(n, (n + LANES - 1) // LANES * LANES):
@@ -68,17 +80,17 @@ def _write_visibility_rays(cams: Cameras, first_eye: int, hits: Hits, stride: in
         ox, oy, oz = triple(cams.position, row + np.int32(first_eye))
         px, py, pz = triple(hits.position, i)
         gx, gy, gz = triple(hits.geometric, i)
-        e, at = gather(hits.offset, i), (first >> 4) * packet
+        e = gather(hits.offset, i)
         # origin: slightly above P, or O for an escaped ray
         x, y, z = px + e * gx, py + e * gy, pz + e * gz
-        store(rays.packets, at + ORIGIN * LANES, select(surface, x, ox))
-        store(rays.packets, at + (ORIGIN + 1) * LANES, select(surface, y, oy))
-        store(rays.packets, at + (ORIGIN + 2) * LANES, select(surface, z, oz))
+        store_row(rays.packets, first, ORIGIN, select(surface, x, ox))
+        store_row(rays.packets, first, ORIGIN + 1, select(surface, y, oy))
+        store_row(rays.packets, first, ORIGIN + 2, select(surface, z, oz))
         # direction: to O, or that of the escaped ray
         dx, dy, dz = select(surface, ox - x, px), select(surface, oy - y, py), select(surface, oz - z, pz)
-        store(rays.packets, at + DIRECTION * LANES, dx)
-        store(rays.packets, at + (DIRECTION + 1) * LANES, dy)
-        store(rays.packets, at + (DIRECTION + 2) * LANES, dz)
+        store_row(rays.packets, first, DIRECTION, dx)
+        store_row(rays.packets, first, DIRECTION + 1, dy)
+        store_row(rays.packets, first, DIRECTION + 2, dz)
         # depth along the optical axis, and cams.near as a fraction of it
         fx, fy, fz = triple(f, row + np.int32(first_eye))
         along = dx * fx + dy * fy + dz * fz
@@ -87,8 +99,8 @@ def _write_visibility_rays(cams: Cameras, first_eye: int, hits: Hits, stride: in
         share = near / select(beyond, depth, one)
         # the ray starts or ends near that depth; a hit nearer than that is hidden
         end = select(beyond, one - EYE_END * share, -one)
-        store(rays.packets, at + TNEAR * LANES, select(surface, nothing, share))
-        store(rays.packets, at + TFAR * LANES, select(surface, end, np.float32(np.inf)))
+        store_row(rays.packets, first, TNEAR, select(surface, nothing, share))
+        store_row(rays.packets, first, TFAR, select(surface, end, np.float32(np.inf)))
 
 
 @kernel
@@ -107,7 +119,7 @@ def _drop_hidden(
             if density.size > 0:
                 flat_density[rays.place[ray]] = 0.0
     for first in range(0, n, LANES):  # shadow rays use the same packets, and start at 0
-        store(rays.packets, (first >> 4) * rays.packets.shape[1] * LANES + TNEAR * LANES, np.float32(0.0))
+        store_row(rays.packets, first, TNEAR, np.float32(0.0))
 
 
 @kernel
@@ -131,7 +143,7 @@ def outer_hits(
     Returns:
         number of visibility rays.
     """
-    capacity, stride = rays.packets.shape[0] * LANES, pixel.shape[1]
+    capacity, stride = room_in(rays.packets), pixel.shape[1]
     # Loop state
     waiting = NO_RAYS  # rays in the queue
     total = NO_RAYS  #   rays traced

@@ -14,7 +14,7 @@ class Rays(NamedTuple):
     """Arrays for rays of one kind.
 
     Attributes:
-        packets: (n_packets, rows, 16).
+        packets: (n_packets, rows, width); see `embree/packets.py`.
         place: (n_rays + LANES,) what a ray belongs to: an index, whose meaning depends on the kernel.
         value: (3, n_rays + LANES) what a ray carries if nothing blocks it.
         number: (2, n_rays + LANES) further integers, whose meaning depends on the kernel.
@@ -36,10 +36,9 @@ NO_RAYS = cast(int, np.int64(0))
 
 
 def _empty_rays(n_rays: int, rows: int, queue: int) -> Rays:
-    n_packets = -(-n_rays // LANES)
-    capacity = n_packets * LANES
+    capacity = -(-n_rays // LANES) * LANES
     return Rays(
-        packets=empty_packets(n_packets, rows),
+        packets=empty_packets(n_rays, rows),
         place=np.empty(capacity + LANES, np.int32),
         value=np.empty((3, max(capacity, queue) + LANES), np.float32),
         number=np.empty((2, capacity + LANES), np.int32),

@@ -10,13 +10,26 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Real, Triple
 
-from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude
+from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude, room_in
 from ..hits.hits import Hits, lift, ray_origin, reflects, reflects_in_lanes, triple
 from ..hits.rays import NO_RAYS, Rays
 from ..inputs.lights import DIRECTIONAL, LightArrays
 from ..inputs.shapes import vector_and_factor
 from ..kernels.kernel import inlined, kernel
-from ..kernels.simd import LANES, bits, compress, ctz, lane_numbers, load, popcount, select, store, triples_at
+from ..kernels.simd import (
+    LANES,
+    bits,
+    compress,
+    ctz,
+    lane_numbers,
+    load,
+    load_row,
+    popcount,
+    select,
+    store,
+    store_row,
+    triples_at,
+)
 
 # A shadow ray ends at this fraction of the distance to the light: a surface that the light lies on must not hide it.
 FAR_END = np.float32(1.0 - 1e-4)
@@ -107,21 +120,20 @@ def _queue(
 @kernel
 def _trace_queue(tracer: Tracer, rays: Rays, n: int, irradiance: Float32) -> None:
     """Trace the n queued shadow rays and add the irradiance of those that nothing blocks."""
-    room, packet = rays.row.shape[1], rays.packets.shape[1] * LANES
+    room = rays.row.shape[1]
     # rays into packets
     for first in range(0, n, LANES):
-        at = (first >> 4) * packet
         for axis in range(3):
-            store(rays.packets, at + (ORIGIN + axis) * LANES, load(rays.row, (FROM + axis) * room + first))
-            store(rays.packets, at + (DIRECTION + axis) * LANES, load(rays.row, (TO + axis) * room + first))
-        store(rays.packets, at + TFAR * LANES, load(rays.row, REACH * room + first))
+            store_row(rays.packets, first, ORIGIN + axis, load(rays.row, (FROM + axis) * room + first))
+            store_row(rays.packets, first, DIRECTION + axis, load(rays.row, (TO + axis) * room + first))
+        store_row(rays.packets, first, TFAR, load(rays.row, REACH * room + first))
     occlude(tracer, rays.packets, n, True)
     # add to E_direct; blocked rays add 0
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]
     flat = irradiance.reshape(irradiance.size)
     for channel in range(channels):
         for first in range(0, n, LANES):
-            blocked = load(rays.packets, (first >> 4) * packet + TFAR * LANES) < np.float32(0.0)
+            blocked = load_row(rays.packets, first, TFAR) < np.float32(0.0)
             at = channel * rays.value.shape[1] + first
             store(rays.value, at, select(blocked, np.float32(0.0), load(rays.value, at)))
         for ray in range(n):
@@ -132,7 +144,7 @@ def _trace_queue(tracer: Tracer, rays: Rays, n: int, irradiance: Float32) -> Non
 def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, irradiance: Float32) -> int:
     """`direct` for few light positions: sixteen hits per step."""
     channels, n_lights, room, row = irradiance.shape[1], irradiance.shape[2], rays.row.shape[1], rays.row
-    capacity = rays.packets.shape[0] * LANES
+    capacity = room_in(rays.packets)
     # Loop state
     waiting = NO_RAYS  # rays in the queue
     total = NO_RAYS  #   rays traced
@@ -172,7 +184,7 @@ def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, ray
 def _direct_by_lights(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, irradiance: Float32) -> int:
     """`direct` for many light positions: sixteen positions per step."""
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]
-    capacity = rays.packets.shape[0] * LANES
+    capacity = room_in(rays.packets)
     # Loop state
     waiting = NO_RAYS  # rays in the queue
     total = NO_RAYS  #   rays traced

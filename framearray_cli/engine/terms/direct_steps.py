@@ -15,13 +15,12 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32
 
-from ..embree.packets import Tracer, is_blocked, occlude, set_ray
+from ..embree.packets import Tracer, is_blocked, occlude, room_in, set_ray
 from ..hits.hits import Hits, lift, ray_origin, reflects
 from ..hits.rays import NO_RAYS, Rays
 from ..inputs.lights import DIRECTIONAL, LightArrays
 from ..inputs.random import STEPS, mix, random_word
 from ..kernels.kernel import inlined, kernel
-from ..kernels.simd import LANES
 from .direct import FAR_END, TO, write_geometry
 
 # Hits per block: enough to fill packets in the later rounds, which have fewer rays.
@@ -121,7 +120,7 @@ def _test_steps(
     hits: Hits, first: int, n: int, lights: LightArrays, s: int, step: int, tracer: Tracer, rays: Rays, tests: StepTests
 ) -> int:
     """Test both ends of every run of positions, and every step-th between; returns the number of rays."""
-    n_lights, capacity, row = tests.factor.shape[1], rays.packets.shape[0] * LANES, rays.row
+    n_lights, capacity, row = tests.factor.shape[1], room_in(rays.packets), rays.row
     reach = np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END
     # Loop state
     waiting = NO_RAYS  # rays in the queue
@@ -209,7 +208,7 @@ def _bisect(
     hits: Hits, first: int, n: int, lights: LightArrays, s: int, tracer: Tracer, rays: Rays, tests: StepTests
 ) -> int:
     """Find the change in each of n intervals whose ends differ; returns the number of rays."""
-    capacity, visible = rays.packets.shape[0] * LANES, tests.visible.reshape(tests.visible.size)
+    capacity, visible = room_in(rays.packets), tests.visible.reshape(tests.visible.size)
     now, total = 0, NO_RAYS  # list of this round's intervals (the next round's is 1 - now); rays traced
     while n > 0:
         # test the middle of each interval
@@ -245,7 +244,7 @@ def _check_agreed(
     hits: Hits, first: int, n: int, lights: LightArrays, s: int, tracer: Tracer, rays: Rays, tests: StepTests
 ) -> int:
     """Test one position of each of n agreed intervals, and correct it m-fold where it disagrees; returns n."""
-    capacity, visible = rays.packets.shape[0] * LANES, tests.visible.reshape(tests.visible.size)
+    capacity, visible = room_in(rays.packets), tests.visible.reshape(tests.visible.size)
     for start in range(0, n, capacity):
         m = min(capacity, n - start)
         for i in range(m):

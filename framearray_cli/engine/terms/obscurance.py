@@ -14,7 +14,20 @@ import numpy as np
 
 from framearray_cli.base.arrays import Rgb
 
-from ..embree.packets import DIRECTION, GEOMETRY, ORIGIN, TFAR, TRIANGLE, Tracer, U, V, intersect, scene_triangle
+from ..embree.packets import (
+    DIRECTION,
+    GEOMETRY,
+    ORIGIN,
+    TFAR,
+    TRIANGLE,
+    Tracer,
+    U,
+    V,
+    intersect,
+    place_in,
+    room_in,
+    scene_triangle,
+)
 from ..hits.hits import Hits, reflects_in_lanes, triple
 from ..hits.rays import NO_RAYS, Rays
 from ..inputs.random import HEMISPHERE, UNIT_24, above, cosine_direction, random_word
@@ -27,11 +40,14 @@ from ..kernels.simd import (
     integers,
     lane_numbers,
     load,
+    load_row,
     popcount,
     reals,
     scatter,
     select,
     store,
+    store_row,
+    width_of_packets,
 )
 from .falloff import CONSTANT, rho_of_lanes
 
@@ -69,7 +85,6 @@ def _write_obscurance_rays(
 
     A packet holds the same ray of 16 hits; n_rays consecutive packets belong to the same hits.
     """
-    size = rays.packets.shape[1] * LANES
     reach, idle = np.float32(np.inf if settings.sky else settings.d_max), np.float32(-1.0)
     step_x, step_y = np.int32(np.uint32(settings.step_x)), np.int32(np.uint32(settings.step_y))
     # fill the last packet with copies of the last hit, whose rays stay idle
@@ -96,14 +111,14 @@ def _write_obscurance_rays(
             x, y, z = cosine_direction(mx, my, mz, u, v)
             x, y, z = above(x, y, z, gx, gy, gz)
             # the ray
-            ray = packet * size
-            store(rays.packets, ray + ORIGIN * LANES, ox)
-            store(rays.packets, ray + (ORIGIN + 1) * LANES, oy)
-            store(rays.packets, ray + (ORIGIN + 2) * LANES, oz)
-            store(rays.packets, ray + DIRECTION * LANES, x)
-            store(rays.packets, ray + (DIRECTION + 1) * LANES, y)
-            store(rays.packets, ray + (DIRECTION + 2) * LANES, z)
-            store(rays.packets, ray + TFAR * LANES, tfar)
+            ray = packet * LANES
+            store_row(rays.packets, ray, ORIGIN, ox)
+            store_row(rays.packets, ray, ORIGIN + 1, oy)
+            store_row(rays.packets, ray, ORIGIN + 2, oz)
+            store_row(rays.packets, ray, DIRECTION, x)
+            store_row(rays.packets, ray, DIRECTION + 1, y)
+            store_row(rays.packets, ray, DIRECTION + 2, z)
+            store_row(rays.packets, ray, TFAR, tfar)
             # the next point of the lattice
             a, b, packet = a + step_x, b + step_y, packet + 1
     return packet
@@ -119,14 +134,13 @@ def _evaluate_rays(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int, setti
     Returns:
         number of listed rays.
     """
-    second, packet = rays.number.shape[1], rays.packets.shape[1] * LANES
+    second = rays.number.shape[1]
     bits, d_max = rays.packets.view(np.int32), np.float32(settings.d_max)
     # Loop state
     varied = NO_RAYS  # rays in the list
     for first in range(0, n, LANES):
         # distance d and triangle of Q, and which rays meet one within d_max
-        ray = (first >> 4) * packet
-        distance, triangle = load(rays.packets, ray + TFAR * LANES), load(bits, ray + TRIANGLE * LANES)
+        distance, triangle = load_row(rays.packets, first, TFAR), load_row(bits, first, TRIANGLE)
         missed = triangle < np.int32(0)
         within = ~missed & (distance < d_max)
         nothing = ~within
@@ -135,7 +149,7 @@ def _evaluate_rays(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int, setti
             nothing = nothing & ~missed
             store(rays.number, second + first, select(missed, integers(1), np.int32(0)))
         # rho(d), and the material of Q
-        triangle = scene_triangle(tracer, triangle, load(bits, ray + GEOMETRY * LANES))
+        triangle = scene_triangle(tracer, triangle, load_row(bits, first, GEOMETRY))
         material = gather(surfaces.material, select(within, triangle, np.int32(0)))
         at, x = material * np.int32(3), select(within, distance, np.float32(0.0)) / d_max
         weight = rho_of_lanes(settings.falloff, settings.tau, x, rays.value, first)
@@ -157,20 +171,20 @@ def _apply_textures(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int) -> N
     """Multiply the value of listed rays 0 to n - 1 by R(Q), looked up where each ray meets its surface."""
     if n == 0:
         return
-    stride, packet = np.int32(rays.value.shape[1]), np.int32(rays.packets.shape[1] * LANES)
+    stride, width = np.int32(rays.value.shape[1]), np.int32(width_of_packets())
     for k in range(n, (n + LANES - 1) // LANES * LANES):
         rays.number[0, k] = rays.number[0, n - 1]  # lanes that repeat a ray compute and write the same value
     bits = rays.packets.view(np.int32)
     for first in range(0, n, LANES):
         # triangle and place (u, v) of each ray
         i = load(rays.number, first)
-        at = (i >> np.int32(4)) * packet + (i & np.int32(15))
+        at = place_in(rays.packets, i)
         triangle, geometry = (
-            gather(bits, at + np.int32(TRIANGLE * LANES)),
-            gather(bits, at + np.int32(GEOMETRY * LANES)),
+            gather(bits, at + np.int32(TRIANGLE) * width),
+            gather(bits, at + np.int32(GEOMETRY) * width),
         )
         triangle = scene_triangle(tracer, triangle, geometry)
-        u, v = gather(rays.packets, at + np.int32(U * LANES)), gather(rays.packets, at + np.int32(V * LANES))
+        u, v = gather(rays.packets, at + np.int32(U) * width), gather(rays.packets, at + np.int32(V) * width)
         # rho(d) -> R(Q) rho(d)
         total = total_at(surfaces, triangle, u, v)
         for channel in range(3):
@@ -227,7 +241,7 @@ def _trace_hits(
     """Estimate W of the n hits listed in `rays.place`, tracing as many rays of each together as fit."""
     if n == 0:
         return
-    room = rays.packets.shape[0]
+    room = room_in(rays.packets) // LANES
     for first_ray in range(0, settings.n_rays, room):
         # rays first_ray to first_ray + n_rays - 1 of every hit
         n_rays = min(settings.n_rays - first_ray, room)
@@ -259,7 +273,7 @@ def obscurance(
     Returns:
         number of rays.
     """
-    fit = max(rays.packets.shape[0] // settings.n_rays, 1) * LANES  # hits whose rays fit into the packets
+    fit = max(room_in(rays.packets) // LANES // settings.n_rays, 1) * LANES  # hits whose rays fit into the packets
     # Loop state
     waiting = NO_RAYS  # hits in the list rays.place
     total = NO_RAYS  #   hits done

@@ -48,14 +48,14 @@ def fill(packets: Any, origins: Any, dirs: Any, far: Any) -> None:
     flat[: len(origins), ORIGIN : ORIGIN + 3] = origins
     flat[: len(origins), DIRECTION : DIRECTION + 3] = dirs
     flat[: len(origins), TFAR] = far
-    packets[:] = flat.reshape(len(packets), LANES, -1).transpose(0, 2, 1)
+    packets[:] = flat.reshape(len(packets), packets.shape[2], -1).transpose(0, 2, 1)
 
 
 def first_hits(
     scene: EmbreeScene, origins: Any, dirs: Any, far: Any = np.inf, coherent: bool = False, near: float = 0.0
 ) -> Any:
     """(n, 4) float64: triangle or -1, t, u, v of each ray."""
-    packets = empty_packets(-(-min(len(origins), CHUNK) // LANES), HIT_ROWS)
+    packets = empty_packets(min(len(origins), CHUNK), HIT_ROWS)
     far, found = np.broadcast_to(far, len(origins)), []
     for i in range(0, len(origins), CHUNK):
         n = len(origins[i : i + CHUNK])
@@ -70,7 +70,7 @@ def first_hits(
 
 def blocked(scene: EmbreeScene, origins: Any, dirs: Any, far: Any, coherent: bool = False) -> Any:
     """(n,) whether each ray meets anything before `far`."""
-    packets = empty_packets(-(-min(len(origins), CHUNK) // LANES), RAY_ROWS)
+    packets = empty_packets(min(len(origins), CHUNK), RAY_ROWS)
     far, found = np.broadcast_to(far, len(origins)), []
     for i in range(0, len(origins), CHUNK):
         n = len(origins[i : i + CHUNK])

@@ -12,6 +12,7 @@ int32 as bits, without the sign. Operands that do not fit together raise a typin
 
 from .arithmetic import bits, ctz, doubles, floor, integers, lane_numbers, popcount, reals, select, sqrt, words
 from .memory import compress, gather, lanes_from, load, put_triples, scatter, store, stored, triples_at
+from .rows import load_row, store_row, width_of_packets
 from .types import LANES, Lanes
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "lane_numbers",
     "lanes_from",
     "load",
+    "load_row",
     "popcount",
     "put_triples",
     "reals",
@@ -34,7 +36,9 @@ __all__ = [
     "select",
     "sqrt",
     "store",
+    "store_row",
     "stored",
     "triples_at",
+    "width_of_packets",
     "words",
 ]

@@ -11,14 +11,13 @@ import numpy as np
 
 from framearray_cli.base.arrays import Bytes, Float32, Float64, Int32
 
-from ...embree.packets import Tracer, is_blocked, occlude, set_ray
+from ...embree.packets import Tracer, is_blocked, occlude, room_in, set_ray
 from ...hits.hits import ESCAPED, SURFACE, Hits, World, ray_origin
 from ...hits.rays import NO_RAYS, Rays
 from ...inputs.lights import LightArrays
 from ...inputs.random import HEMISPHERE, PIXEL, r2, random_word, stream
 from ...inputs.surfaces import Surfaces, geometric_normal, position_at, reflectivity_at, specular_at
 from ...kernels.kernel import kernel
-from ...kernels.simd import LANES
 from .estimate import AMBIENT_STREAM, BATCH, Workspace, choose_steps
 from .walks import DIFFUSE, END, Walkers
 
@@ -121,7 +120,7 @@ def _connect(hits: Hits, walkers: Walkers, n: int, pool: VertexPool, tracer: Tra
     Returns:
         number of rays.
     """
-    capacity = rays.packets.shape[0] * LANES
+    capacity = room_in(rays.packets)
     # Loop state
     waiting = NO_RAYS  # rays in the queue
     total = NO_RAYS  #   rays traced

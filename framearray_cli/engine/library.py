@@ -1,0 +1,84 @@
+"""Embree's C functions, from the library in the embreex wheel, and the widths of packets that it traces natively."""
+
+import ctypes
+import os
+from functools import cache
+from typing import Any
+
+# Rays per packet -> RTC_DEVICE_PROPERTY_NATIVE_RAY..._SUPPORTED.
+_NATIVE = {16: 34, 8: 33, 4: 32}
+WIDEST = 16
+
+
+@cache
+def embree_library() -> ctypes.CDLL | None:
+    """Load Embree from the embreex wheel; None where its symbols cannot be reached.
+
+    Opening the extension module again resolves every `rtc...` symbol through the module's own dependency, however the
+    wheel names that library.
+    """
+    from embreex import rtcore_scene
+
+    try:
+        library = ctypes.CDLL(rtcore_scene.__file__)
+        for name in _SIGNATURES:
+            getattr(library, name)
+    except (OSError, AttributeError):
+        return None
+    for name, (result, *arguments) in _SIGNATURES.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+    return library
+
+
+_POINTER, _UINT, _SIZE, _INT = ctypes.c_void_p, ctypes.c_uint, ctypes.c_size_t, ctypes.c_int
+_TRACE = (None, _POINTER, _POINTER, _POINTER, _POINTER)
+_SIGNATURES: dict[str, tuple[Any, ...]] = {
+    "rtcNewDevice": (_POINTER, ctypes.c_char_p),
+    "rtcGetDeviceError": (_INT, _POINTER),
+    "rtcGetDeviceProperty": (ctypes.c_ssize_t, _POINTER, _INT),
+    "rtcReleaseDevice": (None, _POINTER),
+    "rtcNewScene": (_POINTER, _POINTER),
+    "rtcSetSceneFlags": (None, _POINTER, _INT),
+    "rtcCommitScene": (None, _POINTER),
+    "rtcReleaseScene": (None, _POINTER),
+    "rtcNewGeometry": (_POINTER, _POINTER, _INT),
+    "rtcSetSharedGeometryBuffer": (None, _POINTER, _INT, _UINT, _INT, _POINTER, _SIZE, _SIZE, _SIZE),
+    "rtcSetGeometryUserData": (None, _POINTER, _POINTER),
+    "rtcSetGeometryIntersectFilterFunction": (None, _POINTER, _POINTER),
+    "rtcSetGeometryOccludedFilterFunction": (None, _POINTER, _POINTER),
+    "rtcCommitGeometry": (None, _POINTER),
+    "rtcAttachGeometryByID": (None, _POINTER, _POINTER, _UINT),
+    "rtcReleaseGeometry": (None, _POINTER),
+    **{f"rtc{query}{width}": _TRACE for query in ("Intersect", "Occluded") for width in _NATIVE},
+}
+
+
+def device_configuration() -> bytes | None:
+    """Embree's settings for a device: none, except where tests force an instruction set."""
+    return os.environ.get("FRAMEARRAY_EMBREE", "").encode() or None
+
+
+@cache
+def packet_width() -> int:
+    """The number of rays that Embree traces together at most on this processor: 16, 8 or 4.
+
+    Wider packets it takes apart and traces ray by ray: with AVX2 shadow rays then take more than twice as long. Kernels
+    are compiled for this width. FRAMEARRAY_PACKETS names another one, for tests and measurements.
+    """
+    chosen = os.environ.get("FRAMEARRAY_PACKETS", "")
+    if chosen in {str(width) for width in _NATIVE}:
+        return int(chosen)
+    return max(native_widths(), default=WIDEST)
+
+
+def native_widths() -> tuple[int, ...]:
+    """The numbers of rays per packet that Embree traces together on this processor, the widest first."""
+    library = embree_library()
+    if library is None:
+        return ()
+    device = library.rtcNewDevice(device_configuration())
+    try:
+        return tuple(width for width, key in _NATIVE.items() if library.rtcGetDeviceProperty(device, key))
+    finally:
+        library.rtcReleaseDevice(device)
