@@ -78,6 +78,8 @@ def native_widths() -> tuple[int, ...]:
     if library is None:
         return ()
     device = library.rtcNewDevice(device_configuration())
+    if not device:
+        return ()
     try:
         return tuple(width for width, key in _NATIVE.items() if library.rtcGetDeviceProperty(device, key))
     finally:
