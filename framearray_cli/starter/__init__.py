@@ -12,21 +12,22 @@ from framearray_cli.base.files import write_bytes
 from framearray_cli.base.forms.kinds import mistaken
 
 from .model import Start, table_of, validate_job
-from .plan import StartOptions, plan_start
+from .options import Format, StartOptions, SunOption
+from .plan import plan_start
 from .text import to_text
 
-__all__ = ["Start", "StartOptions", "init"]
+__all__ = ["Format", "Start", "StartOptions", "SunOption", "init"]
 
 
 def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = False) -> Start:
-    """Write a first job for a scene.
+    """Write a first job for a scene; the job, and the folder of its images, have the name of the file.
 
     Args:
         force: replace an existing file.
 
     Raises:
         SceneError: the scene cannot be read, or nothing in it can be seen or lit.
-        JobError: no camera has the name in the options.
+        JobError: no camera has the name in the options, or the sun never rises.
         OutputError: the job file exists already, or cannot be written.
     """
     if problem := mistaken(scene, "scene"):
@@ -35,7 +36,7 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
         raise OutputError(f"{job_file}: is there already; give another name with --output, or --force to replace it")
     if not os.path.exists(scene):
         raise SceneError(f"{scene}: no such scene file")
-    start = plan_start(scene, options)
+    start = plan_start(scene, job_file.stem, options)
     validate_job(table_of(start), scene)
     write_bytes(job_file, to_text(start, job_file).encode("utf-8"))
     return start

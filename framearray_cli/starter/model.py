@@ -44,13 +44,44 @@ class Camera:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LightKeys:
-    """A light's path: its frames, and its position or direction and its power at each."""
+    """A light's path: its frames, and its position or direction and its power at each.
+
+    Attributes:
+        name: for a group.
+    """
 
     kind: Literal["point", "directional"]
     frames: tuple[int, ...]
     vectors: tuple[Vector, ...]
     powers: tuple[Vector, ...]
     about: tuple[str, ...]
+    name: str = "lamp"
+    group: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SunDay:
+    """The sun over a place on a day.
+
+    Attributes:
+        timezone: hours ahead of UTC.
+        start, stop: local times.
+        power: irradiance.
+    """
+
+    latitude: float
+    longitude: float
+    date: str
+    timezone: float
+    start: str
+    stop: str
+    power: Vector
+    about: tuple[str, ...]
+    name: str = "sun"
+    group: str | None = None
+
+
+LightSource = LightKeys | SunDay
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +100,8 @@ class Start:
 
     Attributes:
         inside: whether the scene counts as a room.
+        unit: of length, as it seems: "m", "cm", "mm", "in" or "ft"; "" where nothing tells.
+        format: of the images.
         about: comment lines at the top.
     """
 
@@ -78,11 +111,13 @@ class Start:
     background: Vector
     camera: Camera
     light_frames: int
-    sources: tuple[LightKeys, ...]
+    sources: tuple[LightSource, ...]
     range: float
     inside: bool
     about: tuple[str, ...]
     materials: tuple[MaterialNote, ...]
+    unit: str = ""
+    format: str = "png"
 
     @property
     def outside(self) -> str:
@@ -123,9 +158,10 @@ def table_of(start: Start) -> dict[str, Any]:
         },
         "light": {
             "frames": start.light_frames,
-            "sources": [{"type": s.kind, "keys": source_keys(s)} for s in start.sources],
+            "sources": [source_table(source) for source in start.sources],
         },
         "obscurance": {"range": start.range, "outside": start.outside},
+        "output": {"format": start.format},
     }
 
 
@@ -142,6 +178,24 @@ def validate_job(table: dict[str, Any], file: Path) -> Job:
         more = f"; and {len(problems) - MOST_PROBLEMS} more problems" if len(problems) > MOST_PROBLEMS else ""
         listed = "; ".join(problems[:MOST_PROBLEMS]) + more
         raise SceneError(f"{file}: its cameras or lights do not make a job: {listed}") from error
+
+
+def source_table(source: LightSource) -> dict[str, Any]:
+    """The table of a source."""
+    group = {"group": source.group} if source.group else {}
+    if isinstance(source, LightKeys):
+        return {"type": source.kind, **group, "keys": source_keys(source)}
+    return {
+        "type": "sun",
+        **group,
+        "latitude": source.latitude,
+        "longitude": source.longitude,
+        "date": source.date,
+        "timezone": source.timezone,
+        "start": source.start,
+        "stop": source.stop,
+        "irradiance": list(source.power),
+    }
 
 
 def source_keys(source: LightKeys) -> list[dict[str, Any]]:

@@ -6,17 +6,21 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 
+from .outline import outline_of, thing_corners
 from .rays import Probe
 from .sample import level_directions
-from .views import ASPECT, judge_views
+from .views import ASPECT, judge_shapes, trace_views
 
 FOV_DEG = 40.0  # longer than a room's: a thing seen from some way off is not distorted
-ABOVE_DEG = 20.0  # elevation of the eye, seen from the middle of the thing
+ABOVE_DEG, INTO_DEG = (
+    (12.0, 22.0),
+    (35.0,),
+)  # elevations of the eye to choose from; of one that looks down into a vessel
 ARC_DEG, KEYS = 90.0, 7  # the largest number of keys: 15 degrees apart, the path leaves the circle by a thousandth
 FILLED = 0.88  # largest share of the picture's height or width that the thing covers
-SIDES = 8  # arcs to choose from
-FRONT_BONUS = 0.5  # added to the worth of the front; the back loses as much
-OUTLINE = 4000  # corners that stand for the outline
+SIDES = 16  # arcs to choose from
+FRONT_BONUS = 0.12  # added to the worth of the front; the back loses as much
+ARC_WEIGHTS = np.array([0.5, 0.3, 0.2])  # of its first, middle and last picture: people see the first one first
 SUN_ARC_DEG, SUN_DEG, SUN_KEYS = 110.0, (35.0, 60.0), 5  # from left to right; elevation at the ends and at noon
 
 
@@ -28,28 +32,38 @@ def key_frames(n: int, most: int) -> tuple[list[int], Float64]:
     return frames, np.array(frames) / (n - 1)
 
 
-def choose_orbit(probe: Probe, up: int, shares: Float64) -> tuple[Float64, Float64]:
+def choose_orbit(
+    probe: Probe, up: int, shares: Float64, aspect: float = ASPECT, *, from_above: bool = False
+) -> tuple[Float64, Float64]:
     """Choose the eyes of an orbit, (n, 3), and their common target (3,), in centred coordinates.
 
-    Every picture shows the whole thing.
+    Every picture shows the whole thing, without the ground on which it stands.
 
     Args:
         up: number of the up axis.
         shares: (n,) of the way around, 0 to 1.
+        aspect: width over height of the pictures.
+        from_above: whether to look down into it.
     """
-    corners = probe.scene.corners.reshape(-1, 3).astype(np.float64)
-    target = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    outline = corners[:: max(1, len(corners) // OUTLINE)] - target
+    points = thing_corners(probe.scene.corners, up)
+    target = (points.min(axis=0) + points.max(axis=0)) / 2
+    outline = outline_of(points) - target
     up_dir = np.eye(3)[up]
-    middle = level_directions(SIDES, up)
-    ways = np.stack([_raise_direction(way, up_dir, ABOVE_DEG) for way in middle])
-    far = _fitting_distance(outline, ways, up_dir)
     size = float(np.linalg.norm(outline, axis=1).max())
-    shown, _ = judge_views(probe, target + ways * far, -ways, up_dir, size)
-    best = middle[int((shown + FRONT_BONUS * (middle @ middle[0])).argmax())]
+    middle = level_directions(SIDES, up)
+    above = [(way, angle) for angle in (INTO_DEG if from_above else ABOVE_DEG) for way in middle]
+    tried = np.radians(ARC_DEG * (np.array([0.0, 0.5, 1.0]) - 0.5))
+    ways = np.stack(
+        [_raise_direction(turn_about(way, up_dir, turn), up_dir, high) for way, high in above for turn in tried]
+    )
+    far = _fitting_distances(outline, ways, up_dir, aspect)
+    views = trace_views(probe, target + ways * far[:, None], -ways, up_dir, size, FOV_DEG)
+    worth = judge_shapes(views).reshape(-1, 3)
+    front = np.array([FRONT_BONUS * float(way @ middle[0]) for way, _ in above])
+    best, high = above[int((worth @ ARC_WEIGHTS + front).argmax())]
     arc = np.radians(ARC_DEG * (shares - 0.5))
-    ways = np.stack([_raise_direction(turn_about(best, up_dir, angle), up_dir, ABOVE_DEG) for angle in arc])
-    return target + ways * _fitting_distance(outline, ways, up_dir), target
+    ways = np.stack([_raise_direction(turn_about(best, up_dir, angle), up_dir, high) for angle in arc])
+    return target + ways * _fitting_distances(outline, ways, up_dir, aspect).max(), target
 
 
 def sun_directions(to_eye: Float64, up: int, shares: Float64) -> Float64:
@@ -86,14 +100,14 @@ def _raise_direction(level: Float64, up_dir: Float64, above_deg: float) -> Float
     return np.asarray(math.cos(above) * level + math.sin(above) * up_dir)
 
 
-def _fitting_distance(outline: Float64, ways: Float64, up_dir: Float64) -> float:
-    """Distance from which the outline fits into the picture from all directions `ways`."""
+def _fitting_distances(outline: Float64, ways: Float64, up_dir: Float64, aspect: float) -> Float64:
+    """(n,) distance from which the outline fits into the picture from each of n directions."""
     tall = math.tan(math.radians(FOV_DEG) / 2) * FILLED
     needed = []
     for way in ways:
         right = np.cross(-way, up_dir)
         right /= np.linalg.norm(right)
         above = np.cross(right, -way)
-        across = np.maximum(np.abs(outline @ right) / (tall * ASPECT), np.abs(outline @ above) / tall)
+        across = np.maximum(np.abs(outline @ right) / (tall * aspect), np.abs(outline @ above) / tall)
         needed.append(float((across + outline @ way).max()))
-    return max(needed)
+    return np.array(needed)

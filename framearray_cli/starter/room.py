@@ -1,4 +1,4 @@
-"""Decide whether a scene is a room to be inside of; choose a short walk in it, and a path for a lamp.
+"""Where one can be inside of a scene: the places of a room, its floor and its height.
 
 A point is inside where most rays around it meet surfaces from their front: from inside a wall, a cupboard or a teapot
 one sees the backs of things, and beside a thing on a lawn there is sky.
@@ -13,26 +13,24 @@ from framearray_cli.base.arrays import Float64
 
 from .rays import Probe
 from .sample import directions_around, level_directions, points_in
-from .views import judge_views, view_directions
 
 POINTS, AROUND = 3000, 64
+ROUNDS, ENOUGH, TRIM = 3, 2000, 2  # further rounds of points, until there are enough inside; per cent left out per side
 # A point is inside if at least these shares of its rays hit, and of those that hit, hit a front.
 ENCLOSED, FRONTS = 0.7, 0.75
+UNDER_SKY = 0.55  # instead of ENCLOSED in a place that has no roof
+ROOFED = 0.3  # least share of the points inside that have something above them, in a place with a roof
 # Least share of points in the bounds of a room that are inside. Rooms that were tried have 5 % (a house in a garden
 # of 80 m) to 83 %; things to be looked at have none.
 LEAST_INSIDE = 0.02
-EYE_METRES, ROOM_METRES = 1.6, (2.0, 12.0)  # height of an eye, in rooms whose height is plausible in metres
+EYE_METRES, ROOM_METRES = 1.5, (1.9, 12.0)  # height of an eye, in rooms in which one can stand
 EYE_SHARE = 0.55  # of the height of any other room
-LAMP_SHARE = 0.75  # of the height of a room
 CLEAR = 0.12  # of the height of a room: least distance of an eye from anything; 0.3 m at 2.5 m
-LAMP_CLEAR = 0.15  # the same for a lamp, which would make a white spot on a wall nearby
-STANDS, TURNS = 250, 12  # places and directions whose views are judged
-DOWN = 0.1  # tangent of the angle by which eyes look below the horizon
-WALK = 0.8  # longest walk, heights of the room; over 24 frames that is 8 cm per frame at 2.5 m
 STEPS = 8  # points of a path whose surroundings are checked
-OPEN_SIDE = (0.5, 0.7, 0.9)  # distances from a side of the bounds, heights of the room, from which eyes may look in
-OPEN_BONUS = 0.2  # variety by which such a view must show more than any from inside
-LAMPS, LIT_POINTS = 300, 300  # largest numbers of places for a lamp, and of points in the pictures for it to light
+# The floor below a place is the lowest surface below a place nearby, unless that is a storey lower: distance over the
+# height above the surface below it, and largest and least step over the same height.
+FLOOR_REACH, STOREY, FURNITURE = 0.5, 0.5, 0.06
+HEADROOM = 0.6  # least height of what is above a standing person, over the height of the room; not below a table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,38 +39,51 @@ class Room:
 
     Attributes:
         up: number of the up axis.
-        floor, ceiling: (n,) height of the surface below and above each place.
         places: (n, 3).
-        height: of the room, median.
+        floor, ceiling: (n,) height of the floor below and of the surface above each place; inf under the sky.
+        stands: (n,) whether a person there stands on the floor, and not on a table.
+        height: of the room, median; in a place under the sky, half its width.
+        roofless: whether it is a place under the sky, such as a street.
     """
 
     up: int
     places: Float64
     floor: Float64
     ceiling: Float64
+    stands: NDArray[np.bool_]
     height: float
+    roofless: bool = False
 
     @property
     def up_dir(self) -> Float64:
         """Unit vector, (3,)."""
         return np.asarray(np.eye(3)[self.up])
 
-    def at_share(self, share: float, metres: float | None = None) -> Float64:
-        """The places, moved up or down to a share of the height, or to `metres` above the floor where that fits."""
-        low, high = ROOM_METRES
-        tall = self.ceiling - self.floor
+    @property
+    def enclosed(self) -> float:
+        """Least share of rays around a point inside that hit."""
+        return UNDER_SKY if self.roofless else ENCLOSED
+
+    def at_share(self, share: float) -> Float64:
+        """The places, moved up or down to a share of the height."""
         moved = self.places.copy()
-        fits = (tall >= low) & (tall <= high) & (metres is not None)
-        moved[:, self.up] = self.floor + np.where(fits, metres or 0.0, share * tall)
+        tall = np.where(np.isfinite(self.ceiling), self.ceiling - self.floor, self.height)
+        moved[:, self.up] = self.floor + share * tall
         return moved
 
+    def eye_places(self, metre: float | None) -> Float64:
+        """Places for an eye.
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Walk:
-    """A straight path of the eye with a fixed target: (2, 3) first and last eye, and (3,) target."""
-
-    eyes: Float64
-    target: Float64
+        Args:
+            metre: its length in scene units; None if it is not known.
+        """
+        low, high = ROOM_METRES
+        tall = self.ceiling - self.floor
+        found = self.at_share(EYE_SHARE)
+        if metre is not None:
+            fits = (tall >= low * metre) & ((tall <= high * metre) | self.roofless)
+            found[fits, self.up] = self.floor[fits] + EYE_METRES * metre
+        return found[self.stands] if self.stands.any() else found
 
 
 def find_room(probe: Probe, up: int) -> tuple[Room | None, float]:
@@ -81,139 +92,96 @@ def find_room(probe: Probe, up: int) -> tuple[Room | None, float]:
     Args:
         up: number of the up axis.
     """
-    corners = probe.scene.corners.reshape(-1, 3)
-    low, high = (np.array([f(corners[:, axis]) for axis in range(3)], dtype=np.float64) for f in (np.min, np.max))
+    low, high = bounds(probe)
     places = points_in(low, high, POINTS)
     inside, _ = surroundings(probe, places)
     share = float(inside.mean())
     if share < LEAST_INSIDE:
         return None, share
-    first = places[inside]
-    again = points_in(first.min(axis=0), first.max(axis=0), POINTS)  # so that a house in a garden gets enough points
-    inside, _ = surroundings(probe, again)
-    places = np.concatenate([first, again[inside]])
+    found = places[inside]
+    for _ in range(ROUNDS):  # so that a house in a wide garden gets enough points
+        if len(found) >= ENOUGH:
+            break
+        low, high = np.percentile(found, [TRIM, 100 - TRIM], axis=0)
+        places = points_in(low, high, POINTS)
+        inside, _ = surroundings(probe, places)
+        found = np.concatenate([found, places[inside]])
+    return _room_of(probe, up, found), share
+
+
+def _room_of(probe: Probe, up: int, places: Float64) -> Room | None:
+    """The room of some points inside; None where nothing is below them."""
     axis = np.eye(3)[up]
     below, above = (probe.trace(places, way) for way in (-axis, axis))
-    between = below.hit & above.hit
-    if not between.any():
-        return None, share
-    places, below_by, above_by = places[between], below.distance[between], above.distance[between]
-    height = float(np.median(below_by + above_by))
+    roofless = bool((above.hit & below.hit).sum() < ROOFED * below.hit.sum())
+    kept = below.hit & (above.hit | roofless)
+    if not kept.any():
+        return None
+    places, below_by, above_by = places[kept], below.distance[kept], above.distance[kept]
     level = places[:, up]
-    room = Room(up=up, places=places, floor=level - below_by, ceiling=level + above_by, height=height)
-    return room, share
+    under, ceiling = level - below_by, level + above_by
+    floor, stands = _find_floor(places, under, ceiling, up)
+    height = float(np.median(ceiling - floor))
+    stands &= ceiling - floor >= HEADROOM * height
+    if roofless:
+        height = _half_width(probe, places, up)
+    return Room(up=up, places=places, floor=floor, ceiling=ceiling, stands=stands, height=height, roofless=roofless)
 
 
-def surroundings(probe: Probe, places: Float64) -> tuple[NDArray[np.bool_], Float64]:
+def _find_floor(places: Float64, under: Float64, ceiling: Float64, up: int) -> tuple[Float64, NDArray[np.bool_]]:
+    """Find the floor (n,) below each place, which may be lower than the table below it, and where it is not."""
+    level = np.delete(places, up, axis=1)
+    size = float(np.median(np.minimum(ceiling, places[:, up].max()) - under))
+    floor = under.copy()
+    for first in range(0, len(places), 500):
+        part = slice(first, first + 500)
+        near = ((level[part, None] - level[None]) ** 2).sum(axis=2) <= (FLOOR_REACH * size) ** 2
+        lower = under[part, None] - under[None]
+        near &= (lower > 0) & (lower < STOREY * size)
+        near &= ceiling[None] >= places[part, up, None]  # not below the floor, or below the table
+        floor[part] = np.minimum(under[part], np.where(near, under[None], np.inf).min(axis=1))
+    return floor, under - floor <= FURNITURE * size
+
+
+def _half_width(probe: Probe, places: Float64, up: int) -> float:
+    """Half the median distance of what is around some places at their own height."""
+    some = places[:: max(1, len(places) // 200)]
+    ways = level_directions(16, up)
+    seen = probe.trace(np.repeat(some, 16, axis=0), np.tile(ways, (len(some), 1)))
+    return float(np.median(seen.distance[seen.hit])) / 2 if seen.hit.any() else float(np.ptp(places))
+
+
+def bounds(probe: Probe) -> tuple[Float64, Float64]:
+    """Least and largest coordinates of the scene, (3,) each."""
+    corners = probe.scene.corners.reshape(-1, 3)
+    low, high = (np.array([f(corners[:, axis]) for axis in range(3)], dtype=np.float64) for f in (np.min, np.max))
+    return low, high
+
+
+def surroundings(probe: Probe, places: Float64, enclosed: float = ENCLOSED) -> tuple[NDArray[np.bool_], Float64]:
     """(n,) whether each place is inside, and (n,) distance of the nearest thing."""
     n = len(places)
     around = directions_around(AROUND)
     seen = probe.trace(np.repeat(places, AROUND, axis=0), np.tile(around, (n, 1)))
     hit, front = seen.hit.reshape(n, AROUND), seen.front.reshape(n, AROUND)
-    good = (hit.mean(axis=1) >= ENCLOSED) & (front.sum(axis=1) >= FRONTS * hit.sum(axis=1))
+    good = (hit.mean(axis=1) >= enclosed) & (front.sum(axis=1) >= FRONTS * hit.sum(axis=1))
     return good, seen.distance.reshape(n, AROUND).min(axis=1)
 
 
-def choose_walk(probe: Probe, room: Room) -> Walk | None:
-    """Choose the view that shows most and a short walk from there; None where no place has room for an eye."""
-    eyes = _select_clear(probe, room.at_share(EYE_SHARE, EYE_METRES), CLEAR * room.height, STANDS)
-    if not len(eyes):
-        return None
-    level = level_directions(TURNS, room.up)
-    looks = level - DOWN * room.up_dir
-    looks /= np.linalg.norm(looks, axis=1, keepdims=True)
-    eye, look = np.repeat(eyes, TURNS, axis=0), np.tile(looks, (len(eyes), 1))
-    value, depth = judge_views(probe, eye, look, room.up_dir, room.height)
-    best = int(value.argmax())
-    target = eye[best] + look[best] * max(depth[best], 0.5 * room.height)
-    return _walk_past_open_side(probe, room, float(value[best])) or _walk_from(probe, room, eye[best], target)
+def free_ways(probe: Probe, room: Room, start: Float64, end: Float64, clear: float) -> NDArray[np.bool_]:
+    """(n,) whether a ball of radius `clear` can move straight from start to end, (n, 3) each, and stay inside."""
+    n, shares = len(start), np.linspace(0, 1, STEPS)[:, None]
+    ways = start[:, None] + (end - start)[:, None] * shares
+    inside, nearest = surroundings(probe, ways.reshape(-1, 3), room.enclosed)
+    good = (inside & (nearest >= clear)).reshape(n, STEPS).all(axis=1)
+    return np.asarray(good & ~probe.blocked(start, end))
 
 
-def _walk_past_open_side(probe: Probe, room: Room, least: float) -> Walk | None:
-    """Choose a walk past an open side, as of a doll's house; None unless its view is worth more than `least`."""
-    corners = probe.scene.corners.reshape(-1, 3)
-    low, high = (np.array([f(corners[:, axis]) for axis in range(3)], dtype=np.float64) for f in (np.min, np.max))
-    middle, half = (low + high) / 2, (high - low) / 2
-    ways = np.repeat(level_directions(4, room.up), len(OPEN_SIDE), axis=0)
-    away = np.abs(ways @ half) + np.tile(OPEN_SIDE, 4) * room.height
-    eyes = middle + ways * away[:, None]
-    value, _ = judge_views(probe, eyes, -ways, room.up_dir, room.height)
-    best = int(value.argmax())
-    if value[best] <= least + OPEN_BONUS:
-        return None
-    aside = np.cross(room.up_dir, ways[best]) * 0.25 * room.height
-    return Walk(eyes=np.array([eyes[best] - aside, eyes[best] + aside]), target=middle)
-
-
-def _walk_from(probe: Probe, room: Room, eye: Float64, target: Float64) -> Walk:
-    """Choose the end of a walk: the free path whose last view of the same target shows most."""
-    ends, lengths = [], []
-    longest = min(WALK * room.height, 0.45 * float(np.linalg.norm(target - eye)))
-    for way in level_directions(16, room.up):
-        for share in (1.0, 0.6):
-            end = eye + way * longest * share
-            if _is_free(probe, eye, end, CLEAR * room.height):
-                ends.append(end)
-                lengths.append(share)
-    if not ends:
-        return Walk(eyes=np.array([eye, eye]), target=target)
-    look = target - np.array(ends)
-    value, _ = judge_views(
-        probe, np.array(ends), look / np.linalg.norm(look, axis=1, keepdims=True), room.up_dir, room.height
-    )
-    best = int((value + np.array(lengths)).argmax())
-    return Walk(eyes=np.array([eye, ends[best]]), target=target)
-
-
-def _is_free(probe: Probe, start: Float64, end: Float64, clear: float) -> bool:
-    """Whether a ball of radius `clear` can move straight from start to end and stay inside."""
-    way = start + (end - start) * np.linspace(0, 1, STEPS)[:, None]
-    inside, nearest = surroundings(probe, way)
-    return bool(inside.all() and (nearest >= clear).all() and not probe.blocked(start, end).any())
-
-
-def _select_clear(probe: Probe, places: Float64, clear: float, most: int) -> Float64:
+def select_clear(probe: Probe, room: Room, places: Float64, clear: float, most: int) -> Float64:
     """Select at most `most` places that are inside and `clear` of everything, or half or a quarter of it if none is."""
-    inside, nearest = surroundings(probe, places)
+    inside, nearest = surroundings(probe, places, room.enclosed)
     for least in (clear, clear / 2, clear / 4):
         good = places[inside & (nearest >= least)]
         if len(good):
             return good[:: -(-len(good) // most)]
     return places[:0]
-
-
-def choose_lamp_path(probe: Probe, room: Room, eyes: Float64, targets: Float64) -> Float64 | None:
-    """Choose the start and end of a lamp's path, (2, 3), that light what the eyes see; None where no place has room.
-
-    Args:
-        eyes, targets: (n, 3) of the views to light.
-    """
-    spots = _select_clear(probe, room.at_share(LAMP_SHARE), LAMP_CLEAR * room.height, LAMPS)
-    points = _seen_points(probe, eyes, targets, room.up_dir)
-    if not len(spots) or not len(points):
-        return None
-    lit = ~probe.blocked(np.repeat(spots, len(points), axis=0), np.tile(points, (len(spots), 1)))
-    lit = lit.reshape(len(spots), -1)
-    reach = np.linalg.norm(spots[:, None] - points[None], axis=2)
-    # a distant lamp lights the points evenly, but then it mostly lights another room
-    value = (lit / (1 + (reach / (2 * room.height)) ** 2)).mean(axis=1)
-    first = int(value.argmax())
-    start = spots[first]
-    apart = np.linalg.norm(spots - start, axis=1)
-    # squared, so that the light at the end of the path counts more than the length of the path
-    for other in np.argsort(-(value**2) * np.minimum(apart / room.height, 1.0)):
-        if apart[other] > 0 and _is_free(probe, start, spots[other], LAMP_CLEAR * room.height / 2):
-            return np.array([start, spots[other]])
-    return np.array([start, start])
-
-
-def _seen_points(probe: Probe, eyes: Float64, targets: Float64, up_dir: Float64) -> Float64:
-    """Points (n, 3) slightly in front of the surfaces that the views show."""
-    look = targets - eyes
-    look = look / np.linalg.norm(look, axis=1, keepdims=True)
-    directions = view_directions(look, up_dir)
-    origins = np.repeat(eyes, directions.shape[1], axis=0)
-    directions = directions.reshape(-1, 3)
-    seen = probe.trace(origins, directions)
-    points = (origins + directions * (seen.distance * (1 - 1e-3))[:, None])[seen.hit]
-    return np.asarray(points[:: max(1, len(points) // LIT_POINTS)])

@@ -6,7 +6,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError, SceneError
 from framearray_cli.scene.files import Stage, StageCamera, StageLight
 
-from .model import Camera, EyeKey, LightKeys, round_vector
+from .model import DIGITS, Camera, EyeKey, LightKeys, round_vector
 
 FPS = 24.0  # of the job; times of animations are seconds
 HEIGHT = 240  # pixels of a first picture
@@ -38,11 +38,14 @@ def frame_times(span: tuple[float, float] | None, wanted: int | None, most: int)
     return [float(time) for time in np.linspace(*span, n)]
 
 
-def convert_camera(stage: Stage, camera: StageCamera, wanted: int | None, depth: float) -> Camera:
+def convert_camera(
+    stage: Stage, camera: StageCamera, wanted: int | None, depth: float, resolution: tuple[int, int] | None = None
+) -> Camera:
     """Convert a camera of the file to a path.
 
     Args:
         wanted: number of frames; None: that of its animation.
+        resolution: of the pictures; None: as wide as the camera's aspect asks for.
         depth: distance from the eye to its target, scene units.
 
     Raises:
@@ -67,29 +70,38 @@ def convert_camera(stage: Stage, camera: StageCamera, wanted: int | None, depth:
         keys=tuple(keys) if (matrices != matrices[0]).any() else (keys[0],),
         frames=len(times),
         fov_deg=round(camera.fov_deg, 4),
-        resolution=(max(2 * round(HEIGHT * aspect / 2), 2), HEIGHT),
+        resolution=resolution or (max(2 * round(HEIGHT * aspect / 2), 2), HEIGHT),
         about=tuple(about),
     )
 
 
 def convert_lights(stage: Stage, wanted: int | None) -> tuple[tuple[LightKeys, ...], int]:
-    """Convert the lights of the file that shine, at the file's own strengths; also return the number of positions."""
+    """Convert the lights of the file that shine, at the file's own strengths; also return the number of positions.
+
+    A position that repeats an earlier one is left out, so lights that stand still have one.
+    """
     shining = [light for light in stage.lights if max(light.intensity) > 0]
     span = stage.span([light.node for light in shining])
     times = frame_times(span, wanted, MOST_LIGHTS)
-    return tuple(_convert_light(stage, light, times) for light in shining), len(times)
+    paths = [_light_vectors(stage, light, times) for light in shining]
+    rows = np.concatenate(paths, axis=1) if paths else np.zeros((1, 0))
+    kept = np.sort(np.unique(rows.round(DIGITS), axis=0, return_index=True)[1])
+    sources = [_convert_light(light, path[kept]) for light, path in zip(shining, paths, strict=True)]
+    return tuple(sources), len(kept)
 
 
-def _convert_light(stage: Stage, light: StageLight, times: list[float]) -> LightKeys:
+def _light_vectors(stage: Stage, light: StageLight, times: list[float]) -> Float64:
+    """Positions or directions of a light, (n, 3)."""
     matrices = stage.world_from(light.node, times)
     if light.kind == "directional":
-        vectors = _normalize(-matrices[:, :3, 2], light.name)
-    else:
-        vectors = matrices[:, :3, 3]
-        if not np.isfinite(vectors).all():
-            raise SceneError(f'the light "{light.name}" is nowhere: its node has no finite place')
-    moves = bool((vectors != vectors[0]).any())
-    n = len(times) if moves else 1
+        return _normalize(-matrices[:, :3, 2], light.name)
+    if not np.isfinite(matrices[:, :3, 3]).all():
+        raise SceneError(f'the light "{light.name}" is nowhere: its node has no finite place')
+    return matrices[:, :3, 3]
+
+
+def _convert_light(light: StageLight, vectors: Float64) -> LightKeys:
+    n = len(vectors) if (vectors != vectors[0]).any() else 1
     unit = "lx" if light.kind == "directional" else "cd"
     about = [f'the {light.kind} light "{light.name}" of the file, there {max(light.intensity):.4g} {unit}']
     if light.kind == "spot":
@@ -100,6 +112,7 @@ def _convert_light(stage: Stage, light: StageLight, times: list[float]) -> Light
         vectors=tuple(round_vector(vector) for vector in vectors[:n]),
         powers=(light.intensity,) * n,
         about=tuple(about),
+        name=light.name,
     )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from framearray_cli.base.forms.text import inline, inline_floats, quoted
 
-from .model import Camera, LightKeys, MaterialNote, Start, source_keys
+from .model import Camera, LightSource, MaterialNote, Start, SunDay, source_keys
 
 MOST_STEPS_UP = 2  # largest number of leading ".." of a relative scene name; beyond, it is absolute
 COLUMN = 42  # of comments behind keys
@@ -54,7 +54,11 @@ def to_text(start: Start, job_file: Path) -> str:
             "",
             "[output]",
             _line("directory", quoted(f"out/{start.name}"), "relative to this file"),
-            _line("format", '"png"', '"exr" keeps the linear light, for work after the render'),
+            _line(
+                "format",
+                quoted(start.format),
+                '"png" is small; "exr" keeps the linear light, for work after the render',
+            ),
             _line("fps", "24", "frames per second of movies"),
             "",
         ]
@@ -103,11 +107,15 @@ def _lights(start: Start) -> list[str]:
     return lines
 
 
-def _source(source: LightKeys) -> list[str]:
+def _source(source: LightSource) -> list[str]:
+    group = [_line("group", quoted(source.group), "stored separately, to change it afterwards")] if source.group else []
+    if isinstance(source, SunDay):
+        return [_line("type", '"sun"', "by place and time"), *group, *_sun(source)]
     unit = "W/sr" if source.kind == "point" else "W/m2 of a surface that faces the light"
     power = "intensity" if source.kind == "point" else "irradiance"
     lines = [
         _line("type", quoted(source.kind), '"point": a lamp; "directional": the sun; "sun": by place and time'),
+        *group,
         f"keys = [                                  # {power}: red, green, blue, {unit}",
         *(f"  {_inline(key)}," for key in source_keys(source)),
         "]",
@@ -117,6 +125,18 @@ def _source(source: LightKeys) -> list[str]:
             "# It stands still. A second key, such as { frame = 11, ... }, and more `frames` above make it move."
         )
     return lines
+
+
+def _sun(source: SunDay) -> list[str]:
+    return [
+        _line("latitude", repr(source.latitude), "degrees, north is positive"),
+        _line("longitude", repr(source.longitude), "degrees, east is positive"),
+        _line("date", quoted(source.date), "year-month-day"),
+        _line("timezone", f"{source.timezone:g}", 'hours ahead of UTC, or a name: "Europe/Berlin"'),
+        _line("start", quoted(source.start), "local time of the first position"),
+        _line("stop", quoted(source.stop), "local time of the last"),
+        _line("irradiance", inline_floats(source.power), "of a surface that faces the sun: red, green, blue, W/m2"),
+    ]
 
 
 def _materials(materials: Sequence[MaterialNote]) -> list[str]:

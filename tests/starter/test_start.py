@@ -75,11 +75,11 @@ def code_of(*arguments: str) -> int:
 
 def test_the_text_holds_the_choices(tmp_path: Path) -> None:
     start, job = init_job(room(), tmp_path)
-    expected = Job.model_validate(table_of(start) | {"output": {"directory": str(tmp_path / "out" / "scene")}})
+    expected = Job.model_validate(table_of(start) | {"output": {"directory": str(tmp_path / "out" / "job")}})
     for table in ("camera", "light", "obscurance", "scene", "name"):
         assert getattr(job, table) == getattr(expected, table)
     assert job.scene.file == tmp_path / "scene.glb"
-    assert job.output.directory == tmp_path / "out" / "scene"
+    assert job.output.directory == tmp_path / "out" / "job"  # job and folder have the name of the file
 
 
 def test_every_key_has_a_comment_and_every_material_is_listed(tmp_path: Path) -> None:
@@ -282,7 +282,7 @@ def test_an_existing_file_stays(tmp_path: Path) -> None:
         init(scene, job_file, FEW)
     assert job_file.read_text() == "mine"
     init(scene, job_file, FEW, force=True)
-    assert load_toml(job_file)["name"] == "scene"
+    assert load_toml(job_file)["name"] == "job"
 
 
 def test_the_command_reports_what_it_did(

@@ -1,0 +1,38 @@
+"""What a user asks of `init`."""
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+Format = Literal["exr", "png", "tif", "jpg"]
+
+
+class SunOption(NamedTuple):
+    """A place on Earth, degrees north and east, and a day, year-month-day."""
+
+    latitude: float
+    longitude: float
+    date: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StartOptions:
+    """Options of `init`; None: the starter chooses.
+
+    Attributes:
+        camera: name of a camera of the file.
+        frames, lights: numbers of frames of the camera and of positions of the light.
+        inside: whether the scene is a room.
+        resolution: width and height, pixels.
+        format: of the images.
+        groups: whether every source is a group of its own.
+        sun: the sun over a place instead of other lights.
+    """
+
+    camera: str | None = None
+    frames: int | None = None
+    lights: int | None = None
+    inside: bool | None = None
+    resolution: tuple[int, int] | None = None
+    format: Format = "png"
+    groups: bool = False
+    sun: SunOption | None = None

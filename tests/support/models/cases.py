@@ -1,0 +1,229 @@
+"""What a good first picture shows: hand-made labels for models, for the scenes of jobs/ and for scenes of other people.
+
+Shares are of the picture; a name stands for all materials that begin with it, several names are joined by "|".
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from support import ROOT
+from support.models import rooms, things
+from support.models.shapes import Model
+from support.scenes import scenes_folder
+
+Shares = Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A scene and its labels.
+
+    Attributes:
+        build: makes the model; None for the file `file`.
+        unit, up: of the file; the labels below are in metres.
+        inside: whether it counts as a room.
+        shows: least shares of the picture, that make it a picture of this scene.
+        little: largest shares, of bare surfaces.
+        eye: least and largest height of the eye above what is below it, metres; None: any.
+        whole: what lies within every picture, with a margin; "" for everything, None for nothing.
+        unit_said: the unit that `init` should assume, None where nothing can tell.
+    """
+
+    name: str
+    build: Callable[[], Model] | None = None
+    suffix: str = ".glb"
+    file: Path | None = None
+    unit: str = "m"
+    up: str = "y"
+    inside: bool
+    shows: Shares
+    little: Shares = field(default_factory=dict)
+    eye: tuple[float, float] | None = None
+    whole: str | None = None
+    unit_said: str | None = None
+
+    def scene(self, folder: Path) -> Path:
+        """The file of the scene; models are written to a folder."""
+        if self.build is None:
+            assert self.file is not None
+            return self.file
+        return self.build().save(folder / f"{self.name}{self.suffix}", self.unit, self.up)
+
+
+STANDING = (1.1, 1.9)  # metres; where people hold a camera
+
+
+def _dining(name: str, **more: str) -> Case:
+    shows = {"Table": 0.02, "Chair": 0.03, "Painting|WindowFrame": 0.008, "Wall": 0.1}
+    said = more.get("unit", "m")
+    little = {"Wall|Ceiling": 0.72}
+    return Case(
+        name=name,
+        build=rooms.dining_room,
+        inside=True,
+        shows=shows,
+        little=little,
+        eye=STANDING,
+        unit_said=said,
+        **more,
+    )
+
+
+MODELS = (
+    _dining("dining-m"),
+    _dining("dining-cm", suffix=".obj", unit="cm"),
+    _dining("dining-mm", suffix=".stl", unit="mm", up="z"),
+    _dining("dining-inch", unit="in"),
+    _dining("dining-feet", suffix=".obj", unit="ft"),
+    _dining("dining-z-up", suffix=".obj", up="z"),
+    Case(
+        name="two-rooms",
+        build=rooms.two_rooms,
+        inside=True,
+        shows={"Sofa|Bed": 0.02, "Shelf|Books|Wardrobe|LowTable|Pillow": 0.015},
+        little={"Wall|Ceiling": 0.75},
+        eye=STANDING,
+        unit_said="m",
+    ),
+    Case(
+        name="bare-room",
+        build=rooms.bare_room,
+        inside=True,
+        shows={"Floor": 0.08, "Wall": 0.2, "": 0.7},
+        little={"Wall": 0.75},
+        eye=STANDING,
+        unit_said="m",
+    ),
+    Case(
+        name="column-hall",
+        build=rooms.column_hall,
+        inside=True,
+        shows={"Column": 0.08, "Statue|Plinth": 0.004, "Floor": 0.1},
+        little={"Column": 0.6},
+    ),
+    Case(
+        name="street",
+        build=rooms.street,
+        inside=False,
+        shows={"House": 0.15, "Ground|Pavement": 0.1, "Trunk|Crown|Car": 0.02},
+        little={"Ground": 0.5},
+        eye=(1.1, 6.0),
+    ),
+    Case(
+        name="room-corner",
+        build=rooms.room_corner,
+        inside=False,
+        shows={"Bed": 0.02, "Desk": 0.01, "Wall": 0.08, "Floor": 0.04, "Shelf": 0.003},
+        whole="",
+    ),
+    Case(name="mug", build=things.mug, inside=False, shows={"Glaze": 0.15, "Handle": 0.008}, whole=""),
+    Case(
+        name="mug-mm",
+        build=things.mug,
+        suffix=".stl",
+        unit="mm",
+        up="z",
+        inside=False,
+        shows={"": 0.15},
+        whole="",
+        unit_said="mm",
+    ),
+    Case(name="bottle", build=things.bottle, inside=False, shows={"Clay": 0.05, "Label": 0.02}, whole=""),
+    Case(name="open-box", build=things.open_box, inside=False, shows={"Card": 0.25}, whole=""),
+    Case(name="car", build=things.car, inside=False, shows={"Body": 0.1, "Wheel": 0.02, "Seat|Pillar": 0.01}, whole=""),
+    Case(
+        name="single-wall",
+        build=things.single_wall,
+        inside=False,
+        shows={"Wall": 0.15, "Picture": 0.03, "Frame": 0.004},
+        whole="",
+    ),
+    Case(
+        name="table-scene",
+        build=things.table_scene,
+        inside=False,
+        shows={"Table": 0.06, "Bowl": 0.008, "Books": 0.006, "Bottle": 0.003},
+        whole="Table|Bowl|Books|Bottle",
+    ),
+    Case(name="aerial", build=things.aerial, inside=False, shows={"Ball": 0.01, "Aerial": 0.002}, whole=""),
+    Case(name="tower", build=things.tower, inside=False, shows={"House": 0.1, "Pane": 0.02, "Roof": 0.01}, whole=""),
+)
+OWN = (
+    Case(
+        name="kitchen",
+        file=ROOT / "jobs" / "scenes" / "kitchen.glb",
+        inside=True,
+        shows={"TableTop|Dresser|Cabinet|Worktop": 0.05, "WindowPaint|Porcelain|Gingham|Enamel": 0.01},
+        little={"WallPaint|Ceiling|Plaster": 0.7},
+        eye=STANDING,
+        unit_said="m",
+    ),
+    Case(
+        name="stairs",
+        file=ROOT / "jobs" / "scenes" / "stairs.glb",
+        inside=True,
+        shows={"Runner|RailWood|Marble|FloorMarble": 0.08, "WindowPaint|Crystal|Gilding|Velvet": 0.005},
+        little={"WallSilk|Plaster|Ceiling": 0.7},
+        eye=(1.0, 7.0),
+        unit_said="m",
+    ),
+    Case(
+        name="cabin",
+        file=ROOT / "jobs" / "scenes" / "cabin.glb",
+        inside=True,
+        shows={"Seat": 0.08, "Bin|Ceiling|Cove": 0.05, "Panel|WindowRim|Blind|Carpet|AisleCarpet": 0.03},
+        little={"SeatShell": 0.5, "Ceiling": 0.6},
+        unit_said="m",
+    ),
+)
+
+
+def _other(name: str, file: str, **labels: object) -> Case:
+    return Case(name=name, file=scenes_folder() / file, **labels)  # type: ignore[arg-type]
+
+
+OTHERS = (
+    _other(
+        "cornell_box",
+        "cornell_box/cornell_box.obj",
+        inside=True,
+        shows={"shortBox": 0.03, "tallBox": 0.03, "leftWall": 0.03, "rightWall": 0.03, "floor": 0.05},
+    ),
+    _other(
+        "country_kitchen",
+        "country_kitchen/country_kitchen.glb",
+        inside=True,
+        shows={"Tabletop|Worktops|SmallWorktop": 0.01, "CupboardUnits": 0.03, "Window|Cooker|Blinds|Kettle": 0.01},
+        little={"Walls|Ceiling": 0.7},
+        eye=STANDING,
+        unit_said="m",
+    ),
+    _other(
+        "grey_white_room",
+        "grey_white_room/grey_white_room.glb",
+        inside=True,
+        shows={"Sofa": 0.03, "TableWood": 0.01, "Floor": 0.05},
+        little={"Walls|MattePaint": 0.7},
+        eye=STANDING,
+        unit_said="m",
+    ),
+    _other(
+        "iss_kibo_cabin",
+        "iss_kibo_cabin/iss_kibo_cabin.glb",
+        inside=True,
+        shows={"JPM_Racks": 0.2, "JPM_Bulkhead|Generic_Hub": 0.03},
+        unit_said="m",
+    ),
+    _other(
+        "modern_hall",
+        "modern_hall/modern_hall.glb",
+        inside=True,
+        shows={"Wood": 0.03, "FloorTiles": 0.05},
+        little={"Wall|Wallpaper": 0.75},
+        eye=(1.0, 4.5),
+        unit_said="m",
+    ),
+    _other("utah_teapot", "utah_teapot/utah_teapot.stl", inside=False, shows={"": 0.15}, whole="", up="z"),
+    _other("vr_gallery", "vr_gallery/vr_gallery.glb", inside=True, shows={"": 0.5}, eye=STANDING, unit_said="m"),
+)
