@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -23,6 +24,7 @@ LIGHTS = 12  # positions of the light of a first array; 288 images with its eyes
 LAMP: Vector = (1.0, 0.92, 0.8)  # colour of a lamp, and of the sun
 SUN: Vector = (1.0, 0.94, 0.84)
 GROUP_LENGTH, TAKEN = 32, ("ambient", "background", "layers", "light", "main")  # names that groups cannot have
+GRAZING = 0.1  # share of the time from the rise to the set of the sun
 HOUR_DEG = 15  # longitude that the sun crosses in an hour
 
 
@@ -52,7 +54,7 @@ def add_lights(site: Site, start: Start, stage: Stage, options: StartOptions, en
 def _under_the_sun(site: Site, start: Start, options: StartOptions, ends: Float64, sun: SunOption) -> Start:
     """Add a sun over a place; and other lights too where it lights nothing that the pictures show."""
     n = options.lights or LIGHTS
-    day = make_sun_day(sun, start)
+    day = make_sun_day(sun, start.file)
     alone = replace(start, sources=(day,), light_frames=n)
     if (factors := find_factors(alone, site.probe.scene, site.probe.embree)) is not None:
         return _scale_lights(alone, *factors)
@@ -60,8 +62,8 @@ def _under_the_sun(site: Site, start: Start, options: StartOptions, ends: Float6
     return _try_lights(site, replace(start, about=(*start.about, dark)), options, ends, (day,))
 
 
-def make_sun_day(sun: SunOption, start: Start) -> SunDay:
-    """The sun from its rise to its set, in the time zone of its longitude.
+def make_sun_day(sun: SunOption, file: Path) -> SunDay:
+    """The sun from morning to evening, in the time zone of its longitude.
 
     Raises:
         JobError: it never rises on that day.
@@ -71,9 +73,10 @@ def make_sun_day(sun: SunOption, start: Start) -> SunDay:
     hours = daylight(sun.date, zone, (sun.latitude, sun.longitude))
     if hours == NEVER:
         problem = f"--sun: expected a day on which the sun rises, got {sun.date} at latitude {sun.latitude:g}"
-        raise JobError(str(start.file), [problem])
+        raise JobError(str(file), [problem])
     first, last = hours.split(" and ")[0].split(" to ")[0], hours.split(" to ")[-1]
-    about = f"the sun over {sun.latitude:g}, {sun.longitude:g} on {sun.date}, from its rise to its set"
+    first, last = _without_ends(first, last)
+    about = f"the sun over {sun.latitude:g}, {sun.longitude:g} on {sun.date}, from morning to evening"
     return SunDay(
         latitude=sun.latitude,
         longitude=sun.longitude,
@@ -84,6 +87,13 @@ def make_sun_day(sun: SunOption, start: Start) -> SunDay:
         power=SUN,
         about=(about,),
     )
+
+
+def _without_ends(first: str, last: str) -> tuple[str, str]:
+    """Leave out a share of the time at both ends, at which the sun only grazes the ground."""
+    low, high = (60 * int(text[:2]) + int(text[3:]) for text in (first, last))
+    cut = round(GRAZING * (high - low))
+    return tuple(f"{minute // 60:02d}:{minute % 60:02d}" for minute in (low + cut, high - cut))  # type: ignore[return-value]
 
 
 def _try_lights(site: Site, start: Start, options: StartOptions, ends: Float64, more: tuple[LightSource, ...]) -> Start:

@@ -23,8 +23,8 @@ class StartOptions:
         frames, lights: numbers of frames of the camera and of positions of the light.
         inside: whether the scene is a room.
         resolution: width and height, pixels.
-        format: of the images.
-        groups: whether every source is a group of its own.
+        format: of the images; None: PNG, or EXR with groups.
+        groups: whether every source is a group of its own, which only EXR and TIFF can hold.
         sun: the sun over a place instead of other lights.
     """
 
@@ -33,6 +33,11 @@ class StartOptions:
     lights: int | None = None
     inside: bool | None = None
     resolution: tuple[int, int] | None = None
-    format: Format = "png"
+    format: Format | None = None
     groups: bool = False
     sun: SunOption | None = None
+
+    @property
+    def image_format(self) -> Format:
+        """The format of the images."""
+        return self.format or ("exr" if self.groups else "png")

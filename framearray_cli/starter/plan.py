@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import NAME
 from framearray_cli.scene.files import read_stage
 from framearray_cli.scene.scene import Scene, load_scene
@@ -15,6 +16,7 @@ from .model import MaterialNote, Start, Vector, round_vector
 from .options import StartOptions
 from .site import Site, explored
 
+LINEAR = ("exr", "tif")  # formats whose images can be added up
 SKY: Vector = (0.7, 0.85, 1.05)  # radiance, as in the jobs that come with the project: a bright day
 ROOM_RANGE, THING_RANGE = 0.5, 0.2  # d_max over the height of a room, and over the largest extent of a thing
 
@@ -28,8 +30,11 @@ def plan_start(file: Path, name: str, options: StartOptions) -> Start:
     Raises:
         SceneError: a scene that cannot be read, that has no inside where one is asked for, or whose visible surfaces no
             light reaches.
-        JobError: no camera of that name, or a sun that never rises.
+        JobError: no camera of that name, a sun that never rises, or groups in a format that cannot hold them.
     """
+    if options.groups and options.image_format not in LINEAR:
+        problem = f'--groups: expected --format exr or tif, as groups are added up afterwards, got "{options.format}"'
+        raise JobError(str(file), [problem])
     scene, stage = load_scene(file), read_stage(file)
     with explored(scene, file, options.inside) as site:
         shot = choose_shot(site, stage, options, file)
@@ -46,7 +51,7 @@ def plan_start(file: Path, name: str, options: StartOptions) -> Start:
             about=shot.about or site.about,
             materials=_materials(scene),
             unit="" if site.unit is None else site.unit.name,
-            format=options.format,
+            format=options.image_format,
         )
         return add_lights(site, start, stage, options, shot.ends)
 

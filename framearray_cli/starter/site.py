@@ -90,7 +90,7 @@ def _thing(site: Site, why: str, suffix: str, *, from_above: bool = False) -> Si
     if unit is not None:
         metres = f", {site.size / unit.metre:.2g} m" if unit.name != "m" else ""
         about.append(
-            f"Its unit of length is taken for the {NAMES[unit.name]}: it is {_number(site.size)} units{metres}, long."
+            f"Its unit of length is taken for the {NAMES[unit.name]}: it is {_number(site.size)} units long{metres}."
         )
     return replace(site, unit=unit, about=tuple(about), from_above=from_above)
 

@@ -68,9 +68,11 @@ def init_job(glb: Glb, folder: Path, options: StartOptions = FEW) -> tuple[Start
 
 def code_of(*arguments: str) -> int:
     """The exit code of a command."""
-    with pytest.raises(SystemExit) as ended:
+    try:
         main(list(arguments))
-    return int(ended.value.code or 0)
+    except SystemExit as ended:
+        return int(ended.code or 0)
+    return 0
 
 
 def test_the_text_holds_the_choices(tmp_path: Path) -> None:

@@ -9,9 +9,37 @@ import typer
 from ..describe import init_result
 from ..options import Json, Quiet, output_path
 from ..screen import Screen, err, print_result
-from ..values import whole
+from ..values import choice, whole
+from .init_values import Resolution, SunPlace, read_resolution, read_sun
 
 MOST = 1000  # frames or lights of a first job
+
+
+Resolutions = Annotated[
+    Resolution | None,
+    typer.Option(
+        "--resolution", parser=read_resolution, help="Size of the images, pixels.", metavar="WxH", show_default=False
+    ),
+]
+SunPlaces = Annotated[
+    SunPlace | None,
+    typer.Option(
+        "--sun",
+        parser=read_sun,
+        help="The sun over a place on a day: 48.1,11.6,2026-06-21.",
+        metavar="LAT,LON,DATE",
+        show_default=False,
+    ),
+]
+Formats = Annotated[
+    str | None,
+    typer.Option(
+        "--format",
+        help="Format of the images; default: png, or exr with --groups.",
+        show_default=False,
+        **choice("png", "exr", "tif", "jpg"),
+    ),
+]
 
 
 def init(
@@ -37,6 +65,10 @@ def init(
         bool | None,
         typer.Option("--inside/--outside", help="Treat the scene as a room, or as an object to look at."),
     ] = None,
+    resolution: Resolutions = None,
+    image_format: Formats = None,
+    groups: Annotated[bool, typer.Option("--groups", help="Store the light of every source separately.")] = False,
+    sun: SunPlaces = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing job file.")] = False,
     quiet: Quiet = False,
     json: Json = False,
@@ -45,11 +77,20 @@ def init(
     job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else output_path(target)
     with Screen(err, quiet=quiet) as screen:
         screen.wait("exploring the scene")
-        from framearray_cli.starter import StartOptions
+        from framearray_cli.starter import StartOptions, SunOption
         from framearray_cli.starter import init as run
 
         with screen.compiling():
-            options = StartOptions(camera=camera, frames=frames, lights=lights, inside=inside)
+            options = StartOptions(
+                camera=camera,
+                frames=frames,
+                lights=lights,
+                inside=inside,
+                resolution=resolution,
+                format=image_format,  # type: ignore[arg-type]
+                groups=groups,
+                sun=None if sun is None else SunOption(*sun),
+            )
             start = run(scene, job_file, options, force=force)
         screen.say(start.about)
     images = start.camera.frames * start.light_frames

@@ -1,0 +1,56 @@
+"""What `init` chooses for models, scored by hand-made labels; and what it takes them for."""
+
+from pathlib import Path
+
+import pytest
+from support.models import rooms, things
+from support.models.cases import MODELS, OTHERS, OWN, Case
+from support.models.score import judge
+from support.models.shapes import Model
+
+from framearray_cli.starter import StartOptions, init
+
+LEAST, MEAN = 85.0, 96.0  # of 100, of every scene and of all; docs/decisions/first-job.md has the figures
+QUICK = ("dining-inch", "mug", "street", "table-scene")
+EVERY = (*MODELS, *OWN, *OTHERS)
+
+
+@pytest.mark.parametrize("case", [case for case in MODELS if case.name in QUICK], ids=lambda case: case.name)
+def test_a_model_is_shown_as_its_labels_ask_for(case: Case, tmp_path: Path) -> None:
+    verdict = judge(case, tmp_path, frames=5, lights=2)
+    assert verdict.score >= 95, verdict.missed
+
+
+@pytest.mark.slow
+def test_first_pictures_of_all_scenes(tmp_path: Path) -> None:
+    cases = [case for case in EVERY if case.file is None or case.file.exists()]
+    found = {case.name: judge(case, tmp_path) for case in cases}
+    bad = {name: f"{verdict.score:.0f}: {verdict.missed}" for name, verdict in found.items() if verdict.score < LEAST}
+    assert not bad
+    assert sum(verdict.score for verdict in found.values()) / len(found) >= MEAN
+
+
+def about(model: Model, file: Path, **options: object) -> str:
+    """What `init` reports of a model."""
+    start = init(model.save(file), file.with_suffix(".toml"), StartOptions(frames=2, lights=1, **options))  # type: ignore[arg-type]
+    return "\n".join(start.about)
+
+
+def test_the_report_says_what_a_scene_is_taken_for(tmp_path: Path) -> None:
+    vessel = about(things.bottle(), tmp_path / "bottle.glb")
+    assert "It is round and nothing is in it, so it is taken for a vessel; --inside says otherwise." in vessel
+    assert "Its unit of length is taken for the metre: it is 0.3 units long." in vessel
+    assert "Nobody can stand in it" in about(things.car(), tmp_path / "car.glb")
+    outside = about(things.car(), tmp_path / "again.glb", inside=False)
+    assert "It is looked at from outside, as --outside asks for." in outside
+    assert "There is no room in it" not in outside
+    assert "It is taken for a room, as --inside asks for." in about(things.car(), tmp_path / "in.glb", inside=True)
+
+
+def test_the_same_scene_makes_the_same_job(tmp_path: Path) -> None:
+    scene = rooms.bare_room().save(tmp_path / "room.glb")
+    jobs = []
+    for _ in range(2):
+        init(scene, tmp_path / "room.toml", StartOptions(frames=3, lights=2), force=True)
+        jobs.append((tmp_path / "room.toml").read_bytes())
+    assert jobs[0] == jobs[1]

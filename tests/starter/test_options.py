@@ -1,0 +1,108 @@
+"""Options of `framearray init`: the size and format of images, groups, the sun over a place, and equal positions."""
+
+from pathlib import Path
+
+import pytest
+from support.models import rooms, things
+from support.scenes import Glb
+from support.staged import animate, light
+
+from framearray_cli.base.errors import JobError
+from framearray_cli.cli.main import main
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import read_job
+from framearray_cli.scene.paths.paths import lights
+from framearray_cli.starter import StartOptions, SunOption, init
+from framearray_cli.starter.lighting import make_sun_day
+
+
+def read_first_job(scene: Path, **options: object) -> Job:
+    job_file = scene.parent / "first.toml"
+    init(scene, job_file, StartOptions(frames=2, **options))  # type: ignore[arg-type]
+    return read_job(job_file)
+
+
+def lit_wall() -> Glb:
+    """A wall with two lamps before it, of nearly the same name."""
+    glb = Glb()
+    glb.node(glb.mesh(glb.material("Wall", {"baseColorFactor": [0.5, 0.5, 0.5, 1.0]})))
+    for k, name in enumerate(("Lamp 1", "Lamp/1", "Light")):
+        glb.node(name=name, translation=[float(k), 0.5, 2.0], **light(glb, intensity=100.0))
+    return glb
+
+
+def test_size_and_format_are_in_the_job(tmp_path: Path) -> None:
+    job = read_first_job(things.mug().save(tmp_path / "mug.glb"), resolution=(200, 400), format="exr", lights=1)
+    assert job.camera.resolution == (200, 400)
+    assert job.output.format == "exr"
+    assert (job.name, job.output.directory) == ("first", tmp_path / "out" / "first")
+
+
+def test_every_source_of_the_file_is_a_group_with_a_name_of_its_own(tmp_path: Path) -> None:
+    scene = lit_wall().save(tmp_path / "scene.glb")
+    with pytest.raises(
+        JobError, match="--groups: expected --format exr or tif, as groups are added up afterwards, got"
+    ):
+        read_first_job(scene, groups=True, format="png")
+    job = read_first_job(scene, groups=True)
+    assert job.output.format == "exr"
+    assert [source.group for source in job.light.sources] == ["Lamp-1", "Lamp-1-2", "Light-2"]
+    assert [group.name for group in lights(job).groups] == ["Lamp-1", "Lamp-1-2", "Light-2"]
+    assert all(source.group is None for source in read_first_job_again(tmp_path).light.sources)
+
+
+def read_first_job_again(folder: Path) -> Job:
+    init(folder / "scene.glb", folder / "again.toml", StartOptions(frames=2))
+    return read_job(folder / "again.toml")
+
+
+def test_equal_positions_of_lights_are_one(tmp_path: Path) -> None:
+    """A lamp that goes there and back stands at three places, and one that is animated but at rest at one."""
+    glb = lit_wall()
+    nodes = glb.tree["nodes"]
+    animate(glb, len(nodes) - 1, "translation", [0.0, 1.0, 2.0], [[2, 0.5, 2], [1, 0.5, 2], [2, 0.5, 2]])
+    job = read_first_job(glb.save(tmp_path / "scene.glb"), lights=5)
+    assert job.light.frames == 3
+    still = lit_wall()
+    animate(still, len(nodes) - 1, "translation", [0.0, 1.0], [[2, 0.5, 2], [2, 0.5, 2]])
+    (tmp_path / "still").mkdir()
+    assert read_first_job(still.save(tmp_path / "still" / "scene.glb"), lights=5).light.frames == 1
+
+
+def test_a_sun_over_a_place_shines_in_every_picture(tmp_path: Path) -> None:
+    pytest.importorskip("pvlib")
+    scene = rooms.street().save(tmp_path / "street.glb")
+    job = read_first_job(scene, sun=SunOption(48.1, 11.6, "2026-06-21"), lights=3)
+    (source,) = job.light.sources
+    assert (source.type, source.latitude, source.longitude, source.date) == ("sun", 48.1, 11.6, "2026-06-21")
+    found = lights(job).sources[0]
+    assert (found.vector[:, 1] < -0.15).all()  # from above, and not from the horizon
+    assert (found.intensity > 0).all()
+
+
+def test_a_sun_that_does_not_rise_is_an_error() -> None:
+    pytest.importorskip("pvlib")
+    with pytest.raises(JobError, match="--sun: expected a day on which the sun rises, got 2026-12-21 at latitude 80"):
+        make_sun_day(SunOption(80.0, 0.0, "2026-12-21"), Path("scene.glb"))
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "expected"),
+    [
+        ("--resolution", "640", "expected width and height of 1 to 16384 pixels, such as 640x480, got"),
+        ("--resolution", "0x99999", "expected width and height of 1 to 16384 pixels"),
+        ("--sun", "48.1,11.6", "expected latitude, longitude and date, such as 48.1,11.6,2026-06-21, got"),
+        ("--sun", "91,0,2026-06-21", "expected a latitude from -90 to 90 and a longitude from -180 to 180, got"),
+        ("--sun", "1,2,2026-02-30", "expected latitude, longitude and date"),
+        ("--format", "gif", "expected png, exr, tif or jpg, got"),
+    ],
+)
+def test_values_that_make_no_job(
+    option: str, value: str, expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = things.mug().save(tmp_path / "mug.glb")
+    with pytest.raises(SystemExit) as ended:
+        main(["init", str(scene), "-o", str(tmp_path / "job.toml"), option, value])
+    assert ended.value.code == 2
+    assert expected in capsys.readouterr().err
+    assert not (tmp_path / "job.toml").exists()
