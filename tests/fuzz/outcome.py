@@ -100,15 +100,17 @@ def _limit_itself() -> None:
     os.setpgid(0, 0)
     os.dup2(os.open(os.devnull, os.O_RDWR), 0)
     os.dup2(os.open(os.devnull, os.O_RDWR), 1)
-    sys.stderr = open(2, "w", closefd=False)  # noqa: SIM115  # pytest puts something else in its place
+    # pytest puts something else in their place
+    sys.stdout, sys.stderr = open(1, "w", closefd=False), open(2, "w", closefd=False)  # noqa: SIM115
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def _redirected(log: Path) -> int:
-    """Send stderr to a file."""
-    file = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    """Send stderr to a file, and stdout, where `verify` says what is wrong."""
+    file = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND)
+    os.dup2(file, 1)
     os.dup2(file, 2)
     os.close(file)
     return 2
@@ -127,6 +129,7 @@ def _code_of(arguments: Sequence[str | Path], before: Callable[[], None]) -> int
         traceback.print_exc()
         return 1
     finally:
+        sys.stdout.flush()
         sys.stderr.flush()
     return 0
 
