@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from framearray_cli.base.arrays import is_number
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, require_file, write_bytes
 from framearray_cli.base.forms.kinds import mistaken
@@ -22,6 +23,7 @@ FORMAT, FORMAT_OF_GROUPS = 1, 2
 
 MOST_NAMES = 5  # of arrays in a message
 
+_VECTORS = ("position", "direction", "intensity", "irradiance")  # of a source
 _LIGHT_KEYS = ("ambient", "ambient_error", "sources")
 
 
@@ -144,8 +146,13 @@ def _from_table(table: Mapping[str, Any], directory: Path) -> Manifest:
 
 
 def _lights(place: str, table: Mapping[str, Any]) -> tuple[ManifestLight, ...]:
-    lights = _tables(table, "lights")
-    return tuple(_build(f"{place}[{l}]", ManifestLight, light, _LIGHT_KEYS) for l, light in enumerate(lights))
+    tables = _tables(table, "lights")
+    lights = tuple(_build(f"{place}[{l}]", ManifestLight, light, _LIGHT_KEYS) for l, light in enumerate(tables))
+    for l, light in enumerate(lights):
+        for k, key, value in ((k, key, s[key]) for k, s in enumerate(light.sources) for key in _VECTORS if key in s):
+            good = isinstance(value, list) and len(value) == 3 and all(map(is_number, value))
+            _check(good, f"{place}[{l}]: sources[{k}].{key}: expected 3 finite numbers, got {shown(value)}")
+    return lights
 
 
 def _group(k: int, table: Mapping[str, Any]) -> ManifestGroup:

@@ -90,6 +90,14 @@ def test_numpy_values_paths_and_none_are_written(tmp_path: Path) -> None:
     assert back.lights[0].sources[0]["position"] == [0.0, 0.0, 0.0]
 
 
+@pytest.mark.parametrize("value", [[1.0, 2.0], 5.0, [1.0, 2.0, "x"], [1.0, 2.0, float("inf")]])
+def test_a_source_has_vectors_of_three_numbers(tmp_path: Path, value: object) -> None:
+    light = dataclasses.replace(make_manifest().lights[0], sources=({"type": "point", "intensity": value},))
+    write_manifest(tmp_path, make_manifest(lights=(light, light)))
+    with pytest.raises(OutputError, match=r"lights\[0\]: sources\[0\]\.intensity: expected 3 finite numbers, got"):
+        read_manifest(tmp_path)
+
+
 def test_a_full_array_is_written_fast(tmp_path: Path) -> None:
     manifest = make_manifest(192, 48)
     start = time.perf_counter()
