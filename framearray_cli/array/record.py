@@ -38,6 +38,7 @@ class Entry:
         hits: mean hits per pixel.
         notes: messages for the user.
         errors: light position -> (mean square of the standard error, mean radiance).
+        shares: of clipped and of black pixels, means of these images; None: not known.
     """
 
     c: int
@@ -46,6 +47,7 @@ class Entry:
     hits: float = 0.0
     notes: tuple[str, ...] = ()
     errors: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    shares: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,6 +119,8 @@ class RecordWriter:
             line["notes"] = entry.notes
         if entry.errors:
             line["errors"] = {str(l): error for l, error in entry.errors.items()}
+        if entry.shares:
+            line["shares"] = [round(share, 5) for share in entry.shares]
         self._put(line)
 
     def _put(self, line: Mapping[str, Any]) -> None:
@@ -233,6 +237,7 @@ def _entry(line: Mapping[str, Any]) -> Entry | None:
             hits=float(line["hits"]),
             notes=tuple(str(note) for note in line.get("notes", ())),
             errors={int(l): (float(a), float(b)) for l, (a, b) in line.get("errors", {}).items()},
+            shares=(float(line["shares"][0]), float(line["shares"][1])) if "shares" in line else None,
         )
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError):
         return None

@@ -118,6 +118,7 @@ def summary_lines(summary: "Summary", printed: Sequence[str], job: "Job") -> lis
     there = f"{summary.there:,} of {summary.total:,} images"
     return [
         *(_cost_lines(summary) if summary.images else []),
+        *(_share_lines(summary, job) if summary.images else []),
         *_error_lines(summary),
         *(f"note: {note}" for note in summary.notes if note not in printed),
         *([f"{there} are there; the rest is left to other runs"] if summary.there < summary.total else []),
@@ -139,6 +140,17 @@ def _cost_lines(summary: "Summary") -> list[str]:
         f"{rays:.2f} rays per pixel per image{beside}, {rate:.1f} Mrays/s, "
         f"{summary.hits:.1f} hits per pixel, peak memory {size(summary.peak_memory)}",
     ]
+
+
+def _share_lines(summary: "Summary", job: "Job") -> list[str]:
+    """Describe how many pixels are clipped or black."""
+    from framearray_cli.array.images.images import FOR_SCREENS
+
+    if summary.shares is None:
+        return []
+    clipped, black = summary.shares
+    how = "are clipped" if job.output.format in FOR_SCREENS else "are above 1, which a screen clips"
+    return [f"{clipped:.1%} of the pixels {how}; {black:.1%} are black"]
 
 
 def on_disk_lines(on_disk: "OnDisk", wanted: int) -> list[str]:

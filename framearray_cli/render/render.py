@@ -10,6 +10,7 @@ from threading import Lock
 import numpy as np
 
 from framearray_cli.array.images.images import require_writer
+from framearray_cli.array.images.levels import mean_shares
 from framearray_cli.array.integrity import OnDisk
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import write_manifest
@@ -215,6 +216,7 @@ class _Run:
             hits=float(frame.hits.mean()),
             notes=tuple(notes),
             errors=done.errors,
+            shares=mean_shares(done.shares.values()),
         )
         rays = self._rays + (pool.rays() if pool else Counter[str]())
         self._record.add(entry, rays, time.perf_counter() - self._started)

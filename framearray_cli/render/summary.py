@@ -5,6 +5,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Any
 
+from framearray_cli.array.images.levels import mean_shares
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.record import ArrayRecords
 from framearray_cli.base.memory import peak_memory
@@ -28,6 +29,7 @@ class Summary:
         peak_memory: bytes.
         notes: messages for the user.
         standard_error: table for the manifest; empty unless the job asks for it.
+        shares: of clipped and of black pixels among those on disk; None with groups, and where runs did not count them.
         all_rays, all_seconds: of all runs.
     """
 
@@ -42,6 +44,7 @@ class Summary:
     peak_memory: int
     notes: tuple[str, ...]
     standard_error: dict[str, Any]
+    shares: tuple[float, float] | None
     all_rays: dict[str, int]
     all_seconds: float
 
@@ -90,6 +93,7 @@ def summarize(
         peak_memory=peak_memory(),
         notes=tuple(dict.fromkeys((*notes, *found, *_processor_notes(records)))),
         standard_error=_standard_error(prepared.lights, errors) if errors else {},
+        shares=mean_shares(entry.shares for entry in records.entries for _ in range(*entry.lights) if entry.shares),
         all_rays=dict(all_rays) or dict(rays),
         all_seconds=sum(run.seconds for run in records.runs) or seconds,
     )
@@ -128,6 +132,8 @@ def with_summary(manifest: Manifest, summary: Summary) -> Manifest:
         "processor": processor(),
         "notes": list(summary.notes),
     }
+    if summary.shares:
+        table |= dict(zip(("clipped", "black"), (round(share, 4) for share in summary.shares), strict=True))
     if summary.standard_error:
         table["standard_error"] = summary.standard_error
     table |= {key: manifest.summary[key] for key in ("automatic", "target", "warnings") if key in manifest.summary}

@@ -15,6 +15,7 @@ import numpy as np
 
 from framearray_cli.array.images.attributes import Attributes, frame_attributes
 from framearray_cli.array.images.images import ImageFormat, write_image, write_layers
+from framearray_cli.array.images.levels import pixel_shares
 from framearray_cli.base.arrays import Float32, Images
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
@@ -90,6 +91,7 @@ class FinishedFiles:
         composed: the frame; its images may be overwritten by now.
         files: name -> size and checksum of every file, layers included.
         errors: plane -> (mean square of the standard error, mean radiance), of images that estimate theirs.
+        shares: plane -> shares of clipped and of black pixels, of whole pictures.
     """
 
     composed: Composed
@@ -97,6 +99,7 @@ class FinishedFiles:
     planes: range
     files: Mapping[str, tuple[int, str]]
     errors: Mapping[int, tuple[float, float]]
+    shares: Mapping[int, tuple[float, float]]
 
 
 class _Countdown:
@@ -170,13 +173,16 @@ class ArrayWriter:
     def _write_camera(self, composed: Composed, c: int, unfinished: "_Countdown") -> None:
         """Write all files of a camera, then report them as finished."""
         errors: dict[int, tuple[float, float]] = {}
-        tasks: list[Callable[[], Path]] = [partial(self._write_image, composed, c, p, errors) for p in self._planes]
+        shares: dict[int, tuple[float, float]] = {}
+        write = partial(self._write_image, composed, c, errors=errors, shares=shares)
+        tasks: list[Callable[[], Path]] = [partial(write, p) for p in self._planes]
         if composed.layers is not None:
             tasks.append(partial(self._write_layers, composed.layers, c))
         files: dict[str, tuple[int, str]] = {}
 
         def finish() -> None:
-            self._finished(FinishedFiles(composed=composed, c=c, planes=self._planes, files=files, errors=errors))
+            done = FinishedFiles(composed=composed, c=c, planes=self._planes, files=files, errors=errors, shares=shares)
+            self._finished(done)
             unfinished.count_down()
 
         left = _Countdown(len(tasks), finish)
@@ -200,7 +206,14 @@ class ArrayWriter:
         if error is not None:
             self._free.put(error)
 
-    def _write_image(self, composed: Composed, c: int, p: int, errors: dict[int, tuple[float, float]]) -> Path:
+    def _write_image(
+        self,
+        composed: Composed,
+        c: int,
+        p: int,
+        errors: dict[int, tuple[float, float]],
+        shares: dict[int, tuple[float, float]],
+    ) -> Path:
         target = self._target
         stored = target.names.images[p]
         path = target.directory / stored.file(c)
@@ -213,6 +226,8 @@ class ArrayWriter:
                 "difference": composed.differences[at],
             }
             errors[p] = square_mean(more["error"]), float(image.mean(dtype=np.float64))
+        if not stored.group:
+            shares[p] = pixel_shares(image, target.format)
         write_image(path, image, target.format, target.attributes(c, stored.light, stored.group), more)
         return path
 

@@ -1,5 +1,6 @@
 """Warnings of pilots on the command line: where they go, what --strict does, and when they are rendered."""
 
+import re
 import tomllib
 
 import pytest
@@ -91,3 +92,29 @@ def test_pilots_change_no_image(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("framearray_cli.render.render.find_warnings", lambda *inputs: ())
     run(capsys, "render", "-q", "--restart", job)
     assert {file.name: file.read_bytes() for file in (tmp_path / "out").glob("tiny.*")} == with_pilots
+
+
+@pytest.mark.parametrize(
+    ("output", "line"),
+    [
+        ({"exposure": 20.0}, r"(9\d|100)\.\d% of the pixels are clipped; \d\.\d% are black"),
+        ({"exposure": -20.0}, r"0\.0% of the pixels are clipped; 100\.0% are black"),
+        ({"format": "exr"}, r"\d\.\d% of the pixels are above 1, which a screen clips; \d\.\d% are black"),
+    ],
+)
+def test_the_summary_says_what_is_clipped_and_black(output, line, tmp_path, capsys):
+    result = run(capsys, "render", write_job(tmp_path, output=output))
+    assert re.search(f"^{line}$", result.err + result.out, re.MULTILINE)
+    summary = tomllib.loads((tmp_path / "out" / "manifest.toml").read_text())["summary"]
+    assert {"clipped", "black"} <= summary.keys()
+
+
+def test_the_summary_counts_the_pixels_of_all_runs(tmp_path, capsys):
+    job = write_job(tmp_path, camera=tiny.WALK)
+    shares = []
+    for cameras in ("0-2", "3-5"):
+        run(capsys, "render", "-q", "--cameras", cameras, job)
+        shares.append(tomllib.loads((tmp_path / "out" / "manifest.toml").read_text())["summary"])
+    run(capsys, "render", "-q", "--restart", job)
+    whole = tomllib.loads((tmp_path / "out" / "manifest.toml").read_text())["summary"]
+    assert shares[1]["clipped"] == whole["clipped"] != shares[0]["clipped"]
