@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .images import FOR_SCREENS, ImageFormat
 
 # Pixels that are counted, about; every second, third, ... row and column of a larger image.
-COUNTED = 4096
+COUNTED = 2048
 # The largest radiance that rounds to code 0 of an sRGB screen.
 CODE_0 = 0.5 / 255 / 12.92
 
@@ -25,11 +25,12 @@ def pixel_shares(image: NDArray[Any], image_format: ImageFormat) -> tuple[float,
         image: (h, w, 3), linear radiance.
     """
     step = max(1, int(np.sqrt(image.shape[0] * image.shape[1] / COUNTED)))
-    largest = image[::step, ::step].astype(np.float32).max(axis=-1)
+    part = image[::step, ::step].astype(np.float32)
+    largest = np.maximum(np.maximum(part[..., 0], part[..., 1]), part[..., 2])  # max(axis=-1) takes ten times as long
     screens = image_format.format in FOR_SCREENS
     factor = 2.0**image_format.exposure if screens else 1.0
     black = largest < CODE_0 / factor if screens else largest == 0
-    return float((largest > 1 / factor).mean()), float(black.mean())
+    return np.count_nonzero(largest > 1 / factor) / largest.size, np.count_nonzero(black) / largest.size
 
 
 def mean_shares(shares: Iterable[tuple[float, float]]) -> tuple[float, float] | None:
