@@ -14,8 +14,9 @@ from framearray_cli import __version__
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import make_folder, reason
 from framearray_cli.base.forms.schema import toml_key
+from framearray_cli.base.units import counted
 
-from .manifest import FILE_NAME, Manifest, array_files
+from .manifest import FILE_NAME, MAIN_AXIS, Manifest, array_files
 from .manifest_toml import read_manifest
 from .metadata import JOURNAL, metadata_of
 from .record import FOLDER, record_files
@@ -134,9 +135,14 @@ def _short(value: Any) -> str:
     return "nothing" if value is None else json.dumps(value)
 
 
+def _axis_text(axis: str, n: int) -> str:
+    return counted(n, "light position") if axis == MAIN_AXIS else f"{n:,} of {axis}"
+
+
 def conflict_text(old: Manifest, changed: Sequence[str]) -> str:
     """Word the conflict with the array in a folder: what it is, how it differs, and what to do."""
-    images = f"{old.n_cameras} x {' x '.join(map(str, old.axes.values()))} images"
+    axes = " x ".join(_axis_text(axis, n) for axis, n in old.axes.items())
+    images = f"{counted(old.n_cameras, 'camera position')} x {axes}"
     more = f" and {len(changed) - MOST_REPORTED} more" if len(changed) > MOST_REPORTED else ""
     return (
         f"holds another frame array, {old.name!r} with {images}, made by a different job or from a different scene "

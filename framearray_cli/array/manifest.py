@@ -13,7 +13,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float64, is_number
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms.words import shown
-from framearray_cli.base.units import LEAST_FPS, MOST_FPS
+from framearray_cli.base.units import LEAST_FPS, MOST_FPS, counted
 
 from .names import check_pattern, file_name
 
@@ -179,7 +179,8 @@ class Manifest:
         axes = self.axes
         for k, group in enumerate(self.groups):
             n = len(group.lights)
-            _check(n == axes[group.axis], f"groups[{k}]: expected {axes[group.axis]} lights, as others of its axis")
+            wanted = counted(axes[group.axis], "light position")
+            _check(n == axes[group.axis], f"groups[{k}]: expected {wanted}, as others of its axis")
             check_pattern(f"groups[{k}].images", group.images, {"camera": self.n_cameras > 1, "light": n > 1})
 
     @property

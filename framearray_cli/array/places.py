@@ -19,6 +19,7 @@ from typing import TypeAlias
 from framearray_cli.base.arrays import is_number
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.words import shown
+from framearray_cli.base.units import counted
 
 IndexPlace: TypeAlias = int | float | str
 
@@ -85,10 +86,10 @@ def outside_problem(place: object, n: int, axis: str) -> str:
     Args:
         axis: its name: "camera", "light" or that of another light axis.
     """
-    noun = _NOUNS.get(axis, "position") + ("s" if n > 1 else "") + ("" if axis in _NOUNS else f" of {axis}")
+    noun, of_axis = _NOUNS.get(axis, "position"), "" if axis in _NOUNS else f" of {axis}"
     if n == 1:
-        return f"expected 0, the only {noun}, got {shown(place)}"
-    return f"expected one of {n} {noun} (0 to {n - 1}, or -{n} to -1), got {shown(place)}"
+        return f"expected 0, the only {noun}{of_axis}, got {shown(place)}"
+    return f"expected one of {counted(n, noun)}{of_axis} (0 to {n - 1}, or -{n} to -1), got {shown(place)}"
 
 
 # sets of places

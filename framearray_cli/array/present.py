@@ -10,6 +10,7 @@ from pathlib import Path
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
+from framearray_cli.base.units import agree, counted
 
 from .manifest import Manifest
 from .names import file_name
@@ -80,5 +81,6 @@ def _patterns(manifest: Manifest) -> list[str]:
 
 
 def missing_text(cameras: Collection[int], n: int) -> str:
-    """Word which of n cameras lack images, and the remedy: "12 of 32 cameras lack images: 20-31; ..."."""
-    return f"{len(cameras):,} of {n:,} cameras lack images: {brief_frames_text(cameras)}; {REMEDY}"
+    """Word which camera positions lack images, and the remedy: "12 of 32 camera positions lack images: 20-31; ..."."""
+    some = f"{len(cameras):,} of {counted(n, 'camera position')} {agree(len(cameras), 'lacks', 'lack')} images"
+    return f"{some}: {brief_frames_text(cameras)}; {REMEDY}"

@@ -1,4 +1,4 @@
-"""Bounds of values, and frame rates, times and numbers of bytes as messages show them."""
+"""Bounds of values, and counts, frame rates, times and numbers of bytes as messages show them."""
 
 from fractions import Fraction
 
@@ -28,6 +28,20 @@ def frame_rate(fps: float | Fraction) -> Fraction:
         if abs(fps - float(rate)) < 0.005:  # 23.98 is 0.004 off; the next rate in use, 24, is 0.024 off
             return rate
     return Fraction(fps).limit_denominator(1001)
+
+
+def counted(n: int, noun: str, plural: str = "") -> str:
+    """A number of things: "1 image", "0 images", "1,200 images".
+
+    Args:
+        plural: where it is not the noun and an s.
+    """
+    return f"{n:,} {noun}" if n == 1 else f"{n:,} {plural or noun + 's'}"
+
+
+def agree(n: int, one: str, many: str) -> str:
+    """The form of a verb that goes with a number: `agree(n, "is", "are")`."""
+    return one if n == 1 else many
 
 
 def duration(seconds: float) -> str:

@@ -13,6 +13,7 @@ from framearray_cli import __version__
 from framearray_cli.base.errors import FrameArrayError, JobError, OutputError, ReaderGoneError
 from framearray_cli.base.memory import READ_NEEDS, RENDER_NEEDS, require_address_space
 from framearray_cli.base.signals import Stopped, cancel_alarm, stopped_by
+from framearray_cli.base.units import counted
 
 from .commands.assemble import assemble
 from .commands.check import check
@@ -135,7 +136,7 @@ def ending(error: BaseException, command: str) -> tuple[list[str], int]:
 
 def _problem_lines(error: JobError, outcome: str) -> tuple[list[str], int]:
     """List the problems of a job file, a path file or options, and their outcome."""
-    more = re.fullmatch(r"and (\d+) more problems", error.problems[-1])
-    n = len(error.problems) - 1 + int(more[1]) if more else len(error.problems)
+    more = re.fullmatch(r"and ([\d,]+) more problems?", error.problems[-1])
+    n = len(error.problems) - 1 + int(more[1].replace(",", "")) if more else len(error.problems)
     lines = [f"{error.file}: {problem}".replace("\n", "\\n") for problem in error.problems]
-    return [*lines, f"{n:,} problem{'s' if n > 1 else ''}; {outcome}."], error.exit_code
+    return [*lines, f"{counted(n, 'problem')}; {outcome}."], error.exit_code

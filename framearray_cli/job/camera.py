@@ -1,4 +1,4 @@
-"""`[camera]`: the path of the eye."""
+"""`[camera]`: the path of the camera."""
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -12,9 +12,9 @@ from .values import Direction, FileName, Point, Size
 class CameraKey(Table):
     """Where the camera is at one frame."""
 
-    frame: int = Field(ge=0, lt=MOST_EYES, description="Camera frame, counted from 0.")
-    eye: Point = Field(description="Position of the eye, in the coordinates of the scene file.")
-    target: Point = Field(description="Point that the eye looks at, in the coordinates of the scene file.")
+    frame: int = Field(ge=0, lt=MOST_EYES, description="Number of the camera position, counted from 0.")
+    eye: Point = Field(description="Point that the camera looks from, in the coordinates of the scene file.")
+    target: Point = Field(description="Point that the camera looks at, in the coordinates of the scene file.")
     up: Direction | None = Field(
         default=None,
         description="Direction that is up in the picture. Given at every key or at none.",
@@ -25,12 +25,12 @@ class CameraKey(Table):
     @classmethod
     def _differs_from_eye(cls, target: Float3, info: ValidationInfo) -> Float3:
         if target == info.data.get("eye"):
-            fail([((), f"expected a point other than the eye, got {shown(target)}, the eye itself")])
+            fail([((), f"expected a point other than `eye`, got {shown(target)}, the same")])
         return target
 
 
 class CameraTable(Table):
-    """The eyes."""
+    """The path of the camera: one camera position per frame."""
 
     resolution: Size = Field(default=(400, 300), description="Width and height of every image, pixels.")
     fov: float = Field(default=60.0, ge=1e-3, le=179.9, description="Vertical field of view, degrees.")
@@ -38,21 +38,21 @@ class CameraTable(Table):
         default=0,
         ge=1,
         le=MOST_EYES,
-        description="Number of eyes, N_c.",
-        json_schema_extra=default_text("the last key's frame + 1, or the eyes in `file`"),
+        description="Number of camera positions, N_c.",
+        json_schema_extra=default_text("the last key's frame + 1, or the rows of `file`"),
     )
     file: FileName | None = Field(
         default=None,
-        description="CSV or JSON file with one eye per frame, instead of `keys`.",
+        description="CSV or JSON file with one camera position per row, instead of `keys`.",
         json_schema_extra=default_text("none"),
     )
     keys: tuple[CameraKey, ...] = Field(
         default=(),
         strict=False,
         validate_default=True,
-        description="Positions of the eye at some frames; between them it moves smoothly, before the first and after "
+        description="Where the camera is at some frames; between them it moves smoothly, before the first and after "
         "the last it stands still. One key: a fixed camera.",
-        json_schema_extra={**default_text("the eyes in `file`"), "minItems": 1},
+        json_schema_extra={**default_text("the rows of `file`"), "minItems": 1},
     )
 
     @field_validator("keys")

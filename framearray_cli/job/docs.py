@@ -43,7 +43,7 @@ INTRODUCTION = f"""\
 <!-- Made by `python -m framearray_cli.job.docs docs/guide/` from framearray_cli/job/job.py; edit there. -->
 
 A job file says what to render and how: a scene, a camera path, a light path, and settings. It is written in
-[TOML](https://toml.io). This is a whole job of 96 camera positions (eyes) and 48 light positions:
+[TOML](https://toml.io). This is a whole job of 96 camera positions and 48 light positions:
 
 ```toml
 {EXAMPLE}```
@@ -57,8 +57,8 @@ completes and checks a job file whose first line names it, as above.
 """
 
 EYE_FILE = """\
-A `file` of eyes replaces `keys`. As CSV it starts with a row that names the columns, in any order; you may leave out
-the `up_` columns:
+A `file` of camera positions replaces `keys`. As CSV it starts with a row that names the columns, in any order; you may
+leave out the `up_` columns:
 
 ```csv
 eye_x,eye_y,eye_z,target_x,target_y,target_z,up_x,up_y,up_z
@@ -67,7 +67,7 @@ eye_x,eye_y,eye_z,target_x,target_y,target_z,up_x,up_y,up_z
 ```
 
 As JSON it is a list: `[{"eye": [0.0, 1.6, 3.0], "target": [0.0, 1.2, 0.0]}, ...]`, with `"up"` where wanted.
-The first eye is that of frame 0, the next that of frame 1, and so on.
+The first row is camera position 0, the next 1, and so on.
 """
 
 

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from framearray_cli.base.files import read_at_most
 from framearray_cli.base.forms.problems import append_count, problems_of
+from framearray_cli.base.units import counted
 
 from .camera import CameraKey
 from .keys import MOST_EYES
@@ -48,7 +49,7 @@ def read_eyes(path: Path) -> list[dict[str, Any]]:
         case _:
             raise EyeFileError(f'expected a file name that ends in .csv or .json, got "{path.suffix}"')
     if not 1 <= len(rows) <= MOST_EYES:
-        raise EyeFileError(f"expected 1 to {MOST_EYES} eyes, got {len(rows)}")
+        raise EyeFileError(f"expected 1 to {MOST_EYES} camera positions, got {len(rows)}")
     if problems := _row_problems(rows):
         raise EyeFileError(*problems)
     return [{"frame": frame, **row} for frame, (_, row) in enumerate(rows)]
@@ -104,7 +105,7 @@ def _csv_rows(text: str) -> list[PlacedRow]:
     rows = []
     for place, line in lines[1:]:
         if len(line) != len(header):
-            raise EyeFileError(f"{place}: expected {len(header)} cells, got {len(line)}")
+            raise EyeFileError(f"{place}: expected {counted(len(header), 'cell')}, got {len(line)}")
         cells = dict(zip(header, map(_cell_value, line), strict=True))
         row = {"eye": [cells[name] for name in EYE_COLUMNS], "target": [cells[name] for name in TARGET_COLUMNS]}
         rows.append((place, {**row, "up": [cells[name] for name in UP_COLUMNS]} if with_up else row))

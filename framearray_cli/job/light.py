@@ -38,7 +38,7 @@ GroupName: TypeAlias = Annotated[
 class PointKey(Table):
     """A point source at one light frame."""
 
-    frame: int = Field(ge=0, lt=MOST_EYES, description="Light frame, counted from 0.")
+    frame: int = Field(ge=0, lt=MOST_EYES, description="Number of the light position, counted from 0.")
     position: Point = Field(description="Position, in the coordinates of the scene file.")
     intensity: Emission = Field(description="Radiant intensity, W/sr; one number means white.")
     color: Emission | None = Field(
@@ -51,7 +51,7 @@ class PointKey(Table):
 class DirectionalKey(Table):
     """A directional source, such as the sun, at one light frame."""
 
-    frame: int = Field(ge=0, lt=MOST_EYES, description="Light frame, counted from 0.")
+    frame: int = Field(ge=0, lt=MOST_EYES, description="Number of the light position, counted from 0.")
     direction: Direction = Field(description="The way the light travels: from the sun to the scene. Any length.")
     irradiance: Emission = Field(
         description="Irradiance of a surface that faces the light, W/m2; one number means white."
@@ -95,7 +95,7 @@ class PointSource(_Source):
     keys: Annotated[tuple[PointKey, ...], AfterValidator(_consistent_light_keys)] = Field(
         strict=False,
         min_length=1,
-        description="The source at some light frames; between them all its values change smoothly, before the first "
+        description="The source at some frames; between them all its values change smoothly, before the first "
         "and after the last they stay as they are.",
     )
 
@@ -107,7 +107,7 @@ class DirectionalSource(_Source):
     keys: Annotated[tuple[DirectionalKey, ...], AfterValidator(_consistent_light_keys)] = Field(
         strict=False,
         min_length=1,
-        description="The source at some light frames; between them all its values change smoothly, before the first "
+        description="The source at some frames; between them all its values change smoothly, before the first "
         "and after the last they stay as they are.",
     )
 
@@ -198,7 +198,9 @@ class LightTable(Table):
         },
     )
     sources: tuple[LightSource, ...] = Field(
-        strict=False, min_length=1, description="One or more sources; all of them shine together at each light index."
+        strict=False,
+        min_length=1,
+        description="One or more sources; all of them shine together at each light position.",
     )
 
     @field_validator("sources")

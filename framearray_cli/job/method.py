@@ -66,11 +66,11 @@ class SamplesTable(Table):
 
 
 class ReuseTable(Table):
-    """How far the samples of one eye serve its neighbours."""
+    """How far the samples of one camera position serve its neighbours."""
 
     n_r: HalfWindow = Field(
         default=DEFAULT_N_R,
-        description="Number of frames before and of frames after that share their hits, N_r. 0: no reuse. "
+        description="Number of camera positions before, and of those after, that share their hits, N_r. 0: no reuse. "
         '"auto": chosen from the camera path, likewise; if `hits` is given, for the error that n_r = 3 has with it.',
     )
     weights: Literal["average", "balance"] = Field(
@@ -170,5 +170,6 @@ class DenoiseTable(Table):
 
     obscurance: bool = Field(
         default=False,
-        description="Denoise the obscurance of each camera, once for all lights, with Open Image Denoise.",
+        description="Denoise the obscurance of each camera position, once for all light positions, with Open Image "
+        "Denoise.",
     )

@@ -91,6 +91,8 @@ def _with_eyes(table: dict[str, Any], job_file: Path) -> tuple[dict[str, Any], l
     rest = {key: value for key, value in camera.items() if key != "file"}
     frames, problems = rest.get("frames"), []
     if isinstance(frames, int) and frames != len(keys):
-        problems = [f"camera.frames: expected {len(keys)}, the number of eyes in {shown(name)}, got {shown(frames)}"]
+        problems = [
+            f"camera.frames: expected {len(keys)}, the number of camera positions in {shown(name)}, got {shown(frames)}"
+        ]
         del rest["frames"]
     return {**table, "camera": {**rest, "keys": keys}}, problems

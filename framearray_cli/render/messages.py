@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from framearray_cli.base.units import duration, size
+from framearray_cli.base.units import agree, counted, duration, size
 
 from .progress import ambient_figures
 
@@ -33,7 +33,8 @@ def estimate_lines(estimate: "Estimate") -> list[str]:
         *(settings_lines(estimate.settings) if estimate.settings else []),
         *ambient_lines(ambient_figures(estimate.ambient)),
         *(target_lines(estimate.target) if estimate.target else []),
-        f"array: {n_c:,} cameras x {_light_count(prepared)} = {n_c * n_l:,} images of {width} x {height}",
+        f"array: {counted(n_c, 'camera position')} x {_light_count(prepared)} = {counted(n_c * n_l, 'image')} "
+        f"of {width} x {height}",
         f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_blocks(estimate.blocks)}",
         f"disk: about {size(estimate.disk)} in {job.output.directory}, {size(estimate.free)} free",
         f"time: about {duration(estimate.seconds)} on this machine",
@@ -44,13 +45,13 @@ def _light_count(prepared: "Prepared") -> str:
     """Return the number of images per camera."""
     lights = prepared.lights
     if not lights.groups:
-        return f"{lights.n:,} lights"
+        return counted(lights.n, "light position")
     groups = [f"{len(group.positions):,} of {group.name}" for group in lights.groups]
     return f"({' + '.join(groups)} + {len(lights.unlit)} of ambient light and background)"
 
 
 def _blocks(n: int) -> str:
-    return f"; the lights are rendered in {n} blocks, one after the other" if n > 1 else ""
+    return f"; the light positions are rendered in {counted(n, 'block')}, one after the other" if n > 1 else ""
 
 
 def scene_lines(prepared: "Prepared") -> list[str]:
@@ -68,7 +69,11 @@ def warning_lines(warnings: Sequence[str]) -> list[str]:
 def ambient_lines(figures: "AmbientFigures") -> list[str]:
     """Describe the ambient light and its error."""
     error = figures.error
-    known = f"standard error at most {error:.1%}, {figures.paths:,} paths" if error > 0 else "fixed, or nothing arrives"
+    known = (
+        f"standard error at most {error:.1%}, {counted(figures.paths, 'path')}"
+        if error > 0
+        else "fixed, or nothing arrives"
+    )
     return [
         f"ambient light: I_A {figures.lowest:.4g} to {figures.highest:.4g} ({known})",
         *(f"note: {note}" for note in figures.notes),
@@ -115,13 +120,13 @@ def summary_lines(summary: "Summary", printed: Sequence[str], job: "Job") -> lis
     Args:
         printed: notes that were printed before.
     """
-    there = f"{summary.there:,} of {summary.total:,} images"
+    there = f"{summary.there:,} of {counted(summary.total, 'image')} {agree(summary.there, 'is', 'are')}"
     return [
         *(_cost_lines(summary) if summary.images else []),
         *(_share_lines(summary, job) if summary.images else []),
         *_error_lines(summary),
         *(f"note: {note}" for note in summary.notes if note not in printed),
-        *([f"{there} are there; the rest is left to other runs"] if summary.there < summary.total else []),
+        *([f"{there} there; the rest is left to other runs"] if summary.there < summary.total else []),
         f"images and manifest: {job.output.directory}",
     ]
 
@@ -135,7 +140,7 @@ def _cost_lines(summary: "Summary") -> list[str]:
     beside = f" + {mirrors:.2f} for mirrors" if mirrors else ""
     each = f"{1e3 * summary.seconds / summary.images:.1f} ms per image"
     return [
-        f"{summary.images:,} images in {duration(summary.seconds)}: {each}, "
+        f"{counted(summary.images, 'image')} in {duration(summary.seconds)}: {each}, "
         f"{summary.images / summary.seconds:.1f} images per second",
         f"{rays:.2f} rays per pixel per image{beside}, {rate:.1f} Mrays/s, "
         f"{summary.hits:.1f} hits per pixel, peak memory {size(summary.peak_memory)}",
@@ -157,25 +162,27 @@ def on_disk_lines(on_disk: "OnDisk", wanted: int) -> list[str]:
     """Describe the files of an array that are on disk already."""
     lines = [f"damaged: {name}: {problem}" for name, problem in on_disk.damaged[:MOST_DAMAGED]]
     if len(on_disk.damaged) > MOST_DAMAGED:
-        lines.append(f"damaged: {len(on_disk.damaged) - MOST_DAMAGED:,} more files")
+        lines.append(f"damaged: {counted(len(on_disk.damaged) - MOST_DAMAGED, 'more file')}")
     if on_disk.images:
-        left = f"{wanted:,} are left" if wanted else "nothing is left to do"
-        lines.append(f"{on_disk.images:,} images are there and whole; {left}")
+        left = f"{wanted:,} {agree(wanted, 'is', 'are')} left" if wanted else "nothing is left to do"
+        there = f"{counted(on_disk.images, 'image')} {agree(on_disk.images, 'is', 'are')}"
+        lines.append(f"{there} there and whole; {left}")
     return lines
 
 
 def chunks_line(chunks: "Chunks") -> str:
-    """Describe the chunks of the camera path: "4 chunks of 24 frames; halos add 19% to the hits"."""
+    """Describe the chunks of the camera path: "4 chunks of 24 camera positions; halos add 19% to the hits"."""
     n, sizes = len(chunks.each), sorted({len(chunk) for chunk in chunks.each})
-    frames = f"{' to '.join(map(str, sizes))} frame{'s' if sizes[-1] > 1 else ''}"
+    least = f"{sizes[0]:,} to " if len(sizes) > 1 else ""
+    each = f"{least}{counted(sizes[-1], 'camera position')}"
     if n == 1:
-        return f"1 chunk of {frames}"
-    return f"{n:,} chunks of {frames}; halos add {chunks.more:.0%} to the hits"
+        return f"1 chunk of {each}"
+    return f"{n:,} chunks of {each}; halos add {chunks.more:.0%} to the hits"
 
 
 def workers_text(n: int) -> str:
     """Return "1 worker" or "4 workers"."""
-    return f"{n:,} worker{'s' if n > 1 else ''}"
+    return counted(n, "worker")
 
 
 def _error_lines(summary: "Summary") -> list[str]:

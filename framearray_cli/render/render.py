@@ -16,6 +16,7 @@ from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.record import Entry, RecordWriter, read_records, record_file
 from framearray_cli.base.errors import OutputError
+from framearray_cli.base.units import agree, counted
 from framearray_cli.engine.embree import Engine
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
@@ -244,4 +245,5 @@ class _Run:
 def _bad_values(count: int, c: int, first: tuple[int, int] | None, width: int) -> str:
     l, pixel = first or (0, 0)
     where = f"camera {c}, light {l}, pixel ({pixel % width}, {pixel // width})"
-    return f"{count} values of camera {c} were not finite and were set to 0; the first: {where}"
+    some = f"{counted(count, 'value')} of camera {c} {agree(count, 'was', 'were')} not finite"
+    return f"{some} and {agree(count, 'was', 'were')} set to 0; the first: {where}"

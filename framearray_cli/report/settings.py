@@ -11,6 +11,7 @@ from typing import Any, Literal
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.forms.text import brief
+from framearray_cli.base.units import counted
 from framearray_cli.job.job import Job
 
 # Settings by the job file's key.
@@ -139,7 +140,9 @@ def baselines(base: Settings) -> list[NamedSettings]:
     counts = sorted({max(round(share * base.window_hits), 1) for share in shares})
     return [
         NamedSettings(
-            name=f"{family}, {hits} hits", family=family, settings=replace(unshared, hits=hits, one_light=one_light)
+            name=f"{family}, {counted(hits, 'hit')}",
+            family=family,
+            settings=replace(unshared, hits=hits, one_light=one_light),
         )
         for family, one_light in ((LIGHT_REUSE, False), (SCRATCH, True))
         for hits in counts

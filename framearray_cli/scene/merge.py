@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Corners, CornerUvs, Float64
+from framearray_cli.base.units import agree, counted
 
 from .files.model import Material, Notes, Part
 
@@ -104,7 +105,10 @@ def unit_normals(normals: Corners, has_normals: NDArray[np.bool_], corners: Corn
     bad = ~np.isfinite(unit).all(axis=-1)  # (n, 3)
     broken = int((bad & has_normals[:, None]).sum())
     if broken:
-        notes.add(f"{broken} corner normals are zero, missing or not numbers; geometric normals stand in")
+        notes.add(
+            f"{counted(broken, 'corner normal')} {agree(broken, 'is', 'are')} zero, missing or no number; "
+            "geometric normals stand in"
+        )
     rows = np.flatnonzero(bad.any(axis=1))
     unit[bad] = np.repeat(geometric_normals(corners[rows])[:, None], 3, axis=1)[bad[rows]]
     return np.asarray(unit, dtype=np.float32)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Float64, Int32, Rgb
 from framearray_cli.base.errors import SceneError
+from framearray_cli.base.units import counted
 
 from .cleaning import has_area, is_finite, is_repeated
 from .files import Material, Meshes, Notes, read_meshes
@@ -235,5 +236,6 @@ def _dropped_text(dropped: Mapping[str, int]) -> str:
 def scene_report_lines(report: SceneReport, file: Path | str) -> list[str]:
     """The report on a scene: one line of numbers, then one line per note."""
     left_out = f"; left out: {_dropped_text(report.dropped)}" if report.dropped else ""
-    numbers = f"{report.triangles:,} triangles, {report.materials} materials, {report.textures} textures"
+    found = (report.triangles, "triangle"), (report.materials, "material"), (report.textures, "texture")
+    numbers = ", ".join(counted(n, noun) for n, noun in found)
     return [f"{file}: {numbers}{left_out}", *(f"note: {note}" for note in report.notes)]

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.forms.problems import problems_of
+from framearray_cli.base.units import counted
 from framearray_cli.job.job import Job
 
 MOST_PROBLEMS = 3  # of a job that one error reports; a light that is nowhere has one per key
@@ -175,7 +176,9 @@ def validate_job(table: dict[str, Any], file: Path) -> Job:
         return Job.model_validate(table)
     except ValidationError as error:
         problems = problems_of(error, Job)
-        more = f"; and {len(problems) - MOST_PROBLEMS} more problems" if len(problems) > MOST_PROBLEMS else ""
+        more = (
+            f"; and {counted(len(problems) - MOST_PROBLEMS, 'more problem')}" if len(problems) > MOST_PROBLEMS else ""
+        )
         listed = "; ".join(problems[:MOST_PROBLEMS]) + more
         raise SceneError(f"{file}: its cameras or lights do not make a job: {listed}") from error
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError, SceneError
+from framearray_cli.base.units import counted
 from framearray_cli.scene.files import Stage, StageCamera, StageLight
 
 from .model import DIGITS, Camera, EyeKey, LightKeys, round_vector
@@ -63,7 +64,7 @@ def convert_camera(
     aspect = min(max(camera.aspect or 4 / 3, low), high)
     about = [f'the camera "{camera.name}" of the file']
     if span:
-        about.append(f"animated from {span[0]:g} to {span[1]:g} s; a key for each of {len(times)} frames")
+        about.append(f"animated from {span[0]:g} to {span[1]:g} s; a key for each of {counted(len(times), 'frame')}")
     others = [other.name for other in stage.cameras if other is not camera]
     about += [f'the file also has the camera "{name}": --camera "{name}"' for name in others[:20]]
     return Camera(

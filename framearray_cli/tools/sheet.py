@@ -27,6 +27,7 @@ from framearray_cli.base.arrays import Float32, Image
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.words import shown
+from framearray_cli.base.units import agree, counted
 
 from .axes import LightIndices, evenly_spaced, given_places
 from .drawing import GAP, MARGIN, blank_tile, draw_sheet, gutter
@@ -189,7 +190,8 @@ def _tile_size(manifest: Manifest, n_columns: int, width: int, labels: Sequence[
     full_width, full_height = manifest.resolution
     room = (width - 2 * MARGIN - gutter(labels) + GAP) // n_columns - GAP if labels else width // n_columns
     if room < LEAST_TILE:
-        raise JobError("--width", [f"{width} pixels are too few for {n_columns} columns; try fewer --columns"])
+        few = f"{counted(width, 'pixel')} {agree(width, 'is', 'are')} too few"
+        raise JobError("--width", [f"{few} for {counted(n_columns, 'column')}; try fewer --columns"])
     tile_width = min(room, full_width)
     return tile_width, max(1, round(tile_width * full_height / full_width))
 
@@ -205,10 +207,11 @@ def _find_images(manifest: Manifest, places: _Places) -> tuple[NDArray[np.bool_]
     there: NDArray[np.bool_] = np.array(rows)
     if there.all():
         return there, ()
+    gone = int(np.count_nonzero(~there))
     lacking = [c for i, c in enumerate(places.cameras) if not there[:, i].all()]
     text = (
-        f"{np.count_nonzero(~there):,} of {there.size:,} images of the sheet are missing, "
-        f"of camera{'s' if len(lacking) > 1 else ''} {brief_frames_text(lacking)}; {REMEDY}"
+        f"{gone:,} of {counted(there.size, 'image')} of the sheet {agree(gone, 'is', 'are')} missing, "
+        f"of {agree(len(lacking), 'camera', 'cameras')} {brief_frames_text(lacking)}; {REMEDY}"
     )
     if not there.any():
         raise OutputError(f"{manifest.directory}: {text}")
@@ -236,12 +239,8 @@ def _read_tiles(
 def _heads(manifest: Manifest, axis: str, fixed: LightIndices) -> Sequence[str]:
     """Word the head line: the name, and a text of counts."""
     width, height = manifest.resolution
-    counts = [_count(manifest.n_cameras, "camera")]
-    counts += [_count(n, "light") if name == MAIN_AXIS else f"{n} of {name}" for name, n in manifest.axes.items()]
-    text = f"{' x '.join(counts)},  {width} x {height} pixels"
+    counts = [str(n) if name == MAIN_AXIS else f"{n} of {name}" for name, n in manifest.axes.items()]
+    size = " x ".join([str(manifest.n_cameras), *counts])
+    text = f"{size} images,  {width} x {height} pixels"
     others = [f"at {name} {l}" for name, l in zip(manifest.axes, fixed, strict=True) if name != axis]
     return manifest.name, ",  ".join([text, *others])
-
-
-def _count(n: int, noun: str) -> str:
-    return f"{n} {noun}{'s' if n > 1 else ''}"

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 from framearray_cli.base.forms import text as tomltext
-from framearray_cli.base.units import GIB, MIB, amount, gibibytes, size
+from framearray_cli.base.units import GIB, MIB, agree, amount, counted, gibibytes, size
 
 
 @pytest.mark.parametrize(
@@ -61,3 +61,14 @@ def test_settings_are_brief(value: bool | str | float, text: str) -> None:
     assert tomltext.brief(value) == text
     found = tomllib.loads(f"x = {text}")["x"]
     assert found == value or math.isclose(found, float(value), rel_tol=1e-5)
+
+
+def test_counts_agree_with_their_nouns() -> None:
+    assert [counted(n, "light position") for n in (0, 1, 2, 1200)] == [
+        "0 light positions",
+        "1 light position",
+        "2 light positions",
+        "1,200 light positions",
+    ]
+    assert [counted(n, "entry", "entries") for n in (1, 2)] == ["1 entry", "2 entries"]
+    assert [agree(n, "is", "are") for n in (0, 1, 2)] == ["are", "is", "are"]

@@ -19,7 +19,7 @@ def array(tmp_path: Path) -> Path:
 def test_a_sheet_is_drawn(array, tmp_path, capsys):
     result = run(capsys, "sheet", array, "-o", tmp_path / "s.png", "--columns", 2, "--rows", 2)
     assert (result.code, result.err) == (0, "")
-    assert result.out.startswith(f"{tmp_path / 's.png'}: 2 cameras, 2 light positions, ")
+    assert result.out.startswith(f"{tmp_path / 's.png'}: 2 camera positions x 2 light positions, ")
     assert run(capsys, "sheet", array, "-o", tmp_path / "t.jpg", "-q").out == ""
 
 
@@ -43,9 +43,9 @@ def test_a_sheet_that_cannot_be_drawn(array, tmp_path, capsys, monkeypatch, opti
 @pytest.mark.parametrize(
     ("kind", "folder", "printed"),
     [
-        ("nerfstudio", "x", "4 cameras, 1 light position, "),
-        ("colmap", "x", "4 cameras, 1 light position, "),
-        ("cinema", "x.cdb", "4 cameras, 3 light positions"),
+        ("nerfstudio", "x", "4 camera positions x 1 light position, "),
+        ("colmap", "x", "4 camera positions x 1 light position, "),
+        ("cinema", "x.cdb", "4 camera positions x 3 light positions"),
     ],
 )
 def test_an_array_is_exported(array, tmp_path, capsys, kind, folder, printed):

@@ -50,7 +50,7 @@ def test_what_is_written(tmp_path, capsys, monkeypatch):
     result = run(capsys, "openjd", job, "--chunk", "3")
     assert (result.code, result.err) == (0, "")
     # frames 0 and 5 count twice, for the missing frames beyond the ends; each half traces one frame of the other
-    assert result.out.splitlines()[0] == "2 chunks of 3 frames; halos add 25% to the hits"
+    assert result.out.splitlines()[0] == "2 chunks of 3 camera positions; halos add 25% to the hits"
     template = written(tmp_path / "job.openjd.json")
     defaults = {"JobFile": "job.toml", "SceneFile": "tiny.glb", "OutputFolder": "out", "ChunkSize": 3, "Threads": 2}
     assert parameters(template) == defaults
@@ -79,7 +79,7 @@ def test_files_elsewhere_are_named_from_the_root(tmp_path, capsys):
     ("arguments", "code", "message"),
     [
         (["--chunk", "0"], 2, "--chunk"),
-        (["--chunk", "7"], 2, "expected at most 6, the frames of the camera, got 7"),
+        (["--chunk", "7"], 2, "expected at most 6, the number of camera positions, got 7"),
         (["-o", "walk.txt"], 4, "walk.txt: expected a name that ends in .json, .yaml, .yml"),
         (["-o", "there.json/walk.json"], 4, "there.json: a file of that name is in the way of the folder"),
         (["-o", "there.json"], 4, "there.json: is there already; --force replaces it"),
@@ -109,7 +109,7 @@ def test_bad_jobs(tmp_path, capsys, monkeypatch):
 def test_what_a_render_chooses_is_known(tmp_path, capsys):
     job = write_job(tmp_path, **(JOB | {"reuse": {"n_r": "auto"}}))
     result = run(capsys, "openjd", job, "--chunk", "3", "-o", tmp_path / "a.json")
-    assert result.code == 0 and result.out.startswith("2 chunks of 3 frames; halos add ")
+    assert result.code == 0 and result.out.startswith("2 chunks of 3 camera positions; halos add ")
 
 
 @needs_openjd

@@ -24,7 +24,7 @@ def test_a_render_prints_what_it_did(tmp_path, capsys):
     result = run(capsys, "render", write_job(tmp_path))
     assert result.code == 0
     lines = [line for line in (result.err + result.out).splitlines() if not line.startswith("compil")]
-    assert re.fullmatch(r".*tiny\.glb: \d+ triangles, \d+ materials, 1 textures", lines[0])
+    assert re.fullmatch(r".*tiny\.glb: \d+ triangles, \d+ materials, 1 texture", lines[0])
     assert re.fullmatch(r"ambient light: I_A [\d.]+ to [\d.]+ \(standard error at most .*\)", lines[1])
     assert re.fullmatch(r"3 images in .*: .* ms per image, .* images per second", lines[2])
     assert re.search(
@@ -96,7 +96,8 @@ def test_another_array_is_in_the_way(change, tmp_path, capsys):
     other = write_job(tmp_path, "other.toml", **change)
     result = run(capsys, "render", "-q", other)
     assert (result.code, result.out) == (4, "")
-    assert result.err.startswith(f"{tmp_path / 'out'}: holds another frame array, 'tiny' with 1 x 3 images")
+    size = "1 camera position x 3 light positions"
+    assert result.err.startswith(f"{tmp_path / 'out'}: holds another frame array, 'tiny' with {size}")
     assert "--output" in result.err
     assert "--restart" in result.err
     assert {"seed": "seed: 5 there, 6 now", "name": 'name: "tiny" there, "other" now'}.get(
@@ -183,7 +184,7 @@ def test_check_writes_nothing(tmp_path, capsys):
     result = run(capsys, "check", write_job(tmp_path))
     assert result.code == 0
     text = result.out
-    assert "array: 1 cameras x 3 lights = 3 images of 24 x 18" in text
+    assert "array: 1 camera position x 3 light positions = 3 images of 24 x 18" in text
     for line in ("memory: about ", f"disk: about .* in {re.escape(str(tmp_path / 'out'))}", "time: about "):
         assert re.search(f"^{line}", text, re.MULTILINE), text
     assert "warning" not in result.err

@@ -75,7 +75,7 @@ def test_damage_comes_first_and_few_files_are_named(array, capsys):
     first, second, begun, finished, last, note = (result.out + result.err).splitlines()
     assert first.startswith(f"{array / 'tiny.c0000.l001.png'}: expected ") and "c0002" in second
     assert begun == "camera 3: never begun, 4 of 4 files are left"
-    assert finished == "camera 1: never finished, 1 of 4 files are left"
+    assert finished == "camera 1: never finished, 1 of 4 files is left"
     assert note.startswith("note: 3 files are whole, but have no checksum")
     assert last.startswith(f"2 of {N_FILES} files are missing or damaged, 5 were never finished; `framearray verify")
 

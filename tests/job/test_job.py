@@ -211,7 +211,7 @@ WRONG = [
     ("camera.keys.1.eye", [1, 2, 1e13],
      "camera.keys[1].eye[2]: expected a number from -1e+12 to 1e+12, got 10000000000000.0"),
     ("camera.keys.1.eye", [0.0, 1.2, 0.0],
-     "camera.keys[1].target: expected a point other than the eye, got [0.0, 1.2, 0.0], the eye itself"),
+     "camera.keys[1].target: expected a point other than `eye`, got [0.0, 1.2, 0.0], the same"),
     ("camera.keys.0.up", [0, 0, 0], "camera.keys[0].up: expected a direction, got the zero vector [0, 0, 0]"),
     ("camera.keys.1.up", [0, 1, 0],
      "camera.keys[0].up: missing; keys[1] gives it, so every key of this list must"),

@@ -204,7 +204,7 @@ def test_masked_triangles_come_last_and_glass_is_left_out(tmp_path):
 def test_report_lines(tmp_path):
     file = leaf_and_wall(tmp_path)
     lines = scene_report_lines(load_scene(file).report, file.name)
-    assert lines[0] == "leaf.glb: 4 triangles, 2 materials, 1 textures; left out: 2 transmissive"
+    assert lines[0] == "leaf.glb: 4 triangles, 2 materials, 1 texture; left out: 2 transmissive"
     assert any("Glass" in line for line in lines[1:])
 
 

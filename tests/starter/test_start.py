@@ -295,7 +295,7 @@ def test_the_command_reports_what_it_did(
     assert code_of("init", "my room (1).glb", "--frames", "2", "--lights", "3") == 0
     printed = capsys.readouterr()
     assert "so it is taken for a room" in printed.err
-    assert printed.out.startswith("my room (1).toml: 2 eyes x 3 lights = 6 images")
+    assert printed.out.startswith("my room (1).toml: 2 camera positions x 3 light positions = 6 images")
     assert read_job(tmp_path / "my room (1).toml").name == "my-room-1"
     assert code_of("init", "none.glb") == 3
     assert "none.glb: no such scene file" in capsys.readouterr().err

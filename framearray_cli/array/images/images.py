@@ -18,6 +18,7 @@ from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import MissingExtraError, OutputError
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.files import write_bytes
+from framearray_cli.base.units import counted
 
 from .attributes import Attributes
 from .exr import OIIO_NAMES, oiio, read_pixels, spec_of, write_pixels
@@ -251,5 +252,5 @@ def _largest(label: str, values: Float32) -> float:
     """Return the largest magnitude, and refuse NaN and infinity, which min and max pass on."""
     low, high = float(values.min()), float(values.max())
     if not (math.isfinite(low) and math.isfinite(high)):
-        raise ValueError(f"{label}: not finite, {np.count_nonzero(~np.isfinite(values))} values")
+        raise ValueError(f"{label}: not finite, {counted(int(np.count_nonzero(~np.isfinite(values))), 'value')}")
     return max(-low, high)

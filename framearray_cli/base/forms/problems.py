@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from ..units import FARTHEST
+from ..units import FARTHEST, counted
 from .schema import Schema, allowed_values, file_schema, find, join_options, sections, toml_key, variants
 from .words import shown
 
@@ -52,7 +52,7 @@ def problems_of(error: ValidationError, model: type[BaseModel], most: int = MOST
 
 def append_count(reported: Sequence[str], n: int) -> list[str]:
     """Append the number of problems, of n, that are not reported."""
-    return [*reported, f"and {n - len(reported)} more problems"] if n > len(reported) else list(reported)
+    return [*reported, f"and {counted(n - len(reported), 'more problem')}"] if n > len(reported) else list(reported)
 
 
 def _is_echo(details: ErrorDetails) -> bool:

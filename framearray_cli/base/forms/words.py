@@ -2,7 +2,7 @@
 
 import json
 
-from ..units import FARTHEST
+from ..units import FARTHEST, counted
 
 LONGEST_SHOWN = 40  # characters of a found value in a message
 
@@ -16,8 +16,7 @@ def shown(value: object) -> str:
             whole = f"[{', '.join(shown(item) for item in value)}]"
             if len(whole) <= LONGEST_SHOWN:
                 return whole
-        kind = "table" if value and isinstance(value[0], dict) else "value"
-        return f"a list of {len(value)} {kind}{'s' if len(value) != 1 else ''}"
+        return f"a list of {counted(len(value), 'table' if value and isinstance(value[0], dict) else 'value')}"
     if isinstance(value, bool | str):
         text = json.dumps(value[:1000] if isinstance(value, str) else value, ensure_ascii=False)
     elif isinstance(value, int) and value.bit_length() > 64:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS
+from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS, counted
 
 from ..options import ArrayFolder, Json, Quiet, Strict, output_path, refuse_warnings
 from ..results import AssembleResult
@@ -115,7 +115,8 @@ def assemble(
         )
     rate = f"{float(made.fps):g} frames per second"
     result = AssembleResult(path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps))
-    print_result([f"{made.target}: {made.n_frames} frames from {made.n_images} images, {rate}"], result, quiet=quiet)
+    size = f"{counted(made.n_frames, 'frame')} from {counted(made.n_images, 'image')}"
+    print_result([f"{made.target}: {size}, {rate}"], result, quiet=quiet)
 
 
 def _refuse_conflicts(

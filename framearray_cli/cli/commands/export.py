@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 import typer
 
 from framearray_cli.array.places import ALL_PLACES
+from framearray_cli.base.units import counted
 
 from ..options import ArrayFolder, At, Cameras, Exposure, Json, Light, Quiet, output_path
 from ..results import ExportResult
@@ -55,10 +56,10 @@ def export(
         )  # fmt: skip
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
-    lights = f"{made.n_lights} light position{'s' if made.n_lights > 1 else ''}"
-    points_too = f", {made.n_points:,} points" if kind != "cinema" else ""
+    size = f"{counted(made.n_cameras, 'camera position')} x {counted(made.n_lights, 'light position')}"
+    points_too = f", {counted(made.n_points, 'point')}" if kind != "cinema" else ""
     result = ExportResult(
         directory=str(made.target), format=kind, cameras=made.n_cameras, lights=made.n_lights, points=made.n_points
     )
-    lines = [f"{made.target}: {made.n_cameras} cameras, {lights}{points_too}"]
+    lines = [f"{made.target}: {size}{points_too}"]
     print_result([*lines, *(f"note: {note}" for note in made.notes)], result, quiet=quiet)

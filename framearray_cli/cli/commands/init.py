@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from framearray_cli.base.units import counted
+
 from ..describe import init_result
 from ..options import Json, Quiet, output_path
 from ..screen import Screen, err, print_result
@@ -94,6 +96,7 @@ def init(
             start = run(scene, job_file, options, force=force)
         screen.say(start.about)
     images = start.camera.frames * start.light_frames
-    size = f"{start.camera.frames} eyes x {start.light_frames} lights = {images} images"
+    size = f"{counted(start.camera.frames, 'camera position')} x {counted(start.light_frames, 'light position')}"
+    size += f" = {counted(images, 'image')}"
     lines = [f"{job_file}: {size}; next: framearray render {shlex.quote(str(job_file))}"]
     print_result(lines, init_result(start, job_file, scene), quiet=quiet)

@@ -44,7 +44,7 @@ def openjd(
     frames = job.camera.frames
     if chunk is not None and chunk > frames:
         raise typer.BadParameter(
-            f"expected at most {frames}, the frames of the camera, got {chunk}", param_hint="--chunk"
+            f"expected at most {frames}, the number of camera positions, got {chunk}", param_hint="--chunk"
         )
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the job")

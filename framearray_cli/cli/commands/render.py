@@ -9,7 +9,7 @@ import typer
 
 from framearray_cli.array.places import read_indices
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.units import MOST_THREADS, size
+from framearray_cli.base.units import MOST_THREADS, agree, counted, size
 from framearray_cli.render.messages import (
     ambient_lines,
     chunks_line,
@@ -137,8 +137,8 @@ def render_on_screen(
             if isinstance(error, OutputError):
                 _add_space(error, job.output.directory)
             if screen.done:
-                done = f"{screen.done:,} of {screen.total:,} images were written to {job.output.directory}"
-                error.add_note(f"{done}; the same command goes on with the rest")
+                done = f"{screen.done:,} of {counted(screen.total, 'image')} {agree(screen.done, 'was', 'were')}"
+                error.add_note(f"{done} written to {job.output.directory}; the same command goes on with the rest")
             raise
     result = render_result(summary, job)
     print_result(summary_lines(summary, events.printed, job), result, quiet=quiet)
@@ -163,18 +163,18 @@ class RenderingEvents(PartEvents):
 
     def removed(self, files: int) -> None:
         if files:
-            self._screen.say([f"removed {files:,} files of the frame array in {self._job.output.directory}"])
+            self._screen.say([f"removed {counted(files, 'file')} of the frame array in {self._job.output.directory}"])
 
     def rewriting(self, files: int) -> None:
         if files:
             rate = f"output.fps is {self._job.output.fps:g} now"
-            self._screen.say([f"{rate}: rewriting the headers of {files:,} files, whose pixels stay"])
+            self._screen.say([f"{rate}: rewriting the headers of {counted(files, 'file')}, whose pixels stay"])
 
     def resolved(self, settings: "AutoSettings") -> None:
         self._screen.say(settings_lines(settings))
 
     def scanning(self, files: int) -> None:
-        self._screen.wait(f"comparing {files:,} files with their checksums")
+        self._screen.wait(f"comparing {counted(files, 'file')} with {agree(files, 'its checksum', 'their checksums')}")
 
     def scanned(self, on_disk: "OnDisk", wanted: int) -> None:
         self._total = wanted
@@ -238,4 +238,4 @@ def _add_space(error: OutputError, folder: Path) -> None:
         if (free := free_space(folder)) < LITTLE_SPACE:
             error.add_note(f"{size(free)} are free on that disk")
         if (files := free_files(folder)) is not None and files < FEW_FILES:
-            error.add_note(f"that disk takes {files} more files (inodes)")
+            error.add_note(f"that disk takes {counted(files, 'more file')} (inodes)")

@@ -4,6 +4,8 @@ from typing import Annotated
 
 import typer
 
+from framearray_cli.base.units import counted
+
 from ..options import ArrayFolder, At, Cameras, Exposure, Json, Light, Quiet, output_path
 from ..results import SheetResult
 from ..screen import Screen, err, print_result
@@ -50,6 +52,6 @@ def sheet(
         )  # fmt: skip
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
-    shown = f"{len(made.cameras)} cameras, {len(made.lights)} light positions"
+    shown = f"{counted(len(made.cameras), 'camera position')} x {counted(len(made.lights), 'light position')}"
     result = SheetResult(file=str(made.target), cameras=made.cameras, lights=made.lights, size=made.size)
     print_result([f"{made.target}: {shown}, {made.size[0]} x {made.size[1]} pixels"], result, quiet=quiet)

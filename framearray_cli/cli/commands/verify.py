@@ -6,6 +6,7 @@ import typer
 
 from framearray_cli.base.errors import CheckError
 from framearray_cli.base.memory import RENDER_NEEDS, available_cores, require_address_space
+from framearray_cli.base.units import agree, counted
 
 from ..describe import verify_result
 from ..options import ArrayFolder, Json, Quiet, Threads, with_threads
@@ -58,7 +59,8 @@ def verified_lines(found: "Verification") -> list[str]:
     folder, damaged = found.manifest.directory, found.damaged
     lines = [f"{folder / name}: {problem}" for name, problem in damaged[:MOST_DAMAGED]]
     if len(damaged) > MOST_DAMAGED:
-        lines.append(f"{len(damaged) - MOST_DAMAGED:,} more files are missing or damaged")
+        more = len(damaged) - MOST_DAMAGED
+        lines.append(f"{counted(more, 'more file')} {agree(more, 'is', 'are')} missing or damaged")
     unfinished = found.unfinished()
     each = found.files // found.manifest.n_cameras
     for what, cameras in (
@@ -67,12 +69,13 @@ def verified_lines(found: "Verification") -> list[str]:
     ):
         if cameras:
             left = sum(unfinished[c] for c in cameras)
-            were = f"camera{'s' if len(cameras) > 1 else ''} {brief_frames_text(cameras)}: {what}"
-            lines.append(f"{were}, {left:,} of {each * len(cameras):,} files are left")
+            were = f"{agree(len(cameras), 'camera', 'cameras')} {brief_frames_text(cameras)}: {what}"
+            lines.append(f"{were}, {left:,} of {counted(each * len(cameras), 'file')} {agree(left, 'is', 'are')} left")
     if was_interrupted(folder):
         lines.append("note: a change of output.fps was interrupted; the next render completes it")
     if found.unknown:
-        lines.append(f"note: {found.unknown:,} files are whole, but have no checksum to compare them with")
+        have = agree(found.unknown, "has", "have")
+        lines.append(f"note: {_files(found.unknown)} whole, but {have} no checksum to compare with")
     return [*lines, _sum_up(found, len(damaged), sum(unfinished.values()))]
 
 
@@ -80,8 +83,15 @@ def _sum_up(found: "Verification", damaged: int, left: int) -> str:
     """Word the result in one line, with the remedy."""
     repair = f"`framearray verify --repair {found.manifest.directory}`"
     if not damaged and not left:
-        return f"{found.files:,} files of {found.manifest.name} are whole"
+        name = found.manifest.name
+        return f"{counted(found.files, 'file')} of {name} {agree(found.files, 'is', 'are')} whole"
+    files = counted(found.files, "file")
     if not damaged:
-        return f"{left:,} of {found.files:,} files were never finished; `framearray render JOB` or {repair} goes on"
-    more = f", {left:,} were never finished" if left else ""
-    return f"{damaged:,} of {found.files:,} files are missing or damaged{more}; {repair} renders them again"
+        some = f"{left:,} of {files} {agree(left, 'was', 'were')}"
+        return f"{some} never finished; `framearray render JOB` or {repair} goes on"
+    more = f", {left:,} {agree(left, 'was', 'were')} never finished" if left else ""
+    return f"{damaged:,} of {files} {agree(damaged, 'is', 'are')} missing or damaged{more}; {repair} renders them again"
+
+
+def _files(n: int) -> str:
+    return f"{counted(n, 'file')} {agree(n, 'is', 'are')}"

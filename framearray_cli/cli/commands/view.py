@@ -6,7 +6,7 @@ import typer
 
 from framearray_cli.base.memory import available_cores
 from framearray_cli.base.signals import Stopped, cancel_alarm
-from framearray_cli.base.units import MOST_THREADS, size
+from framearray_cli.base.units import MOST_THREADS, agree, counted, size
 
 from ..options import ArrayFolder, Quiet, output_path
 from ..screen import Screen, err, print_result
@@ -87,5 +87,5 @@ def _lacking_lines(tiles: "Tiles", then: str) -> list[str]:
 
 def _warning_lines(problems: list["OutputError"]) -> list[str]:
     rest = len(problems) - MOST_PROBLEMS
-    more = [f"warning: {rest} more images are damaged"] if rest > 0 else []
+    more = [f"warning: {counted(rest, 'more image')} {agree(rest, 'is', 'are')} damaged"] if rest > 0 else []
     return [*(f"warning: {problem}" for problem in problems[:MOST_PROBLEMS]), *more]

@@ -11,7 +11,7 @@ from typing import Any
 from framearray_cli.array.ranges import frames_text
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import write_bytes
-from framearray_cli.base.units import MOST_THREADS
+from framearray_cli.base.units import MOST_THREADS, counted
 from framearray_cli.job.job import Job
 
 SUFFIXES = (".json", ".yaml", ".yml")  # by which readers recognize the format
@@ -41,9 +41,9 @@ def template(job: Job, job_file: Path, folder: Path, chunk: int, threads: int | 
         "extensions": ["TASK_CHUNKING"],
         "name": job.name,
         "description": (
-            f"The frame array {job.name}: {job.camera.frames} cameras, rendered in chunks of the camera path. Each "
-            "also traces the hits of its halo, N_r frames on either side. All machines must see the job file, the "
-            "scene and the output folder. A chunk that was stopped goes on where it was when it is run again."
+            f"The frame array {job.name}: {counted(job.camera.frames, 'camera position')}, rendered in chunks of the "
+            "path. Each also traces the hits of its halo, N_r frames on either side. All machines must see the job "
+            "file, the scene and the output folder. A chunk that was stopped goes on where it was when it is run again."
         ),
         "parameterDefinitions": _parameters(job, job_file, folder, chunk, threads),
         "steps": [

@@ -6,6 +6,7 @@ import zipfile
 from collections.abc import Iterator
 
 from framearray_cli.base.errors import SceneError
+from framearray_cli.base.units import counted
 
 from .assets import shorten
 from .limit import Limit
@@ -97,9 +98,9 @@ def _check_off(data: bytes) -> None:
     if len(counts) < 2 or min(counts) < 0:
         raise SceneError("broken OFF: expected the numbers of vertices and faces, got none; export it anew")
     if 2 * sum(counts) > len(data):  # a row takes at least two bytes
+        promised = f"{counted(counts[0], 'vertex', 'vertices')} and {counted(counts[1], 'face')}"
         raise SceneError(
-            f"broken OFF: its header promises {counts[0]} vertices and {counts[1]} faces, the file has "
-            f"{len(data)} bytes; export it anew"
+            f"broken OFF: its header promises {promised}, the file has {counted(len(data), 'byte')}; export it anew"
         )
 
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from framearray_cli.base.arrays import Bytes, Float32, Float64
+from framearray_cli.base.units import counted
 
 GREY = 0.5  # reflectivity of surfaces without material: neither black, nor a white that hides all shading
 NAMES_IN_A_NOTE = 6  # names that one note lists before it says "and n more"
@@ -86,7 +87,7 @@ class Notes:
         shown = list(self.found.items())[:MOST_NOTES]
         lines = [f"{sentence}: {join_names(list(names))}" if names else sentence for sentence, names in shown]
         more = len(self.found) - len(shown)
-        return (*lines, *([f"and {more} more notes"] if more else []))
+        return (*lines, *([f"and {counted(more, 'more note')}"] if more else []))
 
 
 def join_names(names: Sequence[str], limit: int = NAMES_IN_A_NOTE) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.forms.kinds import mistaken
+from framearray_cli.base.units import counted
 
 from .assets import AssetError, Assets
 from .formats import unknown_format
@@ -49,7 +50,9 @@ def read_meshes(file: Path, folders: Sequence[Path] = (), memory: int | None = N
         meshes = _read(_bytes_of(file, assets.limit), extension, assets)
         assets.require_inside()
     if not any(len(part.corners) for part in meshes.parts):
-        found = "; ".join((*meshes.notes, *(f"{n} triangles with {why}" for why, n in meshes.dropped.items())))
+        found = "; ".join(
+            (*meshes.notes, *(f"{counted(n, 'triangle')} with {why}" for why, n in meshes.dropped.items()))
+        )
         raise SceneError(f"{file}: expected triangles, got none" + (f" ({found})" if found else ""))
     return replace(meshes, notes=meshes.notes + tuple(f"while reading: {message}" for message in messages))
 

@@ -20,6 +20,7 @@ from framearray_cli.array.ranges import brief_frames_text
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import folder_for
 from framearray_cli.base.forms.table import changed
+from framearray_cli.base.units import agree, counted
 
 from ..progress import Progress
 from .animation import ANIMATIONS, open_animation, require_animation
@@ -140,10 +141,10 @@ def _check_images(pictures: Pictures, line: Timeline) -> None:
         shot, cameras = wanted[missing[0]], {wanted[path].c for path in missing}
         lights = zip(manifest.axes, shot.positions, strict=True)
         place = ", ".join([f"camera {shot.c}", *(f"{axis} {position:g}" for axis, position in lights)])
-        s = "s" if len(cameras) > 1 else ""
+        gone = f"{len(missing):,} of the {counted(len(wanted), 'image')} on the path {agree(len(missing), 'is', 'are')}"
+        whose = f"{agree(len(cameras), 'camera', 'cameras')} {brief_frames_text(cameras)}"
         raise OutputError(
-            f"{manifest.directory}: {len(missing):,} of the {len(wanted):,} images on the path are missing, "
-            f"of camera{s} {brief_frames_text(cameras)}; the first is {missing[0].name} ({place}); {REMEDY}"
+            f"{manifest.directory}: {gone} missing, of {whose}; the first is {missing[0].name} ({place}); {REMEDY}"
         )
     for path in sorted(wanted):
         check_image(path, pictures.manifest.resolution)

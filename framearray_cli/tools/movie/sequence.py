@@ -25,6 +25,7 @@ from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import folder_for, reason, temporary_folder
+from framearray_cli.base.units import counted
 
 from ..progress import Progress
 from .look import Look, screen_codes, shot_label
@@ -94,9 +95,9 @@ def _check_leftovers(folder: Path, before: str, after: str, names: set[str]) -> 
     entries = sorted(entry.name for entry in folder.iterdir()) if os.path.isdir(folder) else []
     left = [name for name in entries if number.fullmatch(name) and name not in names]
     if left:
+        kept = f"{counted(len(left), 'file')} that this one would not replace"
         raise OutputError(
-            f"{folder / left[0]}: belongs to an earlier sequence, with {len(left)} files that this one would not "
-            "replace; delete them or choose another name"
+            f"{folder / left[0]}: belongs to an earlier sequence, with {kept}; delete them or choose another name"
         )
 
 

@@ -53,13 +53,15 @@ def test_the_cost_is_that_of_the_frames_traced(n_r, size):
 def test_halos_of_long_chunks_cost_about_2_n_r_over_their_length():
     chunks = plan_chunks(range(2400), 24, 2400, 3)
     assert chunks.more == pytest.approx(6 / 24, rel=0.02)
-    assert chunks_line(chunks) == "100 chunks of 24 frames; halos add 25% to the hits"
+    assert chunks_line(chunks) == "100 chunks of 24 camera positions; halos add 25% to the hits"
 
 
 def test_line_about_chunks():
-    assert chunks_line(plan_chunks(range(5), 9, 5, 2)) == "1 chunk of 5 frames"
-    assert chunks_line(plan_chunks(range(1), 9, 1, 0)) == "1 chunk of 1 frame"
-    assert chunks_line(plan_chunks(range(5), 2, 5, 0)) == "3 chunks of 1 to 2 frames; halos add 0% to the hits"
+    assert chunks_line(plan_chunks(range(5), 9, 5, 2)) == "1 chunk of 5 camera positions"
+    assert chunks_line(plan_chunks(range(1), 9, 1, 0)) == "1 chunk of 1 camera position"
+    assert (
+        chunks_line(plan_chunks(range(5), 2, 5, 0)) == "3 chunks of 1 to 2 camera positions; halos add 0% to the hits"
+    )
 
 
 def test_a_camera_at_rest_has_one_frame_to_trace():

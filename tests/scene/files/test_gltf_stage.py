@@ -129,7 +129,7 @@ def test_an_orthographic_camera_is_noted(tmp_path: Path) -> None:
     ("times", "values", "message"),
     [
         ([0.0, 0.0], [[0, 0, 0], [1, 0, 0]], "do not rise"),
-        ([0.0, 1.0], [[0, 0, 0]], "2 times and 1 values"),
+        ([0.0, 1.0], [[0, 0, 0]], "2 times and 1 value"),
         ([0.0, math.nan], [[0, 0, 0], [1, 0, 0]], "do not rise, or are not finite"),
     ],
 )

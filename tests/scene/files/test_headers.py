@@ -56,7 +56,7 @@ def test_headers_of_ply(tmp_path: Path, head: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("OFF\n3000000 1 0\n0 0 0\n", "its header promises 3000000 vertices and 1 faces, the file has 22 bytes"),
+        ("OFF\n3000000 1 0\n0 0 0\n", "its header promises 3,000,000 vertices and 1 face, the file has 22 bytes"),
         ("OFF\n-3 1 0\n", "expected the numbers of vertices and faces"),
         ("OFF\n", "expected the numbers of vertices and faces"),
     ],

@@ -330,7 +330,7 @@ def test_a_sequence_replaces_only_its_own_files(out: Path, path_file: Path, tmp_
     assert (tmp_path / "cut" / "notes.txt").read_bytes() == b"mine"
     read_image(tmp_path / "cut" / "shot.0002.png")
     shutil.copyfile(tmp_path / "cut" / "shot.0000.png", tmp_path / "cut" / "shot.0011.png")
-    with pytest.raises(OutputError, match=r"shot\.0011\.png: belongs to an earlier sequence, with 1 files"):
+    with pytest.raises(OutputError, match=r"shot\.0011\.png: belongs to an earlier sequence, with 1 file"):
         assemble_movie(out, path_file, tmp_path / "cut" / "shot.####.png")
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from framearray_cli.base.errors import SceneError
+from framearray_cli.base.units import agree, counted
 
 from ..limit import Limit
 from .values import LIGHTS, Tree, extensions, list_of, map_of, number, number_of, numbers, one_of, table, text
@@ -168,7 +169,8 @@ def _accessors(tree: Tree) -> Iterator[str]:
         if stride < row:
             yield f"accessors[{index}]: expected a byteStride of at least {row}, got {stride}"
         elif end > view["byteLength"]:
-            yield f"accessors[{index}]: its {accessor['count']} values end at byte {end} of {view['byteLength']}"
+            values = f"{counted(accessor['count'], 'value')} {agree(accessor['count'], 'ends', 'end')}"
+            yield f"accessors[{index}]: its {values} at byte {end} of {view['byteLength']}"
 
 
 def _primitives(tree: Tree) -> Iterator[str]:

@@ -11,6 +11,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
+from framearray_cli.base.units import counted
 
 from .container import Gltf
 from .values import Tree
@@ -138,7 +139,7 @@ def _channel(gltf: Gltf, sampler: Tree) -> Channel:
         raise ValueError(f"an animation has the unknown interpolation {interpolation!r}")
     each = 3 if interpolation == "CUBICSPLINE" else 1
     if len(times) == 0 or len(values) != each * len(times):
-        raise ValueError(f"an animation has {len(times)} times and {len(values)} values")
+        raise ValueError(f"an animation has {counted(len(times), 'time')} and {counted(len(values), 'value')}")
     if not np.isfinite(times).all() or (np.diff(times) <= 0).any() or not np.isfinite(values).all():
         raise ValueError("the times of an animation do not rise, or are not finite")
     if interpolation != "CUBICSPLINE":

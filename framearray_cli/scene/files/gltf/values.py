@@ -72,7 +72,8 @@ def number_of(key: str) -> Check:
         if key == "scenes" and not count:
             return  # reported in clearer words later
         if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < count:
-            yield f"{place}: expected the number of one of {count} {key}, from 0, got {_got(value)}"
+            wanted = f"the number of one of {count} {key}, from 0" if count > 1 else f"0, the only one of {key}"
+            yield f"{place}: expected {wanted if count else f'none, as there are no {key}'}, got {_got(value)}"
 
     return check
 

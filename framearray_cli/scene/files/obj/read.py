@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.base.units import agree, counted
 
 from ..assets import AssetError, Assets
 from ..materials import clean_colours, default_material
@@ -182,7 +183,8 @@ def _triangles(text: ObjText, positions: Float64, notes: Notes) -> tuple[Indices
     rows = [line.split() for line in text.faces]
     sizes = np.array([len(row) for row in rows], dtype=np.int64)
     if (sizes < 3).any():
-        notes.add(f"{int((sizes < 3).sum())} faces with fewer than 3 corners are left out")
+        n = int((sizes < 3).sum())
+        notes.add(f"{counted(n, 'face')} with fewer than 3 corners {agree(n, 'is', 'are')} left out")
     fill = {0: "/0/0", 1: "/0", 2: ""}
     try:
         tokens = [word.rstrip("/").replace("//", "/0/") for row in rows for word in row]

@@ -203,7 +203,7 @@ class Page {
     const text = `camera ${view.c} of 0-${nCameras - 1}, ${main.name} ${this.l} of 0-${main.n - 1}`;
     const [lacking, ranges] = array.contents.lacking;
     byId("lacking").hidden = !lacking;
-    byId("lacking").textContent = `${lacking} of ${nCameras} cameras lack images: ${ranges}`;
+    byId("lacking").textContent = `${lacking} of ${nCameras} camera positions lack images: ${ranges}`;
     byId("where").textContent = text;
     byId("pad").setAttribute("aria-label", `Pad: ${text}`);
     byId("picture").setAttribute("aria-label", `Picture of ${array.name}: ${text}`);

@@ -29,7 +29,7 @@ def test_an_unfinished_array_shows_what_is_there_and_what_comes(browser, tmp_pat
                 f"document.getElementById('{name}').hidden || document.getElementById('{name}').textContent"
             )
 
-        assert text("lacking") == "2 of 4 cameras lack images: 1-2"
+        assert text("lacking") == "2 of 4 camera positions lack images: 1-2"
         page.all_loaded()
         page.page.keyboard.press("ArrowRight")
         page.settle()
@@ -46,7 +46,7 @@ def test_an_unfinished_array_shows_what_is_there_and_what_comes(browser, tmp_pat
         assert nearest_place(page.pixels()) == (1, 0), "it appears without a reload"
         page.all_loaded()
         page.wait("!framearray.map.changed")
-        assert page.get(GROUND)[1] != [46, 52, 66, 255] and text("lacking") == "1 of 4 cameras lack images: 2"
+        assert page.get(GROUND)[1] != [46, 52, 66, 255] and text("lacking") == "1 of 4 camera positions lack images: 2"
         asked = [url for url in page.requests if "/tiles/" in url and "c0002" in url]
         assert asked == [], "nothing that is not there is asked for"
         page.check(server.url)
