@@ -179,6 +179,13 @@ def free_memory() -> int:
     return min([machine, *(left for left in (group_memory(), address_space()) if left is not None)])
 
 
+def total_memory() -> int:
+    """Bytes of memory that the machine has."""
+    import psutil
+
+    return int(psutil.virtual_memory().total)
+
+
 def resident_memory() -> int:
     """Bytes that this process holds now: the program, the scene, and Embree's tree if it is built."""
     import psutil

@@ -48,6 +48,7 @@ PAGES = {
     "report": CommandPage("Measure speed and error of settings.", "framearray report room.toml --error 0.05"),
     "openjd": CommandPage("Write a template for a render farm.", "framearray openjd room.toml"),
     "schema": CommandPage("Print the JSON Schema of files.", "framearray schema > job.schema.json"),
+    "doctor": CommandPage("Report versions, processor, memory and extras.", "framearray doctor"),
 }
 FIRST_STEPS = ("framearray init room.glb", "framearray render room.toml", "framearray view out/room")
 
@@ -125,6 +126,8 @@ def usage_problem(error: Any) -> str:
     kind, param = type(error).__name__, getattr(error, "param", None)
     hint = getattr(error, "param_hint", None) or (_parameter_name(param) if param is not None else "")
     hint = hint if isinstance(hint, str) else " / ".join(hint)
+    if param is not None and error.ctx and "ENVIRONMENT" in str(error.ctx.get_parameter_source(param.name)):
+        hint = f"environment variable {param.envvar}"
     if kind == "MissingParameter":
         return f"missing {'argument' if param is not None and _is_argument(param) else 'option'} {hint}"
     if kind == "NoSuchOption":

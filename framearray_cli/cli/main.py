@@ -17,6 +17,7 @@ from framearray_cli.base.units import counted
 
 from .commands.assemble import assemble
 from .commands.check import check
+from .commands.doctor import doctor
 from .commands.export import export
 from .commands.init import init
 from .commands.openjd import openjd
@@ -45,7 +46,7 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain text, also in a log file
 )
 
-for command in (init, check, render, verify, view, assemble, sheet, export, report, openjd, schema):
+for command in (init, check, render, verify, view, assemble, sheet, export, report, openjd, schema, doctor):
     app.command(cls=Command)(command)
 
 
@@ -63,7 +64,7 @@ def _options(
     ] = False,
 ) -> None:
     context.ensure_object(list).append(context.invoked_subcommand)
-    if context.invoked_subcommand != "schema":
+    if context.invoked_subcommand not in ("schema", "doctor"):
         require_address_space(RENDER_NEEDS if context.invoked_subcommand in RENDERING else READ_NEEDS)
 
 

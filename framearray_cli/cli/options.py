@@ -9,7 +9,7 @@ import typer
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.units import MOST_STOPS, MOST_THREADS
 
-from .values import number, whole
+from .values import THREADS_VARIABLE, number, whole
 
 if TYPE_CHECKING:
     from framearray_cli.job.job import Job
@@ -19,7 +19,11 @@ ArrayFolder = Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `r
 Threads = Annotated[
     int | None,
     typer.Option(
-        "--threads", parser=whole(1, MOST_THREADS), help="Threads; default: the job's, else one per core.", metavar="N"
+        "--threads",
+        envvar=THREADS_VARIABLE,
+        parser=whole(1, MOST_THREADS),
+        help=f"Threads; default: ${THREADS_VARIABLE}, else the job's, else one per core.",
+        metavar="N",
     ),
 ]
 Output = Annotated[

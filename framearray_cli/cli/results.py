@@ -7,6 +7,8 @@ added; `framearray schema results` prints the JSON Schema that is made of these 
 from dataclasses import dataclass
 from typing import Any
 
+from .machine_report import DoctorResult
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GroupSize:
@@ -233,4 +235,5 @@ RESULTS: dict[str, tuple[type, ...]] = {
     "assemble": (AssembleResult,),
     "sheet": (SheetResult,),
     "export": (ExportResult,),
+    "doctor": (DoctorResult,),
 }

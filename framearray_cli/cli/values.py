@@ -7,6 +7,8 @@ import typer
 
 from framearray_cli.base.forms.words import bound_text, range_text, shown
 
+THREADS_VARIABLE = "FRAMEARRAY_THREADS"  # in the environment; an option stands above it, a job below
+
 
 def whole(least: int, most: int | None = None) -> Callable[[object], int]:
     """Return a parser of whole numbers within bounds."""

@@ -17,7 +17,20 @@ from framearray_cli.cli.help import PAGES, documentation
 from framearray_cli.cli.main import app
 
 PAGE = ROOT / "docs" / "guide" / "cli.md"
-COMMANDS = ["assemble", "check", "export", "init", "openjd", "render", "report", "schema", "sheet", "verify", "view"]
+COMMANDS = [
+    "assemble",
+    "check",
+    "doctor",
+    "export",
+    "init",
+    "openjd",
+    "render",
+    "report",
+    "schema",
+    "sheet",
+    "verify",
+    "view",
+]
 
 
 # What a parser's own words look like in a help screen or a message.

@@ -10,7 +10,7 @@ from framearray_cli.base.units import MOST_THREADS, agree, counted, size
 
 from ..options import ArrayFolder, Quiet, output_path
 from ..screen import Screen, err, print_result
-from ..values import whole
+from ..values import THREADS_VARIABLE, whole
 
 if TYPE_CHECKING:
     from framearray_cli.base.errors import OutputError
@@ -33,7 +33,13 @@ def view(
     ] = None,
     threads: Annotated[
         int | None,
-        typer.Option("--threads", parser=whole(1, MOST_THREADS), help="Threads; default: one per core.", metavar="N"),
+        typer.Option(
+            "--threads",
+            envvar=THREADS_VARIABLE,
+            parser=whole(1, MOST_THREADS),
+            help=f"Threads; default: ${THREADS_VARIABLE}, else one per core.",
+            metavar="N",
+        ),
     ] = None,
     quiet: Quiet = False,
 ) -> None:

@@ -1,0 +1,128 @@
+"""What `framearray doctor` finds: the program's parts, and what the machine lets it use."""
+
+import importlib
+import importlib.util
+import os
+import platform
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+from framearray_cli import __version__
+from framearray_cli.base.extras import install_command
+from framearray_cli.base.memory import available_cores, free_memory
+
+from .machine_report import CoreCount, DoctorResult, EmbreeReport, ExtraReport, KernelCache, LibraryReport, MemoryReport
+from .values import THREADS_VARIABLE
+
+# Packages that the program cannot do without, and the module that proves them whole.
+REQUIRED = {
+    "numpy": "numpy",
+    "numba": "numba",
+    "llvmlite": "llvmlite.binding",
+    "embreex": "embreex.rtcore_scene",
+    "OpenImageIO": "OpenImageIO",
+    "Pillow": "PIL.Image",
+    "scipy": "scipy",
+    "trimesh": "trimesh",
+    "pydantic": "pydantic",
+    "typer": "typer",
+    "rich": "rich",
+}
+# Extras of the program: what they are for, and their modules.
+EXTRAS = {
+    "movie": ("movies", ("av",)),
+    "denoise": ("denoise.obscurance", ("pyoidn",)),
+    "sun": ('sources of type "sun"', ("pvlib",)),
+    "report": ("framearray report", ("matplotlib", "jinja2", "flip_evaluator")),
+    "dask": ("render --workers and --dask", ("distributed",)),
+}
+
+
+def examine_machine() -> DoctorResult:
+    """Look at everything; nothing is written but the folder of kernels."""
+    from framearray_cli.engine.kernels.instructions import instruction_sets
+    from framearray_cli.engine.kernels.kernel import processor
+
+    return DoctorResult(
+        version=__version__,
+        package=str(Path(__file__).resolve().parents[1]),
+        python=platform.python_version(),
+        executable=sys.executable,
+        processor=processor(),
+        instruction_sets=instruction_sets(),
+        libraries=tuple(_library(name, module) for name, module in REQUIRED.items()),
+        embree=_embree(),
+        extras=tuple(_extra(name) for name in EXTRAS),
+        cores=CoreCount(usable=available_cores(), machine=os.cpu_count() or 1, threads=_threads()),
+        memory=_memory(),
+        kernels=_kernels(),
+        browser=_browser(),
+    )
+
+
+def _library(name: str, module: str) -> LibraryReport:
+    """Import a library, and find its version."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        importlib.import_module(module)
+        problem = None
+    except Exception as error:  # a broken library may raise anything
+        problem = f"{type(error).__name__}: {error}"
+    found = None
+    with suppress(PackageNotFoundError):
+        found = version(name)
+    return LibraryReport(name=name, version=found, problem=problem)
+
+
+def _embree() -> EmbreeReport | None:
+    from framearray_cli.engine.embree.properties import embree_properties
+
+    try:
+        found = embree_properties()
+    except ImportError:
+        return None
+    return EmbreeReport(version=found.version, packet_widths=found.widths) if found else None
+
+
+def _extra(name: str) -> ExtraReport:
+    purpose, modules = EXTRAS[name]
+    missing = tuple(module for module in modules if importlib.util.find_spec(module) is None)
+    install = install_command(f"[{name}]") if missing else None
+    return ExtraReport(name=name, purpose=purpose, missing=missing, install=install)
+
+
+def _threads() -> int | None:
+    """Return the number of threads that the environment sets, if it can be read."""
+    text = os.environ.get(THREADS_VARIABLE, "")
+    return int(text) if text.isdecimal() else None
+
+
+def _memory() -> MemoryReport:
+    from framearray_cli.base.memory import total_memory
+
+    return MemoryReport(free_bytes=free_memory(), machine_bytes=total_memory())
+
+
+def _kernels() -> KernelCache:
+    from framearray_cli.engine.kernels.cache import kept_kernels, kernel_folder, problem
+
+    folder = kernel_folder()
+    files = [file for file in folder.rglob("*") if file.is_file()] if folder else []
+    return KernelCache(
+        folder=str(folder) if folder else None,
+        kernels=kept_kernels(),
+        size_bytes=sum(file.stat().st_size for file in files),
+        problem=problem() or None,
+    )
+
+
+def _browser() -> str | None:
+    """Return the name of the browser that `view` opens; None: it prints only the address."""
+    import webbrowser
+
+    try:
+        return getattr(webbrowser.get(), "name", None) or "the system's"
+    except webbrowser.Error:
+        return None
