@@ -16,6 +16,16 @@ if TYPE_CHECKING:
     from framearray_cli.base.errors import OutputError
     from framearray_cli.tools.view.tiles import Tiles
 
+Threads = Annotated[
+    int | None,
+    typer.Option(
+        "--threads",
+        envvar=THREADS_VARIABLE,
+        parser=whole(1, MOST_THREADS),
+        help=f"Threads; default: ${THREADS_VARIABLE}, else one per core.",
+        metavar="N",
+    ),
+]
 MOST_PROBLEMS = 5  # named one by one
 
 
@@ -31,16 +41,7 @@ def view(
         str | None,
         typer.Option("--cache", help="Folder for prepared pictures; default: OUT/.view.", metavar="FOLDER"),
     ] = None,
-    threads: Annotated[
-        int | None,
-        typer.Option(
-            "--threads",
-            envvar=THREADS_VARIABLE,
-            parser=whole(1, MOST_THREADS),
-            help=f"Threads; default: ${THREADS_VARIABLE}, else one per core.",
-            metavar="N",
-        ),
-    ] = None,
+    threads: Threads = None,
     quiet: Quiet = False,
 ) -> None:
     """Walk through a frame array in the browser."""

@@ -3,7 +3,7 @@
 import ctypes
 from dataclasses import dataclass
 
-from .native import _configuration, embree_library
+from ..library import device_configuration, embree_library
 
 # RTCDeviceProperty of Embree 3 and 4.
 _VERSION = (1, 2, 3)  # major, minor, patch
@@ -25,7 +25,7 @@ def embree_properties() -> EmbreeProperties | None:
         return None
     ask = library.rtcGetDeviceProperty
     ask.restype, ask.argtypes = ctypes.c_ssize_t, (ctypes.c_void_p, ctypes.c_int)
-    device = library.rtcNewDevice(_configuration())
+    device = library.rtcNewDevice(device_configuration())
     try:
         version = ".".join(str(ask(device, key)) for key in _VERSION)
         return EmbreeProperties(version, tuple(n for n, key in _NATIVE_WIDTHS.items() if ask(device, key)))
