@@ -1,18 +1,15 @@
 """What the installed Embree can do on this machine."""
 
-import ctypes
 from dataclasses import dataclass
 
-from ..library import device_configuration, embree_library
+from ..library import device_configuration, embree_library, native_widths
 
-# RTCDeviceProperty of Embree 3 and 4.
-_VERSION = (1, 2, 3)  # major, minor, patch
-_NATIVE_WIDTHS = {4: 32, 8: 33, 16: 34}
+_VERSION = (1, 2, 3)  # RTCDeviceProperty of Embree 3 and 4: major, minor, patch
 
 
 @dataclass(frozen=True, slots=True)
 class EmbreeProperties:
-    """Version of Embree, and the numbers of rays per packet that it traces with instructions of that width."""
+    """Version of Embree, and the numbers of rays per packet that it traces together on this processor."""
 
     version: str
     widths: tuple[int, ...]
@@ -23,11 +20,11 @@ def embree_properties() -> EmbreeProperties | None:
     library = embree_library()
     if library is None:
         return None
-    ask = library.rtcGetDeviceProperty
-    ask.restype, ask.argtypes = ctypes.c_ssize_t, (ctypes.c_void_p, ctypes.c_int)
     device = library.rtcNewDevice(device_configuration())
+    if not device:
+        return None
     try:
-        version = ".".join(str(ask(device, key)) for key in _VERSION)
-        return EmbreeProperties(version, tuple(n for n, key in _NATIVE_WIDTHS.items() if ask(device, key)))
+        version = ".".join(str(library.rtcGetDeviceProperty(device, key)) for key in _VERSION)
+        return EmbreeProperties(version, tuple(sorted(native_widths())))
     finally:
         library.rtcReleaseDevice(device)
