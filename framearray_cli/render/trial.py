@@ -55,7 +55,7 @@ def run_trial(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: i
     """
     small = small_frames(setup, pixels)
     n, still = small.n_frames, prepared.still
-    with tempfile.TemporaryDirectory() as name, TracePool(small, prepared.threads) as pool:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name, TracePool(small, prepared.threads) as pool:
         pace = Pace(block_work(small, range(n), still=still), None)
         folder = Path(name)
         target = replace(array_target(prepared), directory=folder, resolution=(small.cams.width, small.cams.height))
@@ -146,7 +146,7 @@ def writing_cost(prepared: Prepared, image: Image) -> float:
     copies *= random.uniform(1 - BY_COPY, 1 + BY_COPY, (down, 1, across, 1, 1)).astype(np.float32)
     copies *= random.uniform(1 - BY_PIXEL, 1 + BY_PIXEL, copies.shape).astype(np.float32)
     large = np.ascontiguousarray(copies.reshape(down * h, across * w, 3)[:height, :width].astype(image.dtype))
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
         path = Path(name) / target.names.images[0].file(0)
         started = time.thread_time()
         write_image(path, large, target.format, target.attributes(0, 0), {})
