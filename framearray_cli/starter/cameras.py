@@ -13,7 +13,7 @@ from .orbit import FOV_DEG as ORBIT_FOV
 from .orbit import KEYS, choose_orbit, key_frames
 from .room import surroundings
 from .site import Site
-from .staged import choose_camera, convert_camera
+from .staged import choose_camera, convert_camera, convert_lights
 from .views import FOV_DEG as ROOM_FOV
 from .walks import choose_walk
 
@@ -53,7 +53,8 @@ def choose_shot(site: Site, stage: Stage, options: StartOptions, file: object) -
         room = site.room is not None and not site.room.roofless
         return Shot(camera=camera, ends=ends, inside=inside and room, about=("The file brings its own camera.",))
     if site.room is not None:
-        walk = choose_walk(site.probe, site.room, site.metre)
+        lights = () if options.sun else convert_lights(stage, options.lights)[0]
+        walk = choose_walk(site.probe, site.room, site.metre, lights)
         if walk is not None:
             ends = np.stack([walk.eyes, np.array([walk.target] * 2)], axis=1)
             return Shot(camera=_walk_camera(site, ends, options), ends=ends, inside=not site.room.roofless)

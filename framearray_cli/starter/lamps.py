@@ -1,9 +1,12 @@
 """Choose a path for a lamp in a room, so that it lights what the pictures show."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
 
+from .model import LightKeys
 from .rays import Probe
 from .room import Room, free_ways, select_clear
 from .views import view_directions
@@ -11,6 +14,7 @@ from .views import view_directions
 LAMP_SHARE = 0.75  # of the height of a room
 LAMP_CLEAR = 0.15  # over the height: a lamp that is nearer would make a white spot on a wall
 LAMPS, LIT_POINTS = 300, 300  # largest numbers of places for a lamp, and of points in the pictures for it to light
+LIT_STRIDE, MOST_LIT_BY = 5, 8  # rays of a view of which one is followed to the lights; lights that are tried
 TRIED = 20  # ends of its path that are tried at once
 
 
@@ -40,6 +44,27 @@ def choose_lamp_path(probe: Probe, room: Room, eyes: Float64, targets: Float64) 
         if free.any():
             return np.array([start, spots[some[int(free.argmax())]]])
     return np.array([start, start])
+
+
+def lit_shares(probe: Probe, eyes: Float64, targets: Float64, up_dir: Float64, lights: Sequence[LightKeys]) -> Float64:
+    """(n,) share of what each of n views shows that some light of the file reaches, halfway along the lights' paths."""
+    look = targets - eyes
+    directions = view_directions(look / np.linalg.norm(look, axis=1, keepdims=True), up_dir)[:, ::LIT_STRIDE]
+    n, rays = directions.shape[:2]
+    origins, directions = np.repeat(eyes, rays, axis=0), directions.reshape(-1, 3)
+    seen = probe.trace(origins, directions)
+    points = np.where(
+        seen.hit[:, None], origins + directions * (np.where(seen.hit, seen.distance, 0) * (1 - 1e-3))[:, None], 0
+    )
+    lit = np.zeros(len(points), bool)
+    for source in lights[:MOST_LIT_BY]:
+        vector = np.array(source.vectors[len(source.vectors) // 2])
+        far = 4 * float(np.linalg.norm(np.ptp(probe.scene.corners, axis=(0, 1))))
+        end = vector - probe.scene.centre if source.kind == "point" else points - far * vector
+        lit |= ~probe.blocked(points, end)
+    return np.asarray(
+        (lit & seen.hit).reshape(n, rays).sum(axis=1) / np.maximum(seen.hit.reshape(n, rays).sum(axis=1), 1)
+    )
 
 
 def _seen_points(probe: Probe, eyes: Float64, targets: Float64, up_dir: Float64) -> Float64:

@@ -15,7 +15,7 @@ from .rays import Probe
 from .sample import directions_around, level_directions, points_in
 
 POINTS, AROUND = 3000, 64
-ROUNDS, ENOUGH, TRIM = 3, 2000, 2  # further rounds of points, until there are enough inside; per cent left out per side
+ROUNDS, ENOUGH, TRIM = 3, 1500, 2  # further rounds of points, until there are enough inside; per cent left out per side
 # A point is inside if at least these shares of its rays hit, and of those that hit, hit a front.
 ENCLOSED, FRONTS = 0.7, 0.75
 UNDER_SKY = 0.55  # instead of ENCLOSED in a place that has no roof
@@ -42,7 +42,7 @@ class Room:
         places: (n, 3).
         floor, ceiling: (n,) height of the floor below and of the surface above each place; inf under the sky.
         stands: (n,) whether a person there stands on the floor, and not on a table.
-        height: of the room, median; in a place under the sky, half its width.
+        height: of the room, median; in a place under the sky, the distance of what is around.
         roofless: whether it is a place under the sky, such as a street.
     """
 
@@ -124,7 +124,7 @@ def _room_of(probe: Probe, up: int, places: Float64) -> Room | None:
     height = float(np.median(ceiling - floor))
     stands &= ceiling - floor >= HEADROOM * height
     if roofless:
-        height = _half_width(probe, places, up)
+        height = _width(probe, places, up)
     return Room(up=up, places=places, floor=floor, ceiling=ceiling, stands=stands, height=height, roofless=roofless)
 
 
@@ -143,12 +143,12 @@ def _find_floor(places: Float64, under: Float64, ceiling: Float64, up: int) -> t
     return floor, under - floor <= FURNITURE * size
 
 
-def _half_width(probe: Probe, places: Float64, up: int) -> float:
-    """Half the median distance of what is around some places at their own height."""
+def _width(probe: Probe, places: Float64, up: int) -> float:
+    """Median distance of what is around some places at their own height."""
     some = places[:: max(1, len(places) // 200)]
     ways = level_directions(16, up)
     seen = probe.trace(np.repeat(some, 16, axis=0), np.tile(ways, (len(some), 1)))
-    return float(np.median(seen.distance[seen.hit])) / 2 if seen.hit.any() else float(np.ptp(places))
+    return float(np.median(seen.distance[seen.hit])) if seen.hit.any() else float(np.ptp(places))
 
 
 def bounds(probe: Probe) -> tuple[Float64, Float64]:

@@ -123,8 +123,8 @@ def _find_inside(site: Site, file: Path, inside: bool | None) -> Site:
 
 def _size_of(room: Room, unit: Unit | None) -> str:
     """What the unit is taken for, and what follows."""
-    what = "The place is" if room.roofless else "The room is"
-    tall = f"{_number(room.height)} units {'wide from its middle' if room.roofless else 'high'}"
+    what, how = ("The walls around are", "away") if room.roofless else ("The room is", "high")
+    tall = f"{_number(room.height)} units {how}"
     if unit is None:
         return f"{what} {tall}, which fits no common unit of length; the eye is halfway up."
     metres = f", {room.height / unit.metre:.2g} m" if unit.name != "m" else ""

@@ -14,18 +14,18 @@ COLUMNS, ROWS = 16, 12  # rays per view
 FOV_DEG, ASPECT = 60.0, 4 / 3
 BATCH = 2000  # views traced together: 400,000 rays
 NEAR = 0.3  # over the size of the place: a nearer thing fills the picture
-AT_BORDER = 0.6  # over the size: what is nearer and at the border of the picture is cut off
+AT_BORDER = 0.8  # over the size: what is nearer and at the border of the picture is cut off
 FAR = 8.0  # over the same size: greater distances count as this one
 SLICE = 0.2  # over the size: surfaces that face the same way and lie farther apart count as different ones
 SHELL = 0.04  # share of all that is seen from anywhere: a larger surface is a wall, a floor or a ceiling
 HALVES, DEPTH = 0.5, 1.2  # weight of the variety of both halves of the picture against that of all, and of its depth
 # What a view gains: for content, the share of rays that see something else than the shell, up to MUCH; for edges
 # between what neighbouring rays see, up to MANY of them; for a window or a gap that shows some sky.
-CONTENT, MUCH, EDGES, MANY, SKY, SOME_SKY = 3.0, 0.5, 1.5, 0.35, 0.15, (0.01, 0.2)
+CONTENT, MUCH, EDGES, MANY, SKY, SOME_SKY = 3.0, 0.5, 1.5, 0.35, 0.15, (0.01, 0.15)
 # Penalties for the shares of rays that see nothing beyond some sky, that see the back of a surface, that end near the
-# eye, and of rays at the border that end on something cut off. A view of ten different things at equal shares has a
-# variety of 2.3; a fifth of a picture spoils about half of that.
-EMPTY, BACKWARDS, CLOSE, CUT = 4.0, 6.0, 6.0, 1.5
+# eye, and of rays at the border that end on something near: a wall, or a thing that is cut off. A view of ten different
+# things at equal shares has a variety of 2.3; a fifth of a picture spoils about half of that.
+EMPTY, BACKWARDS, CLOSE, CUT, CUT_THING = 4.0, 6.0, 6.0, 1.0, 1.5
 _LEFT_RIGHT_BOTTOM = np.zeros((ROWS, COLUMNS), bool)
 _LEFT_RIGHT_BOTTOM[:, [0, -1]] = _LEFT_RIGHT_BOTTOM[-1] = True
 
@@ -130,7 +130,9 @@ def judge_views(views: Views, shell: NDArray[np.int64], size: float) -> Float64:
     worth += SKY * ((sky >= SOME_SKY[0]) & (sky <= SOME_SKY[1]))
     worth -= EMPTY * np.maximum(sky - SOME_SKY[1], 0) + BACKWARDS * views.back.mean(axis=1)
     worth -= CLOSE * (views.distance < NEAR * size).mean(axis=1)
-    worth -= CUT * (views.distance < AT_BORDER * size)[:, _LEFT_RIGHT_BOTTOM.reshape(-1)].mean(axis=1)
+    border = _LEFT_RIGHT_BOTTOM.reshape(-1)
+    near = (views.distance < AT_BORDER * size)[:, border]
+    worth -= CUT * near.mean(axis=1) + CUT_THING * (near & thing[:, border]).mean(axis=1)
     return np.asarray(worth)
 
 

@@ -1,5 +1,6 @@
 """Choose a short walk in a room or along a street: several are tried, and judged by what their pictures show."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,8 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float64
 
+from .lamps import lit_shares
+from .model import LightKeys
 from .rays import Probe
 from .room import CLEAR, Room, bounds, free_ways, select_clear
 from .sample import level_directions
@@ -20,6 +23,7 @@ WALK = 0.8  # longest walk, heights of the room; over 24 frames that is 8 cm per
 NEARER = 0.45  # longest walk, over the distance of what the eye looks at
 FIRST, MIDDLE, LAST, WORST = 0.4, 0.2, 0.2, 0.2  # weights of the views of a walk: people see the first one first
 LENGTH_BONUS = 0.4  # for the longest walk; a picture of more
+LIT = 1.5  # for a view of which everything is lit by the lights of the file
 LEVEL = 0.85  # least height of the eye at the end of a walk over that at its start
 OPEN_SIDE = (0.5, 0.7, 0.9)  # distances from a side of the bounds, heights of the room, from which eyes may look in
 OPEN_BONUS = 0.2  # variety by which such a view must show more than any from inside
@@ -33,11 +37,12 @@ class Walk:
     target: Float64
 
 
-def choose_walk(probe: Probe, room: Room, metre: float | None) -> Walk | None:
+def choose_walk(probe: Probe, room: Room, metre: float | None, lights: Sequence[LightKeys] = ()) -> Walk | None:
     """Choose the walk whose pictures show most; None where no place has room for an eye.
 
     Args:
         metre: its length in scene units; None if it is not known.
+        lights: of the file; views that they light count for more.
     """
     eyes = select_clear(probe, room, room.eye_places(metre), CLEAR * room.height, STANDS)
     if not len(eyes):
@@ -49,6 +54,8 @@ def choose_walk(probe: Probe, room: Room, metre: float | None) -> Walk | None:
     shell = find_shell(views)
     value = judge_views(views, shell, room.height)
     best = _best_starts(value, TURNS)
+    if lights:
+        value[best] += LIT * lit_shares(probe, eye[best], eye[best] + look[best], room.up_dir, lights)
     depth = _take(views, best).middle_distance(room.height)
     targets = eye[best] + look[best] * np.maximum(depth, 0.5 * room.height)[:, None]
     past = None if room.roofless else _walk_past_open_side(probe, room, shell, float(value.max()))
