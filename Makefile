@@ -33,7 +33,7 @@ install: $(VENV)/installed ## Set up the program in .venv
 
 render: $(VENV)/installed ## Render a small kitchen and assemble a movie
 	$(BIN)/framearray render $(JOB)
-	$(BIN)/framearray assemble $(OUT) jobs/first-movie.toml --output $(OUT)/first-movie.mp4
+	$(BIN)/framearray assemble $(OUT) jobs/first-movie.toml --output $(OUT)/first-movie.mp4 --force
 	@echo "pictures: $(OUT)   movie: $(OUT)/first-movie.mp4"
 
 test: $(VENV)/installed-dev ## Run the tests
@@ -48,7 +48,7 @@ test-all: $(VENV)/installed-dev ## Run all tests, the slow ones too
 
 smoke: $(VENV)/installed ## Render the smallest job
 	$(BIN)/framearray render jobs/smoke.toml
-	$(BIN)/framearray assemble out/smoke jobs/first-movie.toml --output out/smoke/first-movie.mp4
+	$(BIN)/framearray assemble out/smoke jobs/first-movie.toml --output out/smoke/first-movie.mp4 --force
 
 format: $(VENV)/installed-dev ## Format the code
 	$(BIN)/ruff format .

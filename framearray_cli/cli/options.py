@@ -40,6 +40,7 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors.")
 Strict = Annotated[bool, typer.Option("--strict", help="Warnings are errors.")]
 # `main` looks for it before anything else: a wrong command line ends with a document too.
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON document.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
 Exposure = Annotated[
     float,
     typer.Option(

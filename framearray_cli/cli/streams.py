@@ -21,6 +21,12 @@ def is_stdout(name: str) -> bool:
     return re.fullmatch(r"-(\.[A-Za-z0-9]+)?", name) is not None
 
 
+def refuse_json(name: str) -> None:
+    """Refuse `--json` where standard output is to hold a file."""
+    if is_stdout(name) and outcome.wanted:
+        raise typer.BadParameter("expected a file, as --json prints on standard output", param_hint="--output")
+
+
 @contextmanager
 def output_file(target: Path, suffix: str, *, force: bool) -> Iterator[Path]:
     """Yield the file to write: the target, or one whose bytes go to standard output when it is whole.
@@ -37,8 +43,7 @@ def output_file(target: Path, suffix: str, *, force: bool) -> Iterator[Path]:
         require_new(target, force=force)
         yield target
         return
-    if outcome.wanted:
-        raise typer.BadParameter("expected a file, as --json prints on standard output", param_hint="--output")
+    refuse_json(str(target))
     if sys.stdout.isatty():
         raise OutputError("standard output: expected a file or a pipe, got a terminal; give a name with --output")
     with tempfile.TemporaryDirectory() as folder:

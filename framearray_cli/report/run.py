@@ -1,5 +1,6 @@
 """`framearray report`: render references and images of many settings, and compare them."""
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -8,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.base.arrays import Float32
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.files import reason
 from framearray_cli.job.job import Job
 
 from .case import Case, open_case
@@ -19,6 +22,8 @@ from .probes import Probes, choose_probes
 from .reference import Reference, make_reference, passes_for, reference_noise
 from .settings import NamedSettings, Settings, settings_to_try
 
+REFERENCES = "references"
+_MARKS = (REFERENCES, "table.toml")  # what the folder of an earlier report holds, even if it was stopped
 TIMES = 100.0  # samples of a reference over those of a picture
 
 
@@ -80,15 +85,30 @@ class Report:
     signed: Float32
 
 
+def _check_folder(folder: Path) -> None:
+    """Refuse a folder that holds other files: a report replaces only an earlier one, and uses its references again.
+
+    Raises:
+        OutputError: there are files, but none of a report.
+    """
+    try:
+        found = sorted(entry.name for entry in folder.iterdir()) if os.path.exists(folder) else []
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be read as a folder: {reason(error)}") from error
+    if found and not set(_MARKS) & set(found):
+        raise OutputError(f"{folder}: holds other files, {found[0]!r} for one, and no report; choose another folder")
+
+
 def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEvents | None = None) -> Report:
     """Measure a job with its own and with other settings; keep references in the folder for the next report.
 
     Raises:
         MissingExtraError: the libraries of the extra `report` are not installed.
         JobError, SceneError: the job cannot be rendered, or lacks a chosen image or setting.
-        OutputError: the folder cannot be written.
+        OutputError: the folder holds other files, or cannot be written.
     """
     require_extra()
+    _check_folder(folder)
     events = events or ReportEvents()
     with open_case(job) as case:
         events.opened(case)
@@ -100,7 +120,7 @@ def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEv
         passes = passes_for(options.times, case.settings.window_hits)
         references: dict[int, Reference] = {}
         for c in frames:
-            references[c] = make_reference(case, c, chosen.lights, folder / "references", passes)
+            references[c] = make_reference(case, c, chosen.lights, folder / REFERENCES, passes)
             events.done()
         measured: list[Measured] = []
         for named in tried:

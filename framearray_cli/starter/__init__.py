@@ -7,8 +7,8 @@ starter chooses.
 import os
 from pathlib import Path
 
-from framearray_cli.base.errors import OutputError, SceneError
-from framearray_cli.base.files import write_bytes
+from framearray_cli.base.errors import SceneError
+from framearray_cli.base.files import require_new, write_bytes
 from framearray_cli.base.forms.kinds import mistaken
 
 from .model import Start, table_of, validate_job
@@ -16,13 +16,16 @@ from .options import Format, StartOptions, SunOption
 from .plan import plan_start
 from .text import to_text
 
-__all__ = ["Format", "Start", "StartOptions", "SunOption", "init"]
+__all__ = ["STDOUT", "Format", "Start", "StartOptions", "SunOption", "init", "to_text"]
+
+STDOUT = Path("-")
 
 
 def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = False) -> Start:
     """Write a first job for a scene; the job, and the folder of its images, have the name of the file.
 
     Args:
+        job_file: the file; STDOUT: nothing is written, and `to_text` gives the job for the current folder.
         force: replace an existing file.
 
     Raises:
@@ -32,11 +35,12 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
     """
     if problem := mistaken(scene, "scene"):
         raise SceneError(f"{scene}: {problem}")
-    if os.path.exists(job_file) and not force:
-        raise OutputError(f"{job_file}: is there already; give another name with --output, or --force to replace it")
+    if job_file != STDOUT:
+        require_new(job_file, force=force)
     if not os.path.exists(scene):
         raise SceneError(f"{scene}: no such scene file")
-    start = plan_start(scene, job_file.stem, options)
+    start = plan_start(scene, scene.stem if job_file == STDOUT else job_file.stem, options)
     validate_job(table_of(start), scene)
-    write_bytes(job_file, to_text(start, job_file).encode("utf-8"))
+    if job_file != STDOUT:
+        write_bytes(job_file, to_text(start, job_file).encode("utf-8"))
     return start

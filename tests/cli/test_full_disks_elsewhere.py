@@ -12,22 +12,22 @@ WALK = tiny.WALK | {"resolution": [60, 45]}
 FULL = "No space left on device"
 # The file that a command writes, and the command without its array or job.
 FILES = {
-    "movie.mp4": ["assemble", "OUT", "--walk", "-o"],
-    "movie.webm": ["assemble", "OUT", "--walk", "-o"],
-    "movie.mov": ["assemble", "OUT", "--walk", "-o"],
-    "movie.gif": ["assemble", "OUT", "--walk", "-o"],
-    "movie.webp": ["assemble", "OUT", "--walk", "-o"],
-    "sheet.png": ["sheet", "OUT", "-o"],
-    "sheet.exr": ["sheet", "OUT", "-o"],
+    "movie.mp4": ["assemble", "OUT", "--walk", "--force", "-o"],
+    "movie.webm": ["assemble", "OUT", "--walk", "--force", "-o"],
+    "movie.mov": ["assemble", "OUT", "--walk", "--force", "-o"],
+    "movie.gif": ["assemble", "OUT", "--walk", "--force", "-o"],
+    "movie.webp": ["assemble", "OUT", "--walk", "--force", "-o"],
+    "sheet.png": ["sheet", "OUT", "--force", "-o"],
+    "sheet.exr": ["sheet", "OUT", "--force", "-o"],
     "job.toml": ["init", "SCENE", "--force", "-o"],
 }
 FOLDERS = {
-    "frames": ["assemble", "OUT", "--walk", "-o", "frames/f.####.png"],
+    "frames": ["assemble", "OUT", "--walk", "--force", "-o", "frames/f.####.png"],
     "nerf": ["export", "OUT", "-f", "nerfstudio", "--force", "-o", "nerf"],
     "colmap": ["export", "OUT", "-f", "colmap", "--force", "-o", "colmap"],
     "cinema.cdb": ["export", "OUT", "-f", "cinema", "--force", "-o", "cinema"],
-    "page": ["view", "OUT", "--cache", "CACHE", "--export", "page"],
-    "cache": ["view", "OUT", "--cache", "cache", "--export", "PAGE"],
+    "page": ["view", "OUT", "--force", "--cache", "CACHE", "--export", "page"],
+    "cache": ["view", "OUT", "--force", "--cache", "cache", "--export", "PAGE"],
 }
 
 

@@ -85,7 +85,7 @@ def test_a_name_that_cannot_be_shown(tmp_path):
     [
         (["rendr"], "no such command rendr; did you mean render?"),
         (["render"], "Error: missing argument JOB\n"),
-        (["render", "--foo", "job.toml"], "Error: no such option --foo\n"),
+        (["render", "--xyzzy", "job.toml"], "Error: no such option --xyzzy\n"),
         (["render", "--thread", "2", "job.toml"], "Error: no such option --thread; did you mean --threads?\n"),
         (["render", "job.toml", "--threads"], "Error: --threads: expected a value, got none\n"),
         (["render", "--restart=1", "job.toml"], "Error: --restart: expected no value\n"),

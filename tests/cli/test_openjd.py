@@ -82,7 +82,7 @@ def test_files_elsewhere_are_named_from_the_root(tmp_path, capsys):
         (["--chunk", "7"], 2, "expected at most 6, the number of camera positions, got 7"),
         (["-o", "walk.txt"], 4, "walk.txt: expected a name that ends in .json, .yaml, .yml"),
         (["-o", "there.json/walk.json"], 4, "there.json: a file of that name is in the way of the folder"),
-        (["-o", "there.json"], 4, "there.json: is there already; --force replaces it"),
+        (["-o", "there.json"], 4, "there.json: is there already; give another name with --output, or --force to"),
     ],
 )
 def test_bad_options(arguments, code, message, tmp_path, capsys, monkeypatch):

@@ -2,16 +2,20 @@
 
 import os
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from framearray_cli.base.errors import OutputError
+from framearray_cli.base.forms.toml import STDIN
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS, counted
 
-from ..options import ArrayFolder, Json, Quiet, Strict, output_path, refuse_warnings
+from ..options import ArrayFolder, Force, Json, Quiet, Strict, output_path, refuse_warnings
 from ..results import AssembleResult
 from ..screen import Screen, err, print_result
+from ..streams import is_stdout, output_file
 from ..values import number
 
 PathFile = Annotated[
@@ -83,6 +87,7 @@ def assemble(
     view: View = "srgb",
     label: Label = False,
     strict: Strict = False,
+    force: Force = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -96,7 +101,8 @@ def assemble(
     kinds = [kind for kind, wanted in choices.items() if wanted or str(path_file) == kind]
     path_file = None if str(path_file) in choices else path_file  # ./walk is a file
     _refuse_conflicts(path_file, kinds, at, seconds)
-    with Screen(err, quiet=quiet) as screen:
+    movie = _movie_file(target, force=force) if is_stdout(target) else nullcontext(output_path(target))
+    with movie as file, Screen(err, quiet=quiet) as screen:
 
         def warn(warnings: Sequence[str]) -> None:
             if strict:
@@ -106,17 +112,28 @@ def assemble(
         made = run(
             array,
             path_file or Sweep(kind=kinds[0], at=tuple(at or ()), seconds=seconds),
-            output_path(target),
+            file,
             look=Look(exposure=exposure, view=find_view(view), label=label),
             fps=fps,
             positions="blend" if blend else None,
             progress=screen.counter("assembling", "frame"),
             warned=warn,
+            force=force,
         )
     rate = f"{float(made.fps):g} frames per second"
     result = AssembleResult(path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps))
     size = f"{counted(made.n_frames, 'frame')} from {counted(made.n_images, 'image')}"
-    print_result([f"{made.target}: {size}, {rate}"], result, quiet=quiet)
+    print_result([f"{made.target}: {size}, {rate}"], result, quiet=quiet or is_stdout(target))
+
+
+def _movie_file(target: str, *, force: bool) -> AbstractContextManager[Path]:
+    """Return the file of a movie for standard output, which must say its format."""
+    from framearray_cli.tools.movie.assemble import MOVIES
+
+    if Path(target).suffix.lower() not in MOVIES:
+        wanted = ", ".join(f"-{suffix}" for suffix in MOVIES)
+        raise OutputError(f"{target}: expected {wanted}, the format of a movie on standard output")
+    return output_file(Path(target), "", force=force)
 
 
 def _refuse_conflicts(
@@ -127,8 +144,10 @@ def _refuse_conflicts(
     if len(ways) != 1:
         found = " and ".join(ways) or "none of them"
         raise typer.BadParameter(f"expected a path file, --walk, --light or --diagonal; got {found}", param_hint="PATH")
-    if path_file and not path_file.suffix and len(path_file.parts) == 1 and not os.path.exists(path_file):
-        raise typer.BadParameter(f"expected a path file, walk, light or diagonal; got {path_file}", param_hint="PATH")
+    no_file = path_file and not path_file.suffix and len(path_file.parts) == 1 and not os.path.exists(path_file)
+    if no_file and path_file != STDIN:
+        found = f"got {path_file}, and there is no such file"
+        raise typer.BadParameter(f"expected a path file, walk, light or diagonal; {found}", param_hint="PATH")
     if path_file and seconds is not None:
         raise typer.BadParameter("a path file gives the lengths of its segments", param_hint="--seconds")
     if at and kinds in ([], ["diagonal"]):

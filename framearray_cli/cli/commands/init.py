@@ -10,7 +10,8 @@ from framearray_cli.base.units import counted
 
 from ..describe import init_result
 from ..options import Json, Quiet, output_path
-from ..screen import Screen, err, print_result
+from ..screen import Screen, err, out, print_result, say
+from ..streams import refuse_json
 from ..values import choice, whole
 from .init_values import Resolution, SunPlace, read_resolution, read_sun
 
@@ -77,9 +78,10 @@ def init(
 ) -> None:
     """Write a first job for a scene: camera, lights and exposure are found or chosen."""
     job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else output_path(target)
+    refuse_json(str(job_file))
     with Screen(err, quiet=quiet) as screen:
         screen.wait("exploring the scene")
-        from framearray_cli.starter import StartOptions, SunOption
+        from framearray_cli.starter import STDOUT, StartOptions, SunOption, to_text
         from framearray_cli.starter import init as run
 
         with screen.compiling():
@@ -95,6 +97,9 @@ def init(
             )
             start = run(scene, job_file, options, force=force)
         screen.say(start.about)
+    if job_file == STDOUT:
+        say(out, to_text(start, job_file).splitlines())
+        return
     images = start.camera.frames * start.light_frames
     size = f"{counted(start.camera.frames, 'camera position')} x {counted(start.light_frames, 'light position')}"
     size += f" = {counted(images, 'image')}"

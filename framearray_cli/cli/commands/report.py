@@ -11,7 +11,7 @@ from framearray_cli.render.messages import scene_lines
 
 from ..options import JobFile, Quiet, Threads, load_job
 from ..screen import Screen, err, print_result
-from ..values import number, whole
+from ..values import number
 
 if TYPE_CHECKING:
     from framearray_cli.report.case import Case
@@ -24,13 +24,11 @@ Folder = Annotated[
 ]
 Cameras = Annotated[
     list[str] | None,
-    typer.Option(
-        "--cameras", "--camera", parser=whole(0), help="Camera positions to look at: 5, 10-20x5, 50%.", metavar="PLACES"
-    ),
+    typer.Option("--cameras", "--camera", help="Camera positions to look at: 5, 10-20x5, 50%.", metavar="PLACES"),
 ]
 Lights = Annotated[
     list[str] | None,
-    typer.Option("--light", parser=whole(0), help="Light positions to look at: 0,last.", metavar="PLACES"),
+    typer.Option("--light", help="Light positions to look at: 0,last.", metavar="PLACES"),
 ]
 Vary = Annotated[
     list[str] | None,

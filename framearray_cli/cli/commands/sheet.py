@@ -6,9 +6,10 @@ import typer
 
 from framearray_cli.base.units import counted
 
-from ..options import ArrayFolder, At, Cameras, Exposure, Json, Light, Quiet, output_path
+from ..options import ArrayFolder, At, Cameras, Exposure, Force, Json, Light, Quiet, output_path
 from ..results import SheetResult
 from ..screen import Screen, err, print_result
+from ..streams import is_stdout, output_file
 from ..values import whole
 
 MOST_WIDTH = 20_000  # pixels; more is taken for a typing error
@@ -38,20 +39,23 @@ def sheet(
         str | None, typer.Option("--side", help="Axis from top to bottom; default: the first.", metavar="AXIS")
     ] = None,
     at: At = None,
+    force: Force = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:  # fmt: skip
     """Draw a contact sheet: cameras from left to right, light positions from top to bottom."""
     from framearray_cli.tools.sheet import make_sheet
 
-    with Screen(err, quiet=quiet) as screen:
+    file = output_path(target)
+    with output_file(file, ".png", force=force) as part, Screen(err, quiet=quiet) as screen:
         made = make_sheet(
-            array, output_path(target), cameras=cameras, light=light,
+            array, part, cameras=cameras, light=light,
             columns=columns, rows=rows, width=width, exposure=exposure, side=side, at=at or (),
             progress=screen.counter("drawing", "image"),
         )  # fmt: skip
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
     shown = f"{counted(len(made.cameras), 'camera position')} x {counted(len(made.lights), 'light position')}"
-    result = SheetResult(file=str(made.target), cameras=made.cameras, lights=made.lights, size=made.size)
-    print_result([f"{made.target}: {shown}, {made.size[0]} x {made.size[1]} pixels"], result, quiet=quiet)
+    result = SheetResult(file=str(file), cameras=made.cameras, lights=made.lights, size=made.size)
+    lines = [f"{file}: {shown}, {made.size[0]} x {made.size[1]} pixels"]
+    print_result(lines, result, quiet=quiet or is_stdout(target))

@@ -8,7 +8,7 @@ from framearray_cli.base.memory import available_cores
 from framearray_cli.base.signals import Stopped, cancel_alarm
 from framearray_cli.base.units import MOST_THREADS, agree, counted, size
 
-from ..options import ArrayFolder, Quiet, output_path
+from ..options import ArrayFolder, Force, Quiet, output_path
 from ..screen import Screen, err, print_result
 from ..values import THREADS_VARIABLE, whole
 
@@ -42,6 +42,7 @@ def view(
         typer.Option("--cache", help="Folder for prepared pictures; default: OUT/.view.", metavar="FOLDER"),
     ] = None,
     threads: Threads = None,
+    force: Force = False,
     quiet: Quiet = False,
 ) -> None:
     """Walk through a frame array in the browser."""
@@ -54,7 +55,7 @@ def view(
         if target is not None:
             screen.count("preparing", tiles.n_pictures, "picture")
             n_bytes, problems = write_page(
-                tiles, output_path(target, "--export"), threads=workers, progress=screen.advance
+                tiles, output_path(target, "--export"), threads=workers, progress=screen.advance, force=force
             )
             screen.say(_warning_lines(problems))
             screen.end()

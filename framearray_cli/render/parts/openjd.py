@@ -10,7 +10,7 @@ from typing import Any
 
 from framearray_cli.array.ranges import frames_text
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import write_bytes
+from framearray_cli.base.files import require_new, write_bytes
 from framearray_cli.base.units import MOST_THREADS, counted
 from framearray_cli.job.job import Job
 
@@ -142,6 +142,5 @@ def write_template(target: Path, made: dict[str, Any], *, force: bool) -> None:
     """
     if target.suffix.lower() not in SUFFIXES:
         raise OutputError(f"{target}: expected a name that ends in {', '.join(SUFFIXES)}")
-    if target.exists() and not force:
-        raise OutputError(f"{target}: is there already; --force replaces it")
+    require_new(target, force=force)
     write_bytes(target, (json.dumps(made, indent=2, ensure_ascii=False) + "\n").encode())

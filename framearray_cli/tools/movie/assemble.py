@@ -18,7 +18,7 @@ from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.array.present import REMEDY, list_present
 from framearray_cli.array.ranges import brief_frames_text
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import folder_for
+from framearray_cli.base.files import folder_for, require_new
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.units import agree, counted
 
@@ -27,7 +27,7 @@ from .animation import ANIMATIONS, open_animation, require_animation
 from .label import SMALLEST, typeface
 from .look import Look, screen_codes, shot_label
 from .pathfile import Mode, MoviePath, load_movie_path
-from .sequence import check_look, sequence_pattern, write_sequence
+from .sequence import check_earlier, check_look, sequence_pattern, write_sequence
 from .sweep import Sweep, sweep_path
 from .timeline import Shot, Timeline, array_problems, make_timeline
 from .video import VIDEOS, open_video, require_encoder
@@ -68,6 +68,8 @@ def assemble_movie(
     positions: Mode | None = None,
     progress: Progress | None = None,
     warned: Callable[[Sequence[str]], None] = lambda warnings: None,
+    force: bool = True,
+    dry_run: bool = False,
 ) -> AssembleResult:
     """Assemble a movie or an image sequence from a frame array; it appears whole or not at all.
 
@@ -81,6 +83,8 @@ def assemble_movie(
         positions: "nearest" or "blend"; None: as the path says at its top.
         progress: called after each frame.
         warned: called once, before the first frame, with what would make the movie useless; may raise an error.
+        force: replace an earlier movie, or an earlier sequence that is no longer.
+        dry_run: check everything, and write nothing.
 
     Raises:
         JobError: the path is broken, or asks for places that the array lacks.
@@ -88,36 +92,53 @@ def assemble_movie(
         MissingExtraError: a movie needs PyAV, which is not installed, or an encoder or typeface is missing.
     """
     manifest = read_manifest(out)
+    movie, line = _plan(path, manifest, fps, positions)
+    pictures = Pictures(manifest)
+    if look.label:
+        typeface(SMALLEST)
+    is_movie = target.suffix.lower() in MOVIES
+    if not is_movie:
+        target = sequence_pattern(target, _own_suffix(manifest), MOVIES)
+        check_look(target, look)
+    _check_target(target, len(line.shots), force=force)
+    _check_images(pictures, line)
+    levels = picture_warnings(pictures, line, look) if is_movie or format_name(target) in FOR_SCREENS else ()
+    warned([*path_warnings(movie, line), *levels])
+    write = _write_movie if is_movie else write_sequence
+    if not dry_run:
+        write(pictures, line, target, look, progress or (lambda done, total: None))
+    return AssembleResult(
+        target=target if is_movie else target.parent,
+        n_frames=len(line.shots),
+        n_images=len(set(line.shots)),
+        fps=line.fps,
+    )
+
+
+def _plan(
+    path: Path | Sweep, manifest: Manifest, fps: float | None, positions: Mode | None
+) -> tuple[MoviePath, Timeline]:
+    """Read the path, and find what each frame shows."""
     if isinstance(path, Sweep):
         movie = sweep_path(path, manifest)
     else:
         movie = load_movie_path(path, partial(array_problems, manifest=manifest))
     movie = _override(movie, fps, positions)
-    line = make_timeline(f"--{path.kind}" if isinstance(path, Sweep) else path, movie, manifest)
-    pictures = Pictures(manifest)
-    if look.label:
-        typeface(SMALLEST)
-    report = progress or (lambda done, total: None)
-    if target.suffix.lower() in MOVIES:
-        if target.suffix.lower() in VIDEOS:
-            require_encoder(target.suffix.lower())
-        else:
-            require_animation(target.suffix.lower())
-        _check_images(pictures, line)
-        warned([*path_warnings(movie, line), *picture_warnings(pictures, line, look)])
-        _write_movie(pictures, line, target, look, report)
+    return movie, make_timeline(f"--{path.kind}" if isinstance(path, Sweep) else path, movie, manifest)
+
+
+def _check_target(target: Path, n_frames: int, *, force: bool) -> None:
+    """Refuse what is there already, and formats that cannot be written here."""
+    suffix = target.suffix.lower()
+    if suffix not in MOVIES:
+        check_earlier(target, n_frames, force=force)
+        require_writer(format_name(target))  # type: ignore[arg-type]  # checked by sequence_pattern
+        return
+    require_new(target, force=force)
+    if suffix in VIDEOS:
+        require_encoder(suffix)
     else:
-        pattern = sequence_pattern(target, _own_suffix(manifest), MOVIES)
-        check_look(pattern, look)
-        require_writer(format_name(pattern))  # type: ignore[arg-type]  # checked by sequence_pattern
-        _check_images(pictures, line)
-        for_screens = format_name(pattern) in FOR_SCREENS
-        levels = picture_warnings(pictures, line, look) if for_screens else ()
-        warned([*path_warnings(movie, line), *levels])
-        write_sequence(pictures, line, pattern, look, report)
-        target = pattern.parent
-    n_images = len(set(line.shots))
-    return AssembleResult(target=target, n_frames=len(line.shots), n_images=n_images, fps=line.fps)
+        require_animation(suffix)
 
 
 def _override(movie: MoviePath, fps: float | None, positions: Mode | None) -> MoviePath:

@@ -69,11 +69,9 @@ def write_sequence(pictures: Pictures, line: Timeline, pattern: Path, look: Look
     """Write all frames into a temporary folder inside the target folder, then move them out of it.
 
     Raises:
-        OutputError: the system refuses to write, or a longer earlier sequence is in the target folder.
+        OutputError: the system refuses to write.
     """
-    before, digits, after = re.split("(#+)", pattern.name)
-    names = [f"{before}{k:0{len(digits)}d}{after}" for k in range(len(line.shots))]
-    _check_leftovers(pattern.parent, before, after, set(names))
+    before, names = pattern.name.partition("#")[0], _names(pattern, len(line.shots))
     try:
         with folder_for(pattern.parent), temporary_folder(pattern.parent, before) as part:
             last: tuple[Shot, Relight, Path] | None = None
@@ -89,15 +87,36 @@ def write_sequence(pictures: Pictures, line: Timeline, pattern: Path, look: Look
         raise OutputError(f"{pattern}: cannot be written: {reason(error)}") from error
 
 
-def _check_leftovers(folder: Path, before: str, after: str, names: set[str]) -> None:
-    """Refuse a folder where frames of an earlier, longer sequence would follow the last frame of this one."""
+def _names(pattern: Path, n: int) -> list[str]:
+    """Name the files of n frames."""
+    before, digits, after = re.split("(#+)", pattern.name)
+    return [f"{before}{k:0{len(digits)}d}{after}" for k in range(n)]
+
+
+def check_earlier(pattern: Path, n: int, *, force: bool) -> None:
+    """Refuse a folder that holds an earlier sequence of that name.
+
+    Args:
+        n: frames of the sequence to write.
+        force: replace an earlier sequence; but not one whose last frames would follow the last one of this.
+
+    Raises:
+        OutputError: there is one.
+    """
+    folder, names = pattern.parent, set(_names(pattern, n))
+    before, _, after = re.split("(#+)", pattern.name)
     number = re.compile(re.escape(before) + r"\d+" + re.escape(after))
     entries = sorted(entry.name for entry in folder.iterdir()) if os.path.isdir(folder) else []
-    left = [name for name in entries if number.fullmatch(name) and name not in names]
-    if left:
+    found = [name for name in entries if number.fullmatch(name)]
+    if left := [name for name in found if name not in names]:
         kept = f"{counted(len(left), 'file')} that this one would not replace"
         raise OutputError(
             f"{folder / left[0]}: belongs to an earlier sequence, with {kept}; delete them or choose another name"
+        )
+    if found and not force:
+        raise OutputError(
+            f"{folder / found[0]}: is there already, with {len(found)} files of an earlier sequence; give another name "
+            "with --output, or --force to replace them"
         )
 
 

@@ -13,8 +13,11 @@ from .page import page_files
 from .tiles import INDEX_FILE, TILES_FOLDER, Tiles
 
 
-def check_target(target: Path) -> None:
+def check_target(target: Path, *, force: bool = True) -> None:
     """Refuse a folder that holds anything but an earlier export of the page.
+
+    Args:
+        force: accept an earlier export.
 
     Raises:
         OutputError: the folder holds other files, or cannot be read.
@@ -28,6 +31,8 @@ def check_target(target: Path) -> None:
     if strangers or (found and INDEX_FILE not in found):
         name = (strangers or found)[0]
         raise OutputError(f"{target}: holds other files, {name!r} for one; choose a new or empty folder")
+    if found and not force:
+        raise OutputError(f"{target}: an earlier export is there; choose another folder, or give --force to replace it")
 
 
 def export_page(tiles: Tiles, target: Path) -> int:

@@ -82,9 +82,12 @@ def show_page(
 
 
 def write_page(
-    tiles: Tiles, target: Path, *, threads: int, progress: Callable[[int], None]
+    tiles: Tiles, target: Path, *, threads: int, progress: Callable[[int], None], force: bool = True
 ) -> tuple[int, list[OutputError]]:
     """Prepare all tiles, and export the page.
+
+    Args:
+        force: replace an earlier export.
 
     Returns:
         The number of bytes written, and the errors of damaged images.
@@ -93,7 +96,7 @@ def write_page(
         OutputError: the target holds other files or cannot be written.
     """
     target = Path(os.path.realpath(target))  # "." has no name for a folder beside it
-    check_target(target)
+    check_target(target, force=force)
     problems = prepare_all(tiles, threads, progress)
     return export_page(tiles, target), problems
 

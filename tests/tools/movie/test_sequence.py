@@ -209,6 +209,7 @@ def test_ctrl_c_in_a_process_of_its_own(tmp_path: Path) -> None:
     (tmp_path / "m.mp4").write_bytes(b"an earlier movie")
     path = path_file(tmp_path, "[[segments]]\nframes = 200\ncamera = [0, 1]\nloops = 500\n")
     command = [sys.executable, "-m", "framearray_cli", "assemble", str(array.directory), str(path), "-o", "m.mp4", "-q"]
+    command.append("--force")
     package = ROOT
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(package), os.environ.get("PYTHONPATH", "")])}
     process = subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE)
