@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
+from framearray_cli.base.units import FARTHEST
 
 from .model import LightKeys
 from .rays import Probe
@@ -58,7 +59,7 @@ def lit_shares(probe: Probe, eyes: Float64, targets: Float64, up_dir: Float64, l
     )
     lit = np.zeros(len(points), bool)
     for source in lights[:MOST_LIT_BY]:
-        vector = np.array(source.vectors[len(source.vectors) // 2])
+        vector = np.clip(source.vectors[len(source.vectors) // 2], -FARTHEST, FARTHEST)
         far = 4 * float(np.linalg.norm(np.ptp(probe.scene.corners, axis=(0, 1))))
         end = vector - probe.scene.centre if source.kind == "point" else points - far * vector
         lit |= ~probe.blocked(points, end)
