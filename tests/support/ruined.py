@@ -29,13 +29,16 @@ def outwards(low: Any, high: Any) -> Any:
     return faces
 
 
-def room(*, material: Material = WHITE, size: float = 1.0, walls: bool = True, wall: bool = False) -> Scene:
+def room(
+    *, material: Material = WHITE, size: float = 1.0, walls: bool = True, wall: bool = False, crack: bool = False
+) -> Scene:
     """A closed room that shows its fronts inside, and a solid in it that shows them outside.
 
     Args:
         size: what all lengths are multiplied with.
         walls: False: only the floor, and the solid.
         wall: a thin wall across the room, at z = 0.5.
+        crack: a slot in the ceiling, 2 cm wide.
     """
     inside = outwards(*ROOM)[:, ::-1]
     if not walls:
@@ -43,6 +46,9 @@ def room(*, material: Material = WHITE, size: float = 1.0, walls: bool = True, w
     parts = [inside, outwards(*SOLID)]
     if wall:
         parts.append(outwards((-2, 0, 0.45), (2, 2.5, 0.5)))
+    if crack:
+        parts[0] = inside[(inside[..., 1] < 2.4).any(axis=1)]
+        parts += [outwards((-2, 2.5, -2), (-1.2, 2.52, 2)), outwards((-1.18, 2.5, -2), (2, 2.52, 2))]
     part = Part(material=0, corners=size * np.concatenate(parts))
     return build_scene(Meshes(parts=(part,), materials=(material,), textures=(), dropped={}, notes=()), {})
 
@@ -217,6 +223,20 @@ CASES = {
         output={"format": "exr"},
         light=lit(lamp(*GOOD_LAMP) | {"group": "a"}, lamp((9, 9, 9)) | {"group": "b"}),
     ),
+    "a lamp above a crack": case(
+        "black; light reaches only",
+        "light.sources[0]: the lamp at [0, 6, 0] is outside the scene",
+        scene={"crack": True},
+        light=lit(lamp((0, 6, 0), (0.1, 6, 0), intensity=4.0)),
+    ),
+    "a lamp in millimetres": case(
+        "the lamp at [-800, 2200, 400] is outside the scene",
+        light=lit(lamp((-800, 2200, 400), (800, 2200, 400))),
+    ),
+    "an eye in millimetres": case(
+        "the camera: the scene is a speck", "unit", camera=camera(((1500, 1500, 1700), (0, 800, -1000)), frames=1)
+    ),
+    "a sky in 8-bit codes": case("all pictures", "clipped", scene=OPEN, sky=[135.0, 206.0, 235.0]),
     "a sun outside a closed room": case("reaches nothing", "surfaces block it", light=lit(sun((0.2, -1, 0.1)))),
     "a sun from below": case("leads upwards", "turn it round, to [0, -1, 0]", scene=OPEN, light=lit(sun((0, 1, 0)))),
     "all sources off": case(

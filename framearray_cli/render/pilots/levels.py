@@ -6,11 +6,13 @@ import numpy as np
 
 from framearray_cli.array.images.images import FOR_SCREENS
 from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.job.job import Job
 
 from ..prepare import Prepared
 from .positions import lights_text
 from .rays import Flags
+from .reached import scarce_light
 from .seen import bounds, eyes_text
 from .views import Views
 
@@ -30,7 +32,7 @@ MIDDLE = 0.2
 MUCH_SKY, BRIGHT_SKY, OUTSHINES = 0.5, 4.0, 100.0
 
 
-def level_warnings(views: Views, prepared: Prepared, counted: Flags, named: Flags) -> Iterator[str]:
+def level_warnings(views: Views, setup: FrameSetup, prepared: Prepared, counted: Flags, named: Flags) -> Iterator[str]:
     """Find pictures that are clipped or black.
 
     Args:
@@ -52,15 +54,21 @@ def level_warnings(views: Views, prepared: Prepared, counted: Flags, named: Flag
             f"{place}: {float(clipped[bad].mean()):.0%} of the pixels that see surfaces are clipped: the middle one "
             f"has {float(np.median(bright)):.3g}, and a screen shows up to 1; {_advice(job, float(np.median(bright)))}"
         )
+    yield from _dark_warnings(views, setup, prepared, values, counted, named)
+
+
+def _dark_warnings(
+    views: Views, setup: FrameSetup, prepared: Prepared, values: Float32, counted: Flags, named: Flags
+) -> Iterator[str]:
+    """Find pictures that are black; see `level_warnings`."""
     lit = (views.positions.bright | (not views.positions.bright.any())) & ~named
     dark = _shares(values < DARK, views)
     bad = (dark > MOSTLY_DARK) & counted[:, None] & lit
     if place := _place(bad, counted, views, prepared, lit):
         black = values[np.broadcast_to(bad[:, None] & views.surface[..., None], values.shape)]
-        yield (
-            f"{place}: {float(dark[bad].mean()):.0%} of the pixels that see surfaces are black; "
-            f"{_dark_reason(views, prepared, float(np.percentile(black, 90)))}"
-        )
+        level = float(np.percentile(black, 90))
+        reason = scarce_light(views, setup, prepared, bad) or _dark_reason(views, prepared, level)
+        yield f"{place}: {float(dark[bad].mean()):.0%} of the pixels that see surfaces are black; {reason}"
 
 
 def _exposed(views: Views, job: Job) -> Float32:

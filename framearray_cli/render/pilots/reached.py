@@ -13,6 +13,9 @@ from .rays import Flags, is_inside_solid
 from .seen import bounds, vector
 from .views import Views
 
+# Share of what is seen in black pictures, below which light comes through cracks; a lamp that is too weak lights more.
+SCARCE = 0.1
+
 
 def light_warnings(views: Views, setup: FrameSetup, prepared: Prepared) -> Iterator[str]:
     """Find sources that light nothing at any of their positions, and lamps that pass through a solid."""
@@ -42,6 +45,23 @@ def dark_light_positions(views: Views) -> Flags:
     by_plane = np.asarray(views.lit.any(axis=(0, 1)))
     lit = np.array([by_plane[list(planes)].any() for planes in views.positions.together])
     return np.asarray(views.positions.bright & ~lit)
+
+
+def scarce_light(views: Views, setup: FrameSetup, prepared: Prepared, bad: Flags) -> str:
+    """Say why light comes only through cracks to some pictures, (E, K); "" if it does not."""
+    steps = [k for k in np.flatnonzero(bad.any(axis=0)) if views.positions.bright[k]]
+    seen = np.asarray(views.reflects[bad.any(axis=1)])
+    if not steps or not seen.any():
+        return ""
+    planes = sorted({p for k in steps for p in views.positions.together[k]})
+    lit = np.asarray(views.lit[bad.any(axis=1)][..., planes].any(axis=-1))
+    share = float(lit[seen].mean())
+    if share > SCARCE:
+        return ""
+    on = setup.lights.lit[:, [views.positions.planes[p] for p in planes]] > 0
+    s, p = (int(number) for number in np.argwhere(on)[0])
+    reason = _reason(setup, prepared, s, views.positions.planes[planes[p]])
+    return f"light reaches only {share:.1%} of what is seen: {_name(prepared, s)}: {reason}"
 
 
 def _reached(views: Views) -> Flags:

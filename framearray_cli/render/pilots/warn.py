@@ -44,4 +44,4 @@ def _warnings(views: Views, prepared: Prepared, setup: FrameSetup) -> Iterator[s
     lights = list(light_warnings(views, setup, prepared))
     yield from lights
     named = dark_light_positions(views) & bool(lights)
-    yield from level_warnings(views, prepared, ~(empty | buried), named)
+    yield from level_warnings(views, setup, prepared, ~(empty | buried), named)
