@@ -1,37 +1,37 @@
 """Estimate memory, disk space and time of a job without rendering it: `framearray check`."""
 
 import math
-import tempfile
 import time
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 
 from framearray_cli.array.folder import Identity, conflict_text, differences, free_space, read_array
 from framearray_cli.base.memory import free_memory, resident_memory
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.threads import TracePool
-from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.kernels.clock import compile_clock
-from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 
 from .automatic.choose import AutoSettings, require_least_memory, resolve_auto
+from .few_lights import all_lights, few_prepared
 from .identity import identity_of
 from .memory import ambient_memory, light_blocks, mirror_share, window_memory
+from .pace import Cost, Work, block_work, hit_cost, pixel_cost, total_work
 from .pilots.warn import find_warnings
-from .prepare import Prepared, image_ambient, open_embree, plan_work, prepare
+from .prepare import Prepared, open_embree, plan_work, prepare
+from .progress import RenderEvents
 from .target.pilot import Target, allot_hits
-from .writer import ArrayWriter, array_target
+from .trial import Trial, run_trial, writing_cost
 
-# Rays of a probe, about, which take one or two seconds.
-PROBE_RAYS = 12_000_000
+# Rays of a trial, about, which take one or two seconds.
+TRIAL_RAYS = 12_000_000
 # More pixels per frame add no information; with fewer, threads and batches of hits are less busy than in a render.
 MOST_PIXELS, FEWEST_PIXELS = 12_000, 1_000
-# Share of the pixels for a first probe, which compiles kernels and shows how file sizes grow with image sizes.
+# Share of the pixels for a first trial, which compiles kernels and shows how file sizes grow with image sizes.
 FIRST_SHARE = 0.25
+# Light positions that stand for all, at most about: of more, each costs what these cost.
+MOST_LIGHTS = 36
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,53 +61,54 @@ class Estimate:
     warnings: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Probe:
-    """Measured cost of a few small frames.
-
-    Attributes:
-        pixels: per frame.
-        seconds: per native hit.
-        file_bytes: per frame, all its images and layers.
-        writing: seconds to only write a frame; measured only for a camera at rest.
-    """
-
-    pixels: int
-    seconds: float
-    file_bytes: float
-    writing: float
-
-
-def check(job: Job) -> Estimate:
+def check(job: Job, events: RenderEvents | None = None) -> Estimate:
     """Read the inputs of a job, and estimate its cost from a few small frames that are discarded.
+
+    Of many light positions it looks at a few only.
+
+    Args:
+        events: reported as they happen: what was prepared, resolved, loaded, planned and allotted.
 
     Raises:
         JobError, SceneError: the job cannot be rendered.
         OutputError: the output folder holds a manifest that cannot be read.
     """
-    started = time.perf_counter()
+    events, started = events or RenderEvents(), time.perf_counter()
     with compile_clock() as clock:
+
+        def now() -> float:
+            return time.perf_counter() - started - clock.seconds
+
         prepared = prepare(job)
+        events.prepared(prepared)
         require_least_memory(prepared)
         with open_embree(prepared) as embree:
             prepared, settings = resolve_auto(prepared, embree)
+            if settings:
+                events.resolved(settings)
             identity = identity_of(prepared)
-            setup, ambient = plan_work(prepared, embree)
-            pilots = find_warnings(prepared, setup, ambient)
-            setup, target = allot_hits(prepared, setup, ambient)
-            before_frames = time.perf_counter() - started - clock.seconds
-            pixels = _probe_pixels(setup)
-            first, second = (_probe(prepared, setup, ambient, int(p)) for p in (FIRST_SHARE * pixels, pixels))
+            few, before = few_prepared(prepared, MOST_LIGHTS), now()
+            setup, ambient = plan_work(few, embree)
+            ambient_seconds = now() - before
+            events.planned(ambient)
+            pilots = find_warnings(prepared, *all_lights(prepared, MOST_LIGHTS, setup, ambient))
+            before_target = now()
+            setup, target = allot_hits(few, setup, ambient)
+            if target:
+                events.allotted(target)
+            target_seconds = now() - before_target
+            pixels = _trial_pixels(setup)
+            first, second = (run_trial(few, setup, ambient, int(p)) for p in (FIRST_SHARE * pixels, pixels))
             mirrors = mirror_share(setup)
             blocks = light_blocks(prepared, mirrors, per_pixel=setup.per_pixel)
             resident, available = resident_memory(), free_memory()
-    scale = setup.n_pixels / second.pixels
     largest = max(len(block) for block in blocks)
     more = max(window_memory(prepared, largest, mirrors, setup.per_pixel), ambient_memory(prepared))
-    disk = int(_frame_bytes(first, second, setup.n_pixels) * prepared.n_cameras)
+    disk = int(_frame_bytes(first, second, setup.n_pixels, prepared.n_lights) * prepared.n_cameras)
     free = free_space(job.output.directory)
-    hits = float(setup.per_pixel.sum()) * setup.n_pixels
-    copies = prepared.n_cameras - setup.n_frames  # frames of a camera at rest, which are only written
+    whole, _ = all_lights(prepared, MOST_LIGHTS, setup, ambient)
+    by_lights = prepared.n_lights / few.n_lights
+    seconds = before + (ambient_seconds + target_seconds) * by_lights
     return Estimate(
         prepared=prepared,
         settings=settings,
@@ -117,10 +118,33 @@ def check(job: Job) -> Estimate:
         available=resident + available,
         disk=disk,
         free=free,
-        seconds=before_frames + second.seconds * hits * _repeats(setup, len(blocks)) + second.writing * scale * copies,
+        seconds=seconds + _frame_seconds(prepared, setup, whole, second, blocks),
         blocks=len(blocks),
         warnings=(*pilots, *_warnings(job, identity, memory_lacks=more > available, disk_lacks=disk > free)),
     )
+
+
+def _frame_seconds(prepared: Prepared, few: FrameSetup, whole: FrameSetup, trial: Trial, blocks: list[range]) -> float:
+    """Return the expected seconds of all frames, at all light positions.
+
+    Args:
+        few: for the light positions of the trial; `whole`: for all.
+    """
+    n, largest = few.lights.n_lights, max(len(block) for block in blocks)
+    computed = largest if whole.shadow_step == 1 else whole.lights.n_lights  # shadow steps compute all in every block
+    cost = trial.cost
+    each = Work(
+        hits=cost.each.hits * hit_cost(few, computed) / hit_cost(few, n),
+        planes=cost.each.planes
+        * few.n_pixels
+        / trial.pixels
+        * pixel_cost(few, largest)
+        / pixel_cost(few, len(few.kept)),
+        images=writing_cost(prepared, trial.image),
+    )
+    cameras = range(prepared.n_cameras)
+    work = total_work(block_work(whole.for_lights(block), cameras, still=prepared.still) for block in blocks)
+    return Cost(each=each, busy=cost.busy).seconds(work)
 
 
 def _warnings(job: Job, identity: Identity, *, memory_lacks: bool, disk_lacks: bool) -> tuple[str, ...]:
@@ -141,77 +165,17 @@ def _rays_of_a_hit(setup: FrameSetup) -> int:
     return 1 + setup.obscurance.n_rays + (4 if setup.balance else 2) * setup.n_r
 
 
-def _repeats(setup: FrameSetup, blocks: int) -> float:
-    """Return how much longer a render in blocks takes: each finds its hits again."""
-    again = _rays_of_a_hit(setup)
-    return 1 + (blocks - 1) * again / (again + setup.lights.n_lights)
-
-
-def _probe_pixels(setup: FrameSetup) -> int:
-    """Return the pixels per frame of the second probe."""
+def _trial_pixels(setup: FrameSetup) -> int:
+    """Return the pixels per frame of the second trial."""
     rays = _rays_of_a_hit(setup) + setup.lights.n_lights
     hits = float(np.mean(setup.per_pixel)) * min(2 * setup.n_r + 2, setup.n_frames)
-    return int(min(max(PROBE_RAYS / (rays * hits), FEWEST_PIXELS), MOST_PIXELS, setup.n_pixels))
+    return int(min(max(TRIAL_RAYS / (rays * hits), FEWEST_PIXELS), MOST_PIXELS, setup.n_pixels))
 
 
-def _small(setup: FrameSetup, pixels: int) -> FrameSetup:
-    """Return a few frames from the middle of the path, with about that many pixels each."""
-    n = min(2 * setup.n_r + 2, setup.n_frames)
-    first = (setup.n_frames - n) // 2
-    cams, span = setup.cams, slice(first, first + n)
-    shrink = min(math.sqrt(pixels / setup.n_pixels), 1.0)
-    width, height = (max(1, round(side * shrink)) for side in (cams.width, cams.height))
-    return replace(
-        setup,
-        cams=cams._replace(
-            position=cams.position[span],
-            right=cams.right[span],
-            up=cams.up[span],
-            forward=cams.forward[span],
-            focal=cams.focal * height / cams.height,
-            width=width,
-            height=height,
-        ),
-        per_pixel=setup.per_pixel[span],
-        allotment=None,  # of another resolution; `per_pixel` has its means
-    )
-
-
-def _probe(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: int) -> _Probe:
-    """Render and write small frames."""
-    small = _small(setup, pixels)
-    n, writing = small.n_frames, 0.0
-    with TracePool(small, prepared.threads) as pool, tempfile.TemporaryDirectory() as name:
-        started = time.perf_counter()
-        with _writer(prepared, small, Path(name), pool.threads) as writer:
-            window = Window(small, image_ambient(ambient, prepared.lights), pool)
-            for j in ready_frames(window, small, range(n), pool):
-                composed = window.compose(j, writer.block())
-                writer.write(composed, range(j, j + 1))
-            writer.finish()
-        seconds = time.perf_counter() - started
-        file_bytes = sum(file.stat().st_size for file in Path(name).iterdir())
-        if prepared.still:
-            started = time.perf_counter()
-            with _writer(prepared, small, Path(name), pool.threads) as writer:
-                writer.write(composed, range(1))
-            writing = time.perf_counter() - started
-    return _Probe(
-        pixels=small.n_pixels,
-        seconds=seconds / (float(np.sum(small.per_pixel)) * small.n_pixels),
-        file_bytes=file_bytes / n,
-        writing=writing,
-    )
-
-
-def _writer(prepared: Prepared, small: FrameSetup, folder: Path, threads: int) -> ArrayWriter:
-    target = replace(array_target(prepared), directory=folder, resolution=(small.cams.width, small.cams.height))
-    return ArrayWriter(target, range(prepared.n_lights), threads)
-
-
-def _frame_bytes(first: _Probe, second: _Probe, pixels: int) -> float:
+def _frame_bytes(first: Trial, second: Trial, pixels: int, n_images: int) -> float:
     """Return bytes of a frame's files, a power of its pixels: larger images are smoother and compress better."""
+    n = [trial.image_bytes * n_images + trial.layer_bytes for trial in (first, second)]
     if first.pixels == second.pixels:
-        return second.file_bytes * pixels / second.pixels
-    power = math.log(second.file_bytes / first.file_bytes) / math.log(second.pixels / first.pixels)
-    return float(second.file_bytes * (pixels / second.pixels) ** min(max(power, 0.5), 1.0))
+        return n[1] * pixels / second.pixels
+    power = math.log(n[1] / n[0]) / math.log(second.pixels / first.pixels)
+    return float(n[1] * (pixels / second.pixels) ** min(max(power, 0.5), 1.0))

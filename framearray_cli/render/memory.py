@@ -1,5 +1,7 @@
 """Memory that a job needs, and its blocks of light positions."""
 
+from bisect import bisect_left
+
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
@@ -114,10 +116,12 @@ def light_blocks(
         per_pixel: see `window_memory`.
     """
     n, limit = prepared.n_lights, memory_limit(prepared) if limit is None else limit
-    for count in range(1, n + 1):
-        size = -(-n // count)
-        if window_memory(prepared, size, mirror_share, per_pixel) <= limit:
-            break
+
+    def fits(count: int) -> bool:
+        return window_memory(prepared, -(-n // count), mirror_share, per_pixel) <= limit
+
+    count = min(1 + bisect_left(range(1, n + 1), True, key=fits), n)
+    size = -(-n // count)
     return [range(first, min(first + size, n)) for first in range(0, n, size)]
 
 

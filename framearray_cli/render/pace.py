@@ -74,9 +74,13 @@ class Expected:
 
 def plane_cost(setup: FrameSetup, n_planes: int) -> float:
     """Return the approximate time of composing one of n planes, over that of finding a hit at their light positions."""
-    eyes, hits = 2 * setup.n_r + 1, (2 * setup.n_r + 1) * float(setup.per_pixel.mean())
-    pixel = LOOK_UP * eyes / n_planes + ADD * hits + STORE
-    return COMPOSING * pixel * setup.n_pixels / hit_cost(setup, n_planes)
+    return COMPOSING * pixel_cost(setup, n_planes) * setup.n_pixels / hit_cost(setup, n_planes)
+
+
+def pixel_cost(setup: FrameSetup, n_planes: int) -> float:
+    """Return the approximate nanoseconds of composing a pixel of one of n planes."""
+    eyes = 2 * setup.n_r + 1
+    return LOOK_UP * eyes / n_planes + ADD * eyes * float(setup.per_pixel.mean()) + STORE
 
 
 def hit_cost(setup: FrameSetup, n_lights: int) -> float:

@@ -34,7 +34,7 @@ from .progress import RenderEvents
 from .session import RenderSession, complete_manifest, open_session
 from .summary import Summary, summarize, with_summary
 from .target.pilot import allot_hits
-from .trial import Trial, eye_hits, load_kernels, writing_cost
+from .trial import AnyImage, eye_hits, load_kernels, writing_cost
 from .writer import ArrayTarget, ArrayWriter, FinishedFiles, array_target
 
 
@@ -65,7 +65,7 @@ def render(
         prepared, on_disk, directory = session.prepared, session.on_disk, job.output.directory
         if not session.wanted:
             return complete_manifest(session, time.perf_counter() - started)
-        setup, ambient, manifest, rays, trial = _plan(session, events, pilots=pilots)
+        setup, ambient, manifest, rays, sample = _plan(session, events, pilots=pilots)
         with session.folder.exclusive():
             write_manifest(directory, manifest)
         record_path = record_file(directory, session.run.cameras)
@@ -74,7 +74,7 @@ def render(
             try:
                 blocks = light_blocks(prepared, mirror_share(setup), per_pixel=setup.per_pixel)
                 parts = [(block, wanted) for block in blocks if (wanted := on_disk.missing(session.chosen, block))]
-                run.begin(setup, trial, parts)
+                run.begin(setup, sample, parts)
                 for block, wanted in parts:
                     _render_block(run, setup.for_lights(block), ambient, block, wanted)
             except BaseException:
@@ -89,14 +89,14 @@ def render(
 
 def _plan(
     session: RenderSession, events: RenderEvents, *, pilots: bool
-) -> tuple[FrameSetup, Ambient, Manifest, Counter[str], Trial]:
+) -> tuple[FrameSetup, Ambient, Manifest, Counter[str], AnyImage]:
     """Estimate the ambient light, render pilots, allot hits, and build the manifest; count the rays traced."""
     prepared, output = session.prepared, session.prepared.job.output
     for name in {output.format, "exr"} if output.layers else {output.format}:
         require_writer(name)
     setup, ambient = plan_work(prepared, session.embree)
     events.planned(ambient)
-    trial = load_kernels(prepared, setup, ambient)
+    sample = load_kernels(prepared, setup, ambient)
     events.loaded()
     warnings = _look(session, setup, ambient, events) if pilots else session.known_warnings()
     setup, target = allot_hits(prepared, setup, ambient)
@@ -106,7 +106,7 @@ def _plan(
         events.allotted(target)
         rays["target"] = target.rays
     manifest = initial_manifest(prepared, ambient, session.identity, session.settings, target, warnings)
-    return setup, ambient, manifest, rays, trial
+    return setup, ambient, manifest, rays, sample
 
 
 def _look(session: RenderSession, setup: FrameSetup, ambient: Ambient, events: RenderEvents) -> tuple[str, ...]:
@@ -155,14 +155,14 @@ class _Run:
         self._pool: TracePool | None = None
         self._pace: Pace | None = None
 
-    def begin(self, setup: FrameSetup, trial: Trial, parts: Sequence[tuple[range, Sequence[int]]]) -> None:
+    def begin(self, setup: FrameSetup, sample: AnyImage, parts: Sequence[tuple[range, Sequence[int]]]) -> None:
         """Begin to measure how long the frames take, at some blocks of light positions each."""
         prepared = self.prepared
         setups = [(setup.for_lights(block), wanted) for block, wanted in parts]
         work = total_work(block_work(part, wanted, still=prepared.still) for part, wanted in setups)
         expected = Expected(
             plane=plane_cost(setup, len(parts[0][0])) if parts else 0.0,
-            image=writing_cost(prepared, trial.image),
+            image=writing_cost(prepared, sample),
             busy=prepared.threads,
         )
         self._pace = Pace(work, expected)

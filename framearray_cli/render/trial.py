@@ -3,25 +3,30 @@
 import math
 import tempfile
 import time
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from framearray_cli.array.images.images import write_image
 from framearray_cli.base.arrays import Image
+from framearray_cli.base.errors import OutputError
 from framearray_cli.base.hashing import digest
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
-from framearray_cli.engine.inputs.lights import some_lights
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
-from framearray_cli.scene.paths.few import few_planes, lights_at
 
+from .few_lights import with_few_lights
 from .pace import Cost, Pace, block_work
 from .prepare import Prepared, image_ambient
-from .writer import ArrayWriter, array_target
+from .writer import ArrayWriter, array_target, image_format
+
+AnyImage: TypeAlias = Image | NDArray[np.float16]
 
 # Pixels per frame that suffice to have all kernels loaded or compiled, and to show how well pictures compress.
 FEW_PIXELS = 768
@@ -37,14 +42,15 @@ class Trial:
     Attributes:
         pixels: per frame.
         cost: per hit, plane and image of these frames.
-        file_bytes: per frame, all its images and layers.
+        image_bytes, layer_bytes: size of an image, and of the layers of a frame.
         image: (height, width, 3) one of them.
     """
 
     pixels: int
     cost: Cost
-    file_bytes: float
-    image: Image
+    image_bytes: float
+    layer_bytes: float
+    image: AnyImage
 
 
 def run_trial(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: int) -> Trial:
@@ -68,39 +74,16 @@ def run_trial(prepared: Prepared, setup: FrameSetup, ambient: Ambient, pixels: i
                 writer.write(composed, range(j, j + 1))
             writer.finish()
         cost = pace.cost()
-        file_bytes = sum(file.stat().st_size for file in folder.iterdir())
+        sizes = {file.name: file.stat().st_size for file in folder.iterdir()}
     assert cost is not None
-    return Trial(pixels=small.n_pixels, cost=cost, file_bytes=file_bytes / n, image=composed.images[0].copy())
-
-
-def with_few_lights(
-    prepared: Prepared, setup: FrameSetup, ambient: Ambient, most: int
-) -> tuple[Prepared, FrameSetup, Ambient]:
-    """Return the same job with fewer light positions; its frames cost less, and need the same kernels."""
-    few = few_prepared(prepared, most)
-    if few is prepared:
-        return prepared, setup, ambient
-    planes = chosen_planes(prepared, most)
-    return (
-        few,
-        replace(setup, lights=few.light_arrays, kept=range(len(planes)), planes=few.lights.planes),
-        replace(ambient, intensity=ambient.intensity[planes], standard_error=ambient.standard_error[planes]),
+    layers = sum(n_bytes for name, n_bytes in sizes.items() if name in {target.names.layers_file(c) for c in range(n)})
+    return Trial(
+        pixels=small.n_pixels,
+        cost=cost,
+        image_bytes=(sum(sizes.values()) - layers) / (n * len(planes)),
+        layer_bytes=layers / n,
+        image=composed.images[0].copy(),
     )
-
-
-def few_prepared(prepared: Prepared, most: int) -> Prepared:
-    """Return the same job with at most about `most` light positions; the job itself if it has no more."""
-    planes = chosen_planes(prepared, most)
-    if len(planes) == prepared.n_lights:
-        return prepared
-    return replace(
-        prepared, lights=lights_at(prepared.lights, planes), light_arrays=some_lights(prepared.light_arrays, planes)
-    )
-
-
-def chosen_planes(prepared: Prepared, most: int) -> list[int]:
-    """Return the image planes of `few_prepared`; shadow steps need light positions that follow one another."""
-    return few_planes(prepared.lights, most, consecutive=prepared.job.samples.shadow_step > 1)
 
 
 def eye_hits(setup: FrameSetup, c: int) -> float:
@@ -131,13 +114,26 @@ def small_frames(setup: FrameSetup, pixels: int) -> FrameSetup:
     )
 
 
-def load_kernels(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> Trial:
-    """Load the kernels of all frames of a job, or compile them, before the first frame."""
-    return run_trial(*with_few_lights(prepared, setup, ambient, 1), FEW_PIXELS)
+def load_kernels(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> AnyImage:
+    """Load the kernels of all frames of a job, or compile them, before the first frame; return a small image of it."""
+    few, setup, ambient = with_few_lights(prepared, setup, ambient, 1)
+    small, kind = small_frames(setup, FEW_PIXELS), image_format(prepared.job)
+    shape = (few.n_lights, small.cams.height, small.cams.width, 3)
+    images = np.empty(shape, np.float16 if kind.composes_halves else np.float32)
+    with TracePool(small, prepared.threads) as pool:
+        window = Window(small, image_ambient(ambient, few.lights), pool)
+        for j in ready_frames(window, small, range(small.n_frames), pool):
+            window.compose(j, images)
+    image: AnyImage = images[0]
+    return image
 
 
-def writing_cost(prepared: Prepared, image: Image) -> float:
-    """Return the processor seconds of writing an image, measured with one made of copies of a small one."""
+def writing_cost(prepared: Prepared, image: AnyImage) -> float:
+    """Return the processor seconds of writing an image, measured with one made of copies of a small one.
+
+    Returns:
+        0 if it cannot be written, on a full disk for instance.
+    """
     target, random = array_target(prepared), np.random.default_rng(0)
     width, height = target.resolution
     h, w, _ = image.shape
@@ -146,9 +142,10 @@ def writing_cost(prepared: Prepared, image: Image) -> float:
     copies *= random.uniform(1 - BY_COPY, 1 + BY_COPY, (down, 1, across, 1, 1)).astype(np.float32)
     copies *= random.uniform(1 - BY_PIXEL, 1 + BY_PIXEL, copies.shape).astype(np.float32)
     large = np.ascontiguousarray(copies.reshape(down * h, across * w, 3)[:height, :width].astype(image.dtype))
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
+    with suppress(OSError, OutputError), tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
         path = Path(name) / target.names.images[0].file(0)
         started = time.thread_time()
         write_image(path, large, target.format, target.attributes(0, 0), {})
         digest(path)
         return time.thread_time() - started
+    return 0.0
