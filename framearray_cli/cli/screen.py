@@ -82,6 +82,11 @@ class Screen:
             with suppress(OutputError):  # a full log is no reason to end a long render
                 say(self._console, lines)
 
+    def show(self, lines: Iterable[str]) -> None:
+        """Print a part of the result, in place of what is shown on a terminal."""
+        self._end_wait()
+        print_result(lines)
+
     def wait(self, what: str) -> None:
         """Show work of unknown length; only on a terminal."""
         if self._moving and self._bar is None:

@@ -5,8 +5,6 @@ from typing import TYPE_CHECKING
 
 from framearray_cli.base.units import agree, counted, duration, size
 
-from .progress import ambient_figures
-
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk
     from framearray_cli.job.job import Job
@@ -23,31 +21,28 @@ if TYPE_CHECKING:
 MOST_DAMAGED = 5  # files listed by name
 
 
-def estimate_lines(estimate: "Estimate") -> list[str]:
-    """Describe a job and its expected cost."""
-    prepared = estimate.prepared
-    n_c, n_l, job = prepared.n_cameras, prepared.n_lights, prepared.job
+def size_lines(job: "Job") -> list[str]:
+    """Describe the size of an array, before its scene is read."""
+    from .sizes import images_per_camera, rough_bytes, unlit_images
+
     width, height = job.camera.resolution
+    n_c, n_images = job.camera.frames, job.camera.frames * images_per_camera(job)
+    lights = counted(job.light.frames, "light position")
+    if job.light.groups:
+        groups = [f"{group.n:,} of {group.name}" for group in job.light.groups]
+        lights = f"({' + '.join(groups)} + {unlit_images(job)} of ambient light and background)"
+    shape = f"{counted(n_c, 'camera position')} x {lights} = {counted(n_images, 'image')} of {width} x {height}"
+    return [f"array: {shape}, some {size(rough_bytes(job))} of files"]
+
+
+def cost_lines(estimate: "Estimate") -> list[str]:
+    """Describe the expected cost of a job."""
+    folder = estimate.prepared.job.output.directory
     return [
-        *scene_lines(prepared),
-        *(settings_lines(estimate.settings) if estimate.settings else []),
-        *ambient_lines(ambient_figures(estimate.ambient)),
-        *(target_lines(estimate.target) if estimate.target else []),
-        f"array: {counted(n_c, 'camera position')} x {_light_count(prepared)} = {counted(n_c * n_l, 'image')} "
-        f"of {width} x {height}",
         f"memory: about {size(estimate.memory)}, {size(estimate.available)} free{_blocks(estimate.blocks)}",
-        f"disk: about {size(estimate.disk)} in {job.output.directory}, {size(estimate.free)} free",
+        f"disk: about {size(estimate.disk)} in {folder}, {size(estimate.free)} free",
         f"time: about {duration(estimate.seconds)} on this machine",
     ]
-
-
-def _light_count(prepared: "Prepared") -> str:
-    """Return the number of images per camera."""
-    lights = prepared.lights
-    if not lights.groups:
-        return counted(lights.n, "light position")
-    groups = [f"{len(group.positions):,} of {group.name}" for group in lights.groups]
-    return f"({' + '.join(groups)} + {len(lights.unlit)} of ambient light and background)"
 
 
 def _blocks(n: int) -> str:

@@ -67,3 +67,34 @@ def test_time(camera, tmp_path):
         taken = tomllib.loads((tmp_path / "out" / "manifest.toml").read_text())["summary"]["seconds"]
         ratios.append(foretold / taken)
     assert min(max(ratio, 1 / ratio) for ratio in ratios) < 1.5, f"{ratios}, load {os.getloadavg()}"
+
+
+def test_the_size_is_printed_before_the_scene_is_read(tmp_path):
+    """A number of light positions that is a typing error is seen at once, even if the scene cannot be read."""
+    file = job(tmp_path, light={"frames": 9999}, camera=WALK)
+    (tmp_path / "tiny.glb").unlink()
+    result = finish(start("check", file))
+    assert result.code == 3
+    found = re.fullmatch(
+        r"array: 8 \S+.* x 9,999 .* = 79,992 images of 200 x 150, some ([\d.]+) GiB of files\n", result.out
+    )
+    assert found and float(found.group(1)) == pytest.approx(79992 * 200 * 150 * 6 / 2**30, rel=0.1)
+
+
+def test_many_light_positions_cost_no_more_to_check_than_a_few(tmp_path):
+    few, many = (rays_of_check(tmp_path, n) for n in (36, 5000))
+    assert many < 1.5 * few
+
+
+def test_the_time_of_many_light_positions_is_that_of_all(tmp_path):
+    """Rays and images are nearly in proportion."""
+    few, many = (seconds(run("check", job(tmp_path, light={"frames": n}, camera=WALK))) for n in (36, 3600))
+    assert 30 < many / few < 300
+
+
+def rays_of_check(folder: Path, n: int) -> int:
+    """Return the number of shadow rays and walks that the ambient light of n light positions takes."""
+    from framearray_cli.job.read import read_job
+    from framearray_cli.render.estimate import check
+
+    return check(read_job(job(folder, light={"frames": n}, camera=WALK))).ambient.rays

@@ -1,10 +1,27 @@
 """`framearray check`."""
 
-from framearray_cli.render.messages import estimate_lines, warning_lines
+from typing import TYPE_CHECKING
+
+from framearray_cli.render.messages import (
+    ambient_lines,
+    cost_lines,
+    scene_lines,
+    settings_lines,
+    size_lines,
+    target_lines,
+    warning_lines,
+)
+from framearray_cli.render.progress import RenderEvents, ambient_figures
 
 from ..describe import check_result
 from ..options import JobFile, Json, Output, Sets, Strict, Threads, load_job, refuse_warnings
 from ..screen import Screen, err, print_result
+
+if TYPE_CHECKING:
+    from framearray_cli.engine.terms.ambient.estimate import Ambient
+    from framearray_cli.render.automatic.choose import AutoSettings
+    from framearray_cli.render.prepare import Prepared
+    from framearray_cli.render.target.pilot import Target
 
 
 def check(
@@ -18,12 +35,34 @@ def check(
     """Validate a job and its scene, and print its size, memory, disk and time, without rendering it."""
     job = load_job(job_file, threads, output, sets)
     with Screen(err) as screen:
-        screen.wait("reading the scene and rendering a few small frames")
+        screen.show(size_lines(job))  # before the scene is read: a wrong number is seen at once
+        screen.wait("reading the scene")
         from framearray_cli.render.estimate import check as run
 
         with screen.compiling():
-            estimate = run(job)
+            estimate = run(job, CheckingEvents(screen))
     warnings = [] if strict else warning_lines(estimate.warnings)
-    print_result([*estimate_lines(estimate), *warnings], check_result(estimate))
+    print_result([*cost_lines(estimate), *warnings], check_result(estimate))
     if strict:
         refuse_warnings(job_file, estimate.warnings)
+
+
+class CheckingEvents(RenderEvents):
+    """Print what is found as soon as it is."""
+
+    def __init__(self, screen: Screen) -> None:
+        self._screen = screen
+
+    def prepared(self, prepared: "Prepared") -> None:
+        self._screen.show(scene_lines(prepared))
+        self._screen.wait("estimating the ambient light")
+
+    def resolved(self, settings: "AutoSettings") -> None:
+        self._screen.show(settings_lines(settings))
+
+    def planned(self, ambient: "Ambient") -> None:
+        self._screen.show(ambient_lines(ambient_figures(ambient)))
+        self._screen.wait("rendering a few small frames")
+
+    def allotted(self, target: "Target") -> None:
+        self._screen.show(target_lines(target))
