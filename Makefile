@@ -8,7 +8,7 @@ OUT := out/kitchen-small
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-scaling bench-bias bench-ambient bench-report bench-view fuzz clean
+.PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-scaling bench-bias bench-ambient bench-report bench-progress bench-view fuzz clean
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -76,6 +76,9 @@ bench-ambient: $(VENV)/installed-bench ## Measure the ambient estimate against p
 
 bench-report: $(VENV)/installed-bench ## Measure speed against error of the three jobs, and write docs/measured/report-*.md
 	PYTHONPATH=tests $(BIN)/python -m bench report $(BENCH)
+
+bench-progress: $(VENV)/installed-bench ## Measure the time left that renders print and what first runs compile, for docs/measured/progress.md
+	PYTHONPATH=tests $(BIN)/python -m bench.progress $(BENCH)
 
 bench-view: $(VENV)/installed-bench ## Measure the page of `framearray view` in Chromium
 	PYTHONPATH=tests $(BIN)/python -m bench view $(BENCH)
