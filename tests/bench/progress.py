@@ -117,8 +117,8 @@ def _ratios(lines: list[tuple[float, float, str]]) -> list[dict[str, float]]:
     rows = []
     for share in (0.0, *SHARES):
         wall, cpu, left = next(row for row in told if row[0] >= started + share * (end - started))
-        past = next((w, c) for w, c, _ in lines if w >= min(max(wall - BEFORE, started), wall - 0.2))
-        rate = (cpu - past[1]) / max(wall - past[0], 1e-6)
+        before = max(i for i, row in enumerate(lines) if row[0] <= max(wall - BEFORE, started))
+        rate = (cpu - lines[before][1]) / max(wall - lines[before][0], 1e-6)
         rows.append({
             "at": (wall - started) / (end - started), "left": left, "true": end - wall, "ratio": left / (end - wall),
             "corrected": left * rate / max(all_cpu - cpu, 1e-6),
