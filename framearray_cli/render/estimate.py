@@ -107,8 +107,7 @@ def check(job: Job, events: RenderEvents | None = None) -> Estimate:
     disk = int(_frame_bytes(first, second, setup.n_pixels, prepared.n_lights) * prepared.n_cameras)
     free = free_space(job.output.directory)
     whole, _ = all_lights(prepared, MOST_LIGHTS, setup, ambient)
-    by_lights = prepared.n_lights / few.n_lights
-    seconds = before + (ambient_seconds + target_seconds) * by_lights
+    seconds = before + (ambient_seconds + target_seconds) * prepared.n_lights / few.n_lights
     return Estimate(
         prepared=prepared,
         settings=settings,

@@ -161,6 +161,8 @@ class Pace:
             fading = math.exp(-wall / MEMORY)
             self._recent = Clocks(fading * self._recent.wall + wall, fading * self._recent.cpu + cpu)
             self._seen, recent = now, self._recent
+            if done.hits >= self._work.hits and done.planes >= self._work.planes:  # what is left is writing
+                spent += Work(0, 0, max(now.cpu - self._last.cpu, 0.0))
         hit, plane, image = (max(s, 0.0) / d if d > 0 else None for s, d in zip(spent, done, strict=True))
         known = self._expected
         if known and hit is not None:
