@@ -143,9 +143,8 @@ def require_new(path: Path, *, force: bool) -> None:
     Raises:
         OutputError: something is in the way.
     """
-    if force:
-        require_file(path, "; give another name with --output")
-    elif os.path.lexists(path):
+    require_file(path, "; give another name with --output")
+    if not force and os.path.lexists(path):
         raise OutputError(f"{path}: is there already; give another name with --output, or --force to replace it")
 
 

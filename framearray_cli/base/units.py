@@ -68,6 +68,16 @@ def gibibytes(n_bytes: int) -> str:
     return f"{n_bytes / GIB:.{1 if n_bytes >= GIB else 2}f} GiB"
 
 
+_TYPED = ((2**40, "TiB"), (10**12, "TB"), (GIB, "GiB"), (10**9, "GB"), (MIB, "MiB"), (10**6, "MB"), (2**10, "KiB"))
+
+
+def in_unit_of(n_bytes: int, typed: int) -> str:
+    """A number of bytes in the unit in which another one was typed: 500,000,000 was most likely 500 MB."""
+    units = (unit for unit in _TYPED if typed >= unit[0] and 100 * typed % unit[0] == 0)
+    unit, name = next(units, (1, "bytes"))
+    return f"{n_bytes / unit:,.{0 if n_bytes >= 100 * unit or unit == 1 else 2}f} {name}"
+
+
 def amount(n_bytes: int) -> str:
     """A number of bytes in GiB, or in MiB below 0.1 GiB: "1.3 GiB", "12.0 MiB"."""
     if n_bytes >= 0.1 * GIB:

@@ -35,7 +35,7 @@ from .signals import listen
 OUT_OF_MEMORY = 2  # the job needs more than the machine has
 NO_THREADS = "can't start new thread"  # the text of Python's error
 RENDERING = ("render", "check", "init", "report")  # commands that may trace rays
-WRITING = ("assemble", "init", "export", "sheet")  # commands that write, but render no images of a job
+WRITING = ("assemble", "init", "export", "openjd", "sheet")  # commands that write, but render no images of a job
 
 app = typer.Typer(
     name="framearray",

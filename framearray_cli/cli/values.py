@@ -36,7 +36,7 @@ def number(least: float, most: float | None = None) -> Callable[[object], float]
         except ValueError:
             raise refusal(expected, value) from None
         if not number >= least or (most is not None and not number <= most) or number == float("inf"):
-            raise refusal(expected, number)
+            raise refusal(expected, int(number) if number.is_integer() else number)
         return number
 
     return parse

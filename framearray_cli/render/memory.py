@@ -7,7 +7,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.memory import free_memory, resident_memory
-from framearray_cli.base.units import gibibytes
+from framearray_cli.base.units import gibibytes, in_unit_of
 from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.hits.hits import empty_hits
@@ -59,7 +59,9 @@ def require_memory(prepared: Prepared, per_pixel: Float64 | None = None) -> None
         less = "a smaller camera.resolution, reuse.n_r or samples.hits takes less"
         if prepared.job.samples.error is not None:
             less = "a larger samples.error, or a smaller camera.resolution, reuse.n_r or samples.most_hits takes less"
-        problem = f"rendering needs at least {gibibytes(needed)} of memory, {gibibytes(limit)} may be used; {less}"
+        typed = prepared.job.render.memory
+        least, most = (in_unit_of(n, typed) if typed else gibibytes(n) for n in (needed, limit))
+        problem = f"rendering needs at least {least} of memory, {most} may be used; {less}"
         raise JobError(prepared.job.file or prepared.job.name, [problem])
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 from framearray_cli.base.forms import text as tomltext
-from framearray_cli.base.units import GIB, MIB, agree, amount, counted, gibibytes, size
+from framearray_cli.base.units import GIB, MIB, agree, amount, counted, gibibytes, in_unit_of, size
 
 
 @pytest.mark.parametrize(
@@ -72,3 +72,18 @@ def test_counts_agree_with_their_nouns() -> None:
     ]
     assert [counted(n, "entry", "entries") for n in (1, 2)] == ["1 entry", "2 entries"]
     assert [agree(n, "is", "are") for n in (0, 1, 2)] == ["are", "is", "are"]
+
+
+@pytest.mark.parametrize(
+    ("typed", "needed", "expected"),
+    [
+        (500 * 10**6, 650_000_000, "650 MB"),
+        (500 * MIB, 650 * MIB, "650 MiB"),
+        (2 * 10**9, 3_456_000_000, "3.46 GB"),
+        (3 * GIB // 2, 2 * GIB, "2.00 GiB"),
+        (8 * GIB, 900 * GIB, "900 GiB"),
+        (123_456_789, 200_000_001, "200,000,001 bytes"),
+    ],
+)
+def test_memory_is_reported_in_the_unit_that_was_typed(typed: int, needed: int, expected: str) -> None:
+    assert in_unit_of(needed, typed) == expected

@@ -98,7 +98,7 @@ def test_a_name_that_cannot_be_shown(tmp_path):
         (["assemble", "out", "path.toml", "-o", " "], "expected a name, got none"),
         (
             ["assemble", "out", "path.toml", "-o", "a.mp4", "--exposure", "1e9"],
-            "--exposure: expected a number from -64 to 64, got 1000000000.0",
+            "--exposure: expected a number from -64 to 64, got 1000000000",
         ),
     ],
 )
@@ -219,7 +219,7 @@ def test_a_range_in_which_obscurances_mean_nothing(command, value, message, tmp_
 def test_all_problems_are_counted_at_the_end(tmp_path, capsys):
     result = run(capsys, "check", write_job(tmp_path, camera={f"k{i}": 1 for i in range(1200)}))
     assert result.code == 2
-    assert result.err.splitlines()[-2].endswith("job.toml: and 1150 more problems")
+    assert result.err.splitlines()[-2].endswith("job.toml: and 1,150 more problems")
     assert result.err.splitlines()[-1] == "1,200 problems; nothing was rendered."
 
 

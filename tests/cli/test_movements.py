@@ -57,8 +57,8 @@ def test_a_path_file_with_another_rate_and_blends(array: Path, tmp_path: Path, c
         (["path.toml", "--seconds", "2"], "a path file gives the lengths of its segments"),
         (["path.toml", "--at", "2"], "needs --walk or --light, where the other stays"),
         (["--diagonal", "--at", "2"], "needs --walk or --light, where the other stays"),
-        (["--walk", "--seconds", "0"], "--seconds: expected a number from 0.001 to 40000, got 0.0"),
-        (["--walk", "--fps", "0"], "--fps: expected a number from 0.01 to 1000, got 0.0"),
+        (["--walk", "--seconds", "0"], "--seconds: expected a number from 0.001 to 40000, got 0"),
+        (["--walk", "--fps", "0"], "--fps: expected a number from 0.01 to 1000, got 0"),
     ],
 )
 def test_wrong_usage(array: Path, tmp_path: Path, capsys, monkeypatch, options: list[str], message: str) -> None:

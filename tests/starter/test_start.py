@@ -285,6 +285,8 @@ def test_an_existing_file_stays(tmp_path: Path) -> None:
     assert job_file.read_text() == "mine"
     init(scene, job_file, FEW, force=True)
     assert load_toml(job_file)["name"] == "job"
+    with pytest.raises(OutputError, match="expected a file, got a folder or a device; give another name"):
+        init(scene, tmp_path, FEW)
 
 
 def test_the_command_reports_what_it_did(

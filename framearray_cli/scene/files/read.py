@@ -93,6 +93,8 @@ def _scene_errors(file: Path, extension: str) -> Iterator[None]:
         raise SceneError(f"{name}: does not fit into memory, or its header claims more than it holds") from error
     except AssetError as error:
         raise SceneError(f"{name}: {error}") from error
+    except UnicodeDecodeError as error:
+        raise SceneError(f"{name}: broken, or not {extension.upper()} (it is no text); export it anew") from error
     except Exception as error:  # broken files make readers raise anything
         kind = "" if type(error) is ValueError and str(error) else f"{type(error).__name__}: "
         reason = " ".join(f"{kind}{error}".split())[:MAX_REASON].rstrip(" :")

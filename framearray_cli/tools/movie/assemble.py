@@ -99,6 +99,8 @@ def assemble_movie(
     is_movie = target.suffix.lower() in MOVIES
     if not is_movie:
         target = sequence_pattern(target, _own_suffix(manifest), MOVIES)
+        if target.parent.resolve() == manifest.directory.resolve():
+            raise OutputError(f"{target.parent}: holds the frame array itself; choose another folder")
         check_look(target, look)
     _check_target(target, len(line.shots), force=force)
     _check_images(pictures, line)

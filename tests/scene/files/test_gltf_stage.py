@@ -10,7 +10,7 @@ from support.scenes import Glb
 from support.staged import QUARTER, animate, camera, light, shift, turn_y
 
 from framearray_cli.base.errors import SceneError
-from framearray_cli.scene.files import read_stage
+from framearray_cli.scene.files import read_meshes, read_stage
 
 
 def test_a_file_without_any_has_none(tmp_path: Path) -> None:
@@ -140,3 +140,26 @@ def test_broken_animations_are_reported(times: Any, values: Any, message: str, t
     animate(glb, shot, "translation", times, values)
     with pytest.raises(SceneError, match=message):
         read_stage(glb.save(tmp_path / "a.glb"))
+
+
+def notes_of(glb: Glb, tmp_path: Path) -> tuple[str, ...]:
+    return read_meshes(glb.save(tmp_path / "a.glb")).notes
+
+
+def test_animations_of_cameras_and_lights_are_no_loss(tmp_path: Path) -> None:
+    """Jobs have paths for them; only a mesh that stands still differs from the file."""
+    glb = Glb()
+    mesh = glb.node(glb.mesh())
+    eye = camera(glb, translation=[0, 0, 5])
+    lamp = glb.add("nodes", light(glb))
+    glb.tree["scenes"][0]["nodes"] += [eye, lamp]
+    for node in (eye, lamp):
+        animate(glb, node, "translation", [0, 1], [[0, 0, 0], [1, 0, 0]])
+    found = notes_of(glb, tmp_path)
+    assert any(note.startswith("the job gives the lights; ") for note in found)
+    assert not any("animation" in note for note in found)
+    above = glb.add("nodes", {"children": [mesh]})
+    glb.tree["scenes"][0]["nodes"].remove(mesh)
+    glb.tree["scenes"][0]["nodes"].append(above)
+    animate(glb, above, "translation", [0, 1], [[0, 0, 0], [1, 0, 0]])
+    assert "animations of meshes are left out; they stand in their rest pose" in notes_of(glb, tmp_path)

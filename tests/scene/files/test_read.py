@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.scenes import QUAD, QUAD_UVS, Glb, png, shared_scene
+from support.staged import animate
 
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.files import Meshes, read_meshes
@@ -313,10 +314,10 @@ def test_ignored_features_are_noted(tmp_path):
     material = glb.material("Car", emissiveFactor=[1, 0, 0], normalTexture={"index": 0}, extensions=extension)
     glb.texture(png(IMAGE))
     glb.tree["extensionsUsed"] = ["KHR_lights_punctual", "KHR_xmp", "KHR_materials_clearcoat"]
-    glb.tree["animations"] = [{}]
-    glb.node(glb.mesh(material))
+    node = glb.node(glb.mesh(material))
+    animate(glb, node, "translation", [0, 1], [[0, 0, 0], [1, 0, 0]])
     text = notes_of(read_meshes(glb.save(tmp_path / "a.glb")))
-    for expected in ("lights in the scene", "KHR_xmp", "clearcoat", "animations", "emission", "normal maps"):
+    for expected in ("the job gives the lights", "KHR_xmp", "clearcoat", "animations", "emission", "normal maps"):
         assert expected in text
 
 
@@ -540,6 +541,7 @@ def test_stl_has_no_normals_of_its_own(tmp_path):
     ("name", "data", "expected"),
     [
         ("gone.glb", None, "no such scene file"),
+        ("noise.glb", b"\x8a\x01\xff\x9c" * 9, "broken, or not GLB .it is no text.; export it anew"),
         ("a.blend", b"BLENDER", "export the scene as GLB: in Blender"),
         ("a.xcf", b"x", "known format"),
         ("a", b"x", "known format"),

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.movies import plain
 
 from framearray_cli.array.images.images import ImageFormat, read_image, write_image
 from framearray_cli.array.images.png import read_codes
@@ -20,6 +21,7 @@ from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, MissingExtraError, OutputError
 from framearray_cli.tools.movie.assemble import assemble_movie
 from framearray_cli.tools.movie.look import Look
+from framearray_cli.tools.movie.sweep import Sweep
 
 av = pytest.importorskip("av")
 
@@ -338,3 +340,12 @@ def test_more_frames_than_digits(out: Path, path_file: Path, tmp_path: Path) -> 
     assemble_movie(out, path_file, tmp_path / "cut" / "#.png")
     assert len(list((tmp_path / "cut").iterdir())) == 11
     assert (tmp_path / "cut" / "10.png").is_file()
+
+
+def test_a_sequence_stays_out_of_the_folder_of_the_array(tmp_path: Path) -> None:
+    array = plain(tmp_path / "out", 3, 2)
+    before = sorted(array.directory.iterdir())
+    for target in (array.directory, array.directory / "shot.####.png", tmp_path / "x" / ".." / "out"):
+        with pytest.raises(OutputError, match="holds the frame array itself; choose another folder"):
+            assemble_movie(array.directory, Sweep(kind="walk"), target)
+    assert sorted(array.directory.iterdir()) == before

@@ -77,17 +77,33 @@ def note_unread(gltf: Gltf, notes: Notes) -> None:
     """Note what the file contains and the renderer does not show."""
     for extension in sorted(set(gltf.tree.get("extensionsUsed") or []) - HANDLED):
         if extension == "KHR_lights_punctual":
-            notes.add("lights in the scene file are left out; the job gives the lights")
+            notes.add("the job gives the lights; those of the scene count where `framearray init` wrote them into it")
         elif not extension.startswith("KHR_materials_"):  # those are noted with their materials
             notes.add(f"{extension} is left out")
-    if gltf.items("animations"):
-        notes.add("animations are left out; everything stands in its rest pose")
+    if _moves_meshes(gltf):
+        notes.add("animations of meshes are left out; they stand in their rest pose")
     if gltf.items("skins"):
         notes.add("skins are left out; meshes stand in their rest pose")
     if len(gltf.items("scenes")) > 1:
         notes.add("only the file's default scene is read")
     if any(primitive.get("targets") for mesh in gltf.items("meshes") for primitive in mesh["primitives"]):
         notes.add("morph targets are left out")
+
+
+def _moves_meshes(gltf: Gltf) -> bool:
+    """Whether an animation moves a mesh, and not only cameras and lights, which jobs have paths for."""
+    nodes, seen = gltf.items("nodes"), set[int]()
+    channels = [channel for animation in gltf.items("animations") for channel in animation.get("channels") or []]
+    waiting = [node for channel in channels if (node := channel["target"].get("node")) is not None]
+    while waiting:
+        node = waiting.pop()
+        if node in seen:
+            continue
+        seen.add(node)
+        if nodes[node].get("mesh") is not None:
+            return True
+        waiting += nodes[node].get("children") or []
+    return False
 
 
 def placed_meshes(gltf: Gltf, limit: Limit) -> list[tuple[int, Float64]]:
