@@ -115,7 +115,7 @@ def check_earlier(pattern: Path, n: int, *, force: bool) -> None:
         )
     if found and not force:
         raise OutputError(
-            f"{folder / found[0]}: is there already, with {len(found)} files of an earlier sequence; give another name "
+            f"{folder / found[0]}: is there already, with {counted(len(found), 'file')} of an earlier sequence; give another name "
             "with --output, or --force to replace them"
         )
 
