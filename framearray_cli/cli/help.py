@@ -17,6 +17,8 @@ from typing import Any, cast
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from .completions import WORDS
+
 # typer brings its own copy of click since 0.26: UsageError is a base of the one class that all versions export.
 UsageError = cast("type[Exception]", typer.BadParameter.__mro__[1])
 
@@ -57,6 +59,7 @@ class Command(TyperCommand):
     """A command whose help and usage are the same with every version of typer."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        ctx.meta[WORDS] = list(args)  # the parser forgets them where the last option lacks its value
         with _context(ctx):
             return super().parse_args(ctx, args)
 

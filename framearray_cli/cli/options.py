@@ -9,13 +9,28 @@ import typer
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.units import MOST_STOPS, MOST_THREADS
 
+from .completions import (
+    complete_array,
+    complete_axis_places,
+    complete_job,
+    complete_key,
+    complete_light_places,
+    complete_places,
+)
 from .values import THREADS_VARIABLE, number, whole
 
 if TYPE_CHECKING:
     from framearray_cli.job.job import Job
 
-JobFile = Annotated[Path, typer.Argument(metavar="JOB", help="Job file, TOML.", show_default=False)]
-ArrayFolder = Annotated[Path, typer.Argument(metavar="OUT", help="Folder that `render` wrote.", show_default=False)]
+JobFile = Annotated[
+    Path, typer.Argument(metavar="JOB", autocompletion=complete_job, help="Job file, TOML.", show_default=False)
+]
+ArrayFolder = Annotated[
+    Path,
+    typer.Argument(
+        metavar="OUT", autocompletion=complete_array, help="Folder that `render` wrote.", show_default=False
+    ),
+]
 Threads = Annotated[
     int | None,
     typer.Option(
@@ -33,7 +48,10 @@ Output = Annotated[
 Sets = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", help="Replace a key of the job: camera.resolution=[640,480]; may be repeated.", metavar="KEY=VALUE"
+        "--set",
+        help="Replace a key of the job: camera.resolution=[640,480]; may be repeated.",
+        autocompletion=complete_key,
+        metavar="KEY=VALUE",
     ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors.")]
@@ -49,15 +67,30 @@ Exposure = Annotated[
 ]
 Cameras = Annotated[
     str | None,
-    typer.Option("--cameras", help="Camera positions: 0-47, 0-47x3, 5,8-11, last, 50%, all.", metavar="PLACES"),
+    typer.Option(
+        "--cameras",
+        help="Camera positions: 0-47, 0-47x3, 5,8-11, last, 50%, all.",
+        autocompletion=complete_places,
+        metavar="PLACES",
+    ),
 ]
 Light = Annotated[
     str | None,
-    typer.Option("--light", help="Light positions: 0-47, 0-47x3, 5,8-11, last, 50%, all.", metavar="PLACES"),
+    typer.Option(
+        "--light",
+        help="Light positions: 0-47, 0-47x3, 5,8-11, last, 50%, all.",
+        autocompletion=complete_light_places,
+        metavar="PLACES",
+    ),
 ]
 At = Annotated[
     list[str] | None,
-    typer.Option("--at", help="Positions along another light axis: lamps=0-3; may be repeated.", metavar="AXIS=PLACES"),
+    typer.Option(
+        "--at",
+        help="Positions along another light axis: lamps=0-3; may be repeated.",
+        autocompletion=complete_axis_places,
+        metavar="AXIS=PLACES",
+    ),
 ]
 
 

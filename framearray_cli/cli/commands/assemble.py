@@ -12,6 +12,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms.toml import STDIN
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS, counted
 
+from ..completions import complete_axis_places, complete_job
 from ..options import ArrayFolder, Force, Json, Quiet, Strict, output_path, refuse_warnings
 from ..results import AssembleResult
 from ..screen import Screen, err, print_result
@@ -20,7 +21,12 @@ from ..values import number
 
 PathFile = Annotated[
     Path | None,
-    typer.Argument(metavar="PATH", help="Movie path, TOML; or walk, light or diagonal.", show_default=False),
+    typer.Argument(
+        metavar="PATH",
+        autocompletion=complete_job,
+        help="Movie path, TOML; or walk, light or diagonal.",
+        show_default=False,
+    ),
 ]
 Target = Annotated[
     str,
@@ -41,6 +47,7 @@ Stay = Annotated[
         "--at",
         help="Where the other stays: an index, first, last or 50%; AXIS=PLACE for one light axis. Default: first.",
         metavar="PLACE",
+        autocompletion=complete_axis_places,
     ),
 ]
 Seconds = Annotated[

@@ -8,6 +8,7 @@ import typer
 
 from framearray_cli.base.units import counted
 
+from ..completions import complete_camera, complete_scene
 from ..describe import init_result
 from ..options import Json, Quiet, output_path
 from ..screen import Screen, err, out, print_result, say
@@ -17,7 +18,21 @@ from .init_values import Resolution, SunPlace, read_resolution, read_sun
 
 MOST = 1000  # frames or lights of a first job
 
-
+SceneFile = Annotated[
+    Path,
+    typer.Argument(
+        metavar="SCENE", autocompletion=complete_scene, help="Scene file: GLB, OBJ, STL, ...", show_default=False
+    ),
+]
+CameraName = Annotated[
+    str | None,
+    typer.Option(
+        "--camera",
+        help="Which camera of the file; default: the first.",
+        metavar="NAME",
+        autocompletion=complete_camera,
+    ),
+]
 Resolutions = Annotated[
     Resolution | None,
     typer.Option(
@@ -46,14 +61,12 @@ Formats = Annotated[
 
 
 def init(
-    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file: GLB, OBJ, STL, ...", show_default=False)],
+    scene: SceneFile,
     target: Annotated[
         str | None,
         typer.Option("--output", "-o", help="Job file; default: the scene's name, here.", metavar="JOB"),
     ] = None,
-    camera: Annotated[
-        str | None, typer.Option("--camera", help="Which camera of the file; default: the first.", metavar="NAME")
-    ] = None,
+    camera: CameraName = None,
     frames: Annotated[
         int | None,
         typer.Option("--frames", parser=whole(1, MOST), help="Frames of the camera.", metavar="N", show_default=False),

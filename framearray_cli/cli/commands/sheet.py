@@ -6,6 +6,7 @@ import typer
 
 from framearray_cli.base.units import counted
 
+from ..completions import complete_axis
 from ..options import ArrayFolder, At, Cameras, Exposure, Force, Json, Light, Quiet, output_path
 from ..results import SheetResult
 from ..screen import Screen, err, print_result
@@ -36,7 +37,10 @@ def sheet(
     ] = 2400,
     exposure: Exposure = 0.0,
     side: Annotated[
-        str | None, typer.Option("--side", help="Axis from top to bottom; default: the first.", metavar="AXIS")
+        str | None,
+        typer.Option(
+            "--side", help="Axis from top to bottom; default: the first.", metavar="AXIS", autocompletion=complete_axis
+        ),
     ] = None,
     at: At = None,
     force: Force = False,
