@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from framearray_cli.base.errors import CheckError
-from framearray_cli.base.units import counted, size
+from framearray_cli.base.units import size
 
 from ..options import Json
 from ..screen import print_result
@@ -53,7 +53,8 @@ def _embree_line(found: "DoctorResult") -> str:
         return "Embree: its functions cannot be reached; rays go through embreex, which is slower"
     widths = found.embree.packet_widths
     packets = " or ".join([", ".join(map(str, widths[:-1])), str(widths[-1])] if len(widths) > 1 else map(str, widths))
-    return f"Embree {found.embree.version}: traces {counted(packets or 1, 'ray')} at once"
+    rays = f"{packets} rays" if packets else "one ray"
+    return f"Embree {found.embree.version}: traces {rays} at once"
 
 
 def _extra_line(name: str, purpose: str, missing: tuple[str, ...], install: str | None) -> str:

@@ -114,10 +114,9 @@ def check_earlier(pattern: Path, n: int, *, force: bool) -> None:
             f"{folder / left[0]}: belongs to an earlier sequence, with {kept}; delete them or choose another name"
         )
     if found and not force:
-        raise OutputError(
-            f"{folder / found[0]}: is there already, with {counted(len(found), 'file')} of an earlier sequence; give another name "
-            "with --output, or --force to replace them"
-        )
+        kept = f"{counted(len(found), 'file')} of an earlier sequence"
+        remedy = "give another name with --output, or --force to replace them"
+        raise OutputError(f"{folder / found[0]}: is there already, with {kept}; {remedy}")
 
 
 def _move(names: Sequence[str], part: Path, folder: Path) -> None:
