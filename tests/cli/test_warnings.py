@@ -85,6 +85,15 @@ def test_parts_have_the_pilots_of_the_first(tmp_path, capsys, monkeypatch):
     assert len(found) == 1
 
 
+def test_workers_are_not_started_for_a_ruined_job(tmp_path, capsys, monkeypatch):
+    pytest.importorskip("distributed", reason="Dask distributed is not installed (extra dask)")
+    looks, job = counted_pilots(monkeypatch), write_job(tmp_path, **RADIANS)
+    monkeypatch.setattr("framearray_cli.render.parts.run.start_local", lambda workers: pytest.fail("was started"))
+    result = run(capsys, "render", "--workers", "2", "--strict", job)
+    assert (result.code, len(looks)) == (2, 1)
+    assert "camera.fov: 1.047 degrees" in result.err
+
+
 def test_pilots_change_no_image(tmp_path, capsys, monkeypatch):
     job = write_job(tmp_path)
     run(capsys, "render", "-q", job)

@@ -16,8 +16,8 @@ from .reached import scarce_light
 from .seen import bounds, eyes_text
 from .views import Views
 
-# A screen shows values from 0 to 1. Linear formats keep what lies beyond, but three stops more are no exposure.
-CLIPPED, TOO_BRIGHT = 1.0, 8.0
+# A screen shows values from 0 to 1. Linear formats keep what lies beyond, but two stops more are no exposure.
+CLIPPED, TOO_BRIGHT = 1.0, 4.0
 # Three of the 256 codes of a screen.
 DARK = 1e-3
 # Shares of the pixels that see surfaces, from which on a picture is lost.
