@@ -8,7 +8,7 @@ OUT := out/kitchen-small
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-scaling bench-bias bench-ambient bench-report bench-progress bench-view fuzz clean
+.PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-scaling bench-bias bench-ambient bench-report bench-progress bench-first bench-view fuzz clean
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -79,6 +79,9 @@ bench-report: $(VENV)/installed-bench ## Measure speed against error of the thre
 
 bench-progress: $(VENV)/installed-bench ## Measure the time left that renders print and what first runs compile, for docs/measured/progress.md
 	PYTHONPATH=tests $(BIN)/python -m bench.progress $(BENCH)
+
+bench-first: $(VENV)/installed-dev ## Measure the way to the first picture, from an empty home
+	PYTHONPATH=tests $(BIN)/python -m bench first $(BENCH)
 
 bench-view: $(VENV)/installed-bench ## Measure the page of `framearray view` in Chromium
 	PYTHONPATH=tests $(BIN)/python -m bench view $(BENCH)

@@ -20,14 +20,14 @@ from bench.core.steady import steady
 from bench.error import bias, error, reported, reports
 from bench.error import bias_page as biaspage
 from bench.peers import cycles, mitsuba3, peers
+from bench.speed import first, processes, scaling, speed
 from bench.speed import page as table
-from bench.speed import processes, scaling, speed
 from bench.view import page as viewpage
 
 PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
 PARTS = ("speed", "error", "peers", "memory", "startup")
 TRACES = ("trace", "trace-means")
-OTHERS = ("scaling", "report", "bias", "reported", "page", "peak", "view", *TRACES, *ambient.PARTS)
+OTHERS = ("scaling", "report", "bias", "reported", "page", "peak", "view", "first", *TRACES, *ambient.PARTS)
 
 
 def main() -> None:
@@ -51,6 +51,9 @@ def main() -> None:
         return
     if args.what == "view":
         viewpage.run(args.jobs, args.patience, args.quick)
+        return
+    if args.what == "first":
+        print(json.dumps(first.run(args.jobs), indent=2))
         return
     if args.what == "peak":
         print(json.dumps(peak(args.jobs[0], variant_named(args.variant), args)))
