@@ -179,16 +179,24 @@ def remove_array(old: Manifest) -> int:
         OSError: one of them cannot be removed.
         OutputError: a link in the folder leads out of it; no file is removed.
     """
+    files = removable_files(old)
+    for file in files:
+        file.unlink()
+    with suppress(OSError):  # other files lie in it
+        (old.directory / FOLDER).rmdir()
+    return len(files)
+
+
+def removable_files(old: Manifest) -> list[Path]:
+    """List the files that a manifest names and that exist, the manifest last.
+
+    Raises:
+        OutputError: a link in the folder leads out of it.
+    """
     journal = old.directory / FOLDER / JOURNAL
-    removed, files = 0, (*array_files(old), *record_files(old.directory), journal, old.directory / FILE_NAME)
+    files = (*array_files(old), *record_files(old.directory), journal, old.directory / FILE_NAME)
     whole = old.directory.resolve()
     for folder in {file.parent for file in files} - {old.directory}:
         if not folder.resolve().is_relative_to(whole):
             raise OutputError(f"{folder}: leads out of the folder of the array; remove what lies there yourself")
-    for file in files:
-        if os.path.lexists(file) and not file.is_dir():
-            file.unlink()
-            removed += 1
-    with suppress(OSError):  # other files lie in it
-        (old.directory / FOLDER).rmdir()
-    return removed
+    return [file for file in files if os.path.lexists(file) and not file.is_dir()]

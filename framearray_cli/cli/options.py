@@ -59,6 +59,9 @@ Strict = Annotated[bool, typer.Option("--strict", help="Warnings are errors.")]
 # `main` looks for it before anything else: a wrong command line ends with a document too.
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON document.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
+DryRun = Annotated[
+    bool, typer.Option("--dry-run", help="Say what would be written, replaced and removed; touch nothing.")
+]
 Exposure = Annotated[
     float,
     typer.Option(

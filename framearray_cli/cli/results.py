@@ -226,14 +226,21 @@ class Document:
     result: Any
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DryRunResult:
+    """What a command would do, of which `--dry-run` does nothing: a line for each thing."""
+
+    would: tuple[str, ...]
+
+
 # The types of each command's result.
 RESULTS: dict[str, tuple[type, ...]] = {
-    "init": (InitResult,),
+    "init": (InitResult, DryRunResult),
     "check": (CheckResult,),
-    "render": (RenderResult, PreviewResult),
+    "render": (RenderResult, PreviewResult, DryRunResult),
     "verify": (VerifyResult,),
-    "assemble": (AssembleResult,),
+    "assemble": (AssembleResult, DryRunResult),
     "sheet": (SheetResult,),
-    "export": (ExportResult,),
+    "export": (ExportResult, DryRunResult),
     "doctor": (DoctorResult,),
 }

@@ -23,6 +23,7 @@ from framearray_cli.engine.kernels.cache import kept_kernels, problem
 from framearray_cli.engine.kernels.clock import CompileClock, compile_clock
 
 from .document import REMARKS, outcome
+from .results import DryRunResult
 
 
 class _Console(Console):
@@ -246,6 +247,12 @@ def print_result(lines: Iterable[str], result: object = None, *, quiet: bool = F
                 say(err, [line])
         elif not outcome.wanted:
             say(out, [line])
+
+
+def print_would(lines: Iterable[str]) -> None:
+    """Print what a command would do; see `--dry-run`."""
+    lines = tuple(lines)
+    print_result(lines, DryRunResult(would=lines))
 
 
 def say(console: Console, lines: Iterable[str]) -> None:

@@ -16,7 +16,7 @@ from .options import Format, StartOptions, SunOption
 from .plan import plan_start
 from .text import to_text
 
-__all__ = ["STDOUT", "Format", "Start", "StartOptions", "SunOption", "init", "to_text"]
+__all__ = ["STDOUT", "Format", "Start", "StartOptions", "SunOption", "check_files", "init", "to_text"]
 
 STDOUT = Path("-")
 
@@ -33,14 +33,24 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
         JobError: no camera has the name in the options, or the sun never rises.
         OutputError: the job file exists already, or cannot be written.
     """
+    check_files(scene, job_file, force=force)
+    start = plan_start(scene, scene.stem if job_file == STDOUT else job_file.stem, options)
+    validate_job(table_of(start), scene)
+    if job_file != STDOUT:
+        write_bytes(job_file, to_text(start, job_file).encode("utf-8"))
+    return start
+
+
+def check_files(scene: Path, job_file: Path, *, force: bool) -> None:
+    """Refuse a scene that is none, and a job file that is there.
+
+    Raises:
+        SceneError: there is no such scene file.
+        OutputError: the job file exists already.
+    """
     if problem := mistaken(scene, "scene"):
         raise SceneError(f"{scene}: {problem}")
     if job_file != STDOUT:
         require_new(job_file, force=force)
     if not os.path.exists(scene):
         raise SceneError(f"{scene}: no such scene file")
-    start = plan_start(scene, scene.stem if job_file == STDOUT else job_file.stem, options)
-    validate_job(table_of(start), scene)
-    if job_file != STDOUT:
-        write_bytes(job_file, to_text(start, job_file).encode("utf-8"))
-    return start

@@ -13,9 +13,9 @@ from framearray_cli.base.forms.toml import STDIN
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS, counted
 
 from ..completions import complete_axis_places, complete_job
-from ..options import ArrayFolder, Force, Json, Quiet, Strict, output_path, refuse_warnings
+from ..options import ArrayFolder, DryRun, Force, Json, Quiet, Strict, output_path, refuse_warnings
 from ..results import AssembleResult
-from ..screen import Screen, err, print_result
+from ..screen import Screen, err, print_result, print_would
 from ..streams import is_stdout, output_file
 from ..values import number
 
@@ -95,6 +95,7 @@ def assemble(
     label: Label = False,
     strict: Strict = False,
     force: Force = False,
+    dry_run: DryRun = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -108,7 +109,7 @@ def assemble(
     kinds = [kind for kind, wanted in choices.items() if wanted or str(path_file) == kind]
     path_file = None if str(path_file) in choices else path_file  # ./walk is a file
     _refuse_conflicts(path_file, kinds, at, seconds)
-    movie = _movie_file(target, force=force) if is_stdout(target) else nullcontext(output_path(target))
+    movie = _movie_file(target, force=force) if is_stdout(target) and not dry_run else nullcontext(output_path(target))
     with movie as file, Screen(err, quiet=quiet) as screen:
 
         def warn(warnings: Sequence[str]) -> None:
@@ -126,10 +127,15 @@ def assemble(
             progress=screen.counter("assembling", "frame"),
             warned=warn,
             force=force,
+            dry_run=dry_run,
         )
     rate = f"{float(made.fps):g} frames per second"
     result = AssembleResult(path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps))
     size = f"{counted(made.n_frames, 'frame')} from {counted(made.n_images, 'image')}"
+    if dry_run:
+        there = os.path.isfile(target)
+        print_would([f"would {'replace' if there else 'write'} {target}: {size}, {rate}"])
+        return
     print_result([f"{made.target}: {size}, {rate}"], result, quiet=quiet or is_stdout(target))
 
 

@@ -7,9 +7,9 @@ import typer
 from framearray_cli.array.places import ALL_PLACES
 from framearray_cli.base.units import counted
 
-from ..options import ArrayFolder, At, Cameras, Exposure, Json, Light, Quiet, output_path
+from ..options import ArrayFolder, At, Cameras, DryRun, Exposure, Json, Light, Quiet, output_path
 from ..results import ExportResult
-from ..screen import Screen, err, print_result
+from ..screen import Screen, err, print_result, print_would
 from ..values import choice, whole
 
 
@@ -39,6 +39,7 @@ def export(
     ] = 10_000,
     copy: Annotated[bool, typer.Option("--copy", help="Copy images that could be hard links.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier export.")] = False,
+    dry_run: DryRun = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:  # fmt: skip
@@ -52,11 +53,14 @@ def export(
         made = run(
             array, output_path(target), kind, cameras=cameras or ALL_PLACES, light=light, at=at or (),
             image_format=ImageFormat(format=image_format, exposure=exposure), points=points, copy=copy,
-            force=force, progress=screen.counter("exporting", "image"),
+            force=force, dry_run=dry_run, progress=screen.counter("exporting", "image"),
         )  # fmt: skip
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
     size = f"{counted(made.n_cameras, 'camera position')} x {counted(made.n_lights, 'light position')}"
+    if dry_run:
+        print_would([f"would {'replace' if made.replaces else 'write'} {made.target}: {size}"])
+        return
     points_too = f", {counted(made.n_points, 'point')}" if kind != "cinema" else ""
     result = ExportResult(
         directory=str(made.target), format=kind, cameras=made.n_cameras, lights=made.n_lights, points=made.n_points

@@ -10,8 +10,8 @@ from framearray_cli.base.units import counted
 
 from ..completions import complete_camera, complete_scene
 from ..describe import init_result
-from ..options import Json, Quiet, output_path
-from ..screen import Screen, err, out, print_result, say
+from ..options import DryRun, Json, Quiet, output_path
+from ..screen import Screen, err, out, print_result, print_would, say
 from ..streams import refuse_json
 from ..values import choice, whole
 from .init_values import Resolution, SunPlace, read_resolution, read_sun
@@ -59,6 +59,15 @@ Formats = Annotated[
     ),
 ]
 
+Frames = Annotated[
+    int | None,
+    typer.Option("--frames", parser=whole(1, MOST), help="Frames of the camera.", metavar="N", show_default=False),
+]
+Lights = Annotated[
+    int | None,
+    typer.Option("--lights", parser=whole(1, MOST), help="Positions of the light.", metavar="N", show_default=False),
+]
+
 
 def init(
     scene: SceneFile,
@@ -67,16 +76,8 @@ def init(
         typer.Option("--output", "-o", help="Job file; default: the scene's name, here.", metavar="JOB"),
     ] = None,
     camera: CameraName = None,
-    frames: Annotated[
-        int | None,
-        typer.Option("--frames", parser=whole(1, MOST), help="Frames of the camera.", metavar="N", show_default=False),
-    ] = None,
-    lights: Annotated[
-        int | None,
-        typer.Option(
-            "--lights", parser=whole(1, MOST), help="Positions of the light.", metavar="N", show_default=False
-        ),
-    ] = None,
+    frames: Frames = None,
+    lights: Lights = None,
     inside: Annotated[
         bool | None,
         typer.Option("--inside/--outside", help="Treat the scene as a room, or as an object to look at."),
@@ -86,12 +87,16 @@ def init(
     groups: Annotated[bool, typer.Option("--groups", help="Store the light of every source separately.")] = False,
     sun: SunPlaces = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing job file.")] = False,
+    dry_run: DryRun = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Write a first job for a scene: camera, lights and exposure are found or chosen."""
     job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else output_path(target)
     refuse_json(str(job_file))
+    if dry_run:
+        _print_planned(scene, job_file, force=force)
+        return
     with Screen(err, quiet=quiet) as screen:
         screen.wait("exploring the scene")
         from framearray_cli.starter import STDOUT, StartOptions, SunOption, to_text
@@ -118,3 +123,11 @@ def init(
     size += f" = {counted(images, 'image')}"
     lines = [f"{job_file}: {size}; next: framearray render {shlex.quote(str(job_file))}"]
     print_result(lines, init_result(start, job_file, scene), quiet=quiet)
+
+
+def _print_planned(scene: Path, job_file: Path, *, force: bool) -> None:
+    """Print whether the job file would be written or replaced."""
+    from framearray_cli.starter import check_files
+
+    check_files(scene, job_file, force=force)
+    print_would([f"would {'replace' if job_file.exists() else 'write'} {job_file}"])

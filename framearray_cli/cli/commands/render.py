@@ -25,9 +25,23 @@ from framearray_cli.render.parts.progress import PartEvents
 from framearray_cli.render.progress import ambient_figures
 
 from ..describe import render_result
-from ..options import At, Cameras, JobFile, Json, Light, Output, Quiet, Sets, Strict, Threads, load_job, refuse_warnings
+from ..options import (
+    At,
+    Cameras,
+    DryRun,
+    JobFile,
+    Json,
+    Light,
+    Output,
+    Quiet,
+    Sets,
+    Strict,
+    Threads,
+    load_job,
+    refuse_warnings,
+)
 from ..results import RenderResult
-from ..screen import Screen, err, print_result
+from ..screen import Screen, err, print_result, print_would
 from ..values import whole
 from .preview import preview_on_screen, refuse_conflicts
 
@@ -79,12 +93,20 @@ def render(
     ] = None,
     strict: Strict = False,
     restart: Annotated[bool, typer.Option("--restart", help="Remove the frame array in the folder first.")] = False,
+    dry_run: DryRun = False,
     force: Annotated[bool, typer.Option("--force", help="With --preview: replace an existing picture.")] = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Render every image of a job into a folder, with a manifest; skip those that are there."""
-    others = {"--workers": workers, "--dask": dask, "--chunk": chunk, "--restart": restart, "--strict": strict}
+    others = {
+        "--workers": workers,
+        "--dask": dask,
+        "--chunk": chunk,
+        "--restart": restart,
+        "--strict": strict,
+        "--dry-run": dry_run,
+    }
     refuse_conflicts(preview, others, {"--light": light, "--at": at, "--force": force})
     job = load_job(job_file, threads, None if preview else output, sets)
     if preview:
@@ -92,7 +114,21 @@ def render(
         return
     chosen = None if cameras is None else sorted(read_indices("--cameras", cameras, job.camera.frames))
     options = _worker_options(workers, dask, chunk)
+    if dry_run:
+        print_planned(job, restart=restart, cameras=chosen)
+        return
     render_on_screen(job, quiet=quiet, strict=strict, restart=restart, cameras=chosen, options=options)
+
+
+def print_planned(job: "Job", *, restart: bool, cameras: Sequence[int] | None) -> None:
+    """Print what a render would do."""
+    from framearray_cli.render.dry_run import plan_render, planned_lines
+
+    with Screen(err) as screen:
+        screen.wait("reading the scene and the output folder")
+        with screen.compiling():
+            planned = plan_render(job, restart=restart, cameras=cameras)
+    print_would(planned_lines(planned, job))
 
 
 def _worker_options(workers: int | None, dask: str | None, chunk: int | None) -> "WorkerOptions | None":

@@ -24,6 +24,9 @@ def verify(
     repair: Annotated[
         bool, typer.Option("--repair", help="Render what is missing or damaged again, from the job in the manifest.")
     ] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="With --repair: say what would be rendered; touch nothing.")
+    ] = False,
     threads: Threads = None,
     quiet: Quiet = False,
     json: Json = False,
@@ -31,10 +34,14 @@ def verify(
     """Check that every image of a frame array is there, whole and unchanged."""
     from framearray_cli.array.integrity import verify as run
 
+    if dry_run and not repair:
+        raise typer.BadParameter("needs --repair", param_hint="--dry-run")
     with Screen(err, quiet=quiet) as screen:
         found = run(array, threads or available_cores(), screen.counter("verifying", "file"))
     lines = verified_lines(found)
-    if not found.wrong or not repair:
+    if found.wrong and dry_run:
+        lines.append(f"would render {counted(len(found.wrong), 'file')} again")
+    if not found.wrong or not repair or dry_run:
         print_result(lines, verify_result(found), quiet=quiet and not found.wrong)
         if found.wrong:
             raise typer.Exit(CheckError.exit_code)

@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from framearray_cli.array.images.images import ImageFormat, require_writer
-from framearray_cli.array.manifest import layers_path
+from framearray_cli.array.manifest import Manifest, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.array.places import ALL_PLACES, MIDDLE_PLACE, read_indices
@@ -39,6 +39,7 @@ class ExportResult:
         target: the folder.
         n_cameras, n_lights: exported cameras, and light positions of each.
         n_points: in the point cloud.
+        replaces: whether an earlier export was there.
         notes, warnings: for the user.
     """
 
@@ -46,6 +47,7 @@ class ExportResult:
     n_cameras: int
     n_lights: int
     n_points: int
+    replaces: bool
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
 
@@ -62,6 +64,7 @@ def export_array(
     points: int = MOST_POINTS,
     copy: bool = False,
     force: bool = False,
+    dry_run: bool = False,
     progress: Progress | None = None,
 ) -> ExportResult:
     """Export the cameras that have all their images to another tool, as a folder that appears whole or not at all.
@@ -77,6 +80,7 @@ def export_array(
         points: in the point cloud, at most.
         copy: copy pictures of the array that could be linked.
         force: replace an earlier export.
+        dry_run: check everything, and write nothing.
         progress: called after each picture.
 
     Raises:
@@ -84,31 +88,40 @@ def export_array(
         OutputError: a file of the array is missing or damaged, or the target is in use or cannot be written.
     """
     manifest = read_manifest(out)
-    selection = Selection(
-        manifest=manifest,
-        cameras=tuple(sorted(read_indices("--cameras", cameras, manifest.n_cameras))),
-        lights=tuple(sorted(read_light_indices(manifest, light, at, ALL_PLACES if kind == "cinema" else MIDDLE_PLACE))),
-    )
-    if kind not in EXPORT_KINDS:
-        raise JobError("--format", [f"expected {', '.join(EXPORT_KINDS)}, got {kind!r}"])
+    selection = _select(manifest, kind, cameras, light, at)
     target, image_format = _full_name(target, kind), image_format or ImageFormat(format="png")
     require_writer(image_format.format)
     pictures = Pictures(manifest)
     has_cloud = kind != "cinema" and bool(manifest.layers)
     selection, left_out = _split_complete(pictures, selection, layers=has_cloud)
     replaces = find_earlier_export(target, _MARK_FILES[kind], force=force)
-    with whole_folder(target, replace=replaces) as folder:
-        files = _write_pictures(pictures, selection, folder / "images", image_format, copy=copy, progress=progress)
-        cloud = _make_cloud(pictures, selection, image_format.exposure, points) if has_cloud else None
-        _write_tables(folder, kind, selection, files, cloud, image_format.exposure)
-    n_points = len(cloud.position) if cloud else 0
+    n_points = 0
+    if not dry_run:
+        with whole_folder(target, replace=replaces) as folder:
+            files = _write_pictures(pictures, selection, folder / "images", image_format, copy=copy, progress=progress)
+            cloud = _make_cloud(pictures, selection, image_format.exposure, points) if has_cloud else None
+            _write_tables(folder, kind, selection, files, cloud, image_format.exposure)
+        n_points = len(cloud.position) if cloud else 0
     return ExportResult(
         target=target,
         n_cameras=len(selection.cameras),
         n_lights=len(selection.lights),
         n_points=n_points,
-        notes=_notes(kind, bool(manifest.layers), n_points, points),
+        notes=() if dry_run else _notes(kind, bool(manifest.layers), n_points, points),
+        replaces=replaces,
         warnings=(f"left out: {left_out}",) if left_out else (),
+    )
+
+
+def _select(manifest: Manifest, kind: ExportKind, cameras: str, light: str | None, at: Sequence[str]) -> Selection:
+    """Read which cameras and light positions to export."""
+    if kind not in EXPORT_KINDS:
+        raise JobError("--format", [f"expected {', '.join(EXPORT_KINDS)}, got {kind!r}"])
+    default = ALL_PLACES if kind == "cinema" else MIDDLE_PLACE
+    return Selection(
+        manifest=manifest,
+        cameras=tuple(sorted(read_indices("--cameras", cameras, manifest.n_cameras))),
+        lights=tuple(sorted(read_light_indices(manifest, light, at, default))),
     )
 
 
