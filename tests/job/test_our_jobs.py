@@ -88,7 +88,9 @@ def blocked(start: Float64, end: Float64, corners: Float64) -> bool:
     return bool(((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < 1)).any())
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in ("kitchen", "stairs") else name for name in SCENES]
+)
 def test_a_generator_makes_the_same_file_each_time(
     make: Callable[[str, Path], None], name: str, tmp_path: Path
 ) -> None:

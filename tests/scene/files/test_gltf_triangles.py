@@ -116,9 +116,10 @@ def test_draco(tmp_path: Path) -> None:
     np.testing.assert_allclose(found, QUAD[np.array([[0, 1, 2], [0, 2, 3]])], atol=1e-3)
 
 
-def test_a_million_places_are_filled_at_once(tmp_path: Path) -> None:
-    """One after the other they would take a minute; only mirrored ones are turned."""
-    glb, n = Glb(), 1_000_000
+@pytest.mark.parametrize("n", [200_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
+def test_many_places_are_filled_at_once(n: int, tmp_path: Path) -> None:
+    """One after the other a million would take a minute; only mirrored ones are turned."""
+    glb = Glb()
     scale = np.ones((n, 3), np.float32)
     scale[1::2, 0] = -1
     move = np.arange(3 * n, dtype=np.float32).reshape(n, 3)
@@ -128,7 +129,7 @@ def test_a_million_places_are_filled_at_once(tmp_path: Path) -> None:
     file = glb.save(tmp_path / "scene.glb")
     started = time.process_time()
     found = corners(read_meshes(file))
-    assert time.process_time() - started < 10
+    assert time.process_time() - started < 1e-5 * n
     assert found.shape == (n, 3, 3)
     for k in (0, 1, 2, 99_999, n - 1):
         expected = QUAD[:3] * scale[k] + move[k]
