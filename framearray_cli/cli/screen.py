@@ -37,7 +37,7 @@ out, err = _Console(), _Console(stderr=True)
 
 # Plain lines show in a log file that work goes on, without filling it up.
 SECONDS_BETWEEN_LINES = 5.0
-USUAL_KERNELS = 35  # of a render; jobs differ by a few
+RENDER_KERNELS, INIT_KERNELS = 35, 28  # that the commands compile first; jobs differ by a few
 
 
 class _Left(ProgressColumn):
@@ -97,11 +97,15 @@ class Screen:
             self._status.update(Text(what))
 
     @contextmanager
-    def compiling(self) -> Iterator[None]:
-        """Show what is compiled within the block as a stage of its own, which `compiled` ends, or the block."""
+    def compiling(self, usual: int = RENDER_KERNELS) -> Iterator[None]:
+        """Show what is compiled within the block as a stage of its own, which `compiled` ends, or the block.
+
+        Args:
+            usual: kernels that the command needs, about.
+        """
 
         def begin() -> None:
-            self._expected_kernels = max(USUAL_KERNELS - kept_kernels(), 0)
+            self._expected_kernels = max(usual - kept_kernels(), 0)
             keeping = "each time, as they cannot be kept" if problem() else "once"
             self.say([f"compiling kernels for this machine, {keeping}"])
             if self._bar is None:

@@ -131,15 +131,12 @@ def _frame_seconds(prepared: Prepared, few: FrameSetup, whole: FrameSetup, trial
     """
     n, largest = few.lights.n_lights, max(len(block) for block in blocks)
     computed = largest if whole.shadow_step == 1 else whole.lights.n_lights  # shadow steps compute all in every block
-    cost = trial.cost
+    cost, larger = trial.cost, few.n_pixels / trial.pixels
     each = Work(
         hits=cost.each.hits * hit_cost(few, computed) / hit_cost(few, n),
-        planes=cost.each.planes
-        * few.n_pixels
-        / trial.pixels
-        * pixel_cost(few, largest)
-        / pixel_cost(few, len(few.kept)),
+        planes=cost.each.planes * larger * pixel_cost(few, largest) / pixel_cost(few, len(few.kept)),
         images=writing_cost(prepared, trial.image),
+        layers=cost.each.layers * larger,
     )
     cameras = range(prepared.n_cameras)
     work = total_work(block_work(whole.for_lights(block), cameras, still=prepared.still) for block in blocks)

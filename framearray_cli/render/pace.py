@@ -24,14 +24,17 @@ MEMORY = 30.0
 # Processor time of composing over that of finding, beyond what the model of `automatic/cost.py` expects: 2.0 to 2.7 in
 # the three jobs.
 COMPOSING = 2.2
+# Processor time of writing the layers of a frame, over that of an image, before any were written.
+LAYERS = 4.0
 
 
 class Work(NamedTuple):
-    """An amount of work; `hits` native ones to find, `planes` of frames to compose, `images` to write."""
+    """An amount of work: native hits to find, planes of frames to compose, images and layers of frames to write."""
 
     hits: float
     planes: float
     images: float
+    layers: float = 0.0
 
     def __add__(self, other: "Work") -> "Work":  # type: ignore[override]
         return Work(*(a + b for a, b in zip(self, other, strict=True)))
@@ -98,7 +101,7 @@ def block_work(setup: FrameSetup, wanted: Sequence[int], *, still: bool = False)
     """
     frames = [0] if still else wanted
     hits = float(setup.per_pixel[setup.eyes_for(frames)].sum()) * setup.n_pixels
-    return Work(hits, len(frames) * len(setup.kept), len(wanted) * len(setup.kept))
+    return Work(hits, len(frames) * len(setup.kept), len(wanted) * len(setup.kept), len(wanted) * setup.layers)
 
 
 class Clocks(NamedTuple):
@@ -138,10 +141,10 @@ class Pace:
         self._lap(Work(0, planes, 0))
 
     def written(self, images: int, seconds: float) -> None:
-        """Images were written on another thread, in that many processor seconds."""
+        """A file was written on another thread, of one image or (0) of layers, in that many processor seconds."""
         with self._lock:
-            self._done += Work(0, 0, images)
-            self._spent += Work(0, 0, seconds)
+            self._done += Work(0, 0, images, not images)
+            self._spent += Work(0, 0, seconds if images else 0.0, 0.0 if images else seconds)
             # not spent on what the main thread is at
             self._last = self._last._replace(cpu=self._last.cpu + seconds)
 
@@ -163,14 +166,16 @@ class Pace:
             self._seen, recent = now, self._recent
             if done.hits >= self._work.hits and done.planes >= self._work.planes:  # what is left is writing
                 spent += Work(0, 0, max(now.cpu - self._last.cpu, 0.0))
-        hit, plane, image = (max(s, 0.0) / d if d > 0 else None for s, d in zip(spent, done, strict=True))
+        hit, plane, image, layers = (max(s, 0.0) / d if d > 0 else None for s, d in zip(spent, done, strict=True))
         known = self._expected
         if known and hit is not None:
             plane = known.plane * hit if plane is None else plane
             image = known.image if image is None else image
-        if hit is None or plane is None or image is None or recent.cpu <= 0:
+        if layers is None and image is not None:
+            layers = LAYERS * image
+        if hit is None or plane is None or image is None or layers is None or recent.cpu <= 0:
             return None
-        return Cost(each=Work(hit, plane, image), busy=recent.cpu / recent.wall)
+        return Cost(each=Work(hit, plane, image, layers), busy=recent.cpu / recent.wall)
 
     def left(self) -> float | None:
         """Return the expected seconds until the end; None: not known yet."""

@@ -109,6 +109,25 @@ def test_a_camera_at_rest_is_all_writing() -> None:
     assert worst(answers, time.wall) < 1.001
 
 
+def test_layers_of_few_light_positions_count() -> None:
+    """An image per frame, and layers that take eight times as long."""
+    time = Time()
+    pace = Pace(Work(4 * HITS, 4, 4, 4), Expected(plane=FRAME / (EYE / HITS), image=0.5, busy=2.0), time.now)
+    answers = []
+    for _ in range(4):
+        time.spend(EYE)
+        pace.found(HITS)
+    for _ in range(4):
+        time.spend(FRAME)
+        pace.composed(1)
+        for images, seconds in ((1, 0.5), (0, 4.0)):
+            time.spend(seconds)
+            pace.written(images, seconds)
+            answers.append((time.wall, pace.left()))
+    assert worst(answers[1:], time.wall) < 1.001
+    assert pace.left() == pytest.approx(0.0, abs=1e-6)
+
+
 def test_without_an_expectation_nothing_is_known_before_all_was_measured() -> None:
     time = Time()
     pace = Pace(whole(10), None, time.now)
@@ -120,9 +139,9 @@ def test_without_an_expectation_nothing_is_known_before_all_was_measured() -> No
 
 def test_the_work_of_a_resumed_render_is_that_of_the_missing_frames() -> None:
     setup: Any = SimpleNamespace(
-        per_pixel=np.array([2.0, 2, 2, 2, 2, 4]), n_pixels=100, kept=range(3),
+        per_pixel=np.array([2.0, 2, 2, 2, 2, 4]), n_pixels=100, kept=range(3), layers=True,
         eyes_for=lambda wanted: sorted({c for j in wanted for c in range(max(j - 1, 0), min(j + 1, 5) + 1)}),
     )  # fmt: skip
-    assert block_work(setup, range(6)) == Work(1400, 18, 18)
-    assert block_work(setup, [4]) == Work(800, 3, 3)
-    assert block_work(setup, range(6), still=True) == Work(400, 3, 18)
+    assert block_work(setup, range(6)) == Work(1400, 18, 18, 6)
+    assert block_work(setup, [4]) == Work(800, 3, 3, 1)
+    assert block_work(setup, range(6), still=True) == Work(400, 3, 18, 6)

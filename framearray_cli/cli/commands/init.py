@@ -11,7 +11,7 @@ from framearray_cli.base.units import counted
 from ..completions import complete_camera, complete_scene
 from ..describe import init_result
 from ..options import DryRun, Json, Quiet, output_path
-from ..screen import Screen, err, out, print_result, print_would, say
+from ..screen import INIT_KERNELS, Screen, err, out, print_result, print_would, say
 from ..streams import refuse_json
 from ..values import choice, whole
 from .init_values import Resolution, SunPlace, read_resolution, read_sun
@@ -102,7 +102,7 @@ def init(
         from framearray_cli.starter import STDOUT, StartOptions, SunOption, to_text
         from framearray_cli.starter import init as run
 
-        with screen.compiling():
+        with screen.compiling(INIT_KERNELS):
             options = StartOptions(
                 camera=camera,
                 frames=frames,
