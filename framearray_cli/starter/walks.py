@@ -12,7 +12,7 @@ from .lamps import lit_shares
 from .model import LightKeys
 from .rays import Probe
 from .room import CLEAR, Room, bounds, free_ways, select_clear
-from .sample import level_directions
+from .sample import level_directions, points_in
 from .views import Views, find_shell, judge_views, trace_views
 
 STANDS, TURNS = 250, 12  # places and directions whose views are judged
@@ -26,6 +26,11 @@ LENGTH_BONUS = 0.4  # for the longest walk; a picture of more
 LIT = 1.5  # for a view of which everything is lit by the lights of the file
 LEVEL = 0.85  # least height of the eye at the end of a walk over that at its start
 OPEN_SIDE = (0.5, 0.7, 0.9)  # distances from a side of the bounds, heights of the room, from which eyes may look in
+SIDE_RAYS, WALL_DEPTH, CLOSED = (
+    400,
+    0.1,
+    0.25,
+)  # an open side: at most that share of its rays ends so near, of half the depth
 OPEN_BONUS = 0.2  # variety by which such a view must show more than any from inside
 
 
@@ -120,8 +125,11 @@ def _walk_past_open_side(probe: Probe, room: Room, shell: NDArray[np.int64], lea
     """Choose a walk past an open side, as of a doll's house; None unless its view is worth more than `least`."""
     low, high = bounds(probe)
     middle, half = (low + high) / 2, (high - low) / 2
-    ways = np.repeat(level_directions(4, room.up), len(OPEN_SIDE), axis=0)
-    away = np.abs(ways @ half) + np.tile(OPEN_SIDE, 4) * room.height
+    sides = np.array([way for way in level_directions(4, room.up) if _is_open(probe, middle, half, way)])
+    if not len(sides):
+        return None
+    ways = np.repeat(sides, len(OPEN_SIDE), axis=0)
+    away = np.abs(ways @ half) + np.tile(OPEN_SIDE, len(sides)) * room.height
     eyes = middle + ways * away[:, None]
     value = judge_views(trace_views(probe, eyes, -ways, room.up_dir, room.height), shell, room.height)
     best = int(value.argmax())
@@ -129,3 +137,12 @@ def _walk_past_open_side(probe: Probe, room: Room, shell: NDArray[np.int64], lea
         return None
     aside = np.cross(room.up_dir, ways[best]) * 0.25 * room.height
     return Walk(eyes=np.array([eyes[best] - aside, eyes[best] + aside]), target=middle)
+
+
+def _is_open(probe: Probe, middle: Float64, half: Float64, way: Float64) -> bool:
+    """Whether hardly anything stands in one side of the bounds: a wall with a window is not open."""
+    spots = points_in(middle - half, middle + half, SIDE_RAYS)
+    depth = float(np.abs(way @ half))
+    spots += way * (depth - (spots - middle) @ way)[:, None] * (1 + 1e-3)
+    seen = probe.trace(spots, -way)
+    return bool((seen.distance < WALL_DEPTH * depth).mean() <= CLOSED)

@@ -4,14 +4,14 @@ import sys
 import time
 from pathlib import Path
 
-from support.models.cases import MODELS, OTHERS, OWN
+from support.models.cases import LATER, MODELS, OTHERS, OWN
 from support.models.score import judge
 
 
 def main(folder: Path, names: list[str]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     scores = []
-    for case in (*MODELS, *OWN, *OTHERS):
+    for case in (*MODELS, *LATER, *OWN, *OTHERS):
         if (names and case.name not in names) or (case.file is not None and not case.file.exists()):
             continue
         begin = time.perf_counter()

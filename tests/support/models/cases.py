@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from support import ROOT
-from support.models import rooms, things
+from support.models import others, rooms, things
 from support.models.shapes import Model
 from support.scenes import scenes_folder
 
@@ -148,6 +148,38 @@ MODELS = (
     ),
     Case(name="aerial", build=things.aerial, inside=False, shows={"Ball": 0.01, "Aerial": 0.002}, whole=""),
     Case(name="tower", build=things.tower, inside=False, shows={"House": 0.1, "Pane": 0.02, "Roof": 0.01}, whole=""),
+)
+LATER = (
+    Case(
+        name="glazed-room",
+        build=others.glazed_room,
+        unit="in",
+        inside=True,
+        shows={"Table": 0.02, "Chair": 0.02, "Post|Painting": 0.004},
+        little={"Wall|Ceiling": 0.7},
+        eye=STANDING,
+        unit_said="in",
+    ),
+    Case(
+        name="corridor",
+        build=others.corridor,
+        suffix=".obj",
+        unit="cm",
+        inside=True,
+        shows={"Door": 0.02, "Floor": 0.05, "Picture|Side": 0.004},
+        eye=STANDING,
+        unit_said="cm",
+    ),
+    Case(name="bowl", build=others.bowl, inside=False, shows={"Clay": 0.15}, whole=""),
+    Case(name="full-cup", build=others.full_cup, inside=False, shows={"Cup": 0.12, "Coffee": 0.01}, whole=""),
+    Case(name="chair", build=others.chair, inside=False, shows={"Chair": 0.05}, whole=""),
+    Case(
+        name="pavilion",
+        build=others.pavilion,
+        inside=False,
+        shows={"Roof": 0.02, "Bench": 0.01, "Bin": 0.003},
+        whole="Back|Roof|Post|Bench|Bin",
+    ),
 )
 OWN = (
     Case(
