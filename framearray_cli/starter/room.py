@@ -18,6 +18,7 @@ POINTS, AROUND = 3000, 64
 ROUNDS, ENOUGH, TRIM = 3, 1500, 2  # further rounds of points, until there are enough inside; per cent left out per side
 # A point is inside if at least these shares of its rays hit, and of those that hit, hit a front.
 ENCLOSED, FRONTS = 0.7, 0.75
+MOST = 1600  # points kept, since every one is compared with every other
 UNDER_SKY = 0.55  # instead of ENCLOSED in a place that has no roof
 ROOFED = 0.3  # least share of the points inside that have something above them, in a place with a roof
 # Least share of points in the bounds of a room that are inside. Rooms that were tried have 5 % (a house in a garden
@@ -106,7 +107,7 @@ def find_room(probe: Probe, up: int) -> tuple[Room | None, float]:
         places = points_in(low, high, POINTS)
         inside, _ = surroundings(probe, places)
         found = np.concatenate([found, places[inside]])
-    return _room_of(probe, up, found), share
+    return _room_of(probe, up, found[:: -(-len(found) // MOST)]), share
 
 
 def _room_of(probe: Probe, up: int, places: Float64) -> Room | None:
