@@ -178,7 +178,7 @@ def test_the_example_of_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     """Save its files and run its commands as they are."""
     files, commands = readme_files(), readme_commands()
     assert list(files) == ["room.toml", "walk.toml"]
-    assert [command.split()[1] for command in commands] == ["check", "render", "assemble"]
+    assert [command.split()[1] for command in commands] == ["check", "render", "render", "assemble"]
     box(tmp_path / "room.glb")
     for name, content in files.items():
         (tmp_path / name).write_text(content, encoding="utf-8")
@@ -186,6 +186,7 @@ def test_the_example_of_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     for command in commands:
         result = CliRunner().invoke(app, shlex.split(command)[1:], catch_exceptions=False)
         assert result.exit_code == 0, result.output
+    assert (tmp_path / "array-preview.png").is_file()
     rendered = read_manifest(tmp_path / "array")
     listed = re.findall(r"^array/(\S+)", text(ROOT / "README.md"), re.MULTILINE)
     paths = [image_path(rendered, 0, 0), image_path(rendered, 0, 1), layers_path(rendered, 0)]

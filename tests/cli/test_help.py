@@ -142,3 +142,10 @@ def test_version(capsys):
 def test_schema_is_json(capsys):
     schema = json.loads(run(capsys, "schema").out)
     assert {"scene", "camera", "light"} <= set(schema["properties"])
+
+
+@pytest.mark.parametrize("command", ["render", "export", "sheet", "report", "assemble"])
+def test_options_that_take_places_name_the_page(command, capsys):
+    text = " ".join(run(capsys, command, "--help").out.split())
+    assert (ROOT / "docs" / "guide" / "places.md").is_file()
+    assert "guide/places.md" in text

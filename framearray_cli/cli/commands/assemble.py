@@ -45,7 +45,7 @@ Stay = Annotated[
     list[str] | None,
     typer.Option(
         "--at",
-        help="Where the other stays: an index, first, last or 50%; AXIS=PLACE for one light axis. Default: first.",
+        help="Where the other stays: 5, last, 50%, or AXIS=PLACE; see guide/places.md. Default: first.",
         metavar="PLACE",
         autocompletion=complete_axis_places,
     ),
