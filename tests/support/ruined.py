@@ -218,6 +218,10 @@ CASES = {
     "one lamp of two": case(
         "light.sources[1] reaches nothing", light=lit(lamp(*GOOD_LAMP), lamp((0, 0.5, -0.7), (0, 0.5, -0.8)))
     ),
+    "forty lamps outside": case(
+        "every source reaches nothing that is seen: the lamp at [0, 2, 5]",
+        light=lit(*[lamp((0, 2, 5), (0, 2, 6 + k)) for k in range(40)]),
+    ),
     "one group of two": case(
         'light.sources[1] of group "b" reaches nothing',
         output={"format": "exr"},

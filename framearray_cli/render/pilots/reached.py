@@ -23,15 +23,18 @@ def light_warnings(views: Views, setup: FrameSetup, prepared: Prepared) -> Itera
         return
     reached = _reached(views)
     planes = list(views.positions.planes)
-    on = setup.lights.lit[:, planes] > 0
+    on = np.asarray(setup.lights.lit[:, planes] > 0)
+    joint = len(reached) < len(on)  # very many sources are judged together
+    if joint:
+        on = np.asarray(on.any(axis=0))[None]
     for s in range(len(on)):
         if not on[s].any() or (reached[s] & on[s]).all():
             continue
-        name = _name(prepared, s)
+        name = "every source" if joint else _name(prepared, s)
         dark = on[s] & ~reached[s]
         if not reached[s].any():
             yield f"{name} reaches nothing that is seen: {_reason(setup, prepared, s, planes[int(dark.argmax())])}"
-        elif buried := [p for p in np.flatnonzero(dark) if _is_buried(setup, prepared, s, planes[p])]:
+        elif not joint and (buried := [p for p in np.flatnonzero(dark) if _is_buried(setup, prepared, s, planes[p])]):
             steps = [bool(set(together) & set(buried)) for together in views.positions.together]
             at = vector(prepared.lights.sources[s].vector[planes[buried[0]]])
             yield (

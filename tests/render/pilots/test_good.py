@@ -41,8 +41,8 @@ FADE = {
         {"frame": l, "position": [0.0, 2.2, 0.3], "intensity": strength} for l, strength in enumerate((0, 1e-3, 0.1, 8))
     ],
 }
+DIM = LAMP | {"keys": [{**LAMP["keys"][0], "intensity": 0.25}]}
 EXR = {"format": "exr"}
-OUTDOORS = {"fov": 40.0, "frames": 8}
 GOOD: dict[str, dict[str, Any]] = {
     "a still camera": {},
     "a walk": {"camera": tiny.WALK},
@@ -57,6 +57,7 @@ GOOD: dict[str, dict[str, Any]] = {
     "a sun": {"light": {"frames": 1, "sources": [tiny.SUN]}},
     "a sun and a lamp": {"light": {"frames": 3, "sources": [LAMP, tiny.SUN]}},
     "a coloured lamp": {"light": {"frames": 3, "sources": [LAMP, tiny.RED]}},
+    "forty lamps": {"light": {"frames": 3, "sources": [DIM] * 40}, "output": {"format": "exr", "half": "never"}},
     "groups": {"light": GROUPS, "output": EXR},
     "axes": {"light": AXES, "output": EXR},
     "groups and a background": {"light": GROUPS, "output": EXR, "scene": {"background": [0.5, 0.6, 0.8]}},
@@ -65,7 +66,7 @@ GOOD: dict[str, dict[str, Any]] = {
     "only a background": {"light": {"frames": 1, "sources": [OFF]}, "scene": {"background": 1.0}},
     "only ambient light": {"light": {"frames": 1, "sources": [OFF]}, "ambient": {"intensity": 0.5, "paths": None}},
     "a bright sky": {"scene": {"background": [3.0, 3.5, 4.0]}},
-    "a dim lamp": {"light": {"frames": 3, "sources": [LAMP | {"keys": [{**LAMP["keys"][0], "intensity": 0.5}]}]}},
+    "a dim lamp": {"light": {"frames": 3, "sources": [DIM]}},
     "no mirrors": {"specular": {"depth": 0}},
     "ambient light from the lamps": {"ambient": {"method": "light", "paths": WALKS}},
     "fitted ambient light": {"ambient": {"method": "fit", "paths": WALKS}},
