@@ -28,7 +28,7 @@ from .commands.sheet import sheet
 from .commands.verify import verify
 from .commands.view import view
 from .document import document_text, outcome
-from .help import Command, Group, UsageError, usage_lines
+from .help import PAGES, Command, Group, UsageError, usage_lines
 from .screen import err, out, print_result, say
 from .signals import listen
 
@@ -47,7 +47,7 @@ app = typer.Typer(
 )
 
 for command in (init, check, render, verify, view, assemble, sheet, export, report, openjd, schema, doctor):
-    app.command(cls=Command)(command)
+    app.command(cls=Command, short_help=PAGES[command.__name__].summary)(command)
 
 
 def _version(wanted: bool) -> None:

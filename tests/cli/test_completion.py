@@ -12,8 +12,8 @@ from support.program import run, start, write_job
 SHELLS = ("bash", "zsh", "fish")
 
 
-def offered(shell: str, line: str, folder: Path) -> list[str]:
-    """Return what a shell would offer at the end of a line."""
+def answer(shell: str, line: str, folder: Path) -> str:
+    """Return what the program tells the script of a shell at the end of a line."""
     words = [*shlex.split(line), *([""] if line.endswith(" ") else [])]
     variables = {"_FRAMEARRAY_COMPLETE": f"complete_{shell}", "_TYPER_COMPLETE_ARGS": line}
     variables |= {"COMP_WORDS": "\n".join(words), "COMP_CWORD": str(len(words) - 1)}
@@ -23,6 +23,12 @@ def offered(shell: str, line: str, folder: Path) -> list[str]:
             patch.setenv(name, value)
         out, err = start(cwd=folder).communicate(timeout=60)
     assert err == ""
+    return out
+
+
+def offered(shell: str, line: str, folder: Path) -> list[str]:
+    """Return what a shell would offer at the end of a line."""
+    out = answer(shell, line, folder)
     if shell == "zsh":  # _arguments '*: :(("--threads":"Threads" ...))'
         return [one.strip('"').split('":"')[0] for one in out[out.find("((") + 2 : out.rfind("))")].split("\n")]
     return [one.split("\t")[0] for one in out.splitlines() if one]
@@ -46,6 +52,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_each_shell_gets_commands_and_options(shell, folder):
     assert offered(shell, "framearray re", folder) == ["render", "report"]
     assert offered(shell, "framearray render --res", folder) == ["--restart"]
+
+
+def test_descriptions_are_whole(folder):
+    """As the list of commands has them: typer would cut the first line of the help."""
+    assert "render\tRender a job into a frame array." in answer("fish", "framearray re", folder)
 
 
 @pytest.mark.parametrize(
