@@ -45,6 +45,7 @@ DOORS = {
 }
 # Libraries that load slowly or may be absent: `framearray --help` does without.
 HEAVY = (
+    "numpy",
     "numba",
     "llvmlite",
     "embreex",

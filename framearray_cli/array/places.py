@@ -16,7 +16,6 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
-from framearray_cli.base.arrays import is_number
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import counted
@@ -65,6 +64,8 @@ def is_place(value: object) -> bool:
     """Return whether a value of a file is a place: a number, "first", "last" or a percentage."""
     if isinstance(value, str):
         return value in ("first", "last") or percent(value) is not None
+    from framearray_cli.base.arrays import is_number  # loads numpy
+
     return is_number(value)
 
 

@@ -10,8 +10,6 @@ from typing import Any
 
 from framearray_cli import __version__
 
-from .results import RESULTS, Document
-
 REMARKS = ("note: ", "warning: ")  # how lines begin that are no results
 
 
@@ -44,6 +42,8 @@ outcome = Outcome()  # one command runs at a time
 
 def document_text(command: str, exit_code: int, problems: Sequence[str]) -> str:
     """Write the document of the command that ends."""
+    from .results import Document  # takes long to import
+
     document = Document(
         framearray=__version__,
         command=command,
@@ -71,9 +71,11 @@ def _plain(value: Any) -> Any:
 
 def results_schema() -> dict[str, Any]:
     """Make the JSON Schema (2020-12) of the documents of all commands."""
-    from pydantic import TypeAdapter  # takes long to import
+    from pydantic import TypeAdapter  # takes long to import, as the next
 
     from framearray_cli.base.forms.schema import DIALECT, with_descriptions
+
+    from .results import RESULTS, Document
 
     types = {"Document": Document} | {kind.__name__: kind for kinds in RESULTS.values() for kind in kinds}
     _, parts = TypeAdapter.json_schemas(

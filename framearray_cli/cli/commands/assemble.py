@@ -14,7 +14,6 @@ from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_ST
 
 from ..completions import complete_axis_places, complete_job
 from ..options import ArrayFolder, DryRun, Force, Json, Quiet, Strict, output_path, refuse_warnings
-from ..results import AssembleResult
 from ..screen import Screen, err, print_result, print_would
 from ..streams import is_stdout, output_file
 from ..values import number
@@ -130,6 +129,8 @@ def assemble(
             dry_run=dry_run,
         )
     rate = f"{float(made.fps):g} frames per second"
+    from ..results import AssembleResult
+
     result = AssembleResult(path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps))
     size = f"{counted(made.n_frames, 'frame')} from {counted(made.n_images, 'image')}"
     if dry_run:

@@ -13,7 +13,6 @@ from framearray_cli.render.messages import (
 )
 from framearray_cli.render.progress import RenderEvents, ambient_figures
 
-from ..describe import check_result
 from ..options import JobFile, Json, Output, Sets, Strict, Threads, load_job, refuse_warnings
 from ..screen import Screen, err, print_result
 
@@ -42,6 +41,8 @@ def check(
         with screen.compiling():
             estimate = run(job, CheckingEvents(screen))
     warnings = [] if strict else warning_lines(estimate.warnings)
+    from ..describe import check_result
+
     print_result([*cost_lines(estimate), *warnings], check_result(estimate))
     if strict:
         refuse_warnings(job_file, estimate.warnings)

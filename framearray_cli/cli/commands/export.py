@@ -8,7 +8,6 @@ from framearray_cli.array.places import ALL_PLACES
 from framearray_cli.base.units import counted
 
 from ..options import ArrayFolder, At, Cameras, DryRun, Exposure, Json, Light, Quiet, output_path
-from ..results import ExportResult
 from ..screen import Screen, err, print_result, print_would
 from ..values import choice, whole
 
@@ -62,6 +61,8 @@ def export(
         print_would([f"would {'replace' if made.replaces else 'write'} {made.target}: {size}"])
         return
     points_too = f", {counted(made.n_points, 'point')}" if kind != "cinema" else ""
+    from ..results import ExportResult
+
     result = ExportResult(
         directory=str(made.target), format=kind, cameras=made.n_cameras, lights=made.n_lights, points=made.n_points
     )

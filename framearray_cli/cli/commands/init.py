@@ -9,7 +9,6 @@ import typer
 from framearray_cli.base.units import counted
 
 from ..completions import complete_camera, complete_scene
-from ..describe import init_result
 from ..options import DryRun, Json, Quiet, output_path
 from ..screen import INIT_KERNELS, Screen, err, out, print_result, print_would, say
 from ..streams import refuse_json
@@ -122,6 +121,8 @@ def init(
     size = f"{counted(start.camera.frames, 'camera position')} x {counted(start.light_frames, 'light position')}"
     size += f" = {counted(images, 'image')}"
     lines = [f"{job_file}: {size}; next: framearray render {shlex.quote(str(job_file))}"]
+    from ..describe import init_result
+
     print_result(lines, init_result(start, job_file, scene), quiet=quiet)
 
 

@@ -9,7 +9,6 @@ from framearray_cli.array.places import MIDDLE_PLACE, read_axes, read_indices
 from framearray_cli.base.errors import JobError, OutputError
 
 from ..options import output_path
-from ..results import PreviewResult
 from ..screen import Screen, err, print_result
 from ..streams import is_stdout, output_file
 
@@ -57,6 +56,8 @@ def preview_on_screen(
         (height, width, _), full = made.image.shape, job.camera.resolution
         shown = ", ".join([f"camera {c}", *(f"{axis} {l}" for axis, l in places.items())])
         lines = [f"{file}: {shown}, {width} x {height} of {full[0]} x {full[1]} pixels"]
+        from ..results import PreviewResult
+
         result = PreviewResult(preview=str(file), camera=c, lights=dict(places), size=(width, height))
         print_result(lines, result, quiet=quiet)
 

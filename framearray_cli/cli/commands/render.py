@@ -24,7 +24,6 @@ from framearray_cli.render.messages import (
 from framearray_cli.render.parts.progress import PartEvents
 from framearray_cli.render.progress import ambient_figures
 
-from ..describe import render_result
 from ..options import (
     At,
     Cameras,
@@ -40,7 +39,6 @@ from ..options import (
     load_job,
     refuse_warnings,
 )
-from ..results import RenderResult
 from ..screen import Screen, err, print_result, print_would
 from ..values import whole
 from .preview import preview_on_screen, refuse_conflicts
@@ -55,6 +53,8 @@ if TYPE_CHECKING:
     from framearray_cli.render.prepare import Prepared
     from framearray_cli.render.progress import AmbientFigures
     from framearray_cli.render.target.pilot import Target
+
+    from ..results import RenderResult
 
 LITTLE_SPACE = 64 * 1024 * 1024  # bytes; with less, a full disk is the likely cause of an error
 FEW_FILES = 100  # fewer than a run has open, and leaves free when it fails
@@ -154,7 +154,7 @@ def render_on_screen(
     restart: bool = False,
     cameras: Sequence[int] | None = None,
     options: "WorkerOptions | None" = None,
-) -> RenderResult:
+) -> "RenderResult":
     """Render, show the progress on the screen, and print the summary."""
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the scene")
@@ -176,6 +176,8 @@ def render_on_screen(
                 done = f"{screen.done:,} of {counted(screen.total, 'image')} {agree(screen.done, 'was', 'were')}"
                 error.add_note(f"{done} written to {job.output.directory}; the same command goes on with the rest")
             raise
+    from ..describe import render_result
+
     result = render_result(summary, job)
     print_result(summary_lines(summary, events.printed, job), result, quiet=quiet)
     return result

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from framearray_cli.array.manifest import MAIN_AXIS
 from framearray_cli.array.places import CAMERA_AXIS, read_indices
 from framearray_cli.render.messages import scene_lines
 
@@ -69,6 +68,7 @@ def report(
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the scene")
         from framearray_cli import report as reporting
+        from framearray_cli.array.manifest import MAIN_AXIS
 
         class MeasuringEvents(reporting.ReportEvents):
             """Print the scene, then a progress bar."""

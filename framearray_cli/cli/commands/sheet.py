@@ -8,7 +8,6 @@ from framearray_cli.base.units import counted
 
 from ..completions import complete_axis
 from ..options import ArrayFolder, At, Cameras, Exposure, Force, Json, Light, Quiet, output_path
-from ..results import SheetResult
 from ..screen import Screen, err, print_result
 from ..streams import is_stdout, output_file
 from ..values import whole
@@ -60,6 +59,8 @@ def sheet(
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
     shown = f"{counted(len(made.cameras), 'camera position')} x {counted(len(made.lights), 'light position')}"
+    from ..results import SheetResult
+
     result = SheetResult(file=str(file), cameras=made.cameras, lights=made.lights, size=made.size)
     lines = [f"{file}: {shown}, {made.size[0]} x {made.size[1]} pixels"]
     print_result(lines, result, quiet=quiet or is_stdout(target))

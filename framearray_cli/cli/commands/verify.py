@@ -8,7 +8,6 @@ from framearray_cli.base.errors import CheckError
 from framearray_cli.base.memory import RENDER_NEEDS, available_cores, require_address_space
 from framearray_cli.base.units import agree, counted
 
-from ..describe import verify_result
 from ..options import ArrayFolder, Json, Quiet, Threads, with_threads
 from ..screen import Screen, err, print_result
 
@@ -33,6 +32,8 @@ def verify(
 ) -> None:
     """Check that every image of a frame array is there, whole and unchanged."""
     from framearray_cli.array.integrity import verify as run
+
+    from ..describe import verify_result
 
     if dry_run and not repair:
         raise typer.BadParameter("needs --repair", param_hint="--dry-run")
