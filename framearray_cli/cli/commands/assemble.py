@@ -4,7 +4,7 @@ import os
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,6 +17,11 @@ from ..options import ArrayFolder, DryRun, Force, Json, Quiet, Strict, output_pa
 from ..screen import Screen, err, print_result, print_would
 from ..streams import is_stdout, output_file
 from ..values import number
+
+if TYPE_CHECKING:
+    from framearray_cli.tools.movie.assemble import AssembleResult as Made
+
+    from ..results import AssembleResult
 
 PathFile = Annotated[
     Path | None,
@@ -129,15 +134,19 @@ def assemble(
             dry_run=dry_run,
         )
     rate = f"{float(made.fps):g} frames per second"
-    from ..results import AssembleResult
-
-    result = AssembleResult(path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps))
     size = f"{counted(made.n_frames, 'frame')} from {counted(made.n_images, 'image')}"
     if dry_run:
         there = os.path.isfile(target)
         print_would([f"would {'replace' if there else 'write'} {target}: {size}, {rate}"])
         return
-    print_result([f"{made.target}: {size}, {rate}"], result, quiet=quiet or is_stdout(target))
+    print_result([f"{made.target}: {size}, {rate}"], _typed(made), quiet=quiet or is_stdout(target))
+
+
+def _typed(made: "Made") -> "AssembleResult":
+    """Return the result for `--json`."""
+    from ..results import AssembleResult
+
+    return AssembleResult(path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps))
 
 
 def _movie_file(target: str, *, force: bool) -> AbstractContextManager[Path]:
