@@ -152,7 +152,9 @@ def page(results: dict[str, Any], kernels: dict[str, Any]) -> str:
     """Return the page."""
     head = ["Render", "first line", *(f"at {share:.0%}" for share in SHARES)]
     machine = ", ".join(f"{key} {value}" for key, value in describe().items())
-    text = f"{TITLE}\n{machine}.\n\n## Time left\n\n{LEFT}\n"
+    shares = [run["others"] for state in results.values() for run in state.values()] or [0.0]
+    others = f"Just before each render, other programs took {min(shares):.0%} to {max(shares):.0%} of the cores."
+    text = f"{TITLE}\n{machine}.\n{others}\n\n## Time left\n\n{LEFT}\n"
     for state in ("warm", "cold"):
         rows = [
             [name, *(f"{row['ratio']:.2f} ({row['corrected']:.2f})" for row in results[state][name]["rows"])]
