@@ -19,7 +19,7 @@ from framearray_cli.render.prepare import prepare
 # read, with its scene, and its memory estimated.
 MOST_IMAGES, MOST_LIGHTS, MOST_PIXELS, MOST_RAYS, MOST_WALKS, MOST_THREADS = 300, 60, 100_000, 3_000_000, 2_000_000, 64
 FAR_MORE = 10
-whole_render, whole_check, PROBE_RAYS = render.render, check.check, check.PROBE_RAYS
+whole_render, whole_check, TRIAL_RAYS = render.render, check.check, check.TRIAL_RAYS
 DONE = "done"  # a file in the folder of a case that says which of these it was
 
 
@@ -31,7 +31,7 @@ def render_small(folder: Path) -> Callable[[], None]:
     """
 
     def hook() -> None:
-        check.PROBE_RAYS, check.MOST_PIXELS = PROBE_RAYS // 100, check.FEWEST_PIXELS
+        check.TRIAL_RAYS, check.MOST_PIXELS = TRIAL_RAYS // 100, check.FEWEST_PIXELS
 
         def small_check(job: Any) -> Any:
             if size(job) <= FAR_MORE:
