@@ -23,7 +23,6 @@ from framearray_cli.engine.kernels.cache import kept_kernels, problem
 from framearray_cli.engine.kernels.clock import CompileClock, compile_clock
 
 from .document import REMARKS, outcome
-from .results import DryRunResult
 
 
 class _Console(Console):
@@ -255,6 +254,8 @@ def print_result(lines: Iterable[str], result: object = None, *, quiet: bool = F
 
 def print_would(lines: Iterable[str]) -> None:
     """Print what a command would do; see `--dry-run`."""
+    from .results import DryRunResult  # takes long to import
+
     lines = tuple(lines)
     print_result(lines, DryRunResult(would=lines))
 

@@ -73,7 +73,9 @@ def test_embree_traces_packets():
 def threads_of(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
     """Return the number of threads that a job is checked with."""
     seen = []
-    monkeypatch.setattr("framearray_cli.render.estimate.check", lambda job: seen.append(job.render.threads) or 1 / 0)
+    monkeypatch.setattr(
+        "framearray_cli.render.estimate.check", lambda job, *_: seen.append(job.render.threads) or 1 / 0
+    )
     with pytest.raises(ZeroDivisionError):
         run(capsys, "check", *arguments)
     return seen[0]
