@@ -1,4 +1,4 @@
-"""A contact sheet: a frame array as one picture, cameras from left to right, light positions from top to bottom."""
+"""A contact sheet: a frame array as one picture, camera positions from left to right, light positions below."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

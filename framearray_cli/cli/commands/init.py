@@ -60,11 +60,11 @@ Formats = Annotated[
 
 Frames = Annotated[
     int | None,
-    typer.Option("--frames", parser=whole(1, MOST), help="Frames of the camera.", metavar="N", show_default=False),
+    typer.Option("--frames", parser=whole(1, MOST), help="Camera positions.", metavar="N", show_default=False),
 ]
 Lights = Annotated[
     int | None,
-    typer.Option("--lights", parser=whole(1, MOST), help="Positions of the light.", metavar="N", show_default=False),
+    typer.Option("--lights", parser=whole(1, MOST), help="Light positions.", metavar="N", show_default=False),
 ]
 
 

@@ -23,7 +23,10 @@ def openjd(
     chunk: Annotated[
         int | None,
         typer.Option(
-            "--chunk", parser=whole(1), help="Frames per chunk, at most; default: 8 N_r, at least 16.", metavar="N"
+            "--chunk",
+            parser=whole(1),
+            help="Camera positions per chunk, at most; default: 8 N_r, at least 16.",
+            metavar="N",
         ),
     ] = None,
     threads: Annotated[

@@ -88,7 +88,7 @@ def render(
     chunk: Annotated[
         int | None,
         typer.Option(
-            "--chunk", parser=whole(1), help="Frames per part, at most; with --workers or --dask.", metavar="N"
+            "--chunk", parser=whole(1), help="Positions per part, at most; with --workers or --dask.", metavar="N"
         ),
     ] = None,
     strict: Strict = False,

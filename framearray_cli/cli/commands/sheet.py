@@ -26,7 +26,9 @@ def sheet(
     ],
     cameras: Cameras = None,
     light: Light = None,
-    columns: Annotated[int, typer.Option("--columns", parser=whole(1), help="Cameras, at most.", metavar="N")] = 12,
+    columns: Annotated[
+        int, typer.Option("--columns", parser=whole(1), help="Camera positions, at most.", metavar="N")
+    ] = 12,
     rows: Annotated[int, typer.Option("--rows", parser=whole(1), help="Light positions, at most.", metavar="N")] = 8,
     width: Annotated[
         int,
@@ -46,7 +48,7 @@ def sheet(
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:  # fmt: skip
-    """Draw a contact sheet: cameras from left to right, light positions from top to bottom."""
+    """Draw a contact sheet: camera positions from left to right, light positions from top to bottom."""
     from framearray_cli.tools.sheet import make_sheet
 
     file = output_path(target)

@@ -123,7 +123,7 @@ def _parameters(job: Job, job_file: Path, folder: Path, chunk: int, threads: int
             "OutputFolder", job.output.directory, "Output folder", "One folder for all chunks.",
             objectType="DIRECTORY", dataFlow="OUT",
         ),
-        number("ChunkSize", chunk, job.camera.frames, "Frames per chunk", "Frames of a chunk of the camera path."),
+        number("ChunkSize", chunk, job.camera.frames, "Camera positions per chunk", "How many of the path."),
         *([number("Threads", threads, MOST_THREADS, "Threads", "Threads of each chunk.")] if threads else []),
     ]  # fmt: skip
 
