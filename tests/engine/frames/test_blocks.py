@@ -80,5 +80,5 @@ def test_the_limit_is_that_of_the_whole_program(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr("framearray_cli.render.memory.program_memory", lambda: 1000)
     assert [len(block) for block in light_blocks(inputs, 0.0)] == [4, 3]
     monkeypatch.setattr("framearray_cli.render.memory.program_memory", lambda: 2**40)
-    with pytest.raises(JobError, match=r"needs at least 1024\.0 GiB"):
+    with pytest.raises(JobError, match=r"needs at least 1,099,51\d,\d{3},\d{3} bytes"):
         require_memory(inputs)

@@ -20,7 +20,9 @@ def views_of(inputs: Prepared) -> Views:
 
 def compiled() -> dict[str, set[str]]:
     """The kernels, and the types that each is compiled for."""
-    kernels = [found for found in gc.get_objects() if isinstance(found, Dispatcher)]
+    kernels = [
+        found for found in gc.get_objects() if issubclass(type(found), Dispatcher)
+    ]  # `isinstance` would ask dead proxies
     return {kernel.py_func.__qualname__: set(map(str, kernel.signatures)) for kernel in kernels}
 
 
