@@ -57,8 +57,11 @@ def test_embree_names_its_widths():
 
 
 @pytest.mark.slow
-def test_images_are_the_same_for_every_width(tmp_path):
-    """Kernels are compiled for one width, so each needs a process of its own."""
+def test_a_small_array_is_the_same_for_every_width(tmp_path):
+    """Kernels are compiled for one width, so each needs a process of its own.
+
+    Where triangles meet, Embree may choose another one for another width: the smoke job has no such pixel.
+    """
     found = []
     for width in (16, 8, 4):
         out = tmp_path / str(width)
