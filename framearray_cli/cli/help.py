@@ -103,8 +103,9 @@ def _context(ctx: Any) -> Iterator[None]:
     try:
         yield
     except UsageError as error:
-        if error.ctx is None:  # type: ignore[attr-defined]
-            error.ctx = ctx  # type: ignore[attr-defined]
+        known: Any = error  # `UsageError` has no type of its own here
+        if known.ctx is None:
+            known.ctx = ctx
         raise
 
 

@@ -36,7 +36,7 @@ class Work(NamedTuple):
     images: float
     layers: float = 0.0
 
-    def __add__(self, other: "Work") -> "Work":  # type: ignore[override]
+    def __add__(self, other: "Work") -> "Work":  # type: ignore[override]  # of a tuple, + would join
         return Work(*(a + b for a, b in zip(self, other, strict=True)))
 
     def __sub__(self, other: "Work") -> "Work":

@@ -55,9 +55,9 @@ def _under_the_sun(site: Site, start: Start, options: StartOptions, ends: Float6
     """Add a sun over a place; and other lights too where it lights nothing that the pictures show."""
     n = options.lights or LIGHTS
     day = make_sun_day(sun, start.file)
-    alone = replace(start, sources=(day,), light_frames=n)
-    if (factors := find_factors(alone, site.probe.scene, site.probe.embree)) is not None:
-        return _scale_lights(alone, *factors)
+    by_day = replace(start, sources=(day,), light_frames=n)
+    if (factors := find_factors(by_day, site.probe.scene, site.probe.embree)) is not None:
+        return _scale_lights(by_day, *factors)
     dark = "The sun lights nothing that the pictures show, so there is another light, too."
     return _try_lights(site, replace(start, about=(*start.about, dark)), options, ends, (day,))
 
@@ -93,7 +93,8 @@ def _without_ends(first: str, last: str) -> tuple[str, str]:
     """Leave out a share of the time at both ends, at which the sun only grazes the ground."""
     low, high = (60 * int(text[:2]) + int(text[3:]) for text in (first, last))
     cut = round(GRAZING * (high - low))
-    return tuple(f"{minute // 60:02d}:{minute % 60:02d}" for minute in (low + cut, high - cut))  # type: ignore[return-value]
+    start, stop = (f"{minute // 60:02d}:{minute % 60:02d}" for minute in (low + cut, high - cut))
+    return start, stop
 
 
 def _try_lights(site: Site, start: Start, options: StartOptions, ends: Float64, more: tuple[LightSource, ...]) -> Start:

@@ -17,7 +17,7 @@ from .views import Views, find_shell, judge_views, trace_views
 
 STANDS, TURNS = 250, 12  # places and directions whose views are judged
 DOWN = 0.12  # tangent of the angle by which eyes look below the horizon
-STARTS, PER_EYE = 30, 2  # the best views from which walks are tried; at most so many from one place
+STARTS, PER_EYE = 30, 2  # the number of views from which walks are tried, and of those at one place
 WAYS, LENGTHS = 12, (1.0, 0.6)  # directions and shares of the longest walk that are tried from each
 WALK = 0.8  # longest walk, heights of the room; over 24 frames that is 8 cm per frame at 2.5 m
 NEARER = 0.45  # longest walk, over the distance of what the eye looks at

@@ -109,14 +109,14 @@ def _ratios(lines: list[tuple[float, float, str]]) -> list[dict[str, float]]:
     """Return the first estimate, and those at some shares of the time, each with its ratios to the truth."""
     started = max(wall for wall, _, line in lines if line.startswith(("ambient light", "compiled")))
     end, all_cpu = lines[-1][:2]
-    told = [
+    printed = [
         (wall, cpu, sum(float(n) * SECONDS[unit] for n, unit in re.findall(r"([\d.]+) (s|min|h)\b", found.group(1))))
         for wall, cpu, line in lines
         if (found := re.search(r"images, (.*) left", line))
     ]
     rows = []
     for share in (0.0, *SHARES):
-        wall, cpu, left = next(row for row in told if row[0] >= started + share * (end - started))
+        wall, cpu, left = next(row for row in printed if row[0] >= started + share * (end - started))
         before = max(i for i, row in enumerate(lines) if row[0] <= max(wall - BEFORE, started))
         rate = (cpu - lines[before][1]) / max(wall - lines[before][0], 1e-6)
         rows.append({

@@ -95,16 +95,16 @@ def test_a_log_gets_no_waiting(clock):
 @pytest.fixture
 def compiler(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
     """Replace numba's events: the function returned "compiles" kernels, three seconds each."""
-    told: list[Callable[..., None]] = []
+    given: list[Callable[..., None]] = []
     found = CompileClock()
 
     @contextmanager
     def compile_clock(*calls: Callable[..., None]) -> Iterator[CompileClock]:
-        told[:] = calls
+        given[:] = calls
         yield found
 
     def compile_kernels(n: int) -> None:
-        begins, compiled = told
+        begins, compiled = given
         if not found.kernels:
             begins()
         for _ in range(n):

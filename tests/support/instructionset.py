@@ -10,7 +10,7 @@ from typing import Any
 
 from embreex import mesh_construction, rtcore, rtcore_scene
 
-from framearray_cli.engine.library import embree_library
+from framearray_cli.engine.embree_c import embree_library
 
 _NATIVE_RAY16_SUPPORTED = 34  # RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED: packets of 16 need AVX-512
 

@@ -108,7 +108,7 @@ def init(
                 lights=lights,
                 inside=inside,
                 resolution=resolution,
-                format=image_format,  # type: ignore[arg-type]
+                format=image_format,  # type: ignore[arg-type]  # the parser of the option lets no other name through
                 groups=groups,
                 sun=None if sun is None else SunOption(*sun),
             )

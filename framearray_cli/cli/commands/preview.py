@@ -1,7 +1,7 @@
 """`framearray render --preview`."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import typer
 
@@ -13,6 +13,7 @@ from ..screen import Screen, err, print_result
 from ..streams import is_stdout, output_file
 
 if TYPE_CHECKING:
+    from framearray_cli.array.images.images import Extension
     from framearray_cli.job.job import Job
 
 
@@ -35,7 +36,8 @@ def preview_on_screen(
     name = format_name(file) or ("png" if is_stdout(str(file)) else "")
     if name not in ("png", "jpg", "exr", "tif"):
         raise OutputError(f"{file}: expected a .png, .jpg, .exr or .tif for the picture of --preview")
-    require_writer(name)  # type: ignore[arg-type]  # just checked
+    image_format = cast("Extension", name)
+    require_writer(image_format)
     c = _one("--cameras", MIDDLE_PLACE if cameras is None else cameras, job.camera.frames, "camera")
     axes = light_axes(job)
     given = read_axes("--at", at, axes, {group.name: group.axis for group in job.light.groups})
@@ -51,7 +53,7 @@ def preview_on_screen(
         with screen.compiling():
             made = render_preview(job, c, places)
         exposure = job.output.exposure if name in FOR_SCREENS else 0.0
-        write_image(part, made.image, ImageFormat(format=name, exposure=exposure))  # type: ignore[arg-type]
+        write_image(part, made.image, ImageFormat(format=image_format, exposure=exposure))
     if not is_stdout(str(file)):
         (height, width, _), full = made.image.shape, job.camera.resolution
         shown = ", ".join([f"camera {c}", *(f"{axis} {l}" for axis, l in places.items())])

@@ -4,7 +4,7 @@ Kernels trace packets through a `Tracer`, which holds only addresses. Therefore 
 engines serve the same kernels:
 
 - `packets`: Embree's C functions `rtcIntersect16` and `rtcOccluded16`, or those of 8 or 4 rays per call where the
-  processor has no wider ones (`library.py`). The default.
+  processor has no wider ones (`embree_c.py`). The default.
 - `embreex`: the public API of embreex, which calls Embree once per ray. The fallback where the symbols cannot be
   reached, and the twin that tests compare packets with.
 """
@@ -15,7 +15,7 @@ from typing import Literal, Self
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.scene import Scene
 
-from ..library import embree_library
+from ..embree_c import embree_library
 from .fallback import EmbreexScene
 from .native import NativeScene
 from .packets import Tracer

@@ -8,8 +8,8 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Int32
 from framearray_cli.scene.scene import Scene
 
+from ..embree_c import packet_width
 from ..inputs.surfaces import is_cut_out, surfaces
-from ..library import packet_width
 from .packets import (
     DIRECTION,
     GEOMETRY,

@@ -9,8 +9,8 @@ from framearray_cli.base.arrays import Float32
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.scene import Scene
 
+from ..embree_c import device_configuration, packet_width
 from ..kernels.simd import LANES
-from ..library import device_configuration, packet_width
 from .masks import MaskTable
 from .packets import MASKED, OPAQUE, Tracer, aligned_zeros
 

@@ -15,9 +15,9 @@ from numba.extending import intrinsic
 
 from framearray_cli.base.arrays import Float32, Real
 
+from ..embree_c import packet_width
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, select, store_row, width_of_packets
-from ..library import packet_width
 
 RAY_ROWS = 12
 HIT_ROWS = 24  # RTCRayHit16 has 20 to 22 rows, depending on how Embree was built; the rest is padding
@@ -103,7 +103,8 @@ def empty_packets(n_rays: int, rows: int) -> Float32:
 @inlined
 def room_in(packets: Float32) -> int:
     """The number of rays that packets have room for."""
-    return packets.shape[0] * width_of_packets()  # type: ignore[no-any-return]
+    room: int = packets.shape[0] * width_of_packets()
+    return room
 
 
 @inlined
@@ -130,11 +131,11 @@ def set_ray(packets: Float32, i: int, ox: Real, oy: Real, oz: Real, dx: Real, dy
 @inlined
 def _idle_from(packets: Float32, n_rays: int) -> int:
     """Make the lanes after the last ray idle, up to a multiple of 16, and return the number of packets with rays."""
-    width = width_of_packets()
+    width: int = width_of_packets()
     n_packets = (n_rays + width - 1) // width
     for i in range(n_rays, (n_rays + LANES - 1) // LANES * LANES):
         set_ray(packets, i, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0)
-    return n_packets  # type: ignore[no-any-return]
+    return n_packets
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from ..library import device_configuration, embree_library, native_widths
+from ..embree_c import device_configuration, embree_library, native_widths
 
 _VERSION = (1, 2, 3)  # RTCDeviceProperty of Embree 3 and 4: major, minor, patch
 

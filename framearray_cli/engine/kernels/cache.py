@@ -19,7 +19,7 @@ from typing import Any
 
 from framearray_cli.base.files import reason
 
-from ..library import packet_width
+from ..embree_c import packet_width
 
 # Folders of earlier states of the source to keep: enough to switch between a few branches.
 KEPT = 3

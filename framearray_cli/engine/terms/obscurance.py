@@ -81,17 +81,17 @@ class ObscuranceSettings(NamedTuple):
 def _write_obscurance_rays(
     hits: Hits, rays: Rays, n: int, first_ray: int, n_rays: int, settings: ObscuranceSettings
 ) -> int:
-    """Write rays first_ray to first_ray + n_rays - 1 of the n listed hits; returns the number of packets.
+    """Write rays first_ray to first_ray + n_rays - 1 of the n listed hits; returns the number of rays.
 
-    A packet holds the same ray of 16 hits; n_rays consecutive packets belong to the same hits.
+    Sixteen rays in a row are the same ray of 16 hits; n_rays such rows belong to the same hits.
     """
     reach, idle = np.float32(np.inf if settings.sky else settings.d_max), np.float32(-1.0)
     step_x, step_y = np.int32(np.uint32(settings.step_x)), np.int32(np.uint32(settings.step_y))
-    # fill the last packet with copies of the last hit, whose rays stay idle
+    # fill the last step with copies of the last hit, whose rays stay idle
     for k in range(n, (n + LANES - 1) // LANES * LANES):
         rays.place[k] = rays.place[n - 1]
     # Loop state
-    packet = 0  # packets written
+    ray = 0  # rays written
     for first in range(0, n, LANES):
         # shading normal m, geometric normal g, point P, and the origin of rays slightly above it
         hit = load(rays.place, first)
@@ -111,7 +111,6 @@ def _write_obscurance_rays(
             x, y, z = cosine_direction(mx, my, mz, u, v)
             x, y, z = above(x, y, z, gx, gy, gz)
             # the ray
-            ray = packet * LANES
             store_row(rays.packets, ray, ORIGIN, ox)
             store_row(rays.packets, ray, ORIGIN + 1, oy)
             store_row(rays.packets, ray, ORIGIN + 2, oz)
@@ -120,8 +119,8 @@ def _write_obscurance_rays(
             store_row(rays.packets, ray, DIRECTION + 2, z)
             store_row(rays.packets, ray, TFAR, tfar)
             # the next point of the lattice
-            a, b, packet = a + step_x, b + step_y, packet + 1
-    return packet
+            a, b, ray = a + step_x, b + step_y, ray + LANES
+    return ray
 
 
 @kernel
@@ -245,7 +244,7 @@ def _trace_hits(
     for first_ray in range(0, settings.n_rays, room):
         # rays first_ray to first_ray + n_rays - 1 of every hit
         n_rays = min(settings.n_rays - first_ray, room)
-        n_traced = LANES * _write_obscurance_rays(hits, rays, n, first_ray, n_rays, settings)
+        n_traced = _write_obscurance_rays(hits, rays, n, first_ray, n_rays, settings)
         intersect(tracer, rays.packets, n_traced, False)
         varied = _evaluate_rays(surfaces, tracer, rays, n_traced, settings)
         _apply_textures(surfaces, tracer, rays, varied)

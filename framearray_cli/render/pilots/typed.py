@@ -15,7 +15,7 @@ MOST_COLOUR = 10.0
 COLOUR_REMEDY = "expected factors from 0 to 1: divide 8-bit codes by 255, and convert them from sRGB to linear values"
 # Of the size of the scene: where surfaces obscure each other from farther away, all of them are obscured.
 FAR_RANGE = 10.0
-# Of the distance of what is seen: about a pixel of a picture with 300 rows. Closer surfaces cannot be told apart.
+# Of the distance of what is seen: about a pixel of a picture with 300 rows. Closer surfaces look like one.
 NEAR_RANGE = 1 / 300
 
 

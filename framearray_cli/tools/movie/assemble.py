@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 from numpy.typing import NDArray
 
 from framearray_cli.array.images.check import check_image
-from framearray_cli.array.images.images import FOR_SCREENS, format_name, require_writer
+from framearray_cli.array.images.images import FOR_SCREENS, Extension, format_name, require_writer
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures, Relight
@@ -134,7 +134,7 @@ def _check_target(target: Path, n_frames: int, *, force: bool) -> None:
     suffix = target.suffix.lower()
     if suffix not in MOVIES:
         check_earlier(target, n_frames, force=force)
-        require_writer(format_name(target))  # type: ignore[arg-type]  # checked by sequence_pattern
+        require_writer(cast(Extension, format_name(target)))  # `sequence_pattern` has checked it
         return
     require_new(target, force=force)
     if suffix in VIDEOS:

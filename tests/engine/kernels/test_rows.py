@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support import ROOT
 
-from framearray_cli.engine import library
+from framearray_cli.engine import embree_c
 from framearray_cli.engine.kernels.simd import load_row, rows, store_row, width_of_packets
 
 ROWS, RAYS = 5, 48
@@ -39,13 +39,13 @@ def test_sixteen_rays_are_one_packet_or_several(width, dtype, monkeypatch):
 @pytest.mark.parametrize("widths", [(16, 8, 4), (8, 4), (4,), ()])
 def test_the_widest_native_packets_are_used(widths, monkeypatch):
     monkeypatch.delenv("FRAMEARRAY_PACKETS", raising=False)
-    monkeypatch.setattr(library, "native_widths", lambda: widths)
-    assert library.packet_width.__wrapped__() == (widths[0] if widths else 16)
+    monkeypatch.setattr(embree_c, "native_widths", lambda: widths)
+    assert embree_c.packet_width.__wrapped__() == (widths[0] if widths else 16)
 
 
 def test_embree_names_its_widths():
     """With AVX2 only there are no packets of 16, with SSE2 none of 8."""
-    program = "from framearray_cli.engine.library import native_widths; print(native_widths())"
+    program = "from framearray_cli.engine.embree_c import native_widths; print(native_widths())"
 
     def found(isa):
         environment = os.environ | {"FRAMEARRAY_EMBREE": f"isa={isa}"}
