@@ -96,7 +96,7 @@ def hemisphere_rays(stage: Stage, n_rays: int = 5) -> Count:
         d_max=stage.size, falloff=SQRT, tau=1.0, n_rays=n_rays, step_x=step_x, step_y=step_y, sky=True,
         average=nothing, background=nothing,
     )  # fmt: skip
-    traced = LANES * _write_obscurance_rays(stage.hits, rays, stage.n, 0, n_rays, settings)
+    traced = _write_obscurance_rays(stage.hits, rays, stage.n, 0, n_rays, settings)
     intersect(stage.embree.tracer, rays.packets, traced)
     row = rays.packets.transpose(0, 2, 1).reshape(-1, rays.packets.shape[1])[:traced]
     row = row[row[:, TFAR] >= 0]  # but for lanes that stand for no hit
