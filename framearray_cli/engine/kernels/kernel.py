@@ -24,17 +24,25 @@ from numba.core import caching, cgutils
 from numba.extending import intrinsic
 
 from .cache import forgive, kernel_folder
+from .pipeline import KernelCompiler
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 _LINE = 64  # bytes
 # Parts of numba without type annotations.
 _njit: Any = nb.njit
+_unliteral: Any = types.unliteral
 _Locator: Any = caching._CacheLocator
 _OfSourceFile: Any = caching._SourceFileBackedLocatorMixin
 _Files: Any = caching.CompileResultCacheImpl
 _FunctionCache: Any = caching.FunctionCache
-_OPTIONS = {"nogil": True, "error_model": "numpy", "_nrt": False}
+_OPTIONS = {
+    "nogil": True,
+    "error_model": "numpy",
+    "_nrt": False,
+    "no_cfunc_wrapper": True,  # C never calls a kernel
+    "pipeline_class": KernelCompiler,
+}
 
 
 class _OwnLocator(_OfSourceFile, _Locator):  # type: ignore[misc]
@@ -107,7 +115,19 @@ def keep_on_disk(function: F) -> F:
 def kernel(function: F) -> F:
     """Declare a hot loop, to be compiled at its first call; it must not allocate."""
     declared: F = _njit(**_OPTIONS)(function)
+    compiled: Any = declared
+    if hasattr(compiled, "get_call_template"):  # NUMBA_DISABLE_JIT leaves plain Python functions
+        compiled.get_call_template = _without_literals(compiled.get_call_template)
     return keep_on_disk(declared)
+
+
+def _without_literals(template: Callable[..., Any]) -> Callable[..., Any]:
+    """Wrap a method of numba that chooses the machine code for arguments, so that True and False share theirs."""
+
+    def of_types(args: Any, kws: Any) -> Any:
+        return template(tuple(map(_unliteral, args)), {name: _unliteral(kind) for name, kind in kws.items()})
+
+    return of_types
 
 
 def inlined(function: F) -> F:

@@ -245,7 +245,7 @@ def _trace_hits(
         # rays first_ray to first_ray + n_rays - 1 of every hit
         n_rays = min(settings.n_rays - first_ray, room)
         n_traced = _write_obscurance_rays(hits, rays, n, first_ray, n_rays, settings)
-        intersect(tracer, rays.packets, n_traced, False)
+        intersect(tracer, rays.packets, n_traced, False, 0.0)
         varied = _evaluate_rays(surfaces, tracer, rays, n_traced, settings)
         _apply_textures(surfaces, tracer, rays, varied)
         _add_to_hits(rays, n, first_ray, n_rays, settings, result, skylight)

@@ -5,7 +5,7 @@ Each `_..._of` types one function of kernels, and generates its LLVM code.
 
 import operator
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 from llvmlite import ir
 from numba import types
@@ -31,6 +31,8 @@ def _operator(function: Any, compute: Callable[..., Any], dtypes: tuple[Any, ...
     """
 
     class _Typed(_Template):  # type: ignore[misc]
+        metadata: ClassVar = {"target": "cpu"}  # makes numba try this first, before some thirty of its own
+
         def generic(self, args: Any, kws: Any) -> Any:
             lanes = [arg for arg in args if isinstance(arg, Lanes)]
             rest = [arg for arg in args if not isinstance(arg, Lanes)]

@@ -103,7 +103,7 @@ def _write_sides(
 @kernel
 def _trace_connections(tracer: Tracer, rays: Rays, n: int, walkers: Walkers, lit: Bytes) -> None:
     """Trace the n queued connections; light reaches the walks of those that nothing blocks."""
-    occlude(tracer, rays.packets, n)
+    occlude(tracer, rays.packets, n, False)
     for ray in range(n):
         if not is_blocked(rays.packets, ray):
             i, l = divmod(rays.place[ray], lit.shape[1])
