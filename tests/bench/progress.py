@@ -39,12 +39,12 @@ RENDERS: dict[str, tuple[str, list[str]]] = {
     "cabin, EXR, 48 light positions": ("cabin", ["--cameras", "0-11"]),
     "kitchen, camera at rest": ("at-rest", []),
 }
-# The command with lines closer together than a log would bear.
+# The command, with lines closer together than a log would bear. It ends as `framearray` does, at once.
 RUN = """
-import sys
-from framearray_cli.cli import main, screen
+from framearray_cli import __main__ as program
+from framearray_cli.cli import screen
 screen.SECONDS_BETWEEN_LINES = 0.25
-main.main(sys.argv[1:])
+program.main()
 """
 # The command, with each compiled kernel and its seconds, those of kernels within it included, in a file.
 COUNT = """
