@@ -25,6 +25,7 @@ from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 
+from .group_sums import group_sums
 from .manifest import initial_manifest
 from .memory import light_blocks, mirror_share, require_memory
 from .pace import Expected, Pace, block_work, plane_cost, total_work
@@ -128,6 +129,8 @@ def _render_block(run: "_Run", setup: FrameSetup, ambient: Ambient, lights: rang
         ambient: for all light positions.
     """
     target, still = array_target(run.prepared), run.prepared.still
+    if len(lights) == run.prepared.n_lights:  # else no block has all that a picture is made of
+        target = replace(target, sums=group_sums(run.prepared.lights, ambient.intensity))
     i_a = image_ambient(ambient, run.prepared.lights)
     if setup.lights.n_lights < run.prepared.n_lights:  # with shadow steps a block computes all lights
         i_a = i_a.for_lights(lights)
@@ -217,7 +220,7 @@ class _Run:
             hits=float(frame.hits.mean()),
             notes=tuple(notes),
             errors=done.errors,
-            shares=mean_shares(done.shares.values()),
+            shares=mean_shares(done.shares),
         )
         rays = self._rays + (pool.rays() if pool else Counter[str]())
         self._record.add(entry, rays, time.perf_counter() - self._started)

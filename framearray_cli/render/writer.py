@@ -25,6 +25,7 @@ from framearray_cli.engine.images.standard_error import square_mean, standard_er
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Eyes
 
+from .group_sums import GroupSum, sum_shares
 from .names import ArrayNames, array_names
 from .prepare import Prepared
 
@@ -48,6 +49,7 @@ class ArrayTarget:
         directory: output folder.
         names: file names of images and layers.
         resolution: width, height, pixels.
+        sums: pictures that the images written together add up to; empty without groups of sources.
     """
 
     directory: Path
@@ -56,6 +58,7 @@ class ArrayTarget:
     eyes: Eyes
     resolution: tuple[int, int]
     fps: float
+    sums: tuple[GroupSum, ...] = ()
 
     def attributes(self, c: int, l: int | None = None, group: str = "") -> Attributes:
         """Return the metadata of a file of camera c, at light position l of a group if it belongs to one."""
@@ -91,7 +94,7 @@ class FinishedFiles:
         composed: the frame; its images may be overwritten by now.
         files: name -> size and checksum of every file, layers included.
         errors: plane -> (mean square of the standard error, mean radiance), of images that estimate theirs.
-        shares: plane -> shares of clipped and of black pixels, of whole pictures.
+        shares: of clipped and of black pixels, of each picture; empty where these images are parts of pictures.
     """
 
     composed: Composed
@@ -99,7 +102,7 @@ class FinishedFiles:
     planes: range
     files: Mapping[str, tuple[int, str]]
     errors: Mapping[int, tuple[float, float]]
-    shares: Mapping[int, tuple[float, float]]
+    shares: Sequence[tuple[float, float]]
 
 
 class _Countdown:
@@ -181,7 +184,8 @@ class ArrayWriter:
         files: dict[str, tuple[int, str]] = {}
 
         def finish() -> None:
-            done = FinishedFiles(composed=composed, c=c, planes=self._planes, files=files, errors=errors, shares=shares)
+            found = sum_shares(composed.images, self._target.sums, self._target.format) or list(shares.values())
+            done = FinishedFiles(composed=composed, c=c, planes=self._planes, files=files, errors=errors, shares=found)
             self._finished(done)
             unfinished.count_down()
 

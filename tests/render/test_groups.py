@@ -8,7 +8,8 @@ import pytest
 from pydantic import ValidationError
 from support import tiny
 
-from framearray_cli.array.images.images import read_layers
+from framearray_cli.array.images.images import ImageFormat, read_layers
+from framearray_cli.array.images.levels import mean_shares, pixel_shares
 from framearray_cli.array.manifest import array_files
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures, Relight
@@ -90,6 +91,25 @@ def test_a_pair_of_positions_equals_a_render_of_it(
         np.testing.assert_allclose(grouped.picture(c, place), right, rtol=2e-5, atol=2e-6)
         other = grouped.picture(c, (1 - sun, lamp))
         assert np.abs(other - right).max() > 0.01, "the comparison can fail"
+
+
+def test_shares_are_those_of_the_sums(scene: Path, tmp_path: Path, grouped: Pictures) -> None:
+    """Along both axes at once, one picture for each position of the longer one."""
+    pictures = [grouped.picture(c, place) for c in range(3) for place in ((0, 0), (0, 1), (1, 2))]
+    clipped, black = mean_shares([pixel_shares(picture, ImageFormat(format="exr")) for picture in pictures])
+    found = grouped.manifest.summary
+    right = pytest.approx((clipped, black), abs=1e-3)  # sums of halves differ in the last bit, records are rounded
+    assert (found["clipped"], found["black"]) == right
+    assert 0.02 < clipped < 0.98, "the comparison can fail"
+    dark = {"intensity": [0.0] * 3}
+    off = [{**LAMP, "keys": [{**key, "intensity": [0.0] * 3} for key in LAMP["keys"]]}]
+    unlit = rendered(scene, tmp_path, off, ambient=dark, background=[0.0] * 3).manifest.summary
+    assert (unlit["clipped"], unlit["black"]) == (0.0, 1.0)
+
+
+def test_shares_are_missing_where_no_block_holds_all_light_positions(scene: Path, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("framearray_cli.render.render.light_blocks", lambda *given, **more: [range(4), range(4, 9)])
+    assert "clipped" not in rendered(scene, tmp_path, SOURCES).manifest.summary
 
 
 def test_changed_light_equals_a_render_with_it(scene: Path, tmp_path: Path, grouped: Pictures) -> None:

@@ -15,6 +15,12 @@ COUNTED = 2048
 CODE_0 = 0.5 / 255 / 12.92
 
 
+def counted_part(images: NDArray[Any]) -> NDArray[Any]:
+    """Return the pixels that are counted, of images (..., h, w, 3)."""
+    step = max(1, int(np.sqrt(images.shape[-3] * images.shape[-2] / COUNTED)))
+    return images[..., ::step, ::step, :]
+
+
 def pixel_shares(image: NDArray[Any], image_format: ImageFormat) -> tuple[float, float]:
     """Return the shares of the pixels of which any channel is clipped, and of those that are black.
 
@@ -24,8 +30,7 @@ def pixel_shares(image: NDArray[Any], image_format: ImageFormat) -> tuple[float,
     Args:
         image: (h, w, 3), linear radiance.
     """
-    step = max(1, int(np.sqrt(image.shape[0] * image.shape[1] / COUNTED)))
-    part = image[::step, ::step].astype(np.float32)
+    part = counted_part(image).astype(np.float32)
     largest = np.maximum(np.maximum(part[..., 0], part[..., 1]), part[..., 2])  # max(axis=-1) takes ten times as long
     screens = image_format.format in FOR_SCREENS
     factor = 2.0**image_format.exposure if screens else 1.0
