@@ -56,6 +56,7 @@ def check_result(estimate: "Estimate") -> CheckResult:
         disk_bytes=int(estimate.disk),
         free_disk_bytes=int(estimate.free),
         seconds=float(estimate.seconds),
+        rays_together=estimate.rays_together,
     )
 
 
@@ -69,11 +70,12 @@ def _array_size(prepared: "Prepared") -> ArraySize:
     )
 
 
-def render_result(summary: "Summary", job: "Job") -> RenderResult:
-    """Describe what a render did."""
+def render_result(summary: "Summary", job: "Job", compile_seconds: float) -> RenderResult:
+    """Describe what a render did, some of its time by compiling."""
     from framearray_cli.array.manifest import FILE_NAME
 
     folder = job.output.directory
+    clipped, black = summary.shares or (None, None)
     return RenderResult(
         directory=str(folder),
         manifest=str(folder / FILE_NAME),
@@ -82,6 +84,11 @@ def render_result(summary: "Summary", job: "Job") -> RenderResult:
         there=summary.there,
         images=summary.total,
         seconds=float(summary.seconds),
+        compile_seconds=float(compile_seconds),
+        array_seconds=float(summary.all_seconds),
+        stage_seconds={stage: float(seconds) for stage, seconds in summary.stages.items()},
+        clipped=clipped,
+        black=black,
         rays_per_pixel_image={kind: float(n) for kind, n in summary.rays_per_pixel_image.items()},
         hits_per_pixel=float(summary.hits),
         peak_memory_bytes=int(summary.peak_memory),

@@ -11,8 +11,9 @@ from pathlib import Path
 from framearray_cli import __version__
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.memory import available_cores, free_memory
+from framearray_cli.engine.embree_c import EmbreeProperties, embree_properties
 
-from .machine_report import CoreCount, DoctorResult, EmbreeReport, ExtraReport, KernelCache, LibraryReport, MemoryReport
+from .machine_report import CoreCount, DoctorResult, ExtraReport, KernelCache, LibraryReport, MemoryReport
 from .values import THREADS_VARIABLE
 
 # Packages that the program cannot do without, and the module that proves them whole.
@@ -76,14 +77,11 @@ def _library(name: str, module: str) -> LibraryReport:
     return LibraryReport(name=name, version=found, problem=problem)
 
 
-def _embree() -> EmbreeReport | None:
-    from framearray_cli.engine.embree.properties import embree_properties
-
+def _embree() -> EmbreeProperties | None:
     try:
-        found = embree_properties()
+        return embree_properties()
     except ImportError:
         return None
-    return EmbreeReport(version=found.version, packet_widths=found.widths) if found else None
 
 
 def _extra(name: str) -> ExtraReport:

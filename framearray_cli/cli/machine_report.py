@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from framearray_cli.engine.embree_c import EmbreeProperties
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LibraryReport:
@@ -10,14 +12,6 @@ class LibraryReport:
     name: str
     version: str | None
     problem: str | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EmbreeReport:
-    """Embree, and the numbers of rays that it traces with one instruction."""
-
-    version: str
-    packet_widths: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,7 +69,7 @@ class DoctorResult:
     processor: str
     instruction_sets: tuple[str, ...]
     libraries: tuple[LibraryReport, ...]
-    embree: EmbreeReport | None
+    embree: EmbreeProperties | None
     extras: tuple[ExtraReport, ...]
     cores: CoreCount
     memory: MemoryReport

@@ -27,9 +27,9 @@ from .commands.schema import schema
 from .commands.sheet import sheet
 from .commands.verify import verify
 from .commands.view import view
-from .document import document_text, outcome
+from .document import outcome
 from .help import PAGES, Command, Group, UsageError, usage_lines
-from .screen import err, out, print_result, say
+from .screen import err, print_document, print_result, say
 from .signals import listen
 
 OUT_OF_MEMORY = 2  # the job needs more than the machine has
@@ -101,7 +101,7 @@ def _print_document(command: str, exit_code: int, lines: Sequence[str]) -> int:
     """Print the JSON document of a command; return the exit code, another one where it cannot be printed."""
     problems = [line for line in lines if not re.match(r"[\d,]+ problems?; nothing was|Usage: |`framearray|$", line)]
     try:
-        say(out, [document_text(command, exit_code, problems)])
+        print_document(command, exit_code, problems)
     except FrameArrayError as error:
         with suppress(OutputError, ReaderGoneError, OSError):
             say(err, str(error).splitlines())

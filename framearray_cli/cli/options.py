@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -31,16 +31,25 @@ ArrayFolder = Annotated[
         metavar="OUT", autocompletion=complete_array, help="Folder that `render` wrote.", show_default=False
     ),
 ]
-Threads = Annotated[
-    int | None,
-    typer.Option(
+
+
+def _threads_option(otherwise: str) -> Any:
+    """Return the option `--threads`, which an environment variable stands in for.
+
+    Args:
+        otherwise: the default without both, in words.
+    """
+    return typer.Option(
         "--threads",
         envvar=THREADS_VARIABLE,
         parser=whole(1, MOST_THREADS),
-        help=f"Threads; default: ${THREADS_VARIABLE}, else the job's, else one per core.",
+        help=f"Threads; default: ${THREADS_VARIABLE}, else {otherwise}.",
         metavar="N",
-    ),
-]
+    )
+
+
+Threads = Annotated[int | None, _threads_option("the job's, else one per core")]
+ThreadsOfNoJob = Annotated[int | None, _threads_option("one per core")]
 Output = Annotated[
     str | None,
     typer.Option("--output", "-o", help="Folder for the images, instead of the job's.", metavar="FOLDER"),

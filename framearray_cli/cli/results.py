@@ -7,7 +7,9 @@ added; `framearray schema results` prints the JSON Schema that is made of these 
 from dataclasses import dataclass
 from typing import Any
 
+from .array_results import AssembleResult, ExportResult, PageResult, ServerResult, SheetResult
 from .machine_report import DoctorResult
+from .report_result import ReportResult
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +68,7 @@ class CheckResult:
         directory: folder of the images.
         automatic, target: what was chosen for "auto" and samples.error, as in the manifest; null without.
         blocks: number of blocks of light positions that are rendered one after the other.
+        rays_together: rays that Embree traces together on this machine: 16, 8 or 4; 1 where it traces them one by one.
     """
 
     name: str
@@ -81,6 +84,7 @@ class CheckResult:
     disk_bytes: int
     free_disk_bytes: int
     seconds: float
+    rays_together: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,6 +96,10 @@ class RenderResult:
         finished: whether every image of the array is there.
         written: images of this run; `there`: images on disk; `images`: in the array.
         seconds: of this run; `rays_per_pixel_image`: rays per pixel per image of this run, by kind.
+        compile_seconds: time that this run spent compiling, part of `seconds`.
+        array_seconds: of all runs that made the array, each until its last image.
+        stage_seconds: of all threads that trace and compose, in this run, by stage; writing files is no stage.
+        clipped, black: shares of the pixels of all pictures on disk, counted in a part of each; null where not known.
         standard_error: table of the manifest; null unless the job asks for it.
     """
 
@@ -102,6 +110,11 @@ class RenderResult:
     there: int
     images: int
     seconds: float
+    compile_seconds: float
+    array_seconds: float
+    stage_seconds: dict[str, float]
+    clipped: float | None
+    black: float | None
     rays_per_pixel_image: dict[str, float]
     hits_per_pixel: float
     peak_memory_bytes: int
@@ -174,34 +187,19 @@ class InitResult:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ExportResult:
-    """The folder that `export` wrote."""
+class TemplateResult:
+    """The template that `openjd` wrote.
 
-    directory: str
-    format: str
-    cameras: int
-    lights: int
-    points: int
+    Attributes:
+        template: the file; "-" for standard output.
+        chunks: number of chunks of at most `chunk` camera positions.
+        more_hits: hits of halos over those of the whole path.
+    """
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SheetResult:
-    """The picture that `sheet` drew; `cameras`: of the columns; `lights`: of the rows; `size`: pixels."""
-
-    file: str
-    cameras: tuple[int, ...]
-    lights: tuple[int, ...]
-    size: tuple[int, int]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AssembleResult:
-    """The movie or sequence that `assemble` cut; `images`: the number of different places in the array."""
-
-    path: str
-    frames: int
-    images: int
-    fps: float
+    template: str
+    chunks: int
+    chunk: int
+    more_hits: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -240,7 +238,10 @@ RESULTS: dict[str, tuple[type, ...]] = {
     "render": (RenderResult, PreviewResult, DryRunResult),
     "verify": (VerifyResult,),
     "assemble": (AssembleResult, DryRunResult),
-    "sheet": (SheetResult,),
+    "sheet": (SheetResult, DryRunResult),
     "export": (ExportResult, DryRunResult),
+    "view": (PageResult, ServerResult),
+    "report": (ReportResult,),
+    "openjd": (TemplateResult,),
     "doctor": (DoctorResult,),
 }

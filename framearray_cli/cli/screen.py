@@ -6,7 +6,7 @@ Progress is a bar on a terminal, plain lines elsewhere, nothing if quiet.
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import TracebackType
 from typing import IO, Self
@@ -18,11 +18,12 @@ from rich.text import Text
 
 from framearray_cli.base.errors import OutputError, ReaderGoneError
 from framearray_cli.base.files import reason
+from framearray_cli.base.forms.words import printable
 from framearray_cli.base.units import duration
 from framearray_cli.engine.kernels.cache import kept_kernels, problem
 from framearray_cli.engine.kernels.clock import CompileClock, compile_clock
 
-from .document import REMARKS, outcome
+from .document import REMARKS, document_text, outcome
 
 
 class _Console(Console):
@@ -73,6 +74,7 @@ class Screen:
         self._clock: CompileClock | None = None
         self._expected_kernels = 0
         self.done = self.total = 0
+        self.compile_seconds = 0.0  # of what was reported so far
 
     def say(self, lines: Iterable[str]) -> None:
         """Print progress, notes or warnings above the moving line."""
@@ -134,6 +136,7 @@ class Screen:
 
     def report_compiled(self, kernels: int, seconds: float) -> None:
         """Print the number of kernels compiled, and how long that took."""
+        self.compile_seconds += seconds
         kept = "not kept" if problem() else "kept for the next run"
         self.say([f"compiled {kernels} kernel{'s' if kernels > 1 else ''} in {duration(seconds)}; {kept}"])
 
@@ -252,6 +255,17 @@ def print_result(lines: Iterable[str], result: object = None, *, quiet: bool = F
             say(out, [line])
 
 
+def print_document(command: str, exit_code: int = 0, problems: Sequence[str] = ()) -> None:
+    """Print the document of a command if `--json` wants it, once.
+
+    Raises:
+        OutputError, ReaderGoneError: as `say`.
+    """
+    if outcome.wanted:
+        outcome.wanted = False
+        say(out, [document_text(command, exit_code, problems)])
+
+
 def print_would(lines: Iterable[str]) -> None:
     """Print what a command would do; see `--dry-run`."""
     from .results import DryRunResult  # takes long to import
@@ -277,13 +291,6 @@ def say(console: Console, lines: Iterable[str]) -> None:
         _discard(console.file)
         stream = "standard error" if console.stderr else "standard output"
         raise OutputError(f"{stream}: cannot be written: {reason(error)}") from error
-
-
-def printable(text: str) -> str:
-    """Escape invisible characters: names may hold escape sequences, or reverse the line."""
-    if text.replace("\n", "").isprintable():
-        return text
-    return "".join(c if c.isprintable() or c in "\n\xa0" else c.encode("unicode_escape").decode() for c in text)
 
 
 def _discard(stream: IO[str]) -> None:

@@ -2,9 +2,11 @@
 
 import ctypes
 import os
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+_VERSION = (1, 2, 3)  # RTCDeviceProperty of Embree 3 and 4: major, minor, patch
 # Rays per packet -> RTC_DEVICE_PROPERTY_NATIVE_RAY..._SUPPORTED.
 _NATIVE = {16: 34, 8: 33, 4: 32}
 WIDEST = 16
@@ -82,5 +84,33 @@ def native_widths() -> tuple[int, ...]:
         return ()
     try:
         return tuple(width for width, key in _NATIVE.items() if library.rtcGetDeviceProperty(device, key))
+    finally:
+        library.rtcReleaseDevice(device)
+
+
+@dataclass(frozen=True, slots=True)
+class EmbreeProperties:
+    """Embree, and the numbers of rays per packet that it traces together on this processor."""
+
+    version: str
+    packet_widths: tuple[int, ...]
+
+
+def rays_together() -> int:
+    """Return the number of rays that Embree traces together in a render on this machine; 1 through embreex."""
+    return packet_width() if embree_library() else 1
+
+
+def embree_properties() -> EmbreeProperties | None:
+    """Ask Embree; None where its functions cannot be reached, and rays go through embreex."""
+    library = embree_library()
+    if library is None:
+        return None
+    device = library.rtcNewDevice(device_configuration())
+    if not device:
+        return None
+    try:
+        version = ".".join(str(library.rtcGetDeviceProperty(device, key)) for key in _VERSION)
+        return EmbreeProperties(version, tuple(sorted(native_widths())))
     finally:
         library.rtcReleaseDevice(device)

@@ -9,6 +9,7 @@ from framearray_cli.array.images.levels import mean_shares
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.record import ArrayRecords
 from framearray_cli.base.memory import peak_memory
+from framearray_cli.engine.embree_c import rays_together
 from framearray_cli.engine.images.standard_error import error_summary
 from framearray_cli.engine.kernels.kernel import processor
 from framearray_cli.scene.paths.paths import Lights
@@ -22,14 +23,14 @@ class Summary:
 
     Attributes:
         images: number written by this run; `there`: on disk; `total`: of the array.
-        seconds: of this run so far; `stages`: processor seconds by kind of work.
+        seconds: of this run so far; `stages`: those of its threads that trace and compose, by stage.
         rays: number traced by this run, by kind.
         pixels: number per image.
         hits: mean accepted hits per pixel and frame, native and outer.
         peak_memory: bytes.
         notes: messages for the user.
         standard_error: table for the manifest; empty unless the job asks for it.
-        shares: of clipped and of black pixels among those on disk; None with groups, and where runs did not count them.
+        shares: of clipped and of black pixels among those on disk; None where runs did not count them.
         all_rays, all_seconds: of all runs.
     """
 
@@ -130,6 +131,7 @@ def with_summary(manifest: Manifest, summary: Summary) -> Manifest:
         "rays_per_pixel_image": {kind: round(n / per_image, 5) for kind, n in summary.all_rays.items()},
         "peak_memory": summary.peak_memory,
         "processor": processor(),
+        "rays_together": rays_together(),
         "notes": list(summary.notes),
     }
     if summary.shares:

@@ -2,12 +2,16 @@
 
 import json
 import os
+import signal
+import subprocess
+import tomllib
+import urllib.request
 from pathlib import Path
 from typing import Any
 
 import jsonschema
 import pytest
-from support import handmade
+from support import handmade, tiny
 from support.program import Result, finish, run, start, write_job
 
 import framearray_cli
@@ -55,10 +59,18 @@ def test_check_and_render(tmp_path, capsys):
     estimate = found["result"]
     assert (estimate["array"]["cameras"], estimate["array"]["images"]) == (1, 3)
     assert estimate["array"]["resolution"] == [24, 18] and estimate["disk_bytes"] > 100
+    assert estimate["rays_together"] in (16, 8, 4) and f"traces {estimate['rays_together']} rays together" in (
+        run(capsys, "check", job).out
+    )
     result, found = parsed(capsys, "render", job)
     assert result.code == 0 and "triangles" in result.err
     done = found["result"]
     assert (done["written"], done["there"], done["images"], done["finished"]) == (3, 3, 3, True)
+    summary = tomllib.loads(Path(done["manifest"]).read_text())["summary"]
+    assert (done["clipped"], done["black"]) == pytest.approx((summary["clipped"], summary["black"]), abs=1e-4)
+    assert summary["rays_together"] == estimate["rays_together"]
+    assert 0 <= done["compile_seconds"] < done["seconds"] and done["array_seconds"] > 0
+    assert sum(done["stage_seconds"].values()) > 0
     assert done["directory"] == str(tmp_path / "out") and Path(done["manifest"]).is_file()
     other = write_job(tmp_path, "other.toml", seed=9)
     _, found = parsed(capsys, "check", other)
@@ -106,6 +118,39 @@ def test_what_is_done_with_an_array(array, tmp_path, capsys):
     assert found["result"]["directory"].endswith("cinema.cdb") and found["result"]["lights"] == 2
     _, found = parsed(capsys, "assemble", array, "--walk", "-o", tmp_path / "frame.####.png")
     assert (found["result"]["frames"], found["result"]["images"]) == (2, 2)
+
+
+def test_a_template(tmp_path, capsys):
+    job = write_job(tmp_path, camera=tiny.WALK, reuse={"n_r": 1})
+    _, found = parsed(capsys, "openjd", job, "--chunk", "3", "-o", tmp_path / "walk.json")
+    halos = pytest.approx(0.25)  # frames 0 and 5 count twice; each half traces one frame of the other
+    right = {"template": str(tmp_path / "walk.json"), "chunks": 2, "chunk": 3, "more_hits": halos}
+    assert found["result"] == right
+    result, found = parsed(capsys, "openjd", job, "-o", "-")
+    assert result.code == 2 and "expected a file, as --json prints" in found["problems"][0]
+
+
+def test_an_exported_page(array, tmp_path, capsys):
+    _, found = parsed(capsys, "view", array, "--export", tmp_path / "page")
+    page = found["result"]
+    assert (page["directory"], page["damaged"]) == (str(tmp_path / "page"), 0) and page["pictures"] >= 4
+    assert page["size_bytes"] == sum(one.stat().st_size for one in (tmp_path / "page").rglob("*") if one.is_file())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no such signal there")
+def test_the_address_of_the_page_comes_at_once_and_ends_the_document(array):
+    process = start("view", array, "--no-browser", "--json", stdout=subprocess.PIPE)
+    assert process.stdout is not None
+    text = ""
+    while not text.endswith("\n}\n"):
+        line = process.stdout.readline()
+        assert line, text
+        text += line
+    address = valid(Result(code=0, out=text, err=""), 0)["result"]["url"]
+    with urllib.request.urlopen(address, timeout=30) as page:
+        assert b"<html" in page.read()
+    process.send_signal(signal.SIGINT)
+    assert finish(process).out == "", "one document"
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,17 @@
 """Whole reports of small jobs."""
 
 import csv
+import json
 import re
 import tomllib
 from pathlib import Path
 
+import jsonschema
 import pytest
 from support import tiny
 from support.program import Result, run, write_job
+
+from framearray_cli.cli import document
 
 pytest.importorskip("flip_evaluator")
 pytest.importorskip("jinja2")
@@ -70,6 +74,17 @@ def test_references_are_used_again(made: Path, capsys: pytest.CaptureFixture[str
     assert len(kept) == 4
     assert report(capsys, made, *FEW, "--quiet").out == ""
     assert {file: file.stat().st_mtime_ns for file in (made / "out-report" / "references").iterdir()} == kept
+
+
+def test_a_document(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = json.loads(report(capsys, made, *FEW, "--error", "0.000001", "--json").out)
+    jsonschema.Draft202012Validator(document.results_schema()).validate(found)
+    result, rows = found["result"], read_rows(made / "out-report")
+    assert [one["name"] for one in result["settings"]] == [row["name"] for row in rows]
+    assert [one["rmse"] for one in result["settings"]] == pytest.approx([float(row["rmse"]) for row in rows])
+    assert [one["best"] for one in result["settings"]] == [row["on_the_front"] == "True" for row in rows]
+    assert result["settings"][0]["lines"] == [] != result["settings"][1]["lines"]
+    assert result["advice"] == [{"error": 1e-6, "settings": None}] and Path(result["page"]).is_file()
 
 
 def test_advice_is_for_the_errors_that_were_asked_for(made: Path, capsys: pytest.CaptureFixture[str]) -> None:

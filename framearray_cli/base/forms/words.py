@@ -36,3 +36,10 @@ def range_text(low: float, high: float) -> str:
 def bound_text(value: float) -> str:
     """Write a bound: a whole number in full, unless it is long."""
     return str(int(value)) if value == int(value) and abs(value) < FARTHEST else f"{value:g}"
+
+
+def printable(text: str) -> str:
+    """Escape invisible characters: names may hold escape sequences, or reverse the line."""
+    if text.replace("\n", "").isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in "\n\xa0" else c.encode("unicode_escape").decode() for c in text)

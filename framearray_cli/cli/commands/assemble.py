@@ -21,7 +21,7 @@ from ..values import number
 if TYPE_CHECKING:
     from framearray_cli.tools.movie.assemble import AssembleResult as Made
 
-    from ..results import AssembleResult
+    from ..array_results import AssembleResult
 
 PathFile = Annotated[
     Path | None,
@@ -144,7 +144,7 @@ def assemble(
 
 def _typed(made: "Made") -> "AssembleResult":
     """Return the result for `--json`."""
-    from ..results import AssembleResult
+    from ..array_results import AssembleResult
 
     return AssembleResult(path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps))
 

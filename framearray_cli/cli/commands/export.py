@@ -61,7 +61,7 @@ def export(
         print_would([f"would {'replace' if made.replaces else 'write'} {made.target}: {size}"])
         return
     points_too = f", {counted(made.n_points, 'point')}" if kind != "cinema" else ""
-    from ..results import ExportResult
+    from ..array_results import ExportResult
 
     result = ExportResult(
         directory=str(made.target), format=kind, cameras=made.n_cameras, lights=made.n_lights, points=made.n_points

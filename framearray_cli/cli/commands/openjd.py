@@ -9,8 +9,9 @@ import typer
 from framearray_cli.base.units import MOST_THREADS
 from framearray_cli.render.messages import chunks_line
 
-from ..options import JobFile, Quiet, load_job, output_path
+from ..options import JobFile, Json, Quiet, load_job, output_path
 from ..screen import Screen, err, print_result
+from ..streams import is_stdout, output_file
 from ..values import whole
 
 
@@ -40,6 +41,7 @@ def openjd(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an existing template.")] = False,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Write an Open Job Description template that renders a job in chunks on a farm."""
     job = load_job(job_file, threads, None)
@@ -52,12 +54,17 @@ def openjd(
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the job")
         from framearray_cli.render.parts.chunks import default_size, plan_chunks, resolve_n_r
-        from framearray_cli.render.parts.openjd import template, write_template
+        from framearray_cli.render.parts.openjd import SUFFIXES, template, write_template
         from framearray_cli.scene.paths.paths import eyes
 
         n_r, still = resolve_n_r(job), eyes(job).at_rest
         size = chunk or (frames if still else default_size(frames, n_r))
         chunks = plan_chunks(range(frames), size, frames, n_r, still=still)
-        write_template(file, template(job, job_file, file.parent, size, job.render.threads), force=force)
-    if not quiet:
-        print_result([chunks_line(chunks), f"{file}; next: openjd run {shlex.quote(str(file))}"])
+        with output_file(file, SUFFIXES[0], force=force) as part:
+            folder = None if is_stdout(str(file)) else file.parent
+            write_template(part, template(job, job_file, folder, size, job.render.threads))
+    from ..results import TemplateResult
+
+    result = TemplateResult(template=str(file), chunks=len(chunks.each), chunk=size, more_hits=float(chunks.more))
+    lines = [chunks_line(chunks), f"{file}; next: openjd run {shlex.quote(str(file))}"]
+    print_result(lines, result, quiet=quiet or is_stdout(str(file)))

@@ -24,6 +24,7 @@ from framearray_cli.render.messages import (
 from framearray_cli.render.parts.progress import PartEvents
 from framearray_cli.render.progress import ambient_figures
 
+from ..document import outcome
 from ..options import (
     At,
     Cameras,
@@ -154,8 +155,8 @@ def render_on_screen(
     restart: bool = False,
     cameras: Sequence[int] | None = None,
     options: "WorkerOptions | None" = None,
-) -> "RenderResult":
-    """Render, show the progress on the screen, and print the summary."""
+) -> "RenderResult | None":
+    """Render, show the progress on the screen, and print the summary; return the result if `--json` wants it."""
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the scene")
         from framearray_cli.render.render import render as run
@@ -176,9 +177,11 @@ def render_on_screen(
                 done = f"{screen.done:,} of {counted(screen.total, 'image')} {agree(screen.done, 'was', 'were')}"
                 error.add_note(f"{done} written to {job.output.directory}; the same command goes on with the rest")
             raise
-    from ..describe import render_result
+    result = None
+    if outcome.wanted:
+        from ..describe import render_result  # takes long to import
 
-    result = render_result(summary, job)
+        result = render_result(summary, job, screen.compile_seconds)
     print_result(summary_lines(summary, events.printed, job), result, quiet=quiet)
     return result
 

@@ -8,14 +8,17 @@ import typer
 from framearray_cli.array.places import CAMERA_AXIS, read_indices
 from framearray_cli.render.messages import scene_lines
 
-from ..options import JobFile, Quiet, Threads, load_job
+from ..options import JobFile, Json, Quiet, Threads, load_job
 from ..screen import Screen, err, print_result
 from ..values import number
 
 if TYPE_CHECKING:
     from framearray_cli.report.case import Case
+    from framearray_cli.report.front import Advice
+    from framearray_cli.report.measure import Measured
     from framearray_cli.report.run import Report
 
+    from ..report_result import AdvisedSettings, MeasuredSettings, ReportResult
 
 Folder = Annotated[
     Path | None,
@@ -62,6 +65,7 @@ def report(
     times: Times = 100.0,
     threads: Threads = None,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Measure the effect of each setting of a job on speed and error, as a page with tables and plots."""
     job = load_job(job_file, threads, None)
@@ -93,8 +97,7 @@ def report(
         with screen.compiling():
             made = reporting.make_report(job, folder.absolute() if folder else beside, options, MeasuringEvents())
         reporting.write_report(made)
-    if not quiet:
-        print_result(report_lines(made))
+    print_result(report_lines(made), report_result(made), quiet=quiet)
 
 
 def _indices(option: str, texts: list[str] | None, n: int, axis: str = CAMERA_AXIS) -> tuple[int, ...]:
@@ -112,3 +115,41 @@ def report_lines(made: "Report") -> list[str]:
         found = f"{one.best.named.name}, {one.best.ms:.3g} ms per image" if one.best else "nothing that was tried"
         lines += [f"for an RMSE of {one.error:.1%}: {found}", *(f"  {line}" for line in advice_lines(one.best, made))]
     return [*lines, f"report: {made.folder / 'index.html'}"]
+
+
+def report_result(made: "Report") -> "ReportResult":
+    """Describe a report."""
+    from ..report_result import ReportResult
+
+    return ReportResult(
+        directory=str(made.folder),
+        page=str(made.folder / "index.html"),
+        cameras=tuple(int(c) for run in made.probes.cameras for c in run),
+        lights=tuple(int(l) for l in made.probes.lights),
+        reference_hits=float(made.reference_hits),
+        reference_error=float(made.reference_noise),
+        settings=tuple(_settings(one, made) for one in made.measured),
+        advice=tuple(_advised(one, made) for one in made.advice),
+    )
+
+
+def _settings(one: "Measured", made: "Report") -> "MeasuredSettings":
+    from ..report_result import MeasuredSettings
+
+    return MeasuredSettings(
+        name=one.named.name,
+        lines=tuple(one.named.settings.lines(made.settings)),
+        ms=float(one.ms),
+        rmse=float(one.quality.rmse),
+        bias=one.quality.bias,
+        noise=one.quality.noise,
+        flip=one.quality.flip,
+        hits_per_pixel=float(one.hits[0]),
+        best=one in made.front,
+    )
+
+
+def _advised(one: "Advice", made: "Report") -> "AdvisedSettings":
+    from ..report_result import AdvisedSettings
+
+    return AdvisedSettings(error=one.error, settings=_settings(one.best, made) if one.best else None)

@@ -61,7 +61,7 @@ def sheet(
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
     shown = f"{counted(len(made.cameras), 'camera position')} x {counted(len(made.lights), 'light position')}"
-    from ..results import SheetResult
+    from ..array_results import SheetResult
 
     result = SheetResult(file=str(file), cameras=made.cameras, lights=made.lights, size=made.size)
     lines = [f"{file}: {shown}, {made.size[0]} x {made.size[1]} pixels"]

@@ -6,26 +6,16 @@ import typer
 
 from framearray_cli.base.memory import available_cores
 from framearray_cli.base.signals import Stopped, cancel_alarm
-from framearray_cli.base.units import MOST_THREADS, agree, counted, size
+from framearray_cli.base.units import agree, counted, size
 
-from ..options import ArrayFolder, Force, Quiet, output_path
-from ..screen import Screen, err, print_result
-from ..values import THREADS_VARIABLE, whole
+from ..options import ArrayFolder, Force, Json, Quiet, ThreadsOfNoJob, output_path
+from ..screen import Screen, err, print_document, print_result
+from ..values import whole
 
 if TYPE_CHECKING:
     from framearray_cli.base.errors import OutputError
     from framearray_cli.tools.view.tiles import Tiles
 
-Threads = Annotated[
-    int | None,
-    typer.Option(
-        "--threads",
-        envvar=THREADS_VARIABLE,
-        parser=whole(1, MOST_THREADS),
-        help=f"Threads; default: ${THREADS_VARIABLE}, else one per core.",
-        metavar="N",
-    ),
-]
 MOST_PROBLEMS = 5  # named one by one
 
 
@@ -41,12 +31,15 @@ def view(
         str | None,
         typer.Option("--cache", help="Folder for prepared pictures; default: OUT/.view.", metavar="FOLDER"),
     ] = None,
-    threads: Threads = None,
+    threads: ThreadsOfNoJob = None,
     force: Force = False,
     quiet: Quiet = False,
+    json: Json = False,
 ) -> None:
     """Walk through a frame array in the browser."""
     from framearray_cli.tools.view.run import open_tiles, show_page, write_page
+
+    from ..array_results import PageResult, ServerResult
 
     workers = threads or available_cores()
     tiles = open_tiles(array, output_path(cache, "--cache") if cache is not None else None, workers)
@@ -59,12 +52,13 @@ def view(
             )
             screen.say(_warning_lines(problems))
             screen.end()
-            if not quiet:
-                print_result([f"{target}: the page, {size(n_bytes)}; any web server can show it"])
+            page = PageResult(directory=target, size_bytes=n_bytes, pictures=tiles.n_pictures, damaged=len(problems))
+            print_result([f"{target}: the page, {size(n_bytes)}; any web server can show it"], page, quiet=quiet)
             return
 
         def opened(url: str) -> None:
-            print_result([f"{url}  Ctrl-C ends"])
+            print_result([f"{url}  Ctrl-C ends"], ServerResult(url=url, pictures=tiles.n_pictures))
+            print_document("view")  # at once: whoever asked for it waits for the address
             screen.count("preparing", tiles.n_pictures, "picture")
 
         def prepared(problems: list["OutputError"]) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 from framearray_cli.array.ranges import frames_text
 from framearray_cli.base.errors import OutputError
-from framearray_cli.base.files import require_new, write_bytes
+from framearray_cli.base.files import write_bytes
 from framearray_cli.base.units import MOST_THREADS, counted
 from framearray_cli.job.job import Job
 
@@ -22,11 +22,12 @@ LONGEST_CHUNK, LONGEST_VERIFY = 24 * 3600, 4 * 3600
 NOTICE = 30
 
 
-def template(job: Job, job_file: Path, folder: Path, chunk: int, threads: int | None = None) -> dict[str, Any]:
+def template(job: Job, job_file: Path, folder: Path | None, chunk: int, threads: int | None = None) -> dict[str, Any]:
     """Return a template of two steps: render the chunks, then verify every file.
 
     Args:
-        folder: of the template; paths in it are relative to the template, so that both can be moved together.
+        folder: of the template; paths in it are relative to the template, so that both can be moved together. None:
+            not known, and all paths are absolute.
         chunk: most frames per chunk.
         threads: per chunk; None: all of the machine.
     """
@@ -85,7 +86,7 @@ def _action(arguments: list[str], timeout: int) -> dict[str, Any]:
     }
 
 
-def _parameters(job: Job, job_file: Path, folder: Path, chunk: int, threads: int | None) -> list[dict[str, Any]]:
+def _parameters(job: Job, job_file: Path, folder: Path | None, chunk: int, threads: int | None) -> list[dict[str, Any]]:
     """Return the parameters that can be changed when the template is submitted."""
 
     def number(name: str, value: int, most: int, label: str, description: str) -> dict[str, Any]:
@@ -128,19 +129,18 @@ def _parameters(job: Job, job_file: Path, folder: Path, chunk: int, threads: int
     ]  # fmt: skip
 
 
-def _template_path(folder: Path, place: Path) -> str:
+def _template_path(folder: Path | None, place: Path) -> str:
     """Return a path as the template names it: relative if it lies in the template's folder, else absolute."""
-    place, folder = place.absolute(), folder.absolute()
-    return place.relative_to(folder).as_posix() if place.is_relative_to(folder) else str(place)
+    place, folder = place.absolute(), folder.absolute() if folder else None
+    return place.relative_to(folder).as_posix() if folder and place.is_relative_to(folder) else str(place)
 
 
-def write_template(target: Path, made: dict[str, Any], *, force: bool) -> None:
+def write_template(target: Path, made: dict[str, Any]) -> None:
     """Write a template, whole or not at all.
 
     Raises:
-        OutputError: the file exists already, or cannot be written.
+        OutputError: the file has another suffix, or cannot be written.
     """
     if target.suffix.lower() not in SUFFIXES:
         raise OutputError(f"{target}: expected a name that ends in {', '.join(SUFFIXES)}")
-    require_new(target, force=force)
     write_bytes(target, (json.dumps(made, indent=2, ensure_ascii=False) + "\n").encode())
