@@ -63,7 +63,7 @@ def hits_of(job: Job) -> Lit:
         samples = Samples(setup.seed, setup.order, per_pixel=1, first=0)
         native_hits(setup.cams, 0, samples, 0, n, setup.world, False, scratch.hit_rays.packets, scratch.hits)
         irradiance = np.empty((n, setup.lights.channels, setup.lights.n_lights), np.float32)
-        direct(scratch.hits, n, setup.lights, setup.tracer, scratch.test_rays, irradiance)
+        direct(scratch.hits, n, setup.lights, setup.tracer, scratch.test_rays, irradiance, True)
     hits = scratch.hits
     met = hits.kind[:n] == SURFACE
     return Lit(

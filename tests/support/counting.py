@@ -82,7 +82,7 @@ def _lit(stage: Stage, lamps: Any) -> Any:
     source = LightPath(kind="point", vector=lamps, intensity=power)
     lights = light_arrays(lights_without_groups([source]), stage.scene.centre)
     out = np.empty((stage.n, 1, len(lamps)), np.float32)
-    direct(stage.hits, stage.n, lights, stage.embree.tracer, room_for_tests(4096, len(lamps)), out)
+    direct(stage.hits, stage.n, lights, stage.embree.tracer, room_for_tests(4096, len(lamps)), out, True)
     return out[:, 0] > 0
 
 

@@ -42,7 +42,8 @@ def estimate_terms(
     )
     middle = perf_counter()
     if scratch.steps is None:
-        rays = direct(hits, n, setup.lights, setup.tracer, scratch.test_rays, out.irradiance)
+        neighbours = not len(throughput)  # behind mirrors hits lie apart
+        rays = direct(hits, n, setup.lights, setup.tracer, scratch.test_rays, out.irradiance, neighbours)
     else:
         irradiance = out.irradiance if setup.keeps_all else scratch.irradiance
         rays = direct_by_steps(

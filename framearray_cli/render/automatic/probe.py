@@ -77,7 +77,7 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
     frames, densities, diffuse, shadow = [], [], [], 0
     for c in evenly_spaced(n_c, PROBE_FRAMES):
         native_hits(cams, c, samples, 0, n, world, False, hit_rays.packets, hits)
-        shadow += direct(hits, n, lights, embree.tracer, test_rays, irradiance)
+        shadow += direct(hits, n, lights, embree.tracer, test_rays, irradiance, True)
         eyes = range(max(c - reach, 0), min(c + reach, n_c - 1) + 1)
         density, first = np.zeros((n, 2 * reach + 1)), eyes.start - c + reach
         density[:, first : first + len(eyes)] = _densities(cams, c, eyes, hits, n, embree, test_rays)

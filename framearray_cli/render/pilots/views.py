@@ -172,7 +172,7 @@ class _Look:
         irradiance = with_room((n, *self._setup.stored_light), np.float32)
         found = np.zeros((len(self._sources), irradiance.shape[2]), np.int32)
         for s, source in enumerate(self._sources):
-            direct(hits, n, source, self._setup.tracer, scratch.test_rays, irradiance)
+            direct(hits, n, source, self._setup.tracer, scratch.test_rays, irradiance, True)
             found[s] = (irradiance > 0).any(axis=1).sum(axis=0)
         return found
 

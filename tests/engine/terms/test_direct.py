@@ -40,12 +40,12 @@ def arrays(*sources: LightPath) -> LightArrays:
     return light_arrays(lights_without_groups(sources), np.zeros(3))
 
 
-def lit(scene: Scene, hits: Hits, lights: LightArrays, room: int = 4096) -> tuple[Any, int]:
+def lit(scene: Scene, hits: Hits, lights: LightArrays, room: int = 4096, neighbours: bool = True) -> tuple[Any, int]:
     """Irradiance (n, 3, n_lights), the lights' colour included, and the number of rays."""
     n = len(hits.kind)
     out = np.full((n, lights.channels, lights.n_lights), np.nan, np.float32)
     with EmbreeScene(scene) as embree:
-        rays = direct(hits, n, lights, embree.tracer, room_for_tests(room, lights.n_lights), out)
+        rays = direct(hits, n, lights, embree.tracer, room_for_tests(room, lights.n_lights), out, neighbours)
     return out * lights.colour.T, rays
 
 
@@ -93,6 +93,20 @@ def test_few_lights_are_those_of_many(room: int) -> None:
         np.testing.assert_allclose(found, expected[:, :, :n_lights], rtol=1e-6, atol=0)
         assert rays == sum(lit(scene, hits, arrays(*(at(s, l) for s in few)), room)[1] for l in range(n_lights))
         assert (found[[7, 11]] == 0).all()
+
+
+@pytest.mark.parametrize("n_lights", [9, 16, 18, 48])
+def test_hits_that_lie_together_get_the_same_light_to_the_last_bit(n_lights: int) -> None:
+    scene = tiny.scene_of(np.concatenate([tiny.box((-2, 1, -2), (2, 1.5, 2)), *FAR]))
+    hits = floor_points(203)
+    hits.kind[7], hits.reflectivity[11] = ESCAPED, 0.0
+    hits.shading[:] += RNG.normal(scale=0.1, size=(203, 3))
+    positions, ways = RNG.uniform(-3, 3, (n_lights, 3)) + ABOVE, RNG.normal(size=(n_lights, 3)) - ABOVE
+    lights = arrays(lamps(positions, (3.0, 2.0, 1.0)), suns(ways, (1.0, 2.0, 3.0)))
+    together, rays = lit(scene, hits, lights, 64, neighbours=True)
+    apart, rays_apart = lit(scene, hits, lights, 64, neighbours=False)
+    np.testing.assert_array_equal(together, apart)
+    assert rays == rays_apart and 0.1 < (together > 0).mean() < 0.9
 
 
 def at(source: LightPath, l: int) -> LightPath:

@@ -83,7 +83,7 @@ class Workspace:
         """Direct irradiance at the n current hits, (n, channels, n_lights); 0 where no walk leaves diffusely."""
         self.leaves[:n] = self.walkers[0].step[:n, None] == DIFFUSE
         hits = self.hits[0]._replace(reflectivity=self.leaves)
-        self.rays += direct(hits, n, lights, tracer, self.test_rays, self.irradiance)
+        self.rays += direct(hits, n, lights, tracer, self.test_rays, self.irradiance, False)
         return self.irradiance[:n]
 
     def add_direct(self, n: int, lights: LightArrays, tracer: Tracer) -> None:
