@@ -8,7 +8,7 @@ OUT := out/kitchen-small
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-scaling bench-bias bench-ambient bench-report bench-progress bench-first bench-view fuzz clean
+.PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-packets bench-scaling bench-bias bench-ambient bench-report bench-progress bench-first bench-view fuzz clean
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -64,6 +64,10 @@ docs: $(VENV)/installed-dev ## Write the generated pages of docs/
 
 bench: $(VENV)/installed-bench ## Measure the cost per image, and write docs/measured/speed.md
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)
+
+bench-packets: $(VENV)/installed-bench ## Measure rays in packets of every width, with and without AVX-512, and write docs/measured/packets.md
+	PYTHONPATH=tests $(BIN)/python -m bench packets $(BENCH)
+	PYTHONPATH=tests $(BIN)/python -m bench packets --avx2 $(BENCH)
 
 bench-scaling: $(VENV)/installed-bench ## Measure time against the size of a job, for docs/measured/speed.md
 	PYTHONPATH=tests $(BIN)/python -m bench scaling $(BENCH)

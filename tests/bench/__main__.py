@@ -2,6 +2,8 @@
 
 import argparse
 import json
+import os
+import sys
 
 from bench.ambient import pathtraced
 from bench.ambient import run as ambient
@@ -15,19 +17,21 @@ from bench.core.cases import (
     with_resolution,
     with_settings,
 )
-from bench.core.results import folder, load, save
+from bench.core.results import folder, limited, load, save
 from bench.core.steady import steady
 from bench.error import bias, error, reported, reports
 from bench.error import bias_page as biaspage
 from bench.peers import cycles, mitsuba3, peers
-from bench.speed import first, processes, scaling, speed
+from bench.speed import first, packets, processes, scaling, speed
 from bench.speed import page as table
 from bench.view import page as viewpage
 
 PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
 PARTS = ("speed", "error", "peers", "memory", "startup")
 TRACES = ("trace", "trace-means")
-OTHERS = ("scaling", "report", "bias", "reported", "page", "peak", "view", "first", *TRACES, *ambient.PARTS)
+# As `make test-avx2` limits the tests.
+AVX2 = {"FRAMEARRAY_EMBREE": "isa=avx2", "NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": "+avx2"}
+OTHERS = ("scaling", "packets", "report", "bias", "reported", "page", "peak", "view", "first", *TRACES, *ambient.PARTS)
 
 
 def main() -> None:
@@ -45,7 +49,10 @@ def main() -> None:
     parser.add_argument("--resolution", help="for `peak`: 800x600")
     parser.add_argument("--frames", type=int, default=2, help="for `peak`")
     parser.add_argument("--mitsuba", default=pathtraced.COMPILED, help="for `trace` and `trace-means`: the variant")
+    parser.add_argument("--avx2", action="store_true", help="no instructions beyond AVX2")
     args = parser.parse_args()
+    if args.avx2 and not limited():
+        os.execve(sys.executable, [sys.executable, "-m", "bench", *sys.argv[1:]], {**os.environ, **AVX2})
     if args.what in ambient.PARTS:
         ambient.run(args.what, args.jobs, args.quick)
         return
@@ -74,6 +81,11 @@ def main() -> None:
             save(out, f"reported-{name}", {"rows": reported.measure(name, out)})
         reported.write([row for name in JOBS if (kept := load(out, f"reported-{name}")) for row in kept["rows"]])
         return
+    if args.what == "packets":
+        for name in jobs:
+            save(out, f"packets-{name}", packets.measure(name, args.quick))
+        packets.write(args.quick)
+        return
     if args.what == "report":
         for name in jobs:
             reports.measure(name)
@@ -101,7 +113,8 @@ def main() -> None:
     if "scaling" in todo:
         save(out, "scaling", scaling.measure(args.quick))
     table.write(args.quick)
-    biaspage.write(args.quick)
+    if not limited():
+        biaspage.write(args.quick)
 
 
 def peak(name: str, variant: Variant, args: argparse.Namespace) -> dict[str, object]:

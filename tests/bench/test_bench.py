@@ -8,7 +8,7 @@ from bench.core.results import DOCS, load, median, save, site_for, site_in
 from bench.core.steady import mean
 from bench.error import reports
 from bench.error.bias_page import at_most, at_time
-from bench.speed.floor import PIECE, _pieces
+from bench.speed.recording import COHERENT, KEPT_ROWS, OCCLUDED, PIECE, Recording, cut, regroup
 from bench.speed.scaling import resampled
 from framearray_cli.engine.inputs.lights import DIRECTIONAL, POINT, LightArrays
 from framearray_cli.report.metrics import block_mean, errors, relmse, rmse, shadow_edges, squared_bias
@@ -132,18 +132,34 @@ def test_a_resampled_light_path_keeps_its_ends_and_directions_stay_unit():
     np.testing.assert_allclose(found.vector[0, :, 1], (path[:, 0] + path[:, 1]) / 2, atol=1e-6)
 
 
-def test_pieces_hold_one_kind_and_one_flag_each():
-    flags = np.array([0] * 3 + [2] * (PIECE + 5) + [1] * 4, np.uint8)
-    found = _pieces([(3, "native"), (3, "obscurance"), (PIECE + 8, "shadow"), (len(flags), "native")],
-                    ("native", "obscurance", "shadow"), flags)  # fmt: skip
-    assert found.tolist() == [
-        [0, 3, 0],
-        [3, PIECE + 3, 2],
-        [PIECE + 3, PIECE + 8, 2],
-        [PIECE + 8, PIECE + 12, 0],
-    ]
-    mixed = _pieces([(len(flags), "native")], ("native",), flags)
-    assert mixed.tolist() == [[0, 3, 0], [3, PIECE + 3, 0], [PIECE + 3, PIECE + 8, 0], [PIECE + 8, PIECE + 12, 0]]
+@pytest.mark.parametrize("width", [8, 16])
+def test_pieces_hold_one_kind_and_one_flag_each(width: int):
+    n = PIECE // width
+    flags = np.array([0] * 3 + [2] * (n + 5) + [1] * 4, np.uint8)
+    found = cut([(3, "native"), (3, "obscurance"), (n + 8, "shadow"), (len(flags), "native")],
+                ("native", "obscurance", "shadow"), flags, width)  # fmt: skip
+    assert found.tolist() == [[0, 3, 0], [3, n + 3, 2], [n + 3, n + 8, 2], [n + 8, n + 12, 0]]
+    mixed = cut([(len(flags), "native")], ("native",), flags, width)
+    assert mixed.tolist() == [[0, 3, 0], [3, n + 3, 0], [n + 3, n + 8, 0], [n + 8, n + 12, 0]]
+
+
+@pytest.mark.parametrize("width", [1, 4, 8, 16])
+def test_rays_keep_their_order_in_packets_of_another_width(width: int):
+    lanes = np.arange(KEPT_ROWS * 5 * 8, dtype=np.float32).reshape(KEPT_ROWS, 40)
+    lanes[8, 13:16] = lanes[8, 35:] = -1.0  # idle at the end of each run
+    packets = np.ascontiguousarray(lanes.reshape(KEPT_ROWS, 5, 8).transpose(1, 0, 2))
+    flags = np.array([OCCLUDED | COHERENT] * 2 + [0] * 3, np.uint8)
+    pieces = np.array([[0, 2, 0], [2, 5, 1]])
+    recording = Recording(
+        rays=packets, flags=flags, kinds=("shadow", "obscurance"), pieces=pieces, n_rays={}, n_pixels=1
+    )
+    found = regroup(recording, width)
+    assert found.width == width
+    for (start, stop, kind), live in zip(found.pieces, (slice(0, 13), slice(16, 35)), strict=True):
+        again = found.rays[start:stop].transpose(1, 0, 2).reshape(KEPT_ROWS, -1)
+        np.testing.assert_array_equal(again[:, again[8] >= 0], lanes[:, live])
+        assert stop - start == -(-(live.stop - live.start) // width)
+        assert (found.flags[start:stop] == recording.flags[pieces[kind, 0]]).all()
 
 
 def test_an_error_at_another_time_lies_on_the_line_of_logarithms():

@@ -36,9 +36,14 @@ def site_in(results: Path) -> Site:
 DOCS = Site(pages=ROOT / "docs" / "measured", plots=ROOT / "docs" / "plots", pictures=ROOT / "docs" / "pictures")
 
 
+def limited() -> str:
+    """The instruction set that the measurements are limited to, as `avx2`; "" where they are not."""
+    return os.environ.get("FRAMEARRAY_EMBREE", "").removeprefix("isa=")
+
+
 def folder(quick: bool) -> Path:
-    """Where results go; those of quick runs are kept apart."""
-    return RESULTS / "quick" if quick else RESULTS
+    """Where results go; those of quick runs and of limited instruction sets are kept apart."""
+    return RESULTS / limited() / "quick" if quick else RESULTS / limited()
 
 
 def site_for(quick: bool) -> Site:

@@ -77,9 +77,9 @@ class TimedWriter(ArrayWriter):
         """Take a block back that is not to be written."""
         self._free.put(block)
 
-    def _write_image(self, composed: Composed, c: int, p: int, errors: dict[int, tuple[float, float]]) -> Path:
+    def _write_image(self, composed: Composed, c: int, p: int, **found: dict[int, tuple[float, float]]) -> Path:
         started = time.thread_time()
-        path = super()._write_image(composed, c, p, errors)
+        path = super()._write_image(composed, c, p, **found)
         with self._lock:
             self.seconds += time.thread_time() - started
         return path

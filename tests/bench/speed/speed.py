@@ -12,7 +12,8 @@ from bench.core.results import Table, median
 from bench.core.steady import start_of, steady_mean
 from framearray_cli.array.images.images import ImageFormat
 
-from .floor import record, replay
+from .floor import replay
+from .recording import record
 
 # How images are written where a variant is timed with writing.
 FORMATS = {
