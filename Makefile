@@ -65,7 +65,7 @@ docs: $(VENV)/installed-dev ## Write the generated pages of docs/
 bench: $(VENV)/installed-bench ## Measure the cost per image, and write docs/measured/speed.md
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)
 
-bench-packets: $(VENV)/installed-bench ## Measure rays in packets of every width, with and without AVX-512, and write docs/measured/packets.md
+bench-packets: $(VENV)/installed-bench ## Measure rays in packets of every width, with and without AVX-512, and write their page
 	PYTHONPATH=tests $(BIN)/python -m bench packets $(BENCH)
 	PYTHONPATH=tests $(BIN)/python -m bench packets --avx2 $(BENCH)
 

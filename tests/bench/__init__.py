@@ -15,7 +15,7 @@
     speed/    the cost of an image
         recording.py   the rays of a frame or of an ambient estimate, as the program traces them
         floor.py       the same rays, only traced by Embree
-        packets.py     the time of each kind of ray in packets of every width -> docs/measured/packets.md
+        packets.py     the time of each kind of ray in packets of every width -> a page
         speed.py       the program, its options, its floor and its baselines in turn, several times
         processes.py   start-up time and peak memory, each in a process of its own
         scaling.py     time per image against the size of a job
