@@ -4,7 +4,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -102,7 +102,8 @@ def differences(old: Manifest, new: Identity) -> list[str]:
     found = []
     if old.version != __version__:
         found.append(f"program: {old.version} there, {__version__} now")
-    found += _changes(_relevant(old.job), _relevant(new.job))
+    ignored = metadata_of(old.job).keys() & metadata_of(new.job).keys()
+    found += _changes(_relevant(old.job, ignored), _relevant(new.job, ignored))
     if old.scene.get("fingerprint", new.scene) != new.scene:
         found.append("scene: another model, texture or material")
     if not found and (old.name, old.fingerprint) != (new.name, new.fingerprint):
@@ -110,10 +111,14 @@ def differences(old: Manifest, new: Identity) -> list[str]:
     return found
 
 
-def _relevant(job: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the part of a job's table that pixels and file names depend on."""
+def _relevant(job: Mapping[str, Any], ignored: Iterable[tuple[str, str]]) -> dict[str, Any]:
+    """Return the part of a job's table that pixels and file names depend on.
+
+    Args:
+        ignored: further keys that they do not depend on.
+    """
     table: dict[str, Any] = json.loads(json.dumps({k: v for k, v in job.items() if k != "render"}, default=str))
-    for section, key in (("output", "directory"), ("scene", "file"), ("scene", "folders"), *metadata_of(job)):
+    for section, key in (("output", "directory"), ("scene", "file"), ("scene", "folders"), *ignored):
         table.get(section, {}).pop(key, None)
     return table
 

@@ -28,6 +28,8 @@ from .record import FOLDER, read_records, rewrite_checksums
 JOURNAL = "rates.json"  # in the folder of the records, while headers are rewritten
 HOLD_RATE = (".exr", ".png")  # files whose headers hold the frame rate
 
+LOSSLESS = ("none", "rle", "zip", "zips", "piz")  # kinds of compression: each file names its own, and holds all pixels
+
 # Keys that files depend on only if another key of their table has one of these values.
 NEEDS: dict[tuple[str, str], tuple[str, Collection[object]]] = {
     ("output", "compression"): ("format", ("exr",)),
@@ -47,12 +49,22 @@ def metadata_of(job: Mapping[str, Any]) -> dict[tuple[str, str], Any]:
         table = job.get(section)
         if isinstance(table, Mapping) and key in table and table.get(other) not in values:
             found[section, key] = table[key]
+    output = job.get("output")
+    if isinstance(output, Mapping) and output.get("compression") in LOSSLESS:
+        found["output", "compression"] = output["compression"]
     return found
 
 
 def metadata_differs(old: Manifest, job: Mapping[str, Any], fps: float) -> bool:
     """Return whether an array must take over values of a job, or a run that did so was interrupted."""
     return old.fps != fps or metadata_of(old.job) != metadata_of(job) or was_interrupted(old.directory)
+
+
+def other_compression(old: Manifest, job: Mapping[str, Any]) -> str | None:
+    """Return the lossless compression that a job wants of EXR files, if the array has another one."""
+    new = metadata_of(job).get(("output", "compression"))
+    is_exr = job.get("output", {}).get("format") == "exr"
+    return new if is_exr and new != metadata_of(old.job).get(("output", "compression")) else None
 
 
 def was_interrupted(folder: Path) -> bool:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from framearray_cli.array.folder import check_folder, removable_files
+from framearray_cli.array.folder import check_folder, read_array, removable_files
 from framearray_cli.array.integrity import scan_output
 from framearray_cli.array.ranges import brief_frames_text
 from framearray_cli.base.units import agree, counted
@@ -41,7 +41,8 @@ def plan_render(job: Job, *, restart: bool, cameras: Sequence[int] | None) -> Pl
     require_least_memory(prepared)
     with open_embree(prepared) as embree:
         prepared, _ = resolve_auto(prepared, embree)
-    identity, directory = identity_of(prepared), job.output.directory
+    directory = job.output.directory
+    identity = identity_of(prepared, None if restart else read_array(directory))
     old = check_folder(directory, identity, restart=restart)
     chosen = range(prepared.n_cameras) if cameras is None else cameras
     if old is None or restart:

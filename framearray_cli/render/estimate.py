@@ -92,7 +92,7 @@ def check(job: Job, events: RenderEvents | None = None) -> Estimate:
             prepared, settings = resolve_auto(prepared, embree)
             if settings:
                 events.resolved(settings)
-            identity = identity_of(prepared)
+            identity = identity_of(prepared, read_array(job.output.directory))
             few, before = few_prepared(prepared, MOST_LIGHTS), now()
             setup, ambient = plan_work(few, embree)
             ambient_seconds = now() - before

@@ -1,10 +1,13 @@
 """Identity of a frame array: all that determines the bytes of its files, as hashes and as a table."""
 
 import json
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
 from framearray_cli.array.folder import Identity
+from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import plain
 from framearray_cli.array.metadata import metadata_of
 from framearray_cli.base.forms.table import Table
@@ -17,15 +20,35 @@ from .prepare import Prepared
 _DEFAULTS: dict[str, type[Table]] = {"obscurance": ObscuranceTable, "samples": SamplesTable}
 
 
-def identity_of(prepared: Prepared) -> Identity:
-    """Return the identity of the array that a job renders."""
-    job, scene = prepared.job, scene_fingerprint(prepared)
+def identity_of(prepared: Prepared, old: Manifest | None = None) -> Identity:
+    """Return the identity of the array that a job renders.
+
+    Args:
+        old: the array in its folder; of keys that change nothing there it keeps the values, and its fingerprint.
+    """
+    job, scene, table = prepared.job, scene_fingerprint(prepared), job_table(prepared.job)
+    for section, key in unused_keys(prepared) if old else ():
+        known = old.job.get(section) if old else None
+        if isinstance(known, Mapping) and key in known:
+            table[section][key] = known[key]
     return Identity(
         name=job.name,
-        fingerprint=job_fingerprint(prepared, scene),
+        fingerprint=job_fingerprint(prepared, scene, table),
         scene=scene,
-        job=plain(job_table(job)),
+        job=plain(table),
     )
+
+
+def unused_keys(prepared: Prepared) -> Iterator[tuple[str, str]]:
+    """Yield the keys, with their tables, on which no pixel depends in this scene, with these cameras and lights."""
+    job = prepared.job
+    if not prepared.scene.has_mirrors:
+        yield "specular", "depth"
+    if not prepared.scene.has_mirrors or job.specular.depth == 0:
+        yield "specular", "hits"
+    by_up = any(key.up is None for key in job.camera.keys)  # the model itself is not turned
+    if not by_up and all(source.type != "sun" for source in job.light.sources):
+        yield "scene", "up"
 
 
 def scene_fingerprint(prepared: Prepared) -> str:
@@ -34,16 +57,16 @@ def scene_fingerprint(prepared: Prepared) -> str:
     return fingerprint(prepared.scene.centre.tobytes(), *arrays)
 
 
-def job_fingerprint(prepared: Prepared, scene: str | None = None) -> str:
+def job_fingerprint(prepared: Prepared, scene: str | None = None, table: dict[str, Any] | None = None) -> str:
     """Hash all that pixels depend on: the job without `output` and `render`, and the scene as it was read.
 
     Args:
         scene: fingerprint of the scene, if known.
+        table: of the job, if known.
     """
-    table = {key: value for key, value in job_table(prepared.job).items() if key not in ("output", "render")}
-    for where in ("file", "folders"):
-        table["scene"].pop(where, None)
+    table = {key: value for key, value in (table or job_table(prepared.job)).items() if key not in ("output", "render")}
+    table["scene"] = {key: value for key, value in table["scene"].items() if key not in ("file", "folders")}
     for section, key in metadata_of(table):
-        table[section][key] = _DEFAULTS[section].model_fields[key].default
+        table[section] = {**table[section], key: _DEFAULTS[section].model_fields[key].default}
     scene = scene or scene_fingerprint(prepared)
     return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), scene.encode())

@@ -24,6 +24,9 @@ class RenderEvents:
     def rewriting(self, files: int) -> None:
         """The headers of that many files are about to be rewritten: the job has another frame rate."""
 
+    def keeping_compression(self, compression: str) -> None:
+        """The job wants this lossless compression; files that are there keep theirs, which is lossless too."""
+
     def resolved(self, settings: "AutoSettings") -> None:
         """Settings were chosen where the job says "auto"."""
 

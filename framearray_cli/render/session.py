@@ -9,7 +9,7 @@ from framearray_cli.array.folder import Identity, check_folder, claim_folder, re
 from framearray_cli.array.integrity import OnDisk, scan_output
 from framearray_cli.array.lock import ArrayFolder
 from framearray_cli.array.manifest_toml import read_manifest, write_manifest
-from framearray_cli.array.metadata import metadata_differs, take_over_metadata
+from framearray_cli.array.metadata import metadata_differs, other_compression, take_over_metadata
 from framearray_cli.array.ranges import frames_text
 from framearray_cli.array.record import RecordedRun
 from framearray_cli.engine.embree import EmbreeScene, Engine
@@ -67,7 +67,7 @@ def open_session(
     chosen = range(prepared.n_cameras) if cameras is None else cameras
     with open_embree(prepared, engine) as embree, ExitStack() as held:
         prepared, settings = resolve_auto(prepared, embree)
-        identity = identity_of(prepared)
+        identity = identity_of(prepared, None if restart else read_array(directory))
         run = RecordedRun(cameras=frames_text(chosen), processor=processor())
         check_folder(directory, identity, restart=restart)
         folder = ArrayFolder(directory)
@@ -97,6 +97,8 @@ def _take_over_metadata(folder: ArrayFolder, prepared: Prepared, identity: Ident
     old, fps = read_array(prepared.job.output.directory), prepared.job.output.fps
     if old is not None and metadata_differs(old, identity.job, fps):
         folder.require_no_other_run()
+        if (compression := other_compression(old, identity.job)) is not None:
+            events.keeping_compression(compression)
         take_over_metadata(old, identity.job, fps, prepared.threads, events.rewriting)
 
 

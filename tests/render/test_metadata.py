@@ -168,12 +168,82 @@ def test_other_ignored_values_are_taken_over_too(scene: Path, tmp_path: Path) ->
 
 @pytest.mark.parametrize(
     ("kind", "output"),
-    [("png", {"exposure": 1.0}), ("jpg", {"quality": 90}), ("exr", {"half": "never"}), ("exr", {"compression": "zip"})],
+    [("png", {"exposure": 1.0}), ("jpg", {"quality": 90}), ("exr", {"half": "never"}), ("exr", {"compression": "b44"})],
 )
 def test_what_a_format_depends_on_is_another_array(scene: Path, tmp_path: Path, kind: str, output: Any) -> None:
     render(job(scene, tmp_path, kind), cameras=(0,))
     with pytest.raises(OutputError, match=f"another frame array.*output.{next(iter(output))}"):
         render(job(scene, tmp_path, kind, **output), cameras=(0,))
+
+
+@pytest.mark.parametrize(("old", "new"), [("none", "zip"), ("zip", "rle"), ("piz", "none")])
+def test_images_to_come_have_another_lossless_compression(scene: Path, tmp_path: Path, old: str, new: str) -> None:
+    """Pixels are those of either, and files that are there stay."""
+    out, events = tmp_path / "out", Keeping()
+    render(job(scene, out, compression=old), cameras=(0,))
+    before = contents(out)
+    assert render(job(scene, out, compression=new), events).images == 3 * (N - 1)
+    assert events.compression == new and is_whole(out)
+    render(job(scene, tmp_path / "new", compression=new))
+    assert contents(out) == contents(tmp_path / "new") | before
+    for name in before:
+        if "layers" not in name:
+            np.testing.assert_array_equal(read_image(out / name), read_image(tmp_path / "new" / name))
+    assert render(job(scene, out, compression=new), again := Keeping()).images == 0 and not again.compression
+
+
+def test_lossy_compression_is_another_array_either_way(scene: Path, tmp_path: Path) -> None:
+    render(job(scene, tmp_path, compression="dwaa"), cameras=(0,))
+    for other in ("zip", "dwab"):
+        with pytest.raises(OutputError, match=f'output.compression: "dwaa" there, "{other}" now'):
+            render(job(scene, tmp_path, compression=other), cameras=(0,))
+
+
+class Keeping(RenderEvents):
+    compression = ""
+
+    def keeping_compression(self, compression: str) -> None:
+        self.compression = compression
+
+
+UPRIGHT = {**CAMERA, "keys": [{**key, "up": [0.0, 1.0, 0.0]} for key in CAMERA["keys"]]}
+
+
+@pytest.fixture(scope="module")
+def matt(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scene without mirrors."""
+    return tiny.save_glb(tiny.room_meshes(mirrors=False), tmp_path_factory.mktemp("scene") / "matt.glb")
+
+
+@pytest.mark.parametrize(
+    "changes", [{"specular": {"depth": 2}}, {"specular": {"hits": 40}}, {"scene": {"up": "z"}, "camera": UPRIGHT}]
+)
+def test_keys_that_play_no_part_keep_their_first_value(matt: Path, tmp_path: Path, changes: Any) -> None:
+    first = {"camera": UPRIGHT} if "camera" in changes else {}
+    later = changes | ({"scene": {"file": str(matt), **changes["scene"]}} if "scene" in changes else {})
+    render(job(matt, tmp_path, changes=first), cameras=(0,))
+    table, fingerprint = read_manifest(tmp_path).job, read_manifest(tmp_path).fingerprint
+    for cameras in ((0,), (1,), (0, 1)):
+        made = render(job(matt, tmp_path, changes=later), cameras=cameras).images
+        assert made == (3 if cameras == (1,) else 0)
+    assert (read_manifest(tmp_path).job, read_manifest(tmp_path).fingerprint) == (table, fingerprint)
+    assert render(job(matt, tmp_path, changes=first), cameras=(0, 1)).images == 0
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"specular": {"depth": 2}}, "specular.depth"),
+        ({"specular": {"hits": 40}}, "specular.hits"),
+        ({"scene": {"up": "z"}}, "scene.up"),
+    ],
+)
+def test_where_they_play_a_part_they_make_another_array(scene: Path, tmp_path: Path, changes: Any, key: str) -> None:
+    """The scene has mirrors, and the camera no `up` of its own."""
+    render(job(scene, tmp_path), cameras=(0,))
+    later = changes | {"scene": {"file": str(scene), **changes.get("scene", {})}}
+    with pytest.raises(OutputError, match=f"another frame array.*{key}"):
+        render(job(scene, tmp_path, changes=later), cameras=(0,))
 
 
 def test_another_run_in_the_folder_comes_first(scene: Path, tmp_path: Path) -> None:

@@ -211,6 +211,10 @@ class RenderingEvents(PartEvents):
             rate = f"output.fps is {self._job.output.fps:g} now"
             self._screen.say([f"{rate}: rewriting the headers of {counted(files, 'file')}, whose pixels stay"])
 
+    def keeping_compression(self, compression: str) -> None:
+        line = f"output.compression is {compression} now: files that are there keep theirs, which holds the same pixels"
+        self._screen.say([line])
+
     def resolved(self, settings: "AutoSettings") -> None:
         self._screen.say(settings_lines(settings))
 
