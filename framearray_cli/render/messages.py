@@ -57,7 +57,12 @@ def scene_lines(prepared: "Prepared") -> list[str]:
     """Describe the contents of a scene, and what was left out of it."""
     from framearray_cli.scene.scene import scene_report_lines
 
-    return scene_report_lines(prepared.scene.report, prepared.job.scene.file)
+    report, job = prepared.scene.report, prepared.job
+    lines, own = scene_report_lines(report, job.scene.file), len(job.light.sources)
+    if report.lights > own:
+        there = f"the scene file has {counted(report.lights, 'light')}, the job {counted(own, 'source')} of its own"
+        lines.append(f"note: {there}, and only these shine; `framearray init` writes jobs with those of the file")
+    return lines
 
 
 def warning_lines(warnings: Sequence[str]) -> list[str]:

@@ -27,6 +27,7 @@ class SceneReport:
     Attributes:
         dropped: reason -> number of triangles left out, e.g. "degenerate", "non-finite", "duplicate", "transmissive".
         notes: what was not understood or was approximated, one sentence each.
+        lights: number of light sources in the file; a job has its own.
     """
 
     triangles: int
@@ -34,6 +35,7 @@ class SceneReport:
     textures: int
     dropped: dict[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    lights: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -161,6 +163,7 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
             textures=len(meshes.textures),
             dropped=dropped,
             notes=meshes.notes + notes.lines(),
+            lights=meshes.lights,
         ),
     )
 

@@ -61,6 +61,7 @@ class Meshes:
     Attributes:
         textures: (height, width, 4) RGBA each, row 0 on top, colours sRGB encoded, alpha linear.
         dropped: reason -> the number of triangles that could not even be read.
+        lights: number of light sources in the file; a job has its own.
     """
 
     parts: tuple[Part, ...]
@@ -68,6 +69,7 @@ class Meshes:
     textures: tuple[Bytes, ...]
     dropped: dict[str, int]
     notes: tuple[str, ...]
+    lights: int = 0
 
 
 @dataclass(slots=True)

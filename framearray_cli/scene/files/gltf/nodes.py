@@ -76,9 +76,7 @@ def used_materials(gltf: Gltf) -> set[int]:
 def note_unread(gltf: Gltf, notes: Notes) -> None:
     """Note what the file contains and the renderer does not show."""
     for extension in sorted(set(gltf.tree.get("extensionsUsed") or []) - HANDLED):
-        if extension == "KHR_lights_punctual":
-            notes.add("the job gives the lights; those of the scene count where `framearray init` wrote them into it")
-        elif not extension.startswith("KHR_materials_"):  # those are noted with their materials
+        if extension != "KHR_lights_punctual" and not extension.startswith("KHR_materials_"):  # noted elsewhere
             notes.add(f"{extension} is left out")
     if _moves_meshes(gltf):
         notes.add("animations of meshes are left out; they stand in their rest pose")

@@ -8,6 +8,7 @@ from ..textures import TextureTable
 from .container import open_gltf
 from .materials import read_materials
 from .nodes import check_readable, note_unread, placed_meshes, used_materials
+from .stage import count_lights
 from .triangles import Triangles, read_triangles
 
 
@@ -54,6 +55,7 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
         textures=tuple(textures.textures),
         dropped={"index out of range": outside} if outside else {},
         notes=notes.lines(),
+        lights=count_lights(gltf),
     )
 
 

@@ -1,6 +1,7 @@
 """Cameras and lights of a glTF file, and where they are at any time."""
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
@@ -86,6 +87,14 @@ def read_gltf_stage(gltf: Gltf) -> Stage:
         if punctual is not None:
             lights.append(_light(index, node, lights_table[punctual["light"]]))
     return Stage(cameras=tuple(cameras), lights=tuple(lights), motion=motion, notes=tuple(notes))
+
+
+def count_lights(gltf: Gltf) -> int:
+    """Return the number of lights that the default scene shows; 0 if they are broken, as no render needs them."""
+    with suppress(LookupError, TypeError, ValueError, AttributeError):
+        nodes = gltf.items("nodes")
+        return sum(PUNCTUAL in (nodes[index].get("extensions") or {}) for index in _shown(gltf))
+    return 0
 
 
 def _shown(gltf: Gltf) -> list[int]:
