@@ -44,7 +44,7 @@ PAGES = {
     "render": CommandPage("Render a job into a frame array.", "framearray render room.toml --output out/room"),
     "verify": CommandPage("Find damaged and missing files of an array.", "framearray verify out/room --repair"),
     "view": CommandPage("Walk through an array in the browser.", "framearray view out/room"),
-    "assemble": CommandPage("Cut a movie out of an array.", "framearray assemble out/room --walk -o walk.mp4"),
+    "assemble": CommandPage("Cut a movie out of an array.", "framearray assemble out/room walk -o walk.mp4"),
     "sheet": CommandPage("Draw a contact sheet of an array.", "framearray sheet out/room -o sheet.jpg"),
     "export": CommandPage("Export an array for other tools.", "framearray export out/room -f nerfstudio -o room-nerf"),
     "report": CommandPage("Measure speed and error of settings.", "framearray report room.toml --error 0.05"),

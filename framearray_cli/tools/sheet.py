@@ -70,6 +70,7 @@ def make_sheet(
     side: str | None = None,
     at: Sequence[str] = (),
     progress: Progress | None = None,
+    dry_run: bool = False,
 ) -> SheetResult:
     """Draw a contact sheet of a frame array; the file appears whole or not at all.
 
@@ -87,6 +88,7 @@ def make_sheet(
         side: axis of light positions from top to bottom; None: the first.
         at: "AXIS=PLACES" for further axes; the default is a few of the shown one, and the middle of all others.
         progress: called after each image.
+        dry_run: check everything but the pixels of images, and write nothing; the size is then (0, 0).
 
     Raises:
         JobError: an axis or a place is unknown, or images would be too small at that width.
@@ -94,7 +96,6 @@ def make_sheet(
         MissingExtraError: no library here draws labels, or writes the format.
     """
     image_format = _image_format(target, exposure)
-    require_writer(image_format.format)
     manifest = read_manifest(out)
     axis = side if side is not None else next(iter(manifest.axes))
     lights, fixed = _read_lights(manifest, axis, light, at, rows)
@@ -104,6 +105,8 @@ def make_sheet(
     tile = _tile_size(manifest, len(chosen), width, labels)
     places = _Places(chosen, lights, list(manifest.axes).index(axis), fixed)
     there, warnings = _find_images(manifest, places)
+    if dry_run:
+        return SheetResult(target=target, cameras=chosen, lights=lights, size=(0, 0), warnings=warnings)
     tiles = _read_tiles(manifest, places, there, tile, progress)
     if labels:
         shown = srgb8_from_linear(tiles * np.float32(2.0**exposure))
@@ -112,10 +115,16 @@ def make_sheet(
         write_codes(target, codes, image_format)
         size = (codes.shape[1], codes.shape[0])
     else:
-        n_rows, n_columns, tile_height, tile_width, _ = tiles.shape
-        size = (n_columns * tile_width, n_rows * tile_height)
-        write_image(target, tiles.swapaxes(1, 2).reshape(size[1], size[0], 3), image_format)
+        size = _write_linear(target, tiles, image_format)
     return SheetResult(target=target, cameras=chosen, lights=lights, size=size, warnings=warnings)
+
+
+def _write_linear(target: Path, tiles: Float32, image_format: ImageFormat) -> tuple[int, int]:
+    """Write images edge to edge, without labels; return width and height of the sheet."""
+    n_rows, n_columns, height, width, _ = tiles.shape
+    size = (n_columns * width, n_rows * height)
+    write_image(target, tiles.swapaxes(1, 2).reshape(size[1], size[0], 3), image_format)
+    return size
 
 
 class _Places(NamedTuple):
@@ -160,7 +169,9 @@ def _image_format(target: Path, exposure: float) -> ImageFormat:
         raise OutputError(f"{target}: expected a .png, .jpg, .exr or .tif")
     if exposure and name not in FOR_SCREENS:
         raise OutputError(f"{target}: exposure changes only PNG and JPEG; {target.suffix} keeps the radiance")
-    return ImageFormat(format=name)  # type: ignore[arg-type]  # just checked
+    image_format = ImageFormat(format=name)  # type: ignore[arg-type]  # just checked
+    require_writer(image_format.format)
+    return image_format
 
 
 def _read_lights(

@@ -55,6 +55,7 @@ def array(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ("command", "made", "what"),
     [
         (["assemble", "out", "walk", "-o", "x.gif"], "x.gif", "4 frames from 4 images, 24 frames per second"),
+        (["sheet", "out", "-o", "x.png"], "x.png", "4 camera positions x 3 light positions"),
         (["export", "out", "-f", "cinema", "-o", "x"], "x.cdb", "4 camera positions x 3 light positions"),
         (["init", "tiny.glb", "-o", "x.toml", "--frames", "1", "--lights", "1"], "x.toml", ""),
     ],

@@ -8,6 +8,8 @@ import pytest
 from support.movies import decoded, grouped, path_file, plain
 from support.program import names, run
 
+WAYS = "expected a path file, walk, light or diagonal, or --cameras and --light with places"
+
 
 @pytest.fixture
 def array(tmp_path: Path) -> Path:
@@ -26,6 +28,11 @@ def array(tmp_path: Path) -> Path:
         (["--light", "--seconds", "1", "--blend", "--label"], "24 frames from 24 images, 24 frames per second", 24),
         (["--walk", "--seconds", "0.5", "--at", "-1"], "12 frames from 5 images, 24 frames per second", 24),
         (["--walk", "--view", "aces", "--exposure", "1"], "5 frames from 5 images, 24 frames per second", 24),
+        (["--cameras", "all"], "5 frames from 5 images, 24 frames per second", 24),
+        (["--light", "last-0x-2", "--cameras", "-1"], "2 frames from 2 images, 24 frames per second", 24),
+        (["walk", "--cameras", "1-3", "--light", "50%"], "3 frames from 3 images, 24 frames per second", 24),
+        (["diagonal", "--light", "0,2", "--seconds", "0.25"], "6 frames from 6 images, 24 frames per second", 24),
+        (["--at", "light=0-2"], "3 frames from 3 images, 24 frames per second", 24),
     ],
 )
 def test_movements(array: Path, tmp_path: Path, capsys, options: list[str], printed: str, rate: Fraction) -> None:
@@ -46,17 +53,17 @@ def test_a_path_file_with_another_rate_and_blends(array: Path, tmp_path: Path, c
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ([], "expected a path file, --walk, --light or --diagonal; got none of them"),
-        (
-            ["path.toml", "--walk"],
-            "expected a path file, --walk, --light or --diagonal; got the path file path.toml and",
-        ),
-        (["walk", "--light"], "expected a path file, --walk, --light or --diagonal; got --walk and --light"),
+        ([], f"{WAYS}; got none of them"),
+        (["path.toml", "--walk"], f"{WAYS}; got the path file path.toml and walk"),
+        (["walk", "--light"], f"{WAYS}; got walk and light"),
         (["wlak"], "expected a path file, walk, light or diagonal; got wlak"),
-        (["--walk", "--light"], "expected a path file, --walk, --light or --diagonal; got --walk and --light"),
+        (["--walk", "--light"], f"{WAYS}; got walk and light"),
+        (["--walk", "diagonal", "--light"], f"{WAYS}; got walk and light and diagonal"),
         (["path.toml", "--seconds", "2"], "a path file gives the lengths of its segments"),
-        (["path.toml", "--at", "2"], "needs --walk or --light, where the other stays"),
-        (["--diagonal", "--at", "2"], "needs --walk or --light, where the other stays"),
+        (["path.toml", "--at", "2"], "--at: a path file says where camera and light are"),
+        (["path.toml", "--light", "2"], "--light: a path file says where camera and light are"),
+        (["--diagonal", "--at", "2"], "--at: expected AXIS=PLACES; a place without an axis needs walk or light"),
+        (["--cameras", "all", "--at", "2"], "--at: expected AXIS=PLACES; a place without an axis needs walk or light"),
         (["--walk", "--seconds", "0"], "--seconds: expected a number from 0.001 to 40000, got 0"),
         (["--walk", "--fps", "0"], "--fps: expected a number from 0.01 to 1000, got 0"),
     ],
@@ -80,6 +87,11 @@ def test_wrong_usage(array: Path, tmp_path: Path, capsys, monkeypatch, options: 
             ["--light", "--at", "end"],
             '--at: expected an index, "first", "last" or a percentage such as "50%", got "end"\n',
         ),
+        (["--cameras", "0-5"], "--cameras: expected one of 5 camera positions (0 to 4, or -5 to -1), got 5\n"),
+        (["walk", "--light", "noon"], "--light: expected places such as 5, 0-47, "),
+        (["--light", "3", "--cameras", "2"], "--cameras: expected several places, such as 0-last or all, as nothing"),
+        (["--cameras", "all", "--at", "lamp=2"], "--at: expected AXIS=PLACES with one of the axes light (0 to 3), got"),
+        (["--light", "0-2", "--at", "light=1"], "--light: expected either this or --at light=..., got both\n"),
         (["--walk", "--view", "filmic"], "--view: expected srgb, aces or a view of ocio://default ("),
     ],
 )

@@ -4,15 +4,17 @@ import os
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from framearray_cli.array.places import is_notation
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms.toml import STDIN
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, MOST_STOPS, counted
 
-from ..completions import complete_axis_places, complete_job
+from ..completions import complete_axis_places, complete_job, complete_light_places, complete_places
+from ..help import Command
 from ..options import ArrayFolder, DryRun, Force, Json, Quiet, Strict, output_path, refuse_warnings
 from ..screen import Screen, err, print_result, print_would
 from ..streams import is_stdout, output_file
@@ -21,14 +23,12 @@ from ..values import number
 if TYPE_CHECKING:
     from framearray_cli.tools.movie.assemble import AssembleResult as Made
 
-    from ..array_results import AssembleResult
-
 PathFile = Annotated[
     Path | None,
     typer.Argument(
         metavar="PATH",
         autocompletion=complete_job,
-        help="Movie path, TOML; or walk, light or diagonal.",
+        help="Movie path, TOML; or walk, light or diagonal: what moves from first to last.",
         show_default=False,
     ),
 ]
@@ -42,24 +42,44 @@ Target = Annotated[
         show_default=False,
     ),
 ]
-Walk = Annotated[bool, typer.Option("--walk", help="The camera moves, the light stays.")]
-Light = Annotated[bool, typer.Option("--light", help="The light moves, the camera stays.")]
-Diagonal = Annotated[bool, typer.Option("--diagonal", help="Both move.")]
+# Spellings of earlier versions: `walk`, `light` and `diagonal` in the place of a path file mean the same.
+Walk = Annotated[bool, typer.Option("--walk", help="As walk in place of PATH.", hidden=True)]
+Diagonal = Annotated[bool, typer.Option("--diagonal", help="As diagonal in place of PATH.", hidden=True)]
+Cameras = Annotated[
+    str | None,
+    typer.Option(
+        "--cameras",
+        help="Where the camera stays, or what it passes: 5, 0-47x3, last-0; see guide/places.md.",
+        autocompletion=complete_places,
+        metavar="PLACES",
+    ),
+]
+Light = Annotated[
+    str | None,
+    typer.Option(
+        "--light",
+        help="The same of the light.",
+        autocompletion=complete_light_places,
+        metavar="PLACES",
+    ),
+]
 Stay = Annotated[
     list[str] | None,
     typer.Option(
         "--at",
-        help="Where the other stays: 5, last, 50%, or AXIS=PLACE; see guide/places.md. Default: first.",
-        metavar="PLACE",
+        help="The same of another light axis: lamps=0-3; may be repeated.",
+        metavar="AXIS=PLACES",
         autocompletion=complete_axis_places,
     ),
 ]
+MOVEMENTS = ("walk", "light", "diagonal")
+LIGHT_MOVES = "light"  # what `--light` without places stands for, as in earlier versions
 Seconds = Annotated[
     float | None,
     typer.Option(
         "--seconds",
         parser=number(0.001, MOST_SECONDS),
-        help="Length of a movement; default: one frame per image.",
+        help="Length of the movement; default: one frame per image.",
         metavar="S",
     ),
 ]
@@ -87,10 +107,11 @@ def assemble(
     path_file: PathFile = None,
     *,
     target: Target,
-    walk: Walk = False,
-    light: Light = False,
-    diagonal: Diagonal = False,
+    cameras: Cameras = None,
+    light: Light = None,
     at: Stay = None,
+    walk: Walk = False,
+    diagonal: Diagonal = False,
     seconds: Seconds = None,
     fps: FrameRate = None,
     blend: Blend = False,
@@ -109,10 +130,13 @@ def assemble(
     from framearray_cli.tools.movie.look import Look
     from framearray_cli.tools.movie.sweep import Sweep, SweepKind
 
-    choices: dict[SweepKind, bool] = {"walk": walk, "light": light, "diagonal": diagonal}
+    choices: dict[SweepKind, bool] = {"walk": walk, "light": light == LIGHT_MOVES, "diagonal": diagonal}
     kinds = [kind for kind, wanted in choices.items() if wanted or str(path_file) == kind]
     path_file = None if str(path_file) in choices else path_file  # ./walk is a file
-    _refuse_conflicts(path_file, kinds, at, seconds)
+    light = None if light == LIGHT_MOVES else light
+    named = [option for option, text in (("--cameras", cameras), ("--light", light)) if text is not None]
+    _refuse_conflicts(path_file, kinds, named, at or (), seconds)
+    kind = kinds[0] if kinds else None
     movie = _movie_file(target, force=force) if is_stdout(target) and not dry_run else nullcontext(output_path(target))
     with movie as file, Screen(err, quiet=quiet) as screen:
 
@@ -123,7 +147,7 @@ def assemble(
 
         made = run(
             array,
-            path_file or Sweep(kind=kinds[0], at=tuple(at or ()), seconds=seconds),
+            path_file or Sweep(kind=kind, cameras=cameras, light=light, at=tuple(at or ()), seconds=seconds),
             file,
             look=Look(exposure=exposure, view=find_view(view), label=label),
             fps=fps,
@@ -133,20 +157,20 @@ def assemble(
             force=force,
             dry_run=dry_run,
         )
+    _print_made(made, target, dry_run=dry_run, quiet=quiet)
+
+
+def _print_made(made: "Made", target: str, *, dry_run: bool, quiet: bool) -> None:
+    """Print what was written, or would be."""
+    from ..array_results import AssembleResult
+
     rate = f"{float(made.fps):g} frames per second"
     size = f"{counted(made.n_frames, 'frame')} from {counted(made.n_images, 'image')}"
     if dry_run:
-        there = os.path.isfile(target)
-        print_would([f"would {'replace' if there else 'write'} {target}: {size}, {rate}"])
+        print_would([f"would {'replace' if os.path.isfile(target) else 'write'} {target}: {size}, {rate}"])
         return
-    print_result([f"{made.target}: {size}, {rate}"], _typed(made), quiet=quiet or is_stdout(target))
-
-
-def _typed(made: "Made") -> "AssembleResult":
-    """Return the result for `--json`."""
-    from ..array_results import AssembleResult
-
-    return AssembleResult(path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps))
+    result = AssembleResult(path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps))
+    print_result([f"{made.target}: {size}, {rate}"], result, quiet=quiet or is_stdout(target))
 
 
 def _movie_file(target: str, *, force: bool) -> AbstractContextManager[Path]:
@@ -160,18 +184,46 @@ def _movie_file(target: str, *, force: bool) -> AbstractContextManager[Path]:
 
 
 def _refuse_conflicts(
-    path_file: Path | None, kinds: Sequence[str], at: Sequence[str] | None, seconds: float | None
+    path_file: Path | None, kinds: Sequence[str], named: Sequence[str], at: Sequence[str], seconds: float | None
 ) -> None:
-    """Refuse options that do not go together."""
-    ways = ([f"the path file {path_file}"] if path_file else []) + [f"--{kind}" for kind in kinds]
-    if len(ways) != 1:
+    """Refuse options that do not go together.
+
+    Args:
+        named: options that name places.
+    """
+    ways = ([f"the path file {path_file}"] if path_file else []) + list(kinds)
+    axes = any("=" in text for text in at)
+    if len(ways) > 1 or not (ways or named or axes):
         found = " and ".join(ways) or "none of them"
-        raise typer.BadParameter(f"expected a path file, --walk, --light or --diagonal; got {found}", param_hint="PATH")
+        wanted = "a path file, walk, light or diagonal, or --cameras and --light with places"
+        raise typer.BadParameter(f"expected {wanted}; got {found}", param_hint="PATH")
     no_file = path_file and not path_file.suffix and len(path_file.parts) == 1 and not os.path.exists(path_file)
     if no_file and path_file != STDIN:
         found = f"got {path_file}, and there is no such file"
         raise typer.BadParameter(f"expected a path file, walk, light or diagonal; {found}", param_hint="PATH")
     if path_file and seconds is not None:
         raise typer.BadParameter("a path file gives the lengths of its segments", param_hint="--seconds")
-    if at and kinds in ([], ["diagonal"]):
-        raise typer.BadParameter("needs --walk or --light, where the other stays", param_hint="--at")
+    if path_file and (named or at):
+        option = [*named, "--at"][0]
+        raise typer.BadParameter("a path file says where camera and light are", param_hint=option)
+    if any("=" not in text for text in at) and kinds in ([], ["diagonal"]):
+        raise typer.BadParameter("expected AXIS=PLACES; a place without an axis needs walk or light", param_hint="--at")
+
+
+class AssembleCommand(Command):
+    """`assemble`, which also reads `--light` without places: it was a switch in earlier versions."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        words = list(args)
+        end = words.index("--") if "--" in words else len(words)
+        for k, word in enumerate(words[:end]):
+            if word == "--light" and not _are_places(words[k + 1] if k + 1 < end else ""):
+                words[k] = f"--light={LIGHT_MOVES}"
+        return super().parse_args(ctx, words)
+
+
+def _are_places(word: str) -> bool:
+    """Return whether the word behind `--light` belongs to it: neither an option nor an argument."""
+    return is_notation(word) or not (
+        not word or word.startswith("-") or word in MOVEMENTS or word.endswith(".toml") or os.path.exists(word)
+    )

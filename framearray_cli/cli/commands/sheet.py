@@ -1,5 +1,7 @@
 """`framearray sheet`."""
 
+import os
+from contextlib import nullcontext
 from typing import Annotated
 
 import typer
@@ -7,8 +9,8 @@ import typer
 from framearray_cli.base.units import counted
 
 from ..completions import complete_axis
-from ..options import ArrayFolder, At, Cameras, Exposure, Force, Json, Light, Quiet, output_path
-from ..screen import Screen, err, print_result
+from ..options import ArrayFolder, At, Cameras, DryRun, Exposure, Force, Json, Light, Quiet, output_path
+from ..screen import Screen, err, print_result, print_would
 from ..streams import is_stdout, output_file
 from ..values import whole
 
@@ -45,6 +47,7 @@ def sheet(
     ] = None,
     at: At = None,
     force: Force = False,
+    dry_run: DryRun = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:  # fmt: skip
@@ -52,15 +55,20 @@ def sheet(
     from framearray_cli.tools.sheet import make_sheet
 
     file = output_path(target)
-    with output_file(file, ".png", force=force) as part, Screen(err, quiet=quiet) as screen:
+    there = os.path.isfile(file)
+    drawn = nullcontext(file) if dry_run and is_stdout(target) else output_file(file, ".png", force=force)
+    with drawn as part, Screen(err, quiet=quiet) as screen:
         made = make_sheet(
             array, part, cameras=cameras, light=light,
             columns=columns, rows=rows, width=width, exposure=exposure, side=side, at=at or (),
-            progress=screen.counter("drawing", "image"),
+            progress=screen.counter("drawing", "image"), dry_run=dry_run,
         )  # fmt: skip
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
     shown = f"{counted(len(made.cameras), 'camera position')} x {counted(len(made.lights), 'light position')}"
+    if dry_run:
+        print_would([f"would {'replace' if there else 'write'} {file}: {shown}"])
+        return
     from ..array_results import SheetResult
 
     result = SheetResult(file=str(file), cameras=made.cameras, lights=made.lights, size=made.size)

@@ -126,7 +126,7 @@ def _plan(
     else:
         movie = load_movie_path(path, partial(array_problems, manifest=manifest))
     movie = _override(movie, fps, positions)
-    return movie, make_timeline(f"--{path.kind}" if isinstance(path, Sweep) else path, movie, manifest)
+    return movie, make_timeline(path.kind or "--cameras" if isinstance(path, Sweep) else path, movie, manifest)
 
 
 def _check_target(target: Path, n_frames: int, *, force: bool) -> None:

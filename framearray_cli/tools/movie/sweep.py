@@ -1,4 +1,4 @@
-"""Movies without a path file: the camera, the light, or both move once from first to last."""
+"""Movies without a path file: camera, light or both move once, from first to last or along the places named."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,9 +7,8 @@ from typing import Literal, TypeAlias
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.array.places import CAMERA_AXIS, IndexPlace, read_place
 from framearray_cli.base.errors import JobError
-from framearray_cli.base.forms.words import shown
 
-from ..axes import axes_of_groups
+from ..axes import given_places
 from ..spans import resolve_span
 from .pathfile import MoviePath, Segment
 
@@ -18,15 +17,19 @@ SweepKind: TypeAlias = Literal["walk", "light", "diagonal"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweep:
-    """One movement from first to last.
+    """One movement.
 
     Attributes:
-        kind: what moves: "walk" the camera, "light" the light along all its axes, "diagonal" both.
-        at: where the rest stays: places as in a path file; "AXIS=PLACE" applies to one light axis only.
+        kind: what moves from first to last unless it is named below: "walk" the camera, "light" the light along all its
+            axes, "diagonal" both; None: nothing.
+        cameras, light: places that the camera passes through, and the light along the first axis; None: as `kind` says.
+        at: "AXIS=PLACES" for other light axes; a place without an axis is where all that does not move stays.
         seconds: length; None: one frame per image on the way.
     """
 
-    kind: SweepKind
+    kind: SweepKind | None = None
+    cameras: str | None = None
+    light: str | None = None
     at: tuple[str, ...] = ()
     seconds: float | None = None
 
@@ -35,14 +38,24 @@ def sweep_path(sweep: Sweep, manifest: Manifest) -> MoviePath:
     """Make the path of a sweep.
 
     Raises:
-        JobError: `at` is no place, or lies outside the array.
+        JobError: a place is none, or lies outside the array; or nothing moves, and no `kind` says what should.
     """
-    moves: tuple[IndexPlace, ...] = ("first", "last")
     sizes = {CAMERA_AXIS: manifest.n_cameras, **manifest.axes}
-    staying = {"walk": list(manifest.axes), "light": [CAMERA_AXIS], "diagonal": []}[sweep.kind]
-    stays = _read_stays(sweep, {name: sizes[name] for name in staying}, axes_of_groups(manifest))
-    spans = dict.fromkeys(sizes, moves) | stays
-    n_frames = max(n for name, n in sizes.items() if name not in staying)
+    moves: tuple[IndexPlace, ...] = ("first", "last")
+    moving = {"walk": [CAMERA_AXIS], "light": [*manifest.axes], "diagonal": [*sizes], None: []}[sweep.kind]
+    named = _named_places(sweep, manifest)
+    lengths = {name: n if name in moving else 1 for name, n in sizes.items()}
+    spans: dict[str, tuple[IndexPlace, ...]] = dict.fromkeys(moving, moves)
+    spans |= _read_stays(sweep, {name: n for name, n in sizes.items() if name not in moving and name not in named})
+    for name, (option, text) in named.items():
+        spans[name], problems = (text,), list[str]()
+        lengths[name] = len(resolve_span(option, spans[name], sizes[name], name, problems))
+        if problems:
+            raise JobError(option, [problem.removeprefix(f"{option}: ") for problem in problems])
+    n_frames = max(lengths.values())
+    if sweep.kind is None and n_frames == 1:
+        option = next(iter(named.values()), ("--cameras", ""))[0]
+        raise JobError(option, ["expected several places, such as 0-last or all, as nothing else moves"])
     segment = Segment(
         frames=n_frames if sweep.seconds is None else None,
         seconds=sweep.seconds,
@@ -53,29 +66,30 @@ def sweep_path(sweep: Sweep, manifest: Manifest) -> MoviePath:
     return MoviePath(segments=(segment,))
 
 
-def _read_stays(sweep: Sweep, sizes: Mapping[str, int], groups: Mapping[str, str]) -> dict[str, tuple[IndexPlace, ...]]:
-    """Read where each axis stays, and check that it has that place.
+def _named_places(sweep: Sweep, manifest: Manifest) -> dict[str, tuple[str, str]]:
+    """Return the places that options name: axis -> the option, and the places."""
+    named = {} if sweep.cameras is None else {CAMERA_AXIS: ("--cameras", sweep.cameras)}
+    return named | given_places(manifest, sweep.light, [text for text in sweep.at if "=" in text])
+
+
+def _read_stays(sweep: Sweep, sizes: Mapping[str, int]) -> dict[str, tuple[IndexPlace, ...]]:
+    """Read where all axes stay that neither move nor are named, and check that they have that place.
 
     Args:
-        sizes: the number of indices of each axis that stays, by name.
-        groups: the axis of each group of sources, whose name may stand for that of the axis.
+        sizes: the number of indices of each of these axes, by name.
     """
-    stays: dict[str, IndexPlace] = dict.fromkeys(sizes, "first")
+    place: IndexPlace = "first"
     problems: list[str] = []
-    for text in sorted(sweep.at, key=lambda text: "=" in text):  # a place for one axis overrides one for all
-        name, equals, place = text.rpartition("=")
-        name = name if name in sizes else groups.get(name, name)
-        if equals and name not in sizes:
-            problems.append(f"expected PLACE, or AXIS=PLACE with one of {', '.join(sizes)}, got {shown(text)}")
-            continue
-        try:
-            stays |= dict.fromkeys([name] if equals else sizes, read_place(place))
-        except ValueError as error:
-            problems.append(str(error))
+    for text in sweep.at:
+        if "=" not in text:
+            try:
+                place = read_place(text)
+            except ValueError as error:
+                problems.append(str(error))
     for name, n in sizes.items():
         found: list[str] = []
-        resolve_span("--at", (stays[name],), n, name, found)
+        resolve_span("--at", (place,), n, name, found)
         problems += [problem.removeprefix("--at: ") for problem in found]
     if problems:
         raise JobError("--at", problems)
-    return {name: (place,) for name, place in stays.items()}
+    return dict.fromkeys(sizes, (place,))

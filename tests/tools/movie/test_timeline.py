@@ -229,13 +229,23 @@ def test_movements_show_every_image_on_their_way_once() -> None:
     assert len(swept_shots("walk", seconds=2.0)) == 48
 
 
+def test_movements_along_places() -> None:
+    assert swept_shots(None, cameras="last-0", light="3") == [Shot(c, (3,)) for c in reversed(range(N_C))]
+    assert swept_shots(None, light="0-8x4") == [Shot(0, (l,)) for l in (0, 4, 8)]
+    assert swept_shots("walk", cameras="1,2", light="-1") == [Shot(c, (N_L - 1,)) for c in (1, 2)]
+    assert swept_shots("light", cameras="50%") == swept_shots("light", at=("50%",))
+    assert swept_shots("light", GROUPED, at=("lamps=2",))[-1] == Shot(0, (N_L - 1, 2))
+    assert swept_shots(None, GROUPED, at=("lamps=0-2",))[-1] == Shot(0, (0, 2))
+    assert swept_shots("light", cameras="3", light="0-2") == [Shot(3, (l,)) for l in (0, 1, 2)]
+
+
 @pytest.mark.parametrize(
     ("at", "problem"),
     [
         ("9", "expected one of 9 light positions (0 to 8, or -9 to -1), got 9"),
         ("end", 'expected an index, "first", "last" or a percentage such as "50%", got "end"'),
         ("nan", 'expected an index, "first", "last" or a percentage such as "50%", got "nan"'),
-        ("lamp=2", 'expected PLACE, or AXIS=PLACE with one of light, got "lamp=2"'),
+        ("lamp=2", 'expected AXIS=PLACES with one of the axes light (0 to 8), got "lamp=2"'),
         ("120%", 'expected an index, "first", "last" or a percentage such as "50%", got "120%"'),
     ],
 )
