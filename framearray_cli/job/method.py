@@ -73,11 +73,12 @@ class ReuseTable(Table):
         description="Number of camera positions before, and of those after, that share their hits, N_r. 0: no reuse. "
         '"auto": chosen from the camera path, likewise; if `hits` is given, for the error that n_r = 3 has with it.',
     )
-    weights: Literal["average", "balance"] = Field(
+    weights: Literal["average", "balance", "area"] = Field(
         default="balance",
         description='"average": all hits of a pixel have the same weight. "balance": the weight of a hit follows from '
         "how densely its eye samples the place, which removes the error at silhouettes and texture edges and costs "
-        "more rays.",
+        'more rays. "area": the weight is the part of the pixel that a hit stands for, which removes a third of the '
+        'noise at edges; where a surface has just come into view, as with "balance".',
     )
 
 

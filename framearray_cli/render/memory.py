@@ -87,9 +87,9 @@ def window_memory(
     per_pixel = frame_hits(n_frames, job.n_r, job.hits) if per_pixel is None else per_pixel
     held = max(float(per_pixel[max(j - n_r, 0) : j + n_r + 1].sum()) for j in range(n_frames))
     frames = min(2 * n_r + 1, n_frames)
-    balance = job.reuse.weights == "balance" and n_r > 0
+    weighed = 5 if job.reuse.weights == "area" else 4 if job.reuse.weights == "balance" and n_r > 0 else 0
     per_record = 4 * (prepared.light_arrays.channels * n_lights + LANES)
-    per_hit = per_record + 16 * job.output.layers + frames * (8 if balance else 4)
+    per_hit = per_record + 16 * job.output.layers + frames * (4 + weighed)
     # a frame's mirror hits wait for N_r frames; twice while the lists of all batches are joined, and chains add some
     mirrored = mirror_share * job.specular.hits * (n_r + 3) * per_record
     # of the frame being traced: the pixel of each hit in every frame of the window, before hits are sorted by it

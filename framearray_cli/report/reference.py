@@ -99,6 +99,7 @@ def _render_reference(case: Case, c: int, passes: int) -> Reference:
         n_r=0,
         per_pixel=np.full_like(case.setup.per_pixel, HITS),
         balance=False,
+        area=False,
         shadow_step=1,
         layers=True,
     )

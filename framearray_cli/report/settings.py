@@ -39,7 +39,7 @@ class Settings:
     """
 
     n_r: int
-    weights: Literal["average", "balance"]
+    weights: Literal["average", "balance", "area"]
     hits: float
     obscurance: int
     shadow_step: int
@@ -115,7 +115,7 @@ def settings_to_try(base: Settings, n_cameras: int, vary: Mapping[str, Sequence[
     longest = (n_cameras - 1) // 2
     default_values: dict[str, Iterable[Any]] = {
         "reuse.n_r": sorted({0, 1, max(base.n_r, 1), 2 * base.n_r + 1, 2 * (2 * base.n_r + 1)}),
-        "reuse.weights": ("average", "balance"),
+        "reuse.weights": ("average", "balance", "area"),
         "samples.hits": (0.5, 1, 2, 4, 8),
         "samples.obscurance": (1, 2, 5, 10, 20),
         "samples.shadow_step": (1, 2, 4, 8),
@@ -134,8 +134,12 @@ def settings_to_try(base: Settings, n_cameras: int, vary: Mapping[str, Sequence[
 
 
 def baselines(base: Settings) -> list[NamedSettings]:
-    """List settings without reuse among frames, with and without reuse among lights, by hits per pixel."""
-    unshared = replace(base, n_r=0, shadow_step=1, shadow_unbiased=False, weights="average", denoise=False)
+    """List settings without reuse among frames, with and without reuse among lights, by hits per pixel.
+
+    They weigh hits by area where the job does: native hits gain by it, too.
+    """
+    weights: Literal["area", "average"] = "area" if base.weights == "area" else "average"
+    unshared = replace(base, n_r=0, shadow_step=1, shadow_unbiased=False, weights=weights, denoise=False)
     shares = (1 / 14, 1 / 7, 2 / 7, 4 / 7, 1.0, 2.0)
     counts = sorted({max(round(share * base.window_hits), 1) for share in shares})
     return [

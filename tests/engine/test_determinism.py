@@ -71,7 +71,7 @@ def test_particles_from_the_lights_are_the_same_for_any_number_of_threads(paths:
             np.testing.assert_array_equal(getattr(other, name), getattr(one, name))
 
 
-@pytest.mark.parametrize("weights", ["balance", "average"])
+@pytest.mark.parametrize("weights", ["balance", "average", "area"])
 def test_same_bytes_for_1_2_and_5_threads(scene: Path, tmp_path: Path, weights: str) -> None:
     changes = {"reuse": {"n_r": 1, "weights": weights}, "light": {"sources": [LAMP, tiny.SUN]}}
     one = written(scene, tmp_path / "1", 1, **changes)

@@ -114,7 +114,7 @@ def _many_hits(rng: Random, job: Table) -> None:
 
 def _reuse_beyond(rng: Random, job: Table) -> None:
     """N_r beyond the frames that there are."""
-    job["reuse"] = {"n_r": rng.choice((0, 1, 3, 64)), "weights": rng.choice(("average", "balance"))}
+    job["reuse"] = {"n_r": rng.choice((0, 1, 3, 64)), "weights": rng.choice(("average", "balance", "area"))}
 
 
 def _light_anywhere(rng: Random, job: Table) -> None:

@@ -103,6 +103,12 @@ def test_baselines_reach_the_hits_of_the_window() -> None:
         of_family = [one.settings for one in baselines(BASE) if one.family == family]
         assert BASE.window_hits in [s.hits for s in of_family]
         assert all(s.n_r == 0 and s.one_light == (family == SCRATCH) for s in of_family)
+        assert {s.weights for s in of_family} == {"average"}
+
+
+def test_baselines_weigh_by_area_where_the_job_does() -> None:
+    """Native hits gain by it, too: the comparison is with the best way to render from scratch."""
+    assert {one.settings.weights for one in baselines(replace(BASE, weights="area"))} == {"area"}
 
 
 def test_probes_come_with_their_neighbours() -> None:

@@ -18,6 +18,7 @@ import numpy as np
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.render.prepare import Prepared
 from support import oracle_random as rnd
+from support.area_twin import PARTS, area_weights
 from support.oracle_scene import Model, Points, dot, unit
 
 SHADOW_END = 1 - 1e-4  # a shadow ray ends this share of its length before the light
@@ -37,13 +38,20 @@ class Oracle:
     def image(self, c: int, l: int) -> Any:
         """(height, width, 3) radiance of camera c under light l."""
         total, weights, count = np.zeros((self.n_pixels, 3)), np.zeros(self.n_pixels), np.zeros(self.n_pixels, int)
+        parts = []  # of all hits: part of the frame that each lies in, balance weight, radiance
         for k in self.window(c):
             hits = self.native(k)
             pixel, weight = self.use(c, k, hits)
             used = np.flatnonzero(pixel >= 0)
-            np.add.at(total, pixel[used], weight[used, None] * self.radiance(hits[used], l))
+            radiance = self.radiance(hits[used], l)
+            np.add.at(total, pixel[used], weight[used, None] * radiance)
             np.add.at(weights, pixel[used], weight[used])
             np.add.at(count, pixel[used], 1)
+            parts.append((*self.parts(c, hits[used], pixel[used]), weight[used], radiance))
+        if self.job.reuse.weights == "area":
+            column, row, balance, radiance = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+            for p, near, weight in area_weights(column, row, balance, (self.width, self.height)):
+                total[p], weights[p] = weight @ radiance[near], 1
         holes = self.samples(c, np.flatnonzero(count == 0), rnd.HOLE)
         if len(holes):  # a pixel without hits gets one of its own
             total[holes.pixel], weights[holes.pixel], count[holes.pixel] = self.radiance(holes, l), 1, 1
@@ -211,6 +219,18 @@ class Oracle:
             return pixel, np.ones(len(hits))
         total = sum(self.per_pixel(i) * self.seen(i, k, hits)[1] for i in self.window(j))
         return pixel, np.where(pixel >= 0, density, 0) / np.where(total > 0, total, 1)
+
+    def parts(self, j: int, hits: Points, pixel: Any) -> tuple[Any, Any]:
+        """Column and row of the part of frame j in which each hit lies, 16 x 16 per pixel; `pixel` sees the hit."""
+        way = np.where(hits.surface[:, None], hits.position - self.axes(j)[0], hits.escape)
+        _, right, up, forward = self.axes(j)
+        x = self.width / 2 + self.focal * dot(way, right) / dot(way, forward)
+        y = self.height / 2 - self.focal * dot(way, up) / dot(way, forward)
+        corners = pixel % self.width, pixel // self.width
+        return tuple(
+            PARTS * corner + np.clip(np.floor(PARTS * (at - corner)), 0, PARTS - 1).astype(int)
+            for at, corner in zip((x, y), corners, strict=True)
+        )
 
     def seen(self, j: int, k: int, hits: Points) -> tuple[Any, Any]:
         """Pixel of eye j that sees each native hit of eye k, or -1, and p_j = cos theta f^2 / (d^2 cos^3 alpha)."""

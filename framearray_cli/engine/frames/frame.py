@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Int32
+from framearray_cli.base.arrays import Bytes, Float32, Int32
 
 from ..hits.hits import ESCAPED, SURFACE, Hits
 from ..hits.native import Samples, extra_hits, native_hits
 from ..hits.outer import balance_weights, divide_by_own_hits, outer_hits, scale_by_expected_hits, sort_by_pixel
+from ..hits.places import find_places
 from ..inputs.cameras import Cameras
 from ..inputs.random import HOLE_SAMPLE
 from .array_pool import ArrayPool
@@ -36,6 +37,7 @@ class FrameHits:
         records: of the native hits.
         places: frame j -> the hits by the pixel of j that sees them.
         weights: frame j -> (n,) weight w of each hit there, or (0,) where all weigh 1.
+        within: frame j -> (n,) where in its pixel each hit lies, see `hits/places.py`; (0,) unless weights are by area.
         mirrored, mirror_places: reflected hits of mirror pixels of frame c; None in a scene without mirrors.
         mirror_hits: (2, n_pixels) the number of native hits of each pixel whose mirrors were followed, with even and
             with odd sample numbers; (2, 0) without mirrors.
@@ -47,6 +49,7 @@ class FrameHits:
     records: HitRecords
     places: dict[int, HitsByPixel]
     weights: dict[int, Float32]
+    within: dict[int, Bytes]
     mirrored: HitRecords | None
     mirror_places: HitsByPixel | None
     mirror_hits: Int32
@@ -77,6 +80,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
     pixel = take("pixel", (len(frames), n), np.int32)
     order = take("order", (len(frames), n), np.int32)
     weight = take("weight", (len(frames), n if setup.balance else 0), np.float32)
+    within = take("within", (len(frames), n if setup.area else 0), np.uint8)
     n_normals = n if setup.layers or setup.denoise else 0
     normal, depth = np.empty((n_normals, 3), np.float32), np.empty(n_normals, np.float32)
 
@@ -88,7 +92,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
         if n_normals:
             normal[span], depth[span] = _normals_and_depths(setup.cams, c, hits, m)
         estimate_terms(setup, hits, m, scratch, records.part(span), "obscurance", "shadow")
-        _find_outer(setup, c, m, scratch, frames, pixel[:, span], weight[:, span])
+        _find_outer(setup, c, m, scratch, frames, pixel[:, span], weight[:, span], within[:, span])
         return mirror_paths(setup, hits, m, scratch) if setup.depth else []
 
     tasks = [(part, first, m) for part in parts for first, m in pool.batches(part.n)]
@@ -104,7 +108,8 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
         records=records,
         places=places,
         weights={j: weight[row] for row, j in enumerate(frames)},
-        pooled={**records.arrays, "order": order, "weight": weight, "mirror_hits": mirror_hits},
+        within={j: within[row] for row, j in enumerate(frames)},
+        pooled={**records.arrays, "order": order, "weight": weight, "within": within, "mirror_hits": mirror_hits},
         mirrored=reflected[1] if reflected else None,
         mirror_places=_sort_one(reflected[0], setup.n_pixels, pool) if reflected else None,
         mirror_hits=mirror_hits,
@@ -191,16 +196,17 @@ def _normals_and_depths(cams: Cameras, c: int, hits: Hits, n: int) -> tuple[Floa
 
 
 def _find_outer(
-    setup: FrameSetup, c: int, n: int, scratch: Scratch, frames: range, pixel: Int32, weight: Float32
+    setup: FrameSetup, c: int, n: int, scratch: Scratch, frames: range, pixel: Int32, weight: Float32, within: Bytes
 ) -> None:
-    """Find the pixel of each frame that sees native hits 0 to n - 1 of eye c, and the weights of the hits there.
+    """Find the pixel of each frame that sees native hits 0 to n - 1 of eye c, and the weights and places of the hits.
 
     Args:
-        pixel, weight: (n_frames, n) overwritten; row r is of frame frames[r].
+        pixel, weight, within: (n_frames, n) overwritten; row r is of frame frames[r].
     """
     if setup.n_r == 0:  # nothing to project: a hit belongs to its own pixel
-        pixel[0] = scratch.hits.pixel[:n]
+        pixel[0] = scratch.pixel[0, :n] = scratch.hits.pixel[:n]
         weight[:] = 1.0
+        _find_within(setup, n, scratch, frames, scratch.pixel[:1], within)
         return
     started = perf_counter()
     # balance needs p_k of all eyes k of the windows of these frames; row r of seen and density is of eye eyes[r]
@@ -221,4 +227,13 @@ def _find_outer(
         balance_weights(per_pixel, setup.n_r, eyes.start, frames.start, n, seen, density, weight)
         if setup.allotment is not None:
             divide_by_own_hits(hits, of_pixel, frames.start, n, pixel, weight)
+    _find_within(setup, n, scratch, frames, seen[first_row : first_row + len(frames)], within)
     scratch.seconds["visibility"] += perf_counter() - started
+
+
+def _find_within(setup: FrameSetup, n: int, scratch: Scratch, frames: range, pixel: Int32, within: Bytes) -> None:
+    """Find where hits 0 to n - 1 lie in their pixels of each frame, if weights are by area."""
+    if setup.area:
+        place = scratch.place[: len(frames)]
+        find_places(setup.cams, frames.start, scratch.hits, n, pixel, place)
+        within[:] = place[:, :n]

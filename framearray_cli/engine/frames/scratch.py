@@ -23,6 +23,7 @@ class Scratch:
         steps: see `terms/direct_steps.py`; None without shadow steps.
         irradiance: of all lights, where only some are kept; else empty.
         pixel, density: (4 N_r + 1, batch) of the eyes around, see `outer_hits`.
+        place: (2 N_r + 1, batch) where hits lie in their pixels of the frames around, see `find_places`.
         obscurance, skylight: (batch, 3) W and S.
         rays: number of rays traced by kind; `seconds`: by stage.
     """
@@ -39,6 +40,7 @@ class Scratch:
         full = (0 if setup.keeps_all else batch, setup.lights.channels, setup.lights.n_lights)
         self.irradiance = np.empty(full, np.float32)
         self.pixel = np.empty((n_eyes, batch), np.int32)
+        self.place = np.empty((2 * setup.n_r + 1, batch if setup.area else 0), np.int32)
         self.density = np.empty((n_eyes, batch if setup.balance else 0), np.float64)
         self.obscurance = np.empty((batch, 3), np.float32)
         self.skylight = np.empty((batch if setup.obscurance.sky else 0, 3), np.float32)

@@ -31,6 +31,7 @@ class FrameSetup:
         mirror_hits: number of native hits of a pixel that sees a mirror, if more; 0 in a scene without mirrors.
         depth: number of mirror bounces to follow; 0 in a scene without mirrors.
         balance: whether hits are weighed by the balance heuristic; else all weigh 1.
+        area: whether hits are weighed by the part of the pixel that they stand for, see `engine/images/area.py`.
         background: (3,) radiance outside the scene.
         shadow_step, shadow_unbiased: see `terms/direct_steps.py`; step 1 tests every light position.
         layers: whether normals and depths are kept for the layers.
@@ -60,6 +61,7 @@ class FrameSetup:
     layers: bool
     denoise: bool = False
     halves: int = 0
+    area: bool = False
     allotment: Allotment | None = None
     order: Int32 = field(init=False)
 

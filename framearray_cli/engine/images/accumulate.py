@@ -12,7 +12,7 @@ from ..frames.records import HALF, LIT, REFLECTIVITY, WEIGHT, lit_bit
 from ..kernels.kernel import inlined, integer_at, kernel, prefetch, real_at
 from ..kernels.simd import LANES, lane_numbers, lanes_from, load, reals, store
 from .band import HITS_AT_ONCE, INVERSE_PI, Band
-from .sources import IRRADIANCE, ODD_SCALE, ORDER, ROW, SCALE, START, WEIGHTS
+from .sources import IRRADIANCE, ODD_SCALE, ORDER, ROW, SCALE, SHARES, START, WEIGHTS
 
 # Prefetch the irradiance of the hit that comes this many hits later, and the row of the one twice as far ahead: memory
 # answers in about the time that the sums of this many hits take.
@@ -53,9 +53,7 @@ def accumulate(
                 # 2. The weight w of the hit.
                 hit = integer_at(source[ORDER], entry)
                 row = source[ROW] + ROW_BYTES * hit
-                w = odd if real_at(row, HALF) > 0.0 else even
-                if source[WEIGHTS] != 0:
-                    w *= real_at(source[WEIGHTS], hit)
+                w = (odd if real_at(row, HALF) > 0.0 else even) * _weight(source, entry, hit)
                 # 3. What has no l: w R W, w B, w W and w R at once.
                 total = total + lanes_from(row) * w
                 # 4. Note where E[l] of a lit hit is, and its share w R / pi.
@@ -81,6 +79,15 @@ def accumulate(
         else:
             store(band.sums, LANES * i, load(band.sums, LANES * i) + total)
         _add_light(band, i, waiting, channels, n_lights, fresh)
+
+
+@inlined
+def _weight(source: Addresses, entry: int, hit: int) -> Real:
+    """The weight of a hit: of its entry, else its own, else 1."""
+    w = real_at(source[WEIGHTS], hit) if source[WEIGHTS] != 0 else np.float32(1.0)
+    if source[SHARES] != 0:
+        w = real_at(source[SHARES], entry)
+    return w
 
 
 @inlined

@@ -6,14 +6,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from framearray_cli.base.arrays import Addresses, Float32
+from framearray_cli.base.arrays import Addresses, Bytes, Float32
 
 from ..frames.records import HitRecords, HitsByPixel
 
-# Columns of a list of sources: addresses of arrays, 0 for an empty one; and what the arrays hold.
-START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE = range(7)
-_TYPES = (np.int32, np.int32, np.float32, np.float32, np.float32, np.float32, np.float32)
-_NOTHING = np.empty(0, np.float32)
+# Columns of a list of sources: addresses of arrays, 0 for an empty one; and what the arrays hold. SHARES is that of a
+# weight per entry of ORDER in place of one per hit, see `area_weights.py`.
+START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE, PLACES, SHARES = range(9)
+COLUMNS = 9
+_TYPES = (np.int32, np.int32, np.float32, np.float32, np.float32, np.float32, np.float32, np.uint8)
+NO_SCALE, _NO_PLACES = np.empty(0, np.float32), np.empty(0, np.uint8)
+NO_SOURCES: Addresses = np.empty((0, COLUMNS), np.int64)
 
 
 class HitSource(NamedTuple):
@@ -25,20 +28,30 @@ class HitSource(NamedTuple):
         weight: (n_hits,) w of each hit, or (0,) where all weigh 1.
         scale: (n_pixels,) a factor for all hits of a pixel, or (0,) where it is 1.
         odd_scale: (n_pixels,) the factor for odd samples, or (0,) where it is the same.
+        place: (n_hits,) where each hit lies in its pixel, see `hits/places.py`; (0,) where nobody asks.
     """
 
     by_pixel: HitsByPixel
     records: HitRecords
-    weight: Float32 = _NOTHING
-    scale: Float32 = _NOTHING
-    odd_scale: Float32 = _NOTHING
+    weight: Float32 = NO_SCALE
+    scale: Float32 = NO_SCALE
+    odd_scale: Float32 = NO_SCALE
+    place: Bytes = _NO_PLACES
+
+    @property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """The arrays in the order of the columns of a list."""
+        found, records = self.by_pixel, self.records
+        in_order = (found.start, found.order, self.weight, self.scale, self.odd_scale)
+        return (*in_order, records.row, records.irradiance, self.place)
 
 
 class SourceList:
     """Hits of several sources, as `accumulate` takes them; keeps the arrays that it points into.
 
     Attributes:
-        addresses: (n_sources, 7) of the arrays of each source, valid as long as the list lives.
+        sources: the list.
+        addresses: (n_sources, 9) of the arrays of each source, valid as long as the list lives.
     """
 
     def __init__(self, sources: Iterable[HitSource]) -> None:
@@ -47,12 +60,12 @@ class SourceList:
         Raises:
             ValueError: an array is not contiguous, or of another type than kernels read.
         """
-        self._kept = [
-            (s.by_pixel.start, s.by_pixel.order, s.weight, s.scale, s.odd_scale, s.records.row, s.records.irradiance)
-            for s in sources
+        self.sources = list(sources)  # keeps the arrays
+        rows = [
+            [*(_address(array, dtype) for array, dtype in zip(source.arrays, _TYPES, strict=True)), 0]
+            for source in self.sources
         ]
-        rows = [[_address(*of_column) for of_column in zip(arrays, _TYPES, strict=True)] for arrays in self._kept]
-        self.addresses: Addresses = np.array(rows, np.int64).reshape(-1, len(_TYPES))
+        self.addresses: Addresses = np.array(rows, np.int64).reshape(-1, COLUMNS)
 
 
 def _address(array: NDArray[Any], dtype: DTypeLike) -> int:

@@ -6,13 +6,13 @@ The window holds lists of hits, not sums. A hit with its irradiance under every 
 """
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from copy import copy
 from time import perf_counter
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Images, Int32, Rgb
+from framearray_cli.base.arrays import Addresses, Flags, Float32, Images, Int32, Rgb
 
 from ..frames.frame import FrameHits, fill_holes
 from ..frames.records import BY_SAMPLE, INDIRECT, REFLECTIVITY, HitRecords, HitsByPixel
@@ -21,11 +21,12 @@ from ..frames.setup import FrameSetup
 from ..frames.threads import TracePool
 from ..terms.ambient.estimate import Ambient
 from .accumulate import accumulate
+from .area_weights import AreaWeights
 from .band import Band, Finish, as_stored, empty_band
 from .compose import Pixels, Summands, average_native, compose_differences, compose_pixels, weigh_halves
 from .composed import Composed, layers_of
 from .denoise import denoise_obscurance
-from .sources import HitSource, SourceList
+from .sources import NO_SCALE, NO_SOURCES, HitSource, SourceList
 from .standard_error import fill_unknown, half_factors
 
 # Pixels of a band, whose sums over all lights fit a core's cache, and pixels of a task.
@@ -53,6 +54,7 @@ class Window:
         )
         self._frames: dict[int, FrameHits] = {}
         self._holes: dict[int, list[tuple[HitsByPixel, HitRecords]]] = {}
+        self._area = AreaWeights((setup.cams.width, setup.cams.height))
         self._bands = [empty_band(BAND_PIXELS, len(setup.kept)) for _ in range(pool.threads)]
 
     def add(self, frame: FrameHits) -> None:
@@ -92,6 +94,15 @@ class Window:
         finally:
             self._bands.append(band)
 
+    @contextmanager
+    def _weighed(self, hits: SourceList, first: int, n: int) -> Iterator[tuple[Addresses, Int32]]:
+        """Lend the hits of pixels first to first + n - 1 with their weights; and by area, the number in each pixel."""
+        if not self._setup.area:
+            yield hits.addresses, np.empty(0, np.int32)
+            return
+        with self._area.weighed(hits, first, n) as weighed:
+            yield weighed.addresses, weighed.own
+
     def compose(self, j: int, images: Images, eyes: Sequence[int] | None = None) -> Composed:
         """Compose frame j, after all eyes of its window were added and its holes filled.
 
@@ -115,9 +126,11 @@ class Window:
         def compose_task(first: int, scratch: Scratch) -> tuple[int, int, int, int]:
             started = perf_counter()
             n = min(TASK_PIXELS, setup.n_pixels - first)
-            summands = Summands(hits.addresses, mirrored.addresses, setup.lights.channels, smooth)
-            with self._band() as band:
+            with self._weighed(hits, first, n) as (listed, in_pixels), self._band() as band:
+                summands = Summands(listed, mirrored.addresses, setup.lights.channels, smooth)
                 found: tuple[int, int, int, int] = compose_pixels(band, first, n, summands, self._finish, out)
+                if setup.area:
+                    samples[first : first + n] = in_pixels
             if layered:
                 native = frame.places[j]
                 average_native(native.start, native.order, frame.normal, frame.depth, first, n, own)
@@ -142,30 +155,42 @@ class Window:
     def _differences(self, j: int, samples: Int32, shape: tuple[int, ...]) -> Float32:
         """D of the halves of the hits of frame j, (n_lights, height, width, 3); see `standard_error.py`."""
         setup, frame = self._setup, self._frames[j]
-        images, weights = np.empty((len(setup.kept), setup.n_pixels, 3), np.float32), np.empty((2, setup.n_pixels))
-        eyes = setup.eyes_of(j)
-        halves = np.array([setup.half_of(c) for c in eyes], np.int32)
-        hits = self._hits(j, [])
+        images, known = np.empty((len(setup.kept), setup.n_pixels, 3), np.float32), np.empty(setup.n_pixels, np.bool_)
+        halves = np.array([setup.half_of(c) for c in setup.eyes_of(j)], np.int32)
         tasks = [(first, min(TASK_PIXELS, setup.n_pixels - first)) for first in range(0, setup.n_pixels, TASK_PIXELS)]
-        self._pool.run(lambda task, _: weigh_halves(hits.addresses, halves, task[0], task[1], weights), tasks)
-        factors, sources = half_factors(weights), []
-        for c, half in zip(eyes, halves, strict=True):
-            scales = (factors[0], factors[1]) if half == BY_SAMPLE else (factors[half],)
-            found = self._frames[c]
-            sources.append(HitSource(found.places[j], found.records, found.weights[j], *scales))
+        hits, sources = self._hits(j, []), [] if setup.area else self._halved_sources(j, halves, tasks, known)
         if frame.mirrored is not None and frame.mirror_places is not None:
             even, odd = half_factors(frame.mirror_hits)
             sources.append(HitSource(frame.mirror_places, frame.mirrored, scale=even, odd_scale=odd))
         listed, how = SourceList(sources), self._finish._replace(lowest=np.float32(-np.inf))
 
         def compose_task(task: tuple[int, int], _scratch: Scratch) -> None:
-            with self._band() as band:
-                compose_differences(band, *task, listed.addresses, setup.lights.channels, how, images)
+            by_area = self._area.halved(hits, halves, *task, known) if setup.area else nullcontext(NO_SOURCES)
+            with by_area as addresses, self._band() as band:
+                addresses = np.concatenate([addresses, listed.addresses])
+                compose_differences(band, *task, addresses, setup.lights.channels, how, images)
 
         self._pool.run(compose_task, tasks)
         differences = images.reshape(shape)
-        fill_unknown(differences, (weights > 0).all(axis=0).reshape(shape[1:3]), samples.reshape(shape[1:3]))
+        fill_unknown(differences, known.reshape(shape[1:3]), samples.reshape(shape[1:3]))
         return differences
+
+    def _halved_sources(self, j: int, halves: Int32, tasks: Sequence[tuple[int, int]], known: Flags) -> list[HitSource]:
+        """The hits of frame j with their factors in D, by their weights W_A and W_B.
+
+        Args:
+            halves: of the eyes of its window, see `weigh_halves`.
+            tasks: first pixel and number of pixels of each.
+            known: (n_pixels,) overwritten: whether a pixel has hits of both halves.
+        """
+        weights, hits = np.empty((2, self._setup.n_pixels)), self._hits(j, [])
+        self._pool.run(lambda task, _: weigh_halves(hits.addresses, halves, task[0], task[1], weights), tasks)
+        known[:] = (weights > 0).all(axis=0)
+        factors, sources = half_factors(weights), []
+        for source, half in zip(hits.sources, halves, strict=True):
+            even, odd = (factors[0], factors[1]) if half == BY_SAMPLE else (factors[half], NO_SCALE)
+            sources.append(source._replace(scale=even, odd_scale=odd))
+        return sources
 
     def _smooth_indirect(self, j: int, holes: list[tuple[HitsByPixel, HitRecords]], shape: tuple[int, ...]) -> Float32:
         """R W of every pixel of frame j, (n_pixels, 3), with W denoised.
@@ -180,7 +205,8 @@ class Window:
         def average(first: int, _scratch: Scratch) -> None:
             n = min(TASK_PIXELS, n_pixels - first)
             band = empty_band(n, 0)
-            accumulate(band, first, n, hits.addresses, 1, 0, True)
+            with self._weighed(hits, first, n) as (listed, _):
+                accumulate(band, first, n, listed, 1, 0, True)
             indirect[first : first + n] = band.sums[:n, INDIRECT : INDIRECT + 3]
             reflectivity[first : first + n] = band.sums[:n, REFLECTIVITY : REFLECTIVITY + 3]
             native = frame.places[j]
@@ -207,7 +233,9 @@ class Window:
     ) -> SourceList:
         """Native and outer hits of frame j, of its whole window or of some eyes, and those that fill holes."""
         window = [self._frames[c] for c in self._setup.eyes_of(j) if eyes is None or c in eyes]
-        sources = [HitSource(found.places[j], found.records, found.weights[j]) for found in window]
+        sources = [
+            HitSource(found.places[j], found.records, found.weights[j], place=found.within[j]) for found in window
+        ]
         return SourceList(sources + [HitSource(by_pixel, records) for by_pixel, records in holes])
 
     def _mirrored(self, j: int, holes: list[tuple[HitsByPixel, HitRecords]], scale: Float32) -> SourceList:

@@ -74,17 +74,27 @@ def corner_of(cams: Cameras, pixel: int) -> tuple[float, float]:
 
 
 @inlined
+def project(cams: Cameras, k: int, x: Real, y: Real, z: Real) -> tuple[float, float, Real]:
+    """Image position (x, y) of eye k at which the vector (x, y, z) from the eye is seen, and its length along the axis.
+
+    The position is arbitrary where the vector points behind the eye. Takes numbers or lanes.
+    """
+    r, u, f = cams.right, cams.up, cams.forward
+    depth = x * f[k, 0] + y * f[k, 1] + z * f[k, 2]
+    scale = cams.focal / doubles(select(depth > np.float32(0.0), depth, np.float32(1.0)))
+    column = 0.5 * cams.width + scale * doubles(x * r[k, 0] + y * r[k, 1] + z * r[k, 2])
+    row = 0.5 * cams.height - scale * doubles(x * u[k, 0] + y * u[k, 1] + z * u[k, 2])
+    return column, row, depth
+
+
+@inlined
 def project_to_pixel(cams: Cameras, k: int, x: Real, y: Real, z: Real) -> tuple[int, Real]:
     """The pixel of eye k that sees the vector (x, y, z) from the eye, and the vector's length along the optical axis.
 
     The pixel is OUTSIDE where the vector points behind the eye or out of the image. Takes numbers or lanes.
     """
-    r, u, f = cams.right, cams.up, cams.forward
-    depth = x * f[k, 0] + y * f[k, 1] + z * f[k, 2]
+    column, row, depth = project(cams, k, x, y, z)
     ahead = depth > np.float32(0.0)
-    scale = cams.focal / doubles(select(ahead, depth, np.float32(1.0)))
-    column = 0.5 * cams.width + scale * doubles(x * r[k, 0] + y * r[k, 1] + z * r[k, 2])
-    row = 0.5 * cams.height - scale * doubles(x * u[k, 0] + y * u[k, 1] + z * u[k, 2])
     inside = ahead & (column >= 0.0) & (column < cams.width) & (row >= 0.0) & (row < cams.height)
     column, row = select(inside, column, 0.0), select(inside, row, 0.0)
     pixel = integers(row) * np.int32(cams.width) + integers(column)

@@ -168,6 +168,7 @@ def _number_at(dtype: Any, element: Any) -> Callable[..., Any]:
 prefetch: Any = intrinsic(_prefetch_of)
 real_at: Any = intrinsic(_number_at(types.float32, ir.FloatType()))
 integer_at: Any = intrinsic(_number_at(types.int32, ir.IntType(32)))
+byte_at: Any = intrinsic(_number_at(types.uint8, ir.IntType(8)))
 
 
 def processor() -> str:

@@ -21,7 +21,7 @@ from .cost import Model, Reuse, independent_hits
 from .probe import probe
 
 # Longest windows tried. With `average`, distant views of a place bring an error that no number of hits removes.
-LONGEST = {"balance": 16, "average": DEFAULT_N_R}
+LONGEST = {"area": 16, "balance": 16, "average": DEFAULT_N_R}
 # Numbers of hits tried, in rising order.
 HITS = (*sorted(SHARES), *map(float, range(1, 17)))
 # Memory in bytes assumed for choosing, on any machine; what exceeds it counts as rendered in blocks of light positions.
@@ -86,7 +86,8 @@ def resolve_auto(prepared: Prepared, embree: EmbreeScene) -> tuple[Prepared, Aut
         n_lights=prepared.n_lights,
         obscurance=job.samples.obscurance,
         shadow_step=job.samples.shadow_step,
-        balance=job.reuse.weights == "balance",
+        balance=job.reuse.weights != "average",
+        area=job.reuse.weights == "area",
     )
     wanted = wanted_variance(job)
     enough, rows = accuracy_test(model, job), candidates(job, model.found.n_frames)

@@ -22,6 +22,8 @@ EYE_RAY, OBSCURANCE_RAY, SHADOW_RAY, VISIBILITY_RAY = 115.0, 190.0, 48.0, 40.0
 WEIGH, SORT = 0.5, 5.0
 # Per pixel: looking up the hits of one eye; per light position, adding a hit and storing the sum.
 LOOK_UP, ADD, STORE = 18.0, 0.3, 3.2
+# Per hit in a pixel: weighing it by area.
+AREA = 40.0
 # Share of shadow rays traced with `shadow_step` = s: 1 / s, plus this for places where visibility changes.
 BISECTED = 0.04
 
@@ -43,6 +45,7 @@ class Model:
     obscurance: int
     shadow_step: int = 1
     balance: bool = True
+    area: bool = False
 
     def counts(self, reuse: Reuse) -> Float64:
         """Return the expected hits, native and outer, in the pixel of each probed hit, (n,)."""
@@ -77,6 +80,8 @@ class Model:
         light = SHADOW_RAY * found.shadow_rays * min(1.0 / self.shadow_step + BISECTED, 1.0)
         used = native * (1 + 2 * sum(found.seen(k) for k in range(1, n_r + 1)))
         pixel = LOOK_UP * (2 * n_r + 1) * blocks + (ADD * used + STORE) * self.n_lights
+        if self.area:
+            pixel += AREA * used * blocks
         return native * (blocks * find + light) + pixel
 
     def _native(self, reuse: Reuse) -> Float64:

@@ -97,6 +97,7 @@ def _shrink(setup: FrameSetup, planes: Sequence[int], pixels: int) -> FrameSetup
         n_r=0,
         per_pixel=np.ones(setup.n_frames),
         balance=False,
+        area=False,
         shadow_step=1,
         layers=False,
         denoise=False,

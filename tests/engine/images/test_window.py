@@ -85,7 +85,7 @@ def test_a_task_that_fails_gives_its_sums_to_the_next(kernel: str, monkeypatch: 
         np.testing.assert_array_equal(window.compose(1, np.empty(shape, np.float32)).images, before)
 
 
-@pytest.mark.parametrize("weights", ["average", "balance"])
+@pytest.mark.parametrize("weights", ["average", "balance", "area"])
 def test_twice_the_light_is_twice_the_picture(weights: str) -> None:
     """Direct and indirect light together, to the last bit: a factor of two changes no digit."""
     lamp = tiny.TABLE["light"]["sources"][0]

@@ -153,6 +153,8 @@ def test_time_by_hand() -> None:
     assert one.time(Reuse(n_r=1, hits=2)) == pytest.approx(right)
     balanced = Model(found=found, n_lights=20, obscurance=3, balance=True).time(Reuse(n_r=1, hits=2))
     assert balanced == pytest.approx(right + native * (rays + 9 * e.WEIGH))
+    by_area = Model(found=found, n_lights=20, obscurance=3, balance=True, area=True).time(Reuse(n_r=1, hits=2))
+    assert by_area == pytest.approx(balanced + 3 * native * e.AREA)
 
 
 def test_path_ends_count_as_they_are_rendered() -> None:

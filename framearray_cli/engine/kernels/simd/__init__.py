@@ -10,7 +10,20 @@ Two things differ from single numbers. LLVM may fuse sums and products (one roun
 int32 as bits, without the sign. Operands that do not fit together raise a typing error.
 """
 
-from .arithmetic import bits, ctz, doubles, floor, integers, lane_numbers, popcount, reals, select, sqrt, words
+from .arithmetic import (
+    bits,
+    ctz,
+    doubles,
+    floor,
+    integers,
+    lane_numbers,
+    popcount,
+    reals,
+    select,
+    sqrt,
+    sum_of_lanes,
+    words,
+)
 from .memory import compress, gather, lanes_from, load, put_triples, scatter, store, stored, triples_at
 from .rows import load_row, store_row, width_of_packets
 from .types import LANES, Lanes
@@ -38,6 +51,7 @@ __all__ = [
     "store",
     "store_row",
     "stored",
+    "sum_of_lanes",
     "triples_at",
     "width_of_packets",
     "words",

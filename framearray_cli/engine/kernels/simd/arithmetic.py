@@ -140,6 +140,21 @@ def _select_of(typingctx: Any, flags: Any, yes: Any, no: Any) -> Any:
     return lanes(flags, yes, no), codegen
 
 
+def _sum_of_lanes_of(typingctx: Any, value: Any) -> Any:
+    """The sum of all 16 float32 numbers, in pairs: lane 0 and 8, then those sums likewise."""
+    if value != Lanes(types.float32):
+        return None
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        lanes, undefined = args[0], ir.Constant(args[0].type, ir.Undefined)
+        for step in (8, 4, 2, 1):
+            mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [(lane + step) % LANES for lane in range(LANES)])
+            lanes = builder.fadd(lanes, builder.shuffle_vector(lanes, undefined, mask))
+        return builder.extract_element(lanes, ir.IntType(32)(0))
+
+    return types.float32(value), codegen
+
+
 def _function(name: str) -> Callable[..., Any]:
     """An LLVM function of reals, for lanes or for one number."""
 
@@ -205,4 +220,5 @@ reals: Any = intrinsic(_converted(types.float32))
 doubles: Any = intrinsic(_converted(types.float64))
 integers: Any = intrinsic(_converted(types.int32))
 words: Any = intrinsic(_converted(types.uint64))
+sum_of_lanes: Any = intrinsic(_sum_of_lanes_of)
 lane_numbers: Any = intrinsic(_lane_numbers_of)
