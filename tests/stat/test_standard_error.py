@@ -99,6 +99,10 @@ def reported_to_true(images: Array, reported: Array) -> float:
 CASES: dict[str, dict[str, dict[str, Any]]] = {
     "balance": {},
     "average": {"reuse": {"weights": "average"}},
+    "area": {"reuse": {"weights": "area"}},
+    "area, one hit": {"reuse": {"weights": "area"}, "samples": {"hits": 1}},
+    "area, many hits": {"reuse": {"weights": "area"}, "samples": {"hits": 16}},
+    "area, no reuse": {"reuse": {"n_r": 0, "weights": "area"}, "samples": {"hits": 8}},
     "a wide window": {"reuse": {"n_r": 4}, "samples": {"hits": 1}},
     "many hits": {"samples": {"hits": 16}},  # little noise: nothing else may be taken for it
     "many hits, average": {"samples": {"hits": 16}, "reuse": {"weights": "average"}},
@@ -145,7 +149,9 @@ def test_images_of_two_lights_combined_tell_their_error(
     assert abs(reported_to_true(images, differences) - 1) < SHARE
 
 
-@pytest.mark.parametrize(("error", "weights"), [(0.05, "balance"), (0.1, "balance"), (0.1, "average")])
+@pytest.mark.parametrize(
+    ("error", "weights"), [(0.05, "balance"), (0.1, "balance"), (0.1, "average"), (0.05, "area")]
+)
 def test_a_wanted_error_is_reached(error: float, weights: str, scene: Path, tmp_path: Path) -> None:
     """`samples.error` against the spread over seeds, each with a pilot of its own; mirrors are left out of both."""
     changes = {"specular": {"depth": 0}, "reuse": {"weights": weights}}

@@ -11,7 +11,14 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Int32
 from framearray_cli.engine.frames.blocks import Allotment, Blocks, blocks_of
-from framearray_cli.engine.frames.records import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY, HitRecords, empty_records
+from framearray_cli.engine.frames.records import (
+    INDIRECT,
+    LIGHT_INDEPENDENT,
+    OBSCURANCE,
+    REFLECTIVITY,
+    HitRecords,
+    empty_records,
+)
 from framearray_cli.engine.frames.scratch import Scratch
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.shading import estimate_terms
@@ -27,6 +34,8 @@ from .allot import FEWEST, Witnesses, allot
 
 # Added to the job's seed for the pilot; no job's seed is as large.
 PILOT_SEED = 1 << 40
+# Share of the variance between places in a pixel that is left with weights by area (docs/decisions/area-weights.md).
+AREA_SHARE = 0.4
 # Number of frames whose pilot hits judge the allotment.
 JUDGED = 32
 
@@ -142,10 +151,10 @@ class _Pilot:
         for first in range(0, n, batch):
             span = slice(first, min(first + batch, n))
             pair = hit_pairs(span.stop - span.start)
-            radiance = self._radiance(c, pixels[span], scratch)[pair]
+            records = self._records(c, pixels[span], scratch)
+            radiance = _radiance(self.setup, self.ambient, records)[pair]
             mean += float(radiance.sum(dtype=np.float64)) / (2 * n * radiance[0, 0].size)
-            # variance of one hit, from the difference of two
-            variance[span] = np.square(radiance[0] - radiance[1], dtype=np.float64).mean(axis=(1, 2)) / 2
+            variance[span] = self._variance(radiance[0] - radiance[1], records, pair)
             seen, arriving = self._views(c, eyes, 2 * len(pair[0]), scratch)
             block[:, span], density[:, span] = seen[pair], arriving[pair]
         # with one hit per pixel from each frame of the window: the variance, over the number of hits that arrive
@@ -163,15 +172,34 @@ class _Pilot:
             )
         return _FrameNoise(radiance=mean, u=(variance * shared).reshape(by_half), witnesses=witnesses)
 
-    def _radiance(self, c: int, pixels: Int32, scratch: Scratch) -> Float32:
-        """Trace two hits in each of some pixels into `scratch`, and return their radiance, (hits, n_lights, 3)."""
+    def _records(self, c: int, pixels: Int32, scratch: Scratch) -> HitRecords:
+        """Trace two hits in each of some pixels into `scratch`, and return their records."""
         setup, n = self.setup, 2 * len(pixels)
         samples, packets = Samples(setup.seed, pixels, per_pixel=2, first=0, halves=True), scratch.hit_rays.packets
         native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, scratch.hits)
         scratch.rays["pilot"] += n
         records = empty_records(n, *setup.stored_light)
         estimate_terms(setup, scratch.hits, n, scratch, records, "pilot", "pilot")
-        return _radiance(setup, self.ambient, records)
+        return records
+
+    def _variance(self, difference: Float32, records: HitRecords, pair: Int32) -> Float64:
+        """Return the variance of one hit, mean over light positions and channels, from the difference of two, (n,).
+
+        Weights by area lower only what depends on the place in the pixel, not the noise of the obscurance rays.
+
+        Args:
+            difference: (n, n_lights, 3) of the radiance of the hits `pair`.
+        """
+        if not self.setup.area:
+            single: Float64 = np.square(difference, dtype=np.float64).mean(axis=(1, 2)) / 2
+            return single
+        row = records.row[pair]
+        reflectivity, obscurance = (row[..., at : at + 3] for at in (REFLECTIVITY, OBSCURANCE))
+        of_rays = reflectivity.mean(axis=0) * (obscurance[0] - obscurance[1])
+        noise = of_rays[:, None] * self.ambient.intensity
+        squares = AREA_SHARE * np.square(difference - noise, dtype=np.float64) + np.square(noise, dtype=np.float64)
+        weighed: Float64 = squares.mean(axis=(1, 2)) / 2
+        return weighed
 
     def _views(self, c: int, eyes: range, n: int, scratch: Scratch) -> tuple[Int32, Float64]:
         """Return the block in which each eye sees each hit, and the eye's hits there per hit of eye c, (n, n_eyes)."""
