@@ -57,6 +57,7 @@ CAMERA_REUSE = make_variant("camera reuse only", one_light=True, frames=3)
 VARIANTS: tuple[Variant, ...] = (
     FRAME_ARRAY,
     make_variant("weights balance", weights="balance", frames=4, floor=True),
+    make_variant("weights area", weights="area", frames=4, floor=True),
     make_variant("shadow_step 2", shadow_step=2),
     REDUCED,
     make_variant("shadow_step 8", shadow_step=8, frames=4),

@@ -1,4 +1,4 @@
-"""The bias of camera reuse, however many runs are averaged, with both kinds of weights; see docs/measured/bias.md.
+"""The bias of camera reuse, however many runs are averaged, with all kinds of weights; see docs/measured/bias.md.
 
 Frames of a camera path are rendered many times with independent seeds, of the hits of their whole window, and without
 reuse with many more hits: the parts of their reference. Ambient light, average reflectivity and light positions are
@@ -26,9 +26,9 @@ from .squares import products, squares
 
 PLACES = (0.4, 0.6)  # of the camera path
 LIGHTS = tuple((i + 0.5) / 6 for i in range(6))  # of the light path
-WEIGHTS = ("average", "balance")
+WEIGHTS = ("average", "balance", "area")
 PART_HITS = 28  # of a pixel in one part of a reference
-SEEDS = {"average": 10_000, "balance": 20_000, "reference": 2_000_000_000}
+SEEDS = {"average": 10_000, "balance": 20_000, "area": 30_000, "reference": 2_000_000_000}
 EPSILON = 0.01  # of relative squares: (I - R)^2 / (R^2 + EPSILON)
 USUAL = 2  # native hits per pixel and frame, as in jobs
 # Times as many runs as the cabin needs: patches of sunlight make most of the noise.
@@ -54,7 +54,7 @@ class Plan:
     resolution: tuple[int, int] | None
     places: tuple[float, ...] = PLACES
     hits: tuple[int, ...] = (1, 2, 4, 8)
-    runs: Mapping[str, int] = field(default_factory=lambda: {"average": 16, "balance": 40})
+    runs: Mapping[str, int] = field(default_factory=lambda: {"average": 16, "balance": 40, "area": 40})
     parts: int = 50
     fewest: int = 4
     more: int = 1
@@ -66,8 +66,8 @@ class Plan:
 
 
 SMALL = Plan(resolution=(128, 96))
-OWN = Plan(resolution=None, places=PLACES[:1], hits=(1, 2, 4), runs={"average": 4, "balance": 4}, parts=8)
-QUICK = Plan(resolution=(48, 36), runs={"average": 6, "balance": 8}, parts=6)
+OWN = Plan(resolution=None, places=PLACES[:1], hits=(1, 2, 4), runs={"average": 4, "balance": 4, "area": 4}, parts=8)
+QUICK = Plan(resolution=(48, 36), runs={"average": 6, "balance": 8, "area": 8}, parts=6)
 # Measurements of a job: a camera of `CAMERAS` in small, the unchanged job at its own size, and time.
 MEASURES = (*CAMERAS, "own-size", "time")
 TIMED_PLACES = (1 / 3, 2 / 3)  # of the camera path

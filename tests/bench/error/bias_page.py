@@ -36,6 +36,12 @@ Written by `make bench-bias`. Which error of a frame remains in the mean of any 
 Ambient light, average reflectivity and light positions are the same in runs and references: they differ only in reuse.
 """
 
+BY_AREA = f"""
+Weights `area` ([note](../decisions/area-weights.md)) beside `balance`, in the whole picture and in three of its parts
+(see below); {USUAL} hits per pixel and frame.
+"""
+BESIDE = ("silhouettes", "textures", "disocclusions")
+
 BY_PART = f"""
 With {USUAL} hits. *Silhouettes*: inverse depth bends by 5 % or normals part by 18 degrees between neighbours.
 *Textures*: reflectivity steps by 0.03. *Grazing angles*: more than 75.5 degrees from the normal. *Frame edges*: where
@@ -73,7 +79,7 @@ def render(results: Path, site: Site) -> str:
     spent = {job: table for job in JOBS if (table := load(results, f"bias-{job}-time"))}
     parts = [HEAD]
     if found:
-        parts += [*_summary(found), *_by_part(found), *_by_hits(found)]
+        parts += [*_summary(found), *_by_area(found), *_by_part(found), *_by_hits(found)]
         curves = {key: {w: _curve(table, w) for w in ("average", "balance")} for key, table in found.items()}
         if drawn := draw_bias(curves, site.plots):
             parts.append(f"![Squared bias by hits]({site.link(drawn)})")
@@ -129,6 +135,19 @@ Two frames of each path; {USUAL} hits per pixel and frame; references of {first[
 """
     head = ["", "pixels", "lights", "runs", "`average`", "z", "root", "runs", "`balance`", "root", "at most"]
     return ["## Three jobs, three cameras", about, grid(head, rows)]
+
+
+def _by_area(found: Mapping[tuple[str, str], Table]) -> list[str]:
+    """Weights by area beside `balance`, in the parts of the picture that all jobs have."""
+    rows = []
+    for (job, camera), table in found.items():
+        for part in (WHOLE, *BESIDE):
+            both = [row_of(table, weights, USUAL, part) for weights in ("balance", "area")]
+            if balance_and_area := [row for row in both if row]:
+                name = f"{job}, {camera}" if part == WHOLE else part
+                rows.append([name, *(_millionths(row) for row in balance_and_area), _root(balance_and_area[-1])])
+    rows = [row for row in rows if len(row) == 4]  # results of the time before weights by area have three cells
+    return ["## Weights by area", BY_AREA, grid(["", "`balance`", "`area`", "root"], rows)] if rows else []
 
 
 def _by_part(found: Mapping[tuple[str, str], Table]) -> list[str]:

@@ -37,6 +37,8 @@ TRIED = tuple(
         (0, "average", (2, 8, 32, 224)),
         (3, "average", (0.5, 1, 2, 8, 32)),
         (3, "balance", (0.5, 1, 2, 8, 32)),
+        (0, "area", (2, 8, 32)),
+        (3, "area", (0.5, 1, 2, 8, 32)),
     )
     for hits in counts
 )
@@ -135,7 +137,7 @@ def draw(rows: Sequence[Table], file: Path) -> None:
 
     figure, axes = pyplot.subplots(figsize=(4.6, 4.2), layout="constrained")
     try:
-        for weights, colour in (("average", "#c05621"), ("balance", "#2b6cb0")):
+        for weights, colour in (("average", "#c05621"), ("balance", "#2b6cb0"), ("area", "#2f855a")):
             for reuse, marker in (("n_r 3", "o"), ("n_r 0", "x")):
                 some = [row for row in rows if row["variant"].startswith(weights) and reuse in row["variant"]]
                 if some:
