@@ -1,7 +1,7 @@
 """Read and write one image.
 
-EXR and TIFF go through OpenImageIO. It reports success for a PNG on a full disk and reads half a JPEG without an error,
-so PNG and JPEG go through Pillow, in memory.
+EXR and TIFF go through OpenImageIO, but for EXR without compression, which `plain_exr.py` encodes. OpenImageIO reports
+success for a PNG on a full disk and reads half a JPEG without an error, so PNG and JPEG go through Pillow, in memory.
 """
 
 import math
@@ -20,6 +20,7 @@ from framearray_cli.base.extras import install_command
 from framearray_cli.base.files import write_bytes
 from framearray_cli.base.units import counted
 
+from . import plain_exr
 from .attributes import Attributes
 from .exr import OIIO_NAMES, oiio, read_pixels, spec_of, write_pixels
 from .png import can_encode, encode_jpeg, encode_png, read_codes
@@ -157,6 +158,9 @@ def _write_exr(
     layers = [_halves(layer, np.inf) if kind == "half" else layer for layer in more.values()]
     names = ["R", "G", "B"] + [f"{name}.{letter}" for name in more for letter in "RGB"]
     pixels = np.concatenate([image, *layers], axis=-1) if layers else image
+    if image_format.compression == "none" and plain_exr.can_encode(attributes):
+        write_bytes(path, plain_exr.encode_plain_exr(pixels, names, attributes))
+        return
     spec = spec_of(pixels.shape, names, [kind] * len(names), attributes)
     spec.attribute("compression", _compression(image_format.compression))
     write_pixels(path, "openexr", spec, pixels)
