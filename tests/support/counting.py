@@ -24,7 +24,7 @@ from framearray_cli.engine.inputs.surfaces import near_depth
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.direct import FAR_END, direct
 from framearray_cli.engine.terms.falloff import SQRT
-from framearray_cli.engine.terms.obscurance import ObscuranceSettings, _write_obscurance_rays
+from framearray_cli.engine.terms.obscurance_rays import ObscuranceSettings, write_obscurance_rays
 from framearray_cli.scene.paths.paths import LightPath, lights_without_groups
 from support import tiny
 from support.rooms import INSIDE, ON_WALLS, OUTSIDE, TURN, WIDTH, planes
@@ -96,8 +96,8 @@ def hemisphere_rays(stage: Stage, n_rays: int = 5) -> Count:
         d_max=stage.size, falloff=SQRT, tau=1.0, n_rays=n_rays, step_x=step_x, step_y=step_y, sky=True,
         average=nothing, background=nothing,
     )  # fmt: skip
-    traced = _write_obscurance_rays(stage.hits, rays, stage.n, 0, n_rays, settings)
-    intersect(stage.embree.tracer, rays.packets, traced)
+    traced = write_obscurance_rays(stage.hits, rays, stage.n, 0, n_rays, settings, True)
+    intersect(stage.embree.tracer, rays.packets, traced, True)
     row = rays.packets.transpose(0, 2, 1).reshape(-1, rays.packets.shape[1])[:traced]
     row = row[row[:, TFAR] >= 0]  # but for lanes that stand for no hit
     wrong = stage.wrong_ends(row[:, ORIGIN : ORIGIN + 3], row[:, DIRECTION : DIRECTION + 3], row[:, TFAR])

@@ -37,12 +37,13 @@ def estimate_terms(
         throughput: (>= n, 3) the tint t of the mirrors on the way to each hit, or (0, 3) without mirrors.
     """
     started = perf_counter()
+    neighbours = not len(throughput)  # behind mirrors hits lie apart
     scratch.rays[obscurance_kind] += obscurance(
-        hits, n, setup.obscurance, setup.surfaces, setup.tracer, scratch.hit_rays, scratch.obscurance, scratch.skylight
-    )
+        hits, n, setup.obscurance, setup.surfaces, setup.tracer, scratch.hit_rays, scratch.obscurance,
+        scratch.skylight, neighbours,
+    )  # fmt: skip
     middle = perf_counter()
     if scratch.steps is None:
-        neighbours = not len(throughput)  # behind mirrors hits lie apart
         rays = direct(hits, n, setup.lights, setup.tracer, scratch.test_rays, out.irradiance, neighbours)
     else:
         irradiance = out.irradiance if setup.keeps_all else scratch.irradiance

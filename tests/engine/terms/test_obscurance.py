@@ -28,7 +28,9 @@ def curve(falloff: int, tau: float, x: Any, out: Any) -> None:
         out[i] = rho(falloff, tau, x[i])
 
 
-def gathered(scene: Scene, hits: Hits, room: int = 4096, **changes: Any) -> tuple[Any, Any, int]:
+def gathered(
+    scene: Scene, hits: Hits, room: int = 4096, neighbours: bool = True, **changes: Any
+) -> tuple[Any, Any, int]:
     """W (n, 3), S (n, 3) and the number of rays."""
     values = {"d_max": 1.0, "falloff": SQRT, "tau": 3.0, "n_rays": 5, "sky": False} | changes
     background = np.float32(values.pop("background", (0, 0, 0)))
@@ -37,7 +39,8 @@ def gathered(scene: Scene, hits: Hits, room: int = 4096, **changes: Any) -> tupl
     n = len(hits.kind)
     result, sky = np.full((n, 3), np.nan, np.float32), np.full((n if settings.sky else 0, 3), np.nan, np.float32)
     with EmbreeScene(scene) as embree:
-        rays = obscurance(hits, n, settings, surfaces(scene), embree.tracer, room_for_hits(room), result, sky)
+        packets = room_for_hits(room)
+        rays = obscurance(hits, n, settings, surfaces(scene), embree.tracer, packets, result, sky, neighbours)
     return result, sky, rays
 
 
@@ -163,3 +166,40 @@ def test_tilted_shading_normals_do_not_look_into_the_surface() -> None:
     hits.shading[:] = np.float32([0.8, 0.6, 0.0])
     result = gathered(floor, hits)[0]
     np.testing.assert_allclose(result, np.tile(AVERAGE, (2000, 1)), rtol=1e-6)
+
+
+def shelves() -> Scene:
+    """Boards and posts of one material above and around the points of `scattered`."""
+    boards = [tiny.box((x, y, -3), (x + 0.9, y + 0.05, 3)) for x in range(-3, 3) for y in (0.4, 0.8)]
+    posts = [tiny.box((x, 0.02, z), (x + 0.1, 1.5, z + 0.1)) for x in range(-3, 3) for z in range(-3, 3)]
+    return tiny.scene_of(np.concatenate(boards + posts), Material(name="Wood", reflectivity=(0.7, 0.4, 0.2)))
+
+
+def scattered(n: int) -> Hits:
+    """Points of a floor in rows, of which some reflect nothing."""
+    hits = points(n, (0, 0, 0), UP)
+    rng = np.random.default_rng(5)
+    hits.position[:] = rng.uniform(-3, 3, (n, 3)) * [1, 0, 1]
+    hits.position[:] = hits.position[np.argsort(hits.position[:, 0] // 0.5, kind="stable")]
+    hits.key[:] = rng.integers(0, 2**63, n)
+    hits.reflectivity[rng.random(n) < 0.1] = 0.0
+    return hits
+
+
+@pytest.mark.parametrize("changes", [{}, {"sky": True, "background": (1, 2, 3)}, {"n_rays": 300}, {"n_rays": 1}])
+def test_rays_in_the_order_of_directions_have_the_same_values(changes: dict[str, Any]) -> None:
+    """To the last bit, where no two surfaces of unlike colour meet a ray at the same distance."""
+    n = 100 if changes.get("n_rays") == 300 else 5000
+    hits, scene = scattered(n), shelves()
+    w, s, rays = gathered(scene, hits, neighbours=True, **changes)
+    w_apart, s_apart, rays_apart = gathered(scene, hits, neighbours=False, **changes)
+    np.testing.assert_array_equal(w, w_apart)
+    np.testing.assert_array_equal(s, s_apart)
+    assert rays == rays_apart and 0.1 < w[hits.reflectivity[:, 0] > 0].std() / w.mean() < 2
+
+
+def test_batches_of_any_size_give_the_same_obscurances() -> None:
+    hits, scene = scattered(5000), shelves()
+    whole, _, _ = gathered(scene, hits, 8192)
+    parts = [gathered(scene, Hits(*(a[i : i + 2048] for a in hits)), 4096)[0] for i in range(0, 5000, 2048)]
+    np.testing.assert_array_equal(np.concatenate(parts), whole)
