@@ -149,9 +149,7 @@ def test_images_of_two_lights_combined_tell_their_error(
     assert abs(reported_to_true(images, differences) - 1) < SHARE
 
 
-@pytest.mark.parametrize(
-    ("error", "weights"), [(0.05, "balance"), (0.1, "balance"), (0.1, "average"), (0.05, "area")]
-)
+@pytest.mark.parametrize(("error", "weights"), [(0.05, "balance"), (0.1, "balance"), (0.1, "average"), (0.05, "area")])
 def test_a_wanted_error_is_reached(error: float, weights: str, scene: Path, tmp_path: Path) -> None:
     """`samples.error` against the spread over seeds, each with a pilot of its own; mirrors are left out of both."""
     changes = {"specular": {"depth": 0}, "reuse": {"weights": weights}}
