@@ -25,6 +25,7 @@ from numba.extending import intrinsic
 
 from .cache import forgive, kernel_folder
 from .pipeline import KernelCompiler
+from .start import load_numba
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -84,6 +85,7 @@ class _LazyCache:
     @property
     def cache(self) -> Any:
         if self._opened is None:
+            load_numba()
             try:
                 self._opened = _OwnCache(self._function)
             except RuntimeError:  # no folder, or a function without a source file
