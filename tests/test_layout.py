@@ -183,13 +183,12 @@ def test_hot_loops_are_compiled_by_the_decorators_of_kernel() -> None:
                 if any(text.startswith(("nb.", "numba.", "njit")) for text in texts):
                     own[f"{module}.{node.name}"] = texts
     assert set(own) <= {
-        "engine/hits/native.pixel_order",
         "engine/embree/masks._surfaces_at",
         "engine/embree/masks.filter_masked",
     }
 
 
-@pytest.mark.parametrize("name", ["kernel", "inlined"])
+@pytest.mark.parametrize("name", ["kernel", "step", "inlined"])
 def test_kernels_say_what_they_do(name: str) -> None:
     """Each has a docstring, or is a private step of a few lines."""
     for module, tree in TREES.items():

@@ -9,7 +9,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Bytes, Directions, Float32, Int32, Keys, Points, Real, Rgb, Triple
 
-from ..embree.packets import DIRECTION, GEOMETRY, TRIANGLE, Tracer, U, V, scene_triangle
+from ..embree.packets import DIRECTION, GEOMETRY, TRIANGLE, Tracer, U, V, intersect, scene_triangle
 from ..inputs.surfaces import Surfaces, geometric_normal, position_at, reflectivity_at, shading_normal, specular_at
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, gather, lane_numbers, load, load_row, put_triples, select, sqrt, store, triples_at
@@ -125,6 +125,17 @@ def decode_hits(tracer: Tracer, packets: Float32, i: int) -> tuple[bool, int, Re
     triangle = select(missed, 0, scene_triangle(tracer, triangle, load_row(bits, i, GEOMETRY)))
     u, v = load_row(packets, i, U), load_row(packets, i, V)
     return missed, triangle, select(missed, 0.0, u), select(missed, 0.0, v)
+
+
+def trace_hits(
+    world: World, packets: Float32, n: int, *, coherent: bool, near: float, mirrors: bool, hits: Hits
+) -> None:
+    """Trace rays 0 to n - 1 and turn them into hits; see `intersect` and `record_hits`.
+
+    Kernels that write rays do not call these two themselves: they would be compiled into each of them.
+    """
+    intersect(world.tracer, packets, n, coherent, near)
+    record_hits(world, packets, n, mirrors, hits)
 
 
 @kernel

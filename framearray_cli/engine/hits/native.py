@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
 from framearray_cli.base.arrays import Bytes, Float32, Int32, Real
@@ -11,9 +10,9 @@ from ..embree.packets import DIRECTION, ORIGIN, TFAR, intersect
 from ..inputs.cameras import Cameras, corner_of, eye_ray
 from ..inputs.random import OTHER_HALF, PIXEL, PIXEL_SAMPLE, r2, random_word, stream
 from ..inputs.surfaces import specular_at
-from ..kernels.kernel import inlined, keep_on_disk, kernel
+from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, doubles, floor, gather, integers, lane_numbers, put_triples, select, store, store_row
-from .hits import Hits, World, decode_hits, record_hits
+from .hits import Hits, World, decode_hits, trace_hits
 
 
 class Samples(NamedTuple):
@@ -34,14 +33,19 @@ class Samples(NamedTuple):
     halves: bool = False
 
 
-@keep_on_disk
-@nb.njit()
 def pixel_order(width: int, height: int) -> Int32:
     """All pixels, ordered by 4 x 4 blocks within 32 x 32 tiles.
 
     16 neighbours make a coherent packet, and a tile's triangles stay in the cache.
     """
     order = np.empty(width * height, np.int32)
+    _write_order(width, height, order)
+    return order
+
+
+@kernel
+def _write_order(width: int, height: int, order: Int32) -> None:
+    """Write the pixels of `pixel_order`."""
     n = 0
     for ty in range(0, height, 32):
         for tx in range(0, width, 32):
@@ -51,7 +55,6 @@ def pixel_order(width: int, height: int) -> Int32:
                         for x in range(bx, min(bx + 4, width)):
                             order[n] = y * width + x
                             n += 1
-    return order
 
 
 @inlined
@@ -99,7 +102,6 @@ def _write_sample_rays(
     store(hits.key, i, stream(samples.seed, c, pixel, sample))
 
 
-@kernel
 def native_hits(
     cams: Cameras,
     c: int,
@@ -118,6 +120,16 @@ def native_hits(
     Args:
         mirrors: whether the scene has mirrors; otherwise the hits' `specular` is not written.
     """
+    _write_native_rays(cams, c, samples, first, n, packets, hits)
+    # trace from the depth at which eyes begin to see
+    trace_hits(world, packets, n, coherent=True, near=cams.near, mirrors=mirrors, hits=hits)
+
+
+@kernel
+def _write_native_rays(
+    cams: Cameras, c: int, samples: Samples, first: int, n: int, packets: Float32, hits: Hits
+) -> None:
+    """Write the eye rays of `native_hits`."""
     # in float64: a frame may have more hits than an int32 counts, and the quotients of such numbers are exact
     n_pixels, of_group = np.float64(samples.pixels.shape[0]), np.float64(16 * samples.per_pixel)
     for i in range(0, n, LANES):
@@ -129,12 +141,8 @@ def native_hits(
         sample = floor(rest / members)
         pixel = gather(samples.pixels, integers(group * 16.0 + rest - sample * members))
         _write_sample_rays(cams, c, samples, pixel, integers(sample) + np.int32(samples.first), i, packets, hits)
-    # trace from the depth at which eyes begin to see
-    intersect(world.tracer, packets, n, True, cams.near)
-    record_hits(world, packets, n, mirrors, hits)
 
 
-@kernel
 def extra_hits(
     cams: Cameras, c: int, samples: Samples, first: int, n: int, world: World, packets: Float32, hits: Hits
 ) -> None:
@@ -142,13 +150,20 @@ def extra_hits(
 
     Hits are numbered by pixel, within a pixel by sample.
     """
+    _write_extra_rays(cams, c, samples, first, n, packets, hits)
+    trace_hits(world, packets, n, coherent=True, near=cams.near, mirrors=True, hits=hits)
+
+
+@kernel
+def _write_extra_rays(
+    cams: Cameras, c: int, samples: Samples, first: int, n: int, packets: Float32, hits: Hits
+) -> None:
+    """Write the eye rays of `extra_hits`."""
     for i in range(0, n, LANES):
         number = doubles(_lane_numbers_below(i, n)) + np.float64(first)
         at = floor(number / np.float64(samples.per_pixel))
         sample = integers(number - at * np.float64(samples.per_pixel)) + np.int32(samples.first)
         _write_sample_rays(cams, c, samples, gather(samples.pixels, integers(at)), sample, i, packets, hits)
-    intersect(world.tracer, packets, n, True, cams.near)
-    record_hits(world, packets, n, True, hits)
 
 
 @kernel

@@ -19,7 +19,7 @@ from framearray_cli.base.arrays import Float32, Float64, Int32, Real
 
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, is_blocked, occlude, room_in
 from ..inputs.cameras import OUTSIDE, Cameras, project_to_pixel
-from ..kernels.kernel import inlined, kernel
+from ..kernels.kernel import inlined, kernel, step
 from ..kernels.simd import (
     LANES,
     compress,
@@ -60,7 +60,7 @@ def _project_hits(cams: Cameras, k: int, hits: Hits, i: int) -> tuple[int, Real,
     return select(facing > 0.0, pixel, np.int32(OUTSIDE)), facing, doubles(depth)
 
 
-@kernel
+@step
 def _write_visibility_rays(cams: Cameras, first_eye: int, hits: Hits, stride: int, rays: Rays, n: int) -> None:
     """Write the n queued visibility rays: from a hit to an eye, or for an escaped ray from the eye out of the scene.
 
@@ -103,7 +103,7 @@ def _write_visibility_rays(cams: Cameras, first_eye: int, hits: Hits, stride: in
         store_row(rays.packets, first, TFAR, select(surface, end, np.float32(np.inf)))
 
 
-@kernel
+@step
 def _drop_hidden(
     cams: Cameras, first_eye: int, hits: Hits, tracer: Tracer, rays: Rays, n: int, pixel: Int32, density: Float64
 ) -> None:

@@ -5,7 +5,7 @@ passed on (an atomic instruction each, for arrays that the caller holds anyway),
 zero. Without reference counts a kernel must not allocate; its caller passes scratch arrays. A kernel releases the GIL,
 and is compiled once for all runs.
 
-`inlined` is for the small functions that kernels are written with.
+`step` is for parts of a kernel that only kernels call, `inlined` for the small functions that kernels are written with.
 
 Decorating a function only declares it. The first call loads its machine code from disk, or compiles it and makes a
 folder for it (`cache.py`). numba's own settings stay untouched.
@@ -116,7 +116,16 @@ def keep_on_disk(function: F) -> F:
 
 def kernel(function: F) -> F:
     """Declare a hot loop, to be compiled at its first call; it must not allocate."""
-    declared: F = _njit(**_OPTIONS)(function)
+    return _declared(function)
+
+
+def step(function: F) -> F:
+    """Declare a hot loop that only kernels call; compiling it takes less time."""
+    return _declared(function, no_cpython_wrapper=True)
+
+
+def _declared(function: F, **more: bool) -> F:
+    declared: F = _njit(**_OPTIONS, **more)(function)
     compiled: Any = declared
     if hasattr(compiled, "get_call_template"):  # NUMBA_DISABLE_JIT leaves plain Python functions
         compiled.get_call_template = _without_literals(compiled.get_call_template)

@@ -15,7 +15,7 @@ from ..hits.hits import Hits, lift, ray_origin, reflects, reflects_in_lanes, tri
 from ..hits.rays import NO_RAYS, Rays
 from ..inputs.lights import DIRECTIONAL, LightArrays
 from ..inputs.shapes import vector_and_factor
-from ..kernels.kernel import inlined, kernel
+from ..kernels.kernel import inlined, kernel, step
 from ..kernels.simd import (
     LANES,
     bits,
@@ -117,7 +117,7 @@ def _queue(
         store(rays.value, channel * rays.value.shape[1] + waiting, factor * strength)
 
 
-@kernel
+@step
 def _trace_queue(tracer: Tracer, rays: Rays, n: int, irradiance: Float32) -> None:
     """Trace the n queued shadow rays and add the irradiance of those that nothing blocks."""
     room = rays.row.shape[1]

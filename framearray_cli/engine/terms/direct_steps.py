@@ -20,7 +20,7 @@ from ..hits.hits import Hits, lift, ray_origin, reflects
 from ..hits.rays import NO_RAYS, Rays
 from ..inputs.lights import DIRECTIONAL, LightArrays
 from ..inputs.random import STEPS, mix, random_word
-from ..kernels.kernel import inlined, kernel
+from ..kernels.kernel import inlined, kernel, step
 from .direct import FAR_END, TO, write_geometry
 
 # Hits per block: enough to fill packets in the later rounds, which have fewer rays.
@@ -74,7 +74,7 @@ def _run_end(tests: StepTests, b: int, l: int) -> int:
     return l
 
 
-@kernel
+@step
 def _trace_tests(tracer: Tracer, rays: Rays, n: int, visible: Float32) -> None:
     """Trace the n queued shadow rays and record whether each sees its source."""
     occlude(tracer, rays.packets, n, True)
@@ -115,7 +115,7 @@ def _prepare_hit(hits: Hits, i: int, lights: LightArrays, s: int, rays: Rays, b:
     tests.in_front[b] = count
 
 
-@kernel
+@step
 def _test_steps(
     hits: Hits, first: int, n: int, lights: LightArrays, s: int, step: int, tracer: Tracer, rays: Rays, tests: StepTests
 ) -> int:
@@ -161,7 +161,7 @@ def _test_steps(
     return total + waiting
 
 
-@kernel
+@step
 def _compare_tests(hits: Hits, first: int, n: int, step: int, unbiased: bool, tests: StepTests) -> tuple[int, int]:
     """Fill the intervals whose ends agree, and list the others and the checks; returns the length of both lists."""
     n_lights = tests.factor.shape[1]
@@ -203,7 +203,7 @@ def _compare_tests(hits: Hits, first: int, n: int, step: int, unbiased: bool, te
     return n_intervals, n_checks
 
 
-@kernel
+@step
 def _bisect(
     hits: Hits, first: int, n: int, lights: LightArrays, s: int, tracer: Tracer, rays: Rays, tests: StepTests
 ) -> int:
@@ -239,7 +239,7 @@ def _bisect(
     return total
 
 
-@kernel
+@step
 def _check_agreed(
     hits: Hits, first: int, n: int, lights: LightArrays, s: int, tracer: Tracer, rays: Rays, tests: StepTests
 ) -> int:

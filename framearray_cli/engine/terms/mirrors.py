@@ -8,8 +8,8 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Rgb
 
-from ..embree.packets import intersect, set_ray
-from ..hits.hits import SURFACE, Hits, World, record_hits
+from ..embree.packets import set_ray
+from ..hits.hits import SURFACE, Hits, World, trace_hits
 from ..hits.rays import NO_RAYS
 from ..inputs.random import mix
 from ..kernels.kernel import inlined, kernel
@@ -30,7 +30,6 @@ def count_mirrors(hits: Hits, n: int) -> int:
     return total
 
 
-@kernel
 def reflect(
     hits: Hits, n: int, throughput: Rgb, world: World, packets: Float32, reflected: Hits, reflected_throughput: Rgb
 ) -> int:
@@ -44,6 +43,16 @@ def reflect(
     Returns:
         number of reflected hits, which is the number of rays.
     """
+    m: int = _write_reflected_rays(hits, n, throughput, packets, reflected, reflected_throughput)
+    trace_hits(world, packets, m, coherent=True, near=0.0, mirrors=True, hits=reflected)
+    return m
+
+
+@kernel
+def _write_reflected_rays(
+    hits: Hits, n: int, throughput: Rgb, packets: Float32, reflected: Hits, reflected_throughput: Rgb
+) -> int:
+    """Write the rays of `reflect`, and what is known of their hits before tracing."""
     # Loop state
     m = NO_RAYS  # reflected rays
     for i in range(n):
@@ -68,6 +77,4 @@ def reflect(
         reflected.pixel[m] = hits.pixel[i]
         reflected.half[m] = hits.half[i]
         m += 1
-    intersect(world.tracer, packets, m, True, 0.0)
-    record_hits(world, packets, m, True, reflected)
     return m

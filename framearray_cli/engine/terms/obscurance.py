@@ -27,7 +27,7 @@ from ..embree.packets import (
 from ..hits.hits import Hits, reflects_in_lanes
 from ..hits.rays import NO_RAYS, ORDER, RANK, Rays
 from ..inputs.surfaces import Surfaces, total_at
-from ..kernels.kernel import kernel
+from ..kernels.kernel import kernel, step
 from ..kernels.simd import (
     LANES,
     compress,
@@ -52,7 +52,7 @@ from .obscurance_rays import write_obscurance_rays
 RAYS_TOGETHER, HITS_TOGETHER = 4096, 2048
 
 
-@kernel
+@step
 def _evaluate_rays(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int, settings: ObscuranceSettings) -> int:
     """Compute R(Q) rho(d) of traced rays 0 to n - 1 into `rays.value`.
 
@@ -94,7 +94,7 @@ def _evaluate_rays(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int, setti
     return varied
 
 
-@kernel
+@step
 def _apply_textures(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int) -> None:
     """Multiply the value of listed rays 0 to n - 1 by R(Q), looked up where each ray meets its surface."""
     if n == 0:
@@ -120,7 +120,7 @@ def _apply_textures(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int) -> N
             scatter(rays.value, place, gather(rays.value, place) * total[channel])
 
 
-@kernel
+@step
 def _add_to_hits(
     rays: Rays, n: int, first_ray: int, n_rays: int, settings: ObscuranceSettings, result: Rgb, skylight: Rgb
 ) -> None:
@@ -157,7 +157,7 @@ def _add_to_hits(
                 skylight[hit, channel] = before + light * np.float32(rays.number[ORDER, k])
 
 
-@kernel
+@step
 def _trace_hits(
     hits: Hits,
     surfaces: Surfaces,

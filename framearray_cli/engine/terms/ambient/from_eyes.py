@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64, Points, Rgb
 
-from ...embree.packets import intersect, set_ray
-from ...hits.hits import SURFACE, Hits, World, record_hits
+from ...embree.packets import set_ray
+from ...hits.hits import SURFACE, Hits, World, trace_hits
 from ...inputs.cameras import Cameras, eye_ray
 from ...inputs.lights import LightArrays
 from ...inputs.random import CHOICE, PIXEL, PIXEL_SAMPLE, r2, random_word, stream
@@ -33,7 +33,6 @@ from .estimate import (
 from .walks import DIFFUSE, MAX_BOUNCES, MIRROR, Walkers
 
 
-@kernel
 def start_at_eyes(
     cams: Cameras,
     seed: int,
@@ -45,6 +44,15 @@ def start_at_eyes(
     walkers: Walkers,
 ) -> None:
     """Trace eye rays first to first + n - 1, spread over all images of the camera path by the golden ratio sequence."""
+    _write_first_rays(cams, seed, first, n, packets, hits, walkers)
+    trace_hits(world, packets, n, coherent=False, near=cams.near, mirrors=True, hits=hits)
+
+
+@kernel
+def _write_first_rays(
+    cams: Cameras, seed: int, first: int, n: int, packets: Float32, hits: Hits, walkers: Walkers
+) -> None:
+    """Write the eye rays of `start_at_eyes`, and start their walks."""
     # shifts of the sequences, the same for all walks
     key = stream(seed, AMBIENT_STREAM, 0, PIXEL_SAMPLE)
     start = random_word(key, PIXEL)
@@ -64,8 +72,6 @@ def start_at_eyes(
         walkers.walk[i] = i
         for channel in range(3):
             walkers.throughput[i, channel] = 1.0
-    intersect(world.tracer, packets, n, False, cams.near)
-    record_hits(world, packets, n, True, hits)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -12,8 +12,8 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Rgb
 
-from ...embree.packets import intersect, set_ray
-from ...hits.hits import SURFACE, Hits, World, record_hits
+from ...embree.packets import set_ray
+from ...hits.hits import SURFACE, Hits, World, trace_hits
 from ...inputs.lights import LightArrays
 from ...inputs.random import PIXEL, cosine_direction, r2, random_word, stream
 from ...inputs.shapes import emitted_power, emitted_ray, sphere_direction
@@ -42,7 +42,6 @@ class Emitter(NamedTuple):
     radius: float
 
 
-@kernel
 def _emit(
     emitter: Emitter, seed: int, first: int, n: int, world: World, packets: Float32, hits: Hits, walkers: Walkers
 ) -> None:
@@ -50,6 +49,15 @@ def _emit(
 
     The background emits them from a sphere around the scene.
     """
+    _write_emitted_rays(emitter, seed, first, n, packets, hits, walkers)
+    trace_hits(world, packets, n, coherent=False, near=0.0, mirrors=True, hits=hits)
+
+
+@kernel
+def _write_emitted_rays(
+    emitter: Emitter, seed: int, first: int, n: int, packets: Float32, hits: Hits, walkers: Walkers
+) -> None:
+    """Write the rays of `_emit`, and start their walks."""
     lights, s, l, radius = emitter
     for i in range(n):
         # random point (a, b) of the group's sequence, and the particle's stream
@@ -70,8 +78,6 @@ def _emit(
         walkers.walk[i] = i
         for channel in range(3):
             walkers.throughput[i, channel] = 1.0
-    intersect(world.tracer, packets, n, False, 0.0)
-    record_hits(world, packets, n, True, hits)
 
 
 @kernel

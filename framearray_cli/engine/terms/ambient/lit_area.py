@@ -17,7 +17,7 @@ from ...hits.rays import NO_RAYS, Rays
 from ...inputs.lights import LightArrays
 from ...inputs.random import HEMISPHERE, PIXEL, r2, random_word, stream
 from ...inputs.surfaces import Surfaces, geometric_normal, position_at, reflectivity_at, specular_at
-from ...kernels.kernel import kernel
+from ...kernels.kernel import kernel, step
 from .estimate import AMBIENT_STREAM, BATCH, Workspace, choose_steps
 from .walks import DIFFUSE, END, Walkers
 
@@ -100,7 +100,7 @@ def _write_sides(
                 hits.reflectivity[h, axis], hits.specular[h, axis] = diffuse[axis], mirror[axis]
 
 
-@kernel
+@step
 def _trace_connections(tracer: Tracer, rays: Rays, n: int, walkers: Walkers, lit: Bytes) -> None:
     """Trace the n queued connections; light reaches the walks of those that nothing blocks."""
     occlude(tracer, rays.packets, n, False)

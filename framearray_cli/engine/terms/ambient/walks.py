@@ -10,8 +10,8 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32, Rgb, Triple
 
-from ...embree.packets import intersect, set_ray
-from ...hits.hits import SURFACE, Hits, World, record_hits
+from ...embree.packets import set_ray
+from ...hits.hits import SURFACE, Hits, World, trace_hits
 from ...hits.rays import NO_RAYS
 from ...inputs.random import CHOICE, HEMISPHERE, above, cosine_direction, mix, r2, random_word
 from ...kernels.kernel import inlined, kernel
@@ -88,7 +88,6 @@ def _leave(hits: Hits, i: int, step: int) -> Triple:
     return above(d[0] - along * m[0], d[1] - along * m[1], d[2] - along * m[2], g[0], g[1], g[2])
 
 
-@kernel
 def advance(
     hits: Hits,
     walkers: Walkers,
@@ -99,6 +98,16 @@ def advance(
     next_walkers: Walkers,
 ) -> int:
     """Move every walk that continues to its next hit (or escape); returns their number."""
+    m: int = _write_next_rays(hits, walkers, n, packets, next_hits, next_walkers)
+    trace_hits(world, packets, m, coherent=False, near=0.0, mirrors=True, hits=next_hits)
+    return m
+
+
+@kernel
+def _write_next_rays(
+    hits: Hits, walkers: Walkers, n: int, packets: Float32, next_hits: Hits, next_walkers: Walkers
+) -> int:
+    """Write the rays of `advance`, and what is known of their walks before tracing."""
     # Loop state
     m = NO_RAYS  # walks that continue
     for i in range(n):
@@ -115,8 +124,6 @@ def advance(
         for channel in range(3):
             next_walkers.throughput[m, channel] = walkers.throughput[i, channel]
         m += 1
-    intersect(world.tracer, packets, m, False, 0.0)
-    record_hits(world, packets, m, True, next_hits)
     return m
 
 
