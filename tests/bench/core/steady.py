@@ -7,7 +7,7 @@ while it runs, so the result is the cost of an interior frame.
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -18,6 +18,8 @@ import numpy as np
 
 from framearray_cli.array.images.images import ImageFormat
 from framearray_cli.base.arrays import Images, Int32
+from framearray_cli.engine.frames.scratch import Scratch
+from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.composed import Composed
 from framearray_cli.engine.images.window import Window
@@ -43,6 +45,7 @@ class Measured:
             is processor time; it runs beside the others.
         rays: rays per pixel and image, by kind.
         hits: accepted hits per pixel of a frame: mean and 1st percentile.
+        serial: share of the wall time in which no thread of the pool works; with one thread it is Amdahl's figure.
     """
 
     images: int
@@ -51,10 +54,27 @@ class Measured:
     stages: dict[str, float]
     rays: dict[str, float]
     hits: list[float]
+    serial: float
 
     def table(self) -> Table:
         """As a plain table."""
         return asdict(self)
+
+
+class TimedPool(TracePool):
+    """A pool that knows how long it worked, seconds of the thread that calls it."""
+
+    def __init__(self, setup: FrameSetup, threads: int) -> None:
+        self.worked = 0.0
+        super().__init__(setup, threads)
+
+    def run(self, task: Callable[[Any, Scratch], Any], items: Iterable[Any]) -> list[Any]:
+        """Run the tasks, and add the time until all are done."""
+        started = time.perf_counter()
+        try:
+            return super().run(task, items)
+        finally:
+            self.worked += time.perf_counter() - started
 
 
 class TimedWriter(ArrayWriter):
@@ -103,7 +123,7 @@ def steady(case: Case, frames: int, image_format: ImageFormat | None = None, pla
     """
     setup, n_r = case.setup, case.setup.n_r
     first = start_of(case, frames, place) + n_r
-    with TracePool(setup, case.threads) as pool:
+    with TimedPool(setup, case.threads) as pool:
         window = Window(setup, case.ambient, pool)
         ready = ready_frames(window, setup, range(first, first + 1 + frames), pool)
         with _writer(case, Path(), None) as nothing:
@@ -112,12 +132,12 @@ def steady(case: Case, frames: int, image_format: ImageFormat | None = None, pla
 
 
 def _measured(
-    case: Case, window: Window, ready: Iterator[int], pool: TracePool, image_format: ImageFormat | None
+    case: Case, window: Window, ready: Iterator[int], pool: TimedPool, image_format: ImageFormat | None
 ) -> Measured:
     """Time the remaining frames."""
     setup = case.setup
     with tempfile.TemporaryDirectory() as folder, _writer(case, Path(folder), image_format) as writer:
-        rays, seconds = pool.rays(), pool.seconds()
+        rays, seconds, worked = pool.rays(), pool.seconds(), pool.worked
         started, cpu = time.perf_counter(), time.process_time()
         hits = _compose(window, ready, writer)
         wall, cpu = time.perf_counter() - started, time.process_time() - cpu
@@ -126,6 +146,7 @@ def _measured(
         spent = {stage: t for stage, t in spent.items() if stage not in WITHIN_MIRROR}
         spent["rest"] = case.threads * wall - sum(spent.values())
         spent["writing"] = writer.seconds
+        serial = 1.0 - (pool.worked - worked) / wall
     all_hits = np.concatenate(hits)
     return Measured(
         images=images,
@@ -134,6 +155,7 @@ def _measured(
         stages={stage: 1e3 * t / images for stage, t in spent.items()},
         rays={kind: (n - rays[kind]) / images / setup.n_pixels for kind, n in pool.rays().items()},
         hits=[float(all_hits.mean()), float(np.percentile(all_hits, 1))],
+        serial=serial,
     )
 
 

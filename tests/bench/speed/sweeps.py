@@ -31,7 +31,9 @@ SWEEPS: tuple[tuple[str, str, str, list[str], Callable[[Table], list[str]]], ...
      lambda r: [str(r["lights"])]),
     ("n_r", "Frames that share hits", "With 2 native hits per pixel and frame; more frames, more hits per pixel.",
      ["N_r", "hits per pixel"], lambda r: [str(r["n_r"]), f"{r['hits'][0]:.1f}"]),
-    ("threads", "Threads", "One per core, and fewer.", ["threads"], lambda r: [str(r["threads"])]),
+    ("threads", "Threads", "One per core, and fewer. *Serial*: share of the time in which no thread traces or "
+     "composes. With one thread it is\nAmdahl's figure s: n threads are at most 1 / (s + (1 - s) / n) times as fast.",
+     ["threads", "serial"], lambda r: [str(r["threads"]), f"{r['serial']:.1%}"]),
     ("cameras", "Cameras", "The camera path there and back, several times over.", ["N_c"],
      lambda r: [str(r["cameras"])]),
     ("triangles", "Triangles", "A generated room with 50 spheres of more and more triangles. *Scene*: cleaning and "
