@@ -1,4 +1,4 @@
-"""Measure compiling: the first run on a machine compiles its kernels for about a minute, later runs load them."""
+"""Measure compiling: the first run on a machine compiles its kernels for some twenty seconds, later runs load them."""
 
 import time
 from collections.abc import Callable, Iterator
