@@ -47,6 +47,7 @@ def to_text(start: Start, job_file: Path) -> str:
             "",
             "[reuse]",
             _line("n_r", "3", "frames before and after that share their samples"),
+            _line("weights", quoted("area"), "a sample weighs as much as the part of the pixel that it stands for"),
             "",
             "[obscurance]",
             _line("range", f"{start.range:g}", "how far surfaces darken and colour each other, scene units"),
