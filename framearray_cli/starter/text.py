@@ -4,6 +4,7 @@ The text is formatted here rather than by a TOML library, since half of it are c
 """
 
 import os
+import shlex
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,7 @@ def to_text(start: Start, job_file: Path) -> str:
     return "\n".join(
         [
             f"# A first job for {_one_line(start.file.name)}, made by `framearray init`. Change it, then:",
-            f"#   framearray render {_one_line(job_file.name)}",
+            f"#   framearray render {_one_line(shlex.quote(job_file.name))}",
             *_comments(low),
             _line("name", quoted(start.name), "starts every file name"),
             _line("seed", "0", "of all random numbers"),

@@ -214,6 +214,8 @@ def test_missing_and_unreadable_manifests(tmp_path: Path) -> None:
         (tmp_path / "out").mkdir()
         (tmp_path / "out" / "manifest.toml").touch()
         read_manifest(tmp_path)
+    with pytest.raises(OutputError, match=rf"nowhere: no such file; expected .*, such as {tmp_path}/out$"):
+        read_manifest(tmp_path / "nowhere")
     (tmp_path / "manifest.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(OutputError, match="expected UTF-8 text, got a binary file"):
         read_manifest(tmp_path)

@@ -87,6 +87,7 @@ def test_the_text_holds_the_choices(tmp_path: Path) -> None:
 def test_every_key_has_a_comment_and_every_material_is_listed(tmp_path: Path) -> None:
     init_job(room(), tmp_path)
     lines = (tmp_path / "job.toml").read_text().splitlines()
+    assert lines[1] == "#   framearray render job.toml"
     bare = [line for line in lines if " = " in line and not line.startswith(("#", "  {")) and "#" not in line]
     assert bare == []
     # uncommented, the materials are what was read: the job stays valid, and the same picture
