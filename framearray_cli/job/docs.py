@@ -70,6 +70,36 @@ As JSON it is a list: `[{"eye": [0.0, 1.6, 3.0], "target": [0.0, 1.2, 0.0]}, ...
 The first row is camera position 0, the next 1, and so on.
 """
 
+POSITION_FILE = """\
+A `file` of light positions replaces `keys` of points and directional sources. Row k is light position k, from 0.
+
+- `.csv`: a row that names the columns, in any order: `x,y,z`; or `position_x,...` or `direction_x,...`, as in keys.
+  Optionally `intensity` or `intensity_r,intensity_g,intensity_b` (of directional sources `irradiance`), and
+  `color_r,color_g,color_b`.
+- `.json`: a list of `[x, y, z]`, or of keys without `frame`: `[{"position": [0, 2, 1], "intensity": 5}, ...]`.
+- `.npy`: a NumPy array of n x 3 numbers.
+- `.lp`, of reflectance imaging: the number of rows, then one row per image: its name, x, y, z.
+- `.dome`, of RelightLab: JSON with `directions`, `positions`, `positionsSphere` or `positions3d`, as its
+  `lightConfiguration` says. Its sizes and LED corrections are not used.
+
+x, y and z say where the light is: the position of a point, and of a directional source the way from the object to the
+light, against the `direction` of keys. Files of reflectance imaging hold them in the axes of the picture: give
+`space = "camera"`. A source without strengths in its file needs `intensity` or `irradiance` beside `file`.
+
+```toml
+[[light.sources]]
+type = "directional"
+file = "dome.lp"
+space = "camera"
+irradiance = 3.0
+```
+
+The resolved job in the manifest has keys in place of the file.
+"""
+
+
+_MORE = {("camera", None): EYE_FILE, ("light.sources[]", "directional"): POSITION_FILE}
+
 
 def reference_page() -> str:
     """Write the reference page, in Markdown."""
@@ -89,7 +119,7 @@ def _section(root: Schema, section: Section) -> str:
         return ""
     about = section.schema.get("description", "") if section.place else "The keys before the first table."
     table = ["| key | value | default | meaning |", "|---|---|---|---|", *rows]
-    more = [EYE_FILE] if section.place == "camera" else []
+    more = [_MORE[place]] if (place := (section.place, section.kind)) in _MORE else []
     return "\n".join([f"## {_heading(section)}", "", about, "", *table, "", *more])
 
 

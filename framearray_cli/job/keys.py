@@ -25,7 +25,7 @@ def key_problems(keys: Sequence[KeyFrame], directions: str, optional: str) -> li
             text = f"expected more than {before.frame}, the frame of the key before, got {key.frame}"
             problems.append(((i, "frame"), text))
         a, b = getattr(before, directions, None), getattr(key, directions, None)
-        if a and b and _opposite(a, b):
+        if a and b and key.frame > before.frame + 1 and _opposite(a, b):  # neighbours have nothing between them
             text = "expected less than half a turn from the key before, got the opposite direction; add a key between"
             problems.append(((i, directions), text))
     given = [i for i, key in enumerate(keys) if getattr(key, optional) is not None]

@@ -12,9 +12,12 @@ from framearray_cli.base.forms.problems import problems_of
 from framearray_cli.base.forms.toml import STDIN, shown_file
 from framearray_cli.base.forms.words import shown
 
-from .eyefile import EyeFileError, read_eyes
+from .eyefile import read_eyes
 from .job import Job
 from .override import name_settings, put_settings, read_settings
+from .placed import STRENGTHS
+from .positionfile import read_positions
+from .rowfile import RowFileError
 from .values import absolute
 
 
@@ -33,6 +36,8 @@ def read_job(path: Path, sets: Sequence[str] = ()) -> Job:
     put_settings(table, settings)
     job_file = shown_file(path) if path == STDIN else path.absolute()
     table, problems = _with_eyes(table, job_file)
+    table, more = _with_positions(table, job_file)
+    problems += more
     try:
         job = Job.model_validate(table, context={"job_file": job_file})
     except ValidationError as error:
@@ -86,7 +91,7 @@ def _with_eyes(table: dict[str, Any], job_file: Path) -> tuple[dict[str, Any], l
         return table, []
     try:
         keys = read_eyes(absolute(Path(name), job_file))
-    except EyeFileError as error:
+    except RowFileError as error:
         return table, [f"camera.file: {shown(name)}: {problem}" for problem in error.args]
     rest = {key: value for key, value in camera.items() if key != "file"}
     frames, problems = rest.get("frames"), []
@@ -96,3 +101,31 @@ def _with_eyes(table: dict[str, Any], job_file: Path) -> tuple[dict[str, Any], l
         ]
         del rest["frames"]
     return {**table, "camera": {**rest, "keys": keys}}, problems
+
+
+def _with_positions(table: dict[str, Any], job_file: Path) -> tuple[dict[str, Any], list[str]]:
+    """Replace `file` of light sources by keys, so that the job is complete without the files."""
+    light = table.get("light")
+    sources = light.get("sources") if isinstance(light, dict) else None
+    if not isinstance(light, dict) or not isinstance(sources, list):
+        return table, []
+    problems: list[str] = []
+    found = [_with_rows(source, f"light.sources[{i}].file", job_file, problems) for i, source in enumerate(sources)]
+    return {**table, "light": {**light, "sources": found}}, problems
+
+
+def _with_rows(source: Any, place: str, job_file: Path, problems: list[str]) -> Any:
+    """Replace `file` of one source, with the strength and colour beside it, if it is as it should be."""
+    if not isinstance(source, dict) or "keys" in source or str(source.get("type")) not in STRENGTHS:
+        return source  # nothing to replace, or a problem that the validation of the job reports
+    name = source.get("file")
+    if not isinstance(name, str) or not name.strip() or "\0" in name:
+        return source
+    own = ("file", STRENGTHS[source["type"]], "color")
+    common = {key: source[key] for key in own[1:] if key in source}
+    try:
+        keys = read_positions(absolute(Path(name), job_file), source["type"], common)
+    except RowFileError as error:
+        problems += [f"{place}: {shown(name)}: {problem}" for problem in error.args]
+        return source
+    return {key: value for key, value in source.items() if key not in own} | {"keys": keys}

@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from typing import Annotated, TypeAlias
 from zoneinfo import ZoneInfo, available_timezones
 
-from pydantic import PlainValidator, WithJsonSchema
+from pydantic import PlainValidator, ValidationError, WithJsonSchema
 
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.forms.table import fail
@@ -28,6 +28,23 @@ def _date(value: object) -> str:
     if not YEARS[0] <= value.year <= YEARS[1]:
         fail([((), f"expected a year from {YEARS[0]} to {YEARS[1]}, got {value.year}")])
     return value.isoformat()
+
+
+def _dates(value: object) -> str | tuple[str, ...]:
+    """Check a date, or a list of different dates."""
+    if not isinstance(value, list | tuple):
+        return _date(value)
+    if not value:
+        fail([((), "expected a date, or a list of at least 1, got an empty list")])
+    found, problems = [], []
+    for k, each in enumerate(value):
+        try:
+            found.append(_date(each))
+        except ValidationError as error:
+            problems += [((k,), each["ctx"]["text"]) for each in error.errors()]
+    if problems:
+        fail(problems)
+    return tuple(found)
 
 
 def _clock(value: object) -> str:
@@ -75,13 +92,25 @@ def zone_of(value: str | float) -> datetime.tzinfo:
     return datetime.timezone(datetime.timedelta(hours=value))
 
 
+def clock_minutes(clock: str) -> float:
+    """The minutes from midnight to a checked time of day."""
+    time = datetime.time.fromisoformat(clock)
+    return time.hour * 60 + time.minute + time.second / 60
+
+
 def moment(date: str, clock: str, zone: datetime.tzinfo) -> datetime.datetime:
     """The moment at which clocks in a zone show a checked date and time."""
     day, time = datetime.date.fromisoformat(date), datetime.time.fromisoformat(clock)
     return datetime.datetime.combine(day, time, tzinfo=zone)
 
 
-_DATE = WithJsonSchema({"type": "string", "format": "date", "x-words": "a date such as 2026-06-21"})
+_DAY = {"type": "string", "format": "date"}
+_DATES = WithJsonSchema(
+    {
+        "anyOf": [_DAY, {"type": "array", "items": _DAY, "minItems": 1}],
+        "x-words": "a date such as 2026-06-21, or a list of dates",
+    }
+)
 _CLOCK = WithJsonSchema({"type": "string", "x-words": 'a time of day such as "09:30"'})
 _ZONE = WithJsonSchema(
     {
@@ -89,6 +118,6 @@ _ZONE = WithJsonSchema(
         "x-words": 'a name such as "Europe/Berlin", or hours ahead of UTC',
     }
 )
-Date: TypeAlias = Annotated[str, PlainValidator(_date), _DATE]
+Dates: TypeAlias = Annotated[str | tuple[str, ...], PlainValidator(_dates), _DATES]
 Clock: TypeAlias = Annotated[str, PlainValidator(_clock), _CLOCK]
 Zone: TypeAlias = Annotated[str | float, PlainValidator(_zone), _ZONE]

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import PlainValidator, ValidationInfo, WithJsonSchema
 
+from framearray_cli.base.blackbody import black_body
 from framearray_cli.base.forms.table import Float3, fail
 from framearray_cli.base.forms.words import range_text, shown
 from framearray_cli.base.units import FARTHEST
@@ -16,6 +17,8 @@ from framearray_cli.base.units import FARTHEST
 Auto: TypeAlias = Literal["auto"]  # see render/automatic/choose.py
 
 MOST_EMISSION = 1e20  # W/sr, W/m2 or radiance; stays finite after any reflectivity and squared distance
+
+MOST_SIDE = 300  # points along a side of a grid; 300 x 300 are nearly MOST_EYES
 
 SHORTEST = 1e-12  # scene units; shorter directions count as zero
 
@@ -91,6 +94,22 @@ def absolute(path: Path, job_file: Path | None) -> Path:
     return Path(os.path.realpath(whole.parent)) / path.name
 
 
+COLDEST, HOTTEST = 1000, 40000  # kelvin; below red light alone is left, above nothing changes
+
+
+def _colour(value: object) -> tuple[Any, ...]:
+    """Check factors by channel, or read a colour temperature."""
+    if not isinstance(value, str):
+        return _vector(3, 0.0, MOST_EMISSION, grey=True)(value)
+    match = re.fullmatch(r"\s*([0-9]{1,6}(?:\.[0-9]{1,6})?)\s*K\s*", value)
+    if not match:
+        fail([((), f'expected a number, 3 numbers or a temperature such as "3200 K", got {shown(value)}')])
+    kelvin = float(match[1])
+    if not COLDEST <= kelvin <= HOTTEST:
+        fail([((), f"expected a temperature from {COLDEST} to {HOTTEST} K, got {shown(value)}")])
+    return black_body(kelvin)
+
+
 _UNITS = {
     "b": 1,
     "kib": 2**10,
@@ -159,6 +178,27 @@ Direction: TypeAlias = Annotated[Float3, PlainValidator(_direction), _vector_sch
 
 Emission: TypeAlias = Annotated[
     Float3, PlainValidator(_vector(3, 0.0, MOST_EMISSION, grey=True)), _vector_schema(3, grey=True, minimum=0)
+]
+
+Colour: TypeAlias = Annotated[
+    Float3,
+    PlainValidator(_colour),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "minimum": 0},
+                {"type": "array", "items": {"type": "number", "minimum": 0}, "minItems": 3, "maxItems": 3},
+                {"type": "string", "pattern": r"^\s*[0-9]{1,6}(\.[0-9]{1,6})?\s*K\s*$"},
+            ],
+            "x-words": 'a number or 3 numbers of at least 0, or a temperature such as "3200 K"',
+        }
+    ),
+]
+
+GridSize: TypeAlias = Annotated[
+    tuple[int, int],
+    PlainValidator(_vector(2, 1, MOST_SIDE, whole=True)),
+    _vector_schema(2, whole=True, minimum=1, maximum=MOST_SIDE),
 ]
 
 Reflectivity: TypeAlias = Annotated[

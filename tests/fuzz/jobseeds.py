@@ -19,6 +19,25 @@ SUN = {
     "north": [-1.0, 0.0, 0.0],
     "irradiance": [24.0, 22.5, 19.5],
 }
+YEAR = SUN | {"date": ["2026-03-20", "2026-06-21"], "step": 180.0}
+DOME = {"type": "dome", "positions": 3, "shape": "sphere", "top": [0.1, 1, 0], "irradiance": 2.0, "color": "3200 K"}
+LAMPS = {"type": "dome", "positions": 2, "target": [0.1, 0.9, 0.2], "radius": 1.5, "intensity": [4.0, 3.0, 2.0]}
+GRID = {
+    "type": "grid",
+    "counts": [2, 2],
+    "corner": [-0.5, 1.9, -0.5],
+    "side": [1.0, 0.0, 0.0],
+    "other_side": [0.0, 0.0, 1.0],
+    "intensity": 2.0,
+    "color": [1.0, 0.9, 0.8],
+}
+IN_PICTURE = {
+    "type": "point",
+    "space": "camera",
+    "scale": 0.5,
+    "center": [0.0, 1.0, 0.0],
+    "keys": [{"frame": 0, "position": [0, 1, 1], "intensity": 3.0, "color": "2700 K"}],
+}
 GROUPED = {
     "frames": 2,
     "axes": {"lamps": 2},
@@ -63,6 +82,8 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
             output=EXR | {"compression": "zip", "half": "never"},
         ),
         "sun": tiny.table(camera=small, light={"sources": [SUN], "frames": 3}, ambient={"method": "fit", "paths": 64}),
+        "year": tiny.table(camera=small, light={"sources": [YEAR], "frames": 6}),
+        "domes": tiny.table(camera=small, light={"sources": [DOME, LAMPS, GRID, IN_PICTURE], "frames": 4}),
         "automatic": tiny.table(
             camera=small | tiny.WALK, samples={"hits": "auto", "obscurance": 4}, reuse={"n_r": "auto"}, output=EXR
         ),

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from framearray_cli.job.job import Job
-from framearray_cli.job.light import DirectionalKey, PointKey
+from framearray_cli.job.placed import DirectionalKey, PointKey
 
 # Fields of view up to pi are what radians look like; a telescope's picture is rarely meant.
 RADIANS = math.pi

@@ -10,6 +10,9 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 
+# If two directions are closer to parallel than this (radians), rounding decides what is normal to both.
+PARALLEL = 1e-6
+
 
 def unit(vectors: Float64) -> Float64:
     """Scale vectors (n, 3) to length 1; none may be zero."""

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .paths import LightGroup, LightPath, Lights
+from .lightpath import LightPath
+from .paths import LightGroup, Lights
 
 
 def few_planes(lights: Lights, most: int, *, consecutive: bool = False) -> list[int]:

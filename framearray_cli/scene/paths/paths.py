@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
 
 import numpy as np
 
@@ -10,19 +9,12 @@ from framearray_cli.base.arrays import Float64, WorldPoints
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.camera import CameraKey
 from framearray_cli.job.job import Job
-from framearray_cli.job.light import DirectionalKey, PointKey, SunSource
 
 from .curves import interpolate_keys
-from .directions import interpolate_directions, unit
+from .directions import PARALLEL, interpolate_directions, unit
+from .lightpath import LightPath
+from .placing import in_camera_space, place_source
 from .planes import Plane, group_planes, picture_planes
-from .sun import NEVER, daylight, directions_to_sun, sun_path
-
-# If look and up are closer to parallel than this (radians), rounding decides what is right in the picture.
-PARALLEL = 1e-6
-
-
-# What the manifest calls the vector and the strength of a source, by its kind.
-_MANIFEST_KEYS = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,29 +45,6 @@ class Eyes:
         """Return some of the eyes, in the order of the indices."""
         rows = list(indices)
         return replace(self, position=self.position[rows], world_from_camera=self.world_from_camera[rows])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LightPath:
-    """One source at every light position l; in `Lights`, at every image plane.
-
-    Attributes:
-        kind: "point" or "directional".
-        vector: (n, 3) position in scene units, or unit direction in which the light travels.
-        intensity: (n, 3) linear RGB, times the source's colour: W/sr of a point, W/m2 of a directional source.
-        notes: n tables with what else the manifest records of each position; or none.
-    """
-
-    kind: Literal["point", "directional"]
-    vector: Float64
-    intensity: Float64
-    notes: tuple[dict[str, Any], ...] = ()
-
-    def table(self, l: int) -> dict[str, Any]:
-        """Describe the source at position l as the manifest does."""
-        vector, strength = _MANIFEST_KEYS[self.kind]
-        values = {"type": self.kind, vector: self.vector[l].tolist(), strength: self.intensity[l].tolist()}
-        return values | (self.notes[l] if self.notes else {})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,15 +128,16 @@ def lights(job: Job) -> Lights:
         MissingExtraError: there is a sun, and pvlib is not installed.
     """
     table = job.light
+    turn = eyes(job).world_from_camera[0, :3, :3] if in_camera_space(table) else None
     if not table.groups:
-        return lights_without_groups([_place_source(job, i, table.frames) for i in range(len(table.sources))])
+        return lights_without_groups([place_source(job, i, table.frames, turn) for i in range(len(table.sources))])
     planes = group_planes(sum(group.n for group in table.groups), background=any(job.scene.background))
     groups, found, first = [], {}, 0
     for group in table.groups:
         positions = range(first, first + group.n)
         groups.append(LightGroup(name=group.name, axis=group.axis, positions=positions, sources=group.sources))
         for i in group.sources:
-            found[i] = _confine(_place_source(job, i, group.n), positions, len(planes))
+            found[i] = _confine(place_source(job, i, group.n, turn), positions, len(planes))
         first = positions.stop
     return Lights(sources=tuple(found[i] for i in sorted(found)), groups=tuple(groups), planes=planes)
 
@@ -179,55 +149,6 @@ def _confine(path: LightPath, positions: range, n: int) -> LightPath:
     intensity[positions.start : positions.stop] = path.intensity
     notes = tuple(path.notes[k] for k in own) if path.notes else ()
     return LightPath(kind=path.kind, vector=path.vector[own], intensity=intensity, notes=notes)
-
-
-def _place_source(job: Job, i: int, n: int) -> LightPath:
-    """Compute position and intensity of source i at n light positions."""
-    source = job.light.sources[i]
-    if isinstance(source, SunSource):
-        return _place_sun(source, job, f"light.sources[{i}]", n)
-    return _place_light(source.type, source.keys, n)
-
-
-def _place_sun(source: SunSource, job: Job, name: str, n: int) -> LightPath:
-    """Compute directions and irradiance of a sun at n light positions."""
-    up_dir = np.array([0.0, 0.0, 1.0] if job.scene.up == "z" else [0.0, 1.0, 0.0])
-    north_vec = unit(np.array(source.north or ((0.0, 1.0, 0.0) if job.scene.up == "z" else (0.0, 0.0, -1.0))))
-    north_vec = north_vec - (north_vec @ up_dir) * up_dir
-    if np.linalg.norm(north_vec) <= PARALLEL:
-        problem = f'{name}.north: expected a direction that is not up, got the up axis of the scene, "{job.scene.up}"'
-        raise JobError(job.file or job.name, [problem])
-    place = (source.latitude, source.longitude)
-    sun = sun_path(source.date, source.start, source.stop, source.timezone, place, n)
-    if not sun.is_up.any():
-        hours = daylight(source.date, source.timezone, place)
-        when = "it does not rise on that day" if hours == NEVER else f"on {source.date} it is up from {hours}"
-        problem = f"{name}: the sun is below the horizon from {source.start} to {source.stop}; {when}"
-        raise JobError(job.file or job.name, [problem])
-    return LightPath(
-        kind="directional",
-        vector=-directions_to_sun(sun, up_dir, unit(north_vec)),
-        intensity=sun.is_up[:, None] * np.array(source.irradiance),
-        notes=tuple(
-            {"azimuth": round(azimuth, 4), "elevation": round(elevation, 4), "time": time.isoformat(timespec="seconds")}
-            for azimuth, elevation, time in zip(
-                sun.azimuth_deg.tolist(), sun.elevation_deg.tolist(), sun.times, strict=True
-            )
-        ),
-    )
-
-
-def _place_light(
-    kind: Literal["point", "directional"], keys: Sequence[PointKey | DirectionalKey], n_lights: int
-) -> LightPath:
-    """Interpolate the keys of a point or directional source."""
-    frames = [key.frame for key in keys]
-    places = [key.position if isinstance(key, PointKey) else key.direction for key in keys]
-    powers = [key.intensity if isinstance(key, PointKey) else key.irradiance for key in keys]
-    vector = (interpolate_keys if kind == "point" else interpolate_directions)(frames, places, n_lights)
-    colors = [key.color if key.color is not None else (1.0, 1.0, 1.0) for key in keys]
-    intensity = interpolate_keys(frames, powers, n_lights) * interpolate_keys(frames, colors, n_lights)
-    return LightPath(kind=kind, vector=vector, intensity=intensity)
 
 
 def _ups(keys: Sequence[CameraKey], job: Job) -> Float64:

@@ -72,20 +72,34 @@ def sun_at(times: Sequence[datetime], latitude: float, longitude: float) -> SunP
     return SunPath(times=tuple(times), azimuth_deg=azimuth, elevation_deg=elevation)
 
 
-def sun_path(date: str, start: str, stop: str, timezone: str | float, place: tuple[float, float], n: int) -> SunPath:
-    """Find the sun at n moments, evenly spaced from start to stop; one moment is the start.
+def sun_path(
+    dates: Sequence[str],
+    start: str,
+    stop: str,
+    timezone: str | float,
+    place: tuple[float, float],
+    n: int,
+    step: float | None = None,
+) -> SunPath:
+    """Find the sun at n moments: n / len(dates) on each day, evenly spaced from start to stop; one moment is the start.
 
     Args:
-        date, start, stop, timezone: as in a job; clock times of that zone.
+        dates, start, stop, timezone: as in a job; clock times of that zone.
         place: latitude and longitude, degrees.
+        n: a multiple of the number of dates.
+        step: minutes from one moment to the next; None: so that the last is at the stop.
 
     Raises:
         MissingExtraError: pvlib is not installed.
     """
     zone = zone_of(timezone)
-    first = moment(date, start, zone).astimezone(UTC)  # spaced in UTC, so that a clock change causes no jump
-    span = moment(date, stop, zone).astimezone(UTC) - first
-    times = [(first + span * (k / max(n - 1, 1))).astimezone(zone) for k in range(n)]
+    times: list[datetime] = []
+    for date in dates:
+        first = moment(date, start, zone).astimezone(UTC)  # spaced in UTC, so that a clock change causes no jump
+        span = moment(date, stop, zone).astimezone(UTC) - first
+        each = n // len(dates)
+        parts = [timedelta(minutes=step) * k if step else span * (k / max(each - 1, 1)) for k in range(each)]
+        times += [(first + part).astimezone(zone) for part in parts]
     return sun_at(times, *place)
 
 

@@ -86,17 +86,19 @@ def test_true_elevations_would_fail() -> None:
 
 def test_positions_are_evenly_spaced_in_time_across_a_clock_change() -> None:
     place = (52.52, 13.405)
-    sun = sun_path("2026-03-29", "00:00:00", "12:00:00", "Europe/Berlin", place, 12)  # clocks jump from 2 to 3
+    sun = sun_path(("2026-03-29",), "00:00:00", "12:00:00", "Europe/Berlin", place, 12)  # clocks jump from 2 to 3
     steps = [b.timestamp() - a.timestamp() for a, b in zip(sun.times, sun.times[1:], strict=False)]
     assert steps == pytest.approx([3600.0] * 11)
     assert [f"{time:%H:%M %z}" for time in (sun.times[0], sun.times[-1])] == ["00:00 +0100", "12:00 +0200"]
-    assert [f"{time:%H:%M}" for time in sun_path("2026-06-21", "09:00:00", "10:00:00", 2, place, 1).times] == ["09:00"]
+    assert [f"{time:%H:%M}" for time in sun_path(("2026-06-21",), "09:00:00", "10:00:00", 2, place, 1).times] == [
+        "09:00"
+    ]
 
 
 def test_an_offset_is_a_time_zone_too() -> None:
     place = (52.52, 13.405)
     by_name, by_hours = (
-        sun_path("2026-06-21", "09:00:00", "15:00:00", zone, place, 4) for zone in ("Europe/Berlin", 2.0)
+        sun_path(("2026-06-21",), "09:00:00", "15:00:00", zone, place, 4) for zone in ("Europe/Berlin", 2.0)
     )
     np.testing.assert_array_equal(by_name.azimuth_deg, by_hours.azimuth_deg)
 
@@ -227,9 +229,47 @@ def test_an_array_records_the_sun_and_is_dark_before_it_rises(group: str | None,
     noted = manifest.groups[0].lights if group else manifest.lights
     sources = [light.sources[0] for light in noted]
     assert [source["time"] for source in sources] == [f"2026-06-21T{hour:02}:00:00+02:00" for hour in (2, 7, 12)]
-    sun = sun_path("2026-06-21", "02:00:00", "12:00:00", "Europe/Berlin", (52.52, 13.405), 3)
+    sun = sun_path(("2026-06-21",), "02:00:00", "12:00:00", "Europe/Berlin", (52.52, 13.405), 3)
     np.testing.assert_allclose([source["azimuth"] for source in sources], sun.azimuth_deg, atol=1e-4)
     np.testing.assert_allclose([source["elevation"] for source in sources], sun.elevation_deg, atol=1e-4)
     pictures = [Pictures(manifest).picture(0, (l,)) for l in range(3)]
     assert pictures[0].max() == 0  # the sky is black here
     assert min(picture.max() for picture in pictures[1:]) > 0.1
+
+
+def test_days_follow_one_another_on_the_light_axis() -> None:
+    days = ["2026-03-20", "2026-06-21", "2026-12-21"]
+    path = lights(job(frames=12, date=days, start="10:00", stop="13:10", step=60)).sources[0]
+    assert [note["time"][:16] for note in path.notes] == [f"{day}T{h}:00" for day in days for h in (10, 11, 12, 13)]
+    (alone,) = lights(job(frames=4, date=days[1], start="10:00", stop="13:00")).sources
+    # The rotation of the Earth is taken as on the first day: a fraction of a second within a year.
+    np.testing.assert_allclose(path.vector[4:8], alone.vector, atol=1e-4)
+
+
+def test_days_share_the_light_positions_of_a_job() -> None:
+    path = lights(job(frames=6, date=["2026-03-20", "2026-06-21"], start="10:00", stop="12:00")).sources[0]
+    assert [note["time"][5:16] for note in path.notes[2:4]] == ["03-20T12:00", "06-21T10:00"]
+
+
+@pytest.mark.parametrize(
+    ("frames", "changes", "message"),
+    [
+        (5, {"date": ["2026-03-20", "2026-06-21"]}, "expected a number of days that divides the number of light "
+         "positions, 5, got 2; or give `step`"),
+        (5, {"step": 60}, "expected as many light positions as its axis has, 5, got 15; remove the number of the axis"),
+        (5, {"step": 0}, "expected a number from 0.0166667 to 1440, got 0"),
+        (5, {"date": []}, "expected a date, or a list of at least 1, got an empty list"),
+        (4, {"date": ["2026-03-20", "2026-02-30"]}, 'date[1]: expected a date that the calendar has, got "2026-02-30"'),
+        (None, {}, "light.frames: missing; expected the number of positions of the sun, which has no key frames"),
+    ],
+)  # fmt: skip
+def test_wrong_days_and_steps_are_reported(
+    frames: int | None, changes: dict[str, Any], message: str, tmp_path: Path
+) -> None:
+    sun = {"type": "sun", "date": "2026-06-21", "start": "06:00", "stop": "20:00"} | BERLIN | changes
+    light = {"sources": [sun]} | ({"frames": frames} if frames else {})
+    file = tmp_path / "job.toml"
+    file.write_text(tomli_w.dumps(tiny.table() | {"light": light, "scene": {"file": "a.glb"}}), encoding="utf-8")
+    with pytest.raises(JobError) as caught:
+        read_job(file)
+    assert any(problem.endswith(message) for problem in caught.value.problems), caught.value.problems

@@ -1,0 +1,165 @@
+"""Points and directional sources, along key frames or from a file."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, ValidationInfo, model_validator
+
+from framearray_cli.base.forms.table import Table, default_text, fail
+from framearray_cli.base.units import FARTHEST
+
+from .keys import MOST_EYES, key_problems
+from .sourcetable import SourceTable
+from .values import Colour, Direction, Emission, FileName, Point
+
+STRENGTHS = {"point": "intensity", "directional": "irradiance"}  # key of the strength of sources with a file
+
+
+class PointKey(Table):
+    """A point source at one light frame."""
+
+    frame: int = Field(ge=0, lt=MOST_EYES, description="Number of the light position, counted from 0.")
+    position: Point = Field(description="Position, in the coordinates of the scene file.")
+    intensity: Emission = Field(description="Radiant intensity, W/sr; one number means white.")
+    color: Colour | None = Field(
+        default=None,
+        description="Multiplies `intensity` by channel; a temperature stands for the colour of a black body, of "
+        "luminance 1. Given at every key of a source or at none.",
+        json_schema_extra=default_text("1"),
+    )
+
+
+class DirectionalKey(Table):
+    """A directional source, such as the sun, at one light frame."""
+
+    frame: int = Field(ge=0, lt=MOST_EYES, description="Number of the light position, counted from 0.")
+    direction: Direction = Field(description="The way the light travels: from the sun to the scene. Any length.")
+    irradiance: Emission = Field(
+        description="Irradiance of a surface that faces the light, W/m2; one number means white."
+    )
+    color: Colour | None = Field(
+        default=None,
+        description="Multiplies `irradiance` by channel; a temperature stands for the colour of a black body, of "
+        "luminance 1. Given at every key of a source or at none.",
+        json_schema_extra=default_text("1"),
+    )
+
+
+def _consistent_light_keys(keys: Any) -> Any:
+    """Check the keys of one source against each other."""
+    if problems := key_problems(keys, "direction", "color"):
+        fail(problems)
+    return keys
+
+
+def _one_of_both(keys: Any, info: ValidationInfo) -> Any:
+    """Check that a source has either keys or a file."""
+    has_file = info.data.get("file") is not None
+    if has_file and keys:
+        fail([((), "expected either `keys` or `file`, got both")])
+    if not keys and not has_file and "file" in info.data:
+        fail([((), "expected a list of tables, at least 1, got 0; give `keys` or `file`")])
+    return keys
+
+
+_KEYS = "between them all its values change smoothly, before the first and after the last they stay as they are."
+_ROWS = default_text("the rows of `file`") | {"minItems": 1}
+
+
+class _PlacedSource(SourceTable):
+    """Sources with key frames, or with a file that has one position per row."""
+
+    file: FileName | None = Field(
+        default=None,
+        description="CSV, JSON, .npy, or .lp or .dome of reflectance imaging: one light position per row, instead of "
+        "`keys`.",
+        json_schema_extra=default_text("none"),
+    )
+    space: Literal["scene", "camera"] | None = Field(
+        default=None,
+        description='Axes of the positions and directions. "camera": x to the right in the first picture, y up in it, '
+        "z towards the camera, as reflectance imaging has them.",
+        json_schema_extra=default_text('"scene"'),
+    )
+
+    @property
+    def count(self) -> int:
+        """Number of light positions that the keys reach."""
+        return self.keys[-1].frame + 1 if self.keys else 0  # type: ignore[attr-defined]  # of the subclasses
+
+
+class PointSource(_PlacedSource):
+    """A small lamp that shines equally in all directions."""
+
+    type: Literal["point"] = Field(description="Kind of source.")
+    intensity: Emission | None = Field(
+        default=None,
+        description="Only beside `file`: radiant intensity of all its positions, W/sr, if it has none.",
+        json_schema_extra=default_text("that of the file"),
+    )
+    color: Colour | None = Field(
+        default=None,
+        description="Only beside `file`: colour of all its positions, if it has none.",
+        json_schema_extra=default_text("that of the file, or 1"),
+    )
+    scale: float | None = Field(
+        default=None,
+        gt=0,
+        le=FARTHEST,
+        description="Scene units per unit of the positions.",
+        json_schema_extra=default_text("1"),
+    )
+    center: Point | None = Field(
+        default=None,
+        description="Where the positions have their origin, in the coordinates of the scene file.",
+        json_schema_extra=default_text('the origin; with space = "camera" the first target of the camera'),
+    )
+    keys: Annotated[tuple[PointKey, ...], AfterValidator(_consistent_light_keys), AfterValidator(_one_of_both)] = Field(
+        default=(),
+        validate_default=True,
+        strict=False,
+        description=f"The source at some frames; {_KEYS}",
+        json_schema_extra=_ROWS,
+    )
+
+    @model_validator(mode="after")
+    def _only_beside_file(self) -> "PointSource":
+        _refuse_without_file(self, ("intensity", "color"))
+        return self
+
+
+class DirectionalSource(_PlacedSource):
+    """A source infinitely far away, such as the sun."""
+
+    type: Literal["directional"] = Field(description="Kind of source.")
+    irradiance: Emission | None = Field(
+        default=None,
+        description="Only beside `file`: irradiance of a surface that faces the light, W/m2, at all its positions, if "
+        "it has none.",
+        json_schema_extra=default_text("that of the file"),
+    )
+    color: Colour | None = Field(
+        default=None,
+        description="Only beside `file`: colour of all its positions, if it has none.",
+        json_schema_extra=default_text("that of the file, or 1"),
+    )
+    keys: Annotated[
+        tuple[DirectionalKey, ...], AfterValidator(_consistent_light_keys), AfterValidator(_one_of_both)
+    ] = Field(
+        default=(),
+        validate_default=True,
+        strict=False,
+        description=f"The source at some frames; {_KEYS}",
+        json_schema_extra=_ROWS,
+    )
+
+    @model_validator(mode="after")
+    def _only_beside_file(self) -> "DirectionalSource":
+        _refuse_without_file(self, ("irradiance", "color"))
+        return self
+
+
+def _refuse_without_file(source: _PlacedSource, names: tuple[str, ...]) -> None:
+    if source.file is None:
+        text = "expected it only beside `file`, as `keys` have their own"
+        if problems := [((name,), text) for name in names if getattr(source, name) is not None]:
+            fail(problems)

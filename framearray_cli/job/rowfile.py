@@ -1,0 +1,106 @@
+"""Files with one row per frame, which stand in for key frames: reading them, and checking their rows."""
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from pydantic import ValidationError
+
+from framearray_cli.base.files import read_at_most
+from framearray_cli.base.forms.problems import append_count, problems_of
+from framearray_cli.base.forms.table import Table
+from framearray_cli.base.units import counted
+
+LARGEST_ROW_FILE = 64 * 1024 * 1024  # bytes; MOST_EYES rows of nine long numbers are 20 MB
+MOST_ROW_PROBLEMS = 10  # a column that is wrong is wrong in every row
+
+PlacedRow: TypeAlias = tuple[str, dict[str, Any]]  # "row 3" or "entry 3", and the table of a key without its frame
+
+
+class RowFileError(Exception):
+    """An unusable file; the arguments are its problems, each with its row."""
+
+
+def read_data(path: Path) -> bytes:
+    """Read a whole file, up to the largest that is accepted."""
+    try:
+        data = read_at_most(path, LARGEST_ROW_FILE)
+    except FileNotFoundError:
+        raise RowFileError("no such file") from None
+    except OSError as error:
+        raise RowFileError(f"cannot be read: {error.strerror}") from error
+    if data is None:
+        raise RowFileError(f"expected at most {LARGEST_ROW_FILE >> 20} MB, got a bigger file")
+    return data
+
+
+def read_text(path: Path) -> str:
+    """Read a whole UTF-8 file, up to the largest that is accepted."""
+    try:
+        return read_data(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise RowFileError("expected UTF-8 text, got another encoding; save the file as UTF-8") from error
+
+
+def csv_lines(text: str) -> tuple[list[str], list[tuple[str, dict[str, Any]]]]:
+    """Read a CSV file: the names of its columns, in small letters, and place and cells of each row by these names."""
+    try:
+        reader = csv.reader(text.splitlines(), strict=True)
+        lines = [(f"row {reader.line_num}", line) for line in reader if line]
+    except csv.Error as error:
+        raise RowFileError(f"not valid CSV: {error}") from error
+    header = [name.strip().lower() for name in lines[0][1]] if lines else []
+    rows = []
+    for place, line in lines[1:]:
+        if len(line) != len(header):
+            raise RowFileError(f"{place}: expected {counted(len(header), 'cell')}, got {len(line)}")
+        rows.append((place, dict(zip(header, map(cell_value, line), strict=True))))
+    return header, rows
+
+
+def cell_value(cell: str) -> float | str:
+    """Read one cell: a number, or else its text."""
+    try:
+        return float(cell)
+    except ValueError:
+        return cell.strip()
+
+
+def load_json(text: str) -> Any:
+    """Read a JSON file."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise RowFileError(f"not valid JSON: {error}") from error
+
+
+def refuse_frames(rows: Sequence[Mapping[str, Any]]) -> None:
+    """Refuse frame numbers in rows, which are numbered by their order."""
+    for number, row in enumerate(rows, start=1):
+        if "frame" in row:
+            raise RowFileError(
+                f'entry {number}: unknown key "frame"; the first entry is frame 0, the next 1, and so on'
+            )
+
+
+def row_problems(rows: Sequence[PlacedRow], key: type[Table], optional: str, common: Mapping[str, Any]) -> list[str]:
+    """Check each row as a key frame, and that all or none of them give the optional value.
+
+    Args:
+        common: values of all rows that they do not give themselves.
+    """
+    problems: list[str] = []
+    n = 0
+    for frame, (place, row) in enumerate(rows):
+        if (optional in row) != (optional in rows[0][1]):
+            problems.append(f"{place}: {optional}: expected in every row or in none")
+            n += 1
+        try:
+            key.model_validate({"frame": frame, **common, **row})
+        except ValidationError as error:
+            n += error.error_count()
+            if len(problems) < MOST_ROW_PROBLEMS:
+                problems += [f"{place}: {problem}" for problem in problems_of(error, key)]
+    return append_count(problems[:MOST_ROW_PROBLEMS], n)

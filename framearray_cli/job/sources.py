@@ -1,0 +1,160 @@
+"""Kinds of light sources in a job; here those without key frames: domes, grids, and the sun."""
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from framearray_cli.base.forms.table import Place, default_text, fail
+from framearray_cli.base.units import FARTHEST
+
+from .keys import MOST_EYES
+from .placed import DirectionalKey, DirectionalSource, PointSource
+from .sourcetable import SourceTable
+from .times import Clock, Dates, Zone, clock_minutes
+from .values import Colour, Direction, Emission, GridSize, Point
+
+ROUNDING = 1e-6  # of steps; a third of an hour ends after three of them
+
+
+class DomeSource(SourceTable):
+    """Positions that are spread evenly over a hemisphere or sphere: points with `radius`, directions without."""
+
+    type: Literal["dome"] = Field(description="Kind of source.")
+    positions: int = Field(ge=1, le=MOST_EYES, description="Number of light positions.")
+    shape: Literal["hemisphere", "sphere"] = Field(default="hemisphere", description="What they are spread over.")
+    top: Direction | None = Field(
+        default=None,
+        description="Direction of the first position, from the target: the middle of the hemisphere.",
+        json_schema_extra=default_text("the scene's up axis"),
+    )
+    target: Point = Field(default=(0.0, 0.0, 0.0), description="The middle, in the coordinates of the scene file.")
+    radius: float | None = Field(
+        default=None,
+        gt=0,
+        le=FARTHEST,
+        description="Distance of points from the target, scene units.",
+        json_schema_extra=default_text("none: the light comes from infinitely far away"),
+    )
+    intensity: Emission | None = Field(
+        default=None,
+        description="Radiant intensity of each point, W/sr; needs `radius`.",
+        json_schema_extra=default_text("none"),
+    )
+    irradiance: Emission | None = Field(
+        default=None,
+        description="Irradiance of a surface that faces the light, W/m2; without `radius`.",
+        json_schema_extra=default_text("none"),
+    )
+    color: Colour | None = Field(
+        default=None, description="Multiplies the strength by channel.", json_schema_extra=default_text("1")
+    )
+
+    @model_validator(mode="after")
+    def _one_strength(self) -> "DomeSource":
+        wanted, other = ("irradiance", "intensity") if self.radius is None else ("intensity", "irradiance")
+        about = "without `radius`" if self.radius is None else "with `radius`"
+        problems: list[tuple[Place, str]] = []
+        if getattr(self, wanted) is None:
+            problems.append(((wanted,), f"missing; expected a number or 3 numbers, {about}"))
+        if getattr(self, other) is not None:
+            problems.append(((other,), f"expected no value {about}, whose strength is `{wanted}`"))
+        if problems:
+            fail(problems)
+        return self
+
+    @property
+    def keys(self) -> tuple[()]:
+        """No key frames: the positions follow from their number."""
+        return ()
+
+    @property
+    def count(self) -> int:
+        """Number of light positions."""
+        return self.positions
+
+
+class GridSource(SourceTable):
+    """Points on a flat grid, row by row."""
+
+    type: Literal["grid"] = Field(description="Kind of source.")
+    counts: GridSize = Field(description="Number of points along the two sides.")
+    corner: Point = Field(description="First point, in the coordinates of the scene file.")
+    side: Direction = Field(description="From the first point to the last of the first row.")
+    other_side: Direction = Field(description="From the first point to the first of the last row.")
+    intensity: Emission = Field(description="Radiant intensity of each point, W/sr; one number means white.")
+    color: Colour | None = Field(
+        default=None, description="Multiplies `intensity` by channel.", json_schema_extra=default_text("1")
+    )
+
+    @property
+    def keys(self) -> tuple[()]:
+        """No key frames: the positions follow from the counts."""
+        return ()
+
+    @property
+    def count(self) -> int:
+        """Number of light positions."""
+        return self.counts[0] * self.counts[1]
+
+
+class SunSource(SourceTable):
+    """The sun over a place on Earth on one day; below the horizon it shines 0. It needs the extra `sun`."""
+
+    type: Literal["sun"] = Field(description="Kind of source.")
+    latitude: float = Field(ge=-90, le=90, description="Of the place, degrees; north is positive.")
+    longitude: float = Field(ge=-180, le=180, description="Of the place, degrees; east is positive.")
+    date: Dates = Field(
+        description="The day, or a list of days, one behind the other on the light axis: each has the times below."
+    )
+    timezone: Zone = Field(description="Whose clocks show the times: a name of the IANA, or the hours ahead of UTC.")
+    start: Clock = Field(description="Local time of the first light position.")
+    stop: Clock = Field(
+        description="Local time of the last. The positions of `[light] frames` are evenly spaced in time between them."
+    )
+    step: float | None = Field(
+        default=None,
+        ge=1 / 60,
+        le=24 * 60,
+        description="Minutes from one position to the next. The number of positions follows, and the last is at `stop` "
+        "or less than a step before it.",
+        json_schema_extra=default_text("by `[light] frames`"),
+    )
+    north: Direction | None = Field(
+        default=None,
+        description="Direction in the scene that points north; its component along the up axis does not count.",
+        json_schema_extra=default_text("-z in a scene with y up, y in one with z up, so that east is x"),
+    )
+    irradiance: Emission = Field(
+        description="Irradiance of a surface that faces the sun, W/m2; one number means white. Clear air lets about "
+        "1000 W/m2 through; choose what suits the exposure."
+    )
+
+    @field_validator("stop")
+    @classmethod
+    def _after_start(cls, stop: str, info: ValidationInfo) -> str:
+        if stop <= info.data.get("start", ""):
+            fail([((), f"expected a time after the start, {info.data['start']}, got {stop}")])
+        return stop
+
+    @property
+    def keys(self) -> tuple[DirectionalKey, ...]:
+        """No key frames: the positions follow from the times."""
+        return ()
+
+    @property
+    def dates(self) -> tuple[str, ...]:
+        """All days."""
+        return (self.date,) if isinstance(self.date, str) else self.date
+
+    @property
+    def count(self) -> int:
+        """Number of light positions, if `step` determines it; else 0."""
+        if self.step is None:
+            return 0
+        minutes = clock_minutes(self.stop) - clock_minutes(self.start)
+        return len(self.dates) * (int(minutes / self.step + ROUNDING) + 1)
+
+
+LightSource: TypeAlias = Annotated[
+    PointSource | DirectionalSource | SunSource | DomeSource | GridSource, Field(discriminator="type")
+]

@@ -1,0 +1,127 @@
+"""Sources of a job -> where they are, and how strong, at every light position."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from framearray_cli.base.arrays import Float64
+from framearray_cli.base.errors import JobError
+from framearray_cli.job.job import Job
+from framearray_cli.job.light import LightTable
+from framearray_cli.job.placed import DirectionalKey, DirectionalSource, PointKey, PointSource
+from framearray_cli.job.sources import DomeSource, GridSource, SunSource
+
+from .curves import interpolate_keys
+from .directions import PARALLEL, interpolate_directions, unit
+from .domes import dome_directions, grid_points
+from .lightpath import LightPath
+from .sun import NEVER, daylight, directions_to_sun, sun_path
+
+
+def in_camera_space(table: LightTable) -> bool:
+    """Return whether any source has its positions in the axes of the first camera."""
+    return any(isinstance(s, PointSource | DirectionalSource) and s.space == "camera" for s in table.sources)
+
+
+def place_source(job: Job, i: int, n: int, world_from_camera: Float64 | None) -> LightPath:
+    """Compute position and intensity of source i at n light positions.
+
+    Args:
+        world_from_camera: (3, 3) axes of the first camera, where a source needs them.
+
+    Raises:
+        JobError: a sun that never shines, or whose north points up.
+        MissingExtraError: it is a sun, and pvlib is not installed.
+    """
+    source = job.light.sources[i]
+    match source:
+        case SunSource():
+            return _place_sun(source, job, f"light.sources[{i}]", n)
+        case DomeSource():
+            return _place_dome(source, _up(job), n)
+        case GridSource():
+            return _constant(
+                "point", grid_points(source.counts, source.corner, source.side, source.other_side), source, n
+            )
+        case _:
+            path = _interpolate(source.type, source.keys, n)
+            return _in_space(source, path, job, world_from_camera)
+
+
+def _in_space(
+    source: PointSource | DirectionalSource, path: LightPath, job: Job, world_from_camera: Float64 | None
+) -> LightPath:
+    """Turn, scale and move the positions of a source into the coordinates of the scene file."""
+    in_camera = source.space == "camera"
+    vector = path.vector if not in_camera or world_from_camera is None else path.vector @ world_from_camera.T
+    if isinstance(source, PointSource):
+        center = source.center or (job.camera.keys[0].target if in_camera else None)
+        vector = vector * source.scale if source.scale else vector
+        vector = vector + np.array(center) if center else vector
+    return replace(path, vector=vector)
+
+
+def _place_dome(source: DomeSource, up_dir: Float64, n: int) -> LightPath:
+    """Compute points or directions of a dome at n light positions."""
+    to_light = dome_directions(source.positions, np.array(source.top or up_dir), whole=source.shape == "sphere")
+    if source.radius is None:
+        return _constant("directional", -to_light, source, n)
+    return _constant("point", np.array(source.target) + source.radius * to_light, source, n)
+
+
+def _constant(
+    kind: Literal["point", "directional"], vector: Float64, source: DomeSource | GridSource, n: int
+) -> LightPath:
+    """A source of constant strength at its own positions; it stays at the last where n is larger."""
+    strength = source.irradiance if isinstance(source, DomeSource) and kind == "directional" else source.intensity
+    intensity = np.array(strength) * np.array(source.color or 1.0)
+    at = np.minimum(np.arange(n), len(vector) - 1)
+    return LightPath(kind=kind, vector=vector[at], intensity=np.tile(intensity, (n, 1)))
+
+
+def _up(job: Job) -> Float64:
+    """The up axis of the scene, (3,)."""
+    return np.array([0.0, 0.0, 1.0] if job.scene.up == "z" else [0.0, 1.0, 0.0])
+
+
+def _place_sun(source: SunSource, job: Job, name: str, n: int) -> LightPath:
+    """Compute directions and irradiance of a sun at n light positions."""
+    up_dir = _up(job)
+    north_vec = unit(np.array(source.north or ((0.0, 1.0, 0.0) if job.scene.up == "z" else (0.0, 0.0, -1.0))))
+    north_vec = north_vec - (north_vec @ up_dir) * up_dir
+    if np.linalg.norm(north_vec) <= PARALLEL:
+        problem = f'{name}.north: expected a direction that is not up, got the up axis of the scene, "{job.scene.up}"'
+        raise JobError(job.file or job.name, [problem])
+    place = (source.latitude, source.longitude)
+    sun = sun_path(source.dates, source.start, source.stop, source.timezone, place, n, source.step)
+    if not sun.is_up.any():
+        hours = daylight(source.dates[0], source.timezone, place)
+        when = "it does not rise on that day" if hours == NEVER else f"on {source.dates[0]} it is up from {hours}"
+        problem = f"{name}: the sun is below the horizon from {source.start} to {source.stop}; {when}"
+        raise JobError(job.file or job.name, [problem])
+    return LightPath(
+        kind="directional",
+        vector=-directions_to_sun(sun, up_dir, unit(north_vec)),
+        intensity=sun.is_up[:, None] * np.array(source.irradiance),
+        notes=tuple(
+            {"azimuth": round(azimuth, 4), "elevation": round(elevation, 4), "time": time.isoformat(timespec="seconds")}
+            for azimuth, elevation, time in zip(
+                sun.azimuth_deg.tolist(), sun.elevation_deg.tolist(), sun.times, strict=True
+            )
+        ),
+    )
+
+
+def _interpolate(
+    kind: Literal["point", "directional"], keys: Sequence[PointKey | DirectionalKey], n_lights: int
+) -> LightPath:
+    """Interpolate the keys of a point or directional source."""
+    frames = [key.frame for key in keys]
+    places = [key.position if isinstance(key, PointKey) else key.direction for key in keys]
+    powers = [key.intensity if isinstance(key, PointKey) else key.irradiance for key in keys]
+    vector = (interpolate_keys if kind == "point" else interpolate_directions)(frames, places, n_lights)
+    colors = [key.color if key.color is not None else (1.0, 1.0, 1.0) for key in keys]
+    intensity = interpolate_keys(frames, powers, n_lights) * interpolate_keys(frames, colors, n_lights)
+    return LightPath(kind=kind, vector=vector, intensity=intensity)

@@ -1,0 +1,243 @@
+"""Files of light positions: every format, and broken ones with one clear message each."""
+
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+from support import tiny
+
+from framearray_cli.base.errors import JobError
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import job_table, read_job
+
+HERE = [[0.0, 0.0, 2.0], [1.0, 0.5, 2.0], [-1.0, 0.0, 1.5]]
+
+
+def npy(array: Any, **options: Any) -> bytes:
+    file = io.BytesIO()
+    np.save(file, array, **options)
+    return file.getvalue()
+
+
+def dome(configuration: str = "directional", **lists: Any) -> str:
+    return json.dumps({"lightConfiguration": configuration, "imageWidth": 10.0, **lists})
+
+
+def objects(points: Any) -> list[dict[str, float]]:
+    return [dict(zip("xyz", point, strict=True)) for point in points]
+
+
+def read(folder: Path, name: str, content: str | bytes, kind: str = "point", **source: Any) -> Job:
+    (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    strength = {"point": "intensity", "directional": "irradiance"}.get(kind, "intensity")
+    light = {"sources": [{"type": kind, "file": name, strength: 3.0} | source]}
+    light["sources"] = [{key: value for key, value in light["sources"][0].items() if value is not None}]
+    file = folder / "job.toml"
+    file.write_text(tomli_w.dumps(tiny.table() | {"light": light, "scene": {"file": "a.glb"}}), encoding="utf-8")
+    return read_job(file)
+
+
+def problems(*args: Any, **kwargs: Any) -> list[str]:
+    with pytest.raises(JobError) as caught:
+        read(*args, **kwargs)
+    return list(caught.value.problems)
+
+
+LP = "3\ncup 1.jpg 0 0 2\n\ncup 2.jpg   1 0.5 2\ncup 3.jpg\t-1 0 1.5\n"
+GOOD = [
+    ("a.csv", "x,y,z\n0,0,2\n1,.5,2\n-1,0,1.5\n"),
+    ("a.CSV", " Position_z ,position_x,position_y\n2,0,0\n2,1,0.5\n1.5,-1,0\n"),
+    ("a.json", json.dumps(HERE)),
+    ("b.json", json.dumps([{"position": point} for point in HERE])),
+    ("a.npy", npy(np.array(HERE))),
+    ("b.npy", npy(np.array(HERE, np.float32))),
+    ("c.npy", npy(np.asfortranarray(HERE))),
+    ("a.lp", LP),
+    ("a.dome", dome("lights3d", positions=objects(HERE))),
+    ("b.dome", dome("lights3d", positions3d=HERE, directions=[[0, 0, 1]])),
+    ("c.dome", dome("spherical", positionsSphere=objects(HERE))),
+    ("d.dome", json.dumps({"positions": HERE})),
+]
+
+
+@pytest.mark.parametrize(("name", "content"), GOOD, ids=[name for name, _ in GOOD])
+def test_points_of_a_file(tmp_path: Path, name: str, content: str | bytes) -> None:
+    job = read(tmp_path, name, content)
+    keys = job.light.sources[0].keys
+    assert job.light.frames == 3
+    assert [(key.frame, list(key.position), key.intensity) for key in keys] == [
+        (frame, point, (3.0, 3.0, 3.0)) for frame, point in enumerate(HERE)
+    ]
+    again = Job.model_validate(job_table(job))
+    assert again.light == job.light
+
+
+def test_directions_run_from_the_light_to_the_object(tmp_path: Path) -> None:
+    for name, content in (("a.lp", LP), ("a.dome", dome(directions=HERE)), ("a.json", json.dumps(HERE))):
+        keys = read(tmp_path, name, content, "directional").light.sources[0].keys
+        assert [list(key.direction) for key in keys] == [[0.0 - value for value in point] for point in HERE]
+    keys = read(tmp_path, "a.csv", "direction_x,direction_y,direction_z\n0,0,-1\n", "directional").light.sources[0].keys
+    assert keys[0].direction == (0.0, 0.0, -1.0)
+
+
+def test_neighbours_in_a_file_may_be_opposite(tmp_path: Path) -> None:
+    job = read(tmp_path, "a.json", "[[0, 0, 1], [0, 0, -1]]", "directional")
+    assert job.light.frames == 2
+
+
+def test_strength_and_colour_of_each_row(tmp_path: Path) -> None:
+    text = "x,y,z,intensity,color_r,color_g,color_b\n0,0,2,5,1,0.5,0.25\n0,1,2,6,1,1,1\n"
+    first, second = read(tmp_path, "a.csv", text, intensity=None).light.sources[0].keys
+    assert (first.intensity, first.color, second.intensity) == ((5.0,) * 3, (1.0, 0.5, 0.25), (6.0,) * 3)
+    (key,) = read(tmp_path, "b.csv", "x,y,z,intensity_r,intensity_g,intensity_b\n0,0,2,5,6,7\n").light.sources[0].keys
+    assert key.intensity == (5.0, 6.0, 7.0)
+
+
+def test_a_temperature_for_all_positions(tmp_path: Path) -> None:
+    key = read(tmp_path, "a.lp", LP, color="3200 K").light.sources[0].keys[0]
+    assert key.color[0] > 1 > key.color[2] > 0
+
+
+BROKEN = [
+    ("a.csv", "", "row 1: expected the column names x, y, z or position_x, position_y, position_z, and intensity or "
+     "intensity_r, intensity_g, intensity_b where wanted, got none"),
+    ("b.csv", "x,y\n1,2\n", "intensity_b where wanted, got x, y"),
+    ("c.csv", "x,y,z,x\n1,2,3,4\n", "got x, y, z, x"),
+    ("d.csv", "x,y,z,position_x,position_y,position_z\n1,2,3,4,5,6\n",
+     "got x, y, z, position_x, position_y, position_z"),
+    ("e.csv", "x,y,z,power\n1,2,3,4\n", "got x, y, z, power"),
+    ("f.csv", "x,y,z\n", "expected 1 to 100000 light positions, got 0"),
+    ("g.csv", "x,y,z\n1,2,3\n1,2\n", "row 3: expected 3 cells, got 2"),
+    ("h.csv", "x,y,z\n1,2,up\n", 'row 2: position[2]: expected a number, got "up"'),
+    ("i.csv", "x,y,z\n1,2,nan\n", "row 2: position[2]: expected a number, got nan"),
+    ("j.csv", "x,y,z\n1,2,1e13\n", "row 2: position[2]: expected a number from -1e+12 to 1e+12, got 10000000000000.0"),
+    ("k.csv", "x,y,z,intensity\n1,2,3,-4\n", "row 2: intensity: expected a number of at least 0, got -4.0"),
+    ("l.csv", 'x,y,z\n1,2,"3\n', "not valid CSV: unexpected end of data"),
+    ("m.csv", b"x,y,z\n\xff,2,3\n", "expected UTF-8 text, got another encoding; save the file as UTF-8"),
+    ("a.json", "[", "not valid JSON: Expecting value: line 1 column 2 (char 1)"),
+    ("b.json", "{}", 'expected a list of [x, y, z] or of {"position": [...]}, got something else'),
+    ("c.json", "[[1, 2]]", "entry 1: position: expected 3 numbers, got 2"),
+    ("d.json", '[[1, 2, "a"]]', 'entry 1: position[2]: expected a number, got "a"'),
+    ("e.json", '[{"position": [1, 2, 3], "directon": 1}]', 'entry 1: directon: unknown key'),
+    ("f.json", '[{"frame": 0, "position": [1, 2, 3]}]',
+     'entry 1: unknown key "frame"; the first entry is frame 0, the next 1, and so on'),
+    ("g.json", '[{"position": [1, 2, 3], "color": 1}, {"position": [1, 2, 3]}]',
+     "entry 2: color: expected in every row or in none"),
+    ("h.json", "[[1, 2, true]]", "entry 1: position[2]: expected a number, got true"),
+    ("i.json", "[" * 100000, "not valid JSON"),
+    ("j.json", "[]", "expected 1 to 100000 light positions, got 0"),
+    ("a.lp", "", "row 1: expected the number of light positions, got an empty file"),
+    ("b.lp", "cup.jpg 0 0 1\n", 'row 1: expected the number of light positions, got "cup.jpg 0 0 1"'),
+    ("c.lp", "2\ncup.jpg 0 0 1\n", 'row 1: expected 1, the number of rows below, got "2"'),
+    ("d.lp", "1\n0 0 1\n", 'row 2: expected the name of an image and 3 numbers, got "0 0 1"'),
+    ("e.lp", "1\ncup.jpg 0 zero 1\n", 'row 2: position[1]: expected a number, got "zero"'),
+    ("f.lp", "0\n", "expected 1 to 100000 light positions, got 0"),
+    ("g.lp", "1\ncup.jpg 0 inf 1\n", "row 2: position[1]: expected a number from -1e+12 to 1e+12, got inf"),
+    ("h.lp", "99999999999999999999999999\na 1 2 3\n", "row 1: expected 1, the number of rows below"),
+    ("i.lp", "\u0663\na 1 2 3\n", "row 1: expected the number of light positions"),
+    ("a.dome", "[]", "expected an object with directions or positions, got a list of 0 values"),
+    ("b.dome", "{}", "the file has no positions"),
+    ("c.dome", dome(directions=HERE), 'the file has no positions; expected positions; use type = "directional"'),
+    ("d.dome", dome("cubic", positions=HERE),
+     'lightConfiguration: expected one of directional, spherical, lights3d, got "cubic"'),
+    ("e.dome", dome([], positions=HERE), "lightConfiguration: expected one of directional"),
+    ("f.dome", dome("lights3d", positions=3), "positions: expected a list, got 3"),
+    ("g.dome", dome("lights3d", positions=[{"x": 1, "y": 2}]), "positions[0]: expected x, y and z, got no z"),
+    ("h.dome", dome("lights3d", positions=[5]), "positions[0]: expected x, y and z, got 5"),
+    ("i.dome", dome("lights3d", positions=[[1, 2, 3], [1, None, 2]]), "positions[1]: position[1]: expected a number"),
+    ("j.dome", "not json", "not valid JSON"),
+    ("a.npy", b"", "not a valid .npy file"),
+    ("b.npy", b"\x93NUMPY", "not a valid .npy file"),
+    ("c.npy", npy(np.array(HERE))[:-8], "expected 9 numbers of 8 bytes, got 64 bytes"),
+    ("d.npy", npy(np.zeros((4, 2))), "expected an array of n x 3 numbers, got 4 x 2 of type float64"),
+    ("e.npy", npy(np.zeros(())), "expected an array of n x 3 numbers, got one value of type float64"),
+    ("f.npy", npy(np.array([["a", "b", "c"]])), "expected an array of n x 3 numbers, got 1 x 3 of type <U1"),
+    ("g.npy", npy(np.array([[1, 2, None]], object), allow_pickle=True), "of type object"),
+    ("h.npy", npy(np.zeros((0, 3))), "expected 1 to 100000 light positions, got 0"),
+    ("i.npy", npy(np.array([[0, 0, np.inf]])), "row 1: position[2]: expected a number from -1e+12 to 1e+12, got inf"),
+    ("j.npy", npy(np.zeros((1, 3))).replace(b"(1, 3)", b"(9999999999, 3)"[:6]), "not a valid .npy file"),
+    ("a.txt", "0 0 1\n", 'expected a file name that ends in one of .csv, .json, .lp, .dome, .npy, got ".txt"'),
+    ("a", "0 0 1\n", 'expected a file name that ends in one of .csv, .json, .lp, .dome, .npy, got ""'),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "content", "message"), BROKEN, ids=[name for name, *_ in BROKEN])
+def test_a_broken_file_is_one_message(tmp_path: Path, name: str, content: str | bytes, message: str) -> None:
+    (problem,) = problems(tmp_path, name, content)
+    assert problem.startswith(f'light.sources[0].file: "{name}": ')
+    assert message in problem
+
+
+def test_a_header_of_npy_allocates_nothing(tmp_path: Path) -> None:
+    data = npy(np.zeros((1, 3))).replace(b"(1, 3), }" + b" " * 12, b"(1000000000000, 3), }")
+    assert "expected 3,000,000,000,000 numbers of 8 bytes, got 24 bytes" in problems(tmp_path, "a.npy", data)[0]
+
+
+def test_a_direction_of_no_length(tmp_path: Path) -> None:
+    found = problems(tmp_path, "a.lp", "2\na 0 0 1\nb 0 0 0\n", "directional")
+    assert found == [
+        'light.sources[0].file: "a.lp": row 3: direction: expected a direction, got the zero vector [0.0, 0.0, 0.0]'
+    ]
+
+
+def test_a_file_needs_a_strength(tmp_path: Path) -> None:
+    found = problems(tmp_path, "a.lp", LP, intensity=None)
+    assert found == [
+        'light.sources[0].file: "a.lp": the file has no intensity; give it beside `file`, as in intensity = 10'
+    ]
+
+
+def test_missing_file_and_folder(tmp_path: Path) -> None:
+    (tmp_path / "b.lp").mkdir()
+    for name, text in (("gone.lp", "no such file"), ("b.lp", "cannot be read: Is a directory")):
+        assert problems(tmp_path, "a.lp", LP, file=name) == [f'light.sources[0].file: "{name}": {text}']
+
+
+def test_a_wrong_column_is_reported_only_a_few_times(tmp_path: Path) -> None:
+    found = problems(tmp_path, "a.csv", "x,y,z\n" + "a,0,0\n" * 100)
+    assert len(found) == 11
+    assert found[-1].endswith("and 90 more problems")
+
+
+KEY = {"frame": 0, "position": [1, 2, 3], "intensity": 1}
+WRONG = [
+    ({"keys": [KEY], "file": "a.lp"}, ["keys: expected either `keys` or `file`, got both"]),
+    ({"keys": [KEY], "intensity": 3}, ["intensity: expected it only beside `file`, as `keys` have their own"]),
+    ({"keys": [KEY | {"color": "100 K"}]}, ['keys[0].color: expected a temperature from 1000 to 40000 K, got "100 K"']),
+    ({"keys": [KEY | {"color": "warm"}]},
+     ['keys[0].color: expected a number, 3 numbers or a temperature such as "3200 K", got "warm"']),
+    ({"keys": [KEY], "scale": 0}, ["scale: expected a number above 0, got 0"]),
+    ({"keys": [KEY], "space": "world"}, ['space: expected "scene" or "camera", got "world"']),
+    ({}, ["keys: expected a list of tables, at least 1, got 0; give `keys` or `file`"]),
+    ({"type": "dome", "positions": 3}, ["irradiance: missing; expected a number or 3 numbers, without `radius`"]),
+    ({"type": "dome", "positions": 3, "radius": 1, "irradiance": 1},
+     ["intensity: missing; expected a number or 3 numbers, with `radius`",
+      "irradiance: expected no value with `radius`, whose strength is `intensity`"]),
+    ({"type": "dome", "positions": 0, "irradiance": 1}, ["positions: expected a whole number from 1 to 100000, got 0"]),
+    ({"type": "grid", "counts": [2, 0], "corner": [0, 0, 0], "side": [1, 0, 0], "other_side": [0, 1, 0],
+      "intensity": 1},
+     ["counts[1]: expected a whole number from 1 to 300, got 0"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("source", "texts"), WRONG)
+def test_wrong_keys_of_sources(source: dict[str, Any], texts: list[str], tmp_path: Path) -> None:
+    file = tmp_path / "job.toml"
+    table = tiny.table() | {"light": {"sources": [{"type": "point"} | source]}, "scene": {"file": "a.glb"}}
+    file.write_text(tomli_w.dumps(table), encoding="utf-8")
+    with pytest.raises(JobError) as caught:
+        read_job(file)
+    assert [problem.removeprefix("light.sources[0].") for problem in caught.value.problems] == texts
+
+
+def test_a_dome_with_more_positions_than_its_axis(tmp_path: Path) -> None:
+    file = tmp_path / "job.toml"
+    light = {"frames": 4, "sources": [{"type": "dome", "positions": 5, "irradiance": 1}]}
+    file.write_text(tomli_w.dumps(tiny.table() | {"light": light, "scene": {"file": "a.glb"}}), encoding="utf-8")
+    with pytest.raises(JobError) as caught:
+        read_job(file)
+    assert list(caught.value.problems) == ["light.sources[0]: expected at most 4 positions, as its axis has, got 5"]

@@ -1,0 +1,79 @@
+"""Where domes, grids and positions in the axes of a picture put the light."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+
+from framearray_cli.job.job import Job
+from framearray_cli.scene.paths.domes import dome_directions
+from framearray_cli.scene.paths.lightpath import LightPath
+from framearray_cli.scene.paths.paths import eyes, lights
+
+
+def path(frames: int | None = None, camera: dict[str, Any] | None = None, **source: Any) -> LightPath:
+    light: dict[str, Any] = {"sources": [source]} | ({"frames": frames} if frames else {})
+    table = tiny.table(**({"camera": camera} if camera else {})) | {"light": light}
+    return lights(Job.model_validate(table)).sources[0]
+
+
+@pytest.mark.parametrize("whole", [False, True])
+@pytest.mark.parametrize("top", [(0.0, 1.0, 0.0), (1.0, -2.0, 0.3)])
+def test_a_dome_is_even(whole: bool, top: tuple[float, float, float]) -> None:
+    n = 500
+    found = dome_directions(n, np.array(top), whole=whole)
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, atol=1e-12)
+    heights = found @ (np.array(top) / np.linalg.norm(top))
+    least = -1 if whole else 0
+    np.testing.assert_allclose(heights, 1 - (np.arange(n) + 0.5) * (1 - least) / n, atol=1e-12)
+    # Moments of an even spread: the mean is along the axis, half the radius up on a hemisphere.
+    np.testing.assert_allclose(found.mean(axis=0), (1 + least) / 2 * np.array(top) / np.linalg.norm(top), atol=0.01)
+    # A square lattice of n points on this area has the distance sqrt(area / n); the spiral keeps 3/4 of it.
+    apart = np.sort(np.linalg.norm(found[:, None] - found[None], axis=-1), axis=1)[:, 1]
+    assert apart.min() > 0.75 * np.sqrt((4 if whole else 2) * np.pi / n)
+
+
+def test_points_of_a_dome_lie_around_the_target() -> None:
+    found = path(type="dome", positions=7, target=[1, 2, 3], radius=2.5, intensity=[1, 2, 3], color="3200 K")
+    assert found.kind == "point"
+    assert len(found.vector) == 7
+    np.testing.assert_allclose(np.linalg.norm(found.vector - [1, 2, 3], axis=1), 2.5)
+    assert (found.vector[:, 1] > 2).all()
+    assert found.intensity[0] @ (np.array([0.2126, 0.7152, 0.0722]) / [1, 2, 3]) == pytest.approx(1)
+
+
+def test_directions_of_a_dome_come_from_above_and_stay_at_the_last() -> None:
+    found = path(frames=5, type="dome", positions=3, irradiance=2)
+    assert found.kind == "directional"
+    assert (found.vector[:, 1] < 0).all()
+    np.testing.assert_array_equal(found.vector[3:], found.vector[[2, 2]])
+    np.testing.assert_array_equal(found.intensity, 2.0)
+
+
+def test_a_grid_goes_row_by_row() -> None:
+    grid = {"corner": [1, 2, 3], "side": [2, 0, 0], "other_side": [0, 0, -4], "intensity": 1}
+    found = path(type="grid", counts=[3, 2], **grid)
+    wanted = [[1, 2, 3], [2, 2, 3], [3, 2, 3], [1, 2, -1], [2, 2, -1], [3, 2, -1]]
+    np.testing.assert_allclose(found.vector, wanted, atol=1e-12)
+    np.testing.assert_allclose(path(type="grid", counts=[1, 1], **grid).vector, [[1, 2, 3]])
+
+
+def test_positions_in_the_axes_of_the_first_picture() -> None:
+    camera = {"keys": [{"frame": 0, "eye": [3, 1, 0.5], "target": [0, 1, 0.5]}]}
+    keys = [{"frame": 0, "position": [1, 2, 3], "intensity": 1}]
+    found = path(camera=camera, type="point", space="camera", scale=2, keys=keys)
+    np.testing.assert_allclose(found.vector, [[6, 5, -1.5]], atol=1e-12)  # right is -z, up y, towards the camera x
+    centred = path(camera=camera, type="point", space="camera", center=[1, 1, 1], keys=keys)
+    np.testing.assert_allclose(centred.vector, [[4, 3, 0]], atol=1e-12)
+    keys = [{"frame": 0, "direction": [0, 0, -1], "irradiance": 1}]
+    turned = path(camera=camera, type="directional", space="camera", keys=keys)
+    np.testing.assert_allclose(turned.vector, [[-1, 0, 0]], atol=1e-12)
+    look = eyes(tiny.job(camera=camera)).world_from_camera[0, :3, 2]
+    np.testing.assert_allclose(turned.vector[0], -look, atol=1e-12)
+
+
+def test_center_and_scale_in_the_axes_of_the_scene() -> None:
+    keys = [{"frame": 0, "position": [1, 2, 3], "intensity": 1}]
+    np.testing.assert_allclose(path(type="point", scale=2, center=[1, 0, 0], keys=keys).vector, [[3, 4, 6]])
+    np.testing.assert_allclose(path(type="point", keys=keys).vector, [[1, 2, 3]])
