@@ -15,10 +15,10 @@ from ..values import choice, whole
 def export(
     array: ArrayFolder,
     kind: Annotated[
-        Literal["nerfstudio", "colmap", "cinema"],
+        Literal["nerfstudio", "colmap", "cinema", "rti"],
         typer.Option(
             "--format", "-f", help="What the folder is for.", show_default=False,
-            **choice("nerfstudio", "colmap", "cinema"),
+            **choice("nerfstudio", "colmap", "cinema", "rti"),
         ),
     ],
     target: Annotated[
@@ -60,7 +60,7 @@ def export(
     if dry_run:
         print_would([f"would {'replace' if made.replaces else 'write'} {made.target}: {size}"])
         return
-    points_too = f", {counted(made.n_points, 'point')}" if kind != "cinema" else ""
+    points_too = f", {counted(made.n_points, 'point')}" if kind in ("nerfstudio", "colmap") else ""
     from ..array_results import ExportResult
 
     result = ExportResult(

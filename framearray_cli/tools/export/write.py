@@ -19,16 +19,22 @@ from framearray_cli.base.files import whole_folder
 
 from ..axes import read_light_indices
 from ..progress import Progress
-from . import cinema, colmap, nerfstudio
+from . import cinema, colmap, nerfstudio, rti
 from .folder import find_earlier_export, put_picture
 from .points import PointCloud, find_points, source_cameras
 from .selection import Selection
 
-ExportKind: TypeAlias = Literal["nerfstudio", "colmap", "cinema"]
+ExportKind: TypeAlias = Literal["nerfstudio", "colmap", "cinema", "rti"]
 
-EXPORT_KINDS: tuple[ExportKind, ...] = ("nerfstudio", "colmap", "cinema")
+EXPORT_KINDS: tuple[ExportKind, ...] = ("nerfstudio", "colmap", "cinema", "rti")
+ALL_LIGHTS = ("cinema", "rti")  # take every light position by default, and no points
 MOST_POINTS = 10_000  # a COLMAP model has some 25 bytes per point and image
-_MARK_FILES = {"nerfstudio": nerfstudio.TRANSFORMS_FILE, "colmap": colmap.IMAGES_FILE, "cinema": cinema.TABLE_FILE}
+_MARK_FILES = {
+    "nerfstudio": nerfstudio.TRANSFORMS_FILE,
+    "colmap": colmap.IMAGES_FILE,
+    "cinema": cinema.TABLE_FILE,
+    "rti": rti.LIGHTS_FILE,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +80,7 @@ def export_array(
         target: the folder; cinema adds the suffix .cdb.
         kind: one of EXPORT_KINDS.
         cameras: places along the camera path, see `places.read_indices`.
-        light: places along the first light axis; None: all for cinema, the middle one for the others.
+        light: places along the first light axis; None: all for cinema and rti, the middle one for the others.
         at: "AXIS=PLACES" for the other axes; the default is as for `light`.
         image_format: of the pictures; None: PNG.
         points: in the point cloud, at most.
@@ -89,10 +95,12 @@ def export_array(
     """
     manifest = read_manifest(out)
     selection = _select(manifest, kind, cameras, light, at)
+    if kind == "rti":
+        rti.check_lights(selection)
     target, image_format = _full_name(target, kind), image_format or ImageFormat(format="png")
     require_writer(image_format.format)
     pictures = Pictures(manifest)
-    has_cloud = kind != "cinema" and bool(manifest.layers)
+    has_cloud = kind not in ALL_LIGHTS and bool(manifest.layers)
     selection, left_out = _split_complete(pictures, selection, layers=has_cloud)
     replaces = find_earlier_export(target, _MARK_FILES[kind], force=force)
     n_points = 0
@@ -117,7 +125,7 @@ def _select(manifest: Manifest, kind: ExportKind, cameras: str, light: str | Non
     """Read which cameras and light positions to export."""
     if kind not in EXPORT_KINDS:
         raise JobError("--format", [f"expected {', '.join(EXPORT_KINDS)}, got {kind!r}"])
-    default = ALL_PLACES if kind == "cinema" else MIDDLE_PLACE
+    default = ALL_PLACES if kind in ALL_LIGHTS else MIDDLE_PLACE
     return Selection(
         manifest=manifest,
         cameras=tuple(sorted(read_indices("--cameras", cameras, manifest.n_cameras))),
@@ -192,6 +200,8 @@ def _write_tables(
         nerfstudio.write_transforms(folder, selection, from_folder, cloud=cloud, exposure=exposure)
     elif kind == "colmap":
         colmap.write_model(folder, selection, files, cloud or _NO_POINTS)
+    elif kind == "rti":
+        rti.write_lights(folder, selection, files)
     else:
         cinema.write_table(folder, selection, from_folder)
 
@@ -208,7 +218,7 @@ def _make_cloud(pictures: Pictures, selection: Selection, exposure: float, wante
 
 
 def _notes(kind: ExportKind, layers: bool, n_points: int, wanted: int) -> tuple[str, ...]:
-    if kind == "cinema" or not wanted:
+    if kind in ALL_LIGHTS or not wanted:
         return ()
     if not layers:
         return ("no points and no depth: the array was rendered without layers (output.layers)",)
