@@ -36,7 +36,7 @@ DOORS = {
     "typer": ("cli/",),
     "rich": ("cli/screen",),
     "av": ("tools/movie/video",),
-    "scipy": ("scene/paths/curves", "engine/images/standard_error", "engine/frames/blocks"),
+    "scipy": ("scene/paths/curves", "engine/images/standard_error", "engine/frames/blocks", "tools/mixing/environment"),
     "psutil": ("base/memory",),
     "xxhash": ("base/hashing",),
     "filelock": ("array/lock",),

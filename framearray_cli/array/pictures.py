@@ -4,7 +4,8 @@
 
 Rendering is linear in each source: `direct_g` and `R W` are files, I_A,g is in the manifest, a is the factor of the
 ambient light.
-Notation: a position is an index along a light axis, not necessarily whole; there is one per axis of `Manifest.axes`.
+Notation: a position is an index along a light axis, not necessarily whole, or a `Mixture` of light positions; there is
+one per axis of `Manifest.axes`.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -21,13 +22,15 @@ from framearray_cli.base.errors import OutputError
 
 from .images.images import read_image
 from .manifest import BACKGROUND, Manifest, ManifestGroup, ManifestLight, Vector, image_path
+from .mixtures import Mixture, Position, is_constant
 from .names import file_name
 
-Positions: TypeAlias = Sequence[float]
+Positions: TypeAlias = Sequence[Position]
 
 WHITE: Vector = (1.0, 1.0, 1.0)
 # Number of files kept in memory: the next picture of a movie needs most of them again.
 KEPT_FILES = 16
+MOST_KEPT = 2**28  # bytes of more files than these
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,14 +56,24 @@ AS_RENDERED = Relight()
 class Pictures:
     """Reads the files of an array, caches the last of them, and combines them into pictures."""
 
-    def __init__(self, manifest: Manifest, *, read: Callable[[Path], Image] = read_image) -> None:
+    def __init__(
+        self,
+        manifest: Manifest,
+        *,
+        read: Callable[[Path], Image] = read_image,
+        mix: Callable[[Positions], Positions] | None = None,
+    ) -> None:
         """Read no file yet.
 
         Args:
             read: a file -> (h, w, 3) linear radiance.
+            mix: puts sums of light positions in place of those that are asked for.
         """
         self.manifest = manifest
-        self._cached_read = lru_cache(KEPT_FILES)(read)
+        self._mix = mix or (lambda positions: positions)
+        n_bytes = 12 * manifest.resolution[0] * manifest.resolution[1]
+        kept = min(max(manifest.axes.values()) + 2, MOST_KEPT // n_bytes)  # a sum reads a whole axis for each picture
+        self._cached_read = lru_cache(max(kept, KEPT_FILES))(read)
 
     def picture(self, c: int, positions: Positions, relight: Relight = AS_RENDERED) -> Image:
         """Return the picture of camera c, (h, w, 3) linear radiance, not to be modified.
@@ -70,7 +83,7 @@ class Pictures:
         Raises:
             OutputError: a file is missing or damaged, the array has no such position, or no groups to relight.
         """
-        manifest = self.manifest
+        manifest, positions = self.manifest, self._mix(positions)
         self._check_relight(relight)
         if not manifest.groups:
             return self._blend(c, positions[0], None)
@@ -79,7 +92,7 @@ class Pictures:
         weight = of_background * np.asarray(manifest.background_ambient, np.float64)
         total = np.zeros((*manifest.resolution[::-1], 3), np.float32)
         for group in manifest.groups:
-            position = positions[axes.index(group.axis)]
+            position = _once(positions[axes.index(group.axis)], group)
             factor = np.asarray(relight.groups.get(group.name, WHITE), np.float64)
             weight = weight + factor * ambient_at(group.lights, position)
             if factor.any():
@@ -93,10 +106,10 @@ class Pictures:
 
     def files(self, c: int, positions: Positions) -> Iterator[Path]:
         """Yield the files that a picture is made of."""
-        manifest = self.manifest
+        manifest, positions = self.manifest, self._mix(positions)
         axes = list(manifest.axes)
         for group in manifest.groups or (None,):
-            for l, _ in blend_weights(positions[axes.index(group.axis) if group else 0]):
+            for l, _ in blend_weights(_once(positions[axes.index(group.axis)], group) if group else positions[0]):
                 yield image_path(manifest, c, l, group)
         for pattern in (manifest.ambient_images, manifest.background_images):
             if pattern:
@@ -104,9 +117,10 @@ class Pictures:
 
     def whole_file(self, c: int, positions: Positions, relight: Relight = AS_RENDERED) -> Path | None:
         """Return the file that holds exactly this picture, if there is one."""
-        if self.manifest.groups or not relight.changes_nothing or positions[0] != floor(positions[0]):
+        position = self._mix(positions)[0]
+        if self.manifest.groups or not relight.changes_nothing or isinstance(position, Mixture):
             return None
-        return image_path(self.manifest, c, int(positions[0]))
+        return image_path(self.manifest, c, int(position)) if position == floor(position) else None
 
     def _check_relight(self, relight: Relight) -> None:
         if relight.changes_nothing:
@@ -121,9 +135,14 @@ class Pictures:
         if unknown:
             raise OutputError(f"{folder}: no group {unknown[0]!r}; the array has {', '.join(known)}")
 
-    def _blend(self, c: int, position: float, group: ManifestGroup | None) -> Image:
+    def _blend(self, c: int, position: Position, group: ManifestGroup | None) -> Image:
         """Return the image of a group at a position on its axis."""
-        (l, near), *other = blend_weights(position)
+        if isinstance(position, Mixture):
+            total = np.zeros((*self.manifest.resolution[::-1], 3), np.float32)
+            for l, weight in position.weights:
+                total += self._read(image_path(self.manifest, c, l, group)) * np.asarray(weight, np.float32)
+            return total
+        (l, near), *other = _neighbours(position)
         image = self._read(image_path(self.manifest, c, l, group))
         if not other:
             return image
@@ -141,14 +160,27 @@ class Pictures:
         return image
 
 
-def blend_weights(position: float) -> list[tuple[int, float]]:
-    """Return the indices around a position with their weights; only one where the position is whole."""
+def _once(position: Position, group: ManifestGroup) -> Position:
+    """Return where a group is seen: one that does not change along its axis is added once, not by weights."""
+    return 0.0 if isinstance(position, Mixture) and is_constant(group.lights) else position
+
+
+def blend_weights(position: Position) -> list[tuple[int, float]] | list[tuple[int, Vector]]:
+    """Return the indices around a position with their weights; only one where the position is whole.
+
+    Returns:
+        Weights of a mixture are RGB.
+    """
+    return list(position.weights) if isinstance(position, Mixture) else _neighbours(position)
+
+
+def _neighbours(position: float) -> list[tuple[int, float]]:
     index = floor(position)
     weight = position - index
     return [(index, 1 - weight), (index + 1, weight)] if weight else [(index, 1.0)]
 
 
-def ambient_at(lights: Sequence[ManifestLight], position: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def ambient_at(lights: Sequence[ManifestLight], position: Position) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Return I_A at a position, (3,)."""
-    parts = [np.asarray(lights[l].ambient, np.float64) * weight for l, weight in blend_weights(position)]
-    return np.asarray(sum(parts))
+    parts = [np.asarray(lights[l].ambient, np.float64) * np.asarray(weight) for l, weight in blend_weights(position)]
+    return np.asarray(sum(parts, np.zeros(3)))

@@ -23,7 +23,7 @@ from framearray_cli.array.pictures import Pictures
 from framearray_cli.array.places import MIDDLE_PLACE, read_indices
 from framearray_cli.array.present import REMEDY, list_present
 from framearray_cli.array.ranges import brief_frames_text
-from framearray_cli.base.arrays import Float32, Image
+from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.forms.words import shown
@@ -31,7 +31,9 @@ from framearray_cli.base.units import agree, counted
 
 from .axes import LightIndices, evenly_spaced, given_places
 from .drawing import GAP, MARGIN, blank_tile, draw_sheet, gutter
+from .mixing.mixer import SumOptions, open_pictures
 from .progress import Progress
+from .shrinking import area_mean
 
 MOST_COLUMNS, MOST_ROWS = 12, 8  # for an array of 192 x 48: 200 pixels per tile, on a sheet that fits a screen
 WIDTH = 2400  # pixels
@@ -69,24 +71,25 @@ def make_sheet(
     exposure: float = 0.0,
     side: str | None = None,
     at: Sequence[str] = (),
+    sums: SumOptions = SumOptions(),  # noqa: B008  # frozen
     progress: Progress | None = None,
     dry_run: bool = False,
 ) -> SheetResult:
     """Draw a contact sheet of a frame array; the file appears whole or not at all.
 
-    Images shrink by area means of linear light. PNG and JPEG have labels. EXR and TIFF keep the radiance, and hold only
-    the images, edge to edge. Images that are not there yet leave a blank: a pattern, in EXR and TIFF black.
+    Images shrink by area means of linear light. PNG and JPEG have labels. EXR and TIFF have radiance, edge to edge.
+    Images that are not there yet leave a blank: a pattern, in EXR and TIFF black.
 
     Args:
         out: output folder of a render, or its manifest.
         target: a .png, .jpg, .exr or .tif.
         cameras: places along the camera path, one per column; None: a few, evenly spaced.
         light: places along the first light axis, one per row if that is the axis shown, else one; None: as for `at`.
-        columns, rows: the number of cameras and light positions, at most, where they are not named.
-        width: of the sheet, at most, pixels; images are never enlarged.
+        columns, rows, width: cameras, light positions where they are not named, and pixels, at most.
         exposure: stops added to PNG and JPEG.
         side: axis of light positions from top to bottom; None: the first.
         at: "AXIS=PLACES" for further axes; the default is a few of the shown one, and the middle of all others.
+        sums: what pictures are sums of; those of all light positions leave one row of the first axis.
         progress: called after each image.
         dry_run: check everything but the pixels of images, and write nothing; the size is then (0, 0).
 
@@ -95,28 +98,39 @@ def make_sheet(
         OutputError: no image is there, one is damaged, or the target cannot be written.
         MissingExtraError: no library here draws labels, or writes the format.
     """
-    image_format = _image_format(target, exposure)
-    manifest = read_manifest(out)
+    image_format, manifest = sheet_format(target, exposure), read_manifest(out)
     axis = side if side is not None else next(iter(manifest.axes))
+    pictures, left_out = open_pictures(manifest, sums)
     lights, fixed = _read_lights(manifest, axis, light, at, rows)
-    n = manifest.n_cameras
-    chosen = evenly_spaced(n, columns) if cameras is None else read_indices("--cameras", cameras, n)
-    labels = [f"{axis} {l}" for l in lights] if image_format.format in FOR_SCREENS else []
+    names = [f"{axis} {l}" for l in lights]
+    if sums.collapses and axis == next(iter(manifest.axes)):
+        lights, names = lights[:1], ["sum"]
+    chosen, labels = _columns(manifest, cameras, columns), names if image_format.format in FOR_SCREENS else []
     tile = _tile_size(manifest, len(chosen), width, labels)
     places = _Places(chosen, lights, list(manifest.axes).index(axis), fixed)
-    there, warnings = _find_images(manifest, places)
+    there, warnings = _find_images(pictures, places, left_out)
     if dry_run:
         return SheetResult(target=target, cameras=chosen, lights=lights, size=(0, 0), warnings=warnings)
-    tiles = _read_tiles(manifest, places, there, tile, progress)
+    tiles = _read_tiles(pictures, places, there, tile, progress)
     if labels:
         shown = srgb8_from_linear(tiles * np.float32(2.0**exposure))
         shown[~there] = blank_tile(*tile)
-        codes = draw_sheet(shown, chosen, labels, _heads(manifest, axis, fixed), width)
-        write_codes(target, codes, image_format)
-        size = (codes.shape[1], codes.shape[0])
+        size = write_drawn(target, draw_sheet(shown, chosen, labels, _heads(manifest, axis, fixed), width))
     else:
         size = _write_linear(target, tiles, image_format)
     return SheetResult(target=target, cameras=chosen, lights=lights, size=size, warnings=warnings)
+
+
+def write_drawn(target: Path, codes: Bytes) -> tuple[int, int]:
+    """Write a sheet with labels; return its width and height."""
+    write_codes(target, codes, sheet_format(target))
+    return codes.shape[1], codes.shape[0]
+
+
+def _columns(manifest: Manifest, cameras: str | None, most: int) -> tuple[int, ...]:
+    """Read the cameras of the columns, or choose some."""
+    n = manifest.n_cameras
+    return evenly_spaced(n, most) if cameras is None else read_indices("--cameras", cameras, n)
 
 
 def _write_linear(target: Path, tiles: Float32, image_format: ImageFormat) -> tuple[int, int]:
@@ -140,30 +154,8 @@ class _Places(NamedTuple):
         return (*self.fixed[: self.side], l, *self.fixed[self.side + 1 :])
 
 
-def area_mean(image: Image, width: int, height: int) -> Image:
-    """Shrink a linear image: each new pixel is the mean over its area, which may cut pixels.
-
-    Args:
-        image: (h, w, 3).
-        width, height: pixels, at most those of the image.
-
-    Returns:
-        (height, width, 3) float32.
-    """
-    rows, columns = _shares(image.shape[0], height), _shares(image.shape[1], width)
-    narrow = np.einsum("xw,hwk->hxk", columns, image, optimize=True)
-    return np.asarray(np.einsum("yh,hxk->yxk", rows, narrow, optimize=True), np.float32)
-
-
-def _shares(n: int, m: int) -> Float32:
-    """Return the share (m, n) that each of n pixels has in each of m; rows sum to 1."""
-    edges = np.arange(m + 1) * (n / m)
-    low, high = np.arange(n)[None, :], np.arange(1, n + 1)[None, :]
-    overlap = np.minimum(high, edges[1:, None]) - np.maximum(low, edges[:-1, None])
-    return np.asarray(np.maximum(overlap, 0) * (m / n), np.float32)
-
-
-def _image_format(target: Path, exposure: float) -> ImageFormat:
+def sheet_format(target: Path, exposure: float = 0.0) -> ImageFormat:
+    """Return the format of a sheet by the suffix of its file."""
     name = format_name(target)
     if name not in get_args(Extension):
         raise OutputError(f"{target}: expected a .png, .jpg, .exr or .tif")
@@ -207,17 +199,19 @@ def _tile_size(manifest: Manifest, n_columns: int, width: int, labels: Sequence[
     return tile_width, max(1, round(tile_width * full_height / full_width))
 
 
-def _find_images(manifest: Manifest, places: _Places) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-    """Return which images are there, (rows, columns), and warnings about the others.
+def _find_images(
+    pictures: Pictures, places: _Places, left_out: tuple[str, ...]
+) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+    """Return which images are there, (rows, columns), and warnings: those before, and about the others.
 
     Raises:
         OutputError: none is there.
     """
-    pictures, present = Pictures(manifest), list_present(manifest)
+    manifest, present = pictures.manifest, list_present(pictures.manifest)
     rows = [[present.has(pictures.files(c, places.at(l))) for c in places.cameras] for l in places.lights]
     there: NDArray[np.bool_] = np.array(rows)
     if there.all():
-        return there, ()
+        return there, left_out
     gone = int(np.count_nonzero(~there))
     lacking = [c for i, c in enumerate(places.cameras) if not there[:, i].all()]
     text = (
@@ -226,18 +220,18 @@ def _find_images(manifest: Manifest, places: _Places) -> tuple[NDArray[np.bool_]
     )
     if not there.any():
         raise OutputError(f"{manifest.directory}: {text}")
-    return there, (text,)
+    return there, (*left_out, text)
 
 
 def _read_tiles(
-    manifest: Manifest,
+    pictures: Pictures,
     places: _Places,
     there: NDArray[np.bool_],
     tile: tuple[int, int],
     progress: Progress | None,
 ) -> Float32:
     """Read the images that are there, and shrink them: (rows, columns, height, width, 3); the others are black."""
-    pictures, total = Pictures(manifest), int(np.count_nonzero(there))
+    total = int(np.count_nonzero(there))
     tiles = np.zeros((*there.shape, tile[1], tile[0], 3), np.float32)
     for done, (i, j) in enumerate(np.argwhere(there.T).tolist(), start=1):
         picture = pictures.picture(places.cameras[i], places.at(places.lights[j]))

@@ -16,7 +16,8 @@ from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.tools.drawing import SHEET_GREY
-from framearray_cli.tools.sheet import area_mean, make_sheet
+from framearray_cli.tools.sheet import make_sheet
+from framearray_cli.tools.shrinking import area_mean
 
 
 @pytest.fixture

@@ -18,6 +18,7 @@ from ..help import Command
 from ..options import ArrayFolder, DryRun, Force, Json, Quiet, Strict, output_path, refuse_warnings
 from ..screen import Screen, err, print_result, print_would
 from ..streams import is_stdout, output_file
+from ..summing import Environment, Rotate, Soft, Weights, sum_options
 from ..values import number
 
 if TYPE_CHECKING:
@@ -115,6 +116,10 @@ def assemble(
     seconds: Seconds = None,
     fps: FrameRate = None,
     blend: Blend = False,
+    environment: Environment = None,
+    rotate: Rotate = None,
+    soft: Soft = None,
+    weights: Weights = None,
     exposure: Stops = 0.0,
     view: View = "srgb",
     label: Label = False,
@@ -152,11 +157,10 @@ def assemble(
             look=Look(exposure=exposure, view=find_view(view), label=label),
             fps=fps,
             positions="blend" if blend else None,
+            sums=sum_options(environment, rotate, soft, weights, moves=True),
             progress=screen.counter("assembling", "frame"),
-            warned=warn,
-            force=force,
-            dry_run=dry_run,
-        )
+            warned=warn, force=force, dry_run=dry_run,
+        )  # fmt: skip
     _print_made(made, target, dry_run=dry_run, quiet=quiet)
 
 
@@ -164,13 +168,13 @@ def _print_made(made: "Made", target: str, *, dry_run: bool, quiet: bool) -> Non
     """Print what was written, or would be."""
     from ..array_results import AssembleResult
 
-    rate = f"{float(made.fps):g} frames per second"
     size = f"{counted(made.n_frames, 'frame')} from {counted(made.n_images, 'image')}"
+    size += f", {float(made.fps):g} frames per second"
     if dry_run:
-        print_would([f"would {'replace' if os.path.isfile(target) else 'write'} {target}: {size}, {rate}"])
+        print_would([f"would {'replace' if os.path.isfile(target) else 'write'} {target}: {size}"])
         return
     result = AssembleResult(path=str(made.target), frames=made.n_frames, images=made.n_images, fps=float(made.fps))
-    print_result([f"{made.target}: {size}, {rate}"], result, quiet=quiet or is_stdout(target))
+    print_result([f"{made.target}: {size}"], result, quiet=quiet or is_stdout(target))
 
 
 def _movie_file(target: str, *, force: bool) -> AbstractContextManager[Path]:

@@ -9,6 +9,7 @@ from framearray_cli.base.units import counted
 
 from ..options import ArrayFolder, At, Cameras, DryRun, Exposure, Json, Light, Quiet, output_path
 from ..screen import Screen, err, print_result, print_would
+from ..summing import Environment, Rotate, Soft, Weights, sum_options
 from ..values import choice, whole
 
 
@@ -36,6 +37,10 @@ def export(
     points: Annotated[
         int, typer.Option("--points", parser=whole(0), help="Points of the scene, at most.", metavar="N")
     ] = 10_000,
+    environment: Environment = None,
+    rotate: Rotate = None,
+    soft: Soft = None,
+    weights: Weights = None,
     copy: Annotated[bool, typer.Option("--copy", help="Copy images that could be hard links.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace an earlier export.")] = False,
     dry_run: DryRun = False,
@@ -52,6 +57,7 @@ def export(
         made = run(
             array, output_path(target), kind, cameras=cameras or ALL_PLACES, light=light, at=at or (),
             image_format=ImageFormat(format=image_format, exposure=exposure), points=points, copy=copy,
+            sums=sum_options(environment, rotate, soft, weights),
             force=force, dry_run=dry_run, progress=screen.counter("exporting", "image"),
         )  # fmt: skip
         screen.end()
@@ -60,11 +66,10 @@ def export(
     if dry_run:
         print_would([f"would {'replace' if made.replaces else 'write'} {made.target}: {size}"])
         return
-    points_too = f", {counted(made.n_points, 'point')}" if kind in ("nerfstudio", "colmap") else ""
+    size += f", {counted(made.n_points, 'point')}" if kind in ("nerfstudio", "colmap") else ""
     from ..array_results import ExportResult
 
     result = ExportResult(
         directory=str(made.target), format=kind, cameras=made.n_cameras, lights=made.n_lights, points=made.n_points
     )
-    lines = [f"{made.target}: {size}{points_too}"]
-    print_result([*lines, *(f"note: {note}" for note in made.notes)], result, quiet=quiet)
+    print_result([f"{made.target}: {size}", *(f"note: {note}" for note in made.notes)], result, quiet=quiet)

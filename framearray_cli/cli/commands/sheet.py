@@ -2,7 +2,8 @@
 
 import os
 from contextlib import nullcontext
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,7 +13,11 @@ from ..completions import complete_axis
 from ..options import ArrayFolder, At, Cameras, DryRun, Exposure, Force, Json, Light, Quiet, output_path
 from ..screen import Screen, err, print_result, print_would
 from ..streams import is_stdout, output_file
+from ..summing import Environment, Rotate, Soft, Weights, sum_options
 from ..values import whole
+
+if TYPE_CHECKING:
+    from framearray_cli.tools.sheet import SheetResult as Made
 
 MOST_WIDTH = 20_000  # pixels; more is taken for a typing error
 
@@ -46,6 +51,10 @@ def sheet(
         ),
     ] = None,
     at: At = None,
+    environment: Environment = None,
+    rotate: Rotate = None,
+    soft: Soft = None,
+    weights: Weights = None,
     force: Force = False,
     dry_run: DryRun = False,
     quiet: Quiet = False,
@@ -61,16 +70,22 @@ def sheet(
         made = make_sheet(
             array, part, cameras=cameras, light=light,
             columns=columns, rows=rows, width=width, exposure=exposure, side=side, at=at or (),
+            sums=sum_options(environment, rotate, soft, weights),
             progress=screen.counter("drawing", "image"), dry_run=dry_run,
         )  # fmt: skip
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
-    shown = f"{counted(len(made.cameras), 'camera position')} x {counted(len(made.lights), 'light position')}"
-    if dry_run:
-        print_would([f"would {'replace' if there else 'write'} {file}: {shown}"])
-        return
+    _print_made(made, file, f"would {'replace' if there else 'write'}" if dry_run else "", quiet or is_stdout(target))
+
+
+def _print_made(made: "Made", file: Path, would: str, quiet: bool) -> None:
+    """Print what was drawn, or would be."""
     from ..array_results import SheetResult
 
+    shown = f"{counted(len(made.cameras), 'camera position')} x {counted(len(made.lights), 'light position')}"
+    if would:
+        print_would([f"{would} {file}: {shown}"])
+        return
     result = SheetResult(file=str(file), cameras=made.cameras, lights=made.lights, size=made.size)
     lines = [f"{file}: {shown}, {made.size[0]} x {made.size[1]} pixels"]
-    print_result(lines, result, quiet=quiet or is_stdout(target))
+    print_result(lines, result, quiet=quiet)

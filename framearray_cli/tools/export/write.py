@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from framearray_cli.array.images.images import ImageFormat, require_writer
-from framearray_cli.array.manifest import Manifest, layers_path
+from framearray_cli.array.manifest import Manifest, ManifestLight, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.array.places import ALL_PLACES, MIDDLE_PLACE, read_indices
@@ -18,6 +18,7 @@ from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import whole_folder
 
 from ..axes import read_light_indices
+from ..mixing.mixer import SumOptions, open_pictures
 from ..progress import Progress
 from . import cinema, colmap, nerfstudio, rti
 from .folder import find_earlier_export, put_picture
@@ -68,6 +69,7 @@ def export_array(
     at: Sequence[str] = (),
     image_format: ImageFormat | None = None,
     points: int = MOST_POINTS,
+    sums: SumOptions = SumOptions(),  # noqa: B008  # frozen
     copy: bool = False,
     force: bool = False,
     dry_run: bool = False,
@@ -84,6 +86,7 @@ def export_array(
         at: "AXIS=PLACES" for the other axes; the default is as for `light`.
         image_format: of the pictures; None: PNG.
         points: in the point cloud, at most.
+        sums: what pictures are sums of; those of all light positions are one picture per camera.
         copy: copy pictures of the array that could be linked.
         force: replace an earlier export.
         dry_run: check everything, and write nothing.
@@ -95,30 +98,26 @@ def export_array(
     """
     manifest = read_manifest(out)
     selection = _select(manifest, kind, cameras, light, at)
-    if kind == "rti":
-        rti.check_lights(selection)
     target, image_format = _full_name(target, kind), image_format or ImageFormat(format="png")
     require_writer(image_format.format)
-    pictures = Pictures(manifest)
+    pictures, warnings = open_pictures(manifest, sums)
+    selection = _one_light(selection, kind) if sums.collapses else selection
     has_cloud = kind not in ALL_LIGHTS and bool(manifest.layers)
     selection, left_out = _split_complete(pictures, selection, layers=has_cloud)
     replaces = find_earlier_export(target, _MARK_FILES[kind], force=force)
-    n_points = 0
+    cloud = None
     if not dry_run:
         with whole_folder(target, replace=replaces) as folder:
             files = _write_pictures(pictures, selection, folder / "images", image_format, copy=copy, progress=progress)
             cloud = _make_cloud(pictures, selection, image_format.exposure, points) if has_cloud else None
             _write_tables(folder, kind, selection, files, cloud, image_format.exposure)
-        n_points = len(cloud.position) if cloud else 0
+    n_points = len(cloud.position) if cloud else 0
+    n_cameras, n_lights = len(selection.cameras), len(selection.lights)
     return ExportResult(
-        target=target,
-        n_cameras=len(selection.cameras),
-        n_lights=len(selection.lights),
-        n_points=n_points,
+        target=target, n_cameras=n_cameras, n_lights=n_lights, n_points=n_points, replaces=replaces,
         notes=() if dry_run else _notes(kind, bool(manifest.layers), n_points, points),
-        replaces=replaces,
-        warnings=(f"left out: {left_out}",) if left_out else (),
-    )
+        warnings=(*warnings, *([f"left out: {left_out}"] if left_out else [])),
+    )  # fmt: skip
 
 
 def _select(manifest: Manifest, kind: ExportKind, cameras: str, light: str | None, at: Sequence[str]) -> Selection:
@@ -126,11 +125,36 @@ def _select(manifest: Manifest, kind: ExportKind, cameras: str, light: str | Non
     if kind not in EXPORT_KINDS:
         raise JobError("--format", [f"expected {', '.join(EXPORT_KINDS)}, got {kind!r}"])
     default = ALL_PLACES if kind in ALL_LIGHTS else MIDDLE_PLACE
-    return Selection(
+    selection = Selection(
         manifest=manifest,
         cameras=tuple(sorted(read_indices("--cameras", cameras, manifest.n_cameras))),
         lights=tuple(sorted(read_light_indices(manifest, light, at, default))),
     )
+    if kind == "rti":
+        rti.check_lights(selection)
+    return selection
+
+
+def _one_light(selection: Selection, kind: ExportKind) -> Selection:
+    """Return a selection with one place on the first axis, and no sources: its pictures are sums of all of them.
+
+    Raises:
+        JobError: the format needs a source per picture.
+    """
+    if kind == "rti":
+        raise JobError("--format", ["expected another format than rti, as a sum of light has no direction"])
+    lights = tuple(dict.fromkeys((0, *lights[1:]) for lights in selection.lights))
+    return replace(selection, manifest=_without_sources(selection.manifest), lights=lights)
+
+
+def _without_sources(manifest: Manifest) -> Manifest:
+    """Return the manifest of pictures that no position of the sources describes."""
+
+    def bare(lights: Sequence[ManifestLight]) -> tuple[ManifestLight, ...]:
+        return tuple(replace(light, sources=()) for light in lights)
+
+    groups = tuple(replace(group, lights=bare(group.lights)) for group in manifest.groups)
+    return replace(manifest, lights=bare(manifest.lights), groups=groups)
 
 
 def _split_complete(pictures: Pictures, selection: Selection, *, layers: bool) -> tuple[Selection, str]:

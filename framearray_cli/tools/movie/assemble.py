@@ -14,6 +14,7 @@ from framearray_cli.array.images.check import check_image
 from framearray_cli.array.images.images import FOR_SCREENS, Extension, format_name, require_writer
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.mixtures import position_text
 from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.array.present import REMEDY, list_present
 from framearray_cli.array.ranges import brief_frames_text
@@ -22,10 +23,12 @@ from framearray_cli.base.files import folder_for, require_new
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.units import agree, counted
 
+from ..mixing.mixer import SumOptions
 from ..progress import Progress
 from .animation import ANIMATIONS, open_animation, require_animation
 from .label import SMALLEST, typeface
 from .look import Look, screen_codes, shot_label
+from .mixed import mix_timeline
 from .pathfile import Mode, MoviePath, load_movie_path
 from .sequence import check_earlier, check_look, sequence_pattern, write_sequence
 from .sweep import Sweep, sweep_path
@@ -66,6 +69,7 @@ def assemble_movie(
     look: Look = Look(),  # noqa: B008  # frozen
     fps: float | None = None,
     positions: Mode | None = None,
+    sums: SumOptions = SumOptions(),  # noqa: B008  # frozen
     progress: Progress | None = None,
     warned: Callable[[Sequence[str]], None] = lambda warnings: None,
     force: bool = True,
@@ -80,7 +84,7 @@ def assemble_movie(
             without suffix is a folder for "frame.####" in the array's own format.
         look: of movies, PNG and JPEG.
         fps: frames per second; None: those of the path or the array.
-        positions: "nearest" or "blend"; None: as the path says at its top.
+        positions, sums: "nearest" or "blend", and what pictures are sums of; else as the path says at its top.
         progress: called after each frame.
         warned: called once, before the first frame, with what would make the movie useless; may raise an error.
         force: replace an earlier movie, or an earlier sequence that is no longer.
@@ -92,7 +96,8 @@ def assemble_movie(
         MissingExtraError: a movie needs PyAV, which is not installed, or an encoder or typeface is missing.
     """
     manifest = read_manifest(out)
-    movie, line = _plan(path, manifest, fps, positions)
+    left_out: list[str] = []
+    movie, line = _plan(path, manifest, fps, positions, partial(mix_timeline, sums=sums, warn=left_out.append))
     pictures = Pictures(manifest)
     if look.label:
         typeface(SMALLEST)
@@ -105,7 +110,7 @@ def assemble_movie(
     _check_target(target, len(line.shots), force=force)
     _check_images(pictures, line)
     levels = picture_warnings(pictures, line, look) if is_movie or format_name(target) in FOR_SCREENS else ()
-    warned([*path_warnings(movie, line), *levels])
+    warned([*left_out, *path_warnings(movie, line), *levels])
     write = _write_movie if is_movie else write_sequence
     if not dry_run:
         write(pictures, line, target, look, progress or (lambda done, total: None))
@@ -118,15 +123,16 @@ def assemble_movie(
 
 
 def _plan(
-    path: Path | Sweep, manifest: Manifest, fps: float | None, positions: Mode | None
+    path: Path | Sweep, manifest: Manifest, fps: float | None, positions: Mode | None, mix: Callable[..., Timeline]
 ) -> tuple[MoviePath, Timeline]:
-    """Read the path, and find what each frame shows."""
+    """Read the path, and find what each frame shows; `mix` puts sums of light positions in."""
     if isinstance(path, Sweep):
         movie = sweep_path(path, manifest)
     else:
         movie = load_movie_path(path, partial(array_problems, manifest=manifest))
     movie = _override(movie, fps, positions)
-    return movie, make_timeline(path.kind or "--cameras" if isinstance(path, Sweep) else path, movie, manifest)
+    line = make_timeline(path.kind or "--cameras" if isinstance(path, Sweep) else path, movie, manifest)
+    return movie, mix(manifest, movie, line, file=None if isinstance(path, Sweep) else path)
 
 
 def _check_target(target: Path, n_frames: int, *, force: bool) -> None:
@@ -163,7 +169,7 @@ def _check_images(pictures: Pictures, line: Timeline) -> None:
     if missing:
         shot, cameras = wanted[missing[0]], {wanted[path].c for path in missing}
         lights = zip(manifest.axes, shot.positions, strict=True)
-        place = ", ".join([f"camera {shot.c}", *(f"{axis} {position:g}" for axis, position in lights)])
+        place = ", ".join([f"camera {shot.c}", *(f"{axis} {position_text(position)}" for axis, position in lights)])
         gone = f"{len(missing):,} of the {counted(len(wanted), 'image')} on the path {agree(len(missing), 'is', 'are')}"
         whose = f"{agree(len(cameras), 'camera', 'cameras')} {brief_frames_text(cameras)}"
         raise OutputError(

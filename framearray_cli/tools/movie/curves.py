@@ -102,14 +102,17 @@ def _schema(grey_only: bool) -> WithJsonSchema:
 Intensity: TypeAlias = Annotated[LightCurve, PlainValidator(_curve(True)), _schema(True)]
 Colour: TypeAlias = Annotated[LightCurve, PlainValidator(_curve(False)), _schema(False)]
 
-_ONE = LightCurve(((0.0, (1.0, 1.0, 1.0)),))
+Degrees: TypeAlias = Intensity  # bounds suit a thousand turns
+
+ONE = LightCurve(((0.0, (1.0, 1.0, 1.0)),))
+NOT_TURNED = LightCurve(((0.0, (0.0, 0.0, 0.0)),))
 
 
 class LightChange(Table):
     """The factor of the light of a group, or of ambient light: intensity times colour."""
 
-    intensity: Intensity = Field(default=_ONE, description="Factor; 0 turns the light off.")
-    color: Colour = Field(default=_ONE, description="Factor of red, green and blue, or one for all.")
+    intensity: Intensity = Field(default=ONE, description="Factor; 0 turns the light off.")
+    color: Colour = Field(default=ONE, description="Factor of red, green and blue, or one for all.")
 
 
 def relights(
@@ -144,6 +147,18 @@ def _factors(key: str, change: LightChange, times: Sequence[float], problems: li
         r, g, b = (float(x * y) for x, y in zip(value_at(intensity, time), value_at(color, time), strict=True))
         found.append((r, g, b))
     return found
+
+
+def numbers_at(key: str, curve: LightCurve, times: Sequence[float], problems: list[str]) -> list[float]:
+    """Return the value of a curve of single numbers at each time.
+
+    Args:
+        key: where it stands in the file.
+        times: of the frames, seconds, from 0; the last is 100%.
+        problems: receives a line for each key frame out of order.
+    """
+    timed = _timed(key, curve, times[-1], problems)
+    return [value_at(timed, time)[0] for time in times]
 
 
 TimedValues: TypeAlias = tuple[list[float], list[Float3]]  # times in seconds, in order, and values

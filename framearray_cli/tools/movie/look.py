@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
+from framearray_cli.array.mixtures import position_text
 from framearray_cli.base.arrays import Image
 from framearray_cli.base.colour import srgb8_from_linear
 
@@ -59,5 +60,5 @@ def shot_label(manifest: Manifest, shot: Shot) -> str:
     """Word what a frame shows: "c 12  l 3", or "c 12  light 3.25  lamps 1" if there are several light axes."""
     axes = list(manifest.axes)
     names = ["l"] if axes == [MAIN_AXIS] else axes
-    places = [f"{name} {round(position, 2):g}" for name, position in zip(names, shot.positions, strict=True)]
+    places = [f"{name} {position_text(position)}" for name, position in zip(names, shot.positions, strict=True)]
     return "  ".join([f"c {shot.c}", *places])

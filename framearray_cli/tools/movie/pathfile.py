@@ -15,7 +15,7 @@ from framearray_cli.base.forms.table import Place, Table, check_with, fail
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, frame_rate
 
 from ..spans import Span
-from .curves import LightChange
+from .curves import NOT_TURNED, ONE, Degrees, Intensity, LightChange
 from .easing import Ease
 
 MOST_FRAMES = 1_000_000  # eleven hours at 24 frames per second; more is a typing error
@@ -75,6 +75,16 @@ class Segment(Table):
         return round(Fraction(self.hold) * fps)
 
 
+class EnvironmentLight(Table):
+    """An environment map in place of the light positions of the first axis."""
+
+    file: str = Field(
+        min_length=1, max_length=1000, description="Panorama, EXR or HDR; relative to the folder of the path file."
+    )
+    rotate: Degrees = Field(default=NOT_TURNED, description="Degrees that it is turned clockwise, as seen from above.")
+    intensity: Intensity = Field(default=ONE, description="Factor of its light.")
+
+
 class MoviePath(Table):
     """A path file."""
 
@@ -85,6 +95,18 @@ class MoviePath(Table):
     segments: tuple[Segment, ...] = Field(strict=False, description="Played one after another; at least one.")
     groups: dict[str, LightChange] = Field(default={}, description="Changes of the light of groups, by name.")
     ambient: LightChange | None = Field(default=None, description="Change of the ambient light.")
+    environment: EnvironmentLight | None = Field(
+        default=None, description="An environment in place of the light positions of the first axis."
+    )
+    soft: float | None = Field(
+        default=None, ge=1, le=1e5, description="Number of light positions whose mean takes the place of one."
+    )
+
+    @model_validator(mode="after")
+    def _one_sum(self) -> "MoviePath":
+        if self.environment is not None and self.soft is not None:
+            fail([(("soft",), "expected either environment or soft, got both")])
+        return self
 
     @field_validator("segments")
     @classmethod

@@ -22,6 +22,7 @@ from framearray_cli.array.images.images import (
     write_image,
 )
 from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.mixtures import Mixture
 from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import folder_for, reason, temporary_folder
@@ -165,14 +166,15 @@ def _write_frame(pictures: Pictures, shot: Shot, relight: Relight, target: Path,
 def _attributes(manifest: Manifest, shot: Shot, fps: Fraction) -> dict[str, Attribute]:
     """Return the attributes of a frame's file."""
     camera = manifest.cameras[shot.c]
-    whole = len(shot.positions) == 1 and shot.positions[0] == int(shot.positions[0])
+    first = shot.positions[0]
+    whole = len(shot.positions) == 1 and not isinstance(first, Mixture) and first == int(first)
     attributes = frame_attributes(
         world_from_camera=camera.matrix,
         fov_deg=camera.fov,
         resolution=manifest.resolution,
         fps=fps,
         c=shot.c,
-        l=int(shot.positions[0]) if whole else None,
+        l=int(first) if whole and not isinstance(first, Mixture) else None,
         software=f"framearray {manifest.version}",
     )
     return attributes if whole else attributes | {"framearray:place": shot_label(manifest, shot)}

@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
+from framearray_cli.array.mixtures import Position
 from framearray_cli.array.pictures import Relight
 from framearray_cli.array.places import CAMERA_AXIS, IndexPlace, nearest_index
 from framearray_cli.base.errors import JobError
@@ -31,11 +32,11 @@ class Shot:
 
     Attributes:
         c: camera index.
-        positions: one per light axis, in the order of `Manifest.axes`; fractional ones are blended.
+        positions: one per light axis, in the order of `Manifest.axes`; fractional ones are blended, mixtures summed.
     """
 
     c: int
-    positions: tuple[float, ...]
+    positions: tuple[Position, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,1 @@
+"""Sums over light positions, without a ray: soft light, environments, weights of a file."""

@@ -1,0 +1,96 @@
+"""Sums of stored images against renders of all their sources at once."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+
+from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.mixtures import check_mixture, constant_parts
+from framearray_cli.array.pictures import Pictures
+from framearray_cli.base.errors import OutputError
+from framearray_cli.render.render import render
+from framearray_cli.tools.mixing.mixer import mixture_of
+
+DOME = {"type": "dome", "positions": 4, "irradiance": [2.0, 1.5, 1.0]}
+WEIGHTS = np.array([[0.5, 0.25, 2.0], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [3.0, 0.5, 0.125]])
+SUN = {"type": "directional", "keys": [{"frame": 0, "direction": [-0.6, -1.0, -0.3], "irradiance": [3.0, 2.5, 1.5]}]}
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tiny.save_glb(tiny.room_meshes(), tmp_path_factory.mktemp("scene") / "room.glb")
+
+
+def rendered(scene: Path, folder: Path, sources: Any, **changes: Any) -> Pictures:
+    """Render a job of one camera position, and open its pictures."""
+    table = tiny.table(
+        scene={"file": str(scene), "background": changes.get("background", [0.0, 0.0, 0.0])},
+        camera={"resolution": [24, 18]},
+        output={"directory": str(folder), "format": "exr", "half": changes.get("half", "never")},
+    )
+    table["light"] = {"sources": sources}
+    table["ambient"] = changes.get("ambient", table["ambient"])
+    render(tiny.Job.model_validate(table))
+    return Pictures(read_manifest(folder))
+
+
+@pytest.fixture(scope="module")
+def dome(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Pictures:
+    return rendered(scene, tmp_path_factory.mktemp("dome") / "out", [DOME])
+
+
+def at_once(pictures: Pictures, weights: Any) -> list[dict[str, Any]]:
+    """Return all positions of the dome as sources that shine together, each times its weight."""
+    found = []
+    for light, weight in zip(pictures.manifest.lights, weights, strict=True):
+        (source,) = light.sources
+        lit = (np.array(source["irradiance"]) * weight).tolist()
+        found.append({"type": "directional", "keys": [{"frame": 0, **_key(source), "irradiance": lit}]})
+    return found
+
+
+def _key(source: dict[str, Any]) -> dict[str, Any]:
+    return {"direction": list(source["direction"])}
+
+
+def test_a_sum_equals_a_render_of_all_sources_at_once(scene: Path, tmp_path: Path, dome: Pictures) -> None:
+    mixture = mixture_of(WEIGHTS)
+    check_mixture(dome.manifest, mixture)
+    whole = rendered(scene, tmp_path / "out", at_once(dome, WEIGHTS)).picture(0, (0,))
+    made = dome.picture(0, (mixture,))
+    np.testing.assert_allclose(made, whole, rtol=2e-5, atol=2e-6)
+    other = dome.picture(0, (mixture_of(WEIGHTS[::-1]),))
+    assert np.abs(other - whole).max() > 0.01, "the comparison can fail"
+
+
+def test_a_sum_of_halves_is_within_one_step(scene: Path, tmp_path: Path, dome: Pictures) -> None:
+    halves = rendered(scene, tmp_path / "out", [DOME], half="auto")
+    mixture = mixture_of(WEIGHTS)
+    np.testing.assert_allclose(halves.picture(0, (mixture,)), dome.picture(0, (mixture,)), rtol=2**-11, atol=1e-6)
+
+
+def test_groups_add_what_stays_only_once(scene: Path, tmp_path: Path, dome: Pictures) -> None:
+    sky, sun = [0.3, 0.4, 0.5], SUN | {"group": "sun"}
+    groups = rendered(scene, tmp_path / "groups", [DOME | {"group": "dome"}, sun], background=sky)
+    assert constant_parts(groups.manifest) == []
+    mixture = mixture_of(WEIGHTS)
+    check_mixture(groups.manifest, mixture)
+    whole = rendered(scene, tmp_path / "whole", [*at_once(dome, WEIGHTS), SUN], background=sky).picture(0, (0,))
+    np.testing.assert_allclose(groups.picture(0, (mixture,)), whole, rtol=2e-5, atol=2e-6)
+
+
+def test_what_stays_is_found_in_the_manifest(scene: Path, tmp_path: Path, dome: Pictures) -> None:
+    mixed = rendered(scene, tmp_path / "out", [DOME, SUN], background=[0.0, 0.1, 0.0]).manifest
+    assert constant_parts(mixed) == ["the background", "source 1, which stays"]
+    with pytest.raises(OutputError) as caught:
+        check_mixture(mixed, mixture_of(WEIGHTS))
+    assert str(caught.value) == (
+        f"{mixed.directory}: every image holds the background and source 1, which stays, which a sum may contain only "
+        'once; expected weights of sum 1, got 4.5; render again with groups, which keep it apart (group = "..." in '
+        "[[light.sources]])"
+    )
+    check_mixture(mixed, mixture_of(np.full((4, 3), 0.25)))
+    assert constant_parts(dome.manifest) == []
