@@ -14,6 +14,7 @@ from .movie.label import typeface
 SHEET_GREY, HEADING, LABEL = 38, 225, 160
 GAP, MARGIN = 4, 24  # pixels
 HEAD_TEXT, LABEL_TEXT = 22, 15  # height of the letters' boxes, pixels
+SCALE = 400  # longest, pixels
 BLANK, STRIPE = "missing", 12  # an image that is not there: a word, and the distance of stripes in pixels
 
 
@@ -46,6 +47,29 @@ def draw_sheet(tiles: Bytes, cameras: Sequence[int], labels: Sequence[str], head
     for j in range(0, n_rows, _label_stride(LABEL_TEXT, step_y)):
         y = top + j * step_y + tile_height / 2
         draw.text((left - LABEL_TEXT, y), labels[j], font=font, fill=grey, anchor="rm")
+    return np.asarray(picture)
+
+
+def draw_scale(sheet: Bytes, ramp: Bytes, most: float, unit: str) -> Bytes:
+    """Add a scale below a sheet: a bar with its colours, and values from 0 to `most`.
+
+    Args:
+        ramp: (1, n, 3) codes of the bar, from left to right.
+    """
+    import PIL.Image
+    import PIL.ImageDraw
+
+    height, width, _ = sheet.shape
+    picture = PIL.Image.fromarray(np.pad(sheet, ((0, 3 * LABEL_TEXT), (0, 0), (0, 0)), constant_values=SHEET_GREY))
+    draw = PIL.ImageDraw.Draw(picture)
+    left, length = 2 * MARGIN, max(min(SCALE, width - 6 * MARGIN), 1)
+    picture.paste(PIL.Image.fromarray(ramp).resize((length, LABEL_TEXT)), (left, height))
+    for text, x, anchor in (
+        ("0", left - LABEL_TEXT // 2, "rm"),
+        (f"{most:g} {unit}", left + length + LABEL_TEXT // 2, "lm"),
+    ):
+        y = height + LABEL_TEXT // 2
+        draw.text((x, y), text, font=typeface(LABEL_TEXT), fill=(LABEL,) * 3, anchor=anchor)
     return np.asarray(picture)
 
 

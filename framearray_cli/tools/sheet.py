@@ -105,8 +105,8 @@ def make_sheet(
     names = [f"{axis} {l}" for l in lights]
     if sums.collapses and axis == next(iter(manifest.axes)):
         lights, names = lights[:1], ["sum"]
-    chosen, labels = _columns(manifest, cameras, columns), names if image_format.format in FOR_SCREENS else []
-    tile = _tile_size(manifest, len(chosen), width, labels)
+    chosen, labels = choose_columns(manifest, cameras, columns), names if image_format.format in FOR_SCREENS else []
+    tile = tile_size(manifest, len(chosen), width, labels)
     places = _Places(chosen, lights, list(manifest.axes).index(axis), fixed)
     there, warnings = _find_images(pictures, places, left_out)
     if dry_run:
@@ -117,7 +117,7 @@ def make_sheet(
         shown[~there] = blank_tile(*tile)
         size = write_drawn(target, draw_sheet(shown, chosen, labels, _heads(manifest, axis, fixed), width))
     else:
-        size = _write_linear(target, tiles, image_format)
+        size = write_linear(target, tiles, image_format)
     return SheetResult(target=target, cameras=chosen, lights=lights, size=size, warnings=warnings)
 
 
@@ -127,13 +127,13 @@ def write_drawn(target: Path, codes: Bytes) -> tuple[int, int]:
     return codes.shape[1], codes.shape[0]
 
 
-def _columns(manifest: Manifest, cameras: str | None, most: int) -> tuple[int, ...]:
+def choose_columns(manifest: Manifest, cameras: str | None, most: int) -> tuple[int, ...]:
     """Read the cameras of the columns, or choose some."""
     n = manifest.n_cameras
     return evenly_spaced(n, most) if cameras is None else read_indices("--cameras", cameras, n)
 
 
-def _write_linear(target: Path, tiles: Float32, image_format: ImageFormat) -> tuple[int, int]:
+def write_linear(target: Path, tiles: Float32, image_format: ImageFormat) -> tuple[int, int]:
     """Write images edge to edge, without labels; return width and height of the sheet."""
     n_rows, n_columns, height, width, _ = tiles.shape
     size = (n_columns * width, n_rows * height)
@@ -188,7 +188,7 @@ def _read_lights(
     return shown_rows, tuple(places[0] for places in found.values())
 
 
-def _tile_size(manifest: Manifest, n_columns: int, width: int, labels: Sequence[str]) -> tuple[int, int]:
+def tile_size(manifest: Manifest, n_columns: int, width: int, labels: Sequence[str]) -> tuple[int, int]:
     """Return width and height of each image on a sheet with these labels at its side."""
     full_width, full_height = manifest.resolution
     room = (width - 2 * MARGIN - gutter(labels) + GAP) // n_columns - GAP if labels else width // n_columns

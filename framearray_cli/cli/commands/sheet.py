@@ -3,10 +3,11 @@
 import os
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from framearray_cli.base.errors import JobError
 from framearray_cli.base.units import counted
 
 from ..completions import complete_axis
@@ -51,6 +52,9 @@ def sheet(
         ),
     ] = None,
     at: At = None,
+    sun_hours: Annotated[
+        bool, typer.Option("--sun-hours", help="Hours of direct sun in false colour, a row per day of a sun study.")
+    ] = False,
     environment: Environment = None,
     rotate: Rotate = None,
     soft: Soft = None,
@@ -62,17 +66,20 @@ def sheet(
 ) -> None:  # fmt: skip
     """Draw a contact sheet: camera positions from left to right, light positions from top to bottom."""
     from framearray_cli.tools.sheet import make_sheet
+    from framearray_cli.tools.sunsheet import make_sun_sheet
 
     file = output_path(target)
-    there = os.path.isfile(file)
+    there, sums = os.path.isfile(file), sum_options(environment, rotate, soft, weights)
     drawn = nullcontext(file) if dry_run and is_stdout(target) else output_file(file, ".png", force=force)
     with drawn as part, Screen(err, quiet=quiet) as screen:
-        made = make_sheet(
-            array, part, cameras=cameras, light=light,
-            columns=columns, rows=rows, width=width, exposure=exposure, side=side, at=at or (),
-            sums=sum_options(environment, rotate, soft, weights),
-            progress=screen.counter("drawing", "image"), dry_run=dry_run,
-        )  # fmt: skip
+        both: dict[str, Any] = {"cameras": cameras, "columns": columns, "width": width, "dry_run": dry_run}
+        progress = screen.counter("drawing", "image")
+        if sun_hours:
+            _refuse_beside_hours(light=light, at=at, side=side, exposure=exposure, sums=sums.any)
+            made = make_sun_sheet(array, part, progress=progress, **both)
+        else:
+            more: dict[str, Any] = {"rows": rows, "exposure": exposure, "side": side, "at": at or (), "sums": sums}
+            made = make_sheet(array, part, light=light, progress=progress, **both, **more)
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
     _print_made(made, file, f"would {'replace' if there else 'write'}" if dry_run else "", quiet or is_stdout(target))
@@ -89,3 +96,14 @@ def _print_made(made: "Made", file: Path, would: str, quiet: bool) -> None:
     result = SheetResult(file=str(file), cameras=made.cameras, lights=made.lights, size=made.size)
     lines = [f"{file}: {shown}, {made.size[0]} x {made.size[1]} pixels"]
     print_result(lines, result, quiet=quiet)
+
+
+def _refuse_beside_hours(**options: object) -> None:
+    """Refuse options that hours of sun, which count all light positions, would ignore.
+
+    Raises:
+        JobError: one is given.
+    """
+    if given := [name for name, value in options.items() if value]:
+        name = "sums of light" if given[0] == "sums" else f"--{given[0]}"
+        raise JobError("--sun-hours", [f"expected no {name} beside it, as hours are counted over all light positions"])

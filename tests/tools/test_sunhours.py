@@ -1,0 +1,97 @@
+"""Hours of direct sun, from images whose lit pixels are known."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.movies import CAMERA, plain
+
+from framearray_cli.array.images.images import ImageFormat, read_image, write_image
+from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.manifest import Manifest, ManifestGroup, ManifestLight, array_files, image_path
+from framearray_cli.array.manifest_toml import write_manifest
+from framearray_cli.base.errors import OutputError
+from framearray_cli.tools.sunsheet import RAMP, false_colours, make_sun_sheet
+
+TIMES = [f"2026-{day}T{hour:02d}:{minute:02d}:00+01:00" for day in ("03-20", "06-21") for hour, minute in
+         ((8, 0), (8, 30), (9, 0), (9, 30))]  # fmt: skip
+SIZE = (12, 8)
+
+
+def sun(time: str) -> dict[str, Any]:
+    return {"type": "directional", "direction": (0.0, -1.0, 0.0), "irradiance": (3.0,) * 3, "time": time}
+
+
+def study(folder: Path, *, n_sources: int = 1, times: Any = TIMES, with_time: bool = True) -> Manifest:
+    """Write two cameras; at position l of camera c the first l + c columns of pixels are in the sun."""
+    sources = [sun(time) if with_time else {k: v for k, v in sun(time).items() if k != "time"} for time in times]
+    dark = (0.0, 0.0, 0.0)
+    lights = tuple(ManifestLight(ambient=(0.5,) * 3, ambient_error=dark, sources=(s,) * n_sources) for s in sources)
+    lamp = ManifestLight(ambient=(0.5,) * 3, ambient_error=dark, sources=({"type": "point"},))
+    manifest = Manifest(
+        version="0.1.0", name="study", fingerprint="", resolution=SIZE, fps=24, cameras=(CAMERA,) * 2,
+        groups=(
+            ManifestGroup(name="lamp", axis="lamp", images="lamp.c{camera:04d}.exr", lights=(lamp,)),
+            ManifestGroup(name="sun", axis="light", images="sun.c{camera:04d}.l{light:03d}.exr", lights=lights),
+        ),
+        ambient_images="ambient.c{camera:04d}.exr", background_images="back.c{camera:04d}.exr",
+        background_ambient=(0.2,) * 3, directory=folder,
+    )  # fmt: skip
+    for file in array_files(manifest):
+        write_image(file, np.ones((SIZE[1], SIZE[0], 3), np.float32), ImageFormat())
+    for c in range(2):
+        for l in range(len(times)):
+            image = np.zeros((SIZE[1], SIZE[0], 3), np.float32)
+            image[:, : l + c, 1] = 1e-6  # one channel, as dim as a half allows
+            write_image(image_path(manifest, c, l, manifest.groups[1]), image, ImageFormat())
+    write_manifest(folder, manifest)
+    return manifest
+
+
+def test_hours_are_counted_per_day_without_other_light(tmp_path: Path) -> None:
+    manifest = study(tmp_path / "out")
+    made = make_sun_sheet(manifest.directory, tmp_path / "hours.exr", cameras="all")
+    assert (made.cameras, made.lights, made.size) == ((0, 1), (0, 4), (24, 16))
+    hours = read_image(tmp_path / "hours.exr").reshape(2, 8, 2, 12, 3)
+    for c in range(2):
+        for day in range(2):
+            lit = [sum(x < l + c for l in range(4 * day, 4 * day + 4)) for x in range(12)]
+            np.testing.assert_array_equal(hours[day, 0, c, :, 0], 0.5 * np.array(lit))
+    assert (hours == hours[:, :1, :, :, :1]).all()
+
+
+def test_a_sheet_in_false_colour(tmp_path: Path) -> None:
+    manifest = study(tmp_path / "out")
+    make_sun_sheet(manifest.directory, tmp_path / "hours.png")
+    codes = {tuple(code) for code in read_codes(tmp_path / "hours.png").reshape(-1, 3).tolist()}
+    for hours in (0.0, 0.5, 1.0, 1.5, 2.0):
+        assert tuple(false_colours(np.float32(hours), 2.0).tolist()) in codes
+
+
+def test_colours_run_from_dark_to_bright() -> None:
+    codes = false_colours(np.linspace(-1, 13, 50, dtype=np.float32), 12.0).astype(float)
+    assert (np.diff(codes @ [0.2126, 0.7152, 0.0722]) >= 0).all()
+    np.testing.assert_array_equal(codes[[0, -1]], RAMP[[0, -1]])
+
+
+def test_what_is_missing_is_named(tmp_path: Path) -> None:
+    cases = [
+        (plain(tmp_path / "a"), "this array stores its light all together; render again with a source of type"),
+        (study(tmp_path / "b", with_time=False), "this array has no group with a sun; render again"),
+        (study(tmp_path / "c", n_sources=2), 'a sun alone in its group, and "sun" has 2 sources'),
+        (study(tmp_path / "d", times=TIMES[:5]), "at least 2 light positions per day, got 1 on 2026-06-21"),
+    ]
+    for manifest, text in cases:
+        with pytest.raises(OutputError) as caught:
+            make_sun_sheet(manifest.directory, tmp_path / "x.png")
+        assert text in str(caught.value)
+        assert not (tmp_path / "x.png").exists()
+
+
+def test_a_missing_image_is_named(tmp_path: Path) -> None:
+    manifest = study(tmp_path / "out")
+    image_path(replace(manifest), 1, 2, manifest.groups[1]).unlink()
+    with pytest.raises(OutputError, match=r"sun\.c0001\.l002\.exr"):
+        make_sun_sheet(manifest.directory, tmp_path / "x.png")
