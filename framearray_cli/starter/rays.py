@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Float64, Int32
+from framearray_cli.base.arrays import Float32, Float64, Int32
 from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.engine.embree.packets import (
     DIRECTION,
@@ -73,8 +73,10 @@ class Probe:
 
     def normals(self, triangle: Int32) -> Float64:
         """(n, 3) normals by winding, not of unit length."""
-        corners = self.scene.corners[triangle].astype(np.float64)
-        return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        corners = self.scene.corners
+        if len(corners) < len(triangle):  # most of them are asked for several times
+            return _normals(corners)[triangle]
+        return _normals(corners[triangle])
 
     def blocked(self, start: Any, end: Any) -> NDArray[np.bool_]:
         """(n,) whether anything lies between two points, (n, 3) or (3,) each."""
@@ -83,6 +85,11 @@ class Probe:
         packets, n = _fill_packets(RAY_ROWS, start + SHORTENED * step, step, 1 - 2 * SHORTENED)
         occlude(self.embree.tracer, packets, n)
         return np.asarray(_rows(packets, TFAR)[:n] < 0)
+
+
+def _normals(corners: Float32) -> Float64:
+    corners64 = corners.astype(np.float64)
+    return np.cross(corners64[:, 1] - corners64[:, 0], corners64[:, 2] - corners64[:, 0])
 
 
 def _fill_packets(rows: int, origins: Any, directions: Any, tfar: float) -> tuple[Any, int]:
