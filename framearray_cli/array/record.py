@@ -57,12 +57,14 @@ class RecordedRun:
     Attributes:
         cameras: range of those to render, see ranges.py.
         processor: name of the machine's processor; kernels differ between processors.
+        cells: digest of the cells that indirect light was read from; empty without.
         rays: number of rays traced, by kind.
         seconds: of wall time.
     """
 
     cameras: str
     processor: str
+    cells: str = ""
     rays: Mapping[str, int] = field(default_factory=dict)
     seconds: float = 0.0
 
@@ -96,7 +98,8 @@ class RecordWriter:
             raise OutputError(f"{file}: cannot be written: {reason(error)}") from error
         self._torn = True  # the last line of an earlier run may be incomplete
         try:
-            self._put({"fingerprint": fingerprint, "cameras": run.cameras, "processor": run.processor})
+            head = {"fingerprint": fingerprint, "cameras": run.cameras, "processor": run.processor}
+            self._put(head | ({"cells": run.cells} if run.cells else {}))
         except BaseException:
             self._file.close()
             raise
@@ -172,8 +175,8 @@ def read_records(folder: Path, fingerprint: str) -> ArrayRecords:
             if "fingerprint" in line:
                 current = line["fingerprint"] == fingerprint
                 if current:
-                    cameras, processor = (str(line.get(key, "")) for key in ("cameras", "processor"))
-                    runs.append(RecordedRun(cameras=cameras, processor=processor))
+                    about: dict[str, Any] = {key: str(line.get(key, "")) for key in ("cameras", "processor", "cells")}
+                    runs.append(RecordedRun(**about))
             elif current and (entry := _entry(line)):
                 entries[entry.c, *entry.lights] = entry
                 runs[-1] = replace(runs[-1], **_run_costs(line))

@@ -22,6 +22,7 @@ from .method import (
     DEFAULT_N_R,
     AmbientTable,
     DenoiseTable,
+    IndirectTable,
     ObscuranceTable,
     ReuseTable,
     SamplesTable,
@@ -183,6 +184,7 @@ class Job(Table):
     samples: SamplesTable = Field(default_factory=SamplesTable)
     reuse: ReuseTable = Field(default_factory=ReuseTable)
     obscurance: ObscuranceTable
+    indirect: IndirectTable = Field(default_factory=IndirectTable)
     ambient: AmbientTable = Field(default_factory=AmbientTable)
     specular: SpecularTable = Field(default_factory=SpecularTable)
     denoise: DenoiseTable = Field(default_factory=DenoiseTable)
@@ -243,6 +245,7 @@ class Job(Table):
                 [(("samples", "halves"), 'expected output.format = "exr": no other format has room for more channels')]
             )
         self._check_groups()
+        self._check_cells()
         if self.samples.halves and self._window_hits < 2:
             fail([(("samples", "halves"), "expected at least two hits for each pixel of an image")])
         job_file = (info.context or {}).get("job_file")
@@ -254,6 +257,12 @@ class Job(Table):
             directory = absolute(Path("..") / "out" / self.name, job_file)
             fill(self, "output", self.output.model_copy(update={"directory": directory}))
         return self
+
+    def _check_cells(self) -> None:
+        """Refuse what light from cells does not go together with."""
+        if self.indirect.method != "obscurance" and self.denoise.obscurance:
+            problem = f'expected false with indirect.method = "{self.indirect.method}", which shows no obscurance'
+            fail([(("denoise", "obscurance"), problem)])
 
     def _check_groups(self) -> None:
         """Refuse settings that light stored by group does not allow."""

@@ -121,6 +121,37 @@ class ObscuranceTable(Table):
     )
 
 
+class IndirectTable(Table):
+    """How indirect light is found."""
+
+    method: Literal["obscurance", "cells"] = Field(
+        default="obscurance",
+        description='"obscurance": obscurances times one ambient light per light position. "cells": all bounces of '
+        "light are solved once for small cells of the surfaces under every light position, and obscurance rays read "
+        "the cells that they meet.",
+    )
+    cell: float | None = Field(
+        default=None,
+        gt=0,
+        le=1e12,
+        description="Edge of the smallest cells, in scene units. Cells farther away are up to 16 times as large.",
+        json_schema_extra=default_text("a 30th of the median length of obscurance rays to the first surface"),
+    )
+    samples: int = Field(
+        default=2**20,
+        ge=1024,
+        le=2**24,
+        description="Number of walks that sample the cells.",
+    )
+
+    @model_validator(mode="after")
+    def _of_cells(self) -> "IndirectTable":
+        extra = sorted(self.model_fields_set - {"method"})
+        if self.method == "obscurance" and extra:
+            fail([((key,), 'expected method = "cells" beside it: obscurances have no cells') for key in extra])
+        return self
+
+
 class AmbientTable(Table):
     """The ambient light I_A of each light position, the level of all indirect light."""
 

@@ -52,6 +52,8 @@ def job_table(job: Job) -> dict[str, Any]:
     table: dict[str, Any] = _toml_value(job.model_dump(exclude_none=True))
     if job.ambient.intensity is not None:  # excludes `method` and `paths`
         table["ambient"] = {"intensity": table["ambient"]["intensity"]}
+    if job.indirect.method == "obscurance":  # as in jobs of versions without this table
+        del table["indirect"]
     del table["samples"]["most_hits" if job.samples.error is None else "hits"]  # a job has either
     return table
 

@@ -31,7 +31,13 @@ def with_few_lights(
         return prepared, setup, ambient
     return (
         few,
-        replace(setup, lights=few.light_arrays, kept=range(len(planes)), planes=few.lights.planes),
+        replace(
+            setup,
+            lights=few.light_arrays,
+            kept=range(len(planes)),
+            planes=few.lights.planes,
+            cells=setup.cells_at(planes),
+        ),
         replace(ambient, intensity=ambient.intensity[planes], standard_error=ambient.standard_error[planes]),
     )
 
@@ -47,7 +53,13 @@ def all_lights(prepared: Prepared, most: int, setup: FrameSetup, ambient: Ambien
         return setup, ambient
     nearest = np.abs(np.arange(prepared.n_lights)[:, None] - planes).argmin(axis=1)
     return (
-        replace(setup, lights=prepared.light_arrays, kept=range(prepared.n_lights), planes=prepared.lights.planes),
+        replace(
+            setup,
+            lights=prepared.light_arrays,
+            kept=range(prepared.n_lights),
+            planes=prepared.lights.planes,
+            cells=setup.cells_at(nearest.tolist()),
+        ),
         replace(ambient, intensity=ambient.intensity[nearest], standard_error=ambient.standard_error[nearest]),
     )
 

@@ -1,6 +1,7 @@
 """Build the manifest of a render, with everything that other programs need."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -71,6 +72,12 @@ def initial_manifest(
 def _images(prepared: Prepared, ambient: Ambient, files: ArrayNames) -> dict[str, Any]:
     """Return the file patterns of the images, and their lights."""
     lights = prepared.lights
+    if prepared.job.indirect.method == "cells":  # all light is in the images
+        ambient = replace(
+            ambient,
+            intensity=np.zeros_like(ambient.intensity),
+            standard_error=np.zeros_like(ambient.standard_error),
+        )
     i_a = ambient.intensity.astype(np.float64)
     if not lights.groups:
         return {"images": files.pattern(""), "lights": _lights(range(lights.n), lights.sources, i_a, ambient)}

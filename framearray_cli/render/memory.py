@@ -15,6 +15,7 @@ from framearray_cli.engine.hits.native import flag_mirrors, pilot_hits
 from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.ambient.estimate import BATCH
+from framearray_cli.engine.terms.cells.gather import LIGHT
 
 from .prepare import Prepared
 from .writer import BLOCKS, image_format
@@ -88,7 +89,8 @@ def window_memory(
     held = max(float(per_pixel[max(j - n_r, 0) : j + n_r + 1].sum()) for j in range(n_frames))
     frames = min(2 * n_r + 1, n_frames)
     weighed = 5 if job.reuse.weights == "area" else 4 if job.reuse.weights == "balance" and n_r > 0 else 0
-    per_record = 4 * (prepared.light_arrays.channels * n_lights + LANES)
+    values = prepared.light_arrays.channels * n_lights
+    per_record = 4 * (values + LANES + (LIGHT + values if job.indirect.method == "cells" else 0))
     per_hit = per_record + 16 * job.output.layers + frames * (4 + weighed)
     # a frame's mirror hits wait for N_r frames; twice while the lists of all batches are joined, and chains add some
     mirrored = mirror_share * job.specular.hits * (n_r + 3) * per_record

@@ -20,6 +20,9 @@ from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.engine.terms.ambient.fitted import ObscuranceCurve, ambient_by_fit
 from framearray_cli.engine.terms.ambient.from_eyes import EyeWalks, ambient_by_eye, fixed_ambient
 from framearray_cli.engine.terms.ambient.from_lights import LightWalks, ambient_by_light
+from framearray_cli.engine.terms.cells.build import CellWork, build_cells
+from framearray_cli.engine.terms.cells.residual import Accuracy, compare_with_paths
+from framearray_cli.engine.terms.cells.samples import SampleWalks
 from framearray_cli.engine.terms.falloff import FALLOFFS
 from framearray_cli.engine.terms.obscurance import ObscuranceSettings
 from framearray_cli.job.job import Job
@@ -146,7 +149,46 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambi
         denoise=job.denoise.obscurance,
         halves=_halves(job, still=prepared.still),
     )
+    if job.indirect.method == "cells":
+        return _with_cells(prepared, embree, setup, ambient)
     return setup, ambient
+
+
+def _with_cells(
+    prepared: Prepared, embree: EmbreeScene, setup: FrameSetup, ambient: Ambient
+) -> tuple[FrameSetup, Ambient]:
+    """Solve the light of all cells, and note how far it is from that of paths.
+
+    Without cells where the eyes see nothing that other surfaces light.
+    """
+    job = prepared.job
+    walks = SampleWalks(
+        cams=eye_cameras(prepared),
+        seed=job.seed,
+        world=World(prepared.surfaces, embree.tracer),
+        lights=prepared.light_arrays,
+    )
+    work = CellWork(
+        walks=walks,
+        background=np.array(job.scene.background, np.float32),
+        count=job.indirect.samples,
+        edge=job.indirect.cell,
+        threads=prepared.threads,
+    )
+    built = build_cells(work)
+    if built is None:
+        return setup, ambient
+    accuracy = compare_with_paths(built.cells, _eye_walks(prepared, embree), prepared.threads)
+    notes = (accuracy_text(accuracy),) if accuracy else ()
+    return replace(setup, cells=built.cells), replace(ambient, notes=(*ambient.notes, *notes))
+
+
+def accuracy_text(accuracy: Accuracy) -> str:
+    """Return the note on the error of light from cells."""
+    level = f"{accuracy.error:.1%} +- {accuracy.error_error:.1%}"
+    return (
+        f"indirect light differs from paths by {level}, its mean by {accuracy.bias:+.1%} +- {accuracy.bias_error:.1%}"
+    )
 
 
 def image_ambient(ambient: Ambient, lights: Lights) -> Ambient:
@@ -196,19 +238,25 @@ def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Am
             seed=seed, paths=job.ambient.paths, world=world, lights=prepared.light_arrays, background=background
         )
         return ambient_by_light(particles, prepared.threads)
-    walks = EyeWalks(
-        cams=eye_cameras(prepared),
-        seed=seed,
-        paths=job.ambient.paths,
-        world=world,
-        lights=prepared.light_arrays,
-        background=background,
-    )
+    walks = _eye_walks(prepared, embree)
     if job.ambient.method == "fit":
         return ambient_by_fit(walks, _curve(job), prepared.threads)
     if job.ambient.intensity is not None:
         return fixed_ambient(walks, np.array(job.ambient.intensity, np.float32), prepared.threads)
     return ambient_by_eye(walks, prepared.threads)
+
+
+def _eye_walks(prepared: Prepared, embree: EmbreeScene) -> EyeWalks:
+    """Return where walks from the eyes start and what they meet."""
+    job = prepared.job
+    return EyeWalks(
+        cams=eye_cameras(prepared),
+        seed=job.seed,
+        paths=job.ambient.paths,
+        world=World(prepared.surfaces, embree.tracer),
+        lights=prepared.light_arrays,
+        background=np.array(job.scene.background, np.float32),
+    )
 
 
 def _curve(job: Job) -> ObscuranceCurve:

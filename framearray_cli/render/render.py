@@ -26,6 +26,7 @@ from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 
 from .group_sums import group_sums
+from .identity import cells_digest, require_same_cells
 from .manifest import initial_manifest
 from .memory import light_blocks, mirror_share, require_memory
 from .pace import Expected, Pace, block_work, plane_cost, total_work
@@ -67,10 +68,12 @@ def render(
         if not session.wanted:
             return complete_manifest(session, time.perf_counter() - started)
         setup, ambient, manifest, rays, sample = _plan(session, events, pilots=pilots)
+        cells = cells_digest(setup)
+        require_same_cells(directory, cells, on_disk.records)
         with session.folder.exclusive():
             write_manifest(directory, manifest)
         record_path = record_file(directory, session.run.cameras)
-        with RecordWriter(record_path, session.identity.fingerprint, session.run) as record:
+        with RecordWriter(record_path, session.identity.fingerprint, replace(session.run, cells=cells)) as record:
             run = _Run(prepared, record, events, rays, started)
             try:
                 blocks = light_blocks(prepared, mirror_share(setup), per_pixel=setup.per_pixel)

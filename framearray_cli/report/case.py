@@ -84,6 +84,7 @@ def with_settings(case: Case, settings: Settings) -> Case:
     setup = replace(
         setup,
         lights=case.setup.lights,
+        cells=case.setup.cells,
         kept=case.setup.kept,
         per_pixel=np.full_like(setup.per_pixel, middle),
         obscurance=setup.obscurance._replace(average=case.setup.obscurance.average),
@@ -101,6 +102,12 @@ def with_lights(case: Case, l: Sequence[int]) -> Case:
     )
     return replace(
         case,
-        setup=replace(case.setup, lights=lights, kept=range(len(l)), planes=tuple(case.setup.planes[i] for i in l)),
+        setup=replace(
+            case.setup,
+            lights=lights,
+            kept=range(len(l)),
+            planes=tuple(case.setup.planes[i] for i in l),
+            cells=case.setup.cells_at(l),
+        ),
         ambient=ambient,
     )

@@ -64,6 +64,7 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
     small = {"resolution": [12, 9]}
     jobs = {
         "plain": tiny.table(camera=small),
+        "cells": tiny.table(camera=small, indirect={"method": "cells", "samples": 1024, "cell": 0.2}),
         "walk": tiny.table(camera=small | tiny.WALK, reuse={"n_r": 2, "weights": "average"}, output=EXR),
         "spline": tiny.table(
             camera=small | FOUR_KEYS,

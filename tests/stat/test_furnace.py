@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import t
 from support import ROOT
 from support import closed_forms as forms
 from support.stages import result_of
-from support.ztests import Estimate, chi2_bounds, estimate
+from support.ztests import Estimate, chi2_bounds, estimate, sidak
 
 from framearray_cli.job.job import Job
+from framearray_cli.job.method import IndirectTable
 from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.paths import eyes, lights
 
@@ -114,3 +116,27 @@ def test_every_pixel_of_the_furnace(tmp_path: Path) -> None:
 def test_sunlit_sphere_has_a_mean_too() -> None:
     """The expected direct light itself: the light's power over the sphere, seen from its middle."""
     assert expected_direct(0.5)[:, 0].mean() == pytest.approx(0.5 / np.pi, rel=0.005)  # light at the centre: E = 1
+
+
+@pytest.mark.parametrize(
+    "reflectivity", [0.5, pytest.param(0.2, marks=pytest.mark.slow), pytest.param(0.8, marks=pytest.mark.slow)]
+)
+def test_furnace_of_cells(reflectivity: float, tmp_path: Path) -> None:
+    found = []
+    for seed in range(SEEDS):
+        job = furnace_job(reflectivity, tmp_path / str(seed), seed)
+        cells = IndirectTable(method="cells", samples=2**15)
+        rest = result_of(job.model_copy(update={"indirect": cells})).images.mean(axis=-1) - expected_direct(
+            reflectivity
+        )
+        found.append(rest.mean(axis=(0, 2, 3)))
+    right = forms.furnace_indirect(reflectivity)
+    whole = expected_direct(reflectivity).mean(axis=(0, 2, 3)) + right
+    by_light = np.array(found)
+    most = float(t.ppf(1 - sidak(by_light.shape[1]) / 2, SEEDS - 1))
+    for l in range(by_light.shape[1]):  # the same random numbers serve all lights, so each is tested separately
+        got = estimate(by_light[:, l])
+        flat = 1e-4 * whole[l]  # triangles of the sphere have about this share less area
+        assert abs(got.mean - right) < most * got.error + flat
+        assert abs(got.mean - right) < 0.01 * whole[l]
+        assert abs(got.mean - 1.05 * right) > most * got.error + flat  # the test can fail

@@ -153,15 +153,21 @@ class Oracle:
             "constant": lambda: 0 * x,
         }[self.job.obscurance.falloff]()
 
-    def obscurance(self, hits: Points) -> tuple[Any, Any]:
-        """W and S of hits, (n, 3) each: means over cosine-distributed rays."""
-        n, d_max = self.job.samples.obscurance, self.job.obscurance.range
-        sky = self.job.obscurance.outside == "background"
+    def gather_rays(self, hits: Points) -> tuple[Any, Any, Any]:
+        """The hit that each of n cosine-distributed rays per hit leaves, its number there, and its direction."""
+        n = self.job.samples.obscurance
         owner, ray = np.repeat(np.arange(len(hits)), n), np.tile(np.arange(n), len(hits))
         words = rnd.bits(hits.key, rnd.HEMISPHERE)
         dirs = rnd.hemisphere(hits.shading[owner], rnd.points([words[i] for i in owner], ray, rnd.lattice(n)))
         g = hits.geometric[owner]
         dirs -= 2 * np.minimum(dot(dirs, g), 0)[:, None] * g  # up from below the triangle
+        return owner, ray, dirs
+
+    def obscurance(self, hits: Points) -> tuple[Any, Any]:
+        """W and S of hits, (n, 3) each: means over cosine-distributed rays."""
+        n, d_max = self.job.samples.obscurance, self.job.obscurance.range
+        sky = self.job.obscurance.outside == "background"
+        owner, _, dirs = self.gather_rays(hits)
         triangle, uv, distance = self.model.first(hits.start[owner], dirs, np.inf if sky else d_max)
         near = (triangle >= 0) & (distance < d_max)
         brought = np.tile(self.ambient.reflectivity.astype(np.float64), (len(owner), 1))

@@ -22,7 +22,7 @@ from ..inputs.random import HOLE_SAMPLE
 from .array_pool import ArrayPool
 from .mirror_paths import extra_mirror_hits, mirror_paths
 from .passes import Pass
-from .records import BY_SAMPLE, HitRecords, HitsByPixel, empty_records
+from .records import BY_SAMPLE, HitRecords, HitsByPixel
 from .scratch import Scratch
 from .setup import FrameSetup
 from .shading import estimate_terms
@@ -76,7 +76,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
     n = sum(part.n for part in parts)
     frames = setup.frames_around(c, setup.n_r)  # row r of pixel, order and weight is of frame frames[r]
     take = pool.arrays.take
-    records = empty_records(n, *setup.stored_light, take)
+    records = setup.empty_records(n, take)
     pixel = take("pixel", (len(frames), n), np.int32)
     order = take("order", (len(frames), n), np.int32)
     weight = take("weight", (len(frames), n if setup.balance else 0), np.float32)
@@ -121,7 +121,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
 def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> list[tuple[HitsByPixel, HitRecords]]:
     """Find one native hit for each of the pixels of eye c that no other hit reaches; then what mirrors show there."""
     n, samples = len(pixels), Samples(setup.seed, pixels, per_pixel=1, first=HOLE_SAMPLE)
-    records = empty_records(n, *setup.stored_light)
+    records = setup.empty_records(n)
 
     def find_batch(first: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
         m = min(pool.batch, n - first)
@@ -146,7 +146,7 @@ def _join(setup: FrameSetup, parts: list[tuple[Int32, HitRecords]], pool: TraceP
     def take(name: str, *shape_and_type: Any) -> Any:
         return pool.arrays.take(f"mirrored {name}", *shape_and_type)
 
-    pixel, whole = np.empty(n, np.int32), empty_records(n, *setup.stored_light, take)
+    pixel, whole = np.empty(n, np.int32), setup.empty_records(n, take)
 
     def copy(first: int, _scratch: Scratch) -> None:
         for part in range(first, len(parts), pool.threads):

@@ -10,7 +10,7 @@ from ..hits.hits import Hits
 from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
 from ..terms.mirrors import count_mirrors, reflect
 from .passes import Pass, half_sizes
-from .records import HitRecords, empty_records
+from .records import HitRecords
 from .scratch import Scratch
 from .setup import FrameSetup
 from .shading import estimate_terms
@@ -32,7 +32,7 @@ def mirror_paths(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch) -> lis
         reflect(hits, n, throughput, setup.world, scratch.hit_rays.packets, reflected, next_throughput)
         scratch.rays["mirror"] += m
         hits, n, throughput = reflected, m, next_throughput
-        records = empty_records(m, *setup.stored_light)
+        records = setup.empty_records(m)
         estimate_terms(setup, hits, m, scratch, records, "mirror obscurance", "mirror shadow", throughput)
         found.append((hits.pixel[:m].copy(), records))
     scratch.seconds["mirror"] += perf_counter() - started

@@ -1,7 +1,7 @@
 """What composing reads of hits: a record per hit, and the hits of each pixel."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from framearray_cli.base.arrays import Float32, Int32, with_room
 
 from ..kernels.kernel import inlined
 from ..kernels.simd import LANES
+from ..terms.cells.gather import ANY, COLOUR, LIGHT
 
 # Columns of a hit's row, and of sums of rows; those from INDIRECT to REFLECTIVITY are the first of three channels.
 WEIGHT, INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY, LIT, HALF = 0, 1, 4, 7, 10, 13, 14
@@ -40,19 +41,32 @@ class HitRecords:
             with a bit per packet of light positions, see `lit_bit`, set where any irradiance is not zero; HALF, 1 for
             an odd sample of its pixel, else 0.
         irradiance: (n, channels, n_lights) E[l].
+        indirect: (n, LIGHT + channels n_lights) indirect light read from cells, see `gather_cells`; (n, 0) without.
     """
 
     row: Float32
     irradiance: Float32
+    indirect: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
 
     @property
     def arrays(self) -> dict[str, Float32]:
-        """The arrays by name."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        """The arrays by name; `indirect` only if it has columns."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name).shape[1]}
+
+    @property
+    def light(self) -> Float32:
+        """Direct irradiance, and that of cells, in units of the lights' colour, (n, n_lights, 1 or 3)."""
+        direct: Float32 = np.swapaxes(self.irradiance, 1, 2)
+        if not self.indirect.shape[1]:
+            return direct
+        known = np.where(self.indirect[:, ANY, None] > 0, self.indirect, np.float32(0.0))  # else not written
+        gathered = np.swapaxes(known[:, LIGHT:].reshape(self.irradiance.shape), 1, 2)
+        found: Float32 = direct + gathered * known[:, None, COLOUR : COLOUR + 3]
+        return found
 
     def part(self, span: slice) -> "HitRecords":
         """The records of some of the hits; shares memory."""
-        return HitRecords(row=self.row[span], irradiance=self.irradiance[span])
+        return HitRecords(row=self.row[span], irradiance=self.irradiance[span], indirect=self.indirect[span])
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -68,21 +82,28 @@ class HitsByPixel:
     order: Int32
 
 
-def _fresh(_name: str, shape: tuple[int, ...], dtype: Any) -> Any:
+def fresh_array(_name: str, shape: tuple[int, ...], dtype: Any) -> Any:
+    """Allocate a new array; its contents are arbitrary."""
     return with_room(shape, dtype)
 
 
 def empty_records(
-    n: int, channels: int, n_lights: int, take: Callable[[str, tuple[int, ...], Any], Any] = _fresh
+    n: int,
+    channels: int,
+    n_lights: int,
+    columns: int = 0,
+    take: Callable[[str, tuple[int, ...], Any], Any] = fresh_array,
 ) -> HitRecords:
     """Allocate records of n hits; contents are arbitrary.
 
     Args:
         channels: of irradiance, 1 or 3.
         n_lights: light positions whose irradiance is stored.
+        columns: of `indirect`.
         take: returns an array for a name, shape and dtype; by default a new one.
     """
     return HitRecords(
         row=take("row", (n, LANES), np.float32),
         irradiance=take("irradiance", (n, channels, n_lights), np.float32),
+        indirect=take("indirect", (n, columns), np.float32) if columns else np.empty((n, 0), np.float32),
     )

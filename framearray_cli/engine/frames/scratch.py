@@ -6,6 +6,7 @@ import numpy as np
 
 from ..hits.hits import empty_hits
 from ..hits.rays import room_for_hits, room_for_tests
+from ..terms.cells.gather import room_for_gathering
 from ..terms.direct_steps import room_for_steps
 from .setup import FrameSetup
 
@@ -25,6 +26,8 @@ class Scratch:
         pixel, density: (4 N_r + 1, batch) of the eyes around, see `outer_hits`.
         place: (2 N_r + 1, batch) where hits lie in their pixels of the frames around, see `find_places`.
         obscurance, skylight: (batch, 3) W and S.
+        gather: of gather rays, and `constant`: (batch, 3) the light that cells have at every light position; None and
+            (0, 3) without cells.
         rays: number of rays traced by kind; `seconds`: by stage.
     """
 
@@ -44,5 +47,7 @@ class Scratch:
         self.density = np.empty((n_eyes, batch if setup.balance else 0), np.float64)
         self.obscurance = np.empty((batch, 3), np.float32)
         self.skylight = np.empty((batch if setup.obscurance.sky else 0, 3), np.float32)
+        self.gather = room_for_gathering(rays) if setup.cells is not None else None
+        self.constant = np.empty((batch if setup.cells is not None else 0, 3), np.float32)
         self.rays: Counter[str] = Counter()
         self.seconds: defaultdict[str, float] = defaultdict(float)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from framearray_cli.base.arrays import Float64, Int32, Rgb
 from framearray_cli.scene.paths.planes import Plane, first_with_background
@@ -12,10 +13,12 @@ from ..hits.native import pixel_order
 from ..inputs.cameras import Cameras
 from ..inputs.lights import LightArrays, some_lights
 from ..inputs.surfaces import Surfaces
+from ..terms.cells.gather import LIGHT
+from ..terms.cells.table import Cells, at_lights
 from ..terms.obscurance import ObscuranceSettings
 from .blocks import Allotment
 from .passes import Pass, passes, passes_of_counts
-from .records import BY_SAMPLE
+from .records import BY_SAMPLE, HitRecords, empty_records, fresh_array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,6 +42,7 @@ class FrameSetup:
         allotment: native hits per block, where they differ; `per_pixel` then holds their means.
         halves: how hits are split into two halves: BY_SAMPLE, or the number of successive frames that belong to one
             half, or 0 for no split.
+        cells: the light that indirect light is gathered from, at the kept light positions; None: obscurances.
         order: (n_pixels,) every pixel once, in the order of tracing.
     """
 
@@ -63,6 +67,7 @@ class FrameSetup:
     halves: int = 0
     area: bool = False
     allotment: Allotment | None = None
+    cells: Cells | None = None
     order: Int32 = field(init=False)
 
     def __post_init__(self) -> None:
@@ -116,10 +121,20 @@ class FrameSetup:
         Shadow steps need the whole light path: all positions are computed, and those of the block kept.
         """
         planes = self.planes[block.start : block.stop]
-        setup = replace(self, layers=self.layers and block.start == 0, planes=planes)
+        setup = replace(self, layers=self.layers and block.start == 0, planes=planes, cells=self.cells_at(block))
         if self.shadow_step > 1:
             return replace(setup, kept=block)
         return replace(setup, lights=some_lights(self.lights, block), kept=range(len(block)))
+
+    def cells_at(self, positions: Sequence[int]) -> Cells | None:
+        """The cells at some of the kept light positions."""
+        return None if self.cells is None else at_lights(self.cells, list(positions))
+
+    def empty_records(self, n: int, take: Any = None) -> HitRecords:
+        """Allocate records of n hits; see `empty_records` in `records.py`."""
+        channels, n_lights = self.stored_light
+        columns = 0 if self.cells is None else LIGHT + channels * n_lights
+        return empty_records(n, channels, n_lights, columns, take or fresh_array)
 
     def eyes_of(self, j: int) -> range:
         """The window of frame j: the eyes whose hits it shows."""

@@ -9,6 +9,7 @@ from framearray_cli.base.arrays import Float32, Rgb
 from ..hits.hits import ESCAPED, Hits
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, bits, load
+from ..terms.cells.gather import Gathered, gather_cells
 from ..terms.direct import direct
 from ..terms.direct_steps import direct_by_steps
 from ..terms.obscurance import obscurance
@@ -38,10 +39,8 @@ def estimate_terms(
     """
     started = perf_counter()
     neighbours = not len(throughput)  # behind mirrors hits lie apart
-    scratch.rays[obscurance_kind] += obscurance(
-        hits, n, setup.obscurance, setup.surfaces, setup.tracer, scratch.hit_rays, scratch.obscurance,
-        scratch.skylight, neighbours,
-    )  # fmt: skip
+    scratch.rays[obscurance_kind] += _estimate_indirect(setup, hits, n, scratch, out, neighbours)
+    skylight = scratch.skylight if setup.cells is None else scratch.constant
     middle = perf_counter()
     if scratch.steps is None:
         rays = direct(hits, n, setup.lights, setup.tracer, scratch.test_rays, out.irradiance, neighbours)
@@ -54,9 +53,29 @@ def estimate_terms(
         if not setup.keeps_all:
             out.irradiance[:n] = irradiance[:n, :, setup.kept.start : setup.kept.stop]
     scratch.rays[shadow_kind] += rays
-    write_rows(hits, n, setup.background, scratch.obscurance, scratch.skylight, throughput, out.irradiance, out.row)
+    write_rows(hits, n, setup.background, scratch.obscurance, skylight, throughput, out.irradiance, out.row)
     scratch.seconds[obscurance_kind] += middle - started
     scratch.seconds[shadow_kind] += perf_counter() - middle
+
+
+def _estimate_indirect(
+    setup: FrameSetup, hits: Hits, n: int, scratch: Scratch, out: HitRecords, neighbours: bool
+) -> int:
+    """Estimate W, and the indirect light of cells where the job has them; return the number of rays."""
+    rays: int
+    if setup.cells is None or scratch.gather is None:
+        rays = obscurance(
+            hits, n, setup.obscurance, setup.surfaces, setup.tracer, scratch.hit_rays, scratch.obscurance,
+            scratch.skylight, neighbours,
+        )  # fmt: skip
+    else:
+        gathered = Gathered(scratch.obscurance, scratch.skylight, out.indirect, scratch.constant)
+        far = setup.obscurance._replace(sky=True)
+        rays = gather_cells(
+            hits, n, setup.obscurance, far, setup.world, setup.cells, scratch.hit_rays, scratch.gather,
+            scratch.test_rays, gathered, neighbours,
+        )  # fmt: skip
+    return rays
 
 
 @kernel

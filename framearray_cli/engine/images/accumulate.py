@@ -11,8 +11,9 @@ from framearray_cli.base.arrays import Addresses, Real
 from ..frames.records import HALF, LIT, REFLECTIVITY, WEIGHT, lit_bit
 from ..kernels.kernel import inlined, integer_at, kernel, prefetch, real_at
 from ..kernels.simd import LANES, lane_numbers, lanes_from, load, reals, store
+from ..terms.cells.gather import ANY, COLOUR, LIGHT
 from .band import HITS_AT_ONCE, INVERSE_PI, Band
-from .sources import IRRADIANCE, ODD_SCALE, ORDER, ROW, SCALE, SHARES, START, WEIGHTS
+from .sources import GATHERED, IRRADIANCE, ODD_SCALE, ORDER, ROW, SCALE, SHARES, START, WEIGHTS
 
 # Prefetch the irradiance of the hit that comes this many hits later, and the row of the one twice as far ahead: memory
 # answers in about the time that the sums of this many hits take.
@@ -56,17 +57,15 @@ def accumulate(
                 w = (odd if real_at(row, HALF) > 0.0 else even) * _weight(source, entry, hit)
                 # 3. What has no l: w R W, w B, w W and w R at once.
                 total = total + lanes_from(row) * w
-                # 4. Note where E[l] of a lit hit is, and its share w R / pi.
-                lit = int(real_at(row, LIT))
-                if lit == 0 or n_lights == 0:
+                # 4. Note where the light of a hit is, and its share w R / pi.
+                lit, gathered = int(real_at(row, LIT)), _light_from_cells(source, hit, channels * n_lights)
+                if (lit == 0 and gathered == 0) or n_lights == 0:
                     continue
-                if waiting == HITS_AT_ONCE:
+                if waiting >= HITS_AT_ONCE:
                     _add_light(band, i, waiting, channels, n_lights, fresh)
                     waiting, fresh = 0, False
-                band.places[waiting], band.lit[waiting] = source[IRRADIANCE] + 4 * channels * n_lights * hit, lit
-                for channel in range(3):
-                    band.shares[waiting, channel] = w * INVERSE_PI * real_at(row, REFLECTIVITY + channel)
-                waiting += 1
+                direct = source[IRRADIANCE] + 4 * channels * n_lights * hit
+                waiting = _note_light(band, waiting, lit, direct, gathered, row, w)
 
         # 5. Divide by sum(w) for means, else add to the band; then sum the direct light of the hits that still wait.
         if mean:
@@ -127,12 +126,49 @@ def _add_light(band: Band, i: int, n: int, channels: int, n_lights: int, fresh: 
 
 
 @inlined
+def _light_from_cells(source: Addresses, hit: int, values: int) -> int:
+    """The address of a hit's row of indirect light, see `gather_cells`; 0 if it has none."""
+    address = 0
+    if source[GATHERED] != 0:
+        row = source[GATHERED] + 4 * (LIGHT + values) * hit
+        address = row if real_at(row, ANY) > 0.0 else 0
+    return address
+
+
+@inlined
+def _note_light(band: Band, waiting: int, lit: int, direct: int, gathered: int, row: int, w: Real) -> int:
+    """Note the direct light of a lit hit with its share w R / pi, and its light from cells with w R c / pi.
+
+    Args:
+        waiting: length of the queue; direct, gathered: addresses of the light, gathered 0 for none.
+
+    Returns:
+        the new length.
+    """
+    if lit != 0:
+        band.places[waiting], band.lit[waiting] = direct, lit
+        for channel in range(3):
+            band.shares[waiting, channel] = w * INVERSE_PI * real_at(row, REFLECTIVITY + channel)
+        waiting += 1
+    if gathered != 0:
+        band.places[waiting], band.lit[waiting] = gathered + 4 * LIGHT, -1
+        for channel in range(3):
+            share = w * INVERSE_PI * real_at(row, REFLECTIVITY + channel)
+            band.shares[waiting, channel] = share * real_at(gathered, COLOUR + channel)
+        waiting += 1
+    return waiting
+
+
+@inlined
 def _fetch(source: Addresses, entry: int, last: int, channels: int, n_lights: int) -> None:
     """Prefetch the row of a hit that comes soon, and the irradiance of an earlier one; its row says where it is lit."""
     if entry + 2 * AHEAD < last:
         prefetch(source[ROW] + ROW_BYTES * integer_at(source[ORDER], entry + 2 * AHEAD), 1)
     if entry + AHEAD < last:
         hit = integer_at(source[ORDER], entry + AHEAD)
+        if source[GATHERED] != 0:
+            columns = LIGHT + channels * n_lights
+            prefetch(source[GATHERED] + 4 * columns * hit, 4 * columns)
         lit = int(real_at(source[ROW], LANES * hit + LIT))
         for l in range(0, n_lights if lit != 0 else 0, LANES):
             if (lit >> lit_bit(n_lights, l)) & 1:

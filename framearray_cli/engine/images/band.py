@@ -34,9 +34,9 @@ class Band(NamedTuple):
             colour.
         sums: (n_pixels, LANES) sums of w row, see `HitRecords`.
         hits: (n_pixels,) number of hits.
-        places: (HITS_AT_ONCE,) address of the irradiance of a hit.
-        shares: (HITS_AT_ONCE, 3) w R / pi of a hit.
-        lit: (HITS_AT_ONCE,) LIT of a hit.
+        places: (HITS_AT_ONCE + 1,) address of the irradiance of a hit, or of its indirect light from cells.
+        shares: (HITS_AT_ONCE + 1, 3) w R / pi of a hit, times its colour c for indirect light.
+        lit: (HITS_AT_ONCE + 1,) LIT of a hit.
     """
 
     direct: Float32
@@ -63,7 +63,7 @@ class Finish(NamedTuple):
     lowest: Real
 
 
-# Number of lit hits whose direct light is summed together.
+# Number of lit hits whose direct light is summed together; with cells one more, as a hit has light of two kinds.
 HITS_AT_ONCE = 64
 
 
@@ -73,9 +73,9 @@ def empty_band(n_pixels: int, n_lights: int) -> Band:
         direct=with_room((n_pixels, 3, -(-n_lights // LANES) * LANES), np.float32),
         sums=with_room((n_pixels, LANES), np.float32),
         hits=np.empty(n_pixels, np.int32),
-        places=np.empty(HITS_AT_ONCE, np.int64),
-        shares=np.empty((HITS_AT_ONCE, 3), np.float32),
-        lit=np.empty(HITS_AT_ONCE, np.int64),
+        places=np.empty(HITS_AT_ONCE + 1, np.int64),
+        shares=np.empty((HITS_AT_ONCE + 1, 3), np.float32),
+        lit=np.empty(HITS_AT_ONCE + 1, np.int64),
     )
 
 

@@ -12,9 +12,9 @@ from ..frames.records import HitRecords, HitsByPixel
 
 # Columns of a list of sources: addresses of arrays, 0 for an empty one; and what the arrays hold. SHARES is that of a
 # weight per entry of ORDER in place of one per hit, see `area_weights.py`.
-START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE, PLACES, SHARES = range(9)
-COLUMNS = 9
-_TYPES = (np.int32, np.int32, np.float32, np.float32, np.float32, np.float32, np.float32, np.uint8)
+START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE, GATHERED, PLACES, SHARES = range(10)
+COLUMNS = 10
+_TYPES = (np.int32, np.int32, *[np.float32] * 6, np.uint8)
 NO_SCALE, _NO_PLACES = np.empty(0, np.float32), np.empty(0, np.uint8)
 NO_SOURCES: Addresses = np.empty((0, COLUMNS), np.int64)
 
@@ -43,7 +43,7 @@ class HitSource(NamedTuple):
         """The arrays in the order of the columns of a list."""
         found, records = self.by_pixel, self.records
         in_order = (found.start, found.order, self.weight, self.scale, self.odd_scale)
-        return (*in_order, records.row, records.irradiance, self.place)
+        return (*in_order, records.row, records.irradiance, records.indirect, self.place)
 
 
 class SourceList:
@@ -51,7 +51,7 @@ class SourceList:
 
     Attributes:
         sources: the list.
-        addresses: (n_sources, 9) of the arrays of each source, valid as long as the list lives.
+        addresses: (n_sources, 10) of the arrays of each source, valid as long as the list lives.
     """
 
     def __init__(self, sources: Iterable[HitSource]) -> None:

@@ -48,7 +48,7 @@ class Window:
         lowest = -np.inf if setup.shadow_unbiased and setup.shadow_step > 1 else 0.0
         self._finish = Finish(
             colour=self._by_channel(setup.lights.colour),
-            ambient=self._by_channel(ambient.intensity),
+            ambient=self._ambient(ambient),
             light_independent_from=setup.light_independent_from,
             lowest=np.float32(lowest),
         )
@@ -77,13 +77,18 @@ class Window:
     def with_ambient(self, ambient: Ambient) -> "Window":
         """The same window under another ambient light."""
         window = copy(self)
-        window._finish = self._finish._replace(ambient=self._by_channel(ambient.intensity))
+        window._finish = self._finish._replace(ambient=self._ambient(ambient))
         return window
 
     def _by_channel(self, values: Rgb) -> Rgb:
         """Values of the kept lights, (3, n_kept) as the sums, from those of all lights, (n_lights, 3)."""
         kept = self._setup.kept
         return np.ascontiguousarray(values[kept.start : kept.stop].T)
+
+    def _ambient(self, ambient: Ambient) -> Rgb:
+        """I_A of the kept lights, (3, n_kept); 0 where cells take its place."""
+        intensity = self._by_channel(ambient.intensity)
+        return intensity if self._setup.cells is None else np.zeros_like(intensity)
 
     @contextmanager
     def _band(self) -> Iterator[Band]:

@@ -53,11 +53,11 @@ RAYS_TOGETHER, HITS_TOGETHER = 4096, 2048
 
 
 @step
-def _evaluate_rays(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int, settings: ObscuranceSettings) -> int:
+def evaluate_rays(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int, settings: ObscuranceSettings) -> int:
     """Compute R(Q) rho(d) of traced rays 0 to n - 1 into `rays.value`.
 
     Where R varies over the surface the value is only rho(d) so far; `rays.number[0]` lists such rays for
-    `_apply_textures`. `rays.number[1]` is 1 for rays that see the background.
+    `apply_textures`. `rays.number[1]` is 1 for rays that see the background.
 
     Returns:
         number of listed rays.
@@ -95,7 +95,7 @@ def _evaluate_rays(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int, setti
 
 
 @step
-def _apply_textures(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int) -> None:
+def apply_textures(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int) -> None:
     """Multiply the value of listed rays 0 to n - 1 by R(Q), looked up where each ray meets its surface."""
     if n == 0:
         return
@@ -121,7 +121,7 @@ def _apply_textures(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int) -> N
 
 
 @step
-def _add_to_hits(
+def add_to_hits(
     rays: Rays, n: int, first_ray: int, n_rays: int, settings: ObscuranceSettings, result: Rgb, skylight: Rgb
 ) -> None:
     """Add values of rays to the sums of the n listed hits, in the order of rays; the last rays complete the means."""
@@ -178,9 +178,9 @@ def _trace_hits(
         n_rays = min(settings.n_rays - first_ray, most)
         n_traced = write_obscurance_rays(hits, rays, n, first_ray, n_rays, settings, neighbours)
         intersect(tracer, rays.packets, n_traced, neighbours)
-        varied = _evaluate_rays(surfaces, tracer, rays, n_traced, settings)
-        _apply_textures(surfaces, tracer, rays, varied)
-        _add_to_hits(rays, n, first_ray, n_rays, settings, result, skylight)
+        varied = evaluate_rays(surfaces, tracer, rays, n_traced, settings)
+        apply_textures(surfaces, tracer, rays, varied)
+        add_to_hits(rays, n, first_ray, n_rays, settings, result, skylight)
 
 
 @kernel

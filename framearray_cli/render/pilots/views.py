@@ -9,7 +9,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32, with_room
 from framearray_cli.engine.frames.mirror_paths import mirror_paths
-from framearray_cli.engine.frames.records import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY, HitRecords, empty_records
+from framearray_cli.engine.frames.records import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY, HitRecords
 from framearray_cli.engine.frames.scratch import Scratch
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.shading import estimate_terms
@@ -92,6 +92,7 @@ def _shrink(setup: FrameSetup, planes: Sequence[int], pixels: int) -> FrameSetup
         cams=cams._replace(width=width, height=height, focal=cams.focal * height / cams.height),
         lights=some_lights(setup.lights, planes),
         kept=range(len(planes)),
+        cells=setup.cells_at(planes),
         planes=tuple(setup.planes[p] for p in planes),
         obscurance=obscurance._replace(n_rays=n_rays, step_x=step_x, step_y=step_y),
         n_r=0,
@@ -147,7 +148,7 @@ class _Look:
         surface = hits.kind[:n] == SURFACE
         back = surface & from_behind(self._scene, met_triangles(setup.tracer, packets, n), hits.incoming[:n])
         distance = np.linalg.norm(hits.position[:n] - setup.cams.position[c], axis=1)
-        records = empty_records(n, *setup.stored_light)
+        records = setup.empty_records(n)
         estimate_terms(setup, hits, n, scratch, records, "pilot", "pilot")
         reached = self._count_reached(hits, n, scratch)
         radiance = self._radiance(records)
@@ -180,9 +181,9 @@ class _Look:
     def _radiance(self, records: HitRecords) -> Float32:
         """Return the radiance of hits at the light positions of all groups together, (n, K, 3)."""
         rgb = {at: records.row[:, None, at : at + 3] for at in (LIGHT_INDEPENDENT, INDIRECT, REFLECTIVITY)}
-        by_plane = np.swapaxes(records.irradiance, 1, 2) * self._setup.lights.colour / np.float32(np.pi)
+        by_plane = records.light * self._setup.lights.colour / np.float32(np.pi)
         together = np.stack([by_plane[:, list(planes)].sum(axis=1) for planes in self._positions.together], axis=1)
-        radiance: Float32 = (
-            rgb[LIGHT_INDEPENDENT] + rgb[REFLECTIVITY] * together + rgb[INDIRECT] * self._ambient.astype(np.float32)
-        )
+        radiance: Float32 = rgb[LIGHT_INDEPENDENT] + rgb[REFLECTIVITY] * together
+        if self._setup.cells is None:
+            radiance += rgb[INDIRECT] * self._ambient.astype(np.float32)
         return radiance

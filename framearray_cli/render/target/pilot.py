@@ -17,7 +17,6 @@ from framearray_cli.engine.frames.records import (
     OBSCURANCE,
     REFLECTIVITY,
     HitRecords,
-    empty_records,
 )
 from framearray_cli.engine.frames.scratch import Scratch
 from framearray_cli.engine.frames.setup import FrameSetup
@@ -178,7 +177,7 @@ class _Pilot:
         samples, packets = Samples(setup.seed, pixels, per_pixel=2, first=0, halves=True), scratch.hit_rays.packets
         native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, scratch.hits)
         scratch.rays["pilot"] += n
-        records = empty_records(n, *setup.stored_light)
+        records = setup.empty_records(n)
         estimate_terms(setup, scratch.hits, n, scratch, records, "pilot", "pilot")
         return records
 
@@ -229,7 +228,8 @@ def hit_pairs(n: int) -> Int32:
 def _radiance(setup: FrameSetup, ambient: Ambient, records: HitRecords) -> Float32:
     """Return the radiance of each hit under every light, (n, n_lights, 3)."""
     rgb = {at: records.row[:, None, at : at + 3] for at in (LIGHT_INDEPENDENT, INDIRECT, REFLECTIVITY)}
-    direct = np.swapaxes(records.irradiance, 1, 2) * setup.lights.colour / np.float32(np.pi)
-    indirect = ambient.intensity * rgb[INDIRECT]
-    radiance: Float32 = rgb[LIGHT_INDEPENDENT] + rgb[REFLECTIVITY] * direct + indirect
+    light = records.light * setup.lights.colour / np.float32(np.pi)
+    radiance: Float32 = rgb[LIGHT_INDEPENDENT] + rgb[REFLECTIVITY] * light
+    if setup.cells is None:
+        radiance += ambient.intensity * rgb[INDIRECT]
     return radiance

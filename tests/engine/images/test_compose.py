@@ -120,22 +120,25 @@ def test_a_list_of_sources_keeps_its_arrays() -> None:
     assert all(array() is None for array in dropped)
 
 
-@pytest.mark.parametrize("column", ["start", "order", "weight", "scale", "odd_scale", "row", "irradiance", "place"])
+@pytest.mark.parametrize(
+    "column", ["start", "order", "weight", "scale", "odd_scale", "row", "irradiance", "indirect", "place"]
+)
 def test_a_list_of_sources_refuses_what_kernels_would_misread(column: str) -> None:
     case = Case(1)
     ones = np.ones(N_PIXELS, np.float32)
     arrays = {"start": case.start, "order": case.order, "weight": case.weight, "scale": ones, "odd_scale": ones}
     arrays |= {"row": case.row(), "irradiance": case.irradiance, "place": np.zeros(len(case.pixel), np.uint8)}
+    arrays |= {"indirect": np.ones((len(case.pixel), 8), np.float32)}
 
     def listed(**changed: Any) -> SourceList:
         a = arrays | changed
         placed, records = (
             HitsByPixel(start=a["start"], order=a["order"]),
-            HitRecords(row=a["row"], irradiance=a["irradiance"]),
+            HitRecords(row=a["row"], irradiance=a["irradiance"], indirect=a["indirect"]),
         )
         return SourceList([HitSource(placed, records, a["weight"], a["scale"], a["odd_scale"], a["place"])])
 
-    assert listed().addresses.shape == (1, 9)
+    assert listed().addresses.shape == (1, 10)
     with pytest.raises(ValueError, match="contiguous"):
         listed(**{column: np.repeat(arrays[column], 2, axis=0)[::2]})
     with pytest.raises(ValueError, match="expected an array of"):

@@ -1,0 +1,186 @@
+"""Which samples make up which cells, and what keeps cells from leaking through walls.
+
+Two sides of a thin wall may lie in one cell. So a sample joins the first slot of its cell only if it sees the cell's
+guard, a point above the cell's first sample; the others join a second slot, or a coarser cell if they are few. A ray
+that reads a cell with such samples, in it or within reach of the random shift of its end, pays one ray to the guard.
+
+Levels are built from the coarsest to the finest. All choices follow the order of the samples.
+"""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from framearray_cli.base.arrays import Addresses, Flags, Float32, Float64, Int32
+
+from ...embree.packets import Tracer
+from ...hits.rays import room_for_tests
+from .guards import GUARD_HEIGHT, see_guards
+from .samples import Samples
+from .table import ALL, FEWEST_SAMPLES, LEVELS, NOWHERE, Grid, cells_of_keys, empty_slots, fill_slots, write_keys
+
+# Samples per task of visibility rays.
+_BATCH = 1 << 15
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Places:
+    """The cells, and their samples.
+
+    Attributes:
+        slots, other, guard: see `Cells`.
+        first, sample, share: see `Members`.
+        rays: number of visibility rays.
+    """
+
+    slots: Addresses
+    other: Int32
+    guard: Float32
+    first: Addresses
+    sample: Int32
+    share: Float64
+    rays: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Level:
+    """The cells of one level: keys of first slots; then second slots, which have none."""
+
+    keys: Addresses
+    sizes: Addresses
+    sample: Int32
+    other: Int32
+    guard: Float32
+    own: Int32
+    rays: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlaceWork:
+    """What places are found of."""
+
+    grid: Grid
+    samples: Samples
+    tracer: Tracer
+    pool: ThreadPoolExecutor
+
+    def keys(self, level: int, *, shifted: bool) -> Addresses:
+        """The key of each sample's cell of a level; `shifted`: of the place that a ray to it might read instead."""
+        samples = self.samples
+        keys = np.empty(samples.n, np.int64)
+        write_keys(self.grid, level, samples.position, samples.geometric, samples.side, shifted, keys)
+        return keys
+
+    def see(self, rows: Int32, guards: Float32) -> Flags:
+        """Whether each of some samples sees a guard, (n, 4)."""
+        seen = np.ones(len(rows), np.uint8)
+
+        def test(first: int) -> None:
+            span = slice(first, first + _BATCH)
+            see_guards(
+                self.samples.position, self.samples.geometric, rows[span], guards[span], self.tracer,
+                room_for_tests(4096, 1), seen[span],
+            )  # fmt: skip
+
+        list(self.pool.map(test, range(0, len(rows), _BATCH)))
+        return seen.astype(bool)
+
+    def guards(self, level: int, rows: Int32) -> Float32:
+        """The guards above some samples, (n, 4): a point, and its height."""
+        height = np.float32(GUARD_HEIGHT * self.grid.edge * 2**level)
+        found = np.empty((len(rows), 4), np.float32)
+        found[:, :3] = self.samples.position[rows] + height * self.samples.geometric[rows]
+        found[:, 3] = height
+        return found
+
+
+def find_places(work: PlaceWork) -> Places:
+    """Find the cells of all levels."""
+    own = np.full(work.samples.n, ALL, np.int32)
+    empty = np.zeros(1, np.int64)
+    levels: list[_Level] = []
+    base = ALL + 1
+    for level in reversed(range(LEVELS)):
+        levels.append(_find_level(work, level, base, own))
+        own, base = levels[-1].own, base + len(levels[-1].sizes)
+    slots = empty_slots(base)
+    start = ALL + 1
+    for found in levels:
+        fill_slots(found.keys, start, slots)
+        start += len(found.sizes)
+    coarse = levels[0].sizes / max(int(levels[0].sizes.sum()), 1)
+    sizes = np.concatenate([empty, *(found.sizes for found in levels)])
+    return Places(
+        slots=slots,
+        other=np.concatenate([np.full(1, NOWHERE, np.int32), *(found.other for found in levels)]),
+        guard=np.concatenate([np.zeros((1, 4), np.float32), *(found.guard for found in levels)]),
+        first=np.concatenate([empty, np.cumsum(sizes)]),
+        sample=np.concatenate([found.sample for found in levels]),
+        share=np.concatenate([[0.0], coarse, np.zeros(base - 1 - len(coarse))]),
+        rays=sum(found.rays for found in levels),
+    )
+
+
+def _find_level(work: PlaceWork, level: int, base: int, coarser: Int32) -> _Level:
+    """Find the cells of a level, numbered from `base` on.
+
+    Args:
+        coarser: (n_samples,) the cell of the next coarser level that each sample joined.
+    """
+    keys = work.keys(level, shifted=False)
+    order = np.argsort(keys, kind="stable").astype(np.int32)
+    key = keys[order]
+    start = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
+    size = np.diff(start, append=len(order))
+    group = np.repeat(np.arange(len(start)), size)
+    guard = work.guards(level, order[start])
+    seen = work.see(order, guard[group])
+    rays = len(order)
+    # a guard that few samples see gives way to one above the first of the others
+    few = np.add.reduceat(seen, start, dtype=np.int64) * 2 < size
+    rows = np.flatnonzero(few[group])
+    if len(rows):
+        unseen = np.where(seen, len(order), np.arange(len(order)))
+        guard[few] = work.guards(level, order[np.minimum.reduceat(unseen, start)[few]])
+        seen[rows] = work.see(order[rows], guard[group[rows]])
+        rays += len(rows)
+    in_first = np.add.reduceat(seen, start, dtype=np.int64)
+    kept = in_first >= FEWEST_SAMPLES
+    both = kept & (size - in_first >= FEWEST_SAMPLES)
+    # numbers of the slots of each group
+    one = np.where(kept, base + np.cumsum(kept) - 1, NOWHERE)
+    two = np.where(both, base + int(kept.sum()) + np.cumsum(both) - 1, NOWHERE)
+    number = np.where(seen, one[group], two[group])
+    own = coarser.copy()
+    own[order] = np.where(number != NOWHERE, number, coarser[order])
+    joined = np.flatnonzero(number != NOWHERE)
+    joined = joined[np.argsort(number[joined], kind="stable")]
+    sizes = np.bincount(number[joined] - base, minlength=int(kept.sum() + both.sum()))
+    # what a ray reads that does not see the guard
+    other = np.full(len(sizes), NOWHERE, np.int32)
+    aside = np.flatnonzero(~seen & kept[group])[::-1]  # the first of a group wins
+    other[one[group[aside]] - base] = own[order[aside]]
+    guards = np.zeros((len(sizes), 4), np.float32)
+    guards[: int(kept.sum())] = guard[kept]
+    found = _Level(
+        keys=key[start[kept]], sizes=sizes, sample=order[joined], other=other, guard=guards, own=own, rays=rays
+    )
+    return _with_neighbours(work, level, base, found)
+
+
+def _with_neighbours(work: PlaceWork, level: int, base: int, found: _Level) -> _Level:
+    """Test the cells that rays to samples may read by their random shift, too."""
+    slots = empty_slots(len(found.keys) + 1)
+    fill_slots(found.keys, base, slots)
+    cell = np.empty(work.samples.n, np.int32)
+    cells_of_keys(slots, work.keys(level, shifted=True), cell)
+    rows = np.flatnonzero((cell != ALL) & (cell != found.own)).astype(np.int32)
+    rows = rows[found.other[cell[rows] - base] == NOWHERE]
+    seen = work.see(rows, found.guard[cell[rows] - base])
+    aside = rows[~seen][::-1]
+    found.other[cell[aside] - base] = found.own[aside]
+    return _Level(
+        keys=found.keys, sizes=found.sizes, sample=found.sample, other=found.other, guard=found.guard, own=found.own,
+        rays=found.rays + len(rows),
+    )  # fmt: skip

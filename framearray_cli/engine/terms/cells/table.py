@@ -1,0 +1,248 @@
+"""The table of cells: which cell a surface point belongs to, and the light there.
+
+A cell of level s is a cube of edge h_s = h_0 2^s of space, for surfaces that face one of six directions. Levels are
+shifted against each other at random, so that no border lies on a wall. Cell 0 stands for all surfaces together: the
+last resort where no other cell is known.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from framearray_cli.base.arrays import (
+    Addresses,
+    Bytes,
+    Directions,
+    Float32,
+    Int32,
+    Points,
+    Real,
+    Rgb,
+    Triple,
+    with_room,
+)
+
+from ...embree.packets import Tracer, room_in
+from ...hits.rays import NO_RAYS, Rays
+from ...inputs.random import mix, r2
+from ...kernels.kernel import inlined, kernel
+from .guards import choose_slots, write_guard_ray
+
+LEVELS = 7
+# Rays read cells up to this level; coarser ones take their places where they are missing.
+COARSEST_READ = 4
+# A cell with fewer samples is left out of the table, and a coarser one takes its place.
+FEWEST_SAMPLES = 4
+# Share of a ray's length that the edge of the cell it reads has.
+EDGE_OF_LENGTH = 0.3
+ALL = 0  # the cell of all surfaces together
+NOWHERE = -1  # in place of a cell, for a ray that left the scene
+# Bits of a key per axis; places this many cells apart share a cell.
+_AXIS_BITS = 19
+_EMPTY = np.int64(-1)
+# Columns of `Cells.tint`.
+TINT, MEAN, CONSTANT = 0, 3, 4
+
+
+class Grid(NamedTuple):
+    """Where the borders of cells are.
+
+    Attributes:
+        edge: h_0, edge of the finest cells, scene units.
+        jitter: (LEVELS, 3) shift of each level, in edges of its cells.
+    """
+
+    edge: float
+    jitter: Float32
+
+
+class Cells(NamedTuple):
+    """The light of all cells, as kernels read it.
+
+    The irradiance of cell k under light l is tint[k] light[k, l] in units of the lights' colour. With three channels it
+    is light[k, channel, l].
+
+    Attributes:
+        grid: borders of cells.
+        slots: (2 n_slots,) hash table: keys, and the cell of each; n_slots is a power of two.
+        other: (n_cells,) the cell that a ray reads which does not see the guard, or NOWHERE where all see it.
+        guard: (n_cells, 4) a point above a sample of the cell, and its height; see `guards.py`.
+        tint: (n_cells, 8) columns TINT: colour of the light, whose mean by `weights` is 1; MEAN: mean of `light` over
+            all light positions of the job; CONSTANT: radiance E / pi of the light that is the same at all positions.
+        light: (n_cells, channels, n_lights) irradiance by sources.
+        weights: (3,) of channels, which add up to 1.
+        background: (3,) radiance outside the scene.
+    """
+
+    grid: Grid
+    slots: Addresses
+    other: Int32
+    guard: Float32
+    tint: Float32
+    light: Float32
+    weights: Rgb
+    background: Rgb
+
+
+@inlined
+def side_of(x: Real, y: Real, z: Real) -> int:
+    """The direction, 0 to 5, that a surface of normal (x, y, z) faces: axis and sign of its largest component."""
+    ax, ay, az = np.abs(x), np.abs(y), np.abs(z)
+    if ax >= ay and ax >= az:
+        return 0 if x > 0.0 else 1
+    if ay >= az:
+        return 2 if y > 0.0 else 3
+    return 4 if z > 0.0 else 5
+
+
+@inlined
+def key_of(grid: Grid, level: int, side: int, x: Real, y: Real, z: Real) -> int:
+    """The key of the cell of a level that holds a point of a surface that faces `side`."""
+    scale, mask = 1.0 / (grid.edge * (1 << level)), (1 << _AXIS_BITS) - 1
+    i = int(np.floor(x * scale + grid.jitter[level, 0])) & mask
+    j = int(np.floor(y * scale + grid.jitter[level, 1])) & mask
+    k = int(np.floor(z * scale + grid.jitter[level, 2])) & mask
+    key: int = ((((level << 3 | side) << _AXIS_BITS | i) << _AXIS_BITS) | j) << _AXIS_BITS | k
+    return key
+
+
+@inlined
+def level_of(grid: Grid, length: Real) -> int:
+    """The level of the cell that a ray of some length reads."""
+    wanted, level = EDGE_OF_LENGTH * length, 0
+    while level < COARSEST_READ and wanted > 1.4142135623730951 * grid.edge * (1 << level):
+        level += 1
+    return level
+
+
+@inlined
+def first_slot(key: int, n_slots: int) -> int:
+    """Where a key's place in the hash table would be; further ones follow."""
+    return int(np.int64(mix(np.uint64(key)) & np.uint64(n_slots - 1)))
+
+
+@inlined
+def cell_of_key(slots: Addresses, key: int) -> int:
+    """The cell of a key, or ALL if it is not in the table."""
+    n_slots = slots.shape[0] >> 1
+    slot = first_slot(key, n_slots)
+    while slots[2 * slot] != key:
+        if slots[2 * slot] == _EMPTY:
+            return ALL
+        slot = (slot + 1) & (n_slots - 1)
+    return int(slots[2 * slot + 1])
+
+
+@inlined
+def find_cell(grid: Grid, slots: Addresses, level: int, side: int, point: Triple, along: Triple, across: Triple) -> int:
+    """The cell that a ray reads: of its level, or of the first coarser level that has one there.
+
+    Args:
+        along, across: shifts of the point within its surface, in edges of the cell. If there is no cell at the shifted
+            point, beyond a corner for instance, the point itself is looked up.
+    """
+    x, y, z = point
+    h = np.float32(grid.edge * (1 << level))
+    dx, dy, dz = h * (along[0] + across[0]), h * (along[1] + across[1]), h * (along[2] + across[2])
+    found = cell_of_key(slots, key_of(grid, level, side, x + dx, y + dy, z + dz))
+    while found == ALL and level < LEVELS:
+        found = cell_of_key(slots, key_of(grid, level, side, x, y, z))
+        level += 1
+    return found
+
+
+@kernel
+def write_sides(normal: Float32, sides: Bytes) -> None:
+    """Write the direction that each of n normals faces; `sides` is overwritten."""
+    for i in range(normal.shape[0]):
+        sides[i] = side_of(normal[i, 0], normal[i, 1], normal[i, 2])
+
+
+@inlined
+def tangents(x: Real, y: Real, z: Real) -> tuple[Triple, Triple]:
+    """Two unit vectors that form a frame with the unit vector (x, y, z), after Duff et al. (2017)."""
+    one = np.float32(1.0)
+    sign = one if z >= np.float32(0.0) else -one
+    a = -one / (sign + z)
+    b = x * y * a
+    return (one + sign * x * x * a, sign * b, -sign * x), (b, sign + y * y * a, -y)
+
+
+@inlined
+def shifts(normal: Triple, a: Real, b: Real) -> tuple[Triple, Triple]:
+    """Two vectors of up to half a length within a surface, by two random numbers; their sum is the shift."""
+    u, v = tangents(normal[0], normal[1], normal[2])
+    a, b = a - np.float32(0.5), b - np.float32(0.5)
+    return (a * u[0], a * u[1], a * u[2]), (b * v[0], b * v[1], b * v[2])
+
+
+@kernel
+def write_keys(
+    grid: Grid, level: int, position: Points, normal: Directions, sides: Bytes, shifted: bool, keys: Addresses
+) -> None:
+    """Write the key of each of n points, shifted within their surfaces as ends of rays are, or not."""
+    for i in range(position.shape[0]):
+        x, y, z = position[i, 0], position[i, 1], position[i, 2]
+        if shifted:
+            a, b = r2(mix(np.uint64(i)), 0)
+            u, v = shifts((normal[i, 0], normal[i, 1], normal[i, 2]), a, b)
+            h = np.float32(grid.edge * (1 << level))
+            x, y, z = x + h * (u[0] + v[0]), y + h * (u[1] + v[1]), z + h * (u[2] + v[2])
+        keys[i] = key_of(grid, level, int(sides[i]), x, y, z)
+
+
+@kernel
+def cells_of_keys(slots: Addresses, keys: Addresses, cells: Int32) -> None:
+    """Write the cell of each of n keys, ALL for one that is not in the table."""
+    for i in range(keys.shape[0]):
+        cells[i] = cell_of_key(slots, keys[i])
+
+
+@kernel
+def fill_slots(keys: Addresses, first: int, slots: Addresses) -> None:
+    """Put keys into the hash table; key i is that of cell first + i."""
+    n_slots = slots.shape[0] >> 1
+    for i in range(keys.shape[0]):
+        slot = first_slot(keys[i], n_slots)
+        while slots[2 * slot] != _EMPTY:
+            slot = (slot + 1) & (n_slots - 1)
+        slots[2 * slot], slots[2 * slot + 1] = keys[i], first + i
+
+
+@kernel
+def find_targets(
+    cells: Cells, position: Points, normal: Directions, sides: Bytes, length: Float32, tracer: Tracer, rays: Rays,
+    targets: Int32,
+) -> None:  # fmt: skip
+    """Write the cell that each of n rays reads where it ends; NOWHERE where its length is infinite."""
+    grid, slots, capacity, waiting = cells.grid, cells.slots, room_in(rays.packets), NO_RAYS
+    still = (np.float32(0.0), np.float32(0.0), np.float32(0.0))
+    for i in range(position.shape[0]):
+        if not length[i] < np.inf:
+            targets[i] = NOWHERE
+            continue
+        point = (position[i, 0], position[i, 1], position[i, 2])
+        level = level_of(grid, length[i])
+        found = find_cell(grid, slots, level, int(sides[i]), point, still, still)
+        targets[i] = found
+        if cells.other[found] != NOWHERE:
+            facing = (normal[i, 0], normal[i, 1], normal[i, 2])
+            write_guard_ray(cells.guard, found, point, facing, rays, waiting, i)
+            waiting += 1
+            if waiting == capacity:
+                choose_slots(tracer, rays, waiting, cells.other, targets)
+                waiting = NO_RAYS
+    choose_slots(tracer, rays, waiting, cells.other, targets)
+
+
+def empty_slots(n: int) -> Addresses:
+    """Allocate a hash table for n cells, at most half full."""
+    return np.full(2 << max(int(2 * n - 1), 1).bit_length(), _EMPTY, np.int64)
+
+
+def at_lights(cells: Cells, at: slice | list[int]) -> Cells:
+    """The cells at some of the light positions; what they hold there stays the same to the last bit."""
+    some = cells.light[:, :, at]
+    light = with_room(some.shape, np.float32, fill=0)
+    light[:] = some
+    return cells._replace(light=light)

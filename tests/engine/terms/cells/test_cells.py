@@ -1,0 +1,209 @@
+"""Cells against their slow twin: which samples they hold, all bounces between them, and every pixel that reads them."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+from support.oracle_cells import LEVELS, CellMap, CellOracle, side_of, solve
+from support.oracle_scene import Model
+from support.tiny import RED, SUN, WALK
+
+from framearray_cli.engine.frames.frame import find_frame
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.hits.hits import World
+from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.cells import build
+from framearray_cli.engine.terms.cells.places import Places, PlaceWork, find_places
+from framearray_cli.engine.terms.cells.samples import Samples, SampleWalks, draw_samples
+from framearray_cli.engine.terms.cells.sweeps import sweeps_for
+from framearray_cli.engine.terms.cells.table import Cells, at_lights
+from framearray_cli.render.prepare import Prepared, eye_cameras, image_ambient, open_embree, plan_work
+from framearray_cli.render.target.pilot import _radiance
+
+CELLS = {"indirect": {"method": "cells", "samples": 4096, "cell": 0.1}}
+SKY = {"scene": {"background": [0.3, 0.4, 0.5]}}
+LAMP = tiny.TABLE["light"]["sources"][0]
+# rays within rounding of a border that may read another cell than the twin's, in pixels per image
+FLIPS = 2
+# rounding of float32 sums of some hundred samples
+ROUNDING = 512 * 2.0**-24
+
+
+@dataclass(frozen=True)
+class Case:
+    """A tiny job with cells, the samples that they were built of in the order of the build, and their places."""
+
+    inputs: Prepared
+    setup: FrameSetup
+    ambient: Ambient
+    samples: Samples
+    places: Places
+
+    @property
+    def cells(self) -> Cells:
+        assert self.setup.cells is not None
+        return self.setup.cells
+
+    @property
+    def members(self) -> list[Any]:
+        """The samples of each cell."""
+        return [self.places.sample[a:b] for a, b in pairwise(self.places.first)]
+
+
+@contextmanager
+def built(room: Any = None, **changes: Any) -> Iterator[Case]:
+    """Plan a tiny job with cells; draw and place its samples again."""
+    inputs = tiny.prepared(tiny.job(**{**CELLS, **changes}), room)
+    with open_embree(inputs) as embree, build.ThreadPoolExecutor(2) as pool:
+        setup, ambient = plan_work(inputs, embree)
+        walks = SampleWalks(
+            cams=eye_cameras(inputs),
+            seed=inputs.job.seed,
+            world=World(inputs.surfaces, embree.tracer),
+            lights=inputs.light_arrays,
+        )
+        samples, _ = draw_samples(walks, inputs.job.indirect.samples, 2)
+        assert setup.cells is not None
+        grid = setup.cells.grid
+        samples = samples.rows(build._sorted(grid, samples))
+        places = find_places(PlaceWork(grid=grid, samples=samples, tracer=embree.tracer, pool=pool))
+        yield Case(inputs=inputs, setup=setup, ambient=ambient, samples=samples, places=places)
+
+
+def test_samples_join_the_cells_that_they_lie_in_and_whose_guards_they_see() -> None:
+    with built() as case:
+        twin, samples, places = CellMap(case.cells, Model(case.inputs.scene)), case.samples, case.places
+        assert (side_of(samples.geometric) == samples.side).all()
+        np.testing.assert_array_equal(places.slots, case.cells.slots)
+        position, normal = samples.position.astype(np.float64), samples.geometric.astype(np.float64)
+        joined = np.zeros(len(places.other), int)
+        for level in range(LEVELS):
+            number = twin.numbers(level, position, samples.side)
+            known = np.flatnonzero(number > 0)
+            sees = twin.sees(position[known], normal[known], number[known])
+            joined += np.bincount(number[known[sees]], minlength=len(joined))
+        sizes = np.diff(places.first)
+        first = np.array(sorted(twin.number.values()))
+        assert len(first) > 500 and (sizes[1:] >= 4).all()
+        # a ray that passes an edge within rounding may fall on either side
+        assert (sizes[first] != joined[first]).mean() < 0.005
+        # a cell that some sample of its place does not see has another slot
+        blind = np.setdiff1d(np.flatnonzero(joined[first]), np.flatnonzero(sizes[first]))
+        assert len(blind) == 0 and 0.01 < (places.other[first] >= 0).mean() < 0.7
+
+
+def test_light_of_cells_is_that_of_plain_sums() -> None:
+    with built(tiny.room(mirrors=False), **SKY) as case:
+        samples, setup = case.samples, case.setup
+        twin = CellMap(case.cells, Model(case.inputs.scene))
+        with build.ThreadPoolExecutor(2) as pool:
+            direct, _ = build._direct_light(setup.lights, setup.world, samples, pool, 2)
+        escaped = np.isinf(samples.length)
+        length = np.where(escaped, 1.0, samples.length)
+        target = twin.find(samples.end.astype(np.float64), samples.end_normal.astype(np.float64), length)
+        target[escaped] = -1
+        reflectivity = samples.reflectivity.astype(np.float64)
+        sweeps = sweeps_for(reflectivity[~escaped].sum(axis=0) / samples.n)
+        light = solve(case.members, case.places.share, direct, target, reflectivity, sweeps)
+    weights = case.cells.weights.astype(np.float64)
+    expected = np.einsum("kcl,c->kl", light, weights)
+    tint = light.mean(axis=2) / (light.mean(axis=2) @ weights)[:, None]
+    assert len(light) > 500 and expected.mean() > 0.1 and np.ptp(tint) > 0.1
+    off = abs(case.cells.light[:, 0] / expected - 1)
+    assert np.median(off) < ROUNDING
+    assert (off < 1e-3).mean() > 0.99  # a link within rounding of a border may meet another cell
+    np.testing.assert_allclose(np.median(abs(case.cells.tint[:, :3] - tint)), 0, atol=ROUNDING)
+
+
+IMAGES: dict[str, dict[str, Any]] = {
+    "black outside": {},
+    "sky": SKY,
+    "three colours of light": {"light": {"sources": [LAMP, SUN, RED]}},
+    "one ray, one hit": {"samples": {"hits": 1, "obscurance": 1}},
+    "more rays than packets hold": {"samples": {"hits": 1, "obscurance": 300}, "camera": {"resolution": [4, 3]}},
+    "reuse": {"camera": WALK, "reuse": {"n_r": 2}, **SKY},
+}
+
+
+@pytest.mark.parametrize("name", IMAGES)
+def test_every_pixel_is_that_of_the_twin(name: str) -> None:
+    with built(tiny.room(mirrors=False), **IMAGES[name]) as case, TracePool(case.setup, 2) as pool:
+        rendered = tiny.frames_of(case.setup, case.ambient, pool)
+        twin = CellOracle(case.inputs, case.ambient, case.cells)
+        for c in range(len(rendered)):
+            for l in range(case.inputs.n_lights):
+                image, expected = rendered[c].images[l], twin.image(c, l)
+                off = abs(image - expected) / (expected + expected.mean())
+                assert (off > 128 * 2.0**-24).any(axis=-1).sum() <= FLIPS, f"camera {c}, light {l}"
+
+
+@pytest.mark.parametrize("name", ["sky", "three colours of light"])
+def test_radiance_of_records_is_that_of_images(name: str) -> None:
+    """Pilots take the radiance of hits from their records; with one hit per pixel it is the image."""
+    changes = {**IMAGES[name], "samples": {"hits": 1}}
+    with built(tiny.room(mirrors=False), **changes) as case, TracePool(case.setup, 1) as pool:
+        setup = case.setup
+        image = tiny.frames_of(setup, case.ambient, pool)[0].images.reshape(setup.lights.n_lights, -1, 3)
+        frame = find_frame(setup, 0, pool)
+        radiance = _radiance(setup, case.ambient, frame.records)
+        hits = frame.places[0]
+    assert len(radiance) == setup.n_pixels and image.mean() > 0.01
+    np.testing.assert_allclose(radiance[hits.order], image.swapaxes(0, 1), rtol=1e-4, atol=1e-5)
+
+
+def test_threads_and_blocks_of_lights_change_no_bit() -> None:
+    jobs = [tiny.job(**CELLS, **SKY, camera=WALK, reuse={"n_r": 2}, render={"threads": n}) for n in (1, 3)]
+    found = []
+    for job in jobs:
+        with tiny.planned(tiny.prepared(job)) as (setup, ambient), TracePool(setup, job.render.threads or 1) as pool:
+            found.append((setup.cells, [frame.images for frame in tiny.frames_of(setup, ambient, pool)]))
+            parts = []
+            for block in (range(1), range(1, 3)):
+                part = setup.for_lights(block)
+                parts.append([frame.images for frame in tiny.frames_of(part, ambient.for_lights(block), pool)])
+    (one, images), (other, again) = found
+    assert one is not None and other is not None
+    for a, b in ((one.slots, other.slots), (one.tint, other.tint), (one.light, other.light)):
+        np.testing.assert_array_equal(a, b)
+    np.testing.assert_array_equal(images, again)
+    np.testing.assert_array_equal(images, np.concatenate(parts, axis=1))
+
+
+def test_light_of_groups_adds_up_to_that_of_all_sources() -> None:
+    """In a grey room under white light, where one colour per cell is exact; the background has a plane of its own."""
+    walls = np.concatenate([tiny.box((-2, 0, -2), (2, 2.5, 2))[2:], tiny.box((-1, 0, -1), (0, 1, 0), 0.3)])
+    grey = tiny.scene_of(walls, tiny.Material(name="Grey", reflectivity=(0.5, 0.5, 0.5)))
+    lamps = [
+        {"type": "point", "keys": [{"frame": f, "position": [x + 0.3 * f, 2.0, y], "intensity": 5.0} for f in (0, 2)]}
+        for x, y in ((-1.0, 0.5), (0.8, -0.6))
+    ]
+    grouped = [{**lamp, "group": name} for lamp, name in zip(lamps, "ab", strict=True)]
+    found = []
+    for sources in (lamps, grouped):
+        light = {"frames": 3, "sources": sources}
+        with built(grey, **SKY, light=light, output={"format": "exr"}) as case, TracePool(case.setup, 2) as pool:
+            ambient = image_ambient(case.ambient, case.inputs.lights)
+            found.append(tiny.frames_of(case.setup, ambient, pool)[0].images.astype(np.float64))
+    whole, planes = found
+    assert len(planes) == 8 and planes[7].mean() > 0.01 and planes[:6].mean() > 0.1
+    np.testing.assert_allclose(planes[:3] + planes[3:6] + planes[7], whole, rtol=2e-4, atol=1e-5)
+
+
+def test_light_positions_permute() -> None:
+    order = [2, 0, 1]
+    with built(**SKY) as case, TracePool(case.setup, 2) as pool:
+        images = [frame.images for frame in tiny.frames_of(case.setup, case.ambient, pool)]
+        turned = replace(
+            case.setup,
+            lights=build.some_lights(case.setup.lights, order),
+            cells=at_lights(case.cells, order),
+        )
+        ambient = replace(case.ambient, intensity=case.ambient.intensity[order])
+        permuted = [frame.images for frame in tiny.frames_of(turned, ambient, pool)]
+    np.testing.assert_array_equal(np.array(images)[:, order], permuted)

@@ -1,0 +1,26 @@
+"""The table `[indirect]`: what does not go together, and jobs without it."""
+
+import pytest
+from pydantic import ValidationError
+from support import tiny
+
+from framearray_cli.job.read import job_table
+
+CELLS = {"method": "cells"}
+
+
+def test_cells_show_no_obscurance_to_denoise() -> None:
+    with pytest.raises(ValidationError, match="expected false with indirect"):
+        tiny.job(denoise={"obscurance": True}, indirect=CELLS)
+    tiny.job(denoise={"obscurance": True})
+
+
+@pytest.mark.parametrize("key", ["cell", "samples"])
+def test_keys_of_cells_need_cells(key: str) -> None:
+    with pytest.raises(ValidationError, match='expected method = "cells" beside it'):
+        tiny.job(indirect={key: 2048})
+
+
+def test_a_job_without_cells_is_written_as_before() -> None:
+    assert "indirect" not in job_table(tiny.job())
+    assert job_table(tiny.job(indirect=CELLS))["indirect"] == {"method": "cells", "samples": 2**20}

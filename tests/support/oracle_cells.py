@@ -1,0 +1,147 @@
+"""The slow twin with light from cells: which cell a ray reads, and all bounces between cells, as plain as possible."""
+
+from typing import Any
+
+import numpy as np
+
+from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.render.prepare import Prepared
+from support import oracle_random as rnd
+from support.oracle import Oracle
+from support.oracle_scene import Model, Points, dot, unit
+
+LEVELS, COARSEST, SHARE = 7, 4, 0.3  # levels, the coarsest that rays read, edge of cells per length of a ray
+BITS = 19  # of a key per axis
+CELLS = 5  # dimension of the random numbers that move points
+GUARD_END = 1 - 1e-3  # a ray to a guard ends this share of its length before it
+
+
+def side_of(normal: Any) -> Any:
+    """Axis and sign of the largest component of each normal, 0 to 5."""
+    axis = np.abs(normal).argmax(axis=1)
+    return 2 * axis + (np.take_along_axis(normal, axis[:, None], 1)[:, 0] <= 0)
+
+
+class CellMap:
+    """Cells by level, side and place; cell 0 is that of all surfaces together."""
+
+    def __init__(self, cells: Any, model: Model) -> None:
+        self.grid, self.other, self.guard, self.model = cells.grid, cells.other, cells.guard.astype(np.float64), model
+        self.number = {}
+        for key, cell in cells.slots.reshape(-1, 2):
+            if key >= 0:
+                high, place = int(key) >> 3 * BITS, [int(key) >> BITS * axis & 2**BITS - 1 for axis in (2, 1, 0)]
+                self.number[high >> 3, high & 7, *place] = int(cell)
+
+    def keys(self, level: int, position: Any, side: Any) -> list[Any]:
+        """The cell of a level that holds each point."""
+        edge = self.grid.edge * 2**level
+        place = np.floor(position.astype(np.float64) / edge + self.grid.jitter[level]).astype(int) % 2**BITS
+        return [(level, int(s), *map(int, row)) for s, row in zip(side, place, strict=True)]
+
+    def numbers(self, level: int, position: Any, side: Any) -> Any:
+        """The cells of a level, 0 where there is none."""
+        return np.array([self.number.get(key, 0) for key in self.keys(level, position, side)])
+
+    def level(self, length: Any) -> Any:
+        """The level of the cell that rays of some lengths read."""
+        edges = np.maximum(SHARE * length / self.grid.edge, 1e-9)
+        return np.clip(np.round(np.log2(edges)), 0, COARSEST).astype(int)
+
+    def sees(self, position: Any, normal: Any, cell: Any) -> Any:
+        """Whether points see the guards of cells, from as high above their surfaces."""
+        guard = self.guard[cell]
+        start = position + guard[:, 3:] * normal
+        return ~self.model.blocked(start, guard[:, :3] - start, GUARD_END)
+
+    def find(self, position: Any, normal: Any, length: Any, shift: Any = 0.0) -> Any:
+        """The cells that rays read where they end: at the shifted point, or else the first at the point itself."""
+        side, wanted, found = side_of(normal), self.level(length), np.zeros(len(length), int)
+        for level in range(LEVELS):
+            here = self.numbers(level, position, side)
+            first = self.numbers(level, position + shift * self.grid.edge * 2**level, side)
+            here = np.where((wanted == level) & (first > 0), first, here)
+            found = np.where((wanted <= level) & (found == 0), here, found)
+        doubtful = np.flatnonzero(self.other[found] >= 0)
+        aside = doubtful[~self.sees(position[doubtful], normal[doubtful], found[doubtful])]
+        found[aside] = self.other[found[aside]]
+        return found
+
+
+def tangents(normal: Any) -> tuple[Any, Any]:
+    """Frames about unit normals, after Duff et al. (2017)."""
+    x, y, z = normal.T
+    sign = np.where(z >= 0, 1.0, -1.0)
+    a = -1 / (sign + z)
+    b = x * y * a
+    return np.stack([1 + sign * x * x * a, sign * b, -sign * x], 1), np.stack([b, sign + y * y * a, -y], 1)
+
+
+def solve(members: list[Any], share: Any, direct: Any, target: Any, reflectivity: Any, sweeps: int) -> Any:
+    """E of all cells, (n_cells, 3, n_lights), by plain sums in float64.
+
+    Args:
+        members: the samples of each cell; `share`: weights of cells in the mean over all of them.
+        direct: (n_samples, channels, n_lights) E_direct; `target`: the cell that each sample's link meets, or -1.
+    """
+
+    def means(values: Any) -> Any:
+        found = np.stack([values[rows].mean(axis=0) if len(rows) else 0 * values[0] for rows in members])
+        found[0] = np.tensordot(share, found, 1)
+        return found
+
+    own = means(np.broadcast_to(direct, (len(direct), 3, direct.shape[2])))
+    met = target >= 0
+    r = np.minimum(reflectivity[met].sum(axis=0) / len(met), 0.99)[:, None]
+    light, last = own, own
+    for _ in range(sweeps):
+        brought = np.where(met[:, None, None], reflectivity[:, :, None] * light[target], 0.0)
+        last, light = light, own + means(brought)
+    return light + (light - last) * r / (1 - r)
+
+
+class CellOracle(Oracle):
+    """Renders single images of a job whose indirect light comes from cells."""
+
+    def __init__(self, inputs: Prepared, ambient: Ambient, cells: Any) -> None:
+        """Take the cells from the program."""
+        super().__init__(inputs, ambient)
+        self.cells, self.places = cells, CellMap(cells, self.model)
+
+    def radiance(self, hits: Points, l: int) -> Any:
+        """(n, 3): R (E[l] + E_indirect[l]) / pi, or the background where a ray left the scene."""
+        light, same = self.gathered(hits, l)
+        seen = hits.reflectivity * ((self.irradiance(hits, l) + light) / np.pi + same)
+        return np.where(hits.surface[:, None], seen, self.background)
+
+    def gathered(self, hits: Points, l: int) -> tuple[Any, Any]:
+        """E_indirect[l] by sources, and the radiance that is the same under every light, (n, 3) each."""
+        n, cells = self.job.samples.obscurance, self.cells
+        owner, ray, dirs = self.gather_rays(hits)
+        triangle, uv, distance = self.model.first(hits.start[owner], dirs, np.inf)
+        met = triangle >= 0
+        at, uv, owner, ray = triangle[met], uv[met], owner[met], ray[met]
+        corners = self.model.scene.corners[at].astype(np.float64)
+        normal = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+        normal *= np.where(dot(normal, dirs[met]) > 0, -1.0, 1.0)[:, None]
+        words = rnd.bits(hits.key, CELLS)
+        random = rnd.points([words[i] for i in owner], ray, rnd.sequence()) - 0.5
+        along, across = tangents(normal)
+        shift = random[:, :1] * along + random[:, 1:] * across
+        k = self.places.find(self.model.mix(self.model.scene.corners, at, uv), normal, distance[met], shift)
+        r, v, colour = self.model.total(at, uv), cells.weights.astype(np.float64), cells.tint[k, :3].astype(np.float64)
+        hue = np.zeros((len(met), 3))
+        hue[met] = r * colour * cells.tint[k, 3:4]
+        hue = hue.reshape(-1, n, 3).mean(axis=1)
+        mean = (hue @ v)[:, None]
+        hue = np.divide(hue, mean, out=np.zeros_like(hue), where=mean > 0)
+        if cells.light.shape[1] == 3:
+            g = np.zeros((len(met), 3))
+            g[met], hue = r * cells.light[k, :, l], 1.0
+        else:
+            g = np.zeros((len(met), 1))
+            g[met] = ((r * colour) @ v)[:, None] * cells.light[k, :, l]
+        light = hue * g.reshape(-1, n, g.shape[1]).mean(axis=1) * self.inputs.light_arrays.colour[l]
+        same = np.tile(self.background, (len(met), 1))
+        same[met] = r * cells.tint[k, 4:7]
+        return light, same.reshape(-1, n, 3).mean(axis=1)
