@@ -136,7 +136,7 @@ def solve(members: Members, direct: Float32, pool: ThreadPoolExecutor) -> Float3
     r = mean_reflectivity(members)
     before = np.empty((len(direct), 3, direct.shape[2]), np.float32)
     before[:] = direct
-    after = np.empty_like(before)
+    after = np.zeros_like(before)  # the mean over all cells reads cell ALL too, with the share 0
     for _ in range(sweeps_for(r)):
         _over_cells(len(direct), pool, partial(sweep_cells, members), direct, before, after)
         after[ALL] = _mean_over_all(members, after)
