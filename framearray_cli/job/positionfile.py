@@ -175,7 +175,7 @@ def _npy_rows(data: bytes) -> list[PlacedRow]:
         header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         shape, by_columns, dtype = header(file)
     except (ValueError, EOFError, SyntaxError, tokenize.TokenError, TypeError, RecursionError) as error:
-        raise RowFileError(f"not a valid .npy file: {(str(error).splitlines() or ['no header'])[0][:200]}") from error
+        raise RowFileError("not a valid .npy file; expected one that numpy.save writes") from error
     if len(shape) != 2 or shape[1] != len(AXES) or dtype.kind not in "fiu":
         size = " x ".join(map(str, shape)) or "one value"
         raise RowFileError(f"expected an array of n x 3 numbers, got {size} of type {dtype}")

@@ -3,16 +3,20 @@
 import io
 import json
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import numpy as np
 import pytest
 import tomli_w
 from support import tiny
+from support.phrases import library_phrase
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
+from framearray_cli.job.positionfile import read_positions
 from framearray_cli.job.read import job_table, read_job
+from framearray_cli.job.rowfile import RowFileError
 
 HERE = [[0.0, 0.0, 2.0], [1.0, 0.5, 2.0], [-1.0, 0.0, 1.5]]
 
@@ -241,3 +245,34 @@ def test_a_dome_with_more_positions_than_its_axis(tmp_path: Path) -> None:
     with pytest.raises(JobError) as caught:
         read_job(file)
     assert list(caught.value.problems) == ["light.sources[0]: expected at most 4 positions, as its axis has, got 5"]
+
+
+@pytest.mark.parametrize(("name", "content"), GOOD, ids=[name for name, _ in GOOD])
+def test_any_file_is_positions_or_one_error(tmp_path: Path, name: str, content: str | bytes) -> None:
+    """Fifty mutations of each: bytes changed, lost, doubled, and files cut off."""
+    whole = content if isinstance(content, bytes) else content.encode()
+    refused = 0
+    for seed in range(50):
+        rng = Random(seed)
+        data = bytearray(whole)
+        for _ in range(rng.randrange(1, 4)):
+            at, n = rng.randrange(len(data) + 1), rng.randrange(1, 9)
+            match rng.randrange(4):
+                case 0:
+                    data[at : at + n] = rng.randbytes(n)
+                case 1:
+                    del data[at : at + n]
+                case 2:
+                    data[at:at] = data[at : at + n]
+                case _:
+                    data = data[: max(at, 1)]
+        (tmp_path / name).write_bytes(data)
+        for kind, strength in (("point", "intensity"), ("directional", "irradiance")):
+            try:
+                keys = read_positions(tmp_path / name, kind, {strength: 1.0})
+            except RowFileError as error:
+                refused += 1
+                assert all(library_phrase(problem) is None and len(problem) < 500 for problem in error.args)
+            else:
+                assert [key["frame"] for key in keys] == list(range(len(keys)))
+    assert refused > 20, "most of them are broken"
