@@ -21,6 +21,7 @@ from framearray_cli.job.read import job_table
 
 from .prepare import Prepared
 
+PLACED_BY_KEYS = ("point", "directional")  # kinds of sources; suns and domes may depend on the up axis
 _DEFAULTS: dict[str, type[Table]] = {"obscurance": ObscuranceTable, "samples": SamplesTable}
 
 
@@ -51,7 +52,7 @@ def unused_keys(prepared: Prepared) -> Iterator[tuple[str, str]]:
     if not prepared.scene.has_mirrors or job.specular.depth == 0:
         yield "specular", "hits"
     by_up = any(key.up is None for key in job.camera.keys)  # the model itself is not turned
-    if not by_up and all(source.type != "sun" for source in job.light.sources):
+    if not by_up and all(source.type in PLACED_BY_KEYS for source in job.light.sources):
         yield "scene", "up"
 
 

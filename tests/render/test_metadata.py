@@ -206,6 +206,7 @@ class Keeping(RenderEvents):
         self.compression = compression
 
 
+DOME = {"type": "dome", "positions": 3, "irradiance": 2.0}
 UPRIGHT = {**CAMERA, "keys": [{**key, "up": [0.0, 1.0, 0.0]} for key in CAMERA["keys"]]}
 
 
@@ -231,17 +232,20 @@ def test_keys_that_play_no_part_keep_their_first_value(matt: Path, tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    ("changes", "key"),
+    ("first", "changes", "key"),
     [
-        ({"specular": {"depth": 2}}, "specular.depth"),
-        ({"specular": {"hits": 40}}, "specular.hits"),
-        ({"scene": {"up": "z"}}, "scene.up"),
+        ({}, {"specular": {"depth": 2}}, "specular.depth"),
+        ({}, {"specular": {"hits": 40}}, "specular.hits"),
+        ({}, {"scene": {"up": "z"}}, "scene.up"),
+        ({"camera": UPRIGHT, "light": {"frames": 3, "sources": [DOME]}}, {"scene": {"up": "z"}}, "scene.up"),
     ],
 )
-def test_where_they_play_a_part_they_make_another_array(scene: Path, tmp_path: Path, changes: Any, key: str) -> None:
-    """The scene has mirrors, and the camera no `up` of its own."""
-    render(job(scene, tmp_path), cameras=(0,))
-    later = changes | {"scene": {"file": str(scene), **changes.get("scene", {})}}
+def test_where_they_play_a_part_they_make_another_array(
+    scene: Path, tmp_path: Path, first: Any, changes: Any, key: str
+) -> None:
+    """The scene has mirrors, and the camera no `up` of its own, or the light is a dome over the scene."""
+    render(job(scene, tmp_path, changes=first), cameras=(0,))
+    later = first | changes | {"scene": {"file": str(scene), **changes.get("scene", {})}}
     with pytest.raises(OutputError, match=f"another frame array.*{key}"):
         render(job(scene, tmp_path, changes=later), cameras=(0,))
 
