@@ -25,7 +25,7 @@ from .table import CONSTANT, NOWHERE, TINT, Cells, at_lights, find_targets
 
 Rows: TypeAlias = NDArray[np.intp]
 
-POINTS, RAYS = 64, 1024
+POINTS, RAYS = 128, 1024
 # Light positions that stand for all, at most.
 MOST_LIGHTS = 8
 
