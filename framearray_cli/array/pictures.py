@@ -20,13 +20,14 @@ import numpy as np
 from framearray_cli.base.arrays import Image
 from framearray_cli.base.errors import OutputError
 
-from .images.images import read_image
+from .images.images import read_image, read_layers
 from .manifest import BACKGROUND, Manifest, ManifestGroup, ManifestLight, Vector, image_path
 from .mixtures import Mixture, Position, is_constant
 from .names import file_name
 
 Positions: TypeAlias = Sequence[Position]
 
+DIFFERENCE = "difference"  # layer of images with halves
 WHITE: Vector = (1.0, 1.0, 1.0)
 # Number of files kept in memory: the next picture of a movie needs most of them again.
 KEPT_FILES = 16
@@ -70,6 +71,7 @@ class Pictures:
             mix: puts sums of light positions in place of those that are asked for.
         """
         self.manifest = manifest
+        self._of_differences: Pictures | None = None
         self._mix = mix or (lambda positions: positions)
         n_bytes = 12 * manifest.resolution[0] * manifest.resolution[1]
         kept = min(max(manifest.axes.values()) + 2, MOST_KEPT // n_bytes)  # a sum reads a whole axis for each picture
@@ -103,6 +105,21 @@ class Pictures:
         if manifest.background_images and of_background.any():
             total += self._read_unlit(manifest.background_images, c) * of_background.astype(np.float32)
         return total
+
+    def differences(self, c: int, positions: Positions, relight: Relight = AS_RENDERED) -> dict[str, Image]:
+        """Return the signed difference of the halves of a sum of light positions, as the layer of an image.
+
+        Its root mean square over a neighbourhood is the standard error of the sum, as differences add up like images.
+
+        Returns:
+            No layer if the array has no halves, or the picture is no sum.
+        """
+        halves = self.manifest.job.get("samples", {}).get("halves") is True
+        if not halves or not any(isinstance(position, Mixture) for position in self._mix(positions)):
+            return {}
+        if self._of_differences is None:
+            self._of_differences = Pictures(self.manifest, read=_read_difference, mix=self._mix)
+        return {DIFFERENCE: self._of_differences.picture(c, positions, relight)}
 
     def files(self, c: int, positions: Positions) -> Iterator[Path]:
         """Yield the files that a picture is made of."""
@@ -158,6 +175,19 @@ class Pictures:
         if image.shape != (height, width, 3):
             raise OutputError(f"{path}: expected {width} x {height} pixels, got {image.shape[1]} x {image.shape[0]}")
         return image
+
+
+def _read_difference(path: Path) -> Image:
+    """Read the signed difference of the halves of an image, (h, w, 3).
+
+    Raises:
+        OutputError: the file is missing or damaged, or has no such layer.
+    """
+    layers = read_layers(path)
+    names = [f"{DIFFERENCE}.{channel}" for channel in "RGB"]
+    if not all(name in layers for name in names):
+        raise OutputError(f"{path}: expected channels {', '.join(names)}, found {', '.join(layers)}")
+    return np.stack([layers[name] for name in names], axis=-1)
 
 
 def _once(position: Position, group: ManifestGroup) -> Position:

@@ -68,4 +68,5 @@ def put_picture(
         l=frame.lights[0],
         software=f"framearray {manifest.version}",
     )
-    write_image(target, image, image_format, attributes)
+    more = pictures.differences(frame.c, frame.lights) if image_format.format == "exr" else None
+    write_image(target, image, image_format, attributes, more)

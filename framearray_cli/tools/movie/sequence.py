@@ -160,7 +160,8 @@ def _write_frame(pictures: Pictures, shot: Shot, relight: Relight, target: Path,
         codes = screen_codes(image, look, shot_label(pictures.manifest, shot))
         write_codes(target, codes, ImageFormat(format=extension), attributes)
     else:
-        write_image(target, np.ascontiguousarray(image), ImageFormat(format=extension), attributes)
+        more = pictures.differences(shot.c, shot.positions, relight) if extension == "exr" else None
+        write_image(target, np.ascontiguousarray(image), ImageFormat(format=extension), attributes, more)
 
 
 def _attributes(manifest: Manifest, shot: Shot, fps: Fraction) -> dict[str, Attribute]:

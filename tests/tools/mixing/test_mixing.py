@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial import SphericalVoronoi
 from support.movies import grouped, plain
 
-from framearray_cli.array.images.images import ImageFormat, read_image, write_image
-from framearray_cli.array.manifest import Manifest, ManifestLight
+from framearray_cli.array.images.images import ImageFormat, read_image, read_layers, write_image
+from framearray_cli.array.manifest import Manifest, ManifestLight, image_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.mixtures import Mixture
 from framearray_cli.array.pictures import Pictures
@@ -320,3 +320,25 @@ def test_other_axes_stay_where_they_are(tmp_path: Path) -> None:
     made = pictures.picture(0, (mixture, 1))
     wanted = (pictures.picture(0, (0, 1)) + pictures.picture(0, (2, 1))) / 2
     np.testing.assert_allclose(made, wanted, rtol=1e-5, atol=1e-6)
+
+
+def test_differences_of_halves_add_up(array: Manifest, tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    halved = replace(array, job=array.job | {"samples": {"halves": True}})
+    write_manifest(array.directory, halved)
+    signed = rng.normal(size=(6, 8, 12, 3)).astype(np.float16).astype(np.float32)
+    for l in range(6):
+        image = np.full((8, 12, 3), l + 1.0, np.float32)
+        write_image(image_path(array, 0, l), image, ImageFormat(), more={"difference": signed[l]})
+    (tmp_path / "w.csv").write_text("weight\n1\n0\n0\n-2\n0.5\n2\n", encoding="utf-8")
+    sums = SumOptions(weights=tmp_path / "w.csv")
+    wanted = signed[0] - 2 * signed[3] + 0.5 * signed[4] + 2 * signed[5]
+    assemble_movie(array.directory, _path(tmp_path, "frames = 1"), tmp_path / "f.#.exr", sums=sums)
+    options = {"cameras": "0", "sums": sums, "image_format": ImageFormat()}
+    export_array(array.directory, tmp_path / "x", "cinema", **options)
+    for file in (tmp_path / "f.0.exr", *(tmp_path / "x.cdb" / "images").iterdir()):
+        layers = read_layers(file)
+        made = np.stack([layers[f"difference.{channel}"] for channel in "RGB"], axis=-1)
+        np.testing.assert_allclose(made, wanted, rtol=2**-11, atol=1e-6)
+    assemble_movie(array.directory, _path(tmp_path, "frames = 1"), tmp_path / "g.#.exr")
+    assert Pictures(halved).differences(0, (0,)) == {}, "a single image is linked, with its own layers"
