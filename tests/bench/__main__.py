@@ -24,6 +24,9 @@ from bench.error import bias_page as biaspage
 from bench.peers import cycles, mitsuba3, peers
 from bench.speed import first, packets, processes, scaling, speed
 from bench.speed import page as table
+from bench.truth import run as truth
+from bench.truth.rendered import METHODS
+from bench.truth.traced import Place, trace_here
 from bench.view import page as viewpage
 
 PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
@@ -31,7 +34,21 @@ PARTS = ("speed", "error", "peers", "memory", "startup")
 TRACES = ("trace", "trace-means")
 # As `make test-avx2` limits the tests.
 AVX2 = {"FRAMEARRAY_EMBREE": "isa=avx2", "NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": "+avx2"}
-OTHERS = ("scaling", "packets", "report", "bias", "reported", "page", "peak", "view", "first", *TRACES, *ambient.PARTS)
+OTHERS = (
+    "truth",
+    "trace-place",
+    "scaling",
+    "packets",
+    "report",
+    "bias",
+    "reported",
+    "page",
+    "peak",
+    "view",
+    "first",
+    *TRACES,
+    *ambient.PARTS,
+)
 
 
 def main() -> None:
@@ -45,6 +62,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=speed.RUNS, help="how often each thing is measured")
     parser.add_argument("--patience", type=float, default=0.0, help="seconds to wait for a busy machine, each time")
     parser.add_argument("--part", nargs="*", default=list(bias.MEASURES), choices=bias.MEASURES, help="for `bias`")
+    parser.add_argument("--method", nargs="*", default=[], choices=[*METHODS], help="for `truth`; all of them")
     parser.add_argument("--variant", default=FRAME_ARRAY.name, help="for `peak`")
     parser.add_argument("--resolution", help="for `peak`: 800x600")
     parser.add_argument("--frames", type=int, default=2, help="for `peak`")
@@ -55,6 +73,13 @@ def main() -> None:
         os.execve(sys.executable, [sys.executable, "-m", "bench", *sys.argv[1:]], {**os.environ, **AVX2})
     if args.what in ambient.PARTS:
         ambient.run(args.what, args.jobs, args.quick)
+        return
+    if args.what == "truth":
+        truth.run(args.jobs, args.quick, args.method)
+        return
+    if args.what == "trace-place":
+        job, c, l = args.jobs
+        print(json.dumps(trace_here(Place(job=job, c=int(c), l=int(l)), args.quick, folder(args.quick))))
         return
     if args.what == "view":
         viewpage.run(args.jobs, args.patience, args.quick)

@@ -82,7 +82,7 @@ def trace(name: str, quick: bool, folder: Path, variant: str = COMPILED) -> Tabl
     Args:
         variant: of Mitsuba, for its path tracer.
     """
-    mi, why = _mitsuba(variant)
+    mi, why = mitsuba_with(variant)
     if why:
         return {"skipped": why}
     probe = probe_named(name)
@@ -98,7 +98,7 @@ def trace(name: str, quick: bool, folder: Path, variant: str = COMPILED) -> Tabl
     return {"file": file.name, "version": mi.__version__, "samples": samples, "variant": variant}
 
 
-def _mitsuba(variant: str) -> tuple[Any, str]:
+def mitsuba_with(variant: str) -> tuple[Any, str]:
     """Mitsuba, and why it is of no use, or ""."""
     try:
         import mitsuba as mi
@@ -114,7 +114,7 @@ def trace_means(name: str, quick: bool, variant: str = COMPILED) -> Table:
     Returns:
         cameras; indirect: (n,) mean of their indirect light over pixels and channels; error: (n,) its standard error.
     """
-    mi, why = _mitsuba(variant)
+    mi, why = mitsuba_with(variant)
     if why:
         return {"skipped": why}
     probe = probe_named(name)

@@ -1,0 +1,77 @@
+"""Path-traced pictures of a job's images, from Mitsuba 3, kept on the disk."""
+
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.ambient import pathtraced
+from bench.ambient.scenes import Probe
+from bench.core.cases import job_named
+from bench.core.results import Table
+from bench.speed.processes import asked
+from bench.speed.speed import log
+from framearray_cli.base.arrays import Float32
+from framearray_cli.render.prepare import prepare
+
+SAMPLES, QUICK_SAMPLES = 128, 32  # per pixel, in all
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """One image of a job: camera position c under light position l."""
+
+    job: str
+    c: int
+    l: int
+
+    @property
+    def name(self) -> str:
+        """In names of files and tables."""
+        return f"{self.job}-c{self.c}-l{self.l}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Truth:
+    """A path-traced image in two independent halves: all light, and that without light from sources, (2, h, w, 3)."""
+
+    total: Float32
+    indirect: Float32
+
+
+def trace(place: Place, quick: bool, folder: Path) -> Table:
+    """Trace an image in a process of its own; {"skipped": why} where that is impossible."""
+    options = ["--quick"] if quick else []
+    try:
+        return asked("trace-place", place.job, str(place.c), str(place.l), *options)
+    except subprocess.CalledProcessError as error:
+        return {"skipped": f"Mitsuba ended with status {error.returncode}"}
+    finally:
+        log(f"{place.name}: traced")
+
+
+def trace_here(place: Place, quick: bool, folder: Path) -> Table:
+    """Trace an image into `folder` in this process."""
+    mi, why = pathtraced.mitsuba_with(pathtraced.COMPILED)
+    if why:
+        return {"skipped": why}
+    prepared = prepare(job_named(place.job, quick))
+    why = pathtraced.unknown(prepared.scene)
+    if why:
+        return {"skipped": why}
+    probe = Probe(name=place.name, words=place.name, prepared=lambda: prepared, c=place.c, l=place.l)
+    samples = QUICK_SAMPLES if quick else SAMPLES
+    traced = pathtraced.pictures(mi, prepared, probe, samples, pathtraced.COMPILED)
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / f"truth-{place.name}.npz"
+    traced.save(file)
+    return {"file": file.name, "version": mi.__version__, "samples": samples}
+
+
+def read(file: Path) -> Truth:
+    """Read a traced image."""
+    with np.load(file) as kept:
+        total: Any = kept["total"]
+        return Truth(total=total, indirect=total - kept["light"])
