@@ -1,7 +1,7 @@
 """Measurements of the cost and the error of images. Not part of the tests.
 
 `make bench` runs `python -m bench`, `make bench-scaling` runs `python -m bench scaling`; likewise `make bench-bias`,
-`make bench-ambient` and `make bench-report`.
+`make bench-ambient`, `make bench-truth` and `make bench-report`.
 
     core/     shared by all
         cases.py       ways to make the images of a job: the frame array, its options, baselines
@@ -32,6 +32,7 @@
         scenes.py, levels.py, pictures.py   levels against walks, pictures against path-traced ones
         pathtraced.py  pictures by Mitsuba's path tracer
         run.py, page.py, plots.py   results -> docs/measured/ambient.md
+    truth/    images of the jobs against path-traced ones: traced.py, rendered.py, compare.py -> docs/measured/truth.md
     peers/    the cost of images in other programs: mitsuba3.py, cycles.py
     view/     the page of `framearray view` in Chromium
 """

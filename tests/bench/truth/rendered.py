@@ -7,9 +7,9 @@ from pathlib import Path
 from bench.core.cases import job_named
 from bench.core.results import ROOT
 from bench.speed.processes import environment
+from framearray_cli.array.images.images import read_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.array.images.images import read_image
 from framearray_cli.base.arrays import Image
 
 from .traced import Place
@@ -25,7 +25,7 @@ DIRECT = ("ambient.intensity=[0.0, 0.0, 0.0]",)  # nothing but light of the sour
 
 
 def render(place: Place, keys: tuple[str, ...], quick: bool, folder: Path) -> Image | str:
-    """Render the images of a camera position; returns that of the light position, or what the program said against it."""
+    """Render the images of a camera position; returns that of the light position, or the program's error."""
     output = folder / "truth-render"
     width, height = job_named(place.job, quick).camera.resolution
     settings = ("output.format=exr", f"camera.resolution=[{width}, {height}]", *keys)

@@ -6,7 +6,7 @@ from bench.core.cases import JOBS, job_named
 from bench.core.results import folder, load, save
 from bench.speed.speed import log
 
-from . import compare, rendered, traced
+from . import compare, page, rendered, traced
 from .traced import Place
 
 # Camera and light positions of the images, as shares of their paths.
@@ -30,6 +30,7 @@ def run(names: Sequence[str], quick: bool, methods: Sequence[str]) -> None:
             continue
         truth = traced.read(out / table["traced"]["file"])
         table["noise"] = compare.noise(truth)
+        shown = {"truth": truth.total.mean(axis=0)}
         direct = rendered.render(place, rendered.DIRECT, quick, out)
         for method in methods or rendered.METHODS:
             image = rendered.render(place, rendered.METHODS[method], quick, out)
@@ -37,5 +38,8 @@ def run(names: Sequence[str], quick: bool, methods: Sequence[str]) -> None:
                 table["methods"][method] = {"skipped": image if isinstance(image, str) else direct}
             else:
                 table["methods"][method] = compare.distance(image, direct, truth)
+                shown[method] = image
             log(f"{place.name}: {method}: {table['methods'][method]}")
         save(out, f"truth-{place.name}", table)
+        page.keep(shown, place, out)
+    page.write([place for name in JOBS for place in places_of(name, quick)], quick)

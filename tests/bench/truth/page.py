@@ -1,0 +1,112 @@
+"""Results -> docs/measured/truth.md and its pictures. Nothing is measured here."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image as Pillow
+
+from bench.core.markdown import grid, number, percent
+from bench.core.results import Site, Table, folder, load, site_for
+from framearray_cli.base.arrays import Float32, Image
+from framearray_cli.base.colour import srgb8_from_linear
+
+from .compare import BLOCK, means
+from .traced import Place
+
+HEAD = f"""
+# Against the true light
+
+How far images of the jobs are from path-traced ones of the same scene: Mitsuba's `path` integrator, the same triangles,
+textures, mirrors, sources and background, without an end to its paths but by chance. `make bench-truth` measures and
+writes this page; `tests/bench/truth/` says how. Images are those that `framearray render` writes, with the job's own
+samples; only the keys of indirect light differ.
+
+*All light*: RMSE of means over {BLOCK} x {BLOCK} pixels, over their root mean square. *Indirect*: RMSE per pixel,
+noise of ours included, over the mean indirect light. *Mean*: over that of the truth. Noise of the path-traced images is
+no part of any figure: errors against two independent halves of them are multiplied.
+"""
+METHODS = ("obscurance", "obscurance, fit", "local", "cells")
+SHOWN = ("obscurance", "cells")
+WIDTH, GAP, QUALITY = 300, 4, 82  # of one picture and between two, pixels; of JPEG
+
+
+def write(places: Sequence[Place], quick: bool) -> None:
+    """Write the page from all results there are; quick results go beside themselves."""
+    page = site_for(quick).pages / "truth.md"
+    page.write_text(render(places, folder(quick), site_for(quick)), encoding="utf-8")
+    print(page)
+
+
+def render(places: Sequence[Place], results: Path, site: Site) -> str:
+    """The whole page; images without results are left out."""
+    found = {place: table for place in places if (table := load(results, f"truth-{place.name}"))}
+    compared = {place: table for place, table in found.items() if "noise" in table}
+    parts = [HEAD, "## Errors", _errors(compared)]
+    parts += _pictures(compared, results, site)
+    skipped = {place.name: table["traced"]["skipped"] for place, table in found.items() if "skipped" in table["traced"]}
+    if skipped:
+        parts.append("Not path-traced: " + "; ".join(f"{name}: {why}" for name, why in skipped.items()) + ".")
+    return "\n\n".join(part.strip("\n") for part in parts) + "\n"
+
+
+def _errors(compared: Mapping[Place, Table]) -> str:
+    rows = []
+    for place, table in compared.items():
+        for method in METHODS:
+            one = table["methods"].get(method, {"skipped": ""})
+            if "skipped" in one:
+                continue
+            numbers = [percent(one["all"]), number(one["mean"]), percent(one["indirect"]), number(one["indirect_mean"])]
+            rows.append([f"{place.job}, c = {place.c}, l = {place.l}", f"`{method}`", *numbers])
+        noise = table["noise"]
+        rows.append(["", "noise of the truth", percent(noise["all"]), "", percent(noise["indirect"]), ""])
+    return grid(("image", "method", "all light", "mean", "indirect", "mean"), rows)
+
+
+def _pictures(compared: Mapping[Place, Table], results: Path, site: Site) -> list[str]:
+    """A strip per image: truth, each method, and the difference of the last from the truth."""
+    parts = [
+        "## Pictures",
+        f"Truth, `{'`, `'.join(SHOWN)}`, and `{SHOWN[-1]}` minus truth: grey is none, white the mean.",
+    ]
+    for place in compared:
+        shown = results / f"truth-shown-{place.name}.npz"
+        if not shown.is_file():
+            continue
+        with np.load(shown) as kept:
+            images = {name: kept[name] for name in kept.files}
+        file = site.pictures / f"truth-{place.name}.jpg"
+        if all(name in images for name in ("truth", *SHOWN)):
+            _save(_strip(images), file)
+            parts.append(f"![{place.job}: truth, {', '.join(SHOWN)}, difference]({site.link(file)})")
+    return parts if len(parts) > 2 else []
+
+
+def _strip(images: Mapping[str, Image]) -> list[Image]:
+    """What stands side by side, display values from 0 to 255, (h, w, 3)."""
+    row = [srgb8_from_linear(images[name]) for name in ("truth", *SHOWN)]
+    error = means(images[SHOWN[-1]]) - means(images["truth"])
+    grey = np.clip(0.5 + error / (2 * images["truth"].mean()), 0.0, 1.0)
+    full = np.repeat(np.repeat(grey, BLOCK, axis=0), BLOCK, axis=1)
+    return [*row, np.asarray(255 * full + 0.5, np.uint8)]
+
+
+def _save(row: Sequence[Image], file: Path) -> None:
+    height = round(WIDTH * row[0].shape[0] / row[0].shape[1])
+    canvas = Pillow.new("RGB", (len(row) * (WIDTH + GAP) - GAP, height), "white")
+    for i, image in enumerate(row):
+        small = Pillow.fromarray(np.ascontiguousarray(image)).resize((WIDTH, height), Pillow.Resampling.LANCZOS)
+        canvas.paste(small, (i * (WIDTH + GAP), 0))
+    file.parent.mkdir(parents=True, exist_ok=True)
+    canvas.save(file, quality=QUALITY)
+
+
+def keep(images: Mapping[str, Float32], place: Place, results: Path) -> None:
+    """Add images of a place to those that the page shows."""
+    file = results / f"truth-shown-{place.name}.npz"
+    known: dict[str, Float32] = {}
+    if file.is_file():
+        with np.load(file) as kept:
+            known = {name: kept[name] for name in kept.files}
+    np.savez(file, **{**known, **images})  # type: ignore[arg-type]  # numpy's stubs take no names from a dictionary
