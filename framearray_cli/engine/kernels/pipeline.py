@@ -2,13 +2,15 @@
 
 numba analyses an inlined function anew at every call, with all functions that are inlined into it, and copies its code
 twice, object by object; that was a quarter of the time that kernels took to compile. Here each inlined function is
-analysed once per process, and each call makes one copy.
+analysed once per process, and each call makes one copy. That rests on numba's own classes, so any version but the one
+that it was tried with compiles as usual, which takes longer.
 """
 
 from collections.abc import Callable
 from copy import copy
 from typing import Any
 
+import numba as nb
 from numba.core import compiler, compiler_machinery, inline_closurecall, ir, untyped_passes
 
 # Parts of numba without type annotations.
@@ -23,6 +25,7 @@ _register: Any = compiler_machinery.register_pass
 _NODES: Any = (ir.Inst, ir.AbstractRHS)  # statements and expressions
 _SHARED: Any = (ir.Const, ir.Global, ir.FreeVar)  # expressions that never change
 
+_TRIED = "0.68"  # version of numba
 # Inlined functions and their code, which must not be changed.
 _analysed: dict[Callable[..., Any], Any] = {}
 
@@ -31,7 +34,8 @@ class KernelCompiler(_Compiler):  # type: ignore[misc]
     """numba's passes, with faster inlining."""
 
     def define_pipelines(self) -> list[Any]:
-        return [_replace_inlining(_Builder.define_nopython_pipeline(self.state))]
+        passes = _Builder.define_nopython_pipeline(self.state)
+        return [_replace_inlining(passes) if nb.__version__.startswith(f"{_TRIED}.") else passes]
 
 
 def _untyped_pipeline(state: Any) -> Any:

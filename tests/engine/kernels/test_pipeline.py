@@ -76,6 +76,15 @@ def test_an_inlined_function_is_analysed_once(monkeypatch: Any) -> None:
     assert analysed.count("collatz") == 1 and analysed.count("summed") == 2
 
 
+def test_other_versions_of_numba_compile_with_their_own_passes(monkeypatch: Any) -> None:
+    monkeypatch.setattr(pipeline, "_TRIED", "0.1")
+    monkeypatch.setattr(pipeline, "_analysed", {})
+    numbers, out = np.arange(1, 60), np.zeros(59, np.int64)
+    kernel(summed)(numbers, out)
+    assert out.tolist() == expected(numbers)
+    assert not pipeline._analysed
+
+
 @kernel
 def _signed(positive: bool, x: float) -> float:
     return x if positive else -x
