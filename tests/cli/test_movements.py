@@ -31,7 +31,7 @@ def array(tmp_path: Path) -> Path:
         (["--cameras", "all"], "5 frames from 5 images, 24 frames per second", 24),
         (["--light", "last-0x-2", "--cameras", "-1"], "2 frames from 2 images, 24 frames per second", 24),
         (["walk", "--cameras", "1-3", "--light", "50%"], "3 frames from 3 images, 24 frames per second", 24),
-        (["diagonal", "--light", "0,2", "--seconds", "0.25"], "6 frames from 6 images, 24 frames per second", 24),
+        (["diagonal", "--light", "0,2", "--seconds", "0.25"], "6 frames from 5 images, 24 frames per second", 24),
         (["--at", "light=0-2"], "3 frames from 3 images, 24 frames per second", 24),
     ],
 )
