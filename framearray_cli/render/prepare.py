@@ -130,6 +130,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambi
             n_rays=job.samples.obscurance,
             step_x=step_x,
             step_y=step_y,
+            coherent=job.reuse.weights == "area",  # other jobs keep their images, to the last bit
             sky=job.obscurance.outside == "background",
             average=ambient.reflectivity,
             background=background,

@@ -94,7 +94,7 @@ def hemisphere_rays(stage: Stage, n_rays: int = 5) -> Count:
     step_x, step_y = lattice_steps(n_rays)
     nothing = np.zeros(3, np.float32)
     settings = ObscuranceSettings(
-        d_max=stage.size, falloff=SQRT, tau=1.0, n_rays=n_rays, step_x=step_x, step_y=step_y, sky=True,
+        d_max=stage.size, falloff=SQRT, tau=1.0, n_rays=n_rays, step_x=step_x, step_y=step_y, coherent=True, sky=True,
         average=nothing, background=nothing,
     )  # fmt: skip
     traced = write_obscurance_rays(stage.hits, rays, stage.n, 0, n_rays, settings, True)

@@ -177,7 +177,7 @@ def _trace_hits(
         # rays first_ray to first_ray + n_rays - 1 of every hit
         n_rays = min(settings.n_rays - first_ray, most)
         n_traced = write_obscurance_rays(hits, rays, n, first_ray, n_rays, settings, neighbours)
-        intersect(tracer, rays.packets, n_traced, neighbours)
+        intersect(tracer, rays.packets, n_traced, neighbours and settings.coherent)
         varied = evaluate_rays(surfaces, tracer, rays, n_traced, settings)
         apply_textures(surfaces, tracer, rays, varied)
         add_to_hits(rays, n, first_ray, n_rays, settings, result, skylight)

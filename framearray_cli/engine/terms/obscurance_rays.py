@@ -31,6 +31,8 @@ class ObscuranceSettings(NamedTuple):
         tau: steepness of the exponential curve.
         n_rays: rays per hit.
         step_x, step_y: the lattice that spreads them, see `lattice_steps`.
+        coherent: whether packets of rays of one direction are traced as coherent ones, which is faster; where two
+            triangles meet a ray at the same distance, Embree may then report the other one.
         sky: whether rays continue past d_max, and those that escape see the background.
         average: (3,) reflectivity that stands in for R(Q) where a ray meets nothing within d_max.
         background: (3,) radiance outside the scene.
@@ -42,6 +44,7 @@ class ObscuranceSettings(NamedTuple):
     n_rays: int
     step_x: int
     step_y: int
+    coherent: bool
     sky: bool
     average: Rgb
     background: Rgb

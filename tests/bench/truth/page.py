@@ -26,7 +26,7 @@ samples; only the keys of indirect light differ.
 noise of ours included, over the mean indirect light. *Mean*: over that of the truth. Noise of the path-traced images is
 no part of any figure: errors against two independent halves of them are multiplied.
 """
-METHODS = ("obscurance", "obscurance, fit", "local", "cells")
+METHODS = ("obscurance", "obscurance, fit", "cells")
 SHOWN = ("obscurance", "cells")
 WIDTH, GAP, QUALITY = 300, 4, 82  # of one picture and between two, pixels; of JPEG
 

@@ -18,7 +18,6 @@ from .traced import Place
 METHODS = {
     "obscurance": ("ambient.method=eye",),
     "obscurance, fit": ("ambient.method=fit",),
-    "local": ("indirect.method=local",),
     "cells": ("indirect.method=cells",),
 }
 DIRECT = ("ambient.intensity=[0.0, 0.0, 0.0]",)  # nothing but light of the sources

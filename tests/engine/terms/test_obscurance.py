@@ -32,7 +32,7 @@ def gathered(
     scene: Scene, hits: Hits, room: int = 4096, neighbours: bool = True, **changes: Any
 ) -> tuple[Any, Any, int]:
     """W (n, 3), S (n, 3) and the number of rays."""
-    values = {"d_max": 1.0, "falloff": SQRT, "tau": 3.0, "n_rays": 5, "sky": False} | changes
+    values = {"d_max": 1.0, "falloff": SQRT, "tau": 3.0, "n_rays": 5, "coherent": True, "sky": False} | changes
     background = np.float32(values.pop("background", (0, 0, 0)))
     step_x, step_y = lattice_steps(values["n_rays"])
     settings = ObscuranceSettings(**values, step_x=step_x, step_y=step_y, average=AVERAGE, background=background)
