@@ -65,12 +65,13 @@ def _errors(compared: Mapping[Place, Table]) -> str:
 
 
 def _pictures(compared: Mapping[Place, Table], results: Path, site: Site) -> list[str]:
-    """A strip per image: truth, each method, and the difference of the last from the truth."""
+    """A strip per job: truth, each method, and the difference of the last from the truth."""
     parts = [
         "## Pictures",
-        f"Truth, `{'`, `'.join(SHOWN)}`, and `{SHOWN[-1]}` minus truth: grey is none, white the mean.",
+        f"Truth, `{'`, `'.join(SHOWN)}`, and `{SHOWN[-1]}` minus truth: grey is none, white as much as the mean of the"
+        " image.",
     ]
-    for place in compared:
+    for place in {place.job: place for place in compared}.values():  # the last of each job
         shown = results / f"truth-shown-{place.name}.npz"
         if not shown.is_file():
             continue
