@@ -9,11 +9,9 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import TracebackType
-from typing import IO, Self
+from typing import IO, TYPE_CHECKING, Self
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn
-from rich.status import Status
 from rich.text import Text
 
 from framearray_cli.base.errors import OutputError, ReaderGoneError
@@ -24,6 +22,10 @@ from framearray_cli.engine.kernels.cache import kept_kernels, problem
 from framearray_cli.engine.kernels.clock import CompileClock, compile_clock
 
 from .document import REMARKS, document_text, outcome
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+    from rich.status import Status
 
 
 class _Console(Console):
@@ -40,15 +42,16 @@ SECONDS_BETWEEN_LINES = 5.0
 RENDER_KERNELS, INIT_KERNELS = 35, 28  # that the commands compile first; jobs differ by a few
 
 
-class _Left(ProgressColumn):
-    """Print the time left."""
+def _make_bar(console: Console, left: Callable[[], str]) -> "Progress":
+    """Make a bar that vanishes when it ends; `left` words the time left, or gives ""."""
+    from rich import progress  # takes long to import
 
-    def __init__(self, left: Callable[[], float | None]) -> None:
-        super().__init__()
-        self._left = left
+    class Left(progress.ProgressColumn):
+        def render(self, task: progress.Task) -> Text:
+            return Text(left())
 
-    def render(self, task: Task) -> Text:
-        return Text(_left_text(self._left()))
+    columns = progress.TextColumn("{task.description}"), progress.BarColumn(), progress.MofNCompleteColumn(), Left()
+    return progress.Progress(*columns, console=console, transient=True)
 
 
 def _left_text(seconds: float | None) -> str:
@@ -201,9 +204,7 @@ class Screen:
         self._close_bar()
         self._end_wait()
         if self._moving:
-            left = _Left(lambda: self.left() if self.total else None)
-            columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), left)
-            self._bar = Progress(*columns, console=self._console, transient=True)
+            self._bar = _make_bar(self._console, lambda: _left_text(self.left() if self.total else None))
             self._task = self._bar.add_task(label, total=total)
             self._bar.start()
 

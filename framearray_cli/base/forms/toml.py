@@ -2,7 +2,6 @@
 
 import re
 import sys
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +43,8 @@ def load_toml(path: Path) -> dict[str, Any]:
     Raises:
         JobError: the file is missing, not a file, too big, not UTF-8, not TOML or nested too deeply.
     """
+    import tomllib  # of no use to most commands
+
     data = _read_stdin() if path == STDIN else _read_bytes(path)
     path = shown_file(path)
     text = _decode(path, data)
@@ -84,6 +85,8 @@ def parse_value(text: str) -> Any:
     Raises:
         ValueError: the text is no such value.
     """
+    import tomllib  # as above
+
     if long_key_problem(text):
         raise ValueError("too many keys with dots between them")
     try:

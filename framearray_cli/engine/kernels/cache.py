@@ -19,8 +19,6 @@ from typing import Any
 
 from framearray_cli.base.files import reason
 
-from ..embree_c import packet_width
-
 # Folders of earlier states of the source to keep: enough to switch between a few branches.
 KEPT = 3
 # On processors that Linux guards against Downfall, gather instructions take ten times as long.
@@ -49,6 +47,8 @@ def source_digest(package: Path) -> str:
     numba itself keeps kernels apart by its version, Python's version, and the name and instructions of the processor.
     """
     total = hashlib.sha256(b"slow gathers\0" if slow_gathers() else b"")
+    from ..embree_c import packet_width  # loads ctypes
+
     total.update(b"packets of %d\0" % packet_width())
     for file in sorted(package.rglob("*.py")):
         total.update(str(file.relative_to(package)).encode() + b"\0" + file.read_bytes())
