@@ -94,7 +94,7 @@ def absolute(path: Path, job_file: Path | None) -> Path:
     return Path(os.path.realpath(whole.parent)) / path.name
 
 
-COLDEST, HOTTEST = 1000, 40000  # kelvin; below red light alone is left, above nothing changes
+COLDEST, HOTTEST = 1000, 40000  # kelvin; below, only red light is left; above, nothing changes
 
 
 def _colour(value: object) -> tuple[Any, ...]:

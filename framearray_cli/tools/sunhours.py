@@ -43,7 +43,7 @@ def find_sun(manifest: Manifest) -> tuple[ManifestGroup, tuple[SunDay, ...]]:
     """Find the group of the sun, and the days of its positions.
 
     Raises:
-        OutputError: there is no such group, the sun is not alone in it, or a day has one position only.
+        OutputError: there is no such group, the sun is not alone in it, or a day has only one position.
     """
     folder = manifest.directory
     apart = 'render again with a source of type "sun" that has a group of its own, as in group = "sun"'

@@ -13,7 +13,7 @@ from typing import Any
 import numba as nb
 from numba.core import compiler, compiler_machinery, inline_closurecall, ir, untyped_passes
 
-# Parts of numba without type annotations.
+# Parts of numba without type annotations, so mypy ignores that classes derive from them.
 _Compiler: Any = compiler.CompilerBase
 _Builder: Any = compiler.DefaultPassBuilder
 _Inlining: Any = untyped_passes.InlineInlinables
