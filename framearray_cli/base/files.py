@@ -2,7 +2,6 @@
 
 import errno
 import os
-import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -25,7 +24,7 @@ def whole_file(target: Path) -> Iterator[Path]:
     Raises:
         OutputError: the system refused to write; the message names `target` and the reason.
     """
-    part = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
+    part = target.with_name(f".{target.name}.{os.urandom(4).hex()}.part")
     try:
         make_folder(target.parent)
         yield part
@@ -62,7 +61,7 @@ def whole_folder(target: Path, *, replace: bool) -> Iterator[Path]:
 @contextmanager
 def temporary_folder(parent: Path, stem: str) -> Iterator[Path]:
     """Make a hidden folder, and remove it with its contents at the end of the block."""
-    part = parent / f".{stem}{secrets.token_hex(4)}.part"
+    part = parent / f".{stem}{os.urandom(4).hex()}.part"
     try:
         part.mkdir()
         yield part
