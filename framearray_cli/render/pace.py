@@ -15,21 +15,30 @@ from typing import NamedTuple
 
 from framearray_cli.engine.frames.setup import FrameSetup
 
-from .automatic.cost import ADD, EYE_RAY, LOOK_UP, OBSCURANCE_RAY, SHADOW_RAY, STORE, VISIBILITY_RAY
+from .automatic.cost import ADD, EYE_RAY, LOOK_UP, STORE
 
 # Weight of the expected number of busy processors beside the measured one, seconds.
 EXPECTED_SECONDS = 0.1
 # Seconds after which an older measurement of busy processors counts 1 / e: others may use the machine, too.
 MEMORY = 30.0
-# Processor time of composing over that of finding, beyond what the model of `automatic/cost.py` expects: 2.0 to 2.7 in
-# the three jobs.
+# Nanoseconds of processor time per obscurance ray, per shadow ray, and per frame in which a hit is looked for. They
+# are those of today, in the three jobs; the ones of `automatic/cost.py` stay, because they choose settings.
+OBSCURANCE_RAY, SHADOW_RAY, VIEW = 115.0, 21.0, 110.0
+# Processor time of composing, beyond what the model of `automatic/cost.py` expects: 2.0 to 2.7 in the three jobs.
 COMPOSING = 2.2
+# Nanoseconds of weighing by area, per pixel and per hit in it.
+AREA_PIXEL, AREA_HIT = 150.0, 35.0
+# Sums of hits are rounded.
+NEARLY = 1.0 - 1e-9
 # Processor time of writing the layers of a frame, over that of an image, before any were written.
 LAYERS = 4.0
 
 
 class Work(NamedTuple):
-    """An amount of work: native hits to find, planes of frames to compose, images and layers of frames to write."""
+    """An amount of work: native hits to find, planes of frames to compose, images and layers of frames to write.
+
+    Hits count as many times as they cost what one costs that no other frame shares.
+    """
 
     hits: float
     planes: float
@@ -77,20 +86,27 @@ class Expected:
 
 def plane_cost(setup: FrameSetup, n_planes: int) -> float:
     """Return the approximate time of composing one of n planes, over that of finding a hit at their light positions."""
-    return COMPOSING * pixel_cost(setup, n_planes) * setup.n_pixels / hit_cost(setup, n_planes)
+    return pixel_cost(setup, n_planes) * setup.n_pixels / hit_cost(setup, n_planes)
 
 
 def pixel_cost(setup: FrameSetup, n_planes: int) -> float:
     """Return the approximate nanoseconds of composing a pixel of one of n planes."""
     eyes = 2 * setup.n_r + 1
-    return LOOK_UP * eyes / n_planes + ADD * eyes * float(setup.per_pixel.mean()) + STORE
+    hits = eyes * float(setup.per_pixel.mean())
+    weighing = AREA_PIXEL + AREA_HIT * hits if setup.area else 0.0
+    return COMPOSING * (LOOK_UP * eyes / n_planes + ADD * hits + STORE) + weighing / n_planes
 
 
 def hit_cost(setup: FrameSetup, n_lights: int) -> float:
-    """Return the approximate nanoseconds of finding a hit at that many light positions."""
-    views = (4 if setup.balance else 2) * setup.n_r * VISIBILITY_RAY
-    base = EYE_RAY + OBSCURANCE_RAY * setup.obscurance.n_rays + views
-    return base + SHADOW_RAY * n_lights / setup.shadow_step
+    """Return the approximate nanoseconds of finding a hit, at that many light positions, that no other frame shares."""
+    return EYE_RAY + OBSCURANCE_RAY * setup.obscurance.n_rays + SHADOW_RAY * n_lights / setup.shadow_step
+
+
+def eye_work(setup: FrameSetup, c: int) -> float:
+    """Return the native hits of eye c as `Work` counts them; those near the ends of the path are in fewer frames."""
+    others = len(setup.frames_around(c, 2 * setup.n_r if setup.balance else setup.n_r)) - 1
+    each = 1.0 + VIEW * others / hit_cost(setup, setup.lights.n_lights)
+    return each * float(setup.per_pixel[c]) * setup.n_pixels
 
 
 def block_work(setup: FrameSetup, wanted: Sequence[int], *, still: bool = False) -> Work:
@@ -100,7 +116,7 @@ def block_work(setup: FrameSetup, wanted: Sequence[int], *, still: bool = False)
         still: the camera never moves: one frame is composed, and written as that of each camera.
     """
     frames = [0] if still else wanted
-    hits = float(setup.per_pixel[setup.eyes_for(frames)].sum()) * setup.n_pixels
+    hits = sum(eye_work(setup, c) for c in setup.eyes_for(frames))
     return Work(hits, len(frames) * len(setup.kept), len(wanted) * len(setup.kept), len(wanted) * setup.layers)
 
 
@@ -164,7 +180,7 @@ class Pace:
             fading = math.exp(-wall / MEMORY)
             self._recent = Clocks(fading * self._recent.wall + wall, fading * self._recent.cpu + cpu)
             self._seen, recent = now, self._recent
-            if done.hits >= self._work.hits and done.planes >= self._work.planes:  # what is left is writing
+            if done.hits >= self._work.hits * NEARLY and done.planes >= self._work.planes:  # what is left is writing
                 spent += Work(0, 0, max(now.cpu - self._last.cpu, 0.0))
         hit, plane, image, layers = (max(s, 0.0) / d if d > 0 else None for s, d in zip(spent, done, strict=True))
         known = self._expected

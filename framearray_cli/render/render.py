@@ -29,14 +29,14 @@ from .group_sums import group_sums
 from .identity import cells_digest, require_same_cells
 from .manifest import initial_manifest
 from .memory import light_blocks, mirror_share, require_memory
-from .pace import Expected, Pace, block_work, plane_cost, total_work
+from .pace import Expected, Pace, block_work, eye_work, plane_cost, total_work
 from .pilots.warn import find_warnings
 from .prepare import Prepared, image_ambient, plan_work
 from .progress import RenderEvents
 from .session import RenderSession, complete_manifest, open_session
 from .summary import Summary, summarize, with_summary
 from .target.pilot import allot_hits
-from .trial import AnyImage, eye_hits, load_kernels, writing_cost
+from .trial import AnyImage, load_kernels, writing_cost
 from .writer import ArrayTarget, ArrayWriter, FinishedFiles, array_target
 
 
@@ -139,7 +139,7 @@ def _render_block(run: "_Run", setup: FrameSetup, ambient: Ambient, lights: rang
         i_a = i_a.for_lights(lights)
     with run.open_pool(setup) as pool, run.open_writer(target, lights) as writer:
         window = Window(setup, i_a, pool)
-        for j in ready_frames(window, setup, [0] if still else wanted, pool, lambda c: run.found(eye_hits(setup, c))):
+        for j in ready_frames(window, setup, [0] if still else wanted, pool, lambda c: run.found(eye_work(setup, c))):
             images = writer.block()
             composed = window.compose(j, images)
             if composed.beyond and target.format.half == "auto":  # too bright for halves: some will be floats

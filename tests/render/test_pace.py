@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from framearray_cli.render.pace import Clocks, Expected, Pace, Work, block_work
+from framearray_cli.render.pace import Clocks, Expected, Pace, Work, block_work, eye_work, pixel_cost
 
 # Of a render on two cores that are always busy: processor seconds of the hits of an eye, of a frame and of its images.
 EYE, FRAME, IMAGES = 4.0, 1.0, 3.0
@@ -137,11 +137,33 @@ def test_without_an_expectation_nothing_is_known_before_all_was_measured() -> No
     assert worst(answers[5:], time.wall) < 1.001
 
 
+def setup_of(n: int, **values: Any) -> Any:
+    """A setup of n eyes, as far as the work needs it."""
+    usual = {
+        "per_pixel": np.full(n, 2.0), "n_pixels": 100, "kept": range(3), "layers": True, "balance": False, "n_r": 1,
+        "obscurance": SimpleNamespace(n_rays=1), "lights": SimpleNamespace(n_lights=3), "shadow_step": 1, "area": False,
+        "eyes_for": lambda wanted: sorted({c for j in wanted for c in range(max(j - 1, 0), min(j + 1, n - 1) + 1)}),
+        "frames_around": lambda c, reach: range(max(c - reach, 0), min(c + reach, n - 1) + 1),
+    }  # fmt: skip
+    return SimpleNamespace(**usual | values)
+
+
 def test_the_work_of_a_resumed_render_is_that_of_the_missing_frames() -> None:
-    setup: Any = SimpleNamespace(
-        per_pixel=np.array([2.0, 2, 2, 2, 2, 4]), n_pixels=100, kept=range(3), layers=True,
-        eyes_for=lambda wanted: sorted({c for j in wanted for c in range(max(j - 1, 0), min(j + 1, 5) + 1)}),
-    )  # fmt: skip
+    setup = setup_of(6, per_pixel=np.array([2.0, 2, 2, 2, 2, 4]), frames_around=lambda c, reach: range(1))
     assert block_work(setup, range(6)) == Work(1400, 18, 18, 6)
     assert block_work(setup, [4]) == Work(800, 3, 3, 1)
     assert block_work(setup, range(6), still=True) == Work(400, 3, 18, 6)
+
+
+def test_hits_that_more_frames_share_are_more_work() -> None:
+    balance, average = setup_of(9, balance=True), setup_of(9)
+    cost = [eye_work(balance, c) / 200 - 1 for c in range(9)]
+    assert cost == pytest.approx(np.multiply(cost[0], [1, 1.5, 2, 2, 2, 2, 2, 1.5, 1]))
+    assert eye_work(average, 4) == pytest.approx(eye_work(balance, 0)) == pytest.approx(eye_work(setup_of(3), 1))
+    assert block_work(balance, range(9)).hits == pytest.approx(sum(eye_work(balance, c) for c in range(9)))
+
+
+def test_weighing_by_area_is_part_of_composing_and_shared_by_the_planes() -> None:
+    plain, area = setup_of(9), setup_of(9, area=True)
+    more = [n * (pixel_cost(area, n) - pixel_cost(plain, n)) for n in (1, 10)]
+    assert more == pytest.approx([more[0]] * 2) and more[0] > 0
