@@ -33,7 +33,7 @@ class ReportOptions:
 
     Attributes:
         cameras, lights: probe images; if empty, the report chooses a few.
-        vary: values to try by the job file's key.
+        vary: values to try by the job file's key; `only`: no other key is changed.
         errors: each RMSE to find the cheapest settings for; if empty, the job's own, half of it and twice as much.
         times: samples of a reference over those of a picture.
     """
@@ -41,6 +41,7 @@ class ReportOptions:
     cameras: Sequence[int] = ()
     lights: Sequence[int] = ()
     vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    only: bool = False
     errors: Sequence[float] = ()
     times: float = TIMES
 
@@ -114,7 +115,8 @@ def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEv
         events.opened(case)
         still, n_l = case.prepared.still, case.prepared.n_lights
         chosen = choose_probes(case.setup.n_frames, n_l, options.cameras, options.lights, file=job.file or job.name)
-        tried = settings_to_try(case.settings, 1 if still else case.setup.n_frames, options.vary)
+        n_cameras = 1 if still else case.setup.n_frames
+        tried = settings_to_try(case.settings, n_cameras, options.vary, only=options.only)
         frames = [c for run in chosen.cameras for c in run]
         events.planned(len(frames), len(tried))
         passes = passes_for(options.times, case.settings.window_hits)

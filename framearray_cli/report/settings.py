@@ -103,13 +103,16 @@ class NamedSettings:
 LIGHT_REUSE, SCRATCH = "light reuse only", "from scratch"
 
 
-def settings_to_try(base: Settings, n_cameras: int, vary: Mapping[str, Sequence[Any]]) -> list[NamedSettings]:
+def settings_to_try(
+    base: Settings, n_cameras: int, vary: Mapping[str, Sequence[Any]], *, only: bool = False
+) -> list[NamedSettings]:
     """List the settings that a report tests: the job's own, one setting changed at a time, and the baselines.
 
     Args:
         base: the job's.
         n_cameras: N_c; a window is no longer than the path.
         vary: values by the job file's key, in place of the default ones.
+        only: change no other key.
     """
     found = [NamedSettings(name="as the job says", family="job", settings=base)]
     longest = (n_cameras - 1) // 2
@@ -121,13 +124,13 @@ def settings_to_try(base: Settings, n_cameras: int, vary: Mapping[str, Sequence[
         "samples.shadow_step": (1, 2, 4, 8),
         "denoise.obscurance": (False, True) if find_spec("pyoidn") else (False,),
     }
-    for key, values in {**default_values, **vary}.items():
+    for key, values in (vary if only else {**default_values, **vary}).items():
         for value in values:
             changed = replace(base, **{KEYS[key]: value})
             if changed.n_r <= longest and changed != base:
                 found.append(NamedSettings(name=f"{KEYS[key]} {_format_value(value)}", family=key, settings=changed))
     for hits, n_r in ((base.hits / 2, 2 * base.n_r + 1), (base.hits / 4, 4 * base.n_r + 2)):
-        if base.n_r and n_r <= longest and hits >= FEWEST_HITS:
+        if base.n_r and n_r <= longest and hits >= FEWEST_HITS and not only:
             wide = replace(base, hits=hits, n_r=n_r)
             found.append(NamedSettings(name=f"hits {hits:g}, n_r {n_r}", family="hits for n_r", settings=wide))
     return [*found, *baselines(base)]

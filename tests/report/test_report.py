@@ -75,6 +75,13 @@ def test_values_that_no_job_may_have_are_refused(option: str, words: str) -> Non
     assert words in str(caught.value) and str(caught.value).startswith("--vary: ")
 
 
+def test_only_the_values_that_were_asked_for() -> None:
+    tried = settings_to_try(BASE, 41, {"reuse.weights": ["average", "area"]}, only=True)
+    others = [one for one in tried if one.family not in {"job", LIGHT_REUSE, SCRATCH}]
+    assert {one.settings.weights for one in others} == {"average", "area"} - {BASE.weights}
+    assert tried[0].settings == BASE and {LIGHT_REUSE, SCRATCH} <= {one.family for one in tried}
+
+
 def test_default_settings_to_try() -> None:
     tried = settings_to_try(BASE, 41, {})
     assert tried[0].settings == BASE

@@ -40,6 +40,7 @@ Vary = Annotated[
         "--vary", help="Values of a setting to try: samples.hits=1,2,4; may be repeated.", metavar="KEY=VALUES"
     ),
 ]
+Only = Annotated[bool, typer.Option("--only", help="Change only the keys of --vary.")]
 Errors = Annotated[
     list[float] | None,
     typer.Option(
@@ -61,6 +62,7 @@ def report(
     cameras: Cameras = None,
     light: Lights = None,
     vary: Vary = None,
+    only: Only = False,
     error: Errors = None,
     times: Times = 100.0,
     threads: Threads = None,
@@ -90,6 +92,7 @@ def report(
             cameras=_indices("--cameras", cameras, job.camera.frames),
             lights=_indices("--light", light, job.light.frames, MAIN_AXIS),
             vary=dict(reporting.read_vary(option, job) for option in vary or ()),
+            only=only,
             errors=error or (),
             times=times,
         )
