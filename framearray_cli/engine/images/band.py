@@ -16,8 +16,21 @@ from numpy.typing import NDArray
 from framearray_cli.base.arrays import Addresses, Float32, Images, Int32, Real, Rgb, with_room
 
 from ..frames.records import INDIRECT, LIGHT_INDEPENDENT
-from ..kernels.kernel import kernel
-from ..kernels.simd import LANES, compress, gather, lane_numbers, store, stored
+from ..kernels.kernel import inlined, kernel
+from ..kernels.simd import (
+    LANES,
+    bits,
+    compress,
+    gather,
+    lane_numbers,
+    load,
+    popcount,
+    product,
+    select,
+    store,
+    store_columns,
+    stored,
+)
 
 # Images as they are stored: float32, or the bits of halves; (n_lights, n_pixels, 3).
 Stored: TypeAlias = Float32 | NDArray[np.uint16]
@@ -51,8 +64,8 @@ class Finish(NamedTuple):
     """How sums become radiance.
 
     Attributes:
-        colour: (3, n_lights) the unit of direct sums.
-        ambient: (3, n_lights) I_A[l], radiance.
+        colour: (3, n_lights) the unit of direct sums, with room behind.
+        ambient: (3, n_lights) I_A[l], radiance, with room behind.
         light_independent_from: the first plane whose images include B.
         lowest: the least valid value: 0, or minus infinity where estimates may be negative.
     """
@@ -97,56 +110,74 @@ def finish(band: Band, first_pixel: int, n: int, how: Finish, images: Stored) ->
         number of values beyond the largest half.
     """
     # --- loop state ---
-    colour, ambient, light_independent_from, lowest = how
     n_lights, sums = images.shape[0], band.direct  # sums: direct light, and then radiance
     bad, bad_light, bad_pixel = 0, -1, -1  # invalid values; light position and pixel of the first
     beyond = 0  # values beyond the largest half
 
-    for i in range(n):
-        for channel in range(3):
-            # 1. Radiance under each l: colour[l] sum(w R / pi E[l]) + I_A[l] R W, and B for light-independent planes.
-            indirect, light_independent = band.sums[i, INDIRECT + channel], band.sums[i, LIGHT_INDEPENDENT + channel]
-            wrong = large = 0  # invalid values, and values beyond the largest half, of this pixel and channel
-            for part in range(2):
-                first, end, rest = (
-                    (0, light_independent_from, np.float32(0.0))
-                    if part == 0
-                    else (light_independent_from, n_lights, light_independent)
-                )
-                for l in range(first, end):
-                    value = colour[channel, l] * sums[i, channel, l] + ambient[channel, l] * indirect + rest
-                    wrong += not (value >= lowest and abs(value) < np.inf)
-                    large += HALF_MAX < abs(value) < np.inf
-                    sums[i, channel, l] = value
-            beyond += large
+    for block in range(0, n, LANES):
+        # 1. Radiance of some pixels. Blacken and count invalid values; they are rare.
+        m = min(LANES, n - block)
+        for i in range(block, block + m):
+            for channel in range(3):
+                wrong, large = _radiance(band, i, channel, n_lights, how)
+                beyond += large
+                for l in range(n_lights if wrong else 0):
+                    if not (sums[i, channel, l] >= how.lowest and abs(sums[i, channel, l]) < np.inf):
+                        sums[i, channel, l] = 0.0
+                        if bad == 0:
+                            bad_light, bad_pixel = l, first_pixel + i
+                        bad += 1
 
-            # 2. Blacken and count invalid values; rare, so that the loop above stays free of jumps.
-            for l in range(n_lights if wrong else 0):
-                if not (sums[i, channel, l] >= lowest and abs(sums[i, channel, l]) < np.inf):
-                    sums[i, channel, l] = 0.0
-                    if bad == 0:
-                        bad_light, bad_pixel = l, first_pixel + i
-                    bad += 1
-
-    # 3. From all lights of a pixel to all pixels of a light.
-    transpose(sums, 3 * n, images, 3 * first_pixel)
+        # 2. From all lights of a pixel to all pixels of a light.
+        _write_columns(sums, 3 * block, 3 * m, images, 3 * first_pixel)
     return bad, bad_light, bad_pixel, beyond
 
 
-@kernel
-def transpose(sums: Float32, n: int, images: Stored, first: int) -> None:
-    """Write n values (pixel, channel) of each light: in `sums` lights are neighbours, in `images` values.
+@inlined
+def _radiance(band: Band, i: int, channel: int, n_lights: int, how: Finish) -> tuple[bool, int]:
+    """Make radiance of the direct sums of a channel of pixel i: colour[l] sum(w R / pi E[l]) + I_A[l] R W, and B.
+
+    Returns:
+        whether any value is invalid, and the number of values beyond the largest half.
+    """
+    # --- loop state ---
+    wrong = 0  # bits of lanes with invalid values
+    large = 0  # values beyond the largest half
+    nothing, most = np.float32(0.0), np.float32(np.inf)
+    indirect, light_independent = band.sums[i, INDIRECT + channel], band.sums[i, LIGHT_INDEPENDENT + channel]
+    for l in range(0, n_lights, LANES):
+        at, of_light = (3 * i + channel) * band.direct.shape[2] + l, channel * n_lights + l
+        rest = select(lane_numbers() < np.int32(how.light_independent_from - l), nothing, light_independent)
+        value = product(load(how.colour, of_light), load(band.direct, at)) + product(
+            load(how.ambient, of_light), indirect
+        )
+        value = value + rest
+        store(band.direct, at, value)
+        size = select(value < nothing, -value, value)
+        counts = lane_numbers() < np.int32(n_lights - l)
+        wrong |= bits(counts & ~((value >= how.lowest) & (size < most)))
+        large += popcount(counts & (size > HALF_MAX) & (size < most))
+    return wrong != 0, large
+
+
+@inlined
+def _write_columns(sums: Float32, first: int, n: int, images: Stored, first_value: int) -> None:
+    """Write rows first to first + n - 1 of the band, values (pixel, channel), into the images of all lights.
 
     Args:
         sums: (n_pixels, 3, n_lights or more).
-        images: (n_lights, n_pixels, 3), overwritten from value `first` on.
+        images: (n_lights, n_pixels, 3), overwritten; row 0 of the band is value `first_value`.
     """
-    n_lights, row, stride = images.shape[0], images.shape[1] * images.shape[2], sums.shape[2]
-    step = lane_numbers() * np.int32(stride)
-    for block in range(0, n, LANES):
+    n_lights, length, stride = images.shape[0], images.shape[1] * images.shape[2], sums.shape[2]
+    for row in range(first, first + n, LANES):
+        if row + LANES <= first + n:
+            for l in range(0, n_lights, LANES):
+                to = l * length + first_value + row
+                store_columns(sums, row * stride + l, stride, n_lights - l, images, to, length)
+            continue
+        # the last rows of all
+        lane = lane_numbers()
+        counts = lane < np.int32(first + n - row)
         for l in range(n_lights):
-            values = stored(images, gather(sums, step + np.int32(block * stride + l)))
-            if block + LANES <= n:
-                store(images, l * row + first + block, values)
-            else:
-                compress(lane_numbers() < np.int32(n - block), values, images, l * row + first + block)
+            place = select(counts, lane, np.int32(0)) * np.int32(stride) + np.int32(row * stride + l)
+            compress(counts, stored(images, gather(sums, place)), images, l * length + first_value + row)

@@ -12,7 +12,7 @@ from time import perf_counter
 
 import numpy as np
 
-from framearray_cli.base.arrays import Addresses, Flags, Float32, Images, Int32, Rgb
+from framearray_cli.base.arrays import Addresses, Flags, Float32, Images, Int32, Rgb, with_room
 
 from ..frames.frame import FrameHits, fill_holes
 from ..frames.records import BY_SAMPLE, INDIRECT, REFLECTIVITY, HitRecords, HitsByPixel
@@ -83,12 +83,14 @@ class Window:
     def _by_channel(self, values: Rgb) -> Rgb:
         """Values of the kept lights, (3, n_kept) as the sums, from those of all lights, (n_lights, 3)."""
         kept = self._setup.kept
-        return np.ascontiguousarray(values[kept.start : kept.stop].T)
+        found: Rgb = with_room((3, len(kept)), np.float32, fill=0)
+        found[:] = values[kept.start : kept.stop].T
+        return found
 
     def _ambient(self, ambient: Ambient) -> Rgb:
         """I_A of the kept lights, (3, n_kept); 0 where cells take its place."""
-        intensity = self._by_channel(ambient.intensity)
-        return intensity if self._setup.cells is None else np.zeros_like(intensity)
+        intensity = ambient.intensity
+        return self._by_channel(intensity if self._setup.cells is None else np.zeros_like(intensity))
 
     @contextmanager
     def _band(self) -> Iterator[Band]:

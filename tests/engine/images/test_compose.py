@@ -148,13 +148,18 @@ def test_a_list_of_sources_refuses_what_kernels_would_misread(column: str) -> No
 def lights() -> tuple[Any, Any]:
     """Colour and ambient radiance, (3, n_lights)."""
     rng = np.random.default_rng(9)
-    return rng.random((3, N_LIGHTS)).astype(np.float32), rng.random((3, N_LIGHTS)).astype(np.float32)
+    found = [with_room((3, N_LIGHTS), np.float32) for _ in range(2)]
+    for values in found:
+        values[:] = rng.random((3, N_LIGHTS))
+    return found[0], found[1]
 
 
 def composed(
     case: Case, bands: Any = ((0, N_PIXELS),), dtype: Any = np.float32, brightness: float = 1.0
 ) -> tuple[Any, list[tuple[int, int, int, int]]]:
-    colour, ambient = (np.float32(brightness) * values for values in lights())
+    colour, ambient = lights()
+    for values in (colour, ambient):
+        values *= np.float32(brightness)
     images, bad = np.full((N_LIGHTS, N_PIXELS, 3), np.nan, dtype), []
     band = empty_band(N_PIXELS, N_LIGHTS)
     for first, n in bands:

@@ -10,6 +10,7 @@ Two things differ from single numbers. LLVM may fuse sums and products (one roun
 int32 as bits, without the sign. Operands that do not fit together raise a typing error.
 """
 
+from .append import append
 from .arithmetic import (
     bits,
     ctz,
@@ -17,20 +18,24 @@ from .arithmetic import (
     floor,
     integers,
     lane_numbers,
+    largest_of_lanes,
     popcount,
+    product,
     reals,
     select,
     sqrt,
     sum_of_lanes,
     words,
 )
-from .memory import compress, gather, lanes_from, load, put_triples, scatter, store, stored, triples_at
+from .memory import compress, gather, lanes_from, load, put_triples, scatter, store, triples_at
 from .rows import load_row, store_row, width_of_packets
+from .stored import store_columns, stored
 from .types import LANES, Lanes
 
 __all__ = [
     "LANES",
     "Lanes",
+    "append",
     "bits",
     "compress",
     "ctz",
@@ -40,15 +45,18 @@ __all__ = [
     "integers",
     "lane_numbers",
     "lanes_from",
+    "largest_of_lanes",
     "load",
     "load_row",
     "popcount",
+    "product",
     "put_triples",
     "reals",
     "scatter",
     "select",
     "sqrt",
     "store",
+    "store_columns",
     "store_row",
     "stored",
     "sum_of_lanes",

@@ -88,6 +88,17 @@ for _sign, _compare in (
     _operator(_compare, _compared(_sign), (*REAL, *WHOLE), flags=True)
 
 
+def _product_of(typingctx: Any, a: Any, b: Any) -> Any:
+    """The product of lanes of reals and lanes or a number, rounded even where it is added to something."""
+    if not isinstance(a, Lanes) or a.dtype not in REAL or not (b == a or takes(a, b)):
+        return None
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.fmul(args[0], context.cast(builder, args[1], sig.args[1], sig.args[0]))
+
+    return a(a, b), codegen
+
+
 def _popcount_of(typingctx: Any, flags: Any) -> Any:
     """Count the lanes that are flagged; a single flag counts 0 or 1."""
     if flags not in (FLAGS, types.boolean):
@@ -140,19 +151,24 @@ def _select_of(typingctx: Any, flags: Any, yes: Any, no: Any) -> Any:
     return lanes(flags, yes, no), codegen
 
 
-def _sum_of_lanes_of(typingctx: Any, value: Any) -> Any:
-    """The sum of all 16 float32 numbers, in pairs: lane 0 and 8, then those sums likewise."""
-    if value != Lanes(types.float32):
-        return None
+def _across(combine: Callable[..., Any]) -> Callable[..., Any]:
+    """A float32 number of all 16, combined in pairs: lane 0 and 8, then those results likewise."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        lanes, undefined = args[0], ir.Constant(args[0].type, ir.Undefined)
-        for step in (8, 4, 2, 1):
-            mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [(lane + step) % LANES for lane in range(LANES)])
-            lanes = builder.fadd(lanes, builder.shuffle_vector(lanes, undefined, mask))
-        return builder.extract_element(lanes, ir.IntType(32)(0))
+    def of(typingctx: Any, value: Any) -> Any:
+        if value != Lanes(types.float32):
+            return None
 
-    return types.float32(value), codegen
+        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            lanes, undefined = args[0], ir.Constant(args[0].type, ir.Undefined)
+            for step in (8, 4, 2, 1):
+                order = [(lane + step) % LANES for lane in range(LANES)]
+                mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), order)
+                lanes = combine(builder, lanes, builder.shuffle_vector(lanes, undefined, mask))
+            return builder.extract_element(lanes, ir.IntType(32)(0))
+
+        return types.float32(value), codegen
+
+    return of
 
 
 def _function(name: str) -> Callable[..., Any]:
@@ -210,6 +226,7 @@ def _lane_numbers_of(typingctx: Any) -> Any:
     return INTEGERS(), codegen
 
 
+product: Any = intrinsic(_product_of)
 popcount: Any = intrinsic(_popcount_of)
 bits: Any = intrinsic(_bits_of)
 ctz: Any = intrinsic(_ctz_of)
@@ -220,5 +237,6 @@ reals: Any = intrinsic(_converted(types.float32))
 doubles: Any = intrinsic(_converted(types.float64))
 integers: Any = intrinsic(_converted(types.int32))
 words: Any = intrinsic(_converted(types.uint64))
-sum_of_lanes: Any = intrinsic(_sum_of_lanes_of)
+sum_of_lanes: Any = intrinsic(_across(lambda builder, a, b: builder.fadd(a, b)))
+largest_of_lanes: Any = intrinsic(_across(lambda builder, a, b: builder.select(builder.fcmp_ordered(">", a, b), a, b)))
 lane_numbers: Any = intrinsic(_lane_numbers_of)

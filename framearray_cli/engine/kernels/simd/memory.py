@@ -13,7 +13,6 @@ from numba.extending import intrinsic
 from ..cache import slow_gathers
 from .types import ELEMENTS, FLAGS, INTEGERS, LANES, SUFFIX, WORD, Lanes, declared, takes, vector_of
 
-_LARGEST_HALF = 0x477FE000  # 65504 as the bits of a float32
 _Tuple: Any = types.UniTuple  # numba does not annotate it
 
 
@@ -69,43 +68,6 @@ def _store_of(typingctx: Any, array: Any, offset: Any, value: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(array, offset, value), codegen
-
-
-def _stored_of(typingctx: Any, array: Any, value: Any) -> Any:
-    """Convert float32 numbers to what an array stores: themselves, or for uint16 the bits of halves.
-
-    Rounds to the nearest half, ties to even; numbers beyond the largest half become the largest.
-    """
-    if not isinstance(array, types.Array) or value != Lanes(types.float32):
-        return None
-    if array.dtype == types.float32:
-        return value(array, value), lambda context, builder, sig, args: args[1]
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        kind, reals = vector_of(INTEGERS), vector_of(sig.args[1])
-
-        def number(x: int) -> Any:
-            return ir.Constant(kind, [x] * LANES)
-
-        # split off the sign, and cut the size to the largest half
-        bits = builder.bitcast(args[1], kind)
-        sign = builder.and_(bits, number(-(1 << 31)))
-        size = builder.xor(bits, sign)
-        size = builder.select(builder.icmp_signed("<", size, number(_LARGEST_HALF)), size, number(_LARGEST_HALF))
-        # subnormal halves: next to this number a step of float32 is the smallest half, so adding it rounds
-        coarse = number((127 - 15 + 23 - 10 + 1) << 23)
-        small = builder.fadd(builder.bitcast(size, reals), builder.bitcast(coarse, reals))
-        small = builder.sub(builder.bitcast(small, kind), coarse)
-        # normal halves: change the bias of the exponent, and drop 13 bits, rounding to even
-        odd = builder.and_(builder.lshr(size, number(13)), number(1))
-        normal = builder.add(builder.add(size, number(((15 - 127) << 23) + 0xFFF)), odd)
-        normal = builder.lshr(normal, number(13))
-        # 2^-14 is the smallest normal half
-        half = builder.select(builder.icmp_signed("<", size, number(113 << 23)), small, normal)
-        half = builder.or_(half, builder.lshr(sign, number(16)))
-        return builder.trunc(half, vector_of(Lanes(types.uint16)))
-
-    return Lanes(types.uint16)(array, value), codegen
 
 
 def _gather_of(typingctx: Any, array: Any, offsets: Any) -> Any:
@@ -230,7 +192,6 @@ def _compress_of(typingctx: Any, flags: Any, value: Any, array: Any, offset: Any
 load: Any = intrinsic(_load_of)
 lanes_from: Any = intrinsic(_lanes_from_of)
 store: Any = intrinsic(_store_of)
-stored: Any = intrinsic(_stored_of)
 gather: Any = intrinsic(_gather_of)
 triples_at: Any = intrinsic(_triples_at_of)
 put_triples: Any = intrinsic(_put_triples_of)
