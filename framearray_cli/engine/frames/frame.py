@@ -224,7 +224,9 @@ def _find_outer(
             of_pixel, hits = setup.allotment.blocks.of_pixel, setup.allotment.hits
             scale_by_expected_hits(hits, of_pixel, eyes.start, n, seen, density)
             per_pixel = np.ones_like(per_pixel)
-        balance_weights(per_pixel, setup.n_r, eyes.start, frames.start, n, seen, density, weight)
+        found = scratch.weight[: len(frames)]
+        balance_weights(per_pixel, setup.n_r, eyes.start, frames.start, n, seen, density, found)
+        weight[:] = found[:, :n]
         if setup.allotment is not None:
             divide_by_own_hits(hits, of_pixel, frames.start, n, pixel, weight)
     _find_within(setup, n, scratch, frames, seen[first_row : first_row + len(frames)], within)

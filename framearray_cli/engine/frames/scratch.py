@@ -24,6 +24,7 @@ class Scratch:
         steps: see `terms/direct_steps.py`; None without shadow steps.
         irradiance: of all lights, where only some are kept; else empty.
         pixel, density: (4 N_r + 1, batch) of the eyes around, see `outer_hits`.
+        weight: (2 N_r + 1, batch) of hits in the frames around.
         place: (2 N_r + 1, batch) where hits lie in their pixels of the frames around, see `find_places`.
         obscurance, skylight: (batch, 3) W and S.
         gather: of gather rays, and `constant`: (batch, 3) the light that cells have at every light position; None and
@@ -45,6 +46,7 @@ class Scratch:
         self.pixel = np.empty((n_eyes, batch), np.int32)
         self.place = np.empty((2 * setup.n_r + 1, batch if setup.area else 0), np.int32)
         self.density = np.empty((n_eyes, batch if setup.balance else 0), np.float64)
+        self.weight = np.empty((2 * setup.n_r + 1, batch if setup.balance else 0), np.float32)
         self.obscurance = np.empty((batch, 3), np.float32)
         self.skylight = np.empty((batch if setup.obscurance.sky else 0, 3), np.float32)
         self.gather = room_for_gathering(rays) if setup.cells is not None else None

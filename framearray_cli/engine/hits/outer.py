@@ -17,17 +17,23 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Int32, Real
 
-from ..embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, is_blocked, occlude, room_in
+from ..embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, occlude, room_in
 from ..inputs.cameras import OUTSIDE, Cameras, project_to_pixel
 from ..kernels.kernel import inlined, kernel, step
 from ..kernels.simd import (
     LANES,
+    append,
+    bits,
     compress,
+    ctz,
     doubles,
     gather,
     lane_numbers,
     load,
+    load_row,
     popcount,
+    product,
+    reals,
     select,
     store,
     store_row,
@@ -112,12 +118,16 @@ def _drop_hidden(
         return
     _write_visibility_rays(cams, first_eye, hits, pixel.shape[1], rays, n)
     occlude(tracer, rays.packets, n, True)
+    nothing = np.float32(0.0)
     flat_pixel, flat_density = pixel.reshape(pixel.size), density.reshape(density.size)
-    for ray in range(n):
-        if is_blocked(rays.packets, ray):
-            flat_pixel[rays.place[ray]] = OUTSIDE
+    for first in range(0, n, LANES):
+        hidden = bits((load_row(rays.packets, first, TFAR) < nothing) & (lane_numbers() < np.int32(n - first)))
+        while hidden != 0:
+            place = rays.place[first + ctz(hidden)]
+            hidden &= hidden - 1
+            flat_pixel[place] = OUTSIDE
             if density.size > 0:
-                flat_density[rays.place[ray]] = 0.0
+                flat_density[place] = 0.0
     for first in range(0, n, LANES):  # shadow rays use the same packets, and start at 0
         store_row(rays.packets, first, TNEAR, np.float32(0.0))
 
@@ -168,7 +178,7 @@ def outer_hits(
                 if waiting > capacity - LANES:
                     _drop_hidden(cams, first_eye, hits, tracer, rays, waiting, pixel, density)
                     total, waiting = total + waiting, 0
-                compress(wanted, lane_numbers() + np.int32(row * stride + i), rays.place, waiting)
+                append(wanted, lane_numbers() + np.int32(row * stride + i), rays.place, waiting)
                 store(rays.number, waiting, np.int32(row))
                 waiting += popcount(wanted)
     _drop_hidden(cams, first_eye, hits, tracer, rays, waiting, pixel, density)
@@ -193,19 +203,21 @@ def balance_weights(
         pixel, density: (n_eyes, >= n) from `outer_hits`, for all eyes of the windows of all frames of `weight`.
         weight: (n_frames, >= n) overwritten; row r is frame first_frame + r; 0 where the frame does not see the hit.
     """
-    last_eye = first_eye + pixel.shape[0] - 1
+    last_eye, stride = first_eye + pixel.shape[0] - 1, density.shape[1]
     for row in range(weight.shape[0]):
         j = first_frame + row
-        for i in range(n):
-            # frame j does not see hit i
-            weight[row, i] = 0.0
-            if pixel[j - first_eye, i] == OUTSIDE:
-                continue
+        own = j - first_eye
+        for i in range(0, n, LANES):
             # w = p_j / sum of n_k p_k over the window of j
-            total = 0.0  # the sum so far
+            total = doubles(lane_numbers()) * 0.0
             for k in range(max(j - n_r, first_eye), min(j + n_r, last_eye) + 1):
-                total += per_pixel[k] * density[k - first_eye, i]
-            weight[row, i] = density[j - first_eye, i] / total
+                total = total + product(load(density, (k - first_eye) * stride + i), per_pixel[k])
+            seen = load(pixel, own * pixel.shape[1] + i) >= np.int32(0)
+            w = select(seen, reals(load(density, own * stride + i) / total), np.float32(0.0))
+            if i + LANES <= n:
+                store(weight, row * weight.shape[1] + i, w)
+            else:
+                compress(lane_numbers() < np.int32(n - i), w, weight, row * weight.shape[1] + i)
 
 
 @kernel

@@ -18,8 +18,8 @@ from ..inputs.shapes import vector_and_factor
 from ..kernels.kernel import inlined, kernel, step
 from ..kernels.simd import (
     LANES,
+    append,
     bits,
-    compress,
     ctz,
     lane_numbers,
     load,
@@ -128,16 +128,16 @@ def _trace_queue(tracer: Tracer, rays: Rays, n: int, irradiance: Float32) -> Non
             store_row(rays.packets, first, DIRECTION + axis, load(rays.row, (TO + axis) * room + first))
         store_row(rays.packets, first, TFAR, load(rays.row, REACH * room + first))
     occlude(tracer, rays.packets, n, True)
-    # add to E_direct; blocked rays add 0
+    # add to E_direct what rays carry that nothing blocks; idle lanes count as blocked
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]
     flat = irradiance.reshape(irradiance.size)
-    for channel in range(channels):
-        for first in range(0, n, LANES):
-            blocked = load_row(rays.packets, first, TFAR) < np.float32(0.0)
-            at = channel * rays.value.shape[1] + first
-            store(rays.value, at, select(blocked, np.float32(0.0), load(rays.value, at)))
-        for ray in range(n):
-            flat[rays.place[ray] + channel * n_lights] += rays.value[channel, ray]
+    for first in range(0, n, LANES):
+        arrived = bits(~(load_row(rays.packets, first, TFAR) < np.float32(0.0)))
+        while arrived != 0:
+            ray = first + ctz(arrived)
+            arrived &= arrived - 1
+            for channel in range(channels):
+                flat[rays.place[ray] + channel * n_lights] += rays.value[channel, ray]
 
 
 @inlined
@@ -161,20 +161,22 @@ def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, ray
                     _trace_queue(tracer, rays, waiting, irradiance)
                     total, waiting = total + waiting, 0
                 # cos(theta) / d^2 of source s at light position l
-                a, lit = lights.vector, lights.lit[s, l]
-                x, y, z, factor = vector_and_factor(lights, s, a[s, 0, l], a[s, 1, l], a[s, 2, l], p, g, m, lit)
+                a, shines = lights.vector, lights.lit[s, l]
+                x, y, z, factor = vector_and_factor(lights, s, a[s, 0, l], a[s, 1, l], a[s, 2, l], p, g, m, shines)
                 # queue the rays of hits that the source may reach
                 traced = wanted & (factor > np.float32(0.0))
+                if bits(traced) == 0:
+                    continue
                 to, from_point = (x, y, z), np.float32(0.0 if lights.kind[s] == DIRECTIONAL else 1.0)
                 for axis in range(3):
-                    compress(traced, p[axis] + up[axis], row, (FROM + axis) * room + waiting)
-                    compress(traced, to[axis] - from_point * up[axis], row, (TO + axis) * room + waiting)
+                    append(traced, p[axis] + up[axis], row, (FROM + axis) * room + waiting)
+                    append(traced, to[axis] - from_point * up[axis], row, (TO + axis) * room + waiting)
                 store(row, REACH * room + waiting, np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END)
                 # with the irradiance that each carries
-                compress(traced, at * np.int32(channels * n_lights) + np.int32(l), rays.place, waiting)
+                append(traced, at * np.int32(channels * n_lights) + np.int32(l), rays.place, waiting)
                 for channel in range(channels):
                     strength = lights.strength[s, channel, l]
-                    compress(traced, factor * strength, rays.value, channel * rays.value.shape[1] + waiting)
+                    append(traced, factor * strength, rays.value, channel * rays.value.shape[1] + waiting)
                 waiting += popcount(traced)
     _trace_queue(tracer, rays, waiting, irradiance)
     return total + waiting

@@ -30,7 +30,7 @@ from ..inputs.surfaces import Surfaces, total_at
 from ..kernels.kernel import kernel, step
 from ..kernels.simd import (
     LANES,
-    compress,
+    append,
     gather,
     integers,
     lane_numbers,
@@ -89,7 +89,7 @@ def evaluate_rays(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int, settin
         # list the rays whose R(Q) depends on the place; rho = 0 needs no R(Q)
         if settings.falloff != CONSTANT:
             changing = within & (gather(surfaces.plain, material) == np.uint8(0))
-            compress(changing, lane_numbers() + np.int32(first), rays.number, varied)
+            append(changing, lane_numbers() + np.int32(first), rays.number, varied)
             varied += popcount(changing)
     return varied
 
@@ -220,7 +220,7 @@ def obscurance(
     for first in range(0, n, LANES):
         # list the hits that reflect
         wanted = reflects_in_lanes(hits, first, n)
-        compress(wanted, lane_numbers() + np.int32(first), rays.place, waiting)
+        append(wanted, lane_numbers() + np.int32(first), rays.place, waiting)
         waiting += popcount(wanted)
         # trace a full list, and move what is left to its start
         if waiting >= fit:
