@@ -19,7 +19,19 @@ from framearray_cli.base.arrays import Addresses, Bytes, Float32, Int32, with_ro
 from ..frames.records import BY_SAMPLE, HALF
 from ..hits.places import PARTS
 from ..kernels.kernel import byte_at, inlined, integer_at, kernel, real_at
-from ..kernels.simd import LANES, bits, ctz, integers, lane_numbers, load, reals, select, store, sum_of_lanes
+from ..kernels.simd import (
+    LANES,
+    append,
+    integers,
+    lane_numbers,
+    largest_of_lanes,
+    load,
+    popcount,
+    reals,
+    select,
+    store,
+    sum_of_lanes,
+)
 from .accumulate import ROW_BYTES
 from .sources import ORDER, PLACES, ROW, START, WEIGHTS
 
@@ -51,9 +63,9 @@ class AreaRoom(NamedTuple):
         first: (m + 1,) entries of the m pixels from the row above the task's first to the row below its last.
         hit, source, place, balance: (entries,) of the hits of those pixels, by pixel and source: number, source, place
             within its pixel, and balance weight.
-        near, position, share: (entries,) of the hits in and around one pixel: entry, position, and weight
-            in any unit.
-        lanes: (LANES,) positions of a packet of hits.
+        end: (n_sources,) where the next hit of each source is written.
+        near, position, strength, share: (entries,) of the hits in and around one pixel: entry, position, balance
+            weight, and weight in any unit.
         own: (n,) number of hits in each pixel.
         squares: (n,) sum of the squares of the weights in each pixel.
         columns: (POSITIONS, LANES) exp(-x^2 / (2 s^2)) for each column of hits and of the cells of a packet.
@@ -68,10 +80,11 @@ class AreaRoom(NamedTuple):
     source: Int32
     place: Bytes
     balance: Float32
+    end: Int32
     near: Int32
     position: Int32
+    strength: Float32
     share: Float32
-    lanes: Int32
     own: Int32
     squares: Float32
     columns: Float32
@@ -122,17 +135,18 @@ def weigh_by_area(
             total = _share_cells(found, room)
         elif found > 0:
             found, total = own, _keep_own(here, room)
-        # 2. Write them, source by source.
+        # 2. Write them, source by source: what is dropped is overwritten by what follows.
         for s in range(sources.shape[0]):
-            room.start[s, i + 1] = room.start[s, i]
+            room.end[s] = room.start[s, i]
         squares = np.float32(0.0)
         for k in range(found):
-            if room.share[k] > 0.0:
-                entry, w = room.near[k], room.share[k] / total
-                end = room.start[room.source[entry], i + 1]
-                room.order[end], room.weight[end] = room.hit[entry], w
-                room.start[room.source[entry], i + 1] = end + 1
-                squares += w * w
+            entry, w = room.near[k], select(room.share[k] > 0.0, room.share[k] / total, np.float32(0.0))
+            end = room.end[room.source[entry]]
+            room.order[end], room.weight[end] = room.hit[entry], w
+            room.end[room.source[entry]] = end + (w > 0.0)
+            squares += w * w
+        for s in range(sources.shape[0]):
+            room.start[s, i + 1] = room.end[s]
         room.squares[i] = squares
 
 
@@ -164,7 +178,10 @@ def _merge(sources: Addresses, halves: Int32, half: int, low: int, high: int, ro
 
 @inlined
 def _collect(size: tuple[int, int], pixel: int, low: int, room: AreaRoom) -> int:
-    """List the hits in and around a pixel in `near` and `position`; return their number."""
+    """List the hits in and around a pixel in `near`, `position` and `strength`; return their number.
+
+    The last one is repeated, so that packets of hits have no others.
+    """
     width, height = size
     y = pixel // width
     x = pixel - y * width
@@ -176,18 +193,20 @@ def _collect(size: tuple[int, int], pixel: int, low: int, room: AreaRoom) -> int
         begin = room.first[at - 1] if x > 0 else here
         last = room.first[at + 2] if x < width - 1 else right
         for packet in range(begin, last, LANES):
-            inside = _positions(packet, here - packet, right - packet, last - packet, v, room)
-            while inside != 0:
-                lane = ctz(inside)
-                inside &= inside - 1
-                room.near[found], room.position[found] = packet + lane, room.lanes[lane]
-                found += 1
+            inside, position = _positions(packet, here - packet, right - packet, last - packet, v, room)
+            append(inside, lane_numbers() + np.int32(packet), room.near, found)
+            append(inside, position, room.position, found)
+            append(inside, load(room.balance, packet), room.strength, found)
+            found += popcount(inside)
+    if found > 0:
+        store(room.near, found, room.near[found - 1])
+        store(room.strength, found, room.strength[found - 1])
     return found
 
 
 @inlined
-def _positions(packet: int, here: int, right: int, last: int, v: int, room: AreaRoom) -> int:
-    """Write the positions of 16 hits to `lanes`; return bits for those that are in the pixel or near enough to it.
+def _positions(packet: int, here: int, right: int, last: int, v: int, room: AreaRoom) -> tuple[bool, int]:
+    """Whether each of 16 hits is in the pixel or near enough to it, and their positions.
 
     Args:
         packet: entry of the first hit.
@@ -200,19 +219,19 @@ def _positions(packet: int, here: int, right: int, last: int, v: int, room: Area
     column = (places & np.int32(PARTS - 1)) + beside
     row = (places >> np.int32(4)) + np.int32(RING + v * PARTS)
     inside = (lane < np.int32(last)) & (column >= np.int32(0)) & (column < np.int32(POSITIONS))
-    store(room.lanes, 0, row * np.int32(1 << ROW_BITS) + column)
-    found: int = bits(inside & (row >= np.int32(0)) & (row < np.int32(POSITIONS)))
-    return found
+    inside = inside & (row >= np.int32(0)) & (row < np.int32(POSITIONS))
+    return inside, row * np.int32(1 << ROW_BITS) + column
 
 
 @inlined
 def _alike(found: int, room: AreaRoom) -> bool:
     """Whether the balance weights of the collected hits differ by at most a factor of LARGEST_RATIO."""
-    least, most = np.float32(np.inf), np.float32(0.0)
-    for k in range(found):
-        w = room.balance[room.near[k]]
-        least, most = min(least, w), max(most, w)
-    return bool(most <= LARGEST_RATIO * least)
+    most = load(room.strength, 0)
+    least = -most
+    for k in range(LANES, found, LANES):
+        w = load(room.strength, k)
+        most, least = select(w > most, w, most), select(-w > least, -w, least)
+    return bool(largest_of_lanes(most) <= LARGEST_RATIO * -largest_of_lanes(least))
 
 
 @inlined
@@ -233,7 +252,7 @@ def _share_cells(found: int, room: AreaRoom) -> np.float32:
     a, b, c, d = zero, zero, zero, zero
     for k in range(found):
         at, column = (room.position[k] >> ROW_BITS) * (PACKETS * LANES), (room.position[k] & COLUMN) * LANES
-        factor = load(room.columns, column) * room.balance[room.near[k]]
+        factor = load(room.columns, column) * room.strength[k]
         a = a + factor * load(room.rows, at)
         b = b + factor * load(room.rows, at + LANES)
         c = c + factor * load(room.rows, at + 2 * LANES)
@@ -246,7 +265,7 @@ def _share_cells(found: int, room: AreaRoom) -> np.float32:
         at, column = (room.position[k] >> ROW_BITS) * (PACKETS * LANES), (room.position[k] & COLUMN) * LANES
         shares = a * load(room.rows, at) + b * load(room.rows, at + LANES)
         shares = shares + c * load(room.rows, at + 2 * LANES) + d * load(room.rows, at + 3 * LANES)
-        share = room.balance[room.near[k]] * sum_of_lanes(shares * load(room.columns, column))
+        share = room.strength[k] * sum_of_lanes(shares * load(room.columns, column))
         room.share[k] = share if share >= least else np.float32(0.0)
         total += room.share[k]
     return total

@@ -51,7 +51,8 @@ class AreaWeights:
         ends = np.cumsum([0, *counts])
         room = self._room(len(counts), n, high - low, int(ends[-1]))
         try:
-            room.start[:, 0] = 4 * ends[:-1]  # a hit near a corner counts in four pixels
+            # a hit near a corner counts in four pixels, and one entry is written beyond the last
+            room.start[:, 0] = 4 * ends[:-1] + np.arange(len(counts))
             which = np.zeros(len(counts), np.int32) if halves is None else halves
             weigh_by_area(listed.addresses, which, half, self._size, first, n, room)
             yield WeighedHits(listed, first, n, room)
@@ -92,22 +93,23 @@ class AreaWeights:
             pass
         else:
             fits = len(room.start) == n_sources and len(room.own) >= n and len(room.first) > around
-            if fits and len(room.near) >= entries:
+            if fits and len(room.share) >= entries:
                 return room
         entries = int(SPARE * entries)
         return AreaRoom(
             start=np.empty((n_sources, n + 1), np.int32),
-            order=np.empty(4 * entries, np.int32),
-            weight=np.empty(4 * entries, np.float32),
+            order=np.empty(4 * entries + n_sources, np.int32),
+            weight=np.empty(4 * entries + n_sources, np.float32),
             first=np.empty(around + 1, np.int32),
             hit=np.empty(entries, np.int32),
             source=np.empty(entries, np.int32),
             place=np.empty(entries + LANES, np.uint8),
-            balance=np.empty(entries, np.float32),
-            near=np.empty(entries, np.int32),
-            position=np.empty(entries, np.int32),
+            balance=np.empty(entries + LANES, np.float32),
+            end=np.empty(n_sources, np.int32),
+            near=np.empty(entries + LANES, np.int32),
+            position=np.empty(entries + LANES, np.int32),
+            strength=np.empty(entries + LANES, np.float32),
             share=np.empty(entries, np.float32),
-            lanes=np.empty(LANES, np.int32),
             own=np.empty(n, np.int32),
             squares=np.empty(n, np.float32),
             columns=self._factors[0],
