@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Corners, Float64
 
-Mask = NDArray[np.bool_]
+from .vectors import Mask, are_finite, cross, largest
+
 Keys = NDArray[np.uint64]
 
 # A triangle lower than this share of its longest side is narrower than float32 resolves its corners: its normal would
@@ -15,7 +16,7 @@ SLIVER = 2.0**-23
 
 def is_finite(corners: Float64) -> Mask:
     """(n,) whether all corners of a triangle are finite."""
-    return np.asarray(np.isfinite(corners).all(axis=(1, 2)))
+    return are_finite(corners.reshape(len(corners), -1))
 
 
 def has_area(corners: Float64 | Corners) -> Mask:
@@ -28,16 +29,10 @@ def has_area(corners: Float64 | Corners) -> Mask:
     with np.errstate(all="ignore"):  # a triangle beyond the range of float64 compares false, and is left out
         first = corners[:, 1].astype(np.float64) - corners[:, 0]
         second = corners[:, 2].astype(np.float64) - corners[:, 0]
-        longest = np.maximum(_largest(first), _largest(second))
+        longest = np.maximum(largest(first), largest(second))
         scale = 1.0 / np.where(longest > 0, longest, 1.0)
-        area = np.cross(first * scale[:, None], second * scale[:, None])
-    return np.asarray((longest > 0) & (_largest(area) > SLIVER))
-
-
-def _largest(vectors: Float64) -> Float64:
-    """(n,) the largest absolute coordinate; much faster than a reduction along an axis of three."""
-    x, y, z = np.abs(vectors).T
-    return np.asarray(np.maximum(np.maximum(x, y), z))
+        area = cross(first * scale[:, None], second * scale[:, None])
+    return np.asarray((longest > 0) & (largest(area) > SLIVER))
 
 
 def is_repeated(corners: Corners, group: NDArray[np.integer]) -> Mask:
@@ -48,7 +43,11 @@ def is_repeated(corners: Corners, group: NDArray[np.integer]) -> Mask:
         group: (n,) only triangles of the same group are compared.
     """
     hashes = _corner_hashes(corners)  # (n, 3)
-    keys = hashes.sum(axis=1, dtype=np.uint64) + _mix(group.astype(np.uint64))
+    keys = hashes[:, 0] + hashes[:, 1] + hashes[:, 2] + _mix(group.astype(np.uint64))
+    found = np.zeros(len(keys), dtype=np.bool_)
+    ordered = np.sort(keys)
+    if not (ordered[1:] == ordered[:-1]).any():  # as in most scenes
+        return found
     order = np.argsort(keys, kind="stable")
     new = np.ones(len(keys), dtype=np.bool_)
     new[1:] = keys[order][1:] != keys[order][:-1]
@@ -57,7 +56,6 @@ def is_repeated(corners: Corners, group: NDArray[np.integer]) -> Mask:
     # equal keys almost always mean equal corners; the corners themselves decide
     same = (_sorted_corners(corners, hashes, again) == _sorted_corners(corners, hashes, earlier)).all(axis=(1, 2))
     same &= group[again] == group[earlier]
-    found = np.zeros(len(keys), dtype=np.bool_)
     found[again[same]] = True
     return found
 

@@ -10,6 +10,7 @@ from framearray_cli.base.arrays import Corners, CornerUvs, Float64
 from framearray_cli.base.units import agree, counted
 
 from .files.model import Material, Notes, Part
+from .vectors import are_finite, cross, largest, lengths
 
 FAR_UV = 16.0  # float32 texture coordinates beyond it lose texels: whole repeats are subtracted
 
@@ -87,7 +88,7 @@ def merge(parts: Sequence[Part]) -> Merged:
 def _scale_normals(normals: Float64) -> Float64:
     """Scale normals so that their largest component is 1: float32 would round those of a tiny node to 0."""
     with np.errstate(all="ignore"):
-        return np.asarray(normals / np.abs(normals).max(axis=-1, keepdims=True))
+        return np.asarray(normals / largest(normals)[..., None])
 
 
 def unit_normals(normals: Corners, has_normals: NDArray[np.bool_], corners: Corners, notes: Notes) -> Corners:
@@ -100,9 +101,10 @@ def unit_normals(normals: Corners, has_normals: NDArray[np.bool_], corners: Corn
         notes: gets the number of broken normals.
     """
     with np.errstate(all="ignore"):
-        lengths = np.linalg.norm(normals, axis=-1, keepdims=True)
-        unit = normals / lengths
-    bad = ~np.isfinite(unit).all(axis=-1)  # (n, 3)
+        unit = normals / lengths(normals)[..., None]
+    bad = ~are_finite(unit)  # (n, 3)
+    if not bad.any():
+        return np.asarray(unit, dtype=np.float32)
     broken = int((bad & has_normals[:, None]).sum())
     if broken:
         notes.add(
@@ -118,19 +120,18 @@ def geometric_normals(corners: Corners) -> Corners:
     """(n, 3) unit normals by winding, for triangles with an area."""
     first = corners[:, 1].astype(np.float64) - corners[:, 0]
     second = corners[:, 2].astype(np.float64) - corners[:, 0]
-    first /= np.abs(first).max(axis=1, keepdims=True)
-    second /= np.abs(second).max(axis=1, keepdims=True)
-    normal = np.cross(first, second)
-    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True), dtype=np.float32)
+    normal = cross(first / largest(first)[:, None], second / largest(second)[:, None])
+    return np.asarray(normal / lengths(normal)[:, None], dtype=np.float32)
 
 
 def wrap_uvs(uvs: Float64, notes: Notes) -> CornerUvs:
     """Convert texture coordinates to float32; move far ones back by whole repeats, as textures repeat."""
-    bad = np.asarray(~np.isfinite(uvs).all(axis=-1))
+    bad = ~are_finite(uvs)
     if bad.any():
         notes.add(f"{int(bad.sum())} texture coordinates are missing or not numbers, taken as 0")
         uvs = np.where(bad[..., None], 0.0, uvs)
-    far = np.abs(uvs).max(axis=(1, 2)) > FAR_UV
-    if far.any():
-        uvs = np.where(far[:, None, None], uvs - np.floor(uvs.min(axis=1, keepdims=True)), uvs)
-    return np.asarray(uvs, dtype=np.float32)
+    with np.errstate(over="ignore"):  # far ones are replaced
+        wrapped = uvs.astype(np.float32)
+    far = np.flatnonzero(largest(uvs.reshape(len(uvs), -1)) > FAR_UV)
+    wrapped[far] = uvs[far] - np.floor(uvs[far].min(axis=1, keepdims=True))
+    return wrapped

@@ -15,6 +15,7 @@ from .cleaning import has_area, is_finite, is_repeated
 from .files import Material, Meshes, Notes, read_meshes
 from .merge import Merged, add_untextured_variants, merge, unit_normals, wrap_uvs
 from .overrides import Override, override_materials
+from .vectors import rows_of
 
 # Between these sizes tracing was measured to be right. Far below, float32 is denormal; far above, rays hit nothing.
 SMALLEST_SCENE, LARGEST_SCENE = 1e-12, 1e12
@@ -129,10 +130,10 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
     material = merged.material[keep]
     normals, uvs, colours = _empty(3), _empty(2), _empty(3)
     if merged.normals is not None and merged.has_normals[keep].any():
-        normals = unit_normals(merged.normals[keep], merged.has_normals[keep], corners, notes)
+        normals = unit_normals(rows_of(merged.normals, keep), merged.has_normals[keep], corners, notes)
     textured = max((max(m.texture, m.specular_texture, m.alpha_texture) for m in materials), default=-1) >= 0
     if merged.uvs is not None and textured:
-        uvs = wrap_uvs(merged.uvs[keep], notes)
+        uvs = wrap_uvs(rows_of(merged.uvs, keep), notes)
     if merged.colours is not None:
         colours = merged.colours[keep]
     cutoff = np.array([m.alpha_cutoff for m in materials], dtype=np.float32)
@@ -194,9 +195,9 @@ def _select_triangles(
     for reason in sorted({material.left_out for material in materials} - {""}):
         absent = np.array([material.left_out == reason for material in materials])
         rows = _drop(rows, absent[merged.material[rows]], reason, dropped)
-    rows = _drop(rows, ~has_area(merged.corners[rows]), "degenerate", dropped)
+    rows = _drop(rows, ~has_area(rows_of(merged.corners, rows)), "degenerate", dropped)
     _check_left(rows, dropped, notes)
-    left = merged.corners[rows]
+    left = rows_of(merged.corners, rows)
     # axis by axis: numpy takes ten times as long for the bounds of all three at once
     low, high = (np.array([bound(left[..., axis]) for axis in range(3)]) for bound in (np.min, np.max))
     centre = low / 2 + high / 2
@@ -207,14 +208,14 @@ def _select_triangles(
         )
     corners = (left - centre).astype(np.float32)
     flat = ~has_area(corners)
-    rows, corners = _drop(rows, flat, "degenerate", dropped), corners[~flat]
+    rows, corners = _drop(rows, flat, "degenerate", dropped), rows_of(corners, np.flatnonzero(~flat))
     cutoff = np.array([material.alpha_cutoff for material in materials])
     masked = cutoff[merged.material[rows]] > 0
     order = np.argsort(masked, kind="stable")
-    rows, corners, masked = rows[order], corners[order], masked[order]
+    rows, corners, masked = rows[order], rows_of(corners, order), masked[order]
     # of coinciding opaque triangles one hides the others, of any material; a cut-out one lets others show
     again = is_repeated(corners, np.where(masked, merged.material[rows] + 1, 0))
-    rows, corners = _drop(rows, again, "duplicate", dropped), corners[~again]
+    rows, corners = _drop(rows, again, "duplicate", dropped), rows_of(corners, np.flatnonzero(~again))
     _check_left(rows, dropped, notes)
     return rows, centre, corners
 

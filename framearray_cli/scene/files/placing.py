@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
 
+from ..vectors import cross
 from .model import Part
 
 
@@ -73,8 +74,8 @@ def place_mesh(
         at_corners = None if colours is None else colours[faces]
     return Part(
         material=material,
-        corners=join_places(world[:, faces]),
-        normals=None if normals is None else join_places(normals[:, faces]),
+        corners=join_places(np.take(world, faces, axis=1)),
+        normals=None if normals is None else join_places(np.take(normals, faces, axis=1)),
         uvs=None if uvs is None else repeat_at_places(uvs[faces]),
         colours=None if at_corners is None else repeat_at_places(at_corners),
     )
@@ -83,7 +84,7 @@ def place_mesh(
 def cofactors(matrices: Float64) -> Float64:
     """(n, 3, 3) cofactor matrices: each row is the cross product of the two other rows."""
     a, b, c = matrices[:, 0], matrices[:, 1], matrices[:, 2]
-    return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    return np.stack([cross(b, c), cross(c, a), cross(a, b)], axis=1)
 
 
 def file_normals(mesh: Any) -> Float64 | None:
