@@ -11,21 +11,21 @@ Decorating a function only declares it. The first call loads its machine code fr
 folder for it (`cache.py`). numba's own settings stay untouched.
 """
 
+from .start import is_tried, load_numba  # isort: skip  # before any of numba
+
 import platform
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba as nb
 from llvmlite import ir
 from numba import types
-from numba.core import caching, cgutils
+from numba.core import caching, cgutils, compiler
 from numba.extending import intrinsic
 
-from .cache import forgive, kernel_folder
-from .pipeline import KernelCompiler
-from .start import load_numba
+from .cache import kernel_folder
+from .load import KernelCache, KernelFiles
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -33,16 +33,26 @@ _LINE = 64  # bytes
 # Parts of numba without type annotations.
 _njit: Any = nb.njit
 _unliteral: Any = types.unliteral
+_Compiler: Any = compiler.CompilerBase
 _Locator: Any = caching._CacheLocator
 _OfSourceFile: Any = caching._SourceFileBackedLocatorMixin
-_Files: Any = caching.CompileResultCacheImpl
-_FunctionCache: Any = caching.FunctionCache
+
+
+class _KernelCompiler(_Compiler):  # type: ignore[misc]
+    """Compiles by the passes in `pipeline.py`, which need half as long to load as all the rest of numba."""
+
+    def define_pipelines(self) -> list[Any]:
+        from .pipeline import kernel_pipeline
+
+        return [kernel_pipeline(self.state)]
+
+
 _OPTIONS = {
     "nogil": True,
     "error_model": "numpy",
     "_nrt": False,
     "no_cfunc_wrapper": True,  # C never calls a kernel
-    "pipeline_class": KernelCompiler,
+    "pipeline_class": _KernelCompiler,
 }
 
 
@@ -62,30 +72,26 @@ class _OwnLocator(_OfSourceFile, _Locator):  # type: ignore[misc]
         return cls(function, file, folder) if folder and Path(file).exists() else None
 
 
-class _OwnFiles(_Files):  # type: ignore[misc]
+class _OwnFiles(KernelFiles):
     _locator_classes = (_OwnLocator,)
 
 
-class _OwnCache(_FunctionCache):  # type: ignore[misc]
-    """numba's cache of a function, in our folder; where that fails, numba compiles."""
+class _OwnCache(KernelCache):
+    """A cache in our folder."""
 
     _impl_class = _OwnFiles
-
-    def _guard_against_spurious_io_errors(self) -> AbstractContextManager[None]:
-        return forgive(self)
 
 
 class _LazyCache:
     """numba's cache of a function, opened when numba first asks for machine code."""
 
-    def __init__(self, function: Any) -> None:
-        self._function = function
+    def __init__(self, function: Any, *, counts: bool) -> None:
+        self._function, self._counts = function, counts
         self._opened: Any = None
 
     @property
     def cache(self) -> Any:
         if self._opened is None:
-            load_numba()
             try:
                 self._opened = _OwnCache(self._function)
             except RuntimeError:  # no folder, or a function without a source file
@@ -97,7 +103,13 @@ class _LazyCache:
         return self.cache.cache_path
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        return self.cache.load_overload(signature, context)
+        if self._counts or not is_tried():
+            load_numba()
+            context.refresh()  # loads what counts references
+        found = self.cache.load_overload(signature, context)
+        if found is None:
+            load_numba()  # numba compiles it now
+        return found
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
         self.cache.save_overload(signature, compiled)
@@ -110,7 +122,9 @@ def keep_on_disk(function: F) -> F:
     """Keep the machine code of a declared function (`nb.njit`, `CFunc`) for later runs."""
     compiled: Any = function
     if hasattr(compiled, "enable_caching"):  # NUMBA_DISABLE_JIT leaves plain Python functions
-        compiled._cache = _LazyCache(getattr(compiled, "py_func", None) or compiled.__wrapped__)
+        options = getattr(compiled, "targetoptions", {})
+        plain = getattr(compiled, "py_func", None) or compiled.__wrapped__
+        compiled._cache = _LazyCache(plain, counts=options.get("_nrt", True))
     return function
 
 

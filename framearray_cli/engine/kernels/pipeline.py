@@ -2,19 +2,18 @@
 
 numba analyses an inlined function anew at every call, with all functions that are inlined into it, and copies its code
 twice, object by object; that was a quarter of the time that kernels took to compile. Here each inlined function is
-analysed once per process, and each call makes one copy. That rests on numba's own classes, so any version but the one
-that it was tried with compiles as usual, which takes longer.
+analysed once per process, and each call makes one copy.
 """
 
 from collections.abc import Callable
 from copy import copy
 from typing import Any
 
-import numba as nb
 from numba.core import compiler, compiler_machinery, inline_closurecall, ir, untyped_passes
 
+from .start import is_tried
+
 # Parts of numba without type annotations, so mypy ignores that classes derive from them.
-_Compiler: Any = compiler.CompilerBase
 _Builder: Any = compiler.DefaultPassBuilder
 _Inlining: Any = untyped_passes.InlineInlinables
 _Worker: Any = inline_closurecall.InlineWorker
@@ -25,17 +24,14 @@ _register: Any = compiler_machinery.register_pass
 _NODES: Any = (ir.Inst, ir.AbstractRHS)  # statements and expressions
 _SHARED: Any = (ir.Const, ir.Global, ir.FreeVar)  # expressions that never change
 
-_TRIED = "0.68"  # version of numba
 # Inlined functions and their code, which must not be changed.
 _analysed: dict[Callable[..., Any], Any] = {}
 
 
-class KernelCompiler(_Compiler):  # type: ignore[misc]
-    """numba's passes, with faster inlining."""
-
-    def define_pipelines(self) -> list[Any]:
-        passes = _Builder.define_nopython_pipeline(self.state)
-        return [_replace_inlining(passes) if nb.__version__.startswith(f"{_TRIED}.") else passes]
+def kernel_pipeline(state: Any) -> Any:
+    """Return numba's passes, with faster inlining."""
+    passes = _Builder.define_nopython_pipeline(state)
+    return _replace_inlining(passes) if is_tried() else passes
 
 
 def _untyped_pipeline(state: Any) -> Any:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numba.core import untyped_passes
 
-from framearray_cli.engine.kernels import pipeline
+from framearray_cli.engine.kernels import pipeline, start
 from framearray_cli.engine.kernels.kernel import inlined, kernel
 
 SCALE = 3
@@ -77,7 +77,7 @@ def test_an_inlined_function_is_analysed_once(monkeypatch: Any) -> None:
 
 
 def test_other_versions_of_numba_compile_with_their_own_passes(monkeypatch: Any) -> None:
-    monkeypatch.setattr(pipeline, "_TRIED", "0.1")
+    monkeypatch.setattr(start, "TRIED", "0.1")
     monkeypatch.setattr(pipeline, "_analysed", {})
     numbers, out = np.arange(1, 60), np.zeros(59, np.int64)
     kernel(summed)(numbers, out)
