@@ -202,6 +202,12 @@ class Manifest:
         return (*(group.name for group in self.groups), *((BACKGROUND,) if self.background_images else ()))
 
     @property
+    def uses_ambient(self) -> bool:
+        """Whether indirect light is I_A R W; else images hold that of their own sources, and every I_A is 0."""
+        indirect = self.job.get("indirect")
+        return not isinstance(indirect, dict) or indirect.get("method", "obscurance") == "obscurance"
+
+    @property
     def n_lights(self) -> int:
         """N_l: light positions along the first axis."""
         return next(iter(self.axes.values()))

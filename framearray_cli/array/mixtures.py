@@ -74,7 +74,7 @@ def check_mixture(manifest: Manifest, mixture: Mixture) -> None:
     """
     if mixture.is_mean:
         return
-    ambient = manifest.job.get("ambient", {})
+    ambient = manifest.job.get("ambient", {}) if manifest.uses_ambient else {}
     if ambient.get("method") == "light" and "intensity" not in ambient:
         raise OutputError(
             f'{manifest.directory}: with ambient.method = "light" the ambient light of positions does not add up to '
@@ -95,7 +95,7 @@ def constant_parts(manifest: Manifest) -> list[str]:
     if not manifest.groups:
         background = manifest.job.get("scene", {}).get("background", ())
         parts += [f"the {BACKGROUND}"] if any(background) else []
-        fixed = manifest.job.get("ambient", {}).get("intensity", ())
+        fixed = manifest.job.get("ambient", {}).get("intensity", ()) if manifest.uses_ambient else ()
         parts += ["a fixed ambient light"] if any(fixed) else []
     for lights in [group.lights for group in manifest.groups] or [manifest.lights]:
         if not is_constant(lights):

@@ -1,6 +1,7 @@
 """Hours of direct sun, from the images of a sun study: positions with direct light times the time between them.
 
-The sun must be alone in a group of sources, whose images hold its direct light and nothing else. Light that a mirror
+The sun must be alone in a group of sources, whose images hold its direct light and nothing else; so light from cells
+will not do, which they hold too. Light that a mirror
 shows counts as well: the pixel shows a place in the sun.
 """
 
@@ -43,9 +44,15 @@ def find_sun(manifest: Manifest) -> tuple[ManifestGroup, tuple[SunDay, ...]]:
     """Find the group of the sun, and the days of its positions.
 
     Raises:
-        OutputError: there is no such group, the sun is not alone in it, or a day has only one position.
+        OutputError: there is no such group, the sun is not alone in it, its images hold indirect light too, or a day
+            has only one position.
     """
     folder = manifest.directory
+    if not manifest.uses_ambient:
+        raise OutputError(
+            f"{folder}: hours of sun need the direct light of a sun apart from all other light, and images with "
+            'indirect.method = "cells" hold its indirect light too; render again with "obscurance"'
+        )
     apart = 'render again with a source of type "sun" that has a group of its own, as in group = "sun"'
     found = [group for group in manifest.groups if any("time" in source for source in group.lights[0].sources)]
     if not found:

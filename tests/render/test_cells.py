@@ -3,11 +3,17 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from support import tiny
-from support.tiny import WALK
+from support.tiny import SUN, WALK
 
+from framearray_cli.array.images.images import read_image
+from framearray_cli.array.manifest import image_path
 from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.mixtures import Mixture
+from framearray_cli.array.names import file_name
+from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.array.record import read_records, record_files, seal, unseal
 from framearray_cli.base.errors import OutputError
 from framearray_cli.job.job import Job
@@ -19,7 +25,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tiny.save_glb(tiny.room_meshes(), tmp_path_factory.mktemp("scene") / "room.glb")
 
 
-def job(scene: Path, out: Path, threads: int) -> Job:
+def job(scene: Path, out: Path, threads: int, **more: Any) -> Job:
     tables: dict[str, Any] = {
         "scene": {"file": str(scene), "background": [0.3, 0.4, 0.5]},
         "camera": WALK,
@@ -28,7 +34,26 @@ def job(scene: Path, out: Path, threads: int) -> Job:
         "render": {"threads": threads},
         "indirect": {"method": "cells", "samples": 4096},
     }
-    return tiny.job(**tables)
+    return tiny.job(**{**tables, **more})
+
+
+def test_images_of_groups_hold_all_light_of_their_sources(scene: Path, tmp_path: Path) -> None:
+    """Nothing is left for ambient light; the picture is the sum of groups and background, relit as they are."""
+    lamps = [{**lamp, "group": name} for lamp, name in ((tiny.TABLE["light"]["sources"][0], "a"), (SUN, "b"))]
+    render(job(scene, tmp_path, 2, light={"sources": lamps}, camera={"resolution": [8, 6]}))
+    manifest = read_manifest(tmp_path)
+    assert not manifest.uses_ambient
+    assert not read_image(tmp_path / file_name(manifest.ambient_images, 0)).any()
+    a, b = (read_image(image_path(manifest, 0, 1, group)) for group in manifest.groups)
+    sky = read_image(tmp_path / file_name(manifest.background_images, 0))
+    pictures = Pictures(manifest)
+    np.testing.assert_allclose(pictures.picture(0, (1,)), a + b + sky, rtol=1e-6)
+    relit = Relight(groups={"a": (0.0,) * 3, "b": (2.0,) * 3}, ambient=(7.0,) * 3)
+    np.testing.assert_allclose(pictures.picture(0, (1,), relit), 2 * b + sky, rtol=1e-6)
+    mixture = Mixture(((0, (0.5,) * 3), (1, (2.0,) * 3)))
+    mixed = pictures.picture(0, (mixture,), Relight(groups={"b": (0.0,) * 3, "background": (0.0,) * 3}))
+    first = read_image(image_path(manifest, 0, 0, manifest.groups[0]))
+    np.testing.assert_allclose(mixed, 0.5 * first + 2 * a, rtol=1e-5)
 
 
 def images(folder: Path) -> dict[str, bytes]:

@@ -50,6 +50,12 @@ def study(folder: Path, *, n_sources: int = 1, times: Any = TIMES, with_time: bo
     return manifest
 
 
+def lit_by_cells(manifest: Manifest) -> Manifest:
+    changed = replace(manifest, job={"indirect": {"method": "cells"}})
+    write_manifest(manifest.directory, changed)
+    return changed
+
+
 def test_hours_are_counted_per_day_without_other_light(tmp_path: Path) -> None:
     manifest = study(tmp_path / "out")
     made = make_sun_sheet(manifest.directory, tmp_path / "hours.exr", cameras="all")
@@ -81,6 +87,7 @@ def test_what_is_missing_is_named(tmp_path: Path) -> None:
         (plain(tmp_path / "a"), "this array stores its light all together; render again with a source of type"),
         (study(tmp_path / "b", with_time=False), "this array has no group with a sun; render again"),
         (study(tmp_path / "c", n_sources=2), 'a sun alone in its group, and "sun" has 2 sources'),
+        (lit_by_cells(study(tmp_path / "e")), 'images with indirect.method = "cells" hold its indirect light too'),
         (study(tmp_path / "d", times=TIMES[:5]), "at least 2 light positions per day, got 1 on 2026-06-21"),
     ]
     for manifest, text in cases:

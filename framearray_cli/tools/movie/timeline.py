@@ -24,6 +24,10 @@ from .pathfile import MOST_FRAMES, MoviePath, Segment, movie_fps
 # Blended positions are rounded to a millionth of an index, which no picture can show: so a place that is reached in two
 # ways has one position.
 DECIMALS = 6
+_NO_AMBIENT = (
+    "ambient: the images of this array hold the indirect light of their own sources, so that it cannot be changed apart; "
+    'change the groups, or render again with indirect.method = "obscurance"'
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +151,8 @@ def _light_problems(groups: Iterable[str], ambient: bool, manifest: Manifest) ->
             for key in keys
         ]
     known = manifest.group_names
-    return [
+    whole = [] if manifest.uses_ambient or not ambient else [_NO_AMBIENT]
+    return whole + [
         f"groups.{toml_key(name)}: no such group; the array has {', '.join(known)}"
         for name in groups
         if name not in known

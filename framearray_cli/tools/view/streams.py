@@ -63,7 +63,8 @@ def streams_of(manifest: Manifest) -> list[Stream]:
         for k, group in enumerate(manifest.groups):
             n = axes[group.axis]
             found.append(Stream(key=f"g{k}", role="group", label=group.name, axis=group.axis, n=n, group=group))
-        found.append(Stream(key="ambient", role="ambient", label="Ambient"))
+        if manifest.uses_ambient:
+            found.append(Stream(key="ambient", role="ambient", label="Ambient"))
         if manifest.background_images:
             found.append(Stream(key="background", role="background", label="Background"))
     else:

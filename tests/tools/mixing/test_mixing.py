@@ -227,6 +227,23 @@ def test_sums_need_linear_light(tmp_path: Path) -> None:
         make_mixer(manifest, SumOptions(soft=2), pytest.fail)
 
 
+@pytest.mark.parametrize("ambient", [{"method": "light"}, {"method": "eye", "intensity": [0.1, 0.1, 0.1]}])
+def test_images_with_light_from_cells_add_up_whatever_the_ambient_light(
+    array: Manifest, tmp_path: Path, ambient: dict[str, Any]
+) -> None:
+    options = SumOptions(environment=sky(tmp_path, 0, 0))
+    for indirect, refused in ({"method": "obscurance"}, True), ({"method": "cells"}, False):
+        changed = replace(array, job={"ambient": ambient, "indirect": indirect})
+        if refused:
+            with pytest.raises(OutputError, match="ambient light"):
+                make_mixer(changed, options, pytest.fail)
+        else:
+            assert make_mixer(changed, options, pytest.fail) is not None
+    lit = replace(changed, job={**changed.job, "scene": {"background": [0.1, 0.1, 0.1]}})
+    with pytest.raises(OutputError, match="every image holds the background"):
+        make_mixer(lit, options, pytest.fail)
+
+
 def test_ambient_light_of_the_lit_area_does_not_add_up(array: Manifest, tmp_path: Path) -> None:
     changed = replace(array, job={"scene": {"up": "y"}, "ambient": {"method": "light"}})
     with pytest.raises(OutputError, match="the ambient light of positions does not add up"):

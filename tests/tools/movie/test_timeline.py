@@ -1,5 +1,6 @@
 """Easing, holds, loops, reversal, blends and joins, as properties of what the frames show."""
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any
@@ -202,6 +203,14 @@ def test_all_axes_and_places_that_an_array_lacks_are_named() -> None:
     assert problems(only_lamps, {"frames": 2, "light": [0, 1]}) == [
         "segments[0].light: no such light axis; the array has lamps"
     ]
+
+
+def test_light_from_cells_has_no_ambient_light_to_change() -> None:
+    cells = replace(GROUPED, job={"indirect": {"method": "cells"}})
+    (problem,) = problems(cells, {"frames": 2}, ambient={"intensity": 2})
+    assert problem.startswith("ambient: the images of this array hold the indirect light of their own sources")
+    assert problems(cells, {"frames": 2, "light": 9}, groups={"lamps": {"intensity": 2}})[0].startswith("segments[0]")
+    assert len(shots({"frames": 2}, manifest=GROUPED, ambient={"intensity": 2})) == 2
 
 
 def test_too_many_frames_are_refused_before_they_are_listed() -> None:

@@ -1,13 +1,18 @@
 """The page in a browser: pictures by pointer, keys and touch; links, layers, exposure, groups."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from support import handmade
 from support.chromium import PHONE, shown
 from support.expected import bounds, nearest_place, outside
 from support.handmade import N_C, N_L, soft
 
+from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.pictures import Pictures, Relight, ambient_at
 from framearray_cli.base.colour import linear_from_srgb, srgb8_from_linear
+from framearray_cli.tools.view.run import open_server, open_tiles
 
 ONE = (1.0, 1.0, 1.0)
 
@@ -221,3 +226,20 @@ def test_memory_stays_within_its_budget(browser, plain):
         needed = 4 * 64 * 48 * N_C * N_L
         assert 0 < most <= budget < needed
         page.check(plain.url)
+
+
+def test_light_from_cells_has_no_ambient_light(browser, tmp_path):
+    manifest = replace(handmade.grouped(tmp_path / "cells"), job={"indirect": {"method": "cells"}})
+    write_manifest(manifest.directory, manifest)
+    with (
+        open_server(open_tiles(manifest.directory, None, 2)) as server,
+        shown(browser, f"{server.url}#camera=2&light=1") as page,
+    ):
+        roles = page.get("framearray.array.streams.map((stream) => stream.role)")
+        assert roles == ["group", "group", "background"]
+        assert page.get("document.getElementById('ambient')") is None
+        page.page.locator("#group-lamps").fill("0.5")
+        pixels = page.pixels()
+        page.check(server.url)
+    parts = [("g0", 0, (0.5,) * 3), ("g1", 1, ONE), ("background", 0, ONE)]
+    assert outside(pixels, *bounds(server.tiles, 2, parts)) == 0.0
