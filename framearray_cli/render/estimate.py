@@ -2,12 +2,12 @@
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from framearray_cli.array.folder import Identity, conflict_text, differences, free_space, read_array
-from framearray_cli.base.memory import free_memory, resident_memory
+from framearray_cli.base.memory import free_memory, peak_memory, resident_memory
 from framearray_cli.engine.embree_c import rays_together
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.kernels.clock import compile_clock
@@ -17,7 +17,7 @@ from framearray_cli.job.job import Job
 from .automatic.choose import AutoSettings, require_least_memory, resolve_auto
 from .few_lights import all_lights, few_prepared
 from .identity import identity_of
-from .memory import ambient_memory, light_blocks, mirror_share, window_memory
+from .memory import ambient_memory, cells_memory, light_blocks, memory_limit, mirror_share, window_memory
 from .pace import Cost, Work, block_work, hit_cost, pixel_cost, total_work
 from .pilots.warn import find_warnings
 from .prepare import Prepared, open_embree, plan_work, prepare
@@ -95,7 +95,7 @@ def check(job: Job, events: RenderEvents | None = None) -> Estimate:
             identity = identity_of(prepared, read_array(job.output.directory))
             few, before = few_prepared(prepared, MOST_LIGHTS), now()
             setup, ambient = plan_work(few, embree)
-            ambient_seconds = now() - before
+            ambient_seconds, peak = now() - before, peak_memory()
             events.planned(ambient)
             pilots = find_warnings(prepared, *all_lights(prepared, MOST_LIGHTS, setup, ambient))
             before_target = now()
@@ -106,14 +106,20 @@ def check(job: Job, events: RenderEvents | None = None) -> Estimate:
             pixels = _trial_pixels(setup)
             first, second = (run_trial(few, setup, ambient, int(p)) for p in (FIRST_SHARE * pixels, pixels))
             mirrors = mirror_share(setup)
-            blocks = light_blocks(prepared, mirrors, per_pixel=setup.per_pixel)
+            # cells at the light positions that the trial leaves out
+            larger = cells_memory(setup, prepared.n_lights - few.n_lights)
+            limit = memory_limit(prepared) - larger
+            blocks = light_blocks(prepared, mirrors, limit, setup.per_pixel, setup)
             resident, available = resident_memory(), free_memory()
     largest = max(len(block) for block in blocks)
-    more = max(window_memory(prepared, largest, mirrors, setup.per_pixel), ambient_memory(prepared))
+    copied = cells_memory(setup, largest) if len(blocks) > 1 else 0
+    frames = window_memory(prepared, largest, mirrors, setup.per_pixel) + copied
+    more = max(larger + max(frames, peak - resident if setup.cells else 0), ambient_memory(prepared))
     disk = int(_frame_bytes(first, second, setup.n_pixels, prepared.n_lights) * prepared.n_cameras)
     free = free_space(job.output.directory)
-    whole, _ = all_lights(prepared, MOST_LIGHTS, setup, ambient)
-    seconds = before + (ambient_seconds + target_seconds) * prepared.n_lights / few.n_lights
+    whole, _ = all_lights(prepared, MOST_LIGHTS, replace(setup, cells=None), ambient)
+    planning = ambient_seconds + target_seconds
+    seconds = before + planning_seconds(planning, ambient.shared_s, prepared.n_lights / few.n_lights)
     return Estimate(
         prepared=prepared,
         settings=settings,
@@ -127,6 +133,11 @@ def check(job: Job, events: RenderEvents | None = None) -> Estimate:
         blocks=len(blocks),
         warnings=(*pilots, *_warnings(job, identity, memory_lacks=more > available, disk_lacks=disk > free)),
     )
+
+
+def planning_seconds(measured: float, shared: float, more_lights: float) -> float:
+    """Return the seconds of planning at more light positions, of which `shared` do not grow with them."""
+    return shared + max(measured - shared, 0.0) * more_lights
 
 
 def _frame_seconds(prepared: Prepared, few: FrameSetup, whole: FrameSetup, trial: Trial, blocks: list[range]) -> float:

@@ -108,8 +108,17 @@ def window_memory(
     return int(width * height * (held * per_hit + mirrored + per_image_pixel))
 
 
+def cells_memory(setup: FrameSetup, n_lights: int) -> int:
+    """Return the bytes that the light of cells takes at some of the light positions; 0 without cells."""
+    return 0 if setup.cells is None else setup.cells.light[:, :, :1].nbytes * n_lights
+
+
 def light_blocks(
-    prepared: Prepared, mirror_share: float, limit: int | None = None, per_pixel: Float64 | None = None
+    prepared: Prepared,
+    mirror_share: float,
+    limit: int | None = None,
+    per_pixel: Float64 | None = None,
+    setup: FrameSetup | None = None,
 ) -> list[range]:
     """Split the light positions into as few blocks of about equal size as the memory limit allows.
 
@@ -118,11 +127,14 @@ def light_blocks(
     Args:
         limit: bytes; None: `memory_limit`.
         per_pixel: see `window_memory`.
+        setup: whose cells a block holds once more, unless it is the only one; None: a job without cells.
     """
     n, limit = prepared.n_lights, memory_limit(prepared) if limit is None else limit
 
     def fits(count: int) -> bool:
-        return window_memory(prepared, -(-n // count), mirror_share, per_pixel) <= limit
+        size = -(-n // count)
+        copied = cells_memory(setup, size) if setup and count > 1 else 0
+        return window_memory(prepared, size, mirror_share, per_pixel) + copied <= limit
 
     count = min(1 + bisect_left(range(1, n + 1), True, key=fits), n)
     size = -(-n // count)

@@ -1,5 +1,6 @@
 """Prepare a render: scene, eyes, lights, ambient light, and the setup of frames."""
 
+import time
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from framearray_cli.engine.inputs.cameras import Cameras, cameras
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.random import lattice_steps
 from framearray_cli.engine.inputs.surfaces import Surfaces, near_depth, surfaces
+from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.engine.terms.ambient.fitted import ObscuranceCurve, ambient_by_fit
 from framearray_cli.engine.terms.ambient.from_eyes import EyeWalks, ambient_by_eye, fixed_ambient
@@ -158,10 +160,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambi
 def _with_cells(
     prepared: Prepared, embree: EmbreeScene, setup: FrameSetup, ambient: Ambient
 ) -> tuple[FrameSetup, Ambient]:
-    """Solve the light of all cells, and note how far it is from that of paths.
-
-    Without cells where the eyes see nothing that other surfaces light.
-    """
+    """Solve the light of all cells, and note how far it is from that of paths."""
     job = prepared.job
     walks = SampleWalks(
         cams=eye_cameras(prepared),
@@ -177,11 +176,12 @@ def _with_cells(
         threads=prepared.threads,
     )
     built = build_cells(work)
-    if built is None:
-        return setup, ambient
-    accuracy = compare_with_paths(built.cells, _eye_walks(prepared, embree), prepared.threads)
+    started = time.perf_counter()
+    with compile_clock() as clock:
+        accuracy = compare_with_paths(built.cells, _eye_walks(prepared, embree), prepared.threads)
+    shared_s = built.shared_s + time.perf_counter() - started - clock.seconds
     notes = (accuracy_text(accuracy),) if accuracy else ()
-    return replace(setup, cells=built.cells), replace(ambient, notes=(*ambient.notes, *notes))
+    return replace(setup, cells=built.cells), replace(ambient, notes=(*ambient.notes, *notes), shared_s=shared_s)
 
 
 def accuracy_text(accuracy: Accuracy) -> str:

@@ -76,7 +76,7 @@ def render(
         with RecordWriter(record_path, session.identity.fingerprint, replace(session.run, cells=cells)) as record:
             run = _Run(prepared, record, events, rays, started)
             try:
-                blocks = light_blocks(prepared, mirror_share(setup), per_pixel=setup.per_pixel)
+                blocks = light_blocks(prepared, mirror_share(setup), per_pixel=setup.per_pixel, setup=setup)
                 parts = [(block, wanted) for block in blocks if (wanted := on_disk.missing(session.chosen, block))]
                 run.begin(setup, sample, parts)
                 for block, wanted in parts:

@@ -9,6 +9,8 @@ import pytest
 from support import tiny
 from support.program import Result, finish, start, write_job
 
+from framearray_cli.render.estimate import planning_seconds
+
 UNITS = {"bytes": 1, "KiB": 2**10, "MiB": 2**20, "GiB": 2**30}
 SECONDS = {"s": 1, "min": 60, "h": 3600}
 WALK = tiny.WALK | {"resolution": [200, 150], "frames": 8}
@@ -92,9 +94,20 @@ def test_the_time_of_many_light_positions_is_that_of_all(tmp_path):
     assert 30 < many / few < 300
 
 
-def rays_of_check(folder: Path, n: int) -> int:
-    """Return the number of shadow rays and walks that the ambient light of n light positions takes."""
+def test_what_all_light_positions_share_is_prepared_once(tmp_path):
+    assert planning_seconds(5.0, 3.0, 10.0) == 23.0
+    cells = {"method": "cells", "samples": 2**16}
+    plain, solved = (check_of(job(tmp_path, camera=WALK, indirect=keys)).ambient.shared_s for keys in ({}, cells))
+    assert solved > 0 == plain
+
+
+def check_of(file: Path):
     from framearray_cli.job.read import read_job
     from framearray_cli.render.estimate import check
 
-    return check(read_job(job(folder, light={"frames": n}, camera=WALK))).ambient.rays
+    return check(read_job(file))
+
+
+def rays_of_check(folder: Path, n: int) -> int:
+    """Return the number of shadow rays and walks that the ambient light of n light positions takes."""
+    return check_of(job(folder, light={"frames": n}, camera=WALK)).ambient.rays

@@ -1,51 +1,14 @@
-"""Light from cells where it could leak: two rooms and a thin wall, against paths."""
-
-from typing import Any
+"""Light from cells where it is hard to find, against paths: what cells smear, miss, or let through."""
 
 import numpy as np
 import pytest
 from support import tiny
+from support.light_errors import DARK, light_error, paths_of, rendered
+from support.lit_rooms import LIT_ROOMS
 from support.pathtraced import path_traced
+from support.two_rooms import rooms, wall
 
-HEIGHT, DEPTH = 2.5, 2.0
-LAMP = {"type": "point", "keys": [{"frame": 0, "position": [1.0, 2.0, 0.2], "intensity": [8, 8, 6]}]}
-# one eye in the dark room, one in the lit one
-EYES = {
-    "resolution": [32, 24],
-    "frames": 2,
-    "keys": [
-        {"frame": 0, "eye": [-0.3, 1.2, 1.5], "target": [-1.5, 1.0, -1.0]},
-        {"frame": 1, "eye": [0.5, 1.2, 1.5], "target": [1.5, 1.0, -1.0]},
-    ],
-}
-
-
-def wall(x: float, hole: float) -> list[Any]:
-    """A wall across the room at x, without thickness, with a square hole in its middle."""
-    h, z, low, high, side = HEIGHT, DEPTH, 1.2 - hole / 2, 1.2 + hole / 2, hole / 2
-    if hole == 0:
-        return [tiny.quad((x, 0, -z), (x, 0, z), (x, h, z), (x, h, -z))]
-    return [
-        tiny.quad((x, 0, -z), (x, 0, z), (x, low, z), (x, low, -z)),
-        tiny.quad((x, high, -z), (x, high, z), (x, h, z), (x, h, -z)),
-        tiny.quad((x, low, -z), (x, low, -side), (x, high, -side), (x, high, -z)),
-        tiny.quad((x, low, side), (x, low, z), (x, high, z), (x, high, side)),
-    ]
-
-
-def rooms(walls: list[Any]) -> Any:
-    """Two rooms, and the job that looks into both."""
-    scene = tiny.scene_of(
-        np.concatenate([tiny.box((-2, 0, -DEPTH), (2, HEIGHT, DEPTH)), *walls]),
-        tiny.Material(name="Grey", reflectivity=(0.6, 0.5, 0.4)),
-    )
-    job = tiny.job(
-        camera=EYES,
-        light={"frames": 1, "sources": [LAMP]},
-        samples={"hits": 8, "obscurance": 8},
-        indirect={"method": "cells", "samples": 2**17},
-    )
-    return tiny.prepared(job, scene)
+CELLS = {"method": "cells", "samples": 2**18}
 
 
 @pytest.mark.parametrize("thickness", [0.0, 0.02])
@@ -65,3 +28,35 @@ def test_a_room_behind_a_hole_is_as_bright_as_with_paths() -> None:
         right, error = paths.mean(), paths.std(ddof=1) / len(paths) ** 0.5
         assert right > 0.001 and error < 0.04 * right
         assert abs(image[c].mean() - right) < 0.1 * right
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LIT_ROOMS)
+def test_light_is_that_of_paths(name: str) -> None:
+    """The bounds are those that are asked of whole jobs: 2 % of the mean, a quarter of the indirect light per place."""
+    room = LIT_ROOMS[name]
+    found = light_error(rendered(room, indirect=CELLS), rendered(room, ambient=DARK), paths_of(room, 256))
+    assert found.mean_error < 0.01
+    assert abs(found.mean) < 0.02 + 3 * found.mean_error
+    assert found.indirect < 0.25
+
+
+def test_a_floor_alone_is_lit_by_the_sky_only() -> None:
+    """No walk meets a second surface, so that there are no cells; nothing is taken from the ambient light."""
+    grey = (0.5, 0.4, 0.3)
+    floor = tiny.scene_of(
+        tiny.quad((-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9)), tiny.Material(name="Grey", reflectivity=grey)
+    )
+    look = {"keys": [{"frame": 0, "eye": [0.2, 1.3, 1.7], "target": [0, 0, 0]}]}
+    sky, images = [0.3, 0.4, 0.5], []
+    for changes in (
+        {"indirect": CELLS, "scene": {"background": sky}},
+        {"indirect": CELLS},
+        {"ambient": DARK},
+    ):
+        images.append(tiny.render_frames(tiny.prepared(tiny.job(camera=look, **changes), floor), threads=2).images)
+    lit, unlit, direct = images
+    assert direct.mean() > 0.05
+    np.testing.assert_array_equal(unlit, direct)
+    lowest = (lit - direct)[:, :, -1]  # pixels that see nothing but the floor
+    np.testing.assert_allclose(lowest, np.broadcast_to(np.multiply(grey, sky), lowest.shape), rtol=1e-4)

@@ -77,16 +77,33 @@ def tangents(normal: Any) -> tuple[Any, Any]:
     return np.stack([1 + sign * x * x * a, sign * b, -sign * x], 1), np.stack([b, sign + y * y * a, -y], 1)
 
 
-def solve(members: list[Any], share: Any, direct: Any, target: Any, reflectivity: Any, sweeps: int) -> Any:
+def weights_of(members: list[Any], level: Any, wanted: Any) -> list[Any]:
+    """The weight of each sample in the mean of each cell: halved by each level between the cell's and the sample's.
+
+    Args:
+        level: of each cell; `wanted`: of each sample, log2 of the edge that a ray such as found it would read.
+    """
+    found = []
+    for k, rows in enumerate(members):
+        off = np.clip(wanted[rows], 0, COARSEST) - min(level[k], COARSEST)
+        weight = 0.5 ** abs(off)
+        found.append(weight / weight.sum() if len(rows) else weight)
+    return found
+
+
+def solve(
+    members: list[Any], weights: list[Any], share: Any, direct: Any, target: Any, reflectivity: Any, sweeps: int
+) -> Any:
     """E of all cells, (n_cells, 3, n_lights), by plain sums in float64.
 
     Args:
-        members: the samples of each cell; `share`: weights of cells in the mean over all of them.
+        members: the samples of each cell, and their `weights` there.
+        share: weights of cells in the mean over all of them.
         direct: (n_samples, channels, n_lights) E_direct; `target`: the cell that each sample's link meets, or -1.
     """
 
     def means(values: Any) -> Any:
-        found = np.stack([values[rows].mean(axis=0) if len(rows) else 0 * values[0] for rows in members])
+        found = np.stack([np.tensordot(weight, values[rows], 1) for rows, weight in zip(members, weights, strict=True)])
         found[0] = np.tensordot(share, found, 1)
         return found
 

@@ -17,8 +17,12 @@ from framearray_cli.render.prepare import Prepared, eye_cameras, open_embree
 SEED = 1 << 31  # no job of a test has it
 
 
-def path_traced(inputs: Prepared, c: int, samples: int) -> Any:
-    """Independent pictures of camera c with one path per pixel each, (samples, n_pixels, 3, n_lights)."""
+def path_traced(inputs: Prepared, c: int, samples: int, first: int = 0) -> Any:
+    """Independent pictures of camera c with one path per pixel each, (samples, n_pixels, 3, n_lights).
+
+    Args:
+        first: number of the first picture; each has random numbers of its own.
+    """
     cams, background = eye_cameras(inputs), np.array(inputs.job.scene.background, np.float32)
     n = cams.width * cams.height
     assert n <= BATCH
@@ -29,7 +33,7 @@ def path_traced(inputs: Prepared, c: int, samples: int) -> Any:
             cams=cams, seed=0, paths=None, world=world, lights=inputs.light_arrays, background=background
         )  # fmt: skip
         work = Workspace(inputs.light_arrays)
-        for s in range(samples):
+        for s in range(first, first + samples):
             hits, walkers = work.hits[0], work.walkers[0]
             pixels = Samples(SEED + s, np.arange(n, dtype=np.int32), 1, 0, False)
             native_hits(cams, c, pixels, 0, n, world, True, work.hit_packets, hits)
@@ -39,5 +43,5 @@ def path_traced(inputs: Prepared, c: int, samples: int) -> Any:
             choose_steps(hits, walkers, n, False)
             add_background(hits, walkers, n, background, work.sums)
             walks.follow(work, n)
-            pictures[s, pixel] = work.sums[:n] / np.pi
+            pictures[s - first, pixel] = work.sums[:n] / np.pi
     return pictures

@@ -127,8 +127,10 @@ class FrameSetup:
         return replace(setup, lights=some_lights(self.lights, block), kept=range(len(block)))
 
     def cells_at(self, positions: Sequence[int]) -> Cells | None:
-        """The cells at some of the kept light positions."""
-        return None if self.cells is None else at_lights(self.cells, list(positions))
+        """The cells at some of the kept light positions; those of all are not copied."""
+        if self.cells is None or list(positions) == list(range(len(self.kept))):
+            return self.cells
+        return at_lights(self.cells, list(positions))
 
     def empty_records(self, n: int, take: Any = None) -> HitRecords:
         """Allocate records of n hits; see `empty_records` in `records.py`."""

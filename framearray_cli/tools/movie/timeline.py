@@ -25,8 +25,8 @@ from .pathfile import MOST_FRAMES, MoviePath, Segment, movie_fps
 # ways has one position.
 DECIMALS = 6
 _NO_AMBIENT = (
-    "ambient: the images of this array hold the indirect light of their own sources, so that it cannot be changed apart; "
-    'change the groups, or render again with indirect.method = "obscurance"'
+    "ambient: the images of this array hold the indirect light of their own sources, so that it cannot be changed "
+    'apart; change the groups, or render again with indirect.method = "obscurance"'
 )
 
 

@@ -9,7 +9,7 @@ from support import tiny
 
 from framearray_cli.array.images.images import read_image
 from framearray_cli.base.errors import JobError
-from framearray_cli.render.memory import light_blocks, mirror_share, require_memory, window_memory
+from framearray_cli.render.memory import cells_memory, light_blocks, mirror_share, require_memory, window_memory
 from framearray_cli.render.render import render
 
 LAMPS = {"frames": 7, "sources": [*tiny.TABLE["light"]["sources"], tiny.RED]}
@@ -82,3 +82,17 @@ def test_the_limit_is_that_of_the_whole_program(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr("framearray_cli.render.memory.program_memory", lambda: 2**40)
     with pytest.raises(JobError, match=r"needs at least 1,099,51\d,\d{3},\d{3} bytes"):
         require_memory(inputs)
+
+
+def test_blocks_of_light_positions_hold_their_cells_once_more() -> None:
+    inputs = tiny.prepared(tiny.job(indirect={"method": "cells", "samples": 2048}))
+    with tiny.planned(inputs) as (setup, _):
+        assert setup.cells is not None and setup.cells_at(range(3)) is setup.cells
+        assert cells_memory(setup, 3) == setup.cells.light.nbytes > 0
+        one = setup.for_lights(range(1)).cells
+        assert one is not None and one.light.nbytes == cells_memory(setup, 1)
+        fits_two = window_memory(inputs, 2)
+        assert [len(block) for block in light_blocks(inputs, 0.0, fits_two)] == [2, 1]
+        assert [len(block) for block in light_blocks(inputs, 0.0, fits_two, setup=setup)] == [1, 1, 1]
+        fits_all = window_memory(inputs, 3)
+        assert light_blocks(inputs, 0.0, fits_all, setup=setup) == [range(3)]

@@ -43,6 +43,7 @@ class Ambient:
         paths: number of walks, or of particles per light position.
         rays: number of rays traced.
         notes: messages for the user, e.g. that the estimate missed its target error.
+        shared_s: seconds of preparing indirect light that do not grow with the number of light positions.
     """
 
     intensity: Rgb
@@ -51,6 +52,7 @@ class Ambient:
     paths: int
     rays: int
     notes: tuple[str, ...] = ()
+    shared_s: float = 0.0
 
     def for_lights(self, block: range) -> "Ambient":
         """The estimate of a block of light positions."""

@@ -4,6 +4,7 @@ Sums have a fixed order, so that the table has the same bits for any number of t
 blocks, which do not depend on the memory that a render may use.
 """
 
+import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -14,17 +15,32 @@ from framearray_cli.base.arrays import Float32, Float64, Int32, Rgb, with_room
 from ...hits.hits import SURFACE, Hits, World, empty_hits
 from ...hits.rays import Rays, room_for_tests
 from ...inputs.lights import LightArrays, some_lights
+from ...kernels.clock import compile_clock
 from ..ambient.estimate import BATCH
 from ..direct import direct
 from .places import Places, PlaceWork, find_places
 from .samples import Samples, SampleWalks, draw_samples
 from .sweeps import Members, mean_by_cell, solve
-from .table import ALL, CONSTANT, LEVELS, MEAN, TINT, Cells, Grid, find_targets, write_keys
+from .table import (
+    ALL,
+    COARSEST_READ,
+    CONSTANT,
+    EDGE_OF_LENGTH,
+    LEVELS,
+    MEAN,
+    TINT,
+    Cells,
+    Grid,
+    find_targets,
+    write_keys,
+)
 
 # Light positions that are solved together.
 LIGHT_BLOCK = 16
 # The finest cells have this share of the median length of gather rays.
 EDGE_OF_MEDIAN = 1 / 30
+# A sample that was found by a ray of half or twice the length weighs 2 to the minus this.
+WEIGHT_OF_LEVELS = 1.0
 # Links per task.
 LINK_BATCH = 1 << 15
 # Samples are sorted by the cell of this level, so that those of a cell lie close together in memory.
@@ -52,35 +68,44 @@ class CellWork:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Built:
-    """Cells, the irradiance E of all samples together, (n_lights, 3), their mean R, (3,), and the rays they took."""
+    """Cells, and what they took.
+
+    Attributes:
+        mean: (n_lights, 3) irradiance E of all samples together; `reflectivity`: (3,) their mean R.
+        rays: number of rays.
+        shared_s: seconds that do not grow with the number of light positions, compiling left out.
+    """
 
     cells: Cells
     mean: Float64
     reflectivity: Float64
     rays: int
+    shared_s: float
 
 
-def build_cells(work: CellWork) -> Built | None:
-    """Build the cells of a job; None if no walk meets a second surface."""
-    samples, rays = draw_samples(work.walks, work.count, work.threads)
-    if samples.n == 0:
-        return None
-    grid = _grid(samples, work)
+def build_cells(work: CellWork) -> Built:
+    """Build the cells of a job: only the cell of all surfaces, without light, if no walk meets a second surface."""
     with ThreadPoolExecutor(work.threads, thread_name_prefix="cells") as pool:
-        samples = samples.rows(_sorted(grid, samples))
-        world = work.walks.world
-        places = find_places(PlaceWork(grid=grid, samples=samples, tracer=world.tracer, pool=pool))
-        cells = _dark_cells(work, grid, places)
-        members = _link(cells, places, samples, world, pool)
+        started = time.perf_counter()
+        with compile_clock() as clock:
+            samples, rays = draw_samples(work.walks, work.count, work.threads)
+            grid = _grid(samples, work)
+            samples = samples.rows(_sorted(grid, samples))
+            world = work.walks.world
+            places = find_places(PlaceWork(grid=grid, samples=samples, tracer=world.tracer, pool=pool))
+            cells = _dark_cells(work, grid, places)
+            members = _link(cells, places, samples, world, pool)
+        shared_s = time.perf_counter() - started - clock.seconds
         cells, mean, shadow = _light(work, cells, members, samples, pool)
     rays += places.rays
-    reflectivity = members.reflectivity[members.target >= 0].mean(axis=0, dtype=np.float64)
-    return Built(cells=cells, mean=mean, reflectivity=reflectivity, rays=rays + shadow)
+    met = members.reflectivity[members.target >= 0]
+    reflectivity = met.sum(axis=0, dtype=np.float64) / max(len(met), 1)
+    return Built(cells=cells, mean=mean, reflectivity=reflectivity, rays=rays + shadow, shared_s=shared_s)
 
 
 def _grid(samples: Samples, work: CellWork) -> Grid:
     """Choose the borders of cells."""
-    edge = work.edge or float(np.median(samples.first_length)) * EDGE_OF_MEDIAN
+    edge = work.edge or (float(np.median(samples.first_length)) * EDGE_OF_MEDIAN if samples.n else 1.0)
     random = np.random.default_rng([work.walks.seed, LEVELS])
     return Grid(edge=max(edge, 1e-30), jitter=random.random((LEVELS, 3), np.float32))
 
@@ -124,10 +149,29 @@ def _link(cells: Cells, places: Places, samples: Samples, world: World, pool: Th
     return Members(
         first=places.first,
         sample=places.sample,
+        weight=weigh_members(cells.grid, places, samples.first_length),
         target=target,
         reflectivity=samples.reflectivity,
         share=places.share,
     )
+
+
+def weigh_members(grid: Grid, places: Places, length: Float32) -> Float32:
+    """The weight of each sample in the means of each of its cells; the weights of a cell add up to 1.
+
+    A cell is read by rays of some lengths, more often where such rays end: near an edge of a room rays are shorter than
+    in the middle of a wall. So samples that such a ray found count most.
+
+    Args:
+        length: (n_samples,) of the ray that found each sample.
+    """
+    wanted = np.log2(np.maximum(EDGE_OF_LENGTH * length.astype(np.float64) / grid.edge, 1.0))
+    sizes = np.diff(places.first)
+    off = np.minimum(wanted, COARSEST_READ)[places.sample] - np.repeat(np.minimum(places.level, COARSEST_READ), sizes)
+    weight = np.exp2(-WEIGHT_OF_LEVELS * np.abs(off))
+    cell = np.repeat(np.arange(len(sizes)), sizes)
+    found: Float32 = (weight / np.bincount(cell, weight, len(sizes))[cell]).astype(np.float32)
+    return found
 
 
 def _light(

@@ -30,6 +30,7 @@ class Places:
 
     Attributes:
         slots, other, guard: see `Cells`.
+        level: (n_cells,) of each cell; -1 for the cell of all surfaces.
         first, sample, share: see `Members`.
         rays: number of visibility rays.
     """
@@ -37,6 +38,7 @@ class Places:
     slots: Addresses
     other: Int32
     guard: Float32
+    level: Int32
     first: Addresses
     sample: Int32
     share: Float64
@@ -97,6 +99,8 @@ class PlaceWork:
 
 def find_places(work: PlaceWork) -> Places:
     """Find the cells of all levels."""
+    if work.samples.n == 0:
+        return _nowhere()
     own = np.full(work.samples.n, ALL, np.int32)
     empty = np.zeros(1, np.int64)
     levels: list[_Level] = []
@@ -115,11 +119,23 @@ def find_places(work: PlaceWork) -> Places:
         slots=slots,
         other=np.concatenate([np.full(1, NOWHERE, np.int32), *(found.other for found in levels)]),
         guard=np.concatenate([np.zeros((1, 4), np.float32), *(found.guard for found in levels)]),
+        level=np.repeat(
+            np.array([-1, *reversed(range(LEVELS))], np.int32), [1, *(len(found.sizes) for found in levels)]
+        ),
         first=np.concatenate([empty, np.cumsum(sizes)]),
         sample=np.concatenate([found.sample for found in levels]),
         share=np.concatenate([[0.0], coarse, np.zeros(base - 1 - len(coarse))]),
         rays=sum(found.rays for found in levels),
     )
+
+
+def _nowhere() -> Places:
+    """The places of no samples: the cell of all surfaces only."""
+    return Places(
+        slots=empty_slots(1), other=np.full(1, NOWHERE, np.int32), guard=np.zeros((1, 4), np.float32),
+        level=np.full(1, -1, np.int32), first=np.zeros(2, np.int64), sample=np.zeros(0, np.int32), share=np.zeros(1),
+        rays=0,
+    )  # fmt: skip
 
 
 def _find_level(work: PlaceWork, level: int, base: int, coarser: Int32) -> _Level:

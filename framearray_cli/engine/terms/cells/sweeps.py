@@ -30,7 +30,7 @@ class Members(NamedTuple):
 
     Attributes:
         first: (n_cells + 1,) samples of cell k: sample[first[k] : first[k + 1]]; cell ALL has none.
-        sample: numbers of samples, in rising order within a cell.
+        sample: numbers of samples, in rising order within a cell; `weight`: of each in the means of its cell.
         target: (n_samples,) the cell that a sample's link meets, or NOWHERE.
         reflectivity: (n_samples, 3) R there.
         share: (n_cells,) float64 share of all samples, for the mean over all cells: of cells of one level, else 0.
@@ -38,6 +38,7 @@ class Members(NamedTuple):
 
     first: Addresses
     sample: Int32
+    weight: Float32
     target: Int32
     reflectivity: Rgb
     share: Float64
@@ -51,14 +52,10 @@ def mean_of_samples(members: Members, first: int, n: int, values: Float32, mean:
             for l in range(values.shape[2]):
                 mean[k, channel, l] = 0.0
         for at in range(members.first[k], members.first[k + 1]):
-            i = members.sample[at]
+            i, weight = members.sample[at], members.weight[at]
             for channel in range(values.shape[1]):
                 for l in range(values.shape[2]):
-                    mean[k, channel, l] += values[i, channel, l]
-        share = np.float32(1.0 / max(members.first[k + 1] - members.first[k], 1))
-        for channel in range(values.shape[1]):
-            for l in range(values.shape[2]):
-                mean[k, channel, l] *= share
+                    mean[k, channel, l] += weight * values[i, channel, l]
 
 
 @kernel
@@ -80,14 +77,12 @@ def sweep_cells(members: Members, first: int, n: int, direct: Float32, before: F
             if target < 0:
                 continue
             for channel in range(3):
-                r = members.reflectivity[i, channel]
+                r = members.weight[at] * members.reflectivity[i, channel]
                 for l in range(n_lights):
                     after[k, channel, l] += r * before[target, channel, l]
-        share = np.float32(1.0 / max(members.first[k + 1] - members.first[k], 1))
         for channel in range(3):
             for l in range(n_lights):
-                own = direct[k, channel if channels == 3 else 0, l]
-                after[k, channel, l] = own + share * after[k, channel, l]
+                after[k, channel, l] += direct[k, channel if channels == 3 else 0, l]
 
 
 def _over_cells(n_cells: int, pool: ThreadPoolExecutor, task: Callable[..., None], *arrays: Float32) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.oracle_cells import LEVELS, CellMap, CellOracle, side_of, solve
+from support.oracle_cells import LEVELS, SHARE, CellMap, CellOracle, side_of, solve, weights_of
 from support.oracle_scene import Model
 from support.tiny import RED, SUN, WALK
 
@@ -110,7 +110,9 @@ def test_light_of_cells_is_that_of_plain_sums() -> None:
         target[escaped] = -1
         reflectivity = samples.reflectivity.astype(np.float64)
         sweeps = sweeps_for(reflectivity[~escaped].sum(axis=0) / samples.n)
-        light = solve(case.members, case.places.share, direct, target, reflectivity, sweeps)
+        wanted = np.log2(np.maximum(SHARE * samples.first_length.astype(np.float64) / case.cells.grid.edge, 1e-9))
+        weights = weights_of(case.members, case.places.level, wanted)
+        light = solve(case.members, weights, case.places.share, direct, target, reflectivity, sweeps)
     weights = case.cells.weights.astype(np.float64)
     expected = np.einsum("kcl,c->kl", light, weights)
     tint = light.mean(axis=2) / (light.mean(axis=2) @ weights)[:, None]
@@ -128,6 +130,8 @@ IMAGES: dict[str, dict[str, Any]] = {
     "one ray, one hit": {"samples": {"hits": 1, "obscurance": 1}},
     "more rays than packets hold": {"samples": {"hits": 1, "obscurance": 300}, "camera": {"resolution": [4, 3]}},
     "reuse": {"camera": WALK, "reuse": {"n_r": 2}, **SKY},
+    "one light": {"light": {"frames": 1, "sources": [RED]}, **SKY},
+    "more lights than are solved together": {"light": {"frames": 19}, "camera": {"resolution": [4, 3]}},
 }
 
 
@@ -195,15 +199,49 @@ def test_light_of_groups_adds_up_to_that_of_all_sources() -> None:
     np.testing.assert_allclose(planes[:3] + planes[3:6] + planes[7], whole, rtol=2e-4, atol=1e-5)
 
 
-def test_light_positions_permute() -> None:
-    order = [2, 0, 1]
-    with built(**SKY) as case, TracePool(case.setup, 2) as pool:
-        images = [frame.images for frame in tiny.frames_of(case.setup, case.ambient, pool)]
+ORDER = [2, 0, 1]
+
+
+def images_of(case: Case) -> Any:
+    """(n_frames, n_lights, height, width, 3)."""
+    with TracePool(case.setup, 2) as pool:
+        return np.array([frame.images for frame in tiny.frames_of(case.setup, case.ambient, pool)], np.float64)
+
+
+def test_light_positions_of_a_table_permute() -> None:
+    with built(**SKY) as case:
+        images = images_of(case)
         turned = replace(
-            case.setup,
-            lights=build.some_lights(case.setup.lights, order),
-            cells=at_lights(case.cells, order),
+            case.setup, lights=build.some_lights(case.setup.lights, ORDER), cells=at_lights(case.cells, ORDER)
         )
-        ambient = replace(case.ambient, intensity=case.ambient.intensity[order])
-        permuted = [frame.images for frame in tiny.frames_of(turned, ambient, pool)]
-    np.testing.assert_array_equal(np.array(images)[:, order], permuted)
+        ambient = replace(case.ambient, intensity=case.ambient.intensity[ORDER])
+        permuted = images_of(replace(case, setup=turned, ambient=ambient))
+    np.testing.assert_array_equal(images[:, ORDER], permuted)
+
+
+def test_light_positions_of_a_job_permute() -> None:
+    """Cells are solved anew; only the colour of a cell, a mean over all positions, is rounded differently."""
+    keys, found = LAMP["keys"], []
+    ends = [keys[0], {"frame": 1, "position": [0.1, 2.0, 0.9], "intensity": [1.0, 2.0, 9.0]}, keys[1]]
+    for order in ([0, 1, 2], ORDER):
+        lamp = {"type": "point", "keys": [{**ends[l], "frame": k} for k, l in enumerate(order)]}
+        with built(**SKY, light={"sources": [lamp]}) as case:
+            found.append(images_of(case))
+    assert abs(found[0][:, 1] - found[0][:, 0]).mean() > 0.01
+    np.testing.assert_allclose(found[0][:, ORDER], found[1], rtol=ROUNDING, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("sources", [[LAMP], [LAMP, RED]])
+def test_light_is_linear_in_its_sources(sources: list[Any]) -> None:
+    """Three times the light, and none, the light of the background taken off."""
+    found = []
+    for factor in (1.0, 3.0, 0.0):
+        scaled = [
+            {**lamp, "keys": [{**key, "intensity": [factor * i for i in key["intensity"]]} for key in lamp["keys"]]}
+            for lamp in sources
+        ]
+        with built(**SKY, light={"sources": scaled}) as case:
+            found.append(images_of(case))
+    once, thrice, sky = found
+    assert sky.mean() > 0.01 and (once - sky).mean() > 0.01
+    np.testing.assert_allclose(thrice - sky, 3 * (once - sky), rtol=ROUNDING, atol=ROUNDING)
