@@ -105,16 +105,9 @@ def check(job: Job, events: RenderEvents | None = None) -> Estimate:
             target_seconds = now() - before_target
             pixels = _trial_pixels(setup)
             first, second = (run_trial(few, setup, ambient, int(p)) for p in (FIRST_SHARE * pixels, pixels))
-            mirrors = mirror_share(setup)
-            # cells at the light positions that the trial leaves out
-            larger = cells_memory(setup, prepared.n_lights - few.n_lights)
-            limit = memory_limit(prepared) - larger
-            blocks = light_blocks(prepared, mirrors, limit, setup.per_pixel, setup)
+            blocks, frames, left_out = _block_memory(prepared, few, setup)
             resident, available = resident_memory(), free_memory()
-    largest = max(len(block) for block in blocks)
-    copied = cells_memory(setup, largest) if len(blocks) > 1 else 0
-    frames = window_memory(prepared, largest, mirrors, setup.per_pixel) + copied
-    more = max(larger + max(frames, peak - resident if setup.cells else 0), ambient_memory(prepared))
+    more = max(left_out + max(frames, peak - resident if setup.cells else 0), ambient_memory(prepared))
     disk = int(_frame_bytes(first, second, setup.n_pixels, prepared.n_lights) * prepared.n_cameras)
     free = free_space(job.output.directory)
     whole, _ = all_lights(prepared, MOST_LIGHTS, replace(setup, cells=None), ambient)
@@ -133,6 +126,21 @@ def check(job: Job, events: RenderEvents | None = None) -> Estimate:
         blocks=len(blocks),
         warnings=(*pilots, *_warnings(job, identity, memory_lacks=more > available, disk_lacks=disk > free)),
     )
+
+
+def _block_memory(prepared: Prepared, few: Prepared, setup: FrameSetup) -> tuple[list[range], int, int]:
+    """Return the blocks of light positions, the bytes of rendering the largest one, and those of the cells at the
+    positions that the trial leaves out.
+
+    Args:
+        setup: for the light positions of the trial, those of `few`.
+    """
+    mirrors = mirror_share(setup)
+    left_out = cells_memory(setup, prepared.n_lights - few.n_lights)
+    blocks = light_blocks(prepared, mirrors, memory_limit(prepared) - left_out, setup.per_pixel, setup)
+    largest = max(len(block) for block in blocks)
+    copied = cells_memory(setup, largest) if len(blocks) > 1 else 0
+    return blocks, window_memory(prepared, largest, mirrors, setup.per_pixel) + copied, left_out
 
 
 def planning_seconds(measured: float, shared: float, more_lights: float) -> float:
