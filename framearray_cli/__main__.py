@@ -14,7 +14,7 @@ def main() -> None:
     them for garbage while they load and to free them one by one at the end.
     """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    gc.set_threshold(100_000, 50, 50)
+    gc.set_threshold(200_000, 50, 50)
     from framearray_cli.cli.main import main as run
 
     try:

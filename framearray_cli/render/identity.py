@@ -25,13 +25,14 @@ PLACED_BY_KEYS = ("point", "directional")  # kinds of sources; suns and domes ma
 _DEFAULTS: dict[str, type[Table]] = {"obscurance": ObscuranceTable, "samples": SamplesTable}
 
 
-def identity_of(prepared: Prepared, old: Manifest | None = None) -> Identity:
+def identity_of(prepared: Prepared, old: Manifest | None = None, scene: str | None = None) -> Identity:
     """Return the identity of the array that a job renders.
 
     Args:
         old: the array in its folder; of keys that change nothing there it keeps the values, and its fingerprint.
+        scene: fingerprint of the scene, if known.
     """
-    job, scene, table = prepared.job, scene_fingerprint(prepared), job_table(prepared.job)
+    job, scene, table = prepared.job, scene or scene_fingerprint(prepared), job_table(prepared.job)
     for section, key in unused_keys(prepared) if old else ():
         known = old.job.get(section) if old else None
         if isinstance(known, Mapping) and key in known:

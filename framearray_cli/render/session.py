@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
@@ -17,7 +18,7 @@ from framearray_cli.engine.kernels.kernel import processor
 from framearray_cli.job.job import Job
 
 from .automatic.choose import AutoSettings, require_least_memory, resolve_auto
-from .identity import identity_of
+from .identity import identity_of, scene_fingerprint
 from .prepare import Prepared, open_embree, prepare
 from .progress import RenderEvents
 from .summary import Summary, summarize, with_summary
@@ -65,9 +66,12 @@ def open_session(
     require_least_memory(prepared)
     directory = job.output.directory
     chosen = range(prepared.n_cameras) if cameras is None else cameras
-    with open_embree(prepared, engine) as embree, ExitStack() as held:
+    with ThreadPoolExecutor(1, thread_name_prefix="fingerprint") as aside:  # both take as long, and leave Python alone
+        scene = aside.submit(scene_fingerprint, prepared)
+        built = open_embree(prepared, engine)
+    with built as embree, ExitStack() as held:
         prepared, settings = resolve_auto(prepared, embree)
-        identity = identity_of(prepared, None if restart else read_array(directory))
+        identity = identity_of(prepared, None if restart else read_array(directory), scene.result())
         run = RecordedRun(cameras=frames_text(chosen), processor=processor())
         check_folder(directory, identity, restart=restart)
         folder = ArrayFolder(directory)

@@ -12,6 +12,7 @@ import numpy as np
 from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Int32, Real, Rgb, Triple
 from framearray_cli.base.colour import linear_from_srgb8
 from framearray_cli.scene.scene import Scene
+from framearray_cli.scene.vectors import largest
 
 from ..kernels.kernel import inlined
 from ..kernels.simd import doubles, floor, gather, integers, popcount, reals, select, sqrt
@@ -54,13 +55,12 @@ class Surfaces(NamedTuple):
 
 def surfaces(scene: Scene) -> Surfaces:
     """Gather the arrays of a scene that kernels read; they share memory with it."""
-    largest = np.abs(scene.corners).max(axis=(1, 2), initial=0.0)
     arrays = {name: np.ascontiguousarray(getattr(scene, name)) for name in Surfaces._fields if hasattr(scene, name)}
     textured = (scene.reflectivity_texture >= 0) | (scene.specular_texture >= 0)
     plain = ~textured & (len(scene.colours) == 0)
     return Surfaces(
         **arrays,
-        offset=(OFFSET_ULPS * ULP * largest).astype(np.float32),
+        offset=(OFFSET_ULPS * ULP * largest(scene.corners.reshape(-1, 9))).astype(np.float32),
         linear=linear_from_srgb8(np.arange(256, dtype=np.uint8)),
         plain=plain.astype(np.uint8),
         total=np.where(plain[:, None], scene.reflectivity + scene.specular, np.float32(1.0)),
