@@ -18,7 +18,8 @@ from .attributes import FIXED_DATE, Attribute, Attributes
 from .png import check_size
 
 OIIO_NAMES = {"exr": "openexr", "tif": "tiff"}
-_HEADS = (b"\x76\x2f\x31\x01", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")  # of EXR, TIFF and large TIFF
+# Of EXR, TIFF, large TIFF and Radiance.
+_HEADS = (b"\x76\x2f\x31\x01", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+", b"#?RA", b"#?RG")
 
 
 def spec_of(shape: tuple[int, ...], names: list[str], kinds: list[str], attributes: Attributes) -> Any:
@@ -58,7 +59,7 @@ def read_pixels(path: Path) -> tuple[list[str], Float32]:
     if not os.path.isfile(path):
         raise OutputError(f"{path}: no such file")
     if not _begins_well(path):
-        raise OutputError(f"{path}: not an image, or damaged: it does not begin like EXR or TIFF")
+        raise OutputError(f"{path}: not an image, or damaged: it does not begin like EXR, TIFF or HDR")
     source = library.ImageInput.open(str(path))
     if source is None:
         raise OutputError(f"{path}: not an image, or damaged: {_first_line(library.geterror(), path)}")
@@ -117,7 +118,7 @@ def _check_end(path: Path, part: Path, n_bytes: int) -> None:
 
 
 def _begins_well(path: Path) -> bool:
-    """Whether a file begins like EXR or TIFF; OpenImageIO would try all its readers on any other."""
+    """Whether a file begins like EXR, TIFF or HDR; OpenImageIO would try all its readers on any other."""
     try:
         with path.open("rb") as file:
             return file.read(4) in _HEADS

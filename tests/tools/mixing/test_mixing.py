@@ -17,7 +17,7 @@ from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.scene.paths.domes import dome_directions
 from framearray_cli.tools.export import export_array
-from framearray_cli.tools.mixing.environment import LightField, environment_weights, light_field
+from framearray_cli.tools.mixing.environment import LightField, environment_weights, light_field, read_map
 from framearray_cli.tools.mixing.mixer import SumOptions, make_mixer, mean_around
 from framearray_cli.tools.mixing.weightfile import read_weights
 from framearray_cli.tools.movie.assemble import assemble_movie
@@ -60,6 +60,18 @@ def sky(folder: Path, azimuth_deg: float, elevation_deg: float) -> Path:
 
 
 # environments
+
+
+def test_an_hdr_map_has_the_radiance_of_its_mantissas_and_exponents(tmp_path: Path) -> None:
+    """Twin: the definition of RGBE, (m + 1/2) 2^(e - 136), written byte by byte."""
+    random = np.random.default_rng(3)
+    mantissa, exponent = random.integers(128, 256, (16, 32, 3)), random.integers(120, 140, (16, 32, 1))
+    mantissa[0, 0] = 200  # two bytes of 2 would announce run lengths
+    texels = np.concatenate([mantissa, exponent], axis=2).astype(np.uint8)
+    header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16 +X 32\n"
+    (tmp_path / "sky.hdr").write_bytes(header + texels.tobytes())
+    radiance = (mantissa + 0.5) * 2.0 ** (exponent - 136)
+    np.testing.assert_allclose(read_map(tmp_path / "sky.hdr"), radiance, rtol=1 / 256)
 
 
 @pytest.mark.parametrize("n", [24, 96])
