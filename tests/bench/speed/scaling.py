@@ -51,7 +51,7 @@ def measure(quick: bool) -> Table:
 
 def _row(case: Case, quick: bool, **size: float) -> Table:
     measured = steady(case, 1 if quick else FRAMES)
-    log(f"{size}: {measured.ms:.2f} ms per image")
+    log(f"{size}: {measured.ms:.2f} ms per image, serial {measured.serial:.1%}")
     return {**size, **measured.table()}
 
 
