@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support import tiny
@@ -17,6 +18,8 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 ther
 
 N, LIGHTS = 120, 3
 WALK = tiny.WALK | {"frames": N, "resolution": [60, 45]}
+Changes = dict[str, Any]  # of tables of the job
+AREA: Changes = {"reuse": {"weights": "area"}}
 WALK["keys"] = [tiny.WALK["keys"][0], tiny.WALK["keys"][1] | {"frame": N - 1}]
 
 
@@ -24,8 +27,11 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {file.name: file.read_bytes() for file in folder.glob("tiny.*")}
 
 
-def job(folder: Path) -> Path:
-    return write_job(folder, camera=WALK, output={"format": "exr"}, reuse={"n_r": 2}, ambient={"paths": 64})
+def job(folder: Path, changes: Changes) -> Path:
+    reuse = {"n_r": 2} | changes.get("reuse", {})
+    return write_job(
+        folder, **(changes | {"camera": WALK, "output": {"format": "exr"}, "reuse": reuse, "ambient": {"paths": 64}})
+    )
 
 
 def lines(out: Path) -> int:
@@ -33,23 +39,25 @@ def lines(out: Path) -> int:
     return sum(file.read_bytes().count(b"\n") for file in out.glob("records/*.jsonl"))
 
 
-def until_it_renders(folder: Path) -> subprocess.Popen[str]:
+def until_it_renders(folder: Path, changes: Changes) -> subprocess.Popen[str]:
     """Start a render and wait until it has read the folder and renders the rest, if there is any."""
     before = lines(folder / "out")
-    process = start("render", "-q", job(folder))
+    process = start("render", "-q", job(folder, changes))
     while process.poll() is None and lines(folder / "out") == before:
         time.sleep(0.002)
     return process
 
 
-def killed_and_resumed(folder: Path, whole: dict[str, bytes], seconds: float, kills: int, seed: int) -> list[int]:
+def killed_and_resumed(
+    folder: Path, changes: Changes, whole: dict[str, bytes], seconds: float, kills: int, seed: int
+) -> list[int]:
     """Kill a job a number of times, at moments spread over the time in which it writes images. Whenever it reaches its
     end, compare its files and start anew. Return the number of images that each killed run wrote.
     """
     rng, out, found = random.Random(seed), folder / "out", list[int]()
     while len(found) < kills:
         before = len(contents(out)) if out.exists() else 0
-        process = until_it_renders(folder)
+        process = until_it_renders(folder, changes)
         time.sleep(rng.uniform(0, seconds))
         process.send_signal(signal.SIGKILL)
         code = finish(process).code
@@ -59,19 +67,28 @@ def killed_and_resumed(folder: Path, whole: dict[str, bytes], seconds: float, ki
         else:
             assert code == -signal.SIGKILL
             found.append(len(contents(out)) - before)
-    assert finish(start("render", "-q", job(folder))).code == 0
+    assert finish(start("render", "-q", job(folder, changes))).code == 0
     return found
 
 
-@pytest.mark.parametrize("kills", [3, pytest.param(50, marks=pytest.mark.slow)])
-def test_a_render_that_is_killed_ends_with_the_same_bytes(kills, tmp_path):
+@pytest.mark.parametrize(
+    ("kills", "changes"),
+    [
+        (3, {}),
+        pytest.param(50, {}, marks=pytest.mark.slow),
+        pytest.param(10, AREA, marks=pytest.mark.slow),
+        pytest.param(10, AREA | {"indirect": tiny.CELLS}, marks=pytest.mark.slow),
+    ],
+    ids=["3", "50", "area", "cells"],
+)
+def test_a_render_that_is_killed_ends_with_the_same_bytes(kills, changes, tmp_path):
     for name in ("whole", "killed"):
         (tmp_path / name).mkdir()
-    process = until_it_renders(tmp_path / "whole")
+    process = until_it_renders(tmp_path / "whole", changes)
     started = time.monotonic()
     assert finish(process).code == 0
     seconds, whole = time.monotonic() - started, contents(tmp_path / "whole/out")
-    found = killed_and_resumed(tmp_path / "killed", whole, seconds, kills, seed=os.getpid())
+    found = killed_and_resumed(tmp_path / "killed", changes, whole, seconds, kills, seed=os.getpid())
     assert contents(tmp_path / "killed/out") == whole
     assert len(whole) == N * (LIGHTS + 1)  # with layers
     within = sum(images > 0 for images in found)

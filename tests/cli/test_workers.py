@@ -49,8 +49,10 @@ def images(out: Path) -> int:
         {"samples": {"error": 0.1}},
         {"samples": {"halves": True, "hits": 4}},
         {"camera": WALK | {"keys": WALK["keys"][:1]}},
+        {"reuse": {"n_r": 2, "weights": "area"}},
+        {"reuse": {"n_r": 2, "weights": "area"}, "indirect": tiny.CELLS},
     ],
-    ids=["plain", "auto", "error", "halves", "still"],
+    ids=["plain", "auto", "error", "halves", "still", "area", "cells"],
 )
 def test_the_bytes_are_those_of_the_whole(changes, tmp_path, monkeypatch):
     if "error" in changes.get("samples", {}):  # in place of hits

@@ -71,9 +71,13 @@ def test_particles_from_the_lights_are_the_same_for_any_number_of_threads(paths:
             np.testing.assert_array_equal(getattr(other, name), getattr(one, name))
 
 
-@pytest.mark.parametrize("weights", ["balance", "average", "area"])
-def test_same_bytes_for_1_2_and_5_threads(scene: Path, tmp_path: Path, weights: str) -> None:
-    changes = {"reuse": {"n_r": 1, "weights": weights}, "light": {"sources": [LAMP, tiny.SUN]}}
+@pytest.mark.parametrize(
+    ("weights", "indirect"), [("balance", {}), ("average", {}), ("area", {}), ("area", tiny.CELLS)]
+)
+def test_same_bytes_for_1_2_and_5_threads(scene: Path, tmp_path: Path, weights: str, indirect: dict[str, Any]) -> None:
+    changes = {
+        "reuse": {"n_r": 1, "weights": weights}, "light": {"sources": [LAMP, tiny.SUN]}, "indirect": indirect
+    }  # fmt: skip
     one = written(scene, tmp_path / "1", 1, **changes)
     assert len(one) == 4 * 3 + 4, "images and layers"
     assert len(set(one.values())) == len(one), "all different pictures"

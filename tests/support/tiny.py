@@ -200,6 +200,7 @@ WALK = {
         {"frame": 5, "eye": [0.5, 1.45, 1.2], "target": [0.1, 0.8, -1.0]},
     ],
 }
+CELLS = {"method": "cells", "samples": 4096}  # of `indirect`
 SUN = {"type": "directional", "keys": [{"frame": 0, "direction": [-0.6, -1.0, -0.3], "irradiance": [3.0, 2.5, 1.5]}]}
 RED = {"type": "point", "keys": [{"frame": 0, "position": [1.2, 1.0, 0.2], "intensity": [4.0, 0.5, 0.0]}]}
 

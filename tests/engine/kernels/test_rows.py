@@ -57,7 +57,8 @@ def test_embree_names_its_widths():
 
 
 @pytest.mark.slow
-def test_a_small_array_is_the_same_for_every_width(tmp_path):
+@pytest.mark.parametrize("settings", [(), ("reuse.weights=area",), ("reuse.weights=area", "indirect.method=cells")])
+def test_a_small_array_is_the_same_for_every_width(settings, tmp_path):
     """Kernels are compiled for one width, so each needs a process of its own.
 
     Where triangles meet, Embree may choose another one for another width: the smoke job has no such pixel.
@@ -66,6 +67,7 @@ def test_a_small_array_is_the_same_for_every_width(tmp_path):
     for width in (16, 8, 4):
         out = tmp_path / str(width)
         command = [sys.executable, "-m", "framearray_cli", "render", "-q", "jobs/smoke.toml", "-o", str(out)]
+        command += [part for setting in settings for part in ("--set", setting)]
         subprocess.run(command, cwd=ROOT, env=os.environ | {"FRAMEARRAY_PACKETS": str(width)}, check=True)
         found.append({file.name: file.read_bytes() for file in out.glob("smoke.*")})
     assert found[0]

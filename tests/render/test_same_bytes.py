@@ -1,0 +1,69 @@
+"""Weights by area, and light from cells: parts, blocks and runs that stop write the bytes of the whole."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support import tiny
+from support.tiny import WALK
+
+import framearray_cli.render.render as rendering
+from framearray_cli.base.errors import OutputError
+from framearray_cli.job.job import Job
+from framearray_cli.render.progress import RenderEvents
+from framearray_cli.render.render import render
+
+Bytes = dict[str, bytes]
+
+
+class Stopping(RenderEvents):
+    """Ends a run after some images."""
+
+    def __init__(self, most: int) -> None:
+        self.left = most
+
+    def written(self, images: int) -> None:
+        self.left -= images
+        if self.left < 0:
+            raise OutputError("stopped by the test")
+
+
+def job(scene: Path, out: Path, threads: int, indirect: dict[str, Any]) -> Job:
+    tables: dict[str, Any] = {
+        "scene": {"file": str(scene), "background": [0.3, 0.4, 0.5]},
+        "camera": WALK,
+        "output": {"directory": str(out)},
+        "reuse": {"n_r": 1, "weights": "area"},
+        "render": {"threads": threads},
+        "indirect": indirect,
+    }
+    return tiny.job(**tables)
+
+
+def images(folder: Path) -> Bytes:
+    return {file.name: file.read_bytes() for file in folder.glob("*.exr")}
+
+
+@pytest.mark.parametrize("indirect", [{}, tiny.CELLS], ids=["area", "cells"])
+def test_any_way_to_render_writes_the_same_bytes(
+    indirect: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = tiny.save_glb(tiny.room_meshes(), tmp_path / "room.glb")
+    render(job(scene, tmp_path / "whole", 1, indirect))
+    whole = images(tmp_path / "whole")
+    assert len(set(whole.values())) == 6 * (3 + 1), "images and layers, all different"
+
+    for part in ((2, 5), (0, 3), (1, 4)):
+        render(job(scene, tmp_path / "parts", 5, indirect), cameras=part)
+    assert images(tmp_path / "parts") == whole
+
+    for most in (2, 7):
+        with pytest.raises(OutputError, match="stopped"):
+            render(job(scene, tmp_path / "stopped", 2, indirect), Stopping(most))
+    assert 0 < len(images(tmp_path / "stopped")) < len(whole)
+    render(job(scene, tmp_path / "stopped", 2, indirect))
+    assert images(tmp_path / "stopped") == whole
+
+    monkeypatch.setattr(rendering, "light_blocks", lambda *_, **__: [range(0, 2), range(2, 3)])
+    render(job(scene, tmp_path / "blocks", 2, indirect))
+    assert images(tmp_path / "blocks") == whole
