@@ -3,12 +3,16 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numba as nb
 import numpy as np
 import pytest
+from PIL import Image
 from support import ROOT
 
+from framearray_cli.array.folder import read_array
+from framearray_cli.array.record import read_records
 from framearray_cli.engine import embree_c
 from framearray_cli.engine.kernels.simd import load_row, rows, store_row, width_of_packets
 
@@ -56,19 +60,39 @@ def test_embree_names_its_widths():
     assert (found("avx2"), found("sse2")) == ("(8, 4)", "(4,)")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("settings", [(), ("reuse.weights=area",), ("reuse.weights=area", "indirect.method=cells")])
-def test_a_small_array_is_the_same_for_every_width(settings, tmp_path):
-    """Kernels are compiled for one width, so each needs a process of its own.
-
-    Where triangles meet, Embree may choose another one for another width: the smoke job has no such pixel.
-    """
-    found = []
-    for width in (16, 8, 4):
-        out = tmp_path / str(width)
+def rendered(folder: Path, *settings: str) -> list[Path]:
+    """Render the smoke job in packets of 16, 8 and 4 rays; kernels are compiled for one width, so each in a process."""
+    folders = [folder / str(width) for width in (16, 8, 4)]
+    for out in folders:
         command = [sys.executable, "-m", "framearray_cli", "render", "-q", "jobs/smoke.toml", "-o", str(out)]
         command += [part for setting in settings for part in ("--set", setting)]
-        subprocess.run(command, cwd=ROOT, env=os.environ | {"FRAMEARRAY_PACKETS": str(width)}, check=True)
-        found.append({file.name: file.read_bytes() for file in out.glob("smoke.*")})
+        subprocess.run(command, cwd=ROOT, env=os.environ | {"FRAMEARRAY_PACKETS": out.name}, check=True)
+    return folders
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("settings", [(), ("reuse.weights=area",)])
+def test_a_small_array_is_the_same_for_every_width(settings, tmp_path):
+    """Where triangles meet, Embree may choose another one for another width: the smoke job has no such pixel."""
+    found = [{file.name: file.read_bytes() for file in out.glob("smoke.*")} for out in rendered(tmp_path, *settings)]
     assert found[0]
     assert found[0] == found[1] == found[2]
+
+
+@pytest.mark.slow
+def test_light_from_cells_differs_by_last_digits_between_widths(tmp_path):
+    """The cells are the same. Of what is read from them the last digits differ, 1e-6 of a value at most; so fewer than
+    256 times 1e-6 of the values of 8 bits are on the other side of a step."""
+    folders = rendered(tmp_path, "reuse.weights=area", "indirect.method=cells")
+    arrays = [read_array(out) for out in folders]
+    assert all(arrays)
+    cells = [
+        {run.cells for run in read_records(out, array.fingerprint).runs}
+        for out, array in zip(folders, arrays, strict=True)
+    ]
+    assert len(cells[0]) == 1 and cells[0] == cells[1] == cells[2]
+    names = sorted(file.name for file in folders[0].glob("smoke.*.png"))
+    whole, *others = (np.stack([np.asarray(Image.open(out / name), int) for name in names]) for out in folders)
+    for other in others:
+        assert np.abs(other - whole).max() <= 1
+        assert (other != whole).mean() < 256 * 1e-6
