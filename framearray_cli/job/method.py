@@ -124,11 +124,12 @@ class ObscuranceTable(Table):
 class IndirectTable(Table):
     """How indirect light is found."""
 
-    method: Literal["obscurance", "cells"] = Field(
+    method: Literal["obscurance", "local", "cells"] = Field(
         default="obscurance",
         description='"obscurance": obscurances times one ambient light per light position. "cells": all bounces of '
         "light are solved once for small cells of the surfaces under every light position, and obscurance rays read "
-        "the cells that they meet.",
+        'the cells that they meet. "local": obscurances times an ambient light of each cell, found from the same '
+        "solution.",
     )
     cell: float | None = Field(
         default=None,
@@ -143,12 +144,25 @@ class IndirectTable(Table):
         le=2**24,
         description="Number of walks that sample the cells.",
     )
+    filter: int = Field(
+        default=2,
+        ge=0,
+        le=3,
+        description="Number of passes that smooth indirect light between hits of one surface, over 3, 9 and 27 pixels. "
+        "0: none.",
+    )
 
     @model_validator(mode="after")
     def _of_cells(self) -> "IndirectTable":
-        extra = sorted(self.model_fields_set - {"method"})
-        if self.method == "obscurance" and extra:
-            fail([((key,), 'expected method = "cells" beside it: obscurances have no cells') for key in extra])
+        given, problems = self.model_fields_set, []
+        if self.method == "obscurance":
+            problem = 'expected method = "cells" or "local" beside it: obscurances have no cells'
+            problems = [((key,), problem) for key in sorted(given & {"cell", "samples"})]
+        if self.method != "cells" and "filter" in given:
+            problem = 'expected method = "cells" beside it: it smooths what rays read from cells'
+            problems.append((("filter",), problem))
+        if problems:
+            fail(problems)
         return self
 
 

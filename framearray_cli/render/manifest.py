@@ -72,7 +72,7 @@ def initial_manifest(
 def _images(prepared: Prepared, ambient: Ambient, files: ArrayNames) -> dict[str, Any]:
     """Return the file patterns of the images, and their lights."""
     lights = prepared.lights
-    if prepared.job.indirect.method == "cells":  # all light is in the images
+    if prepared.job.indirect.method != "obscurance":  # all light is in the images
         ambient = replace(
             ambient,
             intensity=np.zeros_like(ambient.intensity),

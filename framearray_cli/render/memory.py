@@ -90,7 +90,7 @@ def window_memory(
     frames = min(2 * n_r + 1, n_frames)
     weighed = 5 if job.reuse.weights == "area" else 4 if job.reuse.weights == "balance" and n_r > 0 else 0
     values = prepared.light_arrays.channels * n_lights
-    per_record = 4 * (values + LANES + (LIGHT + values if job.indirect.method == "cells" else 0))
+    per_record = 4 * (values + LANES + (LIGHT + values if job.indirect.method != "obscurance" else 0))
     per_hit = per_record + 16 * job.output.layers + frames * (4 + weighed)
     # a frame's mirror hits wait for N_r frames; twice while the lists of all batches are joined, and chains add some
     mirrored = mirror_share * job.specular.hits * (n_r + 3) * per_record

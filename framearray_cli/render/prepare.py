@@ -152,7 +152,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambi
         denoise=job.denoise.obscurance,
         halves=_halves(job, still=prepared.still),
     )
-    if job.indirect.method == "cells":
+    if job.indirect.method != "obscurance":
         return _with_cells(prepared, embree, setup, ambient)
     return setup, ambient
 
@@ -174,14 +174,18 @@ def _with_cells(
         count=job.indirect.samples,
         edge=job.indirect.cell,
         threads=prepared.threads,
+        local=_curve(job) if job.indirect.method == "local" else None,
     )
     built = build_cells(work)
+    local = work.local is not None
     started = time.perf_counter()
     with compile_clock() as clock:
-        accuracy = compare_with_paths(built.cells, _eye_walks(prepared, embree), prepared.threads)
+        eyes = _eye_walks(prepared, embree)
+        accuracy = None if local else compare_with_paths(built.cells, eyes, prepared.threads)
     shared_s = built.shared_s + time.perf_counter() - started - clock.seconds
     notes = (accuracy_text(accuracy),) if accuracy else ()
-    return replace(setup, cells=built.cells), replace(ambient, notes=(*ambient.notes, *notes), shared_s=shared_s)
+    setup = replace(setup, cells=built.cells, smooth=0 if local else job.indirect.filter, local=local)
+    return setup, replace(ambient, notes=(*ambient.notes, *notes), shared_s=shared_s)
 
 
 def accuracy_text(accuracy: Accuracy) -> str:

@@ -17,10 +17,18 @@ def test_cells_show_no_obscurance_to_denoise() -> None:
 
 @pytest.mark.parametrize("key", ["cell", "samples"])
 def test_keys_of_cells_need_cells(key: str) -> None:
-    with pytest.raises(ValidationError, match='expected method = "cells" beside it'):
+    with pytest.raises(ValidationError, match='expected method = "cells" or "local" beside it'):
         tiny.job(indirect={key: 2048})
+    tiny.job(indirect={"method": "local", key: 2048})
+
+
+@pytest.mark.parametrize("method", ["obscurance", "local"])
+def test_the_filter_needs_gather_rays(method: str) -> None:
+    with pytest.raises(ValidationError, match='expected method = "cells" beside it: it smooths'):
+        tiny.job(indirect={"method": method, "filter": 1})
+    tiny.job(indirect={"method": "cells", "filter": 1})
 
 
 def test_a_job_without_cells_is_written_as_before() -> None:
     assert "indirect" not in job_table(tiny.job())
-    assert job_table(tiny.job(indirect=CELLS))["indirect"] == {"method": "cells", "samples": 2**20}
+    assert job_table(tiny.job(indirect=CELLS))["indirect"] == {"method": "cells", "samples": 2**20, "filter": 2}

@@ -8,11 +8,13 @@ from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.render.prepare import Prepared
 from support import oracle_random as rnd
 from support.oracle import Oracle
-from support.oracle_scene import Model, Points, dot, unit
+from support.oracle_scene import Model, Points, dot
 
 LEVELS, COARSEST, SHARE = 7, 4, 0.3  # levels, the coarsest that rays read, edge of cells per length of a ray
 BITS = 19  # of a key per axis
-CELLS = 5  # dimension of the random numbers that move points
+CELLS, CONTINUED = 5, 16  # dimensions of the random numbers that move points, and of those of where ray 0 ends
+LOCAL = 2  # the level that obscurances take their ambient light from
+STEPS = 4  # rays that follow one that was too short, at most
 GUARD_END = 1 - 1e-3  # a ray to a guard ends this share of its length before it
 
 
@@ -55,17 +57,26 @@ class CellMap:
         return ~self.model.blocked(start, guard[:, :3] - start, GUARD_END)
 
     def find(self, position: Any, normal: Any, length: Any, shift: Any = 0.0) -> Any:
-        """The cells that rays read where they end: at the shifted point, or else the first at the point itself."""
+        """The cells that rays read where they end."""
+        found = self.first(position, normal, length, shift)
+        doubtful = np.flatnonzero(self.other[found] >= 0)
+        aside = doubtful[~self.sees(position[doubtful], normal[doubtful], found[doubtful])]
+        found[aside] = self.other[found[aside]]
+        return found
+
+    def first(self, position: Any, normal: Any, length: Any, shift: Any) -> Any:
+        """The first slots of these cells: at the shifted point, or else the first at the point itself."""
         side, wanted, found = side_of(normal), self.level(length), np.zeros(len(length), int)
         for level in range(LEVELS):
             here = self.numbers(level, position, side)
             first = self.numbers(level, position + shift * self.grid.edge * 2**level, side)
             here = np.where((wanted == level) & (first > 0), first, here)
             found = np.where((wanted <= level) & (found == 0), here, found)
-        doubtful = np.flatnonzero(self.other[found] >= 0)
-        aside = doubtful[~self.sees(position[doubtful], normal[doubtful], found[doubtful])]
-        found[aside] = self.other[found[aside]]
         return found
+
+    def short(self, position: Any, normal: Any, length: Any, shift: Any) -> Any:
+        """Whether rays are shorter than the finest cells, and would read doubtful ones."""
+        return (length < self.grid.edge) & (self.other[self.first(position, normal, length, shift)] >= 0)
 
 
 def tangents(normal: Any) -> tuple[Any, Any]:
@@ -123,7 +134,7 @@ class CellOracle(Oracle):
     def __init__(self, inputs: Prepared, ambient: Ambient, cells: Any) -> None:
         """Take the cells from the program."""
         super().__init__(inputs, ambient)
-        self.cells, self.places = cells, CellMap(cells, self.model)
+        self.cells, self.places, self.kept = cells, CellMap(cells, self.model), 0
 
     def radiance(self, hits: Points, l: int) -> Any:
         """(n, 3): R (E[l] + E_indirect[l]) / pi, or the background where a ray left the scene."""
@@ -131,34 +142,86 @@ class CellOracle(Oracle):
         seen = hits.reflectivity * ((self.irradiance(hits, l) + light) / np.pi + same)
         return np.where(hits.surface[:, None], seen, self.background)
 
+    def landed(self, hits: Points, owner: Any, ray: Any, dirs: Any, last: bool = False) -> tuple[Points, Any, Any, Any]:
+        """Where rays end: points with their keys, R there, the cells that they read, -1 for none, and the short ones.
+
+        Of those the first slots; none is short among the last of a path.
+        """
+        start, keys = hits.start[owner], [hits.key[i] for i in owner]
+        triangle, uv, distance = self.model.first(start, dirs, np.inf)
+        next_keys = [rnd.bits([key], CONTINUED + int(r))[0] for key, r in zip(keys, ray, strict=True)]
+        points = self.model.look(start, dirs, next_keys, hits.pixel[owner])
+        met = np.flatnonzero(triangle >= 0)
+        normal = points.geometric[met]
+        random = rnd.points([rnd.bits([keys[i]], CELLS)[0] for i in met], ray[met], rnd.sequence()) - 0.5
+        along, across = tangents(normal)
+        where = points.position[met], normal, distance[met], random[:, :1] * along + random[:, 1:] * across
+        cell, short, r = np.full(len(dirs), -1), np.zeros(len(dirs), bool), np.zeros((len(dirs), 3))
+        if len(met):
+            cell[met], short[met] = self.places.find(*where), self.places.short(*where) & (not last)
+            cell[short] = self.places.first(*where)[short[met]]
+        r[met] = self.model.total(triangle[met], uv[met])
+        return points, r, cell, short
+
+    def followed(self, points: Points) -> tuple[Any, Any, Any]:
+        """From points that short rays met, on to a long one: 1 + R + R R + ..., the product of all R, and the cell."""
+        n = len(points)
+        series, through, end = np.ones((n, 3)), np.ones((n, 3)), np.full(n, -1)
+        root = np.arange(n)
+        for step in range(STEPS if n else 0):
+            words = rnd.bits(points.key, rnd.HEMISPHERE)
+            dirs = rnd.hemisphere(points.shading, rnd.points(words, np.zeros(len(points)), rnd.lattice(1)))
+            dirs -= 2 * np.minimum(dot(dirs, points.geometric), 0)[:, None] * points.geometric
+            own = np.arange(len(points))
+            points, r, cell, short = self.landed(points, own, np.zeros(len(own), int), dirs, step == STEPS - 1)
+            through[root[cell >= 0]] *= r[cell >= 0]
+            series[root[short]] += through[root[short]]
+            end[root[~short]] = cell[~short]
+            points, root = points[short], root[short]
+            if not len(root):
+                break
+        return series, through, end
+
     def gathered(self, hits: Points, l: int) -> tuple[Any, Any]:
         """E_indirect[l] by sources, and the radiance that is the same under every light, (n, 3) each."""
-        n, cells = self.job.samples.obscurance, self.cells
-        owner, ray, dirs = self.gather_rays(hits)
-        triangle, uv, distance = self.model.first(hits.start[owner], dirs, np.inf)
-        met = triangle >= 0
-        at, uv, owner, ray = triangle[met], uv[met], owner[met], ray[met]
-        corners = self.model.scene.corners[at].astype(np.float64)
-        normal = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-        normal *= np.where(dot(normal, dirs[met]) > 0, -1.0, 1.0)[:, None]
-        words = rnd.bits(hits.key, CELLS)
-        random = rnd.points([words[i] for i in owner], ray, rnd.sequence()) - 0.5
-        along, across = tangents(normal)
-        shift = random[:, :1] * along + random[:, 1:] * across
-        k = self.places.find(self.model.mix(self.model.scene.corners, at, uv), normal, distance[met], shift)
-        r, v, colour = self.model.total(at, uv), cells.weights.astype(np.float64), cells.tint[k, :3].astype(np.float64)
-        hue = np.zeros((len(met), 3))
-        hue[met] = r * colour * cells.tint[k, 3:4]
+        n, cells, unit_of_light = self.job.samples.obscurance, self.cells, self.inputs.light_arrays.colour[l]
+        v, channels = cells.weights.astype(np.float64), cells.light.shape[1]
+        points, r, k, short = self.landed(hits, *self.gather_rays(hits))
+        self.kept += short.sum()
+        tint, missed = cells.tint.astype(np.float64), k < 0
+        hue = np.where(missed[:, None], 0.0, r * tint[k, :3] * tint[k, 3:4])
+        through, end, own = np.ones((len(k), 3)), k.copy(), np.zeros((len(k), 3))
+        through[missed], r[missed] = 1.0, 1.0
+        series, through[short], end[short] = self.followed(points[short])
+        at = [0, 1, 2] if channels == 3 else [unit_of_light.argmax()]  # where all channels are the same times the unit
+        direct = self.irradiance(points[short], l)[:, at]
+        own[short] = series * np.divide(direct, unit_of_light[at], out=0 * direct, where=unit_of_light[at] > 0)
+        same = r * through * np.where((end < 0)[:, None], self.background, tint[end, 4:7])
+        read = np.where((end < 0)[:, None], 0.0, r * through * tint[end, :3])
+        if channels == 3:
+            g = own * r + np.where((end < 0)[:, None], 0.0, r * through) * cells.light[end, :, l]
+        else:
+            g = ((own * r) @ v + (read @ v) * cells.light[end, 0, l])[:, None]
         hue = hue.reshape(-1, n, 3).mean(axis=1)
         mean = (hue @ v)[:, None]
-        hue = np.divide(hue, mean, out=np.zeros_like(hue), where=mean > 0)
-        if cells.light.shape[1] == 3:
-            g = np.zeros((len(met), 3))
-            g[met], hue = r * cells.light[k, :, l], 1.0
-        else:
-            g = np.zeros((len(met), 1))
-            g[met] = ((r * colour) @ v)[:, None] * cells.light[k, :, l]
-        light = hue * g.reshape(-1, n, g.shape[1]).mean(axis=1) * self.inputs.light_arrays.colour[l]
-        same = np.tile(self.background, (len(met), 1))
-        same[met] = r * cells.tint[k, 4:7]
+        hue = 1.0 if channels == 3 else np.divide(hue, mean, out=np.zeros_like(hue), where=mean > 0)
+        light = hue * g.reshape(-1, n, g.shape[1]).mean(axis=1) * unit_of_light
         return light, same.reshape(-1, n, 3).mean(axis=1)
+
+
+class LocalOracle(CellOracle):
+    """Renders single images of a job whose obscurances have the ambient light of cells."""
+
+    def gathered(self, hits: Points, l: int) -> tuple[Any, Any]:
+        """E_indirect[l] by sources, and the radiance that is the same under every light: W times what cells hold."""
+        cells, met = self.cells, np.flatnonzero(hits.surface)
+        obscurance, _ = self.obscurance(hits)
+        along, across = tangents(hits.geometric)
+        random = rnd.points(rnd.bits(hits.key, CELLS), np.zeros(len(hits)), rnd.sequence()) - 0.5
+        shift = random[:, :1] * along + random[:, 1:] * across
+        length = np.full(len(met), 2**LOCAL * self.cells.grid.edge / SHARE)  # of a ray that reads this level
+        k = self.places.find(hits.position[met], hits.geometric[met], length, shift[met])
+        light, same = np.zeros((len(hits), 3)), np.zeros((len(hits), 3))
+        light[met] = obscurance[met] * cells.tint[k, :3] * cells.light[k, :, l] * self.inputs.light_arrays.colour[l]
+        same[met] = obscurance[met] * cells.tint[k, 4:7]
+        return light, same

@@ -91,7 +91,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
         hits = scratch.hits
         if n_normals:
             normal[span], depth[span] = _normals_and_depths(setup.cams, c, hits, m)
-        estimate_terms(setup, hits, m, scratch, records.part(span), "obscurance", "shadow")
+        estimate_terms(setup, hits, m, scratch, records.part(span), "obscurance", "shadow", smooth=True)
         _find_outer(setup, c, m, scratch, frames, pixel[:, span], weight[:, span], within[:, span])
         return mirror_paths(setup, hits, m, scratch) if setup.depth else []
 

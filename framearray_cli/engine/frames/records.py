@@ -10,7 +10,7 @@ from framearray_cli.base.arrays import Float32, Int32, with_room
 
 from ..kernels.kernel import inlined
 from ..kernels.simd import LANES
-from ..terms.cells.gather import ANY, COLOUR, LIGHT
+from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
 
 # Columns of a hit's row, and of sums of rows; those from INDIRECT to REFLECTIVITY are the first of three channels.
 WEIGHT, INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY, LIT, HALF = 0, 1, 4, 7, 10, 13, 14
@@ -59,7 +59,7 @@ class HitRecords:
         direct: Float32 = np.swapaxes(self.irradiance, 1, 2)
         if not self.indirect.shape[1]:
             return direct
-        known = np.where(self.indirect[:, ANY, None] > 0, self.indirect, np.float32(0.0))  # else not written
+        known = np.where(self.indirect[:, LEVEL, None] > 0, self.indirect, np.float32(0.0))  # else not written
         gathered = np.swapaxes(known[:, LIGHT:].reshape(self.irradiance.shape), 1, 2)
         found: Float32 = direct + gathered * known[:, None, COLOUR : COLOUR + 3]
         return found

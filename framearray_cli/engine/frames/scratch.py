@@ -6,7 +6,8 @@ import numpy as np
 
 from ..hits.hits import empty_hits
 from ..hits.rays import room_for_hits, room_for_tests
-from ..terms.cells.gather import room_for_gathering
+from ..terms.cells.lookups import room_for_gathering, room_for_near
+from ..terms.cells.smooth import room_for_smoothing
 from ..terms.direct_steps import room_for_steps
 from .setup import FrameSetup
 
@@ -27,8 +28,9 @@ class Scratch:
         weight: (2 N_r + 1, batch) of hits in the frames around.
         place: (2 N_r + 1, batch) where hits lie in their pixels of the frames around, see `find_places`.
         obscurance, skylight: (batch, 3) W and S.
-        gather: of gather rays, and `constant`: (batch, 3) the light that cells have at every light position; None and
-            (0, 3) without cells.
+        gather, near: of gather rays, and of those too short for cells; and `constant`: (batch, 3) the light that cells
+            have at every light position, `closeness`: (batch,) of their rays; None and empty without cells.
+        smooth: of the filter of indirect light; None without.
         rays: number of rays traced by kind; `seconds`: by stage.
     """
 
@@ -50,6 +52,11 @@ class Scratch:
         self.obscurance = np.empty((batch, 3), np.float32)
         self.skylight = np.empty((batch if setup.obscurance.sky else 0, 3), np.float32)
         self.gather = room_for_gathering(rays) if setup.cells is not None else None
+        channels, n_lights = setup.lights.channels, setup.lights.n_lights
+        near = [room_for_near(channels, n_lights, setup.kept) for _ in range(2 if setup.cells is not None else 0)]
+        self.near = (near[0], near[1]) if near else None
+        self.closeness = np.empty(batch if near else 0, np.float32)
         self.constant = np.empty((batch if setup.cells is not None else 0, 3), np.float32)
+        self.smooth = room_for_smoothing(setup.lights.channels * len(setup.kept)) if setup.smooth else None
         self.rays: Counter[str] = Counter()
         self.seconds: defaultdict[str, float] = defaultdict(float)

@@ -43,6 +43,8 @@ class FrameSetup:
         halves: how hits are split into two halves: BY_SAMPLE, or the number of successive frames that belong to one
             half, or 0 for no split.
         cells: the light that indirect light is gathered from, at the kept light positions; None: obscurances.
+        local: whether `cells` hold the ambient light of obscurances, see `terms/cells/local.py`; else all light.
+        smooth: number of passes of the filter of indirect light from cells.
         order: (n_pixels,) every pixel once, in the order of tracing.
     """
 
@@ -68,6 +70,8 @@ class FrameSetup:
     area: bool = False
     allotment: Allotment | None = None
     cells: Cells | None = None
+    local: bool = False
+    smooth: int = 0
     order: Int32 = field(init=False)
 
     def __post_init__(self) -> None:

@@ -9,7 +9,9 @@ from framearray_cli.base.arrays import Float32, Rgb
 from ..hits.hits import ESCAPED, Hits
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, bits, load
-from ..terms.cells.gather import Gathered, gather_cells
+from ..terms.cells.gather import Gathered, gather_cells, gather_settings
+from ..terms.cells.local import read_cells
+from ..terms.cells.smooth import smooth_light
 from ..terms.direct import direct
 from ..terms.direct_steps import direct_by_steps
 from ..terms.obscurance import obscurance
@@ -29,6 +31,8 @@ def estimate_terms(
     obscurance_kind: str,
     shadow_kind: str,
     throughput: Rgb = _NOTHING,
+    *,
+    smooth: bool = False,
 ) -> None:
     """Estimate W, the light-independent radiance and E[l] of hits 0 to n - 1.
 
@@ -36,10 +40,16 @@ def estimate_terms(
         out: overwritten.
         obscurance_kind, shadow_kind: kinds of rays and stages to count the cost under.
         throughput: (>= n, 3) the tint t of the mirrors on the way to each hit, or (0, 3) without mirrors.
+        smooth: whether hits in a row are neighbours in the image, and their indirect light is filtered.
     """
     started = perf_counter()
     neighbours = not len(throughput)  # behind mirrors hits lie apart
     scratch.rays[obscurance_kind] += _estimate_indirect(setup, hits, n, scratch, out, neighbours)
+    if smooth and scratch.smooth is not None:
+        cams, passes = setup.cams, setup.smooth
+        smooth_light(
+            hits, n, cams.width, cams.height, passes, scratch.closeness, scratch.smooth, out.indirect, scratch.constant
+        )  # fmt: skip
     skylight = scratch.skylight if setup.cells is None else scratch.constant
     middle = perf_counter()
     if scratch.steps is None:
@@ -63,17 +73,18 @@ def _estimate_indirect(
 ) -> int:
     """Estimate W, and the indirect light of cells where the job has them; return the number of rays."""
     rays: int
-    if setup.cells is None or scratch.gather is None:
+    gathered = Gathered(scratch.obscurance, scratch.skylight, out.indirect, scratch.constant, scratch.closeness)
+    if setup.cells is None or scratch.gather is None or scratch.near is None or setup.local:
         rays = obscurance(
             hits, n, setup.obscurance, setup.surfaces, setup.tracer, scratch.hit_rays, scratch.obscurance,
             scratch.skylight, neighbours,
         )  # fmt: skip
+        if setup.cells is not None and scratch.gather is not None:
+            rays += read_cells(hits, n, setup.cells, setup.tracer, scratch.gather, scratch.test_rays, gathered)
     else:
-        gathered = Gathered(scratch.obscurance, scratch.skylight, out.indirect, scratch.constant)
-        far = setup.obscurance._replace(sky=True)
         rays = gather_cells(
-            hits, n, setup.obscurance, far, setup.world, setup.cells, scratch.hit_rays, scratch.gather,
-            scratch.test_rays, gathered, neighbours,
+            hits, n, gather_settings(setup.obscurance), setup.world, setup.lights, setup.cells, scratch.hit_rays,
+            scratch.gather, scratch.test_rays, scratch.near, gathered, neighbours,
         )  # fmt: skip
     return rays
 

@@ -11,7 +11,7 @@ from framearray_cli.base.arrays import Addresses, Real
 from ..frames.records import HALF, LIT, REFLECTIVITY, WEIGHT, lit_bit
 from ..kernels.kernel import inlined, integer_at, kernel, prefetch, real_at
 from ..kernels.simd import LANES, lane_numbers, lanes_from, load, reals, store
-from ..terms.cells.gather import ANY, COLOUR, LIGHT
+from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
 from .band import HITS_AT_ONCE, INVERSE_PI, Band
 from .sources import GATHERED, IRRADIANCE, ODD_SCALE, ORDER, ROW, SCALE, SHARES, START, WEIGHTS
 
@@ -131,7 +131,7 @@ def _light_from_cells(source: Addresses, hit: int, values: int) -> int:
     address = 0
     if source[GATHERED] != 0:
         row = source[GATHERED] + 4 * (LIGHT + values) * hit
-        address = row if real_at(row, ANY) > 0.0 else 0
+        address = row if real_at(row, LEVEL) > 0.0 else 0
     return address
 
 

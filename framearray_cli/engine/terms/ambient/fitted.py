@@ -36,7 +36,8 @@ class ObscuranceCurve:
 
 
 @kernel
-def _rho_of(falloff: int, tau: float, x: Float32, out: Float32) -> None:
+def rho_of(falloff: int, tau: float, x: Float32, out: Float32) -> None:
+    """Write rho of each x = d / d_max."""
     for i in range(x.shape[0]):
         out[i] = rho(falloff, tau, x[i])
 
@@ -147,7 +148,7 @@ class _FitWalks:
         near = steps.distance < curve.d_max  # False for NaN, too
         far = ~near & ~np.isnan(steps.distance)
         openness = np.zeros(n, np.float32)
-        _rho_of(
+        rho_of(
             curve.falloff,
             curve.tau,
             np.divide(steps.distance, curve.d_max, out=np.zeros_like(steps.distance), where=near).astype(np.float32),

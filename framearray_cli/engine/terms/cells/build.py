@@ -17,7 +17,9 @@ from ...hits.rays import Rays, room_for_tests
 from ...inputs.lights import LightArrays, some_lights
 from ...kernels.clock import compile_clock
 from ..ambient.estimate import BATCH
+from ..ambient.fitted import ObscuranceCurve
 from ..direct import direct
+from .local import obscurance_of_cells, per_obscurance
 from .places import Places, PlaceWork, find_places
 from .samples import Samples, SampleWalks, draw_samples
 from .sweeps import Members, mean_by_cell, solve
@@ -57,6 +59,7 @@ class CellWork:
         count: number of walks.
         edge: h_0, scene units; None: a share of the median length of gather rays.
         threads: number of threads.
+        local: obscurances whose ambient light the cells are to hold, see `local.py`; None: they hold all light.
     """
 
     walks: SampleWalks
@@ -64,6 +67,7 @@ class CellWork:
     count: int
     edge: float | None
     threads: int
+    local: ObscuranceCurve | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -188,6 +192,8 @@ def _light(
         rays += traced
         own = mean_by_cell(members, by_sample, pool)
         found = solve(members, own, pool)
+        if work.local:  # only what links bring
+            found -= own
         mean[block.start : block.stop] = found[ALL].T * lights.colour[block.start : block.stop]
         total += found.sum(axis=2, dtype=np.float64)
         at = slice(block.start, block.stop)
@@ -198,6 +204,8 @@ def _light(
         constant = _constant_light(work, members, samples, pool)
         tint[:, CONSTANT : CONSTANT + 3] = constant / np.pi
         mean += constant[ALL]
+    if work.local:
+        cells = per_obscurance(cells, obscurance_of_cells(members, samples, work.local, pool))
     return cells, mean, rays
 
 

@@ -26,7 +26,7 @@ from framearray_cli.engine.terms.cells.table import Cells, at_lights
 from framearray_cli.render.prepare import Prepared, eye_cameras, image_ambient, open_embree, plan_work
 from framearray_cli.render.target.pilot import _radiance
 
-CELLS = {"indirect": {"method": "cells", "samples": 4096, "cell": 0.1}}
+CELLS = {"indirect": {"method": "cells", "samples": 4096, "cell": 0.1, "filter": 0}}
 SKY = {"scene": {"background": [0.3, 0.4, 0.5]}}
 LAMP = tiny.TABLE["light"]["sources"][0]
 # rays within rounding of a border that may read another cell than the twin's, in pixels per image
@@ -129,10 +129,13 @@ IMAGES: dict[str, dict[str, Any]] = {
     "three colours of light": {"light": {"sources": [LAMP, SUN, RED]}},
     "one ray, one hit": {"samples": {"hits": 1, "obscurance": 1}},
     "more rays than packets hold": {"samples": {"hits": 1, "obscurance": 300}, "camera": {"resolution": [4, 3]}},
+    "wide cells": {"indirect": {**CELLS["indirect"], "cell": 0.6}},
     "reuse": {"camera": WALK, "reuse": {"n_r": 2}, **SKY},
     "one light": {"light": {"frames": 1, "sources": [RED]}, **SKY},
     "more lights than are solved together": {"light": {"frames": 19}, "camera": {"resolution": [4, 3]}},
 }
+# rays that are too short for cells: at least that many where cells are wide
+SHORT = 50
 
 
 @pytest.mark.parametrize("name", IMAGES)
@@ -145,6 +148,7 @@ def test_every_pixel_is_that_of_the_twin(name: str) -> None:
                 image, expected = rendered[c].images[l], twin.image(c, l)
                 off = abs(image - expected) / (expected + expected.mean())
                 assert (off > 128 * 2.0**-24).any(axis=-1).sum() <= FLIPS, f"camera {c}, light {l}"
+        assert twin.kept >= SHORT or name != "wide cells"
 
 
 @pytest.mark.parametrize("name", ["sky", "three colours of light"])

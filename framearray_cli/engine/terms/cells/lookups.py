@@ -1,0 +1,203 @@
+"""Where gather rays land: the cells that they read, and those among them that are too short for any cell.
+
+A ray that is shorter than a cell is wide meets a surface that may have little in common with the rest of its cell: the
+other side of a fold, or the inside of a crack. Such rays are kept, see `near.py`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from framearray_cli.base.arrays import Float32, Int32, Real, Rgb, Triple, with_room
+
+from ...embree.packets import DIRECTION, HIT_ROWS, TFAR, Tracer, room_in
+from ...hits.hits import Hits, decode_hits, empty_hits
+from ...hits.rays import NO_RAYS, ORDER, Rays, room_for_hits
+from ...inputs.random import CELLS, CONTINUED, r2, random_word
+from ...inputs.surfaces import Surfaces, geometric_normal, position_at, total_at
+from ...kernels.kernel import inlined, kernel
+from ...kernels.simd import LANES, integers, load_row, select, store, width_of_packets
+from .guards import choose_slots, write_guard_ray
+from .table import NOWHERE, TINT, Cells, find_cell, level_of, shifts, side_of
+
+# Rays that are kept together, of those traced together; the rest read cells.
+MOST_NEAR = 2048
+
+
+class GatherScratch(NamedTuple):
+    """Arrays for one batch of gather rays.
+
+    Attributes:
+        cell: (n_rays,) the cell that each ray reads, NOWHERE, or `near_cell(k)` of ray k that was kept.
+        reflectivity: (3, n_rays) R(Q).
+        point: (6, LANES) Q and its normal, of sixteen rays.
+    """
+
+    cell: Int32
+    reflectivity: Float32
+    point: Float32
+
+
+class NearHits(NamedTuple):
+    """Rays that were kept, and the light that they bring.
+
+    Attributes:
+        place: (MOST_NEAR,) number of the ray among those traced together; `cell`: the cell that it would read.
+        hits: the points Q that they meet.
+        rays, room: their packets, then those of one more ray from each Q.
+        root: (MOST_NEAR,) the kept ray whose path goes through Q; `start`, `own`: (MOST_NEAR,) `place` and `cell` of
+            the rays that paths begin with.
+        through: (3, MOST_NEAR) product of the reflectivities of the path after Q; `series`: (3, MOST_NEAR) 1 plus that
+            product up to each further point; `end`: (MOST_NEAR,) the cell at the end of the path, or NOWHERE.
+        irradiance: (MOST_NEAR, channels, n_lights) E_direct(Q) of all lights that are computed; `first`: the first of
+            those that cells have.
+        light: (MOST_NEAR, channels, n_lights or more, a multiple of LANES) what leaves Q, times pi.
+        hue, constant: (MOST_NEAR, 3) its colour times its mean over light positions, as the cell has it, and the
+            radiance that leaves Q under every l.
+    """
+
+    place: Int32
+    cell: Int32
+    hits: Hits
+    rays: Rays
+    room: GatherScratch
+    root: Int32
+    start: Int32
+    own: Int32
+    through: Rgb
+    series: Rgb
+    end: Int32
+    irradiance: Float32
+    first: int
+    light: Float32
+    hue: Rgb
+    constant: Rgb
+
+
+def room_for_gathering(n_rays: int) -> GatherScratch:
+    """Allocate arrays for n rays."""
+    n = -(-n_rays // LANES) * LANES
+    return GatherScratch(np.empty(n, np.int32), np.empty((3, n), np.float32), np.empty((6, LANES), np.float32))
+
+
+def room_for_near(channels: int, n_lights: int, kept: range) -> NearHits:
+    """Allocate arrays for rays to keep; `kept`: the light positions that cells have, of n_lights."""
+    n = MOST_NEAR
+    return NearHits(
+        place=np.empty(n, np.int32),
+        cell=np.empty(n, np.int32),
+        hits=empty_hits(n),
+        rays=room_for_hits(n),
+        room=room_for_gathering(n),
+        root=np.empty(n, np.int32),
+        start=np.empty(n, np.int32),
+        own=np.empty(n, np.int32),
+        through=np.empty((3, n), np.float32),
+        series=np.empty((3, n), np.float32),
+        end=np.empty(n, np.int32),
+        irradiance=with_room((n, channels, n_lights), np.float32),
+        first=kept.start,
+        light=np.empty((n, channels, -(-len(kept) // LANES) * LANES), np.float32),
+        hue=np.empty((n, 3), np.float32),
+        constant=np.empty((n, 3), np.float32),
+    )
+
+
+@inlined
+def near_cell(k: int) -> int:
+    """What stands in place of the cell of ray k that was kept; its own inverse."""
+    return NOWHERE - 1 - k
+
+
+@inlined
+def _keep_ray(rays: Rays, ray: int, cell: int, near: NearHits, k: int) -> None:
+    """Keep a traced ray as number k."""
+    near.place[k], near.cell[k] = ray, cell
+    width = width_of_packets()
+    p, lane, q, to = ray // width, ray % width, k // width, k % width
+    for row in range(HIT_ROWS):
+        near.rays.packets[q, row, to] = rays.packets[p, row, lane]
+
+
+@kernel
+def find_cells(
+    hits: Hits, surfaces: Surfaces, tracer: Tracer, cells: Cells, rays: Rays, n: int, first_ray: int, n_rays: int,
+    room: GatherScratch, tests: Rays, near: NearHits, reach: float,
+) -> int:  # fmt: skip
+    """Find the cells that traced rays 0 to n - 1 read, and R(Q); n_rays rows of 16 rays belong to the same hits.
+
+    Args:
+        near: keeps rays shorter than `reach` in doubtful cells, as many as fit; their cell is then `near_cell(k)`.
+
+    Returns:
+        number of rays kept.
+    """
+    # Loop state
+    waiting = NO_RAYS  # rays to guards in the queue
+    kept = NO_RAYS  #    rays kept
+    for first in range(0, n, LANES):
+        # make room for sixteen rays to guards
+        if waiting > room_in(tests.packets) - LANES:
+            choose_slots(tracer, tests, waiting, cells.other, room.cell)
+            waiting = NO_RAYS
+        # Q, its normal, and R(Q)
+        missed, triangle, u, v = decode_hits(tracer, rays.packets, first)
+        dx, dy = load_row(rays.packets, first, DIRECTION), load_row(rays.packets, first, DIRECTION + 1)
+        dz = load_row(rays.packets, first, DIRECTION + 2)
+        px, py, pz = position_at(surfaces, triangle, u, v)
+        nx, ny, nz = geometric_normal(surfaces, triangle, dx, dy, dz)
+        total = total_at(surfaces, triangle, u, v)
+        store(room.point, 0, px)
+        store(room.point, LANES, py)
+        store(room.point, 2 * LANES, pz)
+        store(room.point, 3 * LANES, nx)
+        store(room.point, 4 * LANES, ny)
+        store(room.point, 5 * LANES, nz)
+        for channel in range(3):
+            store(room.reflectivity, channel * room.reflectivity.shape[1] + first, total[channel])
+        store(rays.value, first, load_row(rays.packets, first, TFAR))
+        store(room.cell, first, select(missed, integers(NOWHERE), np.int32(0)))
+        for lane in range(min(n - first, LANES)):
+            if room.cell[first + lane] == NOWHERE:
+                continue
+            # the ray as it was written, before rays were sorted by direction: its hit, and its number there
+            written = rays.number[ORDER, first + lane]
+            k, ray = written // (LANES * n_rays) * LANES + written % LANES, first_ray + written // LANES % n_rays
+            # the cell of Q, moved within its surface; the queue holds rays to the guards of doubtful cells
+            key, q = hits.key[rays.place[k]], room.point
+            point, normal = (q[0, lane], q[1, lane], q[2, lane]), (q[3, lane], q[4, lane], q[5, lane])
+            found = _cell_of(cells, point, normal, rays.value[0, first + lane], key, ray)
+            room.cell[first + lane] = found
+            if cells.other[found] == NOWHERE:
+                continue
+            if rays.value[0, first + lane] < reach and kept < near.place.shape[0]:
+                near.hits.key[kept] = random_word(key, CONTINUED + ray)
+                _keep_ray(rays, first + lane, found, near, kept)
+                room.cell[first + lane] = near_cell(kept)
+                kept += 1
+            else:
+                write_guard_ray(cells.guard, found, point, normal, tests, waiting, first + lane)
+                waiting += 1
+    choose_slots(tracer, tests, waiting, cells.other, room.cell)
+    return kept
+
+
+@inlined
+def _cell_of(cells: Cells, point: Triple, normal: Triple, length: Real, key: np.uint64, ray: int) -> int:
+    """The cell that a ray of some length reads at a point, moved within its surface at random."""
+    a, b = r2(random_word(key, CELLS), ray)
+    along, across = shifts(normal, a, b)
+    level, side = level_of(cells.grid, length), side_of(normal[0], normal[1], normal[2])
+    return find_cell(cells.grid, cells.slots, level, side, point, along, across)
+
+
+@inlined
+def weight_of(cells: Cells, reflectivity: Float32, cell: int, ray: int, channel: int) -> Real:
+    """What the light of a cell is multiplied by: R(Q) of a channel, or the mean of R(Q) c over all channels."""
+    if cells.light.shape[1] == 3:
+        r: Real = reflectivity[channel, ray]
+        return r
+    total = np.float32(0.0)
+    for other in range(3):
+        total += cells.weights[other] * reflectivity[other, ray] * cells.tint[cell, TINT + other]
+    return total
