@@ -8,7 +8,7 @@ OUT := out/kitchen-small
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-packets bench-scaling bench-bias bench-ambient bench-truth bench-report bench-progress bench-first bench-view fuzz clean
+.PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-packets bench-scaling bench-bias bench-ambient bench-truth bench-flicker bench-report bench-progress bench-first bench-view fuzz clean
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -80,6 +80,9 @@ bench-ambient: $(VENV)/installed-bench ## Measure the ambient estimate against p
 
 bench-truth: $(VENV)/installed-bench ## Measure images against path-traced ones, and write docs/measured/truth.md
 	PYTHONPATH=tests $(BIN)/python -m bench truth $(BENCH)
+
+bench-flicker: $(VENV)/installed-bench ## Measure how errors change along the paths of light and camera, and write docs/measured/flicker.md
+	PYTHONPATH=tests $(BIN)/python -m bench flicker $(BENCH)
 
 bench-report: $(VENV)/installed-bench ## Measure speed against error of the three jobs, and write docs/measured/report-*.md
 	PYTHONPATH=tests $(BIN)/python -m bench report $(BENCH)

@@ -24,6 +24,7 @@ from bench.error import bias_page as biaspage
 from bench.peers import cycles, mitsuba3, peers
 from bench.speed import first, packets, processes, scaling, speed
 from bench.speed import page as table
+from bench.truth import flicker
 from bench.truth import run as truth
 from bench.truth.rendered import METHODS
 from bench.truth.traced import Place, trace_here
@@ -36,6 +37,7 @@ TRACES = ("trace", "trace-means")
 AVX2 = {"FRAMEARRAY_EMBREE": "isa=avx2", "NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": "+avx2"}
 OTHERS = (
     "truth",
+    "flicker",
     "trace-place",
     "scaling",
     "packets",
@@ -76,6 +78,9 @@ def main() -> None:
         return
     if args.what == "truth":
         truth.run(args.jobs, args.quick, args.method)
+        return
+    if args.what == "flicker":
+        flicker.run(args.jobs, args.quick)
         return
     if args.what == "trace-place":
         job, c, l = args.jobs

@@ -16,11 +16,11 @@ DARK = {"intensity": (0.0, 0.0, 0.0), "paths": None}  # no light but that of sou
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LightError:
-    """Errors against paths.
+    """Errors of indirect light against paths; direct light is that of the same hits, and counts as right.
 
     Attributes:
-        mean: of all light over that of paths, minus 1; `mean_error`: its standard error, that of the paths.
-        whole: root mean square error of means over blocks, over the root mean square of the light.
+        mean: of all light over the right one, minus 1; `mean_error`: its standard error, that of the paths.
+        whole: root mean square error of means over blocks, over the root mean square of all light.
         indirect: the same over the mean indirect light.
         noise: root mean square noise of the paths per block, over the mean indirect light; no part of the others.
         share: of indirect light in all light.
@@ -46,33 +46,32 @@ def rendered(room: LitRoom, **changes: Any) -> Any:
 
 
 def paths_of(room: LitRoom, samples: int) -> Any:
-    """Groups of pictures by paths, (GROUPS, n_c, h, w, 3)."""
+    """Groups of pictures of indirect light by paths, (GROUPS, n_c, h, w, 3)."""
     width, height = RESOLUTION
     inputs = tiny.prepared(room.job(), room.scene())
     found = []
     for c in range(inputs.n_cameras):
         groups = [
-            path_traced(inputs, c, samples // GROUPS, first=g * (samples // GROUPS)).mean(axis=0) for g in range(GROUPS)
+            path_traced(inputs, c, samples // GROUPS, first=g * (samples // GROUPS), direct=False).mean(axis=0)
+            for g in range(GROUPS)
         ]
         found.append(np.array(groups)[:, :, :, 0].reshape(GROUPS, height, width, 3))
     return np.stack(found, axis=1)
 
 
 def light_error(images: Any, direct: Any, paths: Any) -> LightError:
-    """Compare images and their direct light, (n_c, h, w, 3), with groups of pictures by paths."""
+    """Compare images less their direct light, (n_c, h, w, 3), with groups of pictures of indirect light by paths."""
     means = paths.mean(axis=(1, 2, 3, 4))
-    right = float(means.mean())
-    blocks, groups = blocks_of(images), blocks_of(paths)
-    one, other = groups[::2].mean(axis=0), groups[1::2].mean(axis=0)
-    square = float(((blocks - one) * (blocks - other)).mean())
-    rms = float((one * other).mean()) ** 0.5
-    indirect = right - float(direct.mean())
+    indirect, of_sources = float(means.mean()), float(direct.mean())
+    blocks, groups = blocks_of(images - direct), blocks_of(paths)
+    square = float(((blocks - groups[::2].mean(axis=0)) * (blocks - groups[1::2].mean(axis=0))).mean())
+    rms = float(((blocks_of(direct) + groups.mean(axis=0)) ** 2).mean()) ** 0.5
     noise = float(groups.var(axis=0, ddof=1).mean() / GROUPS) ** 0.5
     return LightError(
-        mean=float(images.mean()) / right - 1,
-        mean_error=float(means.std(ddof=1)) / GROUPS**0.5 / right,
+        mean=float((images - direct).mean() - indirect) / (indirect + of_sources),
+        mean_error=float(means.std(ddof=1)) / GROUPS**0.5 / (indirect + of_sources),
         whole=max(square, 0.0) ** 0.5 / rms,
         indirect=max(square, 0.0) ** 0.5 / indirect,
         noise=noise / indirect,
-        share=indirect / right,
+        share=indirect / (indirect + of_sources),
     )

@@ -17,11 +17,12 @@ from framearray_cli.render.prepare import Prepared, eye_cameras, open_embree
 SEED = 1 << 31  # no job of a test has it
 
 
-def path_traced(inputs: Prepared, c: int, samples: int, first: int = 0) -> Any:
+def path_traced(inputs: Prepared, c: int, samples: int, first: int = 0, *, direct: bool = True) -> Any:
     """Independent pictures of camera c with one path per pixel each, (samples, n_pixels, 3, n_lights).
 
     Args:
         first: number of the first picture; each has random numbers of its own.
+        direct: with the direct light of what the eye sees.
     """
     cams, background = eye_cameras(inputs), np.array(inputs.job.scene.background, np.float32)
     n = cams.width * cams.height
@@ -42,6 +43,10 @@ def path_traced(inputs: Prepared, c: int, samples: int, first: int = 0) -> Any:
             work.sums[:] = 0.0
             choose_steps(hits, walkers, n, False)
             add_background(hits, walkers, n, background, work.sums)
+            if not direct:  # `follow` adds it, too
+                work.sums[:] = 0.0
+                work.add_direct(n, inputs.light_arrays, world.tracer)
+                work.sums *= -1.0
             walks.follow(work, n)
             pictures[s - first, pixel] = work.sums[:n] / np.pi
     return pictures

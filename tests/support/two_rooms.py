@@ -32,7 +32,7 @@ def wall(x: float, hole: float) -> list[Any]:
     ]
 
 
-def rooms(walls: list[Any], method: str = "cells", samples: int = 2**17) -> Any:
+def rooms(walls: list[Any], method: str = "cells", samples: int = 2**17, hits: int = 8) -> Any:
     """Two rooms, and the job that looks into both: camera 0 into the dark one."""
     scene = tiny.scene_of(
         np.concatenate([tiny.box((-2, 0, -DEPTH), (2, HEIGHT, DEPTH)), *walls]),
@@ -41,7 +41,7 @@ def rooms(walls: list[Any], method: str = "cells", samples: int = 2**17) -> Any:
     job = tiny.job(
         camera=EYES,
         light={"frames": 1, "sources": [LAMP]},
-        samples={"hits": 8, "obscurance": 8},
+        samples={"hits": hits, "obscurance": 8},
         indirect={"method": method, **({"samples": samples} if method == "cells" else {})},
     )
     return tiny.prepared(job, scene)

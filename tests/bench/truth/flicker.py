@@ -1,0 +1,120 @@
+"""Measures how much errors change from one image to the next: `python -m bench flicker`.
+
+An error that stays where it is looks like texture, one that changes flickers. The reference is the same method with a
+hundred times the samples: ten times the hits, each with ten times the rays, and cells of four times the samples.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from bench.core.cases import JOBS, job_named, with_resolution
+from bench.core.markdown import grid, percent
+from bench.core.results import Table, folder, load, save, site_for
+from bench.speed.speed import log
+from framearray_cli.base.arrays import Float64
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.loop import ready_frames
+from framearray_cli.job.job import Job
+from framearray_cli.render.prepare import image_ambient, open_embree, plan_work, prepare
+
+RESOLUTION, QUICK_RESOLUTION = (80, 60), (40, 30)
+CAMERAS, FIRST = 3, 0.4  # consecutive positions, from this share of the path on
+MORE_HITS, MORE_RAYS, CELL_SAMPLES = 10, 10, 2**22
+# Nothing but direct light, of the same hits.
+DARK: dict[str, Any] = {
+    "ambient": {"intensity": (0.0, 0.0, 0.0)},
+    "indirect": {"method": "obscurance"},
+    "samples": {"obscurance": 1},
+}
+CELLS = {"indirect": {"method": "cells"}}
+HEAD = """
+# Flicker
+
+How much the errors of images change from one light position to the next, and from one camera position to the next.
+`make bench-flicker` measures and writes this page. An error is the difference from the same method with a hundred times
+the samples and another seed. Figures are the root mean square change of errors over all pixels and pairs of neighbours,
+over the mean light of the images: of direct light, and of indirect light from cells. *True change* is that of the
+references. Whole images of 80 x 60 pixels of the three jobs, with their own samples.
+"""
+
+
+def run(names: Sequence[str], quick: bool) -> None:
+    """Measure the jobs, and write the page from all results there are."""
+    out = folder(quick)
+    for name in names or JOBS:
+        table = measure(name, quick)
+        log(f"{name}: {table}")
+        save(out, f"flicker-{name}", table)
+    page = site_for(quick).pages / "flicker.md"
+    page.write_text(render({name: found for name in JOBS if (found := load(out, f"flicker-{name}"))}), encoding="utf-8")
+    print(page)
+
+
+def measure(name: str, quick: bool) -> Table:
+    """The change of errors of direct and of indirect light, over the mean light, along l and along c."""
+    job = with_resolution(job_named(name, quick), QUICK_RESOLUTION if quick else RESOLUTION)
+    first = int(FIRST * job.camera.frames)
+    cameras = range(first, first + CAMERAS)
+    direct, right_direct = (images_of(one, cameras) for one in (changed(job, DARK), better(changed(job, DARK))))
+    whole, right = (images_of(one, cameras) for one in (changed(job, CELLS), better(changed(job, CELLS))))
+    level = float(right.mean())
+    parts = {
+        "direct": (direct, right_direct),
+        "indirect": (whole - direct, right - right_direct),
+        "all": (whole, right),
+    }
+    table: Table = {}
+    for part, (found, reference) in parts.items():
+        for axis, way in ((1, "l"), (0, "c")):
+            table[f"{part}_{way}"] = change(found - reference, axis) / level
+            table[f"{part}_true_{way}"] = change(reference, axis) / level
+    return table
+
+
+def change(values: Float64, axis: int) -> float:
+    """Root mean square difference of neighbours along an axis."""
+    return float((np.diff(values, axis=axis) ** 2).mean()) ** 0.5
+
+
+def changed(job: Job, tables: dict[str, Any]) -> Job:
+    """The job with some keys of its tables changed."""
+    return job.model_copy(update={name: getattr(job, name).model_copy(update=keys) for name, keys in tables.items()})
+
+
+def better(job: Job) -> Job:
+    """The job with a hundred times the samples, and another seed."""
+    assert isinstance(job.samples.hits, int | float)
+    more: dict[str, Any] = {"samples": {"hits": MORE_HITS * job.samples.hits}}
+    if job.indirect.method == "cells":
+        more["samples"]["obscurance"] = MORE_RAYS * job.samples.obscurance
+        more["indirect"] = {"samples": CELL_SAMPLES}
+    return changed(job, more).model_copy(update={"seed": job.seed + 1})
+
+
+def images_of(job: Job, cameras: range) -> Float64:
+    """Images of some camera positions under every light, (n_c, n_l, h, w, 3)."""
+    prepared = prepare(job)
+    with open_embree(prepared) as embree:
+        setup, ambient = plan_work(prepared, embree)
+        with TracePool(setup, prepared.threads) as pool:
+            window = Window(setup, image_ambient(ambient, prepared.lights), pool)
+            shape = (prepared.n_lights, setup.cams.height, setup.cams.width, 3)
+            found = [
+                window.compose(j, np.empty(shape, np.float32)).images.astype(np.float64)
+                for j in ready_frames(window, setup, cameras, pool)
+            ]
+    return np.array(found)
+
+
+def render(tables: dict[str, Table]) -> str:
+    """The page."""
+    rows = []
+    for name, table in tables.items():
+        for way, words in (("l", "light"), ("c", "camera")):
+            keys = (f"direct_{way}", f"indirect_{way}", f"indirect_true_{way}", f"all_{way}", f"all_true_{way}")
+            rows.append([name, words, *(percent(table[key]) for key in keys)])
+    head = ("job", "along", "direct", "indirect", "true change, indirect", "all light", "true change, all light")
+    return f"{HEAD.strip()}\n\n{grid(head, rows)}\n"

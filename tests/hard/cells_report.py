@@ -1,0 +1,111 @@
+"""Write docs/measured/light-from-cells.md: rooms whose indirect light is hard to find by cells, against paths.
+
+PYTHONPATH=tests python tests/hard/cells_report.py docs [PATHS]
+"""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+from support import tiny
+from support.light_errors import DARK, LightError, light_error, paths_of, rendered
+from support.lit_rooms import LIT_ROOMS, TOO_HARD
+from support.pathtraced import path_traced
+from support.two_rooms import rooms, wall
+
+from framearray_cli.base.colour import srgb8_from_linear
+
+METHODS: dict[str, dict[str, Any]] = {"obscurances": {}, "cells": {"indirect": {"method": "cells"}}}
+PATHS = 512  # per pixel of a room
+ROOM_PATHS = {0: 8192, 1: 256}  # per pixel of the dark and of the lit one of two rooms
+HITS = 128  # per pixel of two rooms: few rays find the hole
+ZOOM, GAP = 2, 4
+
+HEAD = """# Light from cells, hard cases
+
+Written by `PYTHONPATH=tests python tests/hard/cells_report.py docs`; `tests/hard/test_light_from_cells.py` tests it
+with fewer samples. The program's own walks trace the paths, {paths} per pixel of images of 64 x 48 pixels; cells have
+2^20 samples, hits 8 rays, pixels 16 hits.
+
+*Mean*: of all light, minus that of paths. *All light*: root mean square error of means over 4 x 4 pixels, over their
+root mean square. *Indirect*: the same over the mean indirect light. The noise of the paths is no part of either. Direct
+light is that of the same hits. The last case is one that cells get wrong.
+
+| Case | | mean, cells | all light, cells | indirect, cells | all light, obscurances | noise of the mean |
+|---|---|---:|---:|---:|---:|---:|
+"""
+ROOMS_HEAD = """
+## Two rooms
+
+A lamp in one room of 2 x 2.5 x 4 m, an eye in each. The wall has no thickness, or two faces 2 cm apart.
+
+| Wall | dark room, cells | dark room, paths | dark over lit, cells | dark over lit, obscurances |
+|---|---:|---:|---:|---:|
+"""
+WALLS = {
+    "closed, no thickness": (0.0, 0.0),
+    "closed, 2 cm": (0.0, 0.02),
+    "a hole of 15 cm, no thickness": (0.15, 0.0),
+    "a hole of 15 cm, 2 cm": (0.15, 0.02),
+}
+
+
+def lines_of_rooms(n_paths: int, sheet: list[Any]) -> Iterator[str]:
+    """A row per room; its pictures join the sheet."""
+    for name, room in (LIT_ROOMS | TOO_HARD).items():
+        paths, direct = paths_of(room, n_paths), rendered(room, ambient=DARK)
+        images = {method: rendered(room, **keys) for method, keys in METHODS.items()}
+        found = {method: light_error(image, direct, paths) for method, image in images.items()}
+        sheet.append([direct[0] + paths.mean(axis=0)[0], *(image[0] for image in images.values())])
+        yield _line(name, room.hard, found["cells"], found["obscurances"])
+        print(name, found, flush=True)
+
+
+def _line(name: str, hard: str, cells: LightError, other: LightError) -> str:
+    figures = [f"{cells.mean:+.1%}", f"{cells.whole:.1%}", f"{cells.indirect:.1%}", f"{other.whole:.1%}"]
+    row = " | ".join([*figures, f"{cells.mean_error:.1%}"]).replace("%", " %")
+    return f"| {name} | {hard} | {row} |"
+
+
+def lines_of_walls() -> Iterator[str]:
+    """A row per wall."""
+    for name, (hole, thickness) in WALLS.items():
+        walls = [*wall(0.0, hole), *(wall(thickness, hole) if thickness else [])]
+        dark, lit = tiny.render_frames(rooms(walls, samples=2**20, hits=HITS), threads=2).images.mean(axis=(1, 2, 3, 4))
+        by_obscurance = tiny.render_frames(rooms(walls, method="obscurance"), threads=2).images.mean(axis=(1, 2, 3, 4))
+        truth = "0"
+        if hole:
+            paths = path_traced(rooms(walls), 0, ROOM_PATHS[0]).mean(axis=(1, 2, 3))
+            truth = f"{paths.mean():.5f} +- {paths.std(ddof=1) / len(paths) ** 0.5:.5f}"
+        ratios = f"{dark / lit:.6f} | {by_obscurance[0] / by_obscurance[1]:.2f}"
+        yield f"| {name} | {dark:.5f} | {truth} | {ratios} |"
+
+
+def save_sheet(rows: list[Any], file: Path) -> None:
+    """Pictures side by side: by paths, by each method, and the difference of the last from paths about grey."""
+    lines = []
+    for row in rows:
+        level = row[0].mean()
+        shown = [srgb8_from_linear(0.4 * image / level) for image in row]
+        shown.append(srgb8_from_linear(np.clip(0.2 + 0.4 * (row[-1] - row[0]) / level, 0, 1)))
+        shown = [np.repeat(np.repeat(image, ZOOM, 0), ZOOM, 1) for image in shown]
+        lines.append(np.concatenate([np.pad(image, ((0, GAP), (0, GAP), (0, 0))) for image in shown], axis=1))
+    Image.fromarray(np.concatenate(lines)).save(file, quality=60)
+
+
+def main(docs: Path, n_paths: int) -> None:
+    """Measure all, and write the page and its picture."""
+    sheet: list[Any] = []
+    text = HEAD.format(paths=n_paths) + "\n".join(lines_of_rooms(n_paths, sheet)) + "\n"
+    save_sheet(sheet, docs / "pictures" / "light-from-cells.jpg")
+    text += "\n![The cases in turn: paths, obscurances, cells, difference](../pictures/light-from-cells.jpg)\n\n"
+    text += "*A row per case: paths, obscurances, cells, and cells minus paths, where grey is none.*\n"
+    text += ROOMS_HEAD + "\n".join(lines_of_walls()) + "\n"
+    (docs / "measured" / "light-from-cells.md").write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else PATHS)
