@@ -19,7 +19,7 @@ from framearray_cli.base.arrays import Float32, Float64, Int32, Real
 
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, TNEAR, Tracer, occlude, room_in
 from ..inputs.cameras import OUTSIDE, Cameras, project_to_pixel
-from ..kernels.kernel import inlined, kernel, step
+from ..kernels.kernel import index, inlined, kernel, step
 from ..kernels.simd import (
     LANES,
     append,
@@ -123,7 +123,7 @@ def _drop_hidden(
     for first in range(0, n, LANES):
         hidden = bits((load_row(rays.packets, first, TFAR) < nothing) & (lane_numbers() < np.int32(n - first)))
         while hidden != 0:
-            place = rays.place[first + ctz(hidden)]
+            place = index(rays.place[index(first + ctz(hidden))])
             hidden &= hidden - 1
             flat_pixel[place] = OUTSIDE
             if density.size > 0:
@@ -271,7 +271,7 @@ def sort_by_pixel(pixel: Int32, first: int, last: int, start: Int32, order: Int3
     for i in range(pixel.shape[0]):
         p = pixel[i]
         if first <= p < last:
-            start[p] += 1
+            start[index(p)] += 1
         elif OUTSIDE < p < first:
             before += 1
     # counts -> index of each pixel's first hit
@@ -284,8 +284,9 @@ def sort_by_pixel(pixel: Int32, first: int, last: int, start: Int32, order: Int3
     for i in range(pixel.shape[0]):
         p = pixel[i]
         if first <= p < last:
-            order[start[p]] = i
-            start[p] += 1
+            at = start[index(p)]
+            order[index(at)] = i
+            start[index(p)] = at + 1
     # the end of a pixel is the start of the next
     for p in range(last - 1, first, -1):
         start[p] = start[p - 1]

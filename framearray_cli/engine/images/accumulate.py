@@ -9,7 +9,7 @@ import numpy as np
 from framearray_cli.base.arrays import Addresses, Real
 
 from ..frames.records import HALF, LIT, REFLECTIVITY, WEIGHT, lit_bit
-from ..kernels.kernel import inlined, integer_at, kernel, prefetch, real_at
+from ..kernels.kernel import index, inlined, integer_at, kernel, prefetch, real_at
 from ..kernels.simd import LANES, lane_numbers, lanes_from, load, reals, store
 from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
 from .band import HITS_AT_ONCE, INVERSE_PI, Band
@@ -146,15 +146,17 @@ def _note_light(band: Band, waiting: int, lit: int, direct: int, gathered: int, 
         the new length.
     """
     if lit != 0:
-        band.places[waiting], band.lit[waiting] = direct, lit
+        at = index(waiting)
+        band.places[at], band.lit[at] = direct, lit
         for channel in range(3):
-            band.shares[waiting, channel] = w * INVERSE_PI * real_at(row, REFLECTIVITY + channel)
+            band.shares[at, channel] = w * INVERSE_PI * real_at(row, REFLECTIVITY + channel)
         waiting += 1
     if gathered != 0:
-        band.places[waiting], band.lit[waiting] = gathered + 4 * LIGHT, -1
+        at = index(waiting)
+        band.places[at], band.lit[at] = gathered + 4 * LIGHT, -1
         for channel in range(3):
             share = w * INVERSE_PI * real_at(row, REFLECTIVITY + channel)
-            band.shares[waiting, channel] = share * real_at(gathered, COLOUR + channel)
+            band.shares[at, channel] = share * real_at(gathered, COLOUR + channel)
         waiting += 1
     return waiting
 

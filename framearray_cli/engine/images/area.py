@@ -18,7 +18,7 @@ from framearray_cli.base.arrays import Addresses, Bytes, Float32, Int32, with_ro
 
 from ..frames.records import BY_SAMPLE, HALF
 from ..hits.places import PARTS
-from ..kernels.kernel import byte_at, inlined, integer_at, kernel, real_at
+from ..kernels.kernel import byte_at, index, inlined, integer_at, kernel, prefetch, real_at
 from ..kernels.simd import (
     LANES,
     append,
@@ -51,6 +51,7 @@ SMALLEST_FACTOR = 1e-18  # of one axis: the products of two and a weight are nor
 # another pixel weighs nearly as much, so that none counts in theirs.
 CENTRE, OUTWEIGHING = (PARTS + 1) * PARTS // 2, np.float32(1e9)
 LEAST_SHARE = np.float32(1 / 32)  # of the mean weight: lighter hits are dropped, which leaves composing less to do
+AHEAD = 16  # prefetch what is known of the hit that a source has this many entries later
 WHOLE = -1  # in place of a half: all hits
 
 
@@ -138,12 +139,13 @@ def weigh_by_area(
         # 2. Write them, source by source: what is dropped is overwritten by what follows.
         for s in range(sources.shape[0]):
             room.end[s] = room.start[s, i]
-        squares = np.float32(0.0)
+        squares, scale = np.float32(0.0), np.float32(1.0) / total if total > 0.0 else np.float32(0.0)
         for k in range(found):
-            entry, w = room.near[k], select(room.share[k] > 0.0, room.share[k] / total, np.float32(0.0))
-            end = room.end[room.source[entry]]
-            room.order[end], room.weight[end] = room.hit[entry], w
-            room.end[room.source[entry]] = end + (w > 0.0)
+            entry, w = index(room.near[k]), room.share[k] * scale
+            source = index(room.source[entry])
+            end = room.end[source]
+            room.order[index(end)], room.weight[index(end)] = room.hit[entry], w
+            room.end[source] = end + (w > 0.0)
             squares += w * w
         for s in range(sources.shape[0]):
             room.start[s, i + 1] = room.end[s]
@@ -158,20 +160,25 @@ def _merge(sources: Addresses, halves: Int32, half: int, low: int, high: int, ro
         room.first[pixel - low] = end
         for s in range(sources.shape[0]):
             source = sources[s]
+            last = integer_at(source[START], high)
             for entry in range(integer_at(source[START], pixel), integer_at(source[START], pixel + 1)):
-                hit = integer_at(source[ORDER], entry)
+                hit, at = integer_at(source[ORDER], entry), index(end)
+                if entry + AHEAD < last:
+                    later = integer_at(source[ORDER], entry + AHEAD)
+                    prefetch(source[PLACES] + later, 1)
+                    prefetch(source[WEIGHTS] + 4 * later, 1)
                 if half != WHOLE:
                     its = halves[s]
                     if its == BY_SAMPLE:
                         its = int(real_at(source[ROW] + ROW_BYTES * hit, HALF))
                     if its != half:
                         continue
-                room.hit[end], room.source[end] = hit, s
+                room.hit[at], room.source[at] = hit, s
                 if source[PLACES] != 0:
-                    room.place[end] = byte_at(source[PLACES], hit)
-                    room.balance[end] = real_at(source[WEIGHTS], hit) if source[WEIGHTS] != 0 else np.float32(1.0)
+                    room.place[at] = byte_at(source[PLACES], hit)
+                    room.balance[at] = real_at(source[WEIGHTS], hit) if source[WEIGHTS] != 0 else np.float32(1.0)
                 else:
-                    room.place[end], room.balance[end] = CENTRE, OUTWEIGHING
+                    room.place[at], room.balance[at] = CENTRE, OUTWEIGHING
                 end += 1
     room.first[high - low] = end
 
@@ -260,12 +267,17 @@ def _share_cells(found: int, room: AreaRoom) -> np.float32:
     # 2. The shares of each hit, summed over all cells.
     one = zero + np.float32(1.0)
     a, b, c, d = one / a, one / b, one / c, one / d
-    least, total = LEAST_SHARE * np.float32(CELLS * CELLS) / np.float32(found), np.float32(0.0)
     for k in range(found):
         at, column = (room.position[k] >> ROW_BITS) * (PACKETS * LANES), (room.position[k] & COLUMN) * LANES
         shares = a * load(room.rows, at) + b * load(room.rows, at + LANES)
         shares = shares + c * load(room.rows, at + 2 * LANES) + d * load(room.rows, at + 3 * LANES)
-        share = room.strength[k] * sum_of_lanes(shares * load(room.columns, column))
-        room.share[k] = share if share >= least else np.float32(0.0)
-        total += room.share[k]
-    return total
+        room.share[k] = sum_of_lanes(shares * load(room.columns, column))
+    # 3. Their weights; very light ones are dropped.
+    least, total = LEAST_SHARE * np.float32(CELLS * CELLS) / np.float32(found), zero
+    for k in range(0, found, LANES):
+        share = load(room.share, k) * load(room.strength, k)
+        share = select((share >= least) & (lane_numbers() < np.int32(found - k)), share, np.float32(0.0))
+        store(room.share, k, share)
+        total = total + share
+    found_weight: np.float32 = sum_of_lanes(total)
+    return found_weight

@@ -93,7 +93,7 @@ class AreaWeights:
             pass
         else:
             fits = len(room.start) == n_sources and len(room.own) >= n and len(room.first) > around
-            if fits and len(room.share) >= entries:
+            if fits and len(room.source) >= entries:
                 return room
         entries = int(SPARE * entries)
         return AreaRoom(
@@ -109,7 +109,7 @@ class AreaWeights:
             near=np.empty(entries + LANES, np.int32),
             position=np.empty(entries + LANES, np.int32),
             strength=np.empty(entries + LANES, np.float32),
-            share=np.empty(entries, np.float32),
+            share=np.empty(entries + LANES, np.float32),
             own=np.empty(n, np.int32),
             squares=np.empty(n, np.float32),
             columns=self._factors[0],

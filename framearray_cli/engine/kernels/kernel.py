@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba as nb
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import caching, cgutils, compiler
@@ -159,6 +160,12 @@ def inlined(function: F) -> F:
     """Declare a function, to be compiled into every kernel that calls it."""
     declared: F = _njit(inline="always", **_OPTIONS)(function)
     return keep_on_disk(declared)
+
+
+@inlined
+def index(i: int) -> int:
+    """An index that is not negative: numba then does not ask whether it counts from the end of an array."""
+    return np.uint64(i)  # type: ignore[return-value]
 
 
 def _prefetch_of(typingctx: Any, address: Any, n_bytes: Any) -> Any:

@@ -15,7 +15,7 @@ from ..hits.hits import Hits, lift, ray_origin, reflects, reflects_in_lanes, tri
 from ..hits.rays import NO_RAYS, Rays
 from ..inputs.lights import DIRECTIONAL, LightArrays
 from ..inputs.shapes import vector_and_factor
-from ..kernels.kernel import inlined, kernel, step
+from ..kernels.kernel import index, inlined, kernel, step
 from ..kernels.simd import (
     LANES,
     append,
@@ -136,8 +136,9 @@ def _trace_queue(tracer: Tracer, rays: Rays, n: int, irradiance: Float32) -> Non
         while arrived != 0:
             ray = first + ctz(arrived)
             arrived &= arrived - 1
+            place = rays.place[index(ray)]
             for channel in range(channels):
-                flat[rays.place[ray] + channel * n_lights] += rays.value[channel, ray]
+                flat[index(place + channel * n_lights)] += rays.value[channel, index(ray)]
 
 
 @inlined

@@ -15,7 +15,7 @@ from ..embree.packets import DIRECTION, ORIGIN, TFAR
 from ..hits.hits import Hits, triple
 from ..hits.rays import ORDER, RANK, Rays
 from ..inputs.random import HEMISPHERE, UNIT_24, above, cosine_direction, random_word
-from ..kernels.kernel import inlined, kernel
+from ..kernels.kernel import index, inlined, kernel
 from ..kernels.simd import LANES, gather, integers, lane_numbers, load, reals, select, store, store_row
 
 # Directions are sorted into 8 x 8 cells of an octahedral map; rays of no hit come last.
@@ -130,13 +130,14 @@ def _sort_rays(rays: Rays, n: int) -> None:
     for cell in range(CELLS + 2):
         start[cell] = 0
     for ray in range(n):
-        start[rank[ray] + 1] += 1
+        start[index(rank[ray] + 1)] += 1
     for cell in range(1, CELLS + 1):
         start[cell] += start[cell - 1]
     for ray in range(n):
-        at = start[rank[ray]]
-        start[rank[ray]] = at + 1
-        order[at], rank[ray] = ray, at
+        cell = index(rank[ray])
+        at = start[cell]
+        start[cell] = at + 1
+        order[index(at)], rank[ray] = ray, at
 
 
 @kernel
