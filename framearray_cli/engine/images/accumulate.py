@@ -163,9 +163,12 @@ def _note_light(band: Band, waiting: int, lit: int, direct: int, gathered: int, 
 
 @inlined
 def _fetch(source: Addresses, entry: int, last: int, channels: int, n_lights: int) -> None:
-    """Prefetch the row of a hit that comes soon, and the irradiance of an earlier one; its row says where it is lit."""
+    """Prefetch row and weight of a hit that comes soon, and irradiance of an earlier one; its row says where it is lit."""
     if entry + 2 * AHEAD < last:
-        prefetch(source[ROW] + ROW_BYTES * integer_at(source[ORDER], entry + 2 * AHEAD), 1)
+        hit = integer_at(source[ORDER], entry + 2 * AHEAD)
+        prefetch(source[ROW] + ROW_BYTES * hit, 1)
+        if source[WEIGHTS] != 0:
+            prefetch(source[WEIGHTS] + 4 * hit, 1)
     if entry + AHEAD < last:
         hit = integer_at(source[ORDER], entry + AHEAD)
         if source[GATHERED] != 0:
