@@ -13,7 +13,7 @@ from ..kernels.kernel import index, inlined, integer_at, kernel, prefetch, real_
 from ..kernels.simd import LANES, lane_numbers, lanes_from, load, reals, store
 from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
 from .band import HITS_AT_ONCE, INVERSE_PI, Band
-from .sources import GATHERED, IRRADIANCE, ODD_SCALE, ORDER, ROW, SCALE, SHARES, START, WEIGHTS
+from .sources import GATHERED, IRRADIANCE, ODD_SCALE, OF, ORDER, ROW, SCALE, SHARES, START, WEIGHTS
 
 # Prefetch the irradiance of the hit that comes this many hits later, and the row of the one twice as far ahead: memory
 # answers in about the time that the sums of this many hits take.
@@ -42,19 +42,21 @@ def accumulate(
         total = reals(lane_numbers()) * np.float32(0.0)  # sum of w row, in a register; its first lane sums w
 
         for s in range(sources.shape[0]):
-            # 1. The hits of the pixel in this source, and the factors of its even and odd samples.
-            source = sources[s]
-            start, end = integer_at(source[START], pixel), integer_at(source[START], pixel + 1)
-            last = integer_at(source[START], first_pixel + n)
-            even = real_at(source[SCALE], pixel) if source[SCALE] != 0 else np.float32(1.0)
-            odd = real_at(source[ODD_SCALE], pixel) if source[ODD_SCALE] != 0 else even
+            # 1. The hits of the pixel in this list, and the factors of its even and odd samples.
+            listed = sources[s]
+            if listed[START] == 0:  # no list, but a source of the one before
+                continue
+            start, end = integer_at(listed[START], pixel), integer_at(listed[START], pixel + 1)
+            last = integer_at(listed[START], first_pixel + n)
+            even = real_at(listed[SCALE], pixel) if listed[SCALE] != 0 else np.float32(1.0)
+            odd = real_at(listed[ODD_SCALE], pixel) if listed[ODD_SCALE] != 0 else even
             n_hits += end - start
             for entry in range(start, end):
-                _fetch(source, entry, last, channels, n_lights)
-                # 2. The weight w of the hit.
-                hit = integer_at(source[ORDER], entry)
+                _fetch(sources, s, entry, last, channels, n_lights)
+                # 2. The source and the weight w of the hit.
+                source, hit = sources[_row_of(listed, s, entry)], integer_at(listed[ORDER], entry)
                 row = source[ROW] + ROW_BYTES * hit
-                w = (odd if real_at(row, HALF) > 0.0 else even) * _weight(source, entry, hit)
+                w = (odd if real_at(row, HALF) > 0.0 else even) * _weight(listed, entry, hit)
                 # 3. What has no l: w R W, w B, w W and w R at once.
                 total = total + lanes_from(row) * w
                 # 4. Note where the light of a hit is, and its share w R / pi.
@@ -78,6 +80,12 @@ def accumulate(
         else:
             store(band.sums, LANES * i, load(band.sums, LANES * i) + total)
         _add_light(band, i, waiting, channels, n_lights, fresh)
+
+
+@inlined
+def _row_of(listed: Addresses, s: int, entry: int) -> int:
+    """The row of the source of an entry, for the list in row s: that row itself, or one after it."""
+    return s + (integer_at(listed[OF], entry) if listed[OF] != 0 else 0)
 
 
 @inlined
@@ -162,15 +170,16 @@ def _note_light(band: Band, waiting: int, lit: int, direct: int, gathered: int, 
 
 
 @inlined
-def _fetch(source: Addresses, entry: int, last: int, channels: int, n_lights: int) -> None:
-    """Prefetch row and weight of a hit that comes soon, and irradiance of an earlier one; its row says where it is lit."""
+def _fetch(sources: Addresses, s: int, entry: int, last: int, channels: int, n_lights: int) -> None:
+    """Prefetch row and weight of a hit that comes soon, and irradiance of an earlier one, which its row describes."""
+    listed = sources[s]
     if entry + 2 * AHEAD < last:
-        hit = integer_at(source[ORDER], entry + 2 * AHEAD)
+        hit, source = integer_at(listed[ORDER], entry + 2 * AHEAD), sources[_row_of(listed, s, entry + 2 * AHEAD)]
         prefetch(source[ROW] + ROW_BYTES * hit, 1)
-        if source[WEIGHTS] != 0:
-            prefetch(source[WEIGHTS] + 4 * hit, 1)
+        if listed[WEIGHTS] != 0:
+            prefetch(listed[WEIGHTS] + 4 * hit, 1)
     if entry + AHEAD < last:
-        hit = integer_at(source[ORDER], entry + AHEAD)
+        hit, source = integer_at(listed[ORDER], entry + AHEAD), sources[_row_of(listed, s, entry + AHEAD)]
         if source[GATHERED] != 0:
             columns = LIGHT + channels * n_lights
             prefetch(source[GATHERED] + 4 * columns * hit, 4 * columns)

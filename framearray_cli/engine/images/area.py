@@ -22,6 +22,7 @@ from ..kernels.kernel import byte_at, index, inlined, integer_at, kernel, prefet
 from ..kernels.simd import (
     LANES,
     append,
+    gather,
     integers,
     lane_numbers,
     largest_of_lanes,
@@ -59,12 +60,11 @@ class AreaRoom(NamedTuple):
     """Room for the hits and weights of the n pixels of a task, and what weights follow from.
 
     Attributes:
-        start: (n_sources, n + 1) hits start[s, i] to start[s, i + 1] are those of source s in pixel i.
-        order, weight: (most,) number and weight of each of them.
+        start: (n + 1,) hits start[i] to start[i + 1] are those of pixel i.
+        order, of, weight: (most,) number, source, counted from 1, and weight of each of them.
         first: (m + 1,) entries of the m pixels from the row above the task's first to the row below its last.
-        hit, source, place, balance: (entries,) of the hits of those pixels, by pixel and source: number, source, place
-            within its pixel, and balance weight.
-        end: (n_sources,) where the next hit of each source is written.
+        hit, source, place, balance: (entries,) of the hits of those pixels, by pixel and source: number, source,
+            counted from 1, place within its pixel, and balance weight.
         near, position, strength, share: (entries,) of the hits in and around one pixel: entry, position, balance
             weight, and weight in any unit.
         own: (n,) number of hits in each pixel.
@@ -75,13 +75,13 @@ class AreaRoom(NamedTuple):
 
     start: Int32
     order: Int32
+    of: Int32
     weight: Float32
     first: Int32
     hit: Int32
     source: Int32
     place: Bytes
     balance: Float32
-    end: Int32
     near: Int32
     position: Int32
     strength: Float32
@@ -122,10 +122,11 @@ def weigh_by_area(
         halves: (n_sources,) the half that all hits of a source belong to, or BY_SAMPLE.
         half: only these hits count, or WHOLE.
         size: (width, height) of the frame.
-        room: overwritten; start[:, 0] says where the list of each source begins.
+        room: overwritten.
     """
     low, high = pixels_around(size, first_pixel, n)
     _merge(sources, halves, half, low, high, room)
+    room.start[0] = 0
     for i in range(n):
         here = first_pixel + i - low
         own = room.first[here + 1] - room.first[here]
@@ -136,20 +137,17 @@ def weigh_by_area(
             total = _share_cells(found, room)
         elif found > 0:
             found, total = own, _keep_own(here, room)
-        # 2. Write them, source by source: what is dropped is overwritten by what follows.
-        for s in range(sources.shape[0]):
-            room.end[s] = room.start[s, i]
-        squares, scale = np.float32(0.0), np.float32(1.0) / total if total > 0.0 else np.float32(0.0)
-        for k in range(found):
-            entry, w = index(room.near[k]), room.share[k] * scale
-            source = index(room.source[entry])
-            end = room.end[source]
-            room.order[index(end)], room.weight[index(end)] = room.hit[entry], w
-            room.end[source] = end + (w > 0.0)
-            squares += w * w
-        for s in range(sources.shape[0]):
-            room.start[s, i + 1] = room.end[s]
-        room.squares[i] = squares
+        # 2. Write those that weigh anything.
+        end, scale = room.start[i], np.float32(1.0) / total if total > 0.0 else np.float32(0.0)
+        squares = reals(lane_numbers()) * np.float32(0.0)
+        for k in range(0, found, LANES):
+            entry, w = load(room.near, k), load(room.share, k) * scale
+            kept = w > np.float32(0.0)
+            append(kept, gather(room.hit, entry), room.order, end)
+            append(kept, gather(room.source, entry), room.of, end)
+            append(kept, w, room.weight, end)
+            end, squares = end + popcount(kept), squares + w * w
+        room.start[i + 1], room.squares[i] = end, sum_of_lanes(squares)
 
 
 @inlined
@@ -173,7 +171,7 @@ def _merge(sources: Addresses, halves: Int32, half: int, low: int, high: int, ro
                         its = int(real_at(source[ROW] + ROW_BYTES * hit, HALF))
                     if its != half:
                         continue
-                room.hit[at], room.source[at] = hit, s
+                room.hit[at], room.source[at] = hit, s + 1
                 if source[PLACES] != 0:
                     room.place[at] = byte_at(source[PLACES], hit)
                     room.balance[at] = real_at(source[WEIGHTS], hit) if source[WEIGHTS] != 0 else np.float32(1.0)
@@ -248,6 +246,7 @@ def _keep_own(here: int, room: AreaRoom) -> np.float32:
     for k in range(room.first[here + 1] - first):
         room.near[k], room.share[k] = first + k, room.balance[first + k]
         total += room.share[k]
+    store(room.share, room.first[here + 1] - first, np.float32(0.0))
     return total
 
 

@@ -9,7 +9,7 @@ from framearray_cli.base.arrays import Addresses, Flags, Int32
 
 from ..kernels.simd import LANES
 from .area import WHOLE, AreaRoom, factors, pixels_around, weigh_by_area
-from .sources import ORDER, SCALE, SHARES, START, WEIGHTS, SourceList
+from .sources import COLUMNS, OF, ORDER, SCALE, SHARES, START, SourceList
 
 # All hits of a pixel cover it a little better than two halves would: measured (docs/decisions/area-weights.md).
 EVENNESS = np.float32(0.96)
@@ -20,18 +20,19 @@ class WeighedHits:
     """Hits in and around some pixels, with their weights.
 
     Attributes:
-        addresses: of the sources with these hits, as `accumulate` takes them.
+        addresses: of a list of these hits and of the sources that it refers to, as `accumulate` takes them.
         own: (n,) number of hits in each pixel.
         squares: (n,) sum of the squares of the weights in each pixel.
     """
 
     def __init__(self, listed: SourceList, first: int, n: int, room: AreaRoom) -> None:
         self.own, self.squares = room.own[:n], room.squares[:n]
-        self.addresses: Addresses = listed.addresses.copy()
-        for s, start in enumerate(room.start):
-            self.addresses[s, START] = start.ctypes.data - start.itemsize * first
-        self.addresses[:, ORDER], self.addresses[:, SHARES] = room.order.ctypes.data, room.weight.ctypes.data
-        self.addresses[:, WEIGHTS] = 0
+        self.addresses: Addresses = np.zeros((1 + len(listed.sources), COLUMNS), np.int64)
+        self.addresses[1:] = listed.addresses
+        self.addresses[1:, START] = 0
+        self.addresses[0, START] = room.start.ctypes.data - room.start.itemsize * first
+        for column, array in ((ORDER, room.order), (SHARES, room.weight), (OF, room.of)):
+            self.addresses[0, column] = array.ctypes.data
 
 
 class AreaWeights:
@@ -48,11 +49,8 @@ class AreaWeights:
         """Weigh the hits in and around pixels first to first + n - 1, see `weigh_by_area`; lend them to a task."""
         low, high = pixels_around(self._size, first, n)
         counts = [int(s.by_pixel.start[high]) - int(s.by_pixel.start[low]) for s in listed.sources]
-        ends = np.cumsum([0, *counts])
-        room = self._room(len(counts), n, high - low, int(ends[-1]))
+        room = self._room(n, high - low, sum(counts))
         try:
-            # a hit near a corner counts in four pixels, and one entry is written beyond the last
-            room.start[:, 0] = 4 * ends[:-1] + np.arange(len(counts))
             which = np.zeros(len(counts), np.int32) if halves is None else halves
             weigh_by_area(listed.addresses, which, half, self._size, first, n, room)
             yield WeighedHits(listed, first, n, room)
@@ -82,30 +80,30 @@ class AreaWeights:
             factors = EVENNESS * np.stack([np.sqrt(ratio), -np.sqrt(ratio)])
             known[first : first + n] = both
             for half, factor in zip((even, odd), factors, strict=True):
-                half.addresses[:, SCALE] = factor.ctypes.data - factor.itemsize * first
+                half.addresses[0, SCALE] = factor.ctypes.data - factor.itemsize * first
             yield np.concatenate([even.addresses, odd.addresses])
 
-    def _room(self, n_sources: int, n: int, around: int, entries: int) -> AreaRoom:
+    def _room(self, n: int, around: int, entries: int) -> AreaRoom:
         """Take room that nobody uses, or allocate it."""
         try:
             room = self._rooms.pop()
         except IndexError:
             pass
         else:
-            fits = len(room.start) == n_sources and len(room.own) >= n and len(room.first) > around
-            if fits and len(room.source) >= entries:
+            if len(room.own) >= n and len(room.first) > around and len(room.source) >= entries:
                 return room
         entries = int(SPARE * entries)
+        most = 4 * entries + LANES  # a hit near a corner counts in four pixels
         return AreaRoom(
-            start=np.empty((n_sources, n + 1), np.int32),
-            order=np.empty(4 * entries + n_sources, np.int32),
-            weight=np.empty(4 * entries + n_sources, np.float32),
+            start=np.empty(n + 1, np.int32),
+            order=np.empty(most, np.int32),
+            of=np.empty(most, np.int32),
+            weight=np.empty(most, np.float32),
             first=np.empty(around + 1, np.int32),
             hit=np.empty(entries, np.int32),
             source=np.empty(entries, np.int32),
             place=np.empty(entries + LANES, np.uint8),
             balance=np.empty(entries + LANES, np.float32),
-            end=np.empty(n_sources, np.int32),
             near=np.empty(entries + LANES, np.int32),
             position=np.empty(entries + LANES, np.int32),
             strength=np.empty(entries + LANES, np.float32),

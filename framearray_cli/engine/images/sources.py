@@ -10,10 +10,11 @@ from framearray_cli.base.arrays import Addresses, Bytes, Float32
 
 from ..frames.records import HitRecords, HitsByPixel
 
-# Columns of a list of sources: addresses of arrays, 0 for an empty one; and what the arrays hold. SHARES is that of a
-# weight per entry of ORDER in place of one per hit, see `area_weights.py`.
-START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE, GATHERED, PLACES, SHARES = range(10)
-COLUMNS = 10
+# Columns of a list of sources: addresses of arrays, 0 for an empty one; and what the arrays hold. Hits weighed by area
+# are one list over all sources (`area_weights.py`): SHARES is that of a weight per entry of ORDER in place of one per
+# hit, OF that of the source of each entry, as the number of rows from the list to it. These rows have no START.
+START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE, GATHERED, PLACES, SHARES, OF = range(11)
+COLUMNS = 11
 _TYPES = (np.int32, np.int32, *[np.float32] * 6, np.uint8)
 NO_SCALE, _NO_PLACES = np.empty(0, np.float32), np.empty(0, np.uint8)
 NO_SOURCES: Addresses = np.empty((0, COLUMNS), np.int64)
@@ -51,7 +52,7 @@ class SourceList:
 
     Attributes:
         sources: the list.
-        addresses: (n_sources, 10) of the arrays of each source, valid as long as the list lives.
+        addresses: (n_sources, COLUMNS) of the arrays of each source, valid as long as the list lives.
     """
 
     def __init__(self, sources: Iterable[HitSource]) -> None:
@@ -62,7 +63,7 @@ class SourceList:
         """
         self.sources = list(sources)  # keeps the arrays
         rows = [
-            [*(_address(array, dtype) for array, dtype in zip(source.arrays, _TYPES, strict=True)), 0]
+            [*(_address(array, dtype) for array, dtype in zip(source.arrays, _TYPES, strict=True)), 0, 0]
             for source in self.sources
         ]
         self.addresses: Addresses = np.array(rows, np.int64).reshape(-1, COLUMNS)

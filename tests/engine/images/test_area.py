@@ -10,7 +10,7 @@ from framearray_cli.engine.frames.records import BY_SAMPLE, HALF, HitsByPixel, e
 from framearray_cli.engine.hits.outer import sort_by_pixel
 from framearray_cli.engine.images.area import WHOLE
 from framearray_cli.engine.images.area_weights import AreaWeights, WeighedHits
-from framearray_cli.engine.images.sources import ORDER, SHARES, START, HitSource, SourceList
+from framearray_cli.engine.images.sources import OF, ORDER, SHARES, START, HitSource, SourceList
 from framearray_cli.engine.kernels.kernel import integer_at, kernel, real_at
 
 SIZE = WIDTH, HEIGHT = 7, 5
@@ -18,11 +18,12 @@ N_PIXELS = WIDTH * HEIGHT
 
 
 @kernel
-def read_hits(address: int, orders: int, shares: int, pixel: int, order: Any, share: Any) -> int:
-    """Copy the hits of a pixel and their weights; return their number."""
-    first, end = integer_at(address, pixel), integer_at(address, pixel + 1)
+def read_hits(listed: Any, pixel: int, of: Any, order: Any, share: Any) -> int:
+    """Copy the hits of a pixel, their sources and their weights; return their number."""
+    first, end = integer_at(listed[START], pixel), integer_at(listed[START], pixel + 1)
     for entry in range(first, end):
-        order[entry - first], share[entry - first] = integer_at(orders, entry), real_at(shares, entry)
+        of[entry - first], order[entry - first] = integer_at(listed[OF], entry), integer_at(listed[ORDER], entry)
+        share[entry - first] = real_at(listed[SHARES], entry)
     return int(end - first)
 
 
@@ -67,14 +68,14 @@ class Hits:
 
 def found_in(weighed: WeighedHits, pixels: range) -> dict[int, dict[tuple[int, int], float]]:
     """The weights of hits (source, number) by pixel."""
-    order, share, found = np.empty(999, np.int32), np.empty(999, np.float32), {}
+    of, order, share = np.empty(999, np.int32), np.empty(999, np.int32), np.empty(999, np.float32)
+    found: dict[int, dict[tuple[int, int], float]] = {}
     for pixel in pixels:
-        of_pixel = {}
-        for s, source in enumerate(weighed.addresses):
-            n = read_hits(source[START], source[ORDER], source[SHARES], pixel, order, share)
-            of_pixel |= {(s, int(hit)): float(w) for hit, w in zip(order[:n], share[:n], strict=True)}
-        if of_pixel:
-            found[pixel] = of_pixel
+        n = read_hits(weighed.addresses[0], pixel, of, order, share)
+        if n:
+            hits = zip(of[:n], order[:n], share[:n], strict=True)
+            found[pixel] = {(int(s) - 1, int(hit)): float(w) for s, hit, w in hits}
+            assert len(found[pixel]) == n
     return found
 
 

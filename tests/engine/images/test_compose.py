@@ -26,7 +26,7 @@ from framearray_cli.engine.hits.outer import sort_by_pixel
 from framearray_cli.engine.images.accumulate import accumulate
 from framearray_cli.engine.images.band import HITS_AT_ONCE, Band, Finish, as_stored, empty_band, finish
 from framearray_cli.engine.images.compose import compose_differences, weigh_halves
-from framearray_cli.engine.images.sources import HitSource, SourceList
+from framearray_cli.engine.images.sources import COLUMNS, HitSource, SourceList
 from framearray_cli.engine.kernels.simd import LANES
 
 N_PIXELS, N_LIGHTS, NOTHING = 40, 7, np.empty(0, np.float32)
@@ -138,7 +138,7 @@ def test_a_list_of_sources_refuses_what_kernels_would_misread(column: str) -> No
         )
         return SourceList([HitSource(placed, records, a["weight"], a["scale"], a["odd_scale"], a["place"])])
 
-    assert listed().addresses.shape == (1, 10)
+    assert listed().addresses.shape == (1, COLUMNS)
     with pytest.raises(ValueError, match="contiguous"):
         listed(**{column: np.repeat(arrays[column], 2, axis=0)[::2]})
     with pytest.raises(ValueError, match="expected an array of"):
