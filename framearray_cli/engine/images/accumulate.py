@@ -18,6 +18,8 @@ from .sources import GATHERED, IRRADIANCE, ODD_SCALE, OF, ORDER, ROW, SCALE, SHA
 # Prefetch the irradiance of the hit that comes this many hits later, and the row of the one twice as far ahead: memory
 # answers in about the time that the sums of this many hits take.
 AHEAD = 8
+# In a list over all eyes a pixel has as many hits as in the lists of some seven eyes together.
+AHEAD_OF_ALL = 56
 ROW_BYTES = 4 * LANES
 
 
@@ -50,9 +52,10 @@ def accumulate(
             last = integer_at(listed[START], first_pixel + n)
             even = real_at(listed[SCALE], pixel) if listed[SCALE] != 0 else np.float32(1.0)
             odd = real_at(listed[ODD_SCALE], pixel) if listed[ODD_SCALE] != 0 else even
+            ahead = AHEAD_OF_ALL if listed[OF] != 0 else AHEAD
             n_hits += end - start
             for entry in range(start, end):
-                _fetch(sources, s, entry, last, channels, n_lights)
+                _fetch(sources, s, entry, ahead, last, channels, n_lights)
                 # 2. The source and the weight w of the hit.
                 source, hit = sources[_row_of(listed, s, entry)], integer_at(listed[ORDER], entry)
                 row = source[ROW] + ROW_BYTES * hit
@@ -170,16 +173,16 @@ def _note_light(band: Band, waiting: int, lit: int, direct: int, gathered: int, 
 
 
 @inlined
-def _fetch(sources: Addresses, s: int, entry: int, last: int, channels: int, n_lights: int) -> None:
+def _fetch(sources: Addresses, s: int, entry: int, ahead: int, last: int, channels: int, n_lights: int) -> None:
     """Prefetch row and weight of a hit that comes soon, and irradiance of an earlier one, which its row describes."""
-    listed = sources[s]
-    if entry + 2 * AHEAD < last:
-        hit, source = integer_at(listed[ORDER], entry + 2 * AHEAD), sources[_row_of(listed, s, entry + 2 * AHEAD)]
+    listed, later, next_one = sources[s], entry + 2 * ahead, entry + ahead
+    if later < last:
+        hit, source = integer_at(listed[ORDER], later), sources[_row_of(listed, s, later)]
         prefetch(source[ROW] + ROW_BYTES * hit, 1)
         if listed[WEIGHTS] != 0:
             prefetch(listed[WEIGHTS] + 4 * hit, 1)
-    if entry + AHEAD < last:
-        hit, source = integer_at(listed[ORDER], entry + AHEAD), sources[_row_of(listed, s, entry + AHEAD)]
+    if next_one < last:
+        hit, source = integer_at(listed[ORDER], next_one), sources[_row_of(listed, s, next_one)]
         if source[GATHERED] != 0:
             columns = LIGHT + channels * n_lights
             prefetch(source[GATHERED] + 4 * columns * hit, 4 * columns)

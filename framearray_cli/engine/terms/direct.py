@@ -35,7 +35,6 @@ from ..kernels.simd import (
 FAR_END = np.float32(1.0 - 1e-4)
 # Rows of queued rays: origin, vector to the light, length in units of that vector.
 FROM, TO, REACH = 0, 3, 6
-ALL_LANES = (1 << LANES) - 1
 # With at most this many light positions a step takes sixteen hits, even those that lie apart.
 FEW_LIGHTS = 8
 
@@ -85,8 +84,8 @@ class _RayStart(NamedTuple):
 @inlined
 def _queue(
     lights: LightArrays, s: int, l: int, to: Triple, factor: Real, start: _RayStart, rays: Rays, waiting: int
-) -> None:
-    """Append rays to light positions l to l + 15; the next rays overwrite those that do not count.
+) -> int:
+    """Append rays to those of light positions l to l + 15 that may reach the hit; return the length of the queue.
 
     Rays start slightly above the hit. A ray to a point source aims from there too: otherwise it would end that far
     beyond the source, and a wall that the source lies on would hide it.
@@ -99,6 +98,7 @@ def _queue(
     channels, n_lights = lights.strength.shape[1], lights.lit.shape[1]
     row, room = rays.row, rays.row.shape[1]
     (x, y, z), origin, up = to, start.origin, start.up
+    reached = factor > np.float32(0.0)
     # from the start of the ray to the source
     if lights.kind[s] != DIRECTIONAL:
         x, y, z = x - up[0], y - up[1], z - up[2]
@@ -106,15 +106,17 @@ def _queue(
     store(row, FROM * room + waiting, origin[0])
     store(row, (FROM + 1) * room + waiting, origin[1])
     store(row, (FROM + 2) * room + waiting, origin[2])
-    store(row, TO * room + waiting, x)
-    store(row, (TO + 1) * room + waiting, y)
-    store(row, (TO + 2) * room + waiting, z)
+    append(reached, x, row, TO * room + waiting)
+    append(reached, y, row, (TO + 1) * room + waiting)
+    append(reached, z, row, (TO + 2) * room + waiting)
     store(row, REACH * room + waiting, np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END)
     # the irradiance that it carries if nothing blocks it, and where that is added
-    store(rays.place, waiting, lane_numbers() + np.int32(start.first_value + l))
+    append(reached, lane_numbers() + np.int32(start.first_value + l), rays.place, waiting)
     for channel in range(channels):
         strength = load(lights.strength, (s * channels + channel) * n_lights + l)
-        store(rays.value, channel * rays.value.shape[1] + waiting, factor * strength)
+        append(reached, factor * strength, rays.value, channel * rays.value.shape[1] + waiting)
+    found: int = waiting + popcount(reached)
+    return found
 
 
 @step
@@ -197,27 +199,13 @@ def _direct_by_lights(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, r
         start = _RayStart(ray_origin(hits, i), lift(hits, i), i * channels * n_lights)
         for s in range(lights.kind.shape[0]):
             for l in range(0, n_lights, LANES):
-                # cos(theta) / d^2 of positions l to l + 15, and a bit for each that may reach the hit
+                # make room for sixteen rays
+                if waiting > capacity - LANES:
+                    _trace_queue(tracer, rays, waiting, irradiance)
+                    total, waiting = total + waiting, 0
+                # cos(theta) / d^2 of positions l to l + 15
                 x, y, z, factor = _geometry_of_lights(hits, i, lights, s, l)
-                lit = bits(factor > np.float32(0.0))
-                while lit != 0:
-                    # make room for sixteen rays
-                    if waiting > capacity - LANES:
-                        _trace_queue(tracer, rays, waiting, irradiance)
-                        total, waiting = total + waiting, 0
-                    # all sixteen at once
-                    if lit == ALL_LANES:
-                        _queue(lights, s, l, (x, y, z), factor, start, rays, waiting)
-                        waiting, lit = waiting + LANES, 0
-                        continue
-                    # else the next run of positions: m of them, after those skipped
-                    skipped = ctz(lit)
-                    m = ctz(~(lit >> skipped))
-                    if skipped > 0:
-                        x, y, z, factor = _geometry_of_lights(hits, i, lights, s, l + skipped)
-                    _queue(lights, s, l + skipped, (x, y, z), factor, start, rays, waiting)
-                    waiting += m
-                    lit &= ~(((1 << m) - 1) << skipped)
+                waiting = _queue(lights, s, l, (x, y, z), factor, start, rays, waiting)
     _trace_queue(tracer, rays, waiting, irradiance)
     return total + waiting
 
