@@ -4,60 +4,17 @@ jobs/furnace-*.toml through the whole program, for independent seeds: the files 
 every pixel is subtracted, and what is left must be the indirect light R / pi R E.
 """
 
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.stats import t
-from support import ROOT
 from support import closed_forms as forms
+from support.furnace import expected_direct, furnace_job
 from support.stages import result_of
-from support.ztests import Estimate, chi2_bounds, estimate, sidak
+from support.ztests import Estimate, chi2_bounds, estimate
 
-from framearray_cli.job.job import Job
-from framearray_cli.job.method import IndirectTable
-from framearray_cli.job.read import read_job
-from framearray_cli.scene.paths.paths import eyes, lights
-
-JOBS = ROOT / "jobs"
 SEEDS = 6
-FINE = 8  # places along each edge of a pixel that its expected direct light is averaged over
-
-
-def furnace_job(reflectivity: float, out: Path, seed: int = 0, method: str = "eye") -> Job:
-    """A job of jobs/ with another seed and method, and files that hold float."""
-    job = read_job(JOBS / f"furnace-{round(100 * reflectivity)}.toml")
-    output = {"directory": out, "half": "never", "compression": "none", "layers": False}
-    tables = {
-        "seed": seed,
-        "ambient": job.ambient.model_copy(update={"method": method}),
-        "output": job.output.model_copy(update=output),
-    }
-    return job.model_copy(update=tables)
-
-
-@cache
-def expected_direct(reflectivity: float) -> NDArray[np.float64]:
-    """Mean direct radiance of every pixel of the furnace job, (n_c, n_l, h, w): eye rays met with the unit sphere."""
-    job = read_job(JOBS / f"furnace-{round(100 * reflectivity)}.toml")
-    width, height = job.camera.resolution
-    focal = 0.5 * height / np.tan(np.radians(job.camera.fov) / 2)
-    x = (np.arange(width * FINE) + 0.5) / FINE - 0.5 * width
-    y = 0.5 * height - (np.arange(height * FINE) + 0.5) / FINE
-    image = np.stack([*np.meshgrid(x / focal, y / focal), np.full((height * FINE, width * FINE), -1.0)], axis=-1)
-    frames = []
-    for matrix in eyes(job).world_from_camera:
-        way = image.reshape(-1, 3) @ matrix[:3, :3].T
-        way /= np.linalg.norm(way, axis=1, keepdims=True)
-        eye = matrix[:3, 3]
-        along = way @ eye
-        points = eye + (np.sqrt(along**2 - eye @ eye + 1) - along)[:, None] * way
-        per_light = [forms.point_irradiance(points, -points, place, 1.0) for place in lights(job).sources[0].vector]
-        fine = np.array(per_light).reshape(-1, height, FINE, width, FINE)
-        frames.append(reflectivity / np.pi * fine.mean(axis=(2, 4)))
-    return np.array(frames)
 
 
 def measured(reflectivity: float, method: str, out: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -116,27 +73,3 @@ def test_every_pixel_of_the_furnace(tmp_path: Path) -> None:
 def test_sunlit_sphere_has_a_mean_too() -> None:
     """The expected direct light itself: the light's power over the sphere, seen from its middle."""
     assert expected_direct(0.5)[:, 0].mean() == pytest.approx(0.5 / np.pi, rel=0.005)  # light at the centre: E = 1
-
-
-@pytest.mark.parametrize(
-    "reflectivity", [0.5, pytest.param(0.2, marks=pytest.mark.slow), pytest.param(0.8, marks=pytest.mark.slow)]
-)
-def test_furnace_of_cells(reflectivity: float, tmp_path: Path) -> None:
-    found = []
-    for seed in range(SEEDS):
-        job = furnace_job(reflectivity, tmp_path / str(seed), seed)
-        cells = IndirectTable(method="cells", samples=2**15)
-        rest = result_of(job.model_copy(update={"indirect": cells})).images.mean(axis=-1) - expected_direct(
-            reflectivity
-        )
-        found.append(rest.mean(axis=(0, 2, 3)))
-    right = forms.furnace_indirect(reflectivity)
-    whole = expected_direct(reflectivity).mean(axis=(0, 2, 3)) + right
-    by_light = np.array(found)
-    most = float(t.ppf(1 - sidak(by_light.shape[1]) / 2, SEEDS - 1))
-    for l in range(by_light.shape[1]):  # the same random numbers serve all lights, so each is tested separately
-        got = estimate(by_light[:, l])
-        flat = 1e-4 * whole[l]  # triangles of the sphere have about this share less area
-        assert abs(got.mean - right) < most * got.error + flat
-        assert abs(got.mean - right) < 0.01 * whole[l]
-        assert abs(got.mean - 1.05 * right) > most * got.error + flat  # the test can fail

@@ -152,10 +152,7 @@ class CellOracle(Oracle):
         next_keys = [rnd.bits([key], CONTINUED + int(r))[0] for key, r in zip(keys, ray, strict=True)]
         points = self.model.look(start, dirs, next_keys, hits.pixel[owner])
         met = np.flatnonzero(triangle >= 0)
-        normal = points.geometric[met]
-        random = rnd.points([rnd.bits([keys[i]], CELLS)[0] for i in met], ray[met], rnd.sequence()) - 0.5
-        along, across = tangents(normal)
-        where = points.position[met], normal, distance[met], random[:, :1] * along + random[:, 1:] * across
+        where = points.position[met], points.geometric[met], distance[met], 0.0  # not shifted
         cell, short, r = np.full(len(dirs), -1), np.zeros(len(dirs), bool), np.zeros((len(dirs), 3))
         if len(met):
             cell[met], short[met] = self.places.find(*where), self.places.short(*where) & (not last)

@@ -3,7 +3,7 @@
     E_indirect(P)[l] = mean over rays of R(Q) E(cell of Q)[l]        Q: the first surface that a ray meets
 
 The rays are those of obscurance, but run to the first surface, so that one set of rays gives W and the indirect light
-of every l. Q is moved within its surface by up to half a cell, which blurs the borders of cells.
+of every l.
 
 Notation of the kernels: rays from a hit P meet Q; E_indirect[l] = c colour[l] g[l], with the colour c of a hit.
 """

@@ -13,12 +13,12 @@ from framearray_cli.base.arrays import Float32, Int32, Real, Rgb, Triple, with_r
 from ...embree.packets import DIRECTION, HIT_ROWS, TFAR, Tracer, room_in
 from ...hits.hits import Hits, decode_hits, empty_hits
 from ...hits.rays import NO_RAYS, ORDER, Rays, room_for_hits
-from ...inputs.random import CELLS, CONTINUED, r2, random_word
+from ...inputs.random import CONTINUED, random_word
 from ...inputs.surfaces import Surfaces, geometric_normal, position_at, total_at
 from ...kernels.kernel import inlined, kernel
 from ...kernels.simd import LANES, integers, load_row, select, store, width_of_packets
 from .guards import choose_slots, write_guard_ray
-from .table import NOWHERE, TINT, Cells, find_cell, level_of, shifts, side_of
+from .table import NOWHERE, TINT, Cells, find_cell, level_of, side_of
 
 # Rays that are kept together, of those traced together; the rest read cells.
 MOST_NEAR = 2048
@@ -163,10 +163,10 @@ def find_cells(
             # the ray as it was written, before rays were sorted by direction: its hit, and its number there
             written = rays.number[ORDER, first + lane]
             k, ray = written // (LANES * n_rays) * LANES + written % LANES, first_ray + written // LANES % n_rays
-            # the cell of Q, moved within its surface; the queue holds rays to the guards of doubtful cells
+            # the cell of Q; the queue holds rays to the guards of doubtful cells
             key, q = hits.key[rays.place[k]], room.point
             point, normal = (q[0, lane], q[1, lane], q[2, lane]), (q[3, lane], q[4, lane], q[5, lane])
-            found = _cell_of(cells, point, normal, rays.value[0, first + lane], key, ray)
+            found = _cell_of(cells, point, normal, rays.value[0, first + lane])
             room.cell[first + lane] = found
             if cells.other[found] == NOWHERE:
                 continue
@@ -183,12 +183,11 @@ def find_cells(
 
 
 @inlined
-def _cell_of(cells: Cells, point: Triple, normal: Triple, length: Real, key: np.uint64, ray: int) -> int:
-    """The cell that a ray of some length reads at a point, moved within its surface at random."""
-    a, b = r2(random_word(key, CELLS), ray)
-    along, across = shifts(normal, a, b)
+def _cell_of(cells: Cells, point: Triple, normal: Triple, length: Real) -> int:
+    """The cell that a ray of some length reads at a point."""
+    still = (np.float32(0.0), np.float32(0.0), np.float32(0.0))
     level, side = level_of(cells.grid, length), side_of(normal[0], normal[1], normal[2])
-    return find_cell(cells.grid, cells.slots, level, side, point, along, across)
+    return find_cell(cells.grid, cells.slots, level, side, point, still, still)
 
 
 @inlined
