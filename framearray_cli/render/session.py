@@ -66,7 +66,7 @@ def open_session(
     require_least_memory(prepared)
     directory = job.output.directory
     chosen = range(prepared.n_cameras) if cameras is None else cameras
-    with ThreadPoolExecutor(1, thread_name_prefix="fingerprint") as aside:  # both take as long, and leave Python alone
+    with ThreadPoolExecutor(1, thread_name_prefix="fingerprint") as aside:  # both take as long, and need no Python
         scene = aside.submit(scene_fingerprint, prepared)
         built = open_embree(prepared, engine)
     with built as embree, ExitStack() as held:

@@ -67,7 +67,7 @@ def test_parts_and_threads_give_the_bytes_of_the_whole(scene: Path, tmp_path: Pa
     assert images(tmp_path / "whole") == images(tmp_path / "parts") != {}
     note = next(note for note in summary.notes if note.startswith("indirect light differs from paths by"))
     manifest = read_manifest(tmp_path / "whole")
-    assert note in manifest.summary["notes"]  # type: ignore[operator]
+    assert note in manifest.summary["notes"]  # type: ignore[operator]  # values of a summary are of any type
     runs = read_records(tmp_path / "parts", manifest.fingerprint).runs
     assert len(runs) == 2 and len({run.cells for run in runs}) == 1 and runs[0].cells.startswith("sha256:")
 

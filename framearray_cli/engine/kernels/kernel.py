@@ -39,7 +39,7 @@ _Locator: Any = caching._CacheLocator
 _OfSourceFile: Any = caching._SourceFileBackedLocatorMixin
 
 
-class _KernelCompiler(_Compiler):  # type: ignore[misc]
+class _KernelCompiler(_Compiler):  # type: ignore[misc]  # numba has no annotations
     """Compiles by the passes in `pipeline.py`, which need half as long to load as all the rest of numba."""
 
     def define_pipelines(self) -> list[Any]:
@@ -165,7 +165,7 @@ def inlined(function: F) -> F:
 @inlined
 def index(i: int) -> int:
     """An index that is not negative: numba then does not ask whether it counts from the end of an array."""
-    return np.uint64(i)  # type: ignore[return-value]
+    return np.uint64(i)  # type: ignore[return-value]  # an integer in kernels, and numpy takes it as one
 
 
 def _prefetch_of(typingctx: Any, address: Any, n_bytes: Any) -> Any:

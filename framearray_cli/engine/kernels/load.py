@@ -19,7 +19,7 @@ _FunctionCache: Any = caching.FunctionCache
 _Library: Any = codegen.JITCodeLibrary
 
 
-class _LazyLibrary(_Library):  # type: ignore[misc]
+class _LazyLibrary(_Library):  # type: ignore[misc]  # numba has no annotations
     """Machine code from disk; the code that other functions inline is read when one of them is compiled.
 
     Until then numba knows none of its symbols.
@@ -59,7 +59,7 @@ class _LazyLibrary(_Library):  # type: ignore[misc]
         self._module = module
 
 
-class KernelFiles(_Files):  # type: ignore[misc]
+class KernelFiles(_Files):  # type: ignore[misc]  # numba has no annotations
     """numba's files of a function, read with `_LazyLibrary`."""
 
     def rebuild(self, context: Any, stored: Any) -> Any:
@@ -75,7 +75,7 @@ class KernelFiles(_Files):  # type: ignore[misc]
                 del generator._library_class  # that of numba's own class again
 
 
-class KernelCache(_FunctionCache):  # type: ignore[misc]
+class KernelCache(_FunctionCache):  # type: ignore[misc]  # numba has no annotations
     """numba's cache of a function; where that fails, numba compiles."""
 
     def load_overload(self, signature: Any, context: Any) -> Any:

@@ -17,7 +17,7 @@ _SETTINGS = Path(".numba_config.yaml")  # in the current folder
 def _hidden(names: tuple[str, ...]) -> Iterator[None]:
     """Let imports fail of modules that were not loaded before."""
     hidden = {name for name in names if name not in sys.modules}
-    sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]
+    sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type]  # None: imports fail
     try:
         yield
     finally:

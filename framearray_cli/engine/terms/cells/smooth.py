@@ -30,7 +30,7 @@ STEP = 3
 SLOPE, FACING = np.float32(0.2), np.float32(0.9)
 # Hits mix up to this share of the harmonic mean length of their rays apart.
 APART = np.float32(0.2)
-# Pixels of a chunk are told apart by their place modulo this, along x and y.
+# The pixels of a chunk differ in their place modulo this, along x and y.
 _TABLE = 64
 _NONE = -1
 _AROUND = 9
