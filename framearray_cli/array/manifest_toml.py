@@ -3,6 +3,7 @@
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,6 @@ FORMAT, FORMAT_OF_GROUPS = 1, 2
 MOST_NAMES = 5  # of arrays in a message
 
 _VECTORS = ("position", "direction", "intensity", "irradiance")  # of a source
-_LIGHT_KEYS = ("ambient", "ambient_error", "sources")
 
 
 def write_manifest(directory: Path, manifest: Manifest) -> Path:
@@ -129,8 +129,7 @@ def _light_lines(key: str, lights: Sequence[ManifestLight]) -> list[str]:
 def _from_table(table: Mapping[str, Any], directory: Path) -> Manifest:
     """Build a manifest from the table of its file; ignore unknown keys."""
     cameras = tuple(
-        _build(f"cameras[{c}]", ManifestCamera, camera, ("world_from_camera", "fov"))
-        for c, camera in enumerate(_tables(table, "cameras"))
+        _build(f"cameras[{c}]", ManifestCamera, camera) for c, camera in enumerate(_tables(table, "cameras"))
     )
     groups = tuple(_group(k, group) for k, group in enumerate(_tables(table, "groups")))
     needed = ("version", "name", "fingerprint", "resolution", "fps") + (() if groups else ("images",))
@@ -148,7 +147,7 @@ def _from_table(table: Mapping[str, Any], directory: Path) -> Manifest:
 
 def _lights(place: str, table: Mapping[str, Any]) -> tuple[ManifestLight, ...]:
     tables = _tables(table, "lights")
-    lights = tuple(_build(f"{place}[{l}]", ManifestLight, light, _LIGHT_KEYS) for l, light in enumerate(tables))
+    lights = tuple(_build(f"{place}[{l}]", ManifestLight, light) for l, light in enumerate(tables))
     for l, light in enumerate(lights):
         for k, key, value in ((k, key, s[key]) for k, s in enumerate(light.sources) for key in _VECTORS if key in s):
             good = isinstance(value, list) and len(value) == 3 and all(map(is_number, value))
@@ -159,16 +158,17 @@ def _lights(place: str, table: Mapping[str, Any]) -> tuple[ManifestLight, ...]:
 def _group(k: int, table: Mapping[str, Any]) -> ManifestGroup:
     lights = _lights(f"groups[{k}].lights", table)
     group = {**table, "lights": list(lights)}
-    built: ManifestGroup = _build(f"groups[{k}]", ManifestGroup, group, ("name", "axis", "images", "lights"))
+    built: ManifestGroup = _build(f"groups[{k}]", ManifestGroup, group)
     return built
 
 
-def _build(place: str, kind: type[Any], table: Mapping[str, Any], keys: Sequence[str]) -> Any:
-    """Build one camera, light or group; a ValueError starts with its place in the file."""
+def _build(place: str, kind: type[Any], table: Mapping[str, Any]) -> Any:
+    """Build one camera, light or group from the keys that are its fields; a ValueError starts with its place."""
+    known = fields(kind)
     try:
-        missing = [key for key in keys if key not in table]
+        missing = [key.name for key in known if key.name not in table and key.default is MISSING]
         _check(not missing, f"expected the keys {', '.join(missing)}, found none")
-        return kind(**{key: _freeze(table[key]) for key in keys})
+        return kind(**{key.name: _freeze(table[key.name]) for key in known if key.name in table})
     except (ValueError, TypeError) as error:
         raise ValueError(f"{place}: {error}") from error
 

@@ -13,8 +13,8 @@ from framearray_cli.engine.loop import ready_frames
 from framearray_cli.job.job import Job
 from framearray_cli.job.method import SamplesTable
 from framearray_cli.job.sourcetable import MAIN_AXIS
-from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import Lights, eyes, lights, lights_without_groups
+from framearray_cli.scene.paths.placing import LightPath
 
 from .automatic.choose import require_least_memory
 from .prepare import Prepared, open_embree, plan_work, prepare, prepared_from

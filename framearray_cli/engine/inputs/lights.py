@@ -14,6 +14,7 @@ from framearray_cli.base.arrays import Float32, Float64, Int32, with_room
 from framearray_cli.scene.paths.paths import Lights
 
 POINT, DIRECTIONAL = 0, 1
+KINDS = {"point": POINT, "directional": DIRECTIONAL}
 
 
 class LightArrays(NamedTuple):
@@ -59,7 +60,7 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
     """Make the arrays of all lights that kernels read, with one channel if that suffices."""
     intensity = np.stack([source.intensity for source in lights.sources])  # (n_sources, n_lights, 3)
     vector = np.stack(
-        [source.vector - centre if source.kind == "point" else source.vector for source in lights.sources]
+        [source.vector if source.kind == "directional" else source.vector - centre for source in lights.sources]
     )
     colour = intensity.sum(axis=0)
     largest = colour.max(axis=-1, keepdims=True)
@@ -69,9 +70,8 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
         strength = scalar
     else:
         strength, colour = intensity, np.ones_like(colour)
-    kind = [POINT if source.kind == "point" else DIRECTIONAL for source in lights.sources]
     found = LightArrays(
-        kind=np.array(kind, np.int32),
+        kind=np.array([KINDS[source.kind] for source in lights.sources], np.int32),
         vector=np.asarray(vector.transpose(0, 2, 1), np.float32),
         strength=np.asarray(strength.transpose(0, 2, 1), np.float32),
         lit=np.asarray((intensity > 0).any(axis=-1), np.float32),

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.inputs.lights import POINT
+from framearray_cli.engine.inputs.lights import DIRECTIONAL
 
 from ..prepare import Prepared
 from .positions import lights_text
@@ -81,14 +81,14 @@ def _name(prepared: Prepared, s: int) -> str:
 
 def _is_buried(setup: FrameSetup, prepared: Prepared, s: int, plane: int) -> bool:
     position = np.asarray(setup.lights.vector[s, :, plane])
-    return bool(setup.lights.kind[s] == POINT) and is_inside_solid(setup, prepared.scene, position)
+    return bool(setup.lights.kind[s] != DIRECTIONAL) and is_inside_solid(setup, prepared.scene, position)
 
 
 def _reason(setup: FrameSetup, prepared: Prepared, s: int, plane: int) -> str:
     """Say why a source lights nothing, and the remedy."""
     values = prepared.lights.sources[s].vector[plane]
     low, high = bounds(prepared)
-    if setup.lights.kind[s] != POINT:
+    if setup.lights.kind[s] == DIRECTIONAL:
         axis = 2 if prepared.job.scene.up == "z" else 1
         if values[axis] > 0:
             return (

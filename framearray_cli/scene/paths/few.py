@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .lightpath import LightPath
 from .paths import LightGroup, Lights
+from .placing import LightPath
 
 
 def few_planes(lights: Lights, most: int, *, consecutive: bool = False) -> list[int]:

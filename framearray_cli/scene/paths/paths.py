@@ -12,8 +12,7 @@ from framearray_cli.job.job import Job
 
 from .curves import interpolate_keys
 from .directions import PARALLEL, interpolate_directions, unit
-from .lightpath import LightPath
-from .placing import in_camera_space, place_source
+from .placing import LightPath, in_camera_space, place_source
 from .planes import Plane, group_planes, picture_planes
 
 

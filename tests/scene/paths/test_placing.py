@@ -8,8 +8,8 @@ from support import tiny
 
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.domes import dome_directions
-from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import eyes, lights
+from framearray_cli.scene.paths.placing import LightPath
 
 
 def path(frames: int | None = None, camera: dict[str, Any] | None = None, **source: Any) -> LightPath:
