@@ -83,8 +83,7 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
 def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
     """The lights at some of their positions, in the same units."""
     some = list(at)
-    found = LightArrays(
-        kind=lights.kind,
+    found = lights._replace(
         vector=lights.vector[:, :, some],
         strength=lights.strength[:, :, some],
         lit=lights.lit[:, some],

@@ -80,8 +80,7 @@ def resampled(lights: LightArrays, at: Float64) -> LightArrays:
     for s, kind in enumerate(lights.kind):
         if kind == DIRECTIONAL:
             vector[s] /= np.linalg.norm(vector[s], axis=0)
-    found = LightArrays(
-        kind=lights.kind,
+    found = lights._replace(
         vector=vector,
         strength=_between(lights.strength, at, 2),
         lit=np.ceil(_between(lights.lit, at, 1)),
