@@ -167,6 +167,7 @@ def _with_cells(
         seed=job.seed,
         world=World(prepared.surfaces, embree.tracer),
         lights=prepared.light_arrays,
+        depth=setup.depth,
     )
     work = CellWork(
         walks=walks,

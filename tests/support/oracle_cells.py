@@ -7,12 +7,13 @@ import numpy as np
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.render.prepare import Prepared
 from support import oracle_random as rnd
-from support.oracle import Oracle
+from support.oracle import Oracle, reflect
 from support.oracle_scene import Model, Points, dot
 
 LEVELS, COARSEST, SHARE = 7, 4, 0.3  # levels, the coarsest that rays read, edge of cells per length of a ray
 BITS = 19  # of a key per axis
 CELLS, CONTINUED = 5, 16  # dimensions of the random numbers that move points, and of those of where ray 0 ends
+MIRRORED = 1 << 17  # the dimension of what ray 0 chooses at mirrors
 LOCAL = 2  # the level that obscurances take their ambient light from
 STEPS = 4  # rays that follow one that was too short, at most
 GUARD_END = 1 - 1e-3  # a ray to a guard ends this share of its length before it
@@ -134,7 +135,7 @@ class CellOracle(Oracle):
     def __init__(self, inputs: Prepared, ambient: Ambient, cells: Any) -> None:
         """Take the cells from the program."""
         super().__init__(inputs, ambient)
-        self.cells, self.places, self.kept = cells, CellMap(cells, self.model), 0
+        self.cells, self.places, self.kept, self.mirrored = cells, CellMap(cells, self.model), 0, 0
 
     def radiance(self, hits: Points, l: int) -> Any:
         """(n, 3): R (E[l] + E_indirect[l]) / pi, or the background where a ray left the scene."""
@@ -148,7 +149,10 @@ class CellOracle(Oracle):
         Of those the first slots; none is short among the last of a path.
         """
         start, keys = hits.start[owner], [hits.key[i] for i in owner]
+        words = [rnd.bits([key], MIRRORED + int(r))[0] for key, r in zip(keys, ray, strict=True)]
+        start, dirs, way, behind = self.passed(start, dirs, words)
         triangle, uv, distance = self.model.first(start, dirs, np.inf)
+        distance = distance + way
         next_keys = [rnd.bits([key], CONTINUED + int(r))[0] for key, r in zip(keys, ray, strict=True)]
         points = self.model.look(start, dirs, next_keys, hits.pixel[owner])
         met = np.flatnonzero(triangle >= 0)
@@ -158,7 +162,44 @@ class CellOracle(Oracle):
             cell[met], short[met] = self.places.find(*where), self.places.short(*where) & (not last)
             cell[short] = self.places.first(*where)[short[met]]
         r[met] = self.model.total(triangle[met], uv[met])
+        r[triangle < 0] = 1
+        r = np.where(np.isnan(behind), r, behind)
         return points, r, cell, short
+
+    def passed(self, start: Any, dirs: Any, words: Any) -> tuple[Any, Any, Any, Any]:
+        """Rays behind the mirrors that they meet: start, direction, length of the way so far, and what mirrors and the
+        surface at its end reflect; NaN for rays that meet no mirror first."""
+        scene = self.inputs.scene
+        depth = self.job.specular.depth if scene.has_mirrors else 0
+        triangle, _, _ = self.model.first(start, dirs, np.inf)
+        mirror = (triangle >= 0) & (scene.specular[scene.material[triangle]] > 0).any(axis=1)
+        rows = np.flatnonzero(mirror) if depth else np.zeros(0, int)
+        start, dirs, way, weight = start.copy(), dirs.copy(), np.zeros(len(dirs)), np.full((len(dirs), 3), np.nan)
+        weight[rows], words = 1.0, list(words)
+        self.mirrored += len(rows)
+        for bounce in range(depth + 1):
+            if not len(rows):
+                break
+            _, _, distance = self.model.first(start[rows], dirs[rows], np.inf)
+            at = self.model.look(start[rows], dirs[rows], [0] * len(rows), rows)
+            part, other = at.specular.max(axis=1), at.reflectivity.max(axis=1)
+            chance = part / np.where(at.surface & (part > 0), part + other, 1)
+            a = rnd.points([words[i] for i in rows], np.zeros(len(rows)), rnd.sequence())[:, 0]
+            goes_on = (a < chance) & (bounce < depth)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                stays = at.reflectivity / (1 - chance)[:, None]
+                goes = at.specular / chance[:, None]
+            stays = at.reflectivity + at.specular if bounce == depth else stays
+            weight[rows] *= np.where(goes_on[:, None], goes, np.where(at.surface[:, None], stays, 1.0))
+            away = reflect(at.incoming, at.shading)
+            into = dot(away, at.geometric) <= 0
+            away[into] = reflect(at.incoming, at.geometric)[into]
+            way[rows[goes_on]] += distance[goes_on]
+            start[rows[goes_on]], dirs[rows[goes_on]] = at.start[goes_on], away[goes_on]
+            rows = rows[goes_on]
+            for i in rows:
+                words[i] = rnd.mix([words[i]])[0]
+        return start, dirs, way, weight
 
     def followed(self, points: Points) -> tuple[Any, Any, Any]:
         """From points that short rays met, on to a long one: 1 + R + R R + ..., the product of all R, and the cell."""
@@ -171,7 +212,7 @@ class CellOracle(Oracle):
             dirs -= 2 * np.minimum(dot(dirs, points.geometric), 0)[:, None] * points.geometric
             own = np.arange(len(points))
             points, r, cell, short = self.landed(points, own, np.zeros(len(own), int), dirs, step == STEPS - 1)
-            through[root[cell >= 0]] *= r[cell >= 0]
+            through[root] *= r
             series[root[short]] += through[root[short]]
             end[root[~short]] = cell[~short]
             points, root = points[short], root[short]
@@ -188,7 +229,6 @@ class CellOracle(Oracle):
         tint, missed = cells.tint.astype(np.float64), k < 0
         hue = np.where(missed[:, None], 0.0, r * tint[k, :3] * tint[k, 3:4])
         through, end, own = np.ones((len(k), 3)), k.copy(), np.zeros((len(k), 3))
-        through[missed], r[missed] = 1.0, 1.0
         series, through[short], end[short] = self.followed(points[short])
         at = [0, 1, 2] if channels == 3 else [unit_of_light.argmax()]  # where all channels are the same times the unit
         direct = self.irradiance(points[short], l)[:, at]

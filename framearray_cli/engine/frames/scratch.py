@@ -7,8 +7,10 @@ import numpy as np
 from ..hits.hits import empty_hits
 from ..hits.rays import room_for_hits, room_for_tests
 from ..terms.cells.lookups import room_for_gathering, room_for_near
+from ..terms.cells.mirrored import room_for_mirrors
 from ..terms.cells.smooth import room_for_smoothing
 from ..terms.direct_steps import room_for_steps
+from ..terms.obscurance import RAYS_TOGETHER
 from .setup import FrameSetup
 
 # Rays traced together within a batch.
@@ -30,6 +32,7 @@ class Scratch:
         obscurance, skylight: (batch, 3) W and S.
         gather, near: of gather rays, and of those too short for cells; and `constant`: (batch, 3) the light that cells
             have at every light position, `closeness`: (batch,) of their rays; None and empty without cells.
+        mirrors: of gather rays that meet mirrors; empty without.
         smooth: of the filter of indirect light; None without.
         rays: number of rays traced by kind; `seconds`: by stage.
     """
@@ -55,6 +58,7 @@ class Scratch:
         channels, n_lights = setup.lights.channels, setup.lights.n_lights
         near = [room_for_near(channels, n_lights, setup.kept) for _ in range(2 if setup.cells is not None else 0)]
         self.near = (near[0], near[1]) if near else None
+        self.mirrors = room_for_mirrors(min(rays, RAYS_TOGETHER), setup.depth if near else 0)
         self.closeness = np.empty(batch if near else 0, np.float32)
         self.constant = np.empty((batch if setup.cells is not None else 0, 3), np.float32)
         self.smooth = room_for_smoothing(setup.lights.channels * len(setup.kept)) if setup.smooth else None

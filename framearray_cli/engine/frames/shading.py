@@ -84,7 +84,7 @@ def _estimate_indirect(
     else:
         rays = gather_cells(
             hits, n, gather_settings(setup.obscurance), setup.world, setup.lights, setup.cells, scratch.hit_rays,
-            scratch.gather, scratch.test_rays, scratch.near, gathered, neighbours,
+            scratch.gather, scratch.test_rays, scratch.near, scratch.mirrors, gathered, neighbours,
         )  # fmt: skip
     return rays
 

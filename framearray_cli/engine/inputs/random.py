@@ -18,6 +18,7 @@ from ..kernels.simd import integers, reals, select, sqrt, words
 # Dimensions: one stream per purpose.
 PIXEL, HEMISPHERE, CHOICE, STEPS, OTHER_HALF, CELLS = 0, 1, 2, 3, 4, 5
 CONTINUED = 16  # and what follows: streams of the points that rays 0, 1, ... of a hit meet
+MIRRORED = 1 << 17  # likewise: what rays 0, 1, ... of a hit choose at mirrors
 PIXEL_SAMPLE = (1 << 16) - 1  # sample index, used by no hit, of numbers that all samples of a pixel share
 HOLE_SAMPLE = (1 << 16) - 2  # sample index of the hit of a pixel that no other hit reaches
 

@@ -23,7 +23,8 @@ from ...kernels.kernel import kernel
 from ...kernels.simd import LANES, compress, lane_numbers, load, popcount, reals
 from ..obscurance import HITS_TOGETHER, RAYS_TOGETHER, add_to_hits, apply_textures, evaluate_rays
 from ..obscurance_rays import ObscuranceSettings, write_obscurance_rays
-from .lookups import GatherScratch, NearHits, find_cells, near_cell, weight_of
+from .lookups import GatherScratch, NearHits, near_cell, weight_of
+from .mirrored import MirrorScratch, find_ends
 from .near import light_near
 from .table import CONSTANT, MEAN, NOWHERE, TINT, Cells
 
@@ -88,7 +89,7 @@ def _sum_cells(
                 place = rank[at + ray * LANES]
                 cell = room.cell[place]
                 if cell == NOWHERE:
-                    same += share * cells.background[channel]
+                    same += share * room.reflectivity[channel, place] * cells.background[channel]
                     continue
                 if cell < NOWHERE:
                     hue += share * near.hue[near_cell(cell), channel]
@@ -127,7 +128,8 @@ def _sum_cells(
 @kernel
 def _gather_hits(
     hits: Hits, world: World, lights: LightArrays, cells: Cells, rays: Rays, n: int, settings: GatherSettings,
-    room: GatherScratch, tests: Rays, near: tuple[NearHits, NearHits], out: Gathered, neighbours: bool,
+    room: GatherScratch, tests: Rays, near: tuple[NearHits, NearHits], mirrors: MirrorScratch, out: Gathered,
+    neighbours: bool,
 ) -> int:  # fmt: skip
     """Gather at the n hits listed in `rays.place`, tracing as many rays of each together as fit.
 
@@ -146,10 +148,11 @@ def _gather_hits(
         n_traced = write_obscurance_rays(hits, rays, n, first_ray, n_rays, settings.far, neighbours)
         intersect(tracer, rays.packets, n_traced, neighbours)
         reach = cells.grid.edge * NEAR
-        kept = find_cells(
-            hits, surfaces, tracer, cells, rays, n_traced, first_ray, n_rays, room, tests, near[0], reach
+        kept, reflected = find_ends(
+            hits, world, cells, rays, n_traced, first_ray, n_rays, room, tests, near[0], reach, mirrors
         )  # fmt: skip
-        total += n_traced + light_near(world, lights, cells, kept, settings.once, reach, room, tests, near[0], near[1])
+        total += n_traced + reflected
+        total += light_near(world, lights, cells, kept, settings.once, reach, room, tests, near[0], near[1], mirrors)
         _sum_cells(cells, rays, n, first_ray, n_rays, of_w.n_rays, room, near[0], out)
         # W, which has its own R(Q), rho and range
         varied = evaluate_rays(surfaces, tracer, rays, n_traced, of_w)
@@ -161,13 +164,14 @@ def _gather_hits(
 @kernel
 def gather_cells(
     hits: Hits, n: int, settings: GatherSettings, world: World, lights: LightArrays, cells: Cells, rays: Rays,
-    room: GatherScratch, tests: Rays, near: tuple[NearHits, NearHits], out: Gathered, neighbours: bool,
+    room: GatherScratch, tests: Rays, near: tuple[NearHits, NearHits], mirrors: MirrorScratch, out: Gathered,
+    neighbours: bool,
 ) -> int:  # fmt: skip
     """Estimate W and the indirect light of hits 0 to n - 1; hits that reflect nothing get none.
 
     Args:
         lights: whose direct light is computed at hits.
-        rays, room, tests, near: scratch; the kernel traces as many rays together as they hold.
+        rays, room, tests, near, mirrors: scratch; the kernel traces as many rays together as they hold.
         neighbours: see `obscurance`.
 
     Returns:
@@ -192,7 +196,7 @@ def gather_cells(
         # gather at a full list, and move what is left to its start
         if waiting >= fit:
             total += _gather_hits(
-                hits, world, lights, cells, rays, fit, settings, room, tests, near, out, neighbours
+                hits, world, lights, cells, rays, fit, settings, room, tests, near, mirrors, out, neighbours
             )  # fmt: skip
             waiting -= fit
             for k in range(waiting):
@@ -200,10 +204,12 @@ def gather_cells(
         # start afresh, see `obscurance`
         if (first + LANES) % HITS_TOGETHER == 0:
             total += _gather_hits(
-                hits, world, lights, cells, rays, waiting, settings, room, tests, near, out, neighbours
+                hits, world, lights, cells, rays, waiting, settings, room, tests, near, mirrors, out, neighbours
             )  # fmt: skip
             waiting = NO_RAYS
-    total += _gather_hits(hits, world, lights, cells, rays, waiting, settings, room, tests, near, out, neighbours)
+    total += _gather_hits(
+        hits, world, lights, cells, rays, waiting, settings, room, tests, near, mirrors, out, neighbours
+    )  # fmt: skip
     return total
 
 

@@ -29,7 +29,7 @@ class GatherScratch(NamedTuple):
 
     Attributes:
         cell: (n_rays,) the cell that each ray reads, NOWHERE, or `near_cell(k)` of ray k that was kept.
-        reflectivity: (3, n_rays) R(Q).
+        reflectivity: (3, n_rays) R(Q), or 1 where nothing is met, times the reflectivity of mirrors on the way.
         point: (6, LANES) Q and its normal, of sixteen rays.
     """
 
@@ -154,7 +154,7 @@ def find_cells(
         store(room.point, 4 * LANES, ny)
         store(room.point, 5 * LANES, nz)
         for channel in range(3):
-            store(room.reflectivity, channel * room.reflectivity.shape[1] + first, total[channel])
+            store(room.reflectivity, channel * room.reflectivity.shape[1] + first, select(missed, 1.0, total[channel]))
         store(rays.value, first, load_row(rays.packets, first, TFAR))
         store(room.cell, first, select(missed, integers(NOWHERE), np.int32(0)))
         for lane in range(min(n - first, LANES)):

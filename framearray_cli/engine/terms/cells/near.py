@@ -18,7 +18,8 @@ from ...kernels.kernel import inlined, kernel
 from ...kernels.simd import LANES, load, store
 from ..direct import direct
 from ..obscurance_rays import ObscuranceSettings, write_obscurance_rays
-from .lookups import GatherScratch, NearHits, find_cells, near_cell
+from .lookups import GatherScratch, NearHits, near_cell
+from .mirrored import MirrorScratch, find_ends
 from .table import CONSTANT, MEAN, NOWHERE, TINT, Cells
 
 # Rays that follow one that was too short, at most; the last reads a cell whatever its length.
@@ -28,7 +29,7 @@ MOST_STEPS = 4
 @kernel
 def light_near(
     world: World, lights: LightArrays, cells: Cells, n: int, once: ObscuranceSettings, reach: float,
-    room: GatherScratch, tests: Rays, near: NearHits, other: NearHits,
+    room: GatherScratch, tests: Rays, near: NearHits, other: NearHits, mirrors: MirrorScratch,
 ) -> int:  # fmt: skip
     """Find the light of kept rays 0 to n - 1.
 
@@ -36,14 +37,14 @@ def light_near(
         once: settings of one ray per hit that does not end.
         reach: rays shorter than this are too short.
         room: of the rays; R(Q) is read from it.
-        tests, other: scratch.
+        tests, other, mirrors: scratch.
 
     Returns:
         number of rays traced.
     """
     if n == 0:
         return 0
-    surfaces, tracer = world
+    tracer = world.tracer
     record_hits(world, near.rays.packets, n, False, near.hits)
     total = direct(near.hits, n, lights, tracer, tests, near.irradiance, False)
     for k in range(n):
@@ -59,7 +60,10 @@ def light_near(
         intersect(tracer, here.rays.packets, left, False)
         total += left
         shortest = reach if step + 1 < MOST_STEPS else 0.0
-        kept = find_cells(here.hits, surfaces, tracer, cells, here.rays, left, 0, 1, here.room, tests, there, shortest)
+        kept, reflected = find_ends(
+            here.hits, world, cells, here.rays, left, 0, 1, here.room, tests, there, shortest, mirrors
+        )  # fmt: skip
+        total += reflected
         for k in range(left):
             _go_on(here, k, near, there)
         if kept == 0:
@@ -80,11 +84,10 @@ def _go_on(here: NearHits, k: int, near: NearHits, there: NearHits) -> None:
         there.root[near_cell(cell)] = root
     else:
         near.end[root] = cell
-    if cell != NOWHERE:
-        for channel in range(3):
-            near.through[channel, root] *= here.room.reflectivity[channel, ray]
-            if cell < NOWHERE:
-                near.series[channel, root] += near.through[channel, root]
+    for channel in range(3):
+        near.through[channel, root] *= here.room.reflectivity[channel, ray]
+        if cell < NOWHERE:
+            near.series[channel, root] += near.through[channel, root]
 
 
 @inlined

@@ -57,12 +57,17 @@ class Samples:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SampleWalks:
-    """Where walks start, and what they meet; arguments of `draw_samples`."""
+    """Where walks start, and what they meet; arguments of `draw_samples`.
+
+    Attributes:
+        depth: most mirrors that gather rays follow; 0 in a scene without mirrors.
+    """
 
     cams: Cameras
     seed: int
     world: World
     lights: LightArrays
+    depth: int = 0
 
     def batch(self, work: Workspace, first: int, n: int) -> Samples:
         """Draw the samples of walks first to first + n - 1."""
@@ -74,6 +79,7 @@ class SampleWalks:
         )
         work.rays += n
         left = walk_to_first_vertices(work, n, self.world, steps)
+        left = self._pass_mirrors(work, left, steps.distance)
         hits, walkers = work.hits[0], work.walkers[0]
         length = steps.distance[walkers.walk[:left]]
         here: dict[str, Any] = {
@@ -84,6 +90,29 @@ class SampleWalks:
         walkers.walk[:left] = np.arange(left)
         more = self._links(work, left, here["position"])
         return Samples(**here, side=sides(here["geometric"]), first_length=length, **more)
+
+    def _pass_mirrors(self, work: Workspace, n: int, distance: Float32) -> int:
+        """Move the n current walks through mirrors as gather rays go; return the number of those that meet a surface.
+
+        Args:
+            distance: (n_walks,) length of the way of each walk, with that between mirrors.
+        """
+        ends: list[list[Any]] = []
+        for bounce in range(self.depth + 1 if self.depth else 0):
+            hits, walkers = work.hits[0], work.walkers[0]
+            choose_steps(hits, walkers, n, True)
+            goes_on = (walkers.step[:n] == MIRROR) & (bounce < self.depth)
+            ends.append([array[:n][~goes_on & (hits.kind[:n] == SURFACE)] for array in (*hits, *walkers)])
+            walkers.step[:n][~goes_on] = END
+            start = hits.position[:n][goes_on]
+            n = work.advance(n, self.world)
+            away = np.linalg.norm(work.hits[0].position[:n] - start, axis=1)
+            distance[work.walkers[0].walk[:n]] += away
+        if ends:
+            for target, *parts in zip((*work.hits[0], *work.walkers[0]), *ends, strict=True):
+                n = sum(len(part) for part in parts)
+                np.concatenate(parts, out=target[:n])
+        return n
 
     def _links(self, work: Workspace, n: int, position: Points) -> dict[str, Any]:
         """Follow the links of the n current hits through mirrors to what they meet."""

@@ -67,6 +67,7 @@ def built(room: Any = None, **changes: Any) -> Iterator[Case]:
             seed=inputs.job.seed,
             world=World(inputs.surfaces, embree.tracer),
             lights=inputs.light_arrays,
+            depth=setup.depth,
         )
         samples, _ = draw_samples(walks, inputs.job.indirect.samples, 2)
         assert setup.cells is not None
