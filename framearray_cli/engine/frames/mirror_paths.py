@@ -9,6 +9,7 @@ from framearray_cli.base.arrays import Int32
 from ..hits.hits import Hits
 from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
 from ..terms.mirrors import count_mirrors, reflect
+from ..terms.obscurance import HITS_TOGETHER
 from .passes import Pass, half_sizes
 from .records import HitRecords
 from .scratch import Scratch
@@ -18,11 +19,25 @@ from .threads import TracePool
 
 
 def mirror_paths(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
-    """Follow hits 0 to n - 1 that are on mirrors; return pixels and records of the reflected hits of each bounce."""
+    """Follow hits 0 to n - 1 that are on mirrors; return pixels and records of the reflected hits of each bounce.
+
+    HITS_TOGETHER hits are followed at a time, through all bounces. Batches begin at multiples of these, so neither the
+    order of reflected hits nor which of their rays share a packet depends on the size of batches.
+    """
     found: list[tuple[Int32, HitRecords]] = []
     if count_mirrors(hits, n) == 0:
         return found
     started = perf_counter()
+    for first in range(0, n, HITS_TOGETHER):
+        some = Hits._make(array[first : first + HITS_TOGETHER] for array in hits)
+        found += _follow(setup, some, min(HITS_TOGETHER, n - first), scratch)
+    scratch.seconds["mirror"] += perf_counter() - started
+    return found
+
+
+def _follow(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
+    """Follow hits 0 to n - 1 from bounce to bounce."""
+    found: list[tuple[Int32, HitRecords]] = []
     throughput = np.ones((n, 3), np.float32)
     for bounce in range(setup.depth):
         m = count_mirrors(hits, n)
@@ -35,7 +50,6 @@ def mirror_paths(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch) -> lis
         records = setup.empty_records(m)
         estimate_terms(setup, hits, m, scratch, records, "mirror obscurance", "mirror shadow", throughput)
         found.append((hits.pixel[:m].copy(), records))
-    scratch.seconds["mirror"] += perf_counter() - started
     return found
 
 
