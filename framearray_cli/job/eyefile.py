@@ -33,7 +33,7 @@ def read_eyes(path: Path) -> list[dict[str, Any]]:
             raise RowFileError(f'expected a file name that ends in .csv or .json, got "{path.suffix}"')
     if not 1 <= len(rows) <= MOST_EYES:
         raise RowFileError(f"expected 1 to {MOST_EYES} camera positions, got {len(rows)}")
-    if problems := row_problems(rows, CameraKey, "up", {}):
+    if problems := row_problems(rows, CameraKey, ("up",), {}):
         raise RowFileError(*problems)
     return [{"frame": frame, **row} for frame, (_, row) in enumerate(rows)]
 

@@ -17,8 +17,8 @@ class KeyFrame(Protocol):
     def frame(self) -> int: ...
 
 
-def key_problems(keys: Sequence[KeyFrame], directions: str, optional: str) -> list[tuple[Place, str]]:
-    """Check keys against each other: their order, a value that only some of them give, turns by half a circle."""
+def key_problems(keys: Sequence[KeyFrame], directions: str, *optional: str) -> list[tuple[Place, str]]:
+    """Check keys against each other: their order, values that only some of them give, turns by half a circle."""
     problems: list[tuple[Place, str]] = []
     for i, (before, key) in enumerate(pairwise(keys), start=1):
         if key.frame <= before.frame:
@@ -28,10 +28,11 @@ def key_problems(keys: Sequence[KeyFrame], directions: str, optional: str) -> li
         if a and b and key.frame > before.frame + 1 and _opposite(a, b):  # neighbours have nothing between them
             text = "expected less than half a turn from the key before, got the opposite direction; add a key between"
             problems.append(((i, directions), text))
-    given = [i for i, key in enumerate(keys) if getattr(key, optional) is not None]
-    if given and len(given) < len(keys):
-        missing = next(i for i in range(len(keys)) if i not in given)
-        problems.append(((missing, optional), f"missing; keys[{given[0]}] gives it, so every key of this list must"))
+    for name in optional:
+        given = [i for i, key in enumerate(keys) if getattr(key, name, None) is not None]
+        if given and len(given) < len(keys):
+            missing = next(i for i in range(len(keys)) if i not in given)
+            problems.append(((missing, name), f"missing; keys[{given[0]}] gives it, so every key of this list must"))
     return problems
 
 

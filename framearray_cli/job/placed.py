@@ -1,6 +1,6 @@
 """Points and directional sources, along key frames or from a file."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 
@@ -12,6 +12,20 @@ from .sourcetable import SourceTable
 from .values import Colour, Direction, Emission, FileName, Point
 
 STRENGTHS = {"point": "intensity", "directional": "irradiance"}  # key of the strength of sources with a file
+SIZES = {"point": "radius", "directional": "angle"}  # key of their size
+WIDEST = 90.0  # degrees; a source of the sky that is wider is no sun
+
+_RADIUS = (
+    "Radius of a lamp that is a sphere, scene units: shadows get soft edges, at the same cost. `intensity` stays that "
+    "of the whole lamp. A point inside it gets none of its light, and nothing shows the lamp itself."
+)
+_ANGLE = (
+    "Angle under which the source is seen, degrees: shadows get soft edges, at the same cost; the sun's is 0.53. "
+    "`irradiance` stays that of the whole source."
+)
+_AT_EVERY_KEY = " Given at every key of a source or at none."
+Radius: TypeAlias = Annotated[float, Field(ge=0, le=FARTHEST)]
+Angle: TypeAlias = Annotated[float, Field(ge=0, le=WIDEST)]
 
 
 class PointKey(Table):
@@ -25,6 +39,9 @@ class PointKey(Table):
         description="Multiplies `intensity` by channel; a temperature stands for the colour of a black body, of "
         "luminance 1. Given at every key of a source or at none.",
         json_schema_extra=default_text("1"),
+    )
+    radius: Radius | None = Field(
+        default=None, description=_RADIUS + _AT_EVERY_KEY, json_schema_extra=default_text("0")
     )
 
 
@@ -42,11 +59,12 @@ class DirectionalKey(Table):
         "luminance 1. Given at every key of a source or at none.",
         json_schema_extra=default_text("1"),
     )
+    angle: Angle | None = Field(default=None, description=_ANGLE + _AT_EVERY_KEY, json_schema_extra=default_text("0"))
 
 
 def _consistent_light_keys(keys: Any) -> Any:
     """Check the keys of one source against each other."""
-    if problems := key_problems(keys, "direction", "color"):
+    if problems := key_problems(keys, "direction", "color", *SIZES.values()):
         fail(problems)
     return keys
 
@@ -88,7 +106,7 @@ class _PlacedSource(SourceTable):
 
 
 class PointSource(_PlacedSource):
-    """A small lamp that shines equally in all directions."""
+    """A lamp that shines equally in all directions: a point, or a sphere."""
 
     type: Literal["point"] = Field(description="Kind of source.")
     intensity: Emission | None = Field(
@@ -100,6 +118,11 @@ class PointSource(_PlacedSource):
         default=None,
         description="Only beside `file`: colour of all its positions, if it has none.",
         json_schema_extra=default_text("that of the file, or 1"),
+    )
+    radius: Radius | None = Field(
+        default=None,
+        description="Only beside `file`: radius of the lamp at all its positions, scene units, if it has none.",
+        json_schema_extra=default_text("that of the file, or 0"),
     )
     scale: float | None = Field(
         default=None,
@@ -123,7 +146,7 @@ class PointSource(_PlacedSource):
 
     @model_validator(mode="after")
     def _only_beside_file(self) -> "PointSource":
-        _refuse_without_file(self, ("intensity", "color"))
+        _refuse_without_file(self, ("intensity", "color", "radius"))
         return self
 
 
@@ -142,6 +165,11 @@ class DirectionalSource(_PlacedSource):
         description="Only beside `file`: colour of all its positions, if it has none.",
         json_schema_extra=default_text("that of the file, or 1"),
     )
+    angle: Angle | None = Field(
+        default=None,
+        description="Only beside `file`: angle under which the source is seen, degrees, if the file has none.",
+        json_schema_extra=default_text("that of the file, or 0"),
+    )
     keys: Annotated[
         tuple[DirectionalKey, ...], AfterValidator(_consistent_light_keys), AfterValidator(_one_of_both)
     ] = Field(
@@ -154,7 +182,7 @@ class DirectionalSource(_PlacedSource):
 
     @model_validator(mode="after")
     def _only_beside_file(self) -> "DirectionalSource":
-        _refuse_without_file(self, ("irradiance", "color"))
+        _refuse_without_file(self, ("irradiance", "color", "angle"))
         return self
 
 

@@ -1,9 +1,9 @@
 """`file` of a light source: one light position per row -> key frames.
 
 CSV: the first row names the columns x, y, z, or those of a key: position_x ..., direction_x ...; optionally intensity
-or irradiance, or these with _r, _g, _b, and color_r, color_g, color_b. JSON: a list of `[x, y, z]`, or of the tables
-of keys. `.npy`: an array (n, 3). `.lp`, of reflectance imaging: the number of rows, then one row per image: its name,
-x, y, z. `.dome`, of RelightLab: JSON with `directions` or positions.
+or irradiance, or these with _r, _g, _b, color_r, color_g, color_b, and radius or angle. JSON: a list of `[x, y, z]`, or
+of the tables of keys. `.npy`: an array (n, 3). `.lp`, of reflectance imaging: the number of rows, then one row per
+image: its name, x, y, z. `.dome`, of RelightLab: JSON with `directions` or positions.
 
 x, y, z say where the light is: the position of a point, and of a directional source the way from the object to it.
 """
@@ -17,7 +17,7 @@ from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import counted
 
 from .keys import MOST_EYES
-from .placed import DirectionalKey, PointKey
+from .placed import SIZES, DirectionalKey, PointKey
 from .rowfile import (
     PlacedRow,
     RowFileError,
@@ -49,14 +49,14 @@ def read_positions(path: Path, kind: str, common: Mapping[str, Any]) -> list[dic
 
     Args:
         kind: "point" or "directional".
-        common: strength and colour of all positions, where the file gives none.
+        common: strength, colour and size of all positions, where the file gives none.
 
     Raises:
         RowFileError: the file is missing, has another format, or has rows that are no light positions.
     """
     vector, strength, key = _KEYS[kind]
     readers: dict[str, Callable[[Path], list[PlacedRow]]] = {
-        ".csv": lambda file: _csv_rows(read_text(file), vector, strength),
+        ".csv": lambda file: _csv_rows(read_text(file), vector, strength, SIZES[kind]),
         ".json": lambda file: _json_rows(read_text(file), vector),
         ".lp": lambda file: _lp_rows(read_text(file)),
         ".dome": lambda file: _dome_rows(read_text(file), kind),
@@ -71,7 +71,7 @@ def read_positions(path: Path, kind: str, common: Mapping[str, Any]) -> list[dic
         raise RowFileError(f"expected 1 to {MOST_EYES} light positions, got {len(rows)}")
     if strength not in common and not any(strength in row for _, row in rows):
         raise RowFileError(f"the file has no {strength}; give it beside `file`, as in {strength} = 10")
-    if problems := row_problems(rows, key, "color", common):
+    if problems := row_problems(rows, key, ("color", SIZES[kind]), common):
         raise RowFileError(*problems)
     return [{"frame": frame, **common, **row} for frame, (_, row) in enumerate(rows)]
 
@@ -86,12 +86,12 @@ def _as_key(row: dict[str, Any], vector: str, kind: str) -> dict[str, Any]:
     return {vector: at, **{key: value for key, value in row.items() if key != AT}}
 
 
-def _csv_rows(text: str, vector: str, strength: str) -> list[PlacedRow]:
+def _csv_rows(text: str, vector: str, strength: str, size: str) -> list[PlacedRow]:
     header, lines = csv_lines(text)
     names = {AT: list(AXES), vector: [f"{vector}_{axis}" for axis in AXES]}
     names |= {key: [f"{key}_{channel}" for channel in "rgb"] for key in (strength, "color")}
     found = {key: columns for key, columns in names.items() if any(name in header for name in columns)}
-    single = [key for key in (strength, "color") if key in header and key not in found]
+    single = [key for key in (strength, "color", size) if key in header and key not in found]
     wanted = [name for columns in found.values() for name in columns] + single
     if sorted(header) != sorted(wanted) or (AT in found) == (vector in found):
         known = f"x, y, z or {', '.join(names[vector])}, and {strength} or {', '.join(names[strength])} where wanted"

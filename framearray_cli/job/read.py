@@ -15,7 +15,7 @@ from framearray_cli.base.forms.words import shown
 from .eyefile import read_eyes
 from .job import Job
 from .override import name_settings, put_settings, read_settings
-from .placed import STRENGTHS
+from .placed import SIZES, STRENGTHS
 from .positionfile import read_positions
 from .rowfile import RowFileError
 from .values import absolute
@@ -123,7 +123,7 @@ def _with_rows(source: Any, place: str, job_file: Path, problems: list[str]) -> 
     name = source.get("file")
     if not isinstance(name, str) or not name.strip() or "\0" in name:
         return source
-    own = ("file", STRENGTHS[source["type"]], "color")
+    own = ("file", STRENGTHS[source["type"]], "color", SIZES[source["type"]])
     common = {key: source[key] for key in own[1:] if key in source}
     try:
         keys = read_positions(absolute(Path(name), job_file), source["type"], common)

@@ -85,8 +85,10 @@ def refuse_frames(rows: Sequence[Mapping[str, Any]]) -> None:
             )
 
 
-def row_problems(rows: Sequence[PlacedRow], key: type[Table], optional: str, common: Mapping[str, Any]) -> list[str]:
-    """Check each row as a key frame, and that all or none of them give the optional value.
+def row_problems(
+    rows: Sequence[PlacedRow], key: type[Table], optional: Sequence[str], common: Mapping[str, Any]
+) -> list[str]:
+    """Check each row as a key frame, and that all or none of them give each optional value.
 
     Args:
         common: values of all rows that they do not give themselves.
@@ -94,9 +96,10 @@ def row_problems(rows: Sequence[PlacedRow], key: type[Table], optional: str, com
     problems: list[str] = []
     n = 0
     for frame, (place, row) in enumerate(rows):
-        if (optional in row) != (optional in rows[0][1]):
-            problems.append(f"{place}: {optional}: expected in every row or in none")
-            n += 1
+        for name in optional:
+            if (name in row) != (name in rows[0][1]):
+                problems.append(f"{place}: {name}: expected in every row or in none")
+                n += 1
         try:
             key.model_validate({"frame": frame, **common, **row})
         except ValidationError as error:

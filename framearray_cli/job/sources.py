@@ -8,7 +8,7 @@ from framearray_cli.base.forms.table import Place, default_text, fail
 from framearray_cli.base.units import FARTHEST
 
 from .keys import MOST_EYES
-from .placed import DirectionalKey, DirectionalSource, PointSource
+from .placed import Angle, DirectionalKey, DirectionalSource, PointSource
 from .sourcetable import SourceTable
 from .times import Clock, Dates, Zone, clock_minutes
 from .values import Colour, Direction, Emission, GridSize, Point
@@ -127,6 +127,12 @@ class SunSource(SourceTable):
     irradiance: Emission = Field(
         description="Irradiance of a surface that faces the sun, W/m2; one number means white. Clear air lets about "
         "1000 W/m2 through; choose what suits the exposure."
+    )
+    angle: Angle | None = Field(
+        default=None,
+        description="Angle under which the sun is seen, degrees: 0.53 is right, and gives shadows soft edges at the "
+        "same cost.",
+        json_schema_extra=default_text("0"),
     )
 
     @field_validator("stop")

@@ -123,6 +123,5 @@ def _spread_indices(n: int) -> list[int]:
 
 def _append_dark(source: LightPath, some: list[int]) -> LightPath:
     """Some positions of a source, followed by one at which it does not shine."""
-    vector = np.concatenate([source.vector[some], source.vector[:1]])
     intensity = np.concatenate([source.intensity[some], np.zeros((1, 3))])
-    return replace(source, vector=vector, intensity=intensity, notes=())
+    return replace(source.at([*some, 0]), intensity=intensity, notes=())

@@ -15,6 +15,7 @@ from framearray_cli.job.job import Job
 MOST_PROBLEMS = 3  # of a job that one error reports; a light that is nowhere has one per key
 Vector = tuple[float, float, float]
 POWERS = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
+SUN_ANGLE = 0.53  # degrees; of the sun, seen from the Earth
 DIGITS = 6  # significant digits of positions and directions; an error of a thousandth of a pixel
 
 
@@ -198,6 +199,7 @@ def source_table(source: LightSource) -> dict[str, Any]:
         "start": source.start,
         "stop": source.stop,
         "irradiance": list(source.power),
+        "angle": SUN_ANGLE,
     }
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from framearray_cli.base.forms.text import inline, inline_floats, quoted
 
-from .model import Camera, LightSource, MaterialNote, Start, SunDay, source_keys
+from .model import SUN_ANGLE, Camera, LightSource, MaterialNote, Start, SunDay, source_keys
 
 MOST_STEPS_UP = 2  # largest number of leading ".." of a relative scene name; beyond, it is absolute
 COLUMN = 42  # of comments behind keys
@@ -138,6 +138,7 @@ def _sun(source: SunDay) -> list[str]:
         _line("start", quoted(source.start), "local time of the first position"),
         _line("stop", quoted(source.stop), "local time of the last"),
         _line("irradiance", inline_floats(source.power), "of a surface that faces the sun: red, green, blue, W/m2"),
+        _line("angle", repr(SUN_ANGLE), "under which the sun is seen, degrees: shadows get soft edges"),
     ]
 
 

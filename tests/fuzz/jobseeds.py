@@ -18,6 +18,7 @@ SUN = {
     "stop": "15:30",
     "north": [-1.0, 0.0, 0.0],
     "irradiance": [24.0, 22.5, 19.5],
+    "angle": 0.53,
 }
 YEAR = SUN | {"date": ["2026-03-20", "2026-06-21"], "step": 180.0}
 DOME = {"type": "dome", "positions": 3, "shape": "sphere", "top": [0.1, 1, 0], "irradiance": 2.0, "color": "3200 K"}
@@ -36,8 +37,9 @@ IN_PICTURE = {
     "space": "camera",
     "scale": 0.5,
     "center": [0.0, 1.0, 0.0],
-    "keys": [{"frame": 0, "position": [0, 1, 1], "intensity": 3.0, "color": "2700 K"}],
+    "keys": [{"frame": 0, "position": [0, 1, 1], "intensity": 3.0, "color": "2700 K", "radius": 0.05}],
 }
+SOFT_SUN = tiny.SUN | {"keys": [key | {"angle": 2.0 * k} for k, key in enumerate(tiny.SUN["keys"])]}
 GROUPED = {
     "frames": 2,
     "axes": {"lamps": 2},
@@ -68,7 +70,7 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
         "walk": tiny.table(camera=small | tiny.WALK, reuse={"n_r": 2, "weights": "average"}, output=EXR),
         "spline": tiny.table(
             camera=small | FOUR_KEYS,
-            light={"sources": [tiny.SUN, tiny.RED], "frames": 3},
+            light={"sources": [SOFT_SUN, tiny.RED], "frames": 3},
             samples={"hits": 0.5, "obscurance": 3, "shadow_step": 2, "shadow_unbiased": True},
             reuse={"n_r": 3, "weights": "balance"},
             specular={"depth": 2, "hits": 4},

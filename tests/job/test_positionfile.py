@@ -101,6 +101,16 @@ def test_strength_and_colour_of_each_row(tmp_path: Path) -> None:
     assert key.intensity == (5.0, 6.0, 7.0)
 
 
+def test_sizes_of_each_row_or_of_all(tmp_path: Path) -> None:
+    first, second = read(tmp_path, "a.csv", "x,y,z,radius\n0,0,2,0.1\n0,1,2,0.2\n").light.sources[0].keys
+    assert (first.radius, second.radius) == (0.1, 0.2)
+    assert {key.radius for key in read(tmp_path, "a.lp", LP, radius=0.25).light.sources[0].keys} == {0.25}
+    key = read(tmp_path, "b.lp", LP, "directional", angle=0.53).light.sources[0].keys[0]
+    assert key.angle == 0.53
+    (problem,) = problems(tmp_path, "c.csv", "x,y,z,radius\n0,0,2,-1\n")
+    assert problem.endswith("radius: expected a number of at least 0, got -1.0")
+
+
 def test_a_temperature_for_all_positions(tmp_path: Path) -> None:
     key = read(tmp_path, "a.lp", LP, color="3200 K").light.sources[0].keys[0]
     assert key.color[0] > 1 > key.color[2] > 0
@@ -214,6 +224,9 @@ WRONG = [
     ({"keys": [KEY | {"color": "100 K"}]}, ['keys[0].color: expected a temperature from 1000 to 40000 K, got "100 K"']),
     ({"keys": [KEY | {"color": "warm"}]},
      ['keys[0].color: expected a number, 3 numbers or a temperature such as "3200 K", got "warm"']),
+    ({"keys": [KEY], "radius": 1}, ["radius: expected it only beside `file`, as `keys` have their own"]),
+    ({"keys": [KEY | {"radius": 1}, KEY | {"frame": 1}]},
+     ["keys[1].radius: missing; keys[0] gives it, so every key of this list must"]),
     ({"keys": [KEY], "scale": 0}, ["scale: expected a number above 0, got 0"]),
     ({"keys": [KEY], "space": "world"}, ['space: expected "scene" or "camera", got "world"']),
     ({}, ["keys: expected a list of tables, at least 1, got 0; give `keys` or `file`"]),

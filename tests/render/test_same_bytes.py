@@ -1,4 +1,4 @@
-"""Weights by area, and light from cells: parts, blocks and runs that stop write the bytes of the whole."""
+"""Weights by area, light from cells, soft lights: parts, blocks and runs that stop write the bytes of the whole."""
 
 from pathlib import Path
 from typing import Any
@@ -28,42 +28,49 @@ class Stopping(RenderEvents):
             raise OutputError("stopped by the test")
 
 
-def job(scene: Path, out: Path, threads: int, indirect: dict[str, Any]) -> Job:
+SOFT = {
+    "sources": [
+        {"type": "point", "keys": [{**key, "radius": 0.2} for key in tiny.TABLE["light"]["sources"][0]["keys"]]},
+        {"type": "directional", "keys": [{**key, "angle": 5.0} for key in tiny.SUN["keys"]]},
+    ]
+}
+
+
+def job(scene: Path, out: Path, threads: int, more: dict[str, Any]) -> Job:
     tables: dict[str, Any] = {
         "scene": {"file": str(scene), "background": [0.3, 0.4, 0.5]},
         "camera": WALK,
         "output": {"directory": str(out)},
         "reuse": {"n_r": 1, "weights": "area"},
         "render": {"threads": threads},
-        "indirect": indirect,
     }
-    return tiny.job(**tables)
+    return tiny.job(**tables, **more)
 
 
 def images(folder: Path) -> Bytes:
     return {file.name: file.read_bytes() for file in folder.glob("*.exr")}
 
 
-@pytest.mark.parametrize("indirect", [{}, tiny.CELLS], ids=["area", "cells"])
+@pytest.mark.parametrize("more", [{}, {"indirect": tiny.CELLS}, {"light": SOFT}], ids=["area", "cells", "soft"])
 def test_any_way_to_render_writes_the_same_bytes(
-    indirect: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    more: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = tiny.save_glb(tiny.room_meshes(), tmp_path / "room.glb")
-    render(job(scene, tmp_path / "whole", 1, indirect))
+    render(job(scene, tmp_path / "whole", 1, more))
     whole = images(tmp_path / "whole")
     assert len(set(whole.values())) == 6 * (3 + 1), "images and layers, all different"
 
     for part in ((2, 5), (0, 3), (1, 4)):
-        render(job(scene, tmp_path / "parts", 5, indirect), cameras=part)
+        render(job(scene, tmp_path / "parts", 5, more), cameras=part)
     assert images(tmp_path / "parts") == whole
 
     for most in (2, 7):
         with pytest.raises(OutputError, match="stopped"):
-            render(job(scene, tmp_path / "stopped", 2, indirect), Stopping(most))
+            render(job(scene, tmp_path / "stopped", 2, more), Stopping(most))
     assert 0 < len(images(tmp_path / "stopped")) < len(whole)
-    render(job(scene, tmp_path / "stopped", 2, indirect))
+    render(job(scene, tmp_path / "stopped", 2, more))
     assert images(tmp_path / "stopped") == whole
 
     monkeypatch.setattr(rendering, "light_blocks", lambda *_, **__: [range(0, 2), range(2, 3)])
-    render(job(scene, tmp_path / "blocks", 2, indirect))
+    render(job(scene, tmp_path / "blocks", 2, more))
     assert images(tmp_path / "blocks") == whole

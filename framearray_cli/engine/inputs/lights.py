@@ -25,6 +25,8 @@ class LightArrays(NamedTuple):
         vector: (n_sources, 3, n_lights) position, centred, or the unit direction that light travels.
         strength: (n_sources, channels, n_lights) W/sr or W/m2 in units of `colour`; 1 or 3 channels.
         lit: (n_sources, n_lights) 1 where a source shines, else 0.
+        size: (n_sources, n_lights) the squared radius of a point source, or sin^2 of half the angle of a directional
+            one; (0,) where no source has a size: kernels are then compiled without it.
         colour: (n_lights, 3) factor of a stored irradiance; ones if there are 3 channels.
     """
 
@@ -32,6 +34,7 @@ class LightArrays(NamedTuple):
     vector: Float32
     strength: Float32
     lit: Float32
+    size: Float32
     colour: Float32
 
     @property
@@ -75,9 +78,21 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
         vector=np.asarray(vector.transpose(0, 2, 1), np.float32),
         strength=np.asarray(strength.transpose(0, 2, 1), np.float32),
         lit=np.asarray((intensity > 0).any(axis=-1), np.float32),
+        size=_sizes(lights),
         colour=np.asarray(colour, np.float32),
     )
     return pad_lights(found)
+
+
+def _sizes(lights: Lights) -> Float32:
+    """`LightArrays.size`."""
+    if all(source.size is None for source in lights.sources):
+        return np.empty(0, np.float32)
+    found = np.zeros((len(lights.sources), lights.n), np.float32)
+    for row, source in zip(found, lights.sources, strict=True):
+        if source.size is not None:
+            row[:] = source.size**2 if source.kind == "point" else np.sin(np.radians(source.size) / 2) ** 2
+    return found
 
 
 def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
@@ -87,6 +102,7 @@ def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
         vector=lights.vector[:, :, some],
         strength=lights.strength[:, :, some],
         lit=lights.lit[:, some],
+        size=lights.size[:, some] if lights.size.ndim > 1 else lights.size,
         colour=lights.colour[some],
     )
     return pad_lights(found)

@@ -19,6 +19,7 @@ from ..kernels.simd import integers, reals, select, sqrt, words
 PIXEL, HEMISPHERE, CHOICE, STEPS, OTHER_HALF, CELLS = 0, 1, 2, 3, 4, 5
 CONTINUED = 16  # and what follows: streams of the points that rays 0, 1, ... of a hit meet
 MIRRORED = 1 << 17  # likewise: what rays 0, 1, ... of a hit choose at mirrors
+SOURCES = 1 << 20  # and what follows: streams of the points of sources 0, 1, ...
 PIXEL_SAMPLE = (1 << 16) - 1  # sample index, used by no hit, of numbers that all samples of a pixel share
 HOLE_SAMPLE = (1 << 16) - 2  # sample index of the hit of a pixel that no other hit reaches
 
@@ -97,6 +98,17 @@ def disc(u: Real, v: Real) -> tuple[Real, Real]:
         one + square * (np.float32(-1 / 6) + square * (np.float32(1 / 120) + square * np.float32(-1 / 5040)))
     )
     return radius * select(steep, sine, cosine), radius * select(steep, cosine, sine)
+
+
+@inlined
+def sphere_point(u: Real, v: Real) -> Triple:
+    """Uniform point of the unit sphere: the disc's point, area for area."""
+    one, two = np.float32(1.0), np.float32(2.0)
+    x, y = disc(u, v)
+    square = x * x + y * y
+    height = one - square
+    scale = two * sqrt(select(height > np.float32(0.0), height, np.float32(0.0)))
+    return scale * x, scale * y, one - two * square
 
 
 @inlined

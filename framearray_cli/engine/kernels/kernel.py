@@ -196,6 +196,16 @@ def _number_at(dtype: Any, element: Any) -> Callable[..., Any]:
     return of
 
 
+def _has_rows_of(typingctx: Any, array: Any) -> Any:
+    """Whether an array has more than one dimension: a constant, so that LLVM removes the branch not taken."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return context.get_constant(types.boolean, array.ndim > 1)
+
+    return types.boolean(array), codegen
+
+
+has_rows: Any = intrinsic(_has_rows_of)
 # For kernels that take the addresses of many arrays: passing the arrays themselves would cost more than a short loop.
 prefetch: Any = intrinsic(_prefetch_of)
 real_at: Any = intrinsic(_number_at(types.float32, ir.FloatType()))

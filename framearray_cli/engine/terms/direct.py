@@ -14,13 +14,14 @@ from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude, room_in
 from ..hits.hits import Hits, lift, ray_origin, reflects, reflects_in_lanes, triple
 from ..hits.rays import NO_RAYS, Rays
 from ..inputs.lights import DIRECTIONAL, LightArrays
-from ..inputs.shapes import vector_and_factor
-from ..kernels.kernel import index, inlined, kernel, step
+from ..inputs.shapes import source_point, vector_and_factor
+from ..kernels.kernel import has_rows, index, inlined, kernel, step
 from ..kernels.simd import (
     LANES,
     append,
     bits,
     ctz,
+    gather,
     lane_numbers,
     load,
     load_row,
@@ -43,17 +44,29 @@ FEW_LIGHTS = 8
 def _geometry_of_lights(hits: Hits, i: int, lights: LightArrays, s: int, l: int) -> tuple[Real, Real, Real, Real]:
     """Vector from hit i to source s at light positions l to l + 15, and the geometry factors of their irradiance.
 
-    The factor is cos(theta) / d^2 for a point source, whose vector ends at the source, and cos(theta) for a
-    directional one, whose vector has length 1. It is 0 where the source does not shine, lies behind either normal, or
-    coincides with the hit.
+    See `vector_and_factor`.
     """
     n_lights = lights.lit.shape[1]
     at = 3 * s * n_lights + l
     x, y = load(lights.vector, at), load(lights.vector, at + n_lights)
     z, lit = load(lights.vector, at + 2 * n_lights), load(lights.lit, s * n_lights + l)
     p, g, m = triple(hits.position, i), triple(hits.geometric, i), triple(hits.shading, i)
-    x, y, z, factor = vector_and_factor(lights, s, x, y, z, p, g, m, lit)
+    same = lane_numbers() * np.int32(0) + np.int32(i)  # q in lanes, which round as those of sixteen hits do
+    size, q = load(lights.size, s * n_lights + l), source_point(gather(hits.key, same), s)
+    x, y, z, factor = vector_and_factor(lights, s, x, y, z, size, p, g, m, q, lit)
     return x, y, z, select(lane_numbers() < np.int32(n_lights - l), factor, np.float32(0.0))
+
+
+@inlined
+def vector_to_source(hits: Hits, i: int, lights: LightArrays, s: int, l: int) -> Triple:
+    """Vector from hit i to source s at light position l, see `vector_and_factor`."""
+    at, p = lights.vector, triple(hits.position, i)
+    x, y, z = at[s, 0, l], at[s, 1, l], at[s, 2, l]
+    if has_rows(lights.size):
+        g, m, size = triple(hits.geometric, i), triple(hits.shading, i), gather(lights.size, s * at.shape[2] + l)
+        x, y, z, _ = vector_and_factor(lights, s, x, y, z, size, p, g, m, source_point(hits.key[i], s), np.float32(1.0))
+        return x, y, z
+    return (-x, -y, -z) if lights.kind[s] == DIRECTIONAL else (x - p[0], y - p[1], z - p[2])
 
 
 @inlined
@@ -157,15 +170,18 @@ def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, ray
         p, g, m = triples_at(hits.position, i), triples_at(hits.geometric, i), triples_at(hits.shading, i)
         e = load(hits.offset, i)
         up = (e * g[0], e * g[1], e * g[2])
+        key = load(hits.key, i)
         for s in range(lights.kind.shape[0]):
+            q = source_point(key, s)
             for l in range(n_lights):
                 # make room for sixteen rays
                 if waiting > capacity - LANES:
                     _trace_queue(tracer, rays, waiting, irradiance)
                     total, waiting = total + waiting, 0
                 # cos(theta) / d^2 of source s at light position l
-                a, shines = lights.vector, lights.lit[s, l]
-                x, y, z, factor = vector_and_factor(lights, s, a[s, 0, l], a[s, 1, l], a[s, 2, l], p, g, m, shines)
+                a, shines, size = lights.vector, lights.lit[s, l], gather(lights.size, s * n_lights + l)
+                ax, ay, az = a[s, 0, l], a[s, 1, l], a[s, 2, l]
+                x, y, z, factor = vector_and_factor(lights, s, ax, ay, az, size, p, g, m, q, shines)
                 # queue the rays of hits that the source may reach
                 traced = wanted & (factor > np.float32(0.0))
                 if bits(traced) == 0:

@@ -21,7 +21,7 @@ from ..hits.rays import NO_RAYS, Rays
 from ..inputs.lights import DIRECTIONAL, LightArrays
 from ..inputs.random import STEPS, mix, random_word
 from ..kernels.kernel import inlined, kernel, step
-from .direct import FAR_END, TO, write_geometry
+from .direct import FAR_END, TO, vector_to_source, write_geometry
 
 # Hits per block: enough to fill packets in the later rounds, which have fewer rays.
 BLOCK_HITS = 128
@@ -90,13 +90,12 @@ def _write_ray(hits: Hits, first: int, lights: LightArrays, s: int, test: int, r
     b = test // n_lights
     l = test - b * n_lights
     ox, oy, oz = ray_origin(hits, first + b)
-    x, y, z = lights.vector[s, 0, l], lights.vector[s, 1, l], lights.vector[s, 2, l]
+    x, y, z = vector_to_source(hits, first + b, lights, s, l)
+    ux, uy, uz = lift(hits, first + b)
     if lights.kind[s] == DIRECTIONAL:
-        set_ray(rays.packets, waiting, ox, oy, oz, -x, -y, -z, np.float32(np.inf))
+        set_ray(rays.packets, waiting, ox, oy, oz, x, y, z, np.float32(np.inf))
     else:
-        p, (ux, uy, uz) = hits.position, lift(hits, first + b)
-        x, y, z = x - p[first + b, 0] - ux, y - p[first + b, 1] - uy, z - p[first + b, 2] - uz
-        set_ray(rays.packets, waiting, ox, oy, oz, x, y, z, FAR_END)
+        set_ray(rays.packets, waiting, ox, oy, oz, x - ux, y - uy, z - uz, FAR_END)
     rays.place[waiting] = test
 
 

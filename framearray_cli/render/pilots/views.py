@@ -115,6 +115,7 @@ def _one_source(lights: LightArrays, s: int) -> LightArrays:
         vector=_with_room(lights.vector[one]),
         strength=_with_room(lights.strength[one]),
         lit=_with_room(lights.lit[one]),
+        size=_with_room(lights.size[one]),
     )
 
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from .paths import LightGroup, Lights
-from .placing import LightPath
 
 
 def few_planes(lights: Lights, most: int, *, consecutive: bool = False) -> list[int]:
@@ -31,17 +30,13 @@ def lights_at(lights: Lights, planes: Sequence[int]) -> Lights:
     """Return the same sources at some planes only, in rising order; every group keeps one at least."""
     chosen = list(planes)
 
-    def cut(path: LightPath) -> LightPath:
-        notes = tuple(path.notes[p] for p in chosen) if path.notes else ()
-        return replace(path, vector=path.vector[chosen], intensity=path.intensity[chosen], notes=notes)
-
     def moved(group: LightGroup) -> LightGroup:
         own = [k for k, p in enumerate(chosen) if p in group.positions]
         return replace(group, positions=range(own[0], own[-1] + 1))
 
     return replace(
         lights,
-        sources=tuple(map(cut, lights.sources)),
+        sources=tuple(path.at(chosen) for path in lights.sources),
         groups=tuple(map(moved, lights.groups)),
         planes=tuple(lights.planes[p] for p in chosen),
     )

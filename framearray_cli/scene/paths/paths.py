@@ -143,11 +143,10 @@ def lights(job: Job) -> Lights:
 
 def _confine(path: LightPath, positions: range, n: int) -> LightPath:
     """Extend a source to n image planes; it shines only at its positions."""
-    own = np.clip(np.arange(n) - positions.start, 0, len(positions) - 1)
     intensity = np.zeros((n, 3))
     intensity[positions.start : positions.stop] = path.intensity
-    notes = tuple(path.notes[k] for k in own) if path.notes else ()
-    return LightPath(kind=path.kind, vector=path.vector[own], intensity=intensity, notes=notes)
+    own = np.clip(np.arange(n) - positions.start, 0, len(positions) - 1).tolist()
+    return replace(path.at(own), intensity=intensity)
 
 
 def _ups(keys: Sequence[CameraKey], job: Job) -> Float64:

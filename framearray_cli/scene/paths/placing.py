@@ -18,8 +18,8 @@ from .directions import PARALLEL, interpolate_directions, unit
 from .domes import dome_directions, grid_points
 from .sun import NEVER, daylight, directions_to_sun, sun_path
 
-# What the manifest calls the vector and the strength of a source, by its kind.
-_MANIFEST_KEYS = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
+# What the manifest calls the vector, the strength and the size of a source, by its kind.
+_MANIFEST_KEYS = {"point": ("position", "intensity", "radius"), "directional": ("direction", "irradiance", "angle")}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,19 +30,34 @@ class LightPath:
         kind: "point" or "directional".
         vector: (n, 3) position in scene units, or unit direction in which the light travels.
         intensity: (n, 3) linear RGB, times the source's colour: W/sr of a point, W/m2 of a directional source.
+        size: (n,) radius of a point source, scene units, or the angle under which a directional one is seen, degrees;
+            None of sources without size.
         notes: n tables with what else the manifest records of each position; or none.
     """
 
     kind: Literal["point", "directional"]
     vector: Float64
     intensity: Float64
+    size: Float64 | None = None
     notes: tuple[dict[str, Any], ...] = ()
 
     def table(self, l: int) -> dict[str, Any]:
         """Describe the source at position l as the manifest does."""
-        vector, strength = _MANIFEST_KEYS[self.kind]
+        vector, strength, size = _MANIFEST_KEYS[self.kind]
         values = {"type": self.kind, vector: self.vector[l].tolist(), strength: self.intensity[l].tolist()}
+        values |= {} if self.size is None else {size: float(self.size[l])}
         return values | (self.notes[l] if self.notes else {})
+
+    def at(self, positions: Sequence[int]) -> "LightPath":
+        """Return the source at some of its positions, in their order."""
+        rows = list(positions)
+        return replace(
+            self,
+            vector=self.vector[rows],
+            intensity=self.intensity[rows],
+            size=None if self.size is None else self.size[rows],
+            notes=tuple(self.notes[k] for k in rows) if self.notes else (),
+        )
 
 
 def in_camera_space(table: LightTable) -> bool:
@@ -130,6 +145,7 @@ def _place_sun(source: SunSource, job: Job, name: str, n: int) -> LightPath:
         kind="directional",
         vector=-directions_to_sun(sun, up_dir, unit(north_vec)),
         intensity=sun.is_up[:, None] * np.array(source.irradiance),
+        size=np.full(n, source.angle) if source.angle else None,
         notes=tuple(
             {"azimuth": round(azimuth, 4), "elevation": round(elevation, 4), "time": time.isoformat(timespec="seconds")}
             for azimuth, elevation, time in zip(
@@ -149,4 +165,6 @@ def _interpolate(
     vector = (interpolate_keys if kind == "point" else interpolate_directions)(frames, places, n_lights)
     colors = [key.color if key.color is not None else (1.0, 1.0, 1.0) for key in keys]
     intensity = interpolate_keys(frames, powers, n_lights) * interpolate_keys(frames, colors, n_lights)
-    return LightPath(kind=kind, vector=vector, intensity=intensity)
+    sizes = [key.radius if isinstance(key, PointKey) else key.angle for key in keys]
+    size = interpolate_keys(frames, [[size or 0.0] for size in sizes], n_lights)[:, 0] if any(sizes) else None
+    return LightPath(kind=kind, vector=vector, intensity=intensity, size=size)

@@ -51,6 +51,7 @@ def _row(selection: Selection, frame: ExportedFrame) -> dict[str, Any]:
         for key in ("position", "direction", "intensity", "irradiance"):
             if key in source:
                 row |= _vector(f"{name}_{key}", source[key], "xyz" if key in ("position", "direction") else "rgb")
+        row |= {f"{name}_{key}": float(source[key]) for key in ("radius", "angle") if key in source}
     return row
 
 

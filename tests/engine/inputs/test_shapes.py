@@ -25,9 +25,9 @@ def lights() -> Any:
 
 def factor(s: int, normal: Any = UP, shading: Any = None, lit: float = 1.0) -> float:
     """The factor of source s at the origin."""
-    triples = [tuple(np.float32(x) for x in v) for v in ((0, 0, 0), normal, normal if shading is None else shading)]
+    triples = [tuple(np.float32(x) for x in v) for v in ((0, 0, 0), normal, normal if shading is None else shading, UP)]
     vector = (np.float32(x) for x in (LAMP, SUN)[s])
-    return float(vector_and_factor(lights(), s, *vector, *triples, np.float32(lit))[3])
+    return float(vector_and_factor(lights(), s, *vector, np.float32(0), *triples, np.float32(lit))[3])
 
 
 @pytest.mark.parametrize("normal", [UP, TILTED])

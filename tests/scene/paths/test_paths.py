@@ -220,6 +220,20 @@ def test_an_eye_that_meets_its_target_is_an_error():
         eyes(job_of(keys))
 
 
+def test_sizes_change_between_keys():
+    keys = [{"frame": 4 * k, "position": [0, k, 0], "intensity": 1, "radius": 0.1 * k} for k in range(2)]
+    sun = {"type": "directional", "keys": [{"frame": 0, "direction": [0, -1, 0], "irradiance": 2, "angle": 0.53}]}
+    lamp, sun = lights(
+        job_of(
+            [{"frame": 0, "eye": [0, 0, 0], "target": [1, 0, 0]}],
+            light={"sources": [{"type": "point", "keys": keys}, sun]},
+        )
+    ).sources
+    np.testing.assert_allclose(lamp.size, np.arange(5) * 0.025, atol=1e-15)
+    assert (lamp.table(4)["radius"], sun.table(2)["angle"]) == (0.1, 0.53)
+    np.testing.assert_allclose(lamp.at([3, 1]).size, [0.075, 0.025])
+
+
 def test_lights_multiply_intensity_and_colour():
     keys = [
         {"frame": 0, "position": [0, 0, 0], "intensity": 10, "color": [1, 0.5, 0]},
@@ -238,6 +252,7 @@ def test_lights_multiply_intensity_and_colour():
     np.testing.assert_array_equal(lamp.intensity[[0, 10]], [[10, 5, 0], [20, 5, 4]])
     np.testing.assert_allclose(lamp.intensity[5], [15, 5, 3.5], atol=1e-14)
     assert (sun.kind, lamp.kind) == ("directional", "point")
+    assert sun.size is lamp.size is None and "angle" not in sun.table(0)
     np.testing.assert_array_equal(sun.vector, np.broadcast_to([0, -1, 0], (11, 3)))
     np.testing.assert_array_equal(sun.intensity, np.full((11, 3), 2.0))
 

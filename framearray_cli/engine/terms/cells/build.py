@@ -229,7 +229,7 @@ def _direct_light(
         n, rays = min(BATCH, samples.n - first), free.pop()
         span = slice(first, first + n)
         here = {name: getattr(samples, name)[span] for name in ("position", "geometric", "shading", "offset")}
-        hits: Hits = model._replace(**here)
+        hits: Hits = model._replace(key=np.arange(first, first + BATCH, dtype=np.uint64), **here)
         traced: int = direct(hits, n, lights, world.tracer, rays, out[span], True)
         free.append(rays)
         return traced
