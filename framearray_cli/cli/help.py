@@ -133,7 +133,9 @@ def usage_problem(error: Any) -> str:
     if param is not None and error.ctx and "ENVIRONMENT" in str(error.ctx.get_parameter_source(param.name)):
         hint = f"environment variable {param.envvar}"
     if kind == "MissingParameter":
-        return f"missing {'argument' if param is not None and _is_argument(param) else 'option'} {hint}"
+        names = str(getattr(param, "metavar", None) or "").split("|")
+        one_of = f"; expected {', '.join(names[:-1])} or {names[-1]}" if len(names) > 1 else ""
+        return f"missing {'argument' if param is not None and _is_argument(param) else 'option'} {hint}{one_of}"
     if kind == "NoSuchOption":
         known = [name for one in error.ctx.command.get_params(error.ctx) for name in one.opts] if error.ctx else []
         near = get_close_matches(error.option_name, known, n=1)

@@ -119,7 +119,7 @@ class Screen:
             if self._clock is None:  # the stage has ended; a few kernels came late
                 return
             total = max(self._expected_kernels, kernels)
-            of = f" of {total}" if self._expected_kernels else ""
+            of = f" of about {total}" if self._expected_kernels else ""
             if self._bar is not None:
                 self._bar.update(self._task, completed=kernels, total=total)
             elif self._is_time():

@@ -82,6 +82,8 @@ def _put(table: dict[str, Any], setting: Setting) -> str | None:
             if not -len(node) <= step < len(node):
                 return f"{where}: expected an item from 0 to {len(node) - 1}, got [{step}]"
             step %= len(node)
+        elif isinstance(node, list):
+            return f'{where}: expected an item, such as {where}[{_index(step)}], got "{step}"'
         elif not isinstance(node, dict):
             return f'{where}: expected a table for the key "{step}", got {shown(node)}'
         typed.append(step)
@@ -93,6 +95,11 @@ def _put(table: dict[str, Any], setting: Setting) -> str | None:
         if kind in variants(root, find(root, tuple(typed))[1]):
             typed.append(kind)
     return None
+
+
+def _index(step: str) -> str:
+    """The number of the item that was probably meant."""
+    return step if step.isdecimal() else "0"
 
 
 def _value(text: str, schema: Schema) -> Any:

@@ -78,8 +78,9 @@ def ambient_lines(figures: "AmbientFigures") -> list[str]:
         if error > 0
         else "fixed, or nothing arrives"
     )
+    lowest, highest = f"{figures.lowest:.4g}", f"{figures.highest:.4g}"
     return [
-        f"ambient light: I_A {figures.lowest:.4g} to {figures.highest:.4g} ({known})",
+        f"ambient light: I_A {lowest if lowest == highest else f'{lowest} to {highest}'} ({known})",
         *(f"note: {note}" for note in figures.notes),
     ]
 

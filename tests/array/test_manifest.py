@@ -216,6 +216,10 @@ def test_missing_and_unreadable_manifests(tmp_path: Path) -> None:
         read_manifest(tmp_path)
     with pytest.raises(OutputError, match=rf"nowhere: no such file; expected .*, such as {tmp_path}/out$"):
         read_manifest(tmp_path / "nowhere")
+    (tmp_path / "jobs" / "out" / "a").mkdir(parents=True)
+    (tmp_path / "jobs" / "out" / "a" / "manifest.toml").touch()
+    with pytest.raises(OutputError, match=rf"manifest.toml: no such file; .*, such as {tmp_path}/jobs/out/a$"):
+        read_manifest(tmp_path / "jobs")
     (tmp_path / "manifest.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(OutputError, match="expected UTF-8 text, got a binary file"):
         read_manifest(tmp_path)

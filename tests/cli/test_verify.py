@@ -45,6 +45,7 @@ def test_every_flipped_byte_is_found_and_repaired(array, capsys):
     assert {line.split(": ")[0] for line in result.out.splitlines()[:-1]} == {str(array / name) for name in names}
     mended = run(capsys, "verify", "--repair", array)
     assert mended.code == 0
+    assert f"6 of {N_FILES} files are missing or damaged\n" in mended.out, "no advice to type the same again"
     assert contents(array) == before
     assert run(capsys, "verify", "-q", array).code == 0
 

@@ -81,6 +81,11 @@ def test_lines_of_the_ambient_light() -> None:
     ]
 
 
+def test_an_ambient_light_of_one_position_is_one_number() -> None:
+    (line,) = ambient_lines(AmbientFigures(lowest=0.28533, highest=0.28534, error=0.015, paths=2**18, notes=()))
+    assert line == "ambient light: I_A 0.2853 (standard error at most 1.5%, 262,144 paths)"
+
+
 def test_lines_of_a_target_that_is_not_reached() -> None:
     first, note = target_lines(TARGET)
     assert first == (

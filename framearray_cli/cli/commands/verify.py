@@ -1,5 +1,7 @@
 """`framearray verify`."""
 
+import shlex
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -39,10 +41,11 @@ def verify(
         raise typer.BadParameter("needs --repair", param_hint="--dry-run")
     with Screen(err, quiet=quiet) as screen:
         found = run(array, threads or available_cores(), screen.counter("verifying", "file"))
-    lines = verified_lines(found)
+    repairs = repair and not dry_run
+    lines = verified_lines(found, repairs=repairs)
     if found.wrong and dry_run:
         lines.append(f"would render {counted(len(found.wrong), 'file')} again")
-    if not found.wrong or not repair or dry_run:
+    if not found.wrong or not repairs:
         print_result(lines, verify_result(found), quiet=quiet and not found.wrong)
         if found.wrong:
             raise typer.Exit(CheckError.exit_code)
@@ -59,8 +62,12 @@ def verify(
     print_result([], verify_result(found, render_on_screen(job, quiet=quiet)))
 
 
-def verified_lines(found: "Verification") -> list[str]:
-    """List damaged files by name, then the cameras that are not finished by ranges, and sum up."""
+def verified_lines(found: "Verification", *, repairs: bool = False) -> list[str]:
+    """List damaged files by name, then the cameras that are not finished by ranges, and sum up.
+
+    Args:
+        repairs: whether the command renders them again now; then the remedy is left out.
+    """
     from framearray_cli.array.metadata import was_interrupted
     from framearray_cli.array.ranges import brief_frames_text
 
@@ -84,21 +91,27 @@ def verified_lines(found: "Verification") -> list[str]:
     if found.unknown:
         have = agree(found.unknown, "has", "have")
         lines.append(f"note: {_files(found.unknown)} whole, but {have} no checksum to compare with")
-    return [*lines, _sum_up(found, len(damaged), sum(unfinished.values()))]
+    remedies = ("", "") if repairs else _remedies(folder)
+    return [*lines, _sum_up(found, len(damaged), sum(unfinished.values()), *remedies)]
 
 
-def _sum_up(found: "Verification", damaged: int, left: int) -> str:
+def _remedies(folder: Path) -> tuple[str, str]:
+    """What to type for damaged files, and where there are only unfinished ones."""
+    repair = f"`framearray verify --repair {shlex.quote(str(folder))}`"
+    return f"; {repair} renders them again", f"; `framearray render JOB` or {repair} goes on"
+
+
+def _sum_up(found: "Verification", damaged: int, left: int, again: str, go_on: str) -> str:
     """Word the result in one line, with the remedy."""
-    repair = f"`framearray verify --repair {found.manifest.directory}`"
     if not damaged and not left:
         name = found.manifest.name
         return f"{counted(found.files, 'file')} of {name} {agree(found.files, 'is', 'are')} whole"
     files = counted(found.files, "file")
     if not damaged:
         some = f"{left:,} of {files} {agree(left, 'was', 'were')}"
-        return f"{some} never finished; `framearray render JOB` or {repair} goes on"
+        return f"{some} never finished{go_on}"
     more = f", {left:,} {agree(left, 'was', 'were')} never finished" if left else ""
-    return f"{damaged:,} of {files} {agree(damaged, 'is', 'are')} missing or damaged{more}; {repair} renders them again"
+    return f"{damaged:,} of {files} {agree(damaged, 'is', 'are')} missing or damaged{more}{again}"
 
 
 def _files(n: int) -> str:

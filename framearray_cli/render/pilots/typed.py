@@ -50,15 +50,20 @@ def range_warnings(job: Job, size: float, distances: "np.ndarray") -> Iterator[s
     wanted = job.obscurance.range
     if wanted > FAR_RANGE * size:
         yield (
-            f"obscurance.range: {wanted:g} scene units, in a scene of {size:.3g}: everything obscures everything, and "
-            f"indirect light is almost black; about {_good_range(size)} would suit the scene"
+            f"obscurance.range: {wanted:g} scene units, in a scene of {_short(size)}: everything obscures everything, "
+            f"and indirect light is almost black; about {_good_range(size)} would suit the scene"
         )
     elif len(distances) and wanted < NEAR_RANGE * (middle := float(np.median(distances))):
         yield (
-            f"obscurance.range: {wanted:g} scene units, where surfaces are seen from {middle:.3g} away: obscurance is "
-            f"narrower than a pixel, and indirect light is flat; about {_good_range(min(size, 2 * middle))} would suit "
-            "the scene"
+            f"obscurance.range: {wanted:g} scene units, where surfaces are seen from {_short(middle)} away: obscurance "
+            f"is narrower than a pixel, and indirect light is flat; about {_good_range(min(size, 2 * middle))} would "
+            "suit the scene"
         )
+
+
+def _short(length: float) -> str:
+    """Return a length with three digits, without an exponent where it has few."""
+    return f"{float(f'{length:.3g}'):g}"
 
 
 def _good_range(size: float) -> str:

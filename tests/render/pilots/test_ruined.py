@@ -1,9 +1,12 @@
 """Every ruined job is warned of, with number, place and remedy; good jobs are not."""
 
+import numpy as np
 import pytest
 from support import tiny
 from support.ruined import CASES, Case, case
 
+from framearray_cli.job.job import Job
+from framearray_cli.render.pilots.typed import range_warnings
 from framearray_cli.render.pilots.warn import find_warnings
 
 
@@ -23,3 +26,9 @@ def test_a_ruined_job_is_warned_of(name):
 
 def test_the_job_that_they_are_made_from_is_good():
     assert warnings_of(case()) == ()
+
+
+def test_long_lengths_are_written_without_an_exponent() -> None:
+    job = Job.model_validate(tiny.table(obscurance={"range": 13000.0}))
+    (warning,) = range_warnings(job, 1133.7, np.empty(0))
+    assert "13000 scene units, in a scene of 1130:" in warning

@@ -174,8 +174,8 @@ def make_ambient(
     notes: tuple[str, ...] = ()
     if automatic and error.max() > TARGET_ERROR:
         notes = (
-            f"ambient: standard error {error.max():.1%} at light {int(error.argmax())} after {spent} walks, "
-            f"the most that are spent by themselves; set ambient.paths for more",
+            f"ambient: standard error {error.max():.1%} at light {int(error.argmax())} after {spent:,} walks, "
+            "as many as the program takes unasked; set ambient.paths for more",
         )
     return Ambient(
         intensity=(mean.T / math.pi).astype(np.float32),
