@@ -182,7 +182,9 @@ def _with_cells(
     started = time.perf_counter()
     with compile_clock() as clock:
         eyes = _eye_walks(prepared, embree)
-        accuracy = None if local else compare_with_paths(built.cells, eyes, prepared.threads)
+        accuracy = (
+            None if local else compare_with_paths(built.cells, eyes, setup.obscurance, setup.depth, prepared.threads)
+        )
     shared_s = built.shared_s + time.perf_counter() - started - clock.seconds
     notes = (accuracy_text(accuracy),) if accuracy else ()
     setup = replace(setup, cells=built.cells, smooth=0 if local else job.indirect.filter, local=local)

@@ -67,6 +67,7 @@ class Report:
         settings: the job's own; `measured[0]` is their cost and error.
         reference_hits: native hits per pixel of the references.
         reference_noise: RMSE of the references themselves over their mean.
+        notes: on ambient and indirect light, such as how far light from cells is from that of paths.
         example: (h, w, 3) the reference of the first probe image.
         flip, signed: (h, w) error of the job's own settings in that image: HDR-FLIP, and I - R over the mean of R.
     """
@@ -81,6 +82,7 @@ class Report:
     advice: tuple[Advice, ...]
     reference_hits: int
     reference_noise: float
+    notes: tuple[str, ...]
     example: Float32
     flip: Float32
     signed: Float32
@@ -142,6 +144,7 @@ def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEv
             advice=tuple(advise(measured, wanted)),
             reference_hits=2 * first.hits,
             reference_noise=reference_noise(list(references.values()), case, chosen.lights),
+            notes=case.ambient.notes,
             example=right,
             flip=flip_map(own.example, right),
             signed=np.asarray((own.example - right).mean(axis=-1) / right.mean(dtype=np.float64), np.float32),

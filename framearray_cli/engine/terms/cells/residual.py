@@ -1,8 +1,8 @@
-"""How far light from cells is from that of paths, measured at some points that the eyes see.
+"""How far light from cells is from that of paths, measured at points that the eyes see.
 
-At each point P, rays gather what cells say leaves Q towards P, and one path from each Q estimates the same without
-bias. Their mean difference, over two halves of the rays, gives the error of cells at P: products of halves have no
-noise on average. This is the correction of two-level Monte Carlo methods, used as a measurement.
+At each point P rays gather what cells bring, and paths estimate the same without bias, both in two halves. The product
+of both halves' differences has no noise on average. Many points with few paths each are best: points differ more than
+the mean of some paths is noisy. Errors are those of images: of R E, over its mean.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -12,27 +12,34 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.base.arrays import Float32, Float64, with_room
 
-from ...hits.hits import SURFACE, Hits
-from ...hits.rays import room_for_tests
-from ...inputs.lights import LightArrays, some_lights
+from ...hits.hits import SURFACE, Hits, empty_hits
+from ...hits.rays import room_for_hits, room_for_tests
+from ...inputs.lights import some_lights
+from ...inputs.random import lattice_steps
 from ..ambient.estimate import BATCH, Workspace, add_background, choose_steps
 from ..ambient.from_eyes import EyeWalks, start_at_eyes
 from ..ambient.walks import DIFFUSE
-from .samples import sides
-from .table import CONSTANT, NOWHERE, TINT, Cells, at_lights, find_targets
+from ..obscurance_rays import ObscuranceSettings
+from .gather import COLOUR, LEVEL, LIGHT, Gathered, GatherSettings, gather_cells, gather_settings
+from .lookups import room_for_gathering, room_for_near
+from .mirrored import room_for_mirrors
+from .table import Cells, at_lights
 
 Rows: TypeAlias = NDArray[np.intp]
 
-POINTS, RAYS = 128, 1024
+POINTS, PATHS, RAYS = 1024, 256, 128  # points; paths and gather rays at each
+HALVES = 2
 # Light positions that stand for all, at most.
 MOST_LIGHTS = 8
+# Groups of points whose spread gives the standard errors.
+GROUPS = 32
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Accuracy:
-    """Error of light from cells, over the mean indirect light.
+    """Error of light from cells, over the mean indirect light of images.
 
     Attributes:
         bias: signed mean over points and light positions; `bias_error`: its standard error.
@@ -45,39 +52,57 @@ class Accuracy:
     error_error: float
 
 
-def compare_with_paths(cells: Cells, walks: EyeWalks, threads: int) -> Accuracy | None:
-    """Compare the light that cells bring to some points with that of paths; None where there is none."""
+def compare_with_paths(
+    cells: Cells, walks: EyeWalks, obscurance: ObscuranceSettings, depth: int, threads: int
+) -> Accuracy | None:
+    """Compare the light that cells bring to some points with that of paths; None where there is none.
+
+    Args:
+        obscurance: of gather rays, but for their number; `depth`: most mirrors that these follow.
+    """
     n_lights = walks.lights.n_lights
     at = sorted(set(np.linspace(0, n_lights - 1, MOST_LIGHTS).round().astype(int).tolist()))
     few = EyeWalks(
         cams=walks.cams, seed=walks.seed + 1, paths=None, world=walks.world, lights=some_lights(walks.lights, at),
         background=walks.background,
     )  # fmt: skip
-    cells = at_lights(cells, at)
+    step_x, step_y = lattice_steps(RAYS // HALVES)
+    settings = gather_settings(obscurance._replace(n_rays=RAYS // HALVES, step_x=step_x, step_y=step_y))
     points, rows = _points(few)
     rows = rows[:POINTS]
-    if len(rows) < 2:
+    if len(rows) < GROUPS:
         return None
-    per_batch = BATCH // RAYS
-
-    def measure(first: int) -> tuple[Float64, Float64]:
-        return _residuals(cells, few, points, rows[first : first + per_batch])
-
+    measuring = _Measuring(cells=at_lights(cells, at), walks=few, settings=settings, depth=depth, points=points)
+    per_batch = BATCH // PATHS
     with ThreadPoolExecutor(threads, thread_name_prefix="cells") as pool:
-        found = list(pool.map(measure, range(0, len(rows), per_batch)))
-    halves = np.concatenate([residual for residual, _ in found])  # (n_points, 2, n_lights)
-    mean = float(np.concatenate([light for _, light in found]).mean())
-    if mean <= 0:
+        found = list(pool.map(measuring.batch, np.array_split(rows, -(-len(rows) // per_batch))))
+    return _accuracy(np.concatenate([paths for paths, _ in found]), np.concatenate([read for _, read in found]))
+
+
+def _accuracy(paths: Float64, read: Float64) -> Accuracy | None:
+    """The errors of what was read, against paths, (n_points, HALVES, n_lights) each.
+
+    Standard errors are those of the jackknife over groups of points, which follow each other across the images.
+    """
+    residual = read - paths
+    signed, squares, light = residual.mean(axis=(1, 2)), residual.prod(axis=1).mean(axis=1), paths.mean(axis=(1, 2))
+    if light.mean() <= 0:
         return None
-    signed = -halves.mean(axis=(1, 2)) / mean
-    squares = halves.prod(axis=1).mean(axis=1) / mean**2
-    error = float(np.sqrt(max(squares.mean(), 0.0)))
-    spread = float(squares.std(ddof=1)) / len(squares) ** 0.5
+
+    def errors(chosen: NDArray[np.bool_]) -> tuple[float, float]:
+        level = light[chosen].mean()
+        return signed[chosen].mean() / level, squares[chosen].mean() / level**2
+
+    group = np.arange(len(light)) % GROUPS
+    bias, square = errors(group >= 0)
+    without = np.array([errors(group != g) for g in range(GROUPS)])
+    bias_error, spread = np.sqrt((GROUPS - 1) * without.var(axis=0))
+    error = float(np.sqrt(max(square, 0.0)))
     return Accuracy(
-        bias=float(signed.mean()),
-        bias_error=float(signed.std(ddof=1)) / len(signed) ** 0.5,
+        bias=float(bias),
+        bias_error=float(bias_error),
         error=error,
-        error_error=spread / (2 * error) if error**2 > spread else spread**0.5 / 2,
+        error_error=float(spread / (2 * error) if error**2 > spread else spread**0.5 / 2),
     )
 
 
@@ -89,46 +114,68 @@ def _points(walks: EyeWalks) -> tuple[Hits, Rows]:
     return hits, np.flatnonzero((hits.kind == SURFACE) & (hits.reflectivity > 0).any(axis=1))
 
 
-def _residuals(cells: Cells, walks: EyeWalks, points: Hits, rows: Rows) -> tuple[Float64, Float64]:
-    """Path minus cell at some points: mean of each half of the rays and of the channels, (n, 2, n_lights); and the
-    mean light of paths, (n, n_lights).
-    """
-    work, world = Workspace(walks.lights), walks.world
-    n = len(rows) * RAYS
-    hits, walkers = work.hits[0], work.walkers[0]
-    for name in Hits._fields:
-        getattr(hits, name)[:n] = np.repeat(getattr(points, name)[rows], RAYS, axis=0)
-    hits.key[:n] += np.tile(np.arange(RAYS, dtype=np.uint64), len(rows)) * np.uint64(0x9E3779B97F4A7C15 >> 1 | 1)
-    start = hits.position[:n].copy()
-    walkers.walk[:n], walkers.throughput[:n], walkers.step[:n] = np.arange(n), 1.0, DIFFUSE
-    work.sums[:] = 0.0
-    n = work.advance(n, world)
-    hits, walkers = work.hits[0], work.walkers[0]
-    read = _read(cells, hits, n, start, walks)
-    add_background(hits, walkers, n, walks.background, work.sums)
-    choose_steps(hits, walkers, n, False)
-    walks.follow(work, n)
-    light = work.sums[:n].mean(axis=1, dtype=np.float64).reshape(len(rows), 2, RAYS // 2, -1)
-    residual = light - read.mean(axis=1, dtype=np.float64).reshape(light.shape)
-    return residual.mean(axis=2), light.mean(axis=(1, 2))
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Measuring:
+    """What batches of points are measured with."""
 
+    cells: Cells
+    walks: EyeWalks
+    settings: GatherSettings
+    depth: int
+    points: Hits
 
-def _read(cells: Cells, hits: Hits, n: int, start: Float32, walks: EyeWalks) -> Float32:
-    """What cells say leaves hits 0 to n - 1, times pi, (n, 3, n_lights)."""
-    surface = hits.kind[:n] == SURFACE
-    length = np.where(surface, np.linalg.norm(hits.position[:n] - start, axis=1), np.inf).astype(np.float32)
-    normal, target = np.ascontiguousarray(hits.geometric[:n]), np.empty(n, np.int32)
-    find_targets(
-        cells, hits.position[:n], normal, sides(normal), length, walks.world.tracer, room_for_tests(BATCH, 1), target
-    )
-    r = (hits.reflectivity[:n] + hits.specular[:n])[:, :, None]
-    light = cells.light[target] * cells.tint[target, TINT : TINT + 3, None] * _colour(walks.lights)
-    constant = np.pi * cells.tint[target, CONSTANT : CONSTANT + 3, None]
-    outside = np.float32(np.pi) * walks.background[None, :, None]
-    found: Float32 = np.where((target == NOWHERE)[:, None, None], outside, r * (light + constant))
-    return found
+    def batch(self, rows: Rows) -> tuple[Float64, Float64]:
+        """R E at some points, mean of the channels, by paths and by cells, (n, HALVES, n_lights) each."""
+        return self._by_paths(rows), self._by_cells(rows)
 
+    def _repeated(self, rows: Rows, times: range, hits: Hits) -> int:
+        """Write each point that many times, each time with random numbers of its own; return the number of hits."""
+        n = len(rows) * len(times)
+        for name in Hits._fields:
+            getattr(hits, name)[:n] = np.repeat(getattr(self.points, name)[rows], len(times), axis=0)
+        hits.key[:n] += np.tile(np.array(times, np.uint64), len(rows)) * np.uint64(0x9E3779B97F4A7C15 >> 1 | 1)
+        return n
 
-def _colour(lights: LightArrays) -> Float32:
-    """The unit of irradiance, (1, 3, n_lights)."""
-    return lights.colour.T[None]
+    def _by_paths(self, rows: Rows) -> Float64:
+        walks = self.walks
+        work = Workspace(walks.lights)
+        hits, walkers = work.hits[0], work.walkers[0]
+        n = self._repeated(rows, range(PATHS), hits)
+        walkers.walk[:n], walkers.throughput[:n], walkers.step[:n] = np.arange(n), hits.reflectivity[:n], DIFFUSE
+        work.sums[:] = 0.0
+        left = work.advance(n, walks.world)
+        hits, walkers = work.hits[0], work.walkers[0]
+        add_background(hits, walkers, left, walks.background, work.sums)
+        choose_steps(hits, walkers, left, False)
+        walks.follow(work, left)
+        light = work.sums[:n].mean(axis=1, dtype=np.float64)
+        found: Float64 = light.reshape(len(rows), HALVES, PATHS // HALVES, -1).mean(axis=2)
+        return found
+
+    def _by_cells(self, rows: Rows) -> Float64:
+        hits = empty_hits(len(rows) * HALVES)
+        n, (channels, n_lights) = self._repeated(rows, range(PATHS, PATHS + HALVES), hits), self.cells.light.shape[1:]
+        out = Gathered(
+            obscurance=np.empty((n, 3), np.float32),
+            skylight=np.empty((n if self.settings.obscurance.sky else 0, 3), np.float32),
+            light=with_room((n, LIGHT + channels * n_lights), np.float32),
+            constant=np.empty((n, 3), np.float32),
+            closeness=np.empty(n, np.float32),
+        )
+        near, other = (room_for_near(channels, n_lights, range(n_lights)) for _ in range(2))
+        gather_cells(
+            hits, n, self.settings, self.walks.world, self.walks.lights, self.cells, room_for_hits(BATCH),
+            room_for_gathering(BATCH), room_for_tests(BATCH, n_lights), (near, other),
+            room_for_mirrors(BATCH, self.depth), out, False,
+        )  # fmt: skip
+        light = self._irradiance(out, n) + np.pi * out.constant[:, :, None]
+        seen = (light * hits.reflectivity[:, :, None]).mean(axis=1, dtype=np.float64)
+        found: Float64 = seen.reshape(len(rows), HALVES, -1)
+        return found
+
+    def _irradiance(self, out: Gathered, n: int) -> Float32:
+        """E[l] by sources, (n, 3, n_lights)."""
+        known = np.where(out.light[:, LEVEL, None] > 0, out.light, np.float32(0.0))  # else not written
+        light = known[:, LIGHT:].reshape(n, *self.cells.light.shape[1:])
+        found: Float32 = light * known[:, COLOUR : COLOUR + 3, None] * self.walks.lights.colour.T[None]
+        return found
