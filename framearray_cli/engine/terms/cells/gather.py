@@ -146,7 +146,7 @@ def _gather_hits(
         # rays first_ray to first_ray + n_rays - 1 of every hit
         n_rays = min(of_w.n_rays - first_ray, most)
         n_traced = write_obscurance_rays(hits, rays, n, first_ray, n_rays, settings.far, neighbours)
-        intersect(tracer, rays.packets, n_traced, neighbours)
+        intersect(tracer, rays.packets, n_traced, False)
         reach = cells.grid.edge * NEAR
         kept, reflected = find_ends(
             hits, world, cells, rays, n_traced, first_ray, n_rays, room, tests, near[0], reach, mirrors
