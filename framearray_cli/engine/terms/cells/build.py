@@ -96,7 +96,8 @@ def build_cells(work: CellWork) -> Built:
             grid = _grid(samples, work)
             samples = samples.rows(_sorted(grid, samples))
             world = work.walks.world
-            places = find_places(PlaceWork(grid=grid, samples=samples, tracer=world.tracer, pool=pool))
+            shifted = work.local is not None
+            places = find_places(PlaceWork(grid=grid, samples=samples, tracer=world.tracer, pool=pool, shifted=shifted))
             cells = _dark_cells(work, grid, places)
             members = _link(cells, places, samples, world, pool)
         shared_s = time.perf_counter() - started - clock.seconds

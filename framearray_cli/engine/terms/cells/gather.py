@@ -19,7 +19,7 @@ from ...hits.hits import Hits, World, reflects_in_lanes
 from ...hits.rays import NO_RAYS, RANK, Rays
 from ...inputs.lights import LightArrays
 from ...inputs.random import lattice_steps
-from ...kernels.kernel import kernel
+from ...kernels.kernel import inlined, kernel, prefetch
 from ...kernels.simd import LANES, compress, lane_numbers, load, popcount, reals
 from ..obscurance import HITS_TOGETHER, RAYS_TOGETHER, add_to_hits, apply_textures, evaluate_rays
 from ..obscurance_rays import ObscuranceSettings, write_obscurance_rays
@@ -35,6 +35,8 @@ COLOUR, LEVEL, LIGHT = 0, 3, 4
 
 # Rays shorter than this share of the finest cells' edge read no doubtful cell.
 NEAR = 1.0
+# What a hit reads is prefetched this many hits before.
+AHEAD = 2
 # Shorter ones count as this long for the mean of 1 / length.
 SHORTEST = 0.1
 
@@ -64,6 +66,17 @@ class Gathered(NamedTuple):
     closeness: Float32
 
 
+@inlined
+def _prefetch_cells(cells: Cells, rays: Rays, k: int, n_rays: int, room: GatherScratch) -> None:
+    """Prefetch what the rays of listed hit k read."""
+    rank, bytes_of_light = rays.number[RANK], 4 * cells.light.shape[1] * cells.light.shape[2]
+    at = k // LANES * LANES * n_rays + k % LANES
+    for ray in range(n_rays):
+        cell = max(room.cell[rank[at + ray * LANES]], 0)
+        prefetch(cells.tint.ctypes.data + 4 * cells.tint.shape[1] * cell, 1)
+        prefetch(cells.light.ctypes.data + bytes_of_light * cell, bytes_of_light)
+
+
 @kernel
 def _sum_cells(
     cells: Cells, rays: Rays, n: int, first_ray: int, n_rays: int, all_rays: int, room: GatherScratch,
@@ -75,6 +88,8 @@ def _sum_cells(
     last, share = first_ray + n_rays == all_rays, np.float32(1.0 / all_rays)
     nothing, shortest = np.float32(0.0), np.float32(SHORTEST * cells.grid.edge)
     for k in range(n):
+        if k + AHEAD < n:
+            _prefetch_cells(cells, rays, k + AHEAD, n_rays, room)
         hit, rank = rays.place[k], rays.number[RANK]
         at = k // LANES * LANES * n_rays + k % LANES
         close = out.closeness[hit] if first_ray > 0 else nothing

@@ -8,20 +8,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Int32, Real, Rgb, Triple, with_room
+from framearray_cli.base.arrays import Addresses, Float32, Int32, Real, Rgb, with_room
 
-from ...embree.packets import DIRECTION, HIT_ROWS, TFAR, Tracer, room_in
+from ...embree.packets import DIRECTION, HIT_ROWS, TFAR, Tracer, hit_triangle, room_in
 from ...hits.hits import Hits, decode_hits, empty_hits
 from ...hits.rays import NO_RAYS, ORDER, Rays, room_for_hits
 from ...inputs.random import CONTINUED, random_word
 from ...inputs.surfaces import Surfaces, geometric_normal, position_at, total_at
-from ...kernels.kernel import inlined, kernel
+from ...kernels.kernel import inlined, kernel, prefetch
 from ...kernels.simd import LANES, integers, load_row, select, store, width_of_packets
 from .guards import choose_slots, write_guard_ray
-from .table import NOWHERE, TINT, Cells, find_cell, level_of, side_of
+from .table import ALL, NOWHERE, TINT, Cells, cell_of_key, coarser_cell, first_slot, key_of, level_of, side_of
 
 # Rays that are kept together, of those traced together; the rest read cells.
 MOST_NEAR = 2048
+# Rays between those whose triangles are prefetched and those that are looked up; bytes of a triangle and of a slot.
+_AHEAD, _TRIANGLE_BYTES, _SLOT_BYTES = 2 * LANES, 36, 16
 
 
 class GatherScratch(NamedTuple):
@@ -31,11 +33,15 @@ class GatherScratch(NamedTuple):
         cell: (n_rays,) the cell that each ray reads, NOWHERE, or `near_cell(k)` of ray k that was kept.
         reflectivity: (3, n_rays) R(Q), or 1 where nothing is met, times the reflectivity of mirrors on the way.
         point: (6, LANES) Q and its normal, of sixteen rays.
+        level, side: (LANES,) which cell each of them asks for, and `key`: (LANES,) its key.
     """
 
     cell: Int32
     reflectivity: Float32
     point: Float32
+    level: Int32
+    side: Int32
+    key: Addresses
 
 
 class NearHits(NamedTuple):
@@ -77,7 +83,14 @@ class NearHits(NamedTuple):
 def room_for_gathering(n_rays: int) -> GatherScratch:
     """Allocate arrays for n rays."""
     n = -(-n_rays // LANES) * LANES
-    return GatherScratch(np.empty(n, np.int32), np.empty((3, n), np.float32), np.empty((6, LANES), np.float32))
+    return GatherScratch(
+        cell=np.empty(n, np.int32),
+        reflectivity=np.empty((3, n), np.float32),
+        point=np.empty((6, LANES), np.float32),
+        level=np.empty(LANES, np.int32),
+        side=np.empty(LANES, np.int32),
+        key=np.empty(LANES, np.int64),
+    )
 
 
 def room_for_near(channels: int, n_lights: int, kept: range) -> NearHits:
@@ -119,6 +132,46 @@ def _keep_ray(rays: Rays, ray: int, cell: int, near: NearHits, k: int) -> None:
         near.rays.packets[q, row, to] = rays.packets[p, row, lane]
 
 
+@inlined
+def _prefetch_triangles(surfaces: Surfaces, tracer: Tracer, rays: Rays, first: int) -> None:
+    """Prefetch the triangles that sixteen traced rays met."""
+    for ray in range(first, first + LANES):
+        triangle = hit_triangle(tracer, rays.packets, ray)
+        prefetch(surfaces.corners.ctypes.data + _TRIANGLE_BYTES * max(triangle, 0), _TRIANGLE_BYTES)
+
+
+@inlined
+def _write_points(surfaces: Surfaces, tracer: Tracer, rays: Rays, first: int, room: GatherScratch) -> None:
+    """Write Q, its normal, R(Q) and the length of sixteen traced rays; their cell is NOWHERE where they met nothing."""
+    missed, triangle, u, v = decode_hits(tracer, rays.packets, first)
+    dx, dy = load_row(rays.packets, first, DIRECTION), load_row(rays.packets, first, DIRECTION + 1)
+    dz = load_row(rays.packets, first, DIRECTION + 2)
+    px, py, pz = position_at(surfaces, triangle, u, v)
+    nx, ny, nz = geometric_normal(surfaces, triangle, dx, dy, dz)
+    total = total_at(surfaces, triangle, u, v)
+    store(room.point, 0, px)
+    store(room.point, LANES, py)
+    store(room.point, 2 * LANES, pz)
+    store(room.point, 3 * LANES, nx)
+    store(room.point, 4 * LANES, ny)
+    store(room.point, 5 * LANES, nz)
+    for channel in range(3):
+        store(room.reflectivity, channel * room.reflectivity.shape[1] + first, select(missed, 1.0, total[channel]))
+    store(rays.value, first, load_row(rays.packets, first, TFAR))
+    store(room.cell, first, select(missed, integers(NOWHERE), np.int32(0)))
+
+
+@inlined
+def _write_keys(cells: Cells, rays: Rays, first: int, n: int, room: GatherScratch) -> None:
+    """Write the keys of the cells that rays first to first + n - 1 read, and prefetch their places in the table."""
+    n_slots, q = cells.slots.shape[0] >> 1, room.point
+    for lane in range(n):
+        level, side = level_of(cells.grid, rays.value[0, first + lane]), side_of(q[3, lane], q[4, lane], q[5, lane])
+        key = key_of(cells.grid, level, side, q[0, lane], q[1, lane], q[2, lane])
+        room.level[lane], room.side[lane], room.key[lane] = level, side, key
+        prefetch(cells.slots.ctypes.data + _SLOT_BYTES * first_slot(key, n_slots), _SLOT_BYTES)
+
+
 @kernel
 def find_cells(
     hits: Hits, surfaces: Surfaces, tracer: Tracer, cells: Cells, rays: Rays, n: int, first_ray: int, n_rays: int,
@@ -140,38 +193,29 @@ def find_cells(
         if waiting > room_in(tests.packets) - LANES:
             choose_slots(tracer, tests, waiting, cells.other, room.cell)
             waiting = NO_RAYS
-        # Q, its normal, and R(Q)
-        missed, triangle, u, v = decode_hits(tracer, rays.packets, first)
-        dx, dy = load_row(rays.packets, first, DIRECTION), load_row(rays.packets, first, DIRECTION + 1)
-        dz = load_row(rays.packets, first, DIRECTION + 2)
-        px, py, pz = position_at(surfaces, triangle, u, v)
-        nx, ny, nz = geometric_normal(surfaces, triangle, dx, dy, dz)
-        total = total_at(surfaces, triangle, u, v)
-        store(room.point, 0, px)
-        store(room.point, LANES, py)
-        store(room.point, 2 * LANES, pz)
-        store(room.point, 3 * LANES, nx)
-        store(room.point, 4 * LANES, ny)
-        store(room.point, 5 * LANES, nz)
-        for channel in range(3):
-            store(room.reflectivity, channel * room.reflectivity.shape[1] + first, select(missed, 1.0, total[channel]))
-        store(rays.value, first, load_row(rays.packets, first, TFAR))
-        store(room.cell, first, select(missed, integers(NOWHERE), np.int32(0)))
-        for lane in range(min(n - first, LANES)):
+        if first + _AHEAD < n:
+            _prefetch_triangles(surfaces, tracer, rays, first + _AHEAD)
+        _write_points(surfaces, tracer, rays, first, room)
+        last = min(n - first, LANES)
+        _write_keys(cells, rays, first, last, room)
+        for lane in range(last):
             if room.cell[first + lane] == NOWHERE:
+                continue
+            # the cell of Q
+            q = room.point
+            point, normal = (q[0, lane], q[1, lane], q[2, lane]), (q[3, lane], q[4, lane], q[5, lane])
+            found = cell_of_key(cells.slots, room.key[lane])
+            if found == ALL:
+                found = coarser_cell(cells.grid, cells.slots, room.level[lane], room.side[lane], point)
+            room.cell[first + lane] = found
+            if cells.other[found] == NOWHERE:
                 continue
             # the ray as it was written, before rays were sorted by direction: its hit, and its number there
             written = rays.number[ORDER, first + lane]
             k, ray = written // (LANES * n_rays) * LANES + written % LANES, first_ray + written // LANES % n_rays
-            # the cell of Q; the queue holds rays to the guards of doubtful cells
-            key, q = hits.key[rays.place[k]], room.point
-            point, normal = (q[0, lane], q[1, lane], q[2, lane]), (q[3, lane], q[4, lane], q[5, lane])
-            found = _cell_of(cells, point, normal, rays.value[0, first + lane])
-            room.cell[first + lane] = found
-            if cells.other[found] == NOWHERE:
-                continue
+            # the queue holds rays to the guards of doubtful cells
             if rays.value[0, first + lane] < reach and kept < near.place.shape[0]:
-                near.hits.key[kept] = random_word(key, CONTINUED + ray)
+                near.hits.key[kept] = random_word(hits.key[rays.place[k]], CONTINUED + ray)
                 _keep_ray(rays, first + lane, found, near, kept)
                 room.cell[first + lane] = near_cell(kept)
                 kept += 1
@@ -180,14 +224,6 @@ def find_cells(
                 waiting += 1
     choose_slots(tracer, tests, waiting, cells.other, room.cell)
     return kept
-
-
-@inlined
-def _cell_of(cells: Cells, point: Triple, normal: Triple, length: Real) -> int:
-    """The cell that a ray of some length reads at a point."""
-    still = (np.float32(0.0), np.float32(0.0), np.float32(0.0))
-    level, side = level_of(cells.grid, length), side_of(normal[0], normal[1], normal[2])
-    return find_cell(cells.grid, cells.slots, level, side, point, still, still)
 
 
 @inlined

@@ -60,12 +60,13 @@ class _Level:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlaceWork:
-    """What places are found of."""
+    """What places are found of; `shifted`: whether the ends of rays move at random before they read a cell."""
 
     grid: Grid
     samples: Samples
     tracer: Tracer
     pool: ThreadPoolExecutor
+    shifted: bool = False
 
     def keys(self, level: int, *, shifted: bool) -> Addresses:
         """The key of each sample's cell of a level; `shifted`: of the place that a ray to it might read instead."""
@@ -182,7 +183,7 @@ def _find_level(work: PlaceWork, level: int, base: int, coarser: Int32) -> _Leve
     found = _Level(
         keys=key[start[kept]], sizes=sizes, sample=order[joined], other=other, guard=guards, own=own, rays=rays
     )
-    return _with_neighbours(work, level, base, found)
+    return _with_neighbours(work, level, base, found) if work.shifted else found
 
 
 def _with_neighbours(work: PlaceWork, level: int, base: int, found: _Level) -> _Level:

@@ -43,7 +43,7 @@ class SmoothScratch(NamedTuple):
         head: (_TABLE^2,) the first hit of each pixel; `follow`: (HITS_TOGETHER,) the next hit of the same pixel.
         ordinal: (HITS_TOGETHER,) the number of hits of the same pixel before.
         around: (HITS_TOGETHER, _AROUND) the hits that a hit's mean is taken over; `members`: their number.
-        close: (HITS_TOGETHER,) mean of 1 / length of the rays of a hit and of those around it.
+        close: (HITS_TOGETHER,) mean of 1 / length of the rays of a hit and of those around it, of any distance.
         light: (HITS_TOGETHER, LIGHT + values) and `constant`: (HITS_TOGETHER, 3) what hits had before a pass.
     """
 
@@ -97,6 +97,12 @@ def _list_hits(hits: Hits, first: int, n: int, width: int, room: SmoothScratch) 
 
 
 @inlined
+def _near_enough(square: float, close: float) -> bool:
+    """Whether hits at the square of a distance mix, by 1 / length of their rays."""
+    return bool(square * close * close <= APART * APART)
+
+
+@inlined
 def _mix(hits: Hits, a: int, b: int, close: float) -> bool:
     """Whether hits a and b mix: on one surface, nearly flat in between, near each other, of one half of the samples.
 
@@ -115,7 +121,7 @@ def _mix(hits: Hits, a: int, b: int, close: float) -> bool:
         and facing >= FACING
         and from_a * from_a <= most
         and from_b * from_b <= most
-        and square * close * close <= APART * APART
+        and _near_enough(square, close)
     )
 
 
@@ -149,10 +155,10 @@ def _find_around(hits: Hits, first: int, n: int, width: int, height: int, step: 
 
 
 @kernel
-def _average_closeness(
+def _find_first(
     hits: Hits, first: int, n: int, width: int, height: int, closeness: Float32, room: SmoothScratch
 ) -> None:
-    """Average 1 / length over each hit and those around it, of any distance."""
+    """Average 1 / length over each hit and those around it, and list those of them that are near enough to mix."""
     for k in range(n):
         room.close[k] = 0.0
     _find_around(hits, first, n, width, height, 1, room)
@@ -161,6 +167,19 @@ def _average_closeness(
         for i in range(room.members[k]):
             total += closeness[first + room.around[k, i]]
         room.close[k] = total / np.float32(max(room.members[k], 1))
+    p = hits.position
+    for k in range(n):
+        kept = min(room.members[k], 1)
+        a = first + k
+        for i in range(1, room.members[k]):
+            other = room.around[k, i]
+            b = first + other
+            x, y, z = p[b, 0] - p[a, 0], p[b, 1] - p[a, 1], p[b, 2] - p[a, 2]
+            close = np.float32(0.5) * (room.close[k] + room.close[other])
+            if _near_enough(x * x + y * y + z * z, close):
+                room.around[k, kept] = other
+                kept += 1
+        room.members[k] = kept
 
 
 @kernel
@@ -212,8 +231,9 @@ def smooth_light(
     for first in range(0, n, HITS_TOGETHER):
         m, step = min(HITS_TOGETHER, n - first), 1
         _list_hits(hits, first, m, width, room)
-        _average_closeness(hits, first, m, width, height, closeness, room)
-        for _ in range(passes):
-            _find_around(hits, first, m, width, height, step, room)
+        _find_first(hits, first, m, width, height, closeness, room)
+        for done in range(passes):
+            if done > 0:
+                step *= STEP
+                _find_around(hits, first, m, width, height, step, room)
             _average(first, m, room, light, constant)
-            step *= STEP

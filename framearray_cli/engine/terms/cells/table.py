@@ -151,6 +151,16 @@ def find_cell(grid: Grid, slots: Addresses, level: int, side: int, point: Triple
     return found
 
 
+@inlined
+def coarser_cell(grid: Grid, slots: Addresses, level: int, side: int, point: Triple) -> int:
+    """The cell at a point of the first coarser level that has one there."""
+    found = ALL
+    while found == ALL and level + 1 < LEVELS:
+        level += 1
+        found = cell_of_key(slots, key_of(grid, level, side, point[0], point[1], point[2]))
+    return found
+
+
 @kernel
 def write_sides(normal: Float32, sides: Bytes) -> None:
     """Write the direction that each of n normals faces; `sides` is overwritten."""
