@@ -8,7 +8,7 @@ OUT := out/kitchen-small
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-packets bench-scaling bench-bias bench-ambient bench-truth bench-flicker bench-report bench-progress bench-first bench-view fuzz clean
+.PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-packets bench-scaling bench-error bench-bias bench-ambient bench-truth bench-flicker bench-report bench-progress bench-first bench-view fuzz clean
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -64,6 +64,9 @@ docs: $(VENV)/installed-dev ## Write the generated pages of docs/
 
 bench: $(VENV)/installed-bench ## Measure the cost per image, and write docs/measured/speed.md
 	PYTHONPATH=tests $(BIN)/python -m bench $(BENCH)
+
+bench-error: $(VENV)/installed-bench ## Measure the error of images by setting, and write docs/measured/error.md
+	PYTHONPATH=tests $(BIN)/python -m bench error $(BENCH)
 
 bench-packets: $(VENV)/installed-bench ## Measure rays in packets of every width, with and without AVX-512, and write their page
 	PYTHONPATH=tests $(BIN)/python -m bench packets $(BENCH)

@@ -21,7 +21,7 @@
         scaling.py     time per image against the size of a job
         parts.py, sweeps.py, page.py   results -> docs/measured/speed.md
     error/    the error of images
-        error.py       the distance of each variant from a reference
+        error.py, error_page.py   the distance of each variant from a reference -> docs/measured/error.md
         squares.py     squared bias without noise, and its standard error
         regions.py     silhouettes, textures, disocclusions and other parts of a picture
         camera_paths.py   cameras that move as a job says, fast, or close to a surface

@@ -21,6 +21,7 @@ from bench.core.results import folder, limited, load, save
 from bench.core.steady import steady
 from bench.error import bias, error, reported, reports
 from bench.error import bias_page as biaspage
+from bench.error import error_page as errorpage
 from bench.peers import cycles, mitsuba3, peers
 from bench.speed import first, packets, processes, scaling, speed
 from bench.speed import page as table
@@ -31,7 +32,7 @@ from bench.truth.traced import Place, trace_here
 from bench.view import page as viewpage
 
 PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
-PARTS = ("speed", "error", "peers", "memory", "startup")
+PARTS = ("speed", "peers", "memory", "startup")
 TRACES = ("trace", "trace-means")
 # As `make test-avx2` limits the tests.
 AVX2 = {"FRAMEARRAY_EMBREE": "isa=avx2", "NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": "+avx2"}
@@ -40,6 +41,7 @@ OTHERS = (
     "flicker",
     "trace-place",
     "scaling",
+    "error",
     "packets",
     "report",
     "bias",
@@ -111,6 +113,11 @@ def main() -> None:
             save(out, f"reported-{name}", {"rows": reported.measure(name, out)})
         reported.write([row for name in JOBS if (kept := load(out, f"reported-{name}")) for row in kept["rows"]])
         return
+    if args.what == "error":
+        for name in jobs:
+            save(out, f"error-{name}", error.measure(name, args.quick, out))
+        errorpage.write(args.quick)
+        return
     if args.what == "packets":
         for name in jobs:
             save(out, f"packets-{name}", packets.measure(name, args.quick))
@@ -131,8 +138,6 @@ def main() -> None:
     for name in jobs:
         if "speed" in todo:
             save(out, f"speed-{name}", speed.measure(name, args.quick, args.runs, args.patience))
-        if "error" in todo:
-            save(out, f"error-{name}", error.measure(name, args.quick, out))
         if "peers" in todo:
             for program in PROGRAMS:
                 save(out, f"{program}-{name}", peers.measure(program, name, args.quick))
@@ -143,8 +148,6 @@ def main() -> None:
     if "scaling" in todo:
         save(out, "scaling", scaling.measure(args.quick))
     table.write(args.quick)
-    if not limited():
-        biaspage.write(args.quick)
 
 
 def peak(name: str, variant: Variant, args: argparse.Namespace) -> dict[str, object]:

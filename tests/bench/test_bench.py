@@ -1,18 +1,25 @@
 """The parts of tests/bench that compute or write without measuring: metrics, tables, resampled lights, pieces."""
 
+import os
+
 import numpy as np
 import pytest
+from support import ROOT
 
+from bench.core.cases import BY_AREA, FRAME_ARRAY, REDUCED, SCRATCH, VARIANTS
 from bench.core.markdown import grid, number, percent
 from bench.core.results import DOCS, load, median, save, site_for, site_in
 from bench.core.steady import mean
 from bench.error import reports
 from bench.error.bias_page import at_most, at_time
+from bench.speed.processes import environment
 from bench.speed.recording import COHERENT, KEPT_ROWS, OCCLUDED, PIECE, Recording, cut, regroup
 from bench.speed.scaling import resampled
+from bench.speed.speed import FORMATS, WRITTEN
 from framearray_cli.engine.inputs.lights import DIRECTIONAL, POINT, LightArrays
 from framearray_cli.report.metrics import block_mean, errors, relmse, rmse, shadow_edges, squared_bias
 
+WITH_WRITING = [variant for variant in VARIANTS if variant.writes]
 SETTINGS = [
     {"name": "as the job says", "one_light": False, "ms": 5.0, "rmse": 0.1, "bias": 0.01, "noise": 0.09, "flip": 0.05,
      "flicker_camera": 0.02, "accepted_hits": 13.0, "times_faster_than_scratch": 40.0, "on_the_front": True},
@@ -173,6 +180,20 @@ def test_a_bound_counts_noise_against_balance():
     average = {"bias": 10.0, "error": 0.1}
     assert at_most({"bias": -1.0, "error": 0.2}, average) == pytest.approx(0.06)
     assert at_most({"bias": 0.5, "error": 0.2}, average) == pytest.approx(0.11)
+
+
+def test_programs_of_their_own_find_what_this_one_finds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Mitsuba may lie in a folder of PYTHONPATH."""
+    monkeypatch.setenv("PYTHONPATH", "/somewhere")
+    places = environment()["PYTHONPATH"].split(os.pathsep)
+    assert places == [str(ROOT), str(ROOT / "tests"), "/somewhere"]
+
+
+def test_variants_are_written_in_known_containers() -> None:
+    """Ratios between variants need one container that all of them are written in."""
+    assert all(WRITTEN in variant.writes and set(variant.writes) <= set(FORMATS) for variant in WITH_WRITING)
+    assert {FRAME_ARRAY, BY_AREA, REDUCED, SCRATCH} <= set(WITH_WRITING)
+    assert all(variant.frames for variant in WITH_WRITING)
 
 
 def test_pages_find_their_plots(tmp_path):

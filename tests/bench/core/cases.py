@@ -26,16 +26,16 @@ class Variant:
     Attributes:
         name: in results and tables.
         settings: those of a report.
-        frames: cameras of one timed run; 0: measure only its error, and its time from one short run.
+        frames: cameras of one timed run; 0: measure only its error.
         floor: replay its rays through Embree only.
-        writes: time it with writing, too.
+        writes: the containers to time it with writing in, too; names of `FORMATS` in `bench/speed/speed.py`.
     """
 
     name: str
     settings: Settings
     frames: int = 0
     floor: bool = False
-    writes: bool = False
+    writes: tuple[str, ...] = ()
 
 
 USUAL_SETTINGS = Settings(
@@ -43,21 +43,24 @@ USUAL_SETTINGS = Settings(
 )
 
 
-def make_variant(name: str, *, frames: int = 0, floor: bool = False, writes: bool = False, **changes: Any) -> Variant:
+def make_variant(
+    name: str, *, frames: int = 0, floor: bool = False, writes: tuple[str, ...] = (), **changes: Any
+) -> Variant:
     """Return a variant of the usual settings, with changes."""
     return Variant(name=name, settings=replace(USUAL_SETTINGS, **changes), frames=frames, floor=floor, writes=writes)
 
 
-FRAME_ARRAY = make_variant("frame array", frames=4, floor=True, writes=True)
-REDUCED = make_variant("shadow_step 4", shadow_step=4, frames=4, floor=True, writes=True)
-SCRATCH = make_variant("from scratch", n_r=0, hits=14, one_light=True, frames=4, floor=True, writes=True)
+FRAME_ARRAY = make_variant("frame array", frames=4, floor=True, writes=("zip:1", "none"))
+BY_AREA = make_variant("weights area", weights="area", frames=4, floor=True, writes=("none",))
+REDUCED = make_variant("shadow_step 4", shadow_step=4, frames=4, floor=True, writes=("none",))
+SCRATCH = make_variant("from scratch", n_r=0, hits=14, one_light=True, frames=1, floor=True, writes=("none",))
 LIGHT_REUSE = make_variant("light reuse only", n_r=0, hits=14, frames=1)
 CAMERA_REUSE = make_variant("camera reuse only", one_light=True, frames=3)
 
 VARIANTS: tuple[Variant, ...] = (
     FRAME_ARRAY,
     make_variant("weights balance", weights="balance", frames=4, floor=True),
-    make_variant("weights area", weights="area", frames=4, floor=True),
+    BY_AREA,
     make_variant("shadow_step 2", shadow_step=2),
     REDUCED,
     make_variant("shadow_step 8", shadow_step=8, frames=4),

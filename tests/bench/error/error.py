@@ -1,4 +1,4 @@
-"""The distance of each variant's images from the reference, beside their cost."""
+"""The distance of each variant's images from the reference."""
 
 import tempfile
 import time
@@ -19,14 +19,13 @@ from bench.core.cases import (
     Variant,
     job_named,
     open_case,
-    parts_of,
     with_lights,
     with_settings,
 )
 from bench.core.frames import frame
 from bench.core.machine import busy
 from bench.core.results import Table
-from bench.core.steady import mean, steady
+from bench.core.steady import mean
 from bench.speed.speed import log
 from framearray_cli.array.images.images import ImageFormat, read_image, write_image
 from framearray_cli.base.arrays import Images
@@ -77,8 +76,6 @@ def measure(name: str, quick: bool, folder: Path, variants: Sequence[Variant] = 
             found[variant.name] = compare(case, l, pairs, references)
             found[variant.name]["flicker"] = flicker(case, l, pairs, references)
             found[variant.name]["added"] = added(variant, pairs, exact, references, case, l)
-            if not variant.frames:
-                found[variant.name]["ms"] = _time(case, variant)
             log(f"{name}: {variant.name}: RMSE {found[variant.name]['rmse']:.2%}")
         return {
             "epsilon": 0.01,
@@ -159,11 +156,6 @@ def added(
             right = wanted.image(k, case.ambient.intensity[l[k]])
             shares.append(rmse(pair[0][k], other[k]) / float(right.mean(dtype=np.float64)))
     return sum(shares) / len(shares)
-
-
-def _time(case: Case, variant: Variant) -> float:
-    parts = parts_of(case, variant)
-    return sum(steady(part, 2).ms for part in parts) / len(parts)
 
 
 def containers(case: Case, c: int, l: Sequence[int]) -> dict[str, Table]:

@@ -25,8 +25,8 @@ from .recording import COHERENT, WALKS, Recording, record, record_ambient, regro
 from .speed import log
 
 WIDTHS = (1, 4, 8, 16)
-RUNS = 5
-MOST_RAYS = 2_000_000  # of a kind
+RUNS = 3
+MOST_RAYS = 500_000  # of a kind
 
 
 def measure(name: str, quick: bool) -> Table:

@@ -20,7 +20,6 @@ def write(quick: bool) -> None:
 def render(results: Path, site: Site) -> str:
     """The whole page; parts without results are left out."""
     speed = {name: table for name in JOBS if (table := load(results, f"speed-{name}"))}
-    error = {name: table for name in JOBS if (table := load(results, f"error-{name}"))}
     mitsuba = {name: table for name in JOBS if (table := load(results, f"mitsuba-{name}"))}
     cycles = {name: table for name in JOBS if (table := load(results, f"cycles-{name}"))}
     memory, startup, scaling = (load(results, name) for name in ("memory", "startup", "scaling"))
@@ -32,8 +31,6 @@ def render(results: Path, site: Site) -> str:
         parts += [*pages.summary(speed, mitsuba), *pages.cost(speed), *pages.stages(speed), *pages.writing(speed)]
     if mitsuba:
         parts += pages.peers(speed, mitsuba, cycles)
-    if error:
-        parts += [*pages.errors(error, speed), *pages.containers(error)]
     if memory:
         parts += pages.memory(memory)
     if startup:

@@ -3,7 +3,7 @@
 import statistics
 from collections.abc import Mapping, Sequence
 
-from bench.core.cases import FRAME_ARRAY, JOBS, REDUCED, SCRATCH, VARIANTS
+from bench.core.cases import BY_AREA, FRAME_ARRAY, JOBS, REDUCED, SCRATCH, VARIANTS
 from bench.core.markdown import grid, number, percent, times, total
 from bench.core.results import Table
 
@@ -15,8 +15,8 @@ HEAD = """
 # Speed
 
 The cost of an image, beside the time that Embree needs only to trace the same rays and beside rendering every image
-from scratch, and the error of the images. `make bench` and `make bench-scaling` measure and write this page;
-`tests/bench/` says how. Times are those of one machine: compare the ratios.
+from scratch. `make bench` and `make bench-scaling` measure and write this page; `tests/bench/` says how. Times are
+those of one machine: compare the ratios. [Error](error.md) has the error of the images.
 """
 
 # Kinds of rays, as the program counts them, by the stage that traces them.
@@ -54,9 +54,9 @@ def summary(speed: Mapping[str, Table], mitsuba: Mapping[str, Table]) -> list[st
     rows = []
     for name, table in speed.items():
         found = table["median"]
-        array, reduced, scratch = (found[v.name] for v in (FRAME_ARRAY, REDUCED, SCRATCH))
+        array, area, reduced, scratch = (found[v.name] for v in (FRAME_ARRAY, BY_AREA, REDUCED, SCRATCH))
         peer = mitsuba.get(name, {})
-        written = array["written"][WRITTEN]["ms"]
+        written, by_area = (t["written"][WRITTEN]["ms"] for t in (array, area))
         rows.append(
             [
                 f"`jobs/{name}.toml`",
@@ -66,12 +66,13 @@ def summary(speed: Mapping[str, Table], mitsuba: Mapping[str, Table]) -> list[st
                 times(scratch["ms"] / reduced["ms"]),
                 number(written),
                 times(scratch["written"][WRITTEN]["ms"] / written),
-                times(peer["written_ms"] / written) if "written_ms" in peer else "",
+                *(times(peer["written_ms"] / own) if "written_ms" in peer else "" for own in (written, by_area)),
             ]
         )
     head = [
         "job", "ms per image", "to the floor", "from scratch takes", "same, to `shadow_step` 4",
         "written, ms", "from scratch, written", "Mitsuba, written",
+        "same, to weights `area`",
     ]  # fmt: skip
     runs = min(len(tables) for table in speed.values() for tables in table["runs"].values())
     about = f"""
@@ -167,13 +168,18 @@ def writing(speed: Mapping[str, Table]) -> list[str]:
             t, scratch = table["median"][variant], table["median"][SCRATCH.name]
             cells = [f"{name}, {variant}", number(t["ms"])]
             for stored in FORMATS:
+                if stored not in t["written"]:
+                    cells += [""] * 3
+                    continue
                 ms = t["written"][stored]["ms"]
                 own = t["written"][stored]["stages"]["writing"]
-                cells += [number(ms), times(ms / t["ms"]), number(own), times(scratch["written"][stored]["ms"] / ms)]
+                cells += [number(ms), times(ms / t["ms"]), number(own)]
+            cells.append(times(scratch["written"][WRITTEN]["ms"] / t["written"][WRITTEN]["ms"]))
             rows.append(cells)
     head = ["", "not written, ms"]
     for stored in FORMATS:
-        head += [f"`{stored}`, ms", "longer by", "writing, processor ms", "from scratch takes"]
+        head += [f"`{stored}`, ms", "longer by", "writing, processor ms"]
+    head.append(f"from scratch, `{WRITTEN}`, takes")
     return ["## Writing", "Half EXR to a temporary folder, beside the tracing.", grid(head, rows)]
 
 
@@ -208,71 +214,6 @@ def peers(speed: Mapping[str, Table], mitsuba: Mapping[str, Table], cycles: Mapp
   another picture. It takes materials and lights as they are, textures as their mean colour, and no mirrors.
 """
     return ["## Other programs", about, *([grid(head, rows)] if rows else []), "\n".join(why)]
-
-
-def errors(error: Mapping[str, Table], speed: Mapping[str, Table]) -> list[str]:
-    """Error beside time, by job."""
-    first = next(iter(error.values()))
-    about = f"""
-Against references with reuse off, other seeds and {first["hits"]} native hits per pixel, made in two halves. Ambient
-light is the same for all. Errors are relative to the mean of the reference, averaged over
-{len(first["lights"])} light positions:
-
-- *RMSE*; *relMSE*: mean of (I - R)^2 / (R^2 + {first["epsilon"]}); *mean error*: mean of I - R.
-- *At shadow edges*: RMSE and largest error where irradiance jumps, but neither normal nor depth.
-- *Bias*: root of the squared bias, from two runs and the two halves, whose noise is independent: it contains no
-  noise. Where the squared bias is less than twice its standard error, "below" that.
-- *Added*: RMSE of the difference to exact shadows with the same random numbers.
-- *Flicker*: RMSE of the change of the error from one frame of the camera path to the next, over sqrt 2: equal to
-  *RMSE* where the errors of two frames are independent.
-"""
-    head = ["", "ms", "RMSE", "relMSE", "mean error", "edges, RMSE", "edges, most", "bias", "added", "flicker"]
-    parts = ["## Error beside time", about]
-    for name, table in error.items():
-        rows = []
-        for variant, t in table["variants"].items():
-            timed = speed.get(name, {}).get("median", {}).get(variant, {})  # only if timed with the same cameras
-            rows.append(
-                [
-                    variant,
-                    number(timed["ms"]) if "ms" in timed else "",
-                    percent(t["rmse"]),
-                    number(t["relmse"]),
-                    percent(t["bias"], 2),
-                    percent(t["edge_rmse"]),
-                    percent(t["edge_max"]),
-                    _bias(t),
-                    percent(t["added"]) if t["added"] else "",
-                    percent(t["flicker"]),
-                ]
-            )
-        known = f"The reference's own RMSE is {percent(table['noise'], 2)}."
-        parts += [f"### Error: {name}", f"Camera {', '.join(map(str, table['cameras']))}. {known}", grid(head, rows)]
-    return parts
-
-
-def _bias(t: Table) -> str:
-    square, spread = t["squared_bias"], t["squared_bias_error"]
-    if square < 2 * spread:
-        return f"below {percent((max(square, 0) + 2 * spread) ** 0.5, 2)}"
-    return percent(square**0.5, 2)
-
-
-def containers(error: Mapping[str, Table]) -> list[str]:
-    """Ways to store an image."""
-    name, table = next(iter(error.items()))
-    rows = [
-        [
-            stored,
-            number(t["cpu_ms"]),
-            number(t["wall_ms"]),
-            number(t["bytes"] / 1024),
-            percent(t["rmse"], 2) if "rmse" in t else "",
-        ]
-        for stored, t in table["formats"].items()
-    ]
-    head = ["", "one thread, processor ms", "all threads, ms per image", "KiB", "RMSE added"]
-    return ["## Containers", f"An image of {name}, with no other work.", grid(head, rows)]
 
 
 def memory(found: Table) -> list[str]:

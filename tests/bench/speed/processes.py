@@ -19,7 +19,7 @@ from framearray_cli.job.read import job_table
 
 from .speed import log
 
-REPEATS = 5
+REPEATS = 3
 PROGRAM = (sys.executable, "-m", "framearray_cli")
 # Traces one ray, then does everything before the first frame, and reports the end of each.
 FIRST_RAYS = """
@@ -40,7 +40,8 @@ with open_embree(prepared) as embree:
 def environment(**changes: str) -> dict[str, str]:
     """The environment of a process that runs the program of this checkout as a user would."""
     kept = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
-    return {**kept, "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'tests'}", **changes}
+    places = [str(ROOT), str(ROOT / "tests"), *filter(None, [kept.get("PYTHONPATH")])]
+    return {**kept, "PYTHONPATH": os.pathsep.join(places), **changes}
 
 
 def start_up(quick: bool) -> Table:
@@ -108,7 +109,7 @@ def memory(quick: bool, jobs: Sequence[str] = JOBS) -> Table:
     found: Table = {}
     for name in jobs:
         found[name] = {}
-        for variant in ("frame array", "weights balance"):
+        for variant in ("frame array", "weights area"):
             found[name][variant] = asked("peak", name, "--variant", variant, *(["--quick"] if quick else []))
             log(f"{name}: {variant}: {found[name][variant]['peak'] / 2**30:.2f} GiB at most")
     return found

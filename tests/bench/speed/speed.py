@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from bench.core.cases import VARIANTS, Case, Variant, job_named, open_case, parts_of
 from bench.core.machine import describe, quiet
 from bench.core.markdown import total
-from bench.core.results import Table, median
+from bench.core.results import Table, limited, median
 from bench.core.steady import start_of, steady_mean
 from framearray_cli.array.images.images import ImageFormat
 
@@ -21,7 +21,7 @@ FORMATS = {
     "none": ImageFormat(compression="none", half="always"),
 }
 WRITTEN = "none"  # the default of jobs
-RUNS = 3
+RUNS = 2
 
 
 def places_of(runs: int) -> list[float]:
@@ -34,10 +34,13 @@ def measure(
 ) -> Table:
     """Measure a job: variant -> medians of its runs; variants without `frames` are left out.
 
+    With fewer instructions only those with a floor are measured.
+
     Args:
         patience: seconds to wait, before each measurement, for other programs to free the cores.
     """
-    timed = [v for v in variants if v.frames and not (v.denoise and find_spec("pyoidn") is None)]
+    timed = [v for v in variants if v.frames and (v.floor or not limited())]
+    timed = [v for v in timed if not (v.settings.denoise and find_spec("pyoidn") is None)]
     found: dict[str, list[Table]] = {variant.name: [] for variant in timed}
     shares: list[float] = []
     with open_case(job_named(name, quick)) as case:
@@ -68,9 +71,8 @@ def measure(
 def measure_once(case: Case, variant: Variant, place: float) -> Table:
     """Measure one variant at one place of the path, with its floor and with writing where it asks for them."""
     parts = parts_of(case, variant)
-    names = FORMATS if variant.writes else {}
-    table, *written = steady_mean(parts, variant.frames, [None, *(FORMATS[name] for name in names)], place)
-    table["written"] = dict(zip(names, written, strict=True))
+    table, *written = steady_mean(parts, variant.frames, [None, *(FORMATS[name] for name in variant.writes)], place)
+    table["written"] = dict(zip(variant.writes, written, strict=True))
     if variant.floor:
         part = parts[len(parts) // 2]
         first = start_of(part, variant.frames, place)
