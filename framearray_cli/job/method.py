@@ -152,6 +152,12 @@ class IndirectTable(Table):
         "0: none.",
     )
 
+    exact: bool = Field(
+        default=False,
+        description="Follow a path from each hit in place of every ray that reads a cell: for references, with many "
+        "hits. No cells are built and nothing is smoothed, so the mean is right, and pixels are noisy.",
+    )
+
     @model_validator(mode="after")
     def _of_cells(self) -> "IndirectTable":
         given, problems = self.model_fields_set, []
@@ -161,6 +167,11 @@ class IndirectTable(Table):
         if self.method != "cells" and "filter" in given:
             problem = 'expected method = "cells" beside it: it smooths what rays read from cells'
             problems.append((("filter",), problem))
+        if self.exact and self.method != "cells":
+            problems.append((("exact",), 'expected false, or method = "cells" beside it: it takes the place of cells'))
+        elif self.exact:
+            problem = "expected no value, as exact = true builds no cells and smooths nothing; remove one of the two"
+            problems += [((key,), problem) for key in sorted(given & {"cell", "samples", "filter"})]
         if problems:
             fail(problems)
         return self

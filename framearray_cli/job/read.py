@@ -54,6 +54,10 @@ def job_table(job: Job) -> dict[str, Any]:
         table["ambient"] = {"intensity": table["ambient"]["intensity"]}
     if job.indirect.method == "obscurance":  # as in jobs of versions without this table
         del table["indirect"]
+    elif job.indirect.exact:  # excludes the keys of cells
+        table["indirect"] = {"method": "cells", "exact": True}
+    else:
+        del table["indirect"]["exact"]
     del table["samples"]["most_hits" if job.samples.error is None else "hits"]  # a job has either
     return table
 

@@ -23,6 +23,7 @@ from framearray_cli.engine.terms.ambient.fitted import ObscuranceCurve, ambient_
 from framearray_cli.engine.terms.ambient.from_eyes import EyeWalks, ambient_by_eye, fixed_ambient
 from framearray_cli.engine.terms.ambient.from_lights import LightWalks, ambient_by_light
 from framearray_cli.engine.terms.cells.build import CellWork, build_cells
+from framearray_cli.engine.terms.cells.exact import coloured, no_cells
 from framearray_cli.engine.terms.cells.residual import Accuracy, compare_with_paths
 from framearray_cli.engine.terms.cells.samples import SampleWalks
 from framearray_cli.engine.terms.falloff import FALLOFFS
@@ -86,12 +87,13 @@ def prepare(job: Job) -> Prepared:
 
 def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepared:
     """Put together a job, its scene, and the eyes and lights to render: those of the job, or a few of them."""
+    arrays = light_arrays(lights, scene.centre)
     return Prepared(
         job=job,
         scene=scene,
         eyes=eyes,
         lights=lights,
-        light_arrays=light_arrays(lights, scene.centre),
+        light_arrays=coloured(arrays) if job.indirect.exact else arrays,
         surfaces=surfaces(scene),
         still=eyes.at_rest,
     )
@@ -152,6 +154,8 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambi
         denoise=job.denoise.obscurance,
         halves=_halves(job, still=prepared.still),
     )
+    if job.indirect.exact:
+        return replace(setup, cells=no_cells(setup.lights, background), exact=True), ambient
     if job.indirect.method != "obscurance":
         return _with_cells(prepared, embree, setup, ambient)
     return setup, ambient

@@ -1,10 +1,12 @@
 """The table `[indirect]`: what does not go together, and jobs without it."""
 
+from pathlib import Path
+
 import pytest
 from pydantic import ValidationError
 from support import tiny
 
-from framearray_cli.job.read import job_table
+from framearray_cli.job.read import job_of_table, job_table
 
 CELLS = {"method": "cells"}
 
@@ -27,6 +29,25 @@ def test_the_filter_needs_gather_rays(method: str) -> None:
     with pytest.raises(ValidationError, match='expected method = "cells" beside it: it smooths'):
         tiny.job(indirect={"method": method, "filter": 1})
     tiny.job(indirect={"method": "cells", "filter": 1})
+
+
+@pytest.mark.parametrize("more", [{"cell": 0.1}, {"samples": 2048}, {"filter": 0}])
+def test_paths_take_no_keys_of_cells(more: dict[str, float]) -> None:
+    with pytest.raises(ValidationError, match="expected no value, as exact = true builds no cells"):
+        tiny.job(indirect={**CELLS, "exact": True, **more})
+
+
+@pytest.mark.parametrize("method", ["obscurance", "local"])
+def test_paths_take_the_place_of_cells(method: str) -> None:
+    with pytest.raises(ValidationError, match='expected false, or method = "cells" beside it'):
+        tiny.job(indirect={"method": method, "exact": True})
+
+
+def test_a_job_with_paths_reads_back() -> None:
+    job = tiny.job(indirect={**CELLS, "exact": True})
+    table = job_table(job)
+    assert table["indirect"] == {"method": "cells", "exact": True}
+    assert job_of_table(table, Path("job"), job.output.directory).indirect == job.indirect
 
 
 def test_a_job_without_cells_is_written_as_before() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..hits.hits import empty_hits
 from ..hits.rays import room_for_hits, room_for_tests
+from ..terms.cells.exact import PathScratch
 from ..terms.cells.lookups import room_for_gathering, room_for_near
 from ..terms.cells.mirrored import room_for_mirrors
 from ..terms.cells.smooth import room_for_smoothing
@@ -33,6 +34,7 @@ class Scratch:
         gather, near: of gather rays, and of those too short for cells; and `constant`: (batch, 3) the light that cells
             have at every light position, `closeness`: (batch,) of their rays; None and empty without cells.
         mirrors: of gather rays that meet mirrors; empty without.
+        paths: of indirect light by paths; None without.
         smooth: of the filter of indirect light; None without.
         rays: number of rays traced by kind; `seconds`: by stage.
     """
@@ -61,6 +63,7 @@ class Scratch:
         self.mirrors = room_for_mirrors(min(rays, RAYS_TOGETHER), setup.depth if near else 0)
         self.closeness = np.empty(batch if near else 0, np.float32)
         self.constant = np.empty((batch if setup.cells is not None else 0, 3), np.float32)
+        self.paths = PathScratch(setup.lights) if setup.exact else None
         self.smooth = room_for_smoothing(setup.lights.channels * len(setup.kept)) if setup.smooth else None
         self.rays: Counter[str] = Counter()
         self.seconds: defaultdict[str, float] = defaultdict(float)

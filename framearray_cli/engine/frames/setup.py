@@ -44,6 +44,7 @@ class FrameSetup:
             half, or 0 for no split.
         cells: the light that indirect light is gathered from, at the kept light positions; None: obscurances.
         local: whether `cells` hold the ambient light of obscurances, see `terms/cells/local.py`; else all light.
+        exact: whether paths take the place of `cells`, which then hold nothing, see `terms/cells/exact.py`.
         smooth: number of passes of the filter of indirect light from cells.
         order: (n_pixels,) every pixel once, in the order of tracing.
     """
@@ -71,6 +72,7 @@ class FrameSetup:
     allotment: Allotment | None = None
     cells: Cells | None = None
     local: bool = False
+    exact: bool = False
     smooth: int = 0
     order: Int32 = field(init=False)
 

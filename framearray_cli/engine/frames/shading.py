@@ -9,6 +9,7 @@ from framearray_cli.base.arrays import Float32, Rgb
 from ..hits.hits import ESCAPED, Hits
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, bits, load
+from ..terms.cells.exact import light_of_paths
 from ..terms.cells.gather import Gathered, gather_cells, gather_settings
 from ..terms.cells.local import read_cells
 from ..terms.cells.smooth import smooth_light
@@ -74,12 +75,17 @@ def _estimate_indirect(
     """Estimate W, and the indirect light of cells where the job has them; return the number of rays."""
     rays: int
     gathered = Gathered(scratch.obscurance, scratch.skylight, out.indirect, scratch.constant, scratch.closeness)
-    if setup.cells is None or scratch.gather is None or scratch.near is None or setup.local:
+    if setup.cells is None or scratch.gather is None or scratch.near is None or setup.local or setup.exact:
         rays = obscurance(
             hits, n, setup.obscurance, setup.surfaces, setup.tracer, scratch.hit_rays, scratch.obscurance,
             scratch.skylight, neighbours,
         )  # fmt: skip
-        if setup.cells is not None and scratch.gather is not None:
+        if scratch.paths is not None:
+            rays += light_of_paths(
+                hits, n, setup.obscurance.n_rays, setup.world, setup.lights, setup.kept, setup.background,
+                scratch.paths, gathered,
+            )  # fmt: skip
+        elif setup.cells is not None and scratch.gather is not None:
             rays += read_cells(hits, n, setup.cells, setup.tracer, scratch.gather, scratch.test_rays, gathered)
     else:
         rays = gather_cells(
