@@ -10,6 +10,7 @@ from framearray_cli.base.units import FARTHEST
 from .keys import MOST_EYES
 from .placed import Angle, DirectionalKey, DirectionalSource, PointSource
 from .sourcetable import SourceTable
+from .spot import SpotSource
 from .times import Clock, Dates, Zone, clock_minutes
 from .values import Colour, Direction, Emission, GridSize, Point
 
@@ -162,5 +163,5 @@ class SunSource(SourceTable):
 
 
 LightSource: TypeAlias = Annotated[
-    PointSource | DirectionalSource | SunSource | DomeSource | GridSource, Field(discriminator="type")
+    PointSource | DirectionalSource | SpotSource | SunSource | DomeSource | GridSource, Field(discriminator="type")
 ]

@@ -21,7 +21,7 @@ from framearray_cli.job.read import job_table
 
 from .prepare import Prepared
 
-PLACED_BY_KEYS = ("point", "directional")  # kinds of sources; suns and domes may depend on the up axis
+PLACED_BY_KEYS = ("point", "directional", "spot")  # kinds of sources; suns and domes may depend on the up axis
 _DEFAULTS: dict[str, type[Table]] = {"obscurance": ObscuranceTable, "samples": SamplesTable}
 
 

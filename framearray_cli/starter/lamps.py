@@ -61,7 +61,7 @@ def lit_shares(probe: Probe, eyes: Float64, targets: Float64, up_dir: Float64, l
     for source in lights[:MOST_LIT_BY]:
         vector = np.clip(source.vectors[len(source.vectors) // 2], -FARTHEST, FARTHEST)
         far = 4 * float(np.linalg.norm(np.ptp(probe.scene.corners, axis=(0, 1))))
-        end = vector - probe.scene.centre if source.kind == "point" else points - far * vector
+        end = vector - probe.scene.centre if source.kind != "directional" else points - far * vector
         lit |= ~probe.blocked(points, end)
     return np.asarray(
         (lit & seen.hit).reshape(n, rays).sum(axis=1) / np.maximum(seen.hit.reshape(n, rays).sum(axis=1), 1)

@@ -14,7 +14,11 @@ from framearray_cli.job.job import Job
 
 MOST_PROBLEMS = 3  # of a job that one error reports; a light that is nowhere has one per key
 Vector = tuple[float, float, float]
-POWERS = {"point": ("position", "intensity"), "directional": ("direction", "irradiance")}
+POWERS = {
+    "point": ("position", "intensity"),
+    "directional": ("direction", "irradiance"),
+    "spot": ("position", "intensity"),
+}
 SUN_ANGLE = 0.53  # degrees; of the sun, seen from the Earth
 DIGITS = 6  # significant digits of positions and directions; an error of a thousandth of a pixel
 
@@ -49,14 +53,18 @@ class LightKeys:
     """A light's path: its frames, and its position or direction and its power at each.
 
     Attributes:
+        aims: of a spot: the way the middle of its light goes.
+        cone_deg: of a spot: its angles `inner` and `outer`.
         name: for a group.
     """
 
-    kind: Literal["point", "directional"]
+    kind: Literal["point", "directional", "spot"]
     frames: tuple[int, ...]
     vectors: tuple[Vector, ...]
     powers: tuple[Vector, ...]
     about: tuple[str, ...]
+    aims: tuple[Vector, ...] = ()
+    cone_deg: tuple[float, float] | None = None
     name: str = "lamp"
     group: str | None = None
 
@@ -206,7 +214,14 @@ def source_table(source: LightSource) -> dict[str, Any]:
 def source_keys(source: LightKeys) -> list[dict[str, Any]]:
     """The key frames of a source."""
     place, power = POWERS[source.kind]
-    return [
+    keys: list[dict[str, Any]] = [
         {"frame": frame, place: list(vector), power: list(strength)}
         for frame, vector, strength in zip(source.frames, source.vectors, source.powers, strict=True)
+    ]
+    if source.cone_deg is None:
+        return keys
+    inner, outer = source.cone_deg
+    return [
+        key | {"direction": list(aim), "inner": inner, "outer": outer}
+        for key, aim in zip(keys, source.aims, strict=True)
     ]

@@ -5,6 +5,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError, SceneError
 from framearray_cli.base.units import counted
+from framearray_cli.job.spot import NARROWEST
 from framearray_cli.scene.files import Stage, StageCamera, StageLight
 
 from .model import DIGITS, Camera, EyeKey, LightKeys, round_vector
@@ -92,27 +93,30 @@ def convert_lights(stage: Stage, wanted: int | None) -> tuple[tuple[LightKeys, .
 
 
 def _light_vectors(stage: Stage, light: StageLight, times: list[float]) -> Float64:
-    """Positions or directions of a light, (n, 3)."""
+    """Positions or directions of a light, (n, 3), or both of a spot, (n, 6)."""
     matrices = stage.world_from(light.node, times)
-    if light.kind == "directional":
-        return _normalize(-matrices[:, :3, 2], light.name)
-    if not np.isfinite(matrices[:, :3, 3]).all():
+    place = matrices[:, :3, 3]
+    if light.kind != "directional" and not np.isfinite(place).all():
         raise SceneError(f'the light "{light.name}" is nowhere: its node has no finite place')
-    return matrices[:, :3, 3]
+    if light.kind == "point":
+        return place
+    way = _normalize(-matrices[:, :3, 2], light.name)
+    return way if light.kind == "directional" else np.concatenate([place, way], axis=1)
 
 
 def _convert_light(light: StageLight, vectors: Float64) -> LightKeys:
     n = len(vectors) if (vectors != vectors[0]).any() else 1
     unit = "lx" if light.kind == "directional" else "cd"
     about = [f'the {light.kind} light "{light.name}" of the file, there {max(light.intensity):.4g} {unit}']
-    if light.kind == "spot":
-        about.append("a spot: here it shines to all sides, as there are no spots")
+    cone = light.cone_deg
     return LightKeys(
-        kind="directional" if light.kind == "directional" else "point",
+        kind=light.kind,
         frames=tuple(range(n)),
-        vectors=tuple(round_vector(vector) for vector in vectors[:n]),
+        vectors=tuple(round_vector(vector[:3]) for vector in vectors[:n]),
         powers=(light.intensity,) * n,
         about=tuple(about),
+        aims=tuple(round_vector(vector[3:]) for vector in vectors[:n]) if cone else (),
+        cone_deg=(round(min(cone), 4), round(max(max(cone), NARROWEST), 4)) if cone else None,
         name=light.name,
     )
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from framearray_cli.base.forms.text import inline, inline_floats, quoted
 
-from .model import SUN_ANGLE, Camera, LightSource, MaterialNote, Start, SunDay, source_keys
+from .model import POWERS, SUN_ANGLE, Camera, LightSource, MaterialNote, Start, SunDay, source_keys
 
 MOST_STEPS_UP = 2  # largest number of leading ".." of a relative scene name; beyond, it is absolute
 COLUMN = 42  # of comments behind keys
@@ -113,10 +113,14 @@ def _source(source: LightSource) -> list[str]:
     group = [_line("group", quoted(source.group), "stored separately, to change it afterwards")] if source.group else []
     if isinstance(source, SunDay):
         return [_line("type", '"sun"', "by place and time"), *group, *_sun(source)]
-    unit = "W/sr" if source.kind == "point" else "W/m2 of a surface that faces the light"
-    power = "intensity" if source.kind == "point" else "irradiance"
+    power = POWERS[source.kind][1]
+    unit = "W/m2 of a surface that faces the light" if power == "irradiance" else "W/sr"
     lines = [
-        _line("type", quoted(source.kind), '"point": a lamp; "directional": the sun; "sun": by place and time'),
+        _line(
+            "type",
+            quoted(source.kind),
+            '"point": a lamp; "spot": in a cone; "directional": the sun; "sun": by place and time',
+        ),
         *group,
         f"keys = [                                  # {power}: red, green, blue, {unit}",
         *(f"  {_inline(key)}," for key in source_keys(source)),
@@ -174,4 +178,7 @@ def _line(key: str, value: str, comment: str) -> str:
 
 
 def _inline(table: dict[str, Any]) -> str:
-    return inline({key: value if isinstance(value, int) else list(map(float, value)) for key, value in table.items()})
+    numbers = {
+        key: value if isinstance(value, int | float) else list(map(float, value)) for key, value in table.items()
+    }
+    return inline(numbers)

@@ -40,6 +40,19 @@ IN_PICTURE = {
     "keys": [{"frame": 0, "position": [0, 1, 1], "intensity": 3.0, "color": "2700 K", "radius": 0.05}],
 }
 SOFT_SUN = tiny.SUN | {"keys": [key | {"angle": 2.0 * k} for k, key in enumerate(tiny.SUN["keys"])]}
+SPOTS = [
+    {
+        "type": "spot",
+        "keys": [
+            {"frame": 2 * k, "position": [0.5, 1.9, k], "target": [0, 0, -k], "intensity": 3.0, "inner": 10.0 * k}
+            for k in range(2)
+        ],
+    },
+    {
+        "type": "spot",
+        "keys": [{"frame": 0, "position": [0, 1.9, 0], "direction": [0, -1, 0.2], "intensity": 3.0, "outer": 30.0}],
+    },
+]
 GROUPED = {
     "frames": 2,
     "axes": {"lamps": 2},
@@ -86,7 +99,7 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
         ),
         "sun": tiny.table(camera=small, light={"sources": [SUN], "frames": 3}, ambient={"method": "fit", "paths": 64}),
         "year": tiny.table(camera=small, light={"sources": [YEAR], "frames": 6}),
-        "domes": tiny.table(camera=small, light={"sources": [DOME, LAMPS, GRID, IN_PICTURE], "frames": 4}),
+        "domes": tiny.table(camera=small, light={"sources": [DOME, LAMPS, GRID, IN_PICTURE, *SPOTS], "frames": 4}),
         "automatic": tiny.table(
             camera=small | tiny.WALK, samples={"hits": "auto", "obscurance": 4}, reuse={"n_r": "auto"}, output=EXR
         ),

@@ -204,7 +204,8 @@ def test_a_camera_is_chosen_by_its_name(tmp_path: Path) -> None:
 def test_lights_of_the_file_keep_their_places_and_relative_strengths(tmp_path: Path) -> None:
     glb = room()
     lamp = glb.node(name="Lamp", **light(glb, intensity=1000.0, color=[1.0, 0.5, 0.25]))
-    glb.node(name="Beam", translation=[-1.0, 2.0, 1.0], **light(glb, "spot", intensity=500.0))
+    cone = {"innerConeAngle": 0.2, "outerConeAngle": 0.6}
+    glb.node(name="Beam", translation=[-1.0, 2.0, 1.0], **light(glb, "spot", intensity=500.0, spot=cone))
     down = {"rotation": [-QUARTER, 0.0, 0.0, QUARTER]}  # -z turned to -y
     glb.node(name="Sun", **down, **light(glb, "directional", intensity=30.0))
     glb.node(name="Off", **light(glb, intensity=0.0))
@@ -221,7 +222,8 @@ def test_lights_of_the_file_keep_their_places_and_relative_strengths(tmp_path: P
     np.testing.assert_allclose(moving.intensity[0], np.array([1000, 500, 250]) * factor, rtol=0.01)
     np.testing.assert_allclose(beam.intensity[0], 500 * factor, rtol=0.01)
     np.testing.assert_allclose(sun.intensity[0], 30 * factor, rtol=0.01)
-    assert "a spot: here it shines to all sides" in (tmp_path / "job.toml").read_text()
+    np.testing.assert_allclose(beam.cone.axis[0], [0, 0, -1], atol=1e-6)
+    np.testing.assert_allclose(beam.cone.angles_deg[0], np.degrees([0.2, 0.6]), atol=1e-4)
 
 
 def test_lights_that_light_nothing_give_way_to_chosen_ones(tmp_path: Path) -> None:

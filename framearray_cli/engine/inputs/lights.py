@@ -14,6 +14,7 @@ from framearray_cli.base.arrays import Float32, Float64, Int32, with_room
 from framearray_cli.scene.paths.paths import Lights
 
 POINT, DIRECTIONAL = 0, 1
+SHARPEST = 0.001  # width of a spot's edge, in cosines, over that of its cone
 KINDS = {"point": POINT, "directional": DIRECTIONAL}
 
 
@@ -27,6 +28,8 @@ class LightArrays(NamedTuple):
         lit: (n_sources, n_lights) 1 where a source shines, else 0.
         size: (n_sources, n_lights) the squared radius of a point source, or sin^2 of half the angle of a directional
             one; (0,) where no source has a size: kernels are then compiled without it.
+        cone: (n_sources, 5, n_lights) the unit axis of a spot, and a and b of its falloff, see `spot_share`; 0, 0 and 1
+            of other sources. (0,) where there are no spots: kernels are then compiled without them.
         colour: (n_lights, 3) factor of a stored irradiance; ones if there are 3 channels.
     """
 
@@ -35,6 +38,7 @@ class LightArrays(NamedTuple):
     strength: Float32
     lit: Float32
     size: Float32
+    cone: Float32
     colour: Float32
 
     @property
@@ -79,6 +83,7 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
         strength=np.asarray(strength.transpose(0, 2, 1), np.float32),
         lit=np.asarray((intensity > 0).any(axis=-1), np.float32),
         size=_sizes(lights),
+        cone=_cones(lights),
         colour=np.asarray(colour, np.float32),
     )
     return pad_lights(found)
@@ -95,6 +100,20 @@ def _sizes(lights: Lights) -> Float32:
     return found
 
 
+def _cones(lights: Lights) -> Float32:
+    """`LightArrays.cone`; a and b are those of glTF's KHR_lights_punctual."""
+    if all(source.cone is None for source in lights.sources):
+        return np.empty(0, np.float32)
+    found = np.zeros((len(lights.sources), 5, lights.n), np.float32)
+    found[:, 4] = 1.0
+    for rows, source in zip(found, lights.sources, strict=True):
+        if source.cone is not None:
+            inner, outer = np.cos(np.radians(source.cone.angles_deg.T))
+            a = 1 / np.maximum(inner - outer, SHARPEST * (1 - outer))
+            rows[:] = [*source.cone.axis.T, a, -a * outer]
+    return found
+
+
 def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
     """The lights at some of their positions, in the same units."""
     some = list(at)
@@ -103,6 +122,7 @@ def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
         strength=lights.strength[:, :, some],
         lit=lights.lit[:, some],
         size=lights.size[:, some] if lights.size.ndim > 1 else lights.size,
+        cone=lights.cone[:, :, some] if lights.cone.ndim > 1 else lights.cone,
         colour=lights.colour[some],
     )
     return pad_lights(found)

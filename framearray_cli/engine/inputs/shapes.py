@@ -8,14 +8,70 @@ height along the cone's axis says how far from the axis, the rest of it to which
 under the same random numbers at all light positions, without axes that could turn or jump.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from framearray_cli.base.arrays import Real, Triple
+from framearray_cli.base.arrays import Float64, Real, Triple
 
 from ..kernels.kernel import has_rows, inlined
-from ..kernels.simd import gather, select, sqrt
+from ..kernels.simd import gather, load, select, sqrt
 from .lights import DIRECTIONAL, LightArrays
 from .random import SOURCES, r2, random_word, sphere_point
+
+
+class SourceAt(NamedTuple):
+    """A source at one light position, or at those of the lanes; see `LightArrays`.
+
+    Attributes:
+        place: the source's position, or for a directional one the direction in which its light travels.
+        size: not read where no source has a size.
+        cone: axis, a and b; not read where there are no spots.
+        lit: 1 where the source shines, else 0.
+    """
+
+    place: Triple
+    size: Real
+    cone: tuple[Real, Real, Real, Real, Real]
+    lit: Real
+
+
+@inlined
+def source_at(lights: LightArrays, s: int, l: int) -> SourceAt:
+    """Source s at light position l."""
+    n_lights = lights.lit.shape[1]
+    one, five, at = s * n_lights + l, 5 * s * n_lights + l, lights.vector
+    return SourceAt(
+        (at[s, 0, l], at[s, 1, l], at[s, 2, l]),
+        gather(lights.size, one),
+        (
+            gather(lights.cone, five),
+            gather(lights.cone, five + n_lights),
+            gather(lights.cone, five + 2 * n_lights),
+            gather(lights.cone, five + 3 * n_lights),
+            gather(lights.cone, five + 4 * n_lights),
+        ),
+        lights.lit[s, l],
+    )
+
+
+@inlined
+def source_in_lanes(lights: LightArrays, s: int, l: int) -> SourceAt:
+    """Source s at light positions l to l + 15."""
+    n_lights = lights.lit.shape[1]
+    one, three, five = s * n_lights + l, 3 * s * n_lights + l, 5 * s * n_lights + l
+    return SourceAt(
+        (load(lights.vector, three), load(lights.vector, three + n_lights), load(lights.vector, three + 2 * n_lights)),
+        load(lights.size, one),
+        (
+            load(lights.cone, five),
+            load(lights.cone, five + n_lights),
+            load(lights.cone, five + 2 * n_lights),
+            load(lights.cone, five + 3 * n_lights),
+            load(lights.cone, five + 4 * n_lights),
+        ),
+        load(lights.lit, one),
+    )
 
 
 @inlined
@@ -27,31 +83,21 @@ def source_point(key: np.uint64, s: int) -> Triple:
 
 @inlined
 def vector_and_factor(
-    lights: LightArrays,
-    s: int,
-    x: Real,
-    y: Real,
-    z: Real,
-    size: Real,
-    p: Triple,
-    g: Triple,
-    m: Triple,
-    q: Triple,
-    lit: Real,
+    lights: LightArrays, s: int, source: SourceAt, p: Triple, g: Triple, m: Triple, q: Triple
 ) -> tuple[Real, Real, Real, Real]:
     """Vectors from points p to source s at one or more light positions, and the geometry factors of their irradiance.
 
     The irradiance is the factor times the strength: cos(theta) / d^2 for a point source, whose vector ends at the
     source, and cos(theta) for a directional one, whose vector has length 1. It is 0 where the source does not shine or
-    lies behind either normal. Of a source with a size it is the estimate by one direction, see `_cone_sample`.
+    lies behind either normal. Of a source with a size it is the estimate by one direction, see `_cone_sample`; a spot's
+    falls off towards its edge.
 
     Args:
-        x, y, z: the source's position, or for a directional one the direction in which its light travels.
-        size: see `LightArrays`; not read where no source has a size.
+        source: source s at these light positions.
         p, g, m: points, geometric and shading normals.
         q: see `source_point`; not read where no source has a size.
-        lit: 1 where the source shines, else 0.
     """
+    (x, y, z), size, cone, lit = source
     kind, nothing, one = lights.kind[s], np.float32(0.0), np.float32(1.0)
     # the vector to the source: L - P, or against the light's direction
     sign, from_point = (-one, nothing) if kind == DIRECTIONAL else (one, one)
@@ -60,7 +106,10 @@ def vector_and_factor(
         x, y, z, factor = _cone_sample(kind, x, y, z, size, q)
         cosine = x * m[0] + y * m[1] + z * m[2]
         in_front = (cosine > nothing) & (x * g[0] + y * g[1] + z * g[2] > nothing)
-        return x, y, z, select(in_front, cosine * factor * lit, nothing)
+        factor = cosine * factor * lit
+        if has_rows(lights.cone):
+            factor = factor * spot_share(cone, x, y, z)
+        return x, y, z, select(in_front, factor, nothing)
     # cos(theta), not yet divided by d; the source counts in front of both normals
     cosine = x * m[0] + y * m[1] + z * m[2]
     in_front = (cosine > nothing) & (x * g[0] + y * g[1] + z * g[2] > nothing)
@@ -69,7 +118,25 @@ def vector_and_factor(
     if kind != DIRECTIONAL:
         square = x * x + y * y + z * z
         factor = factor / (square * sqrt(square))
+    if has_rows(lights.cone):
+        factor = factor * spot_share(cone, x, y, z)
     return x, y, z, select(in_front, factor, nothing)
+
+
+@inlined
+def spot_share(cone: tuple[Real, Real, Real, Real, Real], x: Real, y: Real, z: Real) -> Real:
+    """The share of a spot's intensity that it sends against a vector (x, y, z) to it [KHR_lights_punctual].
+
+    It is (a c + b)^2 with c the cosine of the angle from the axis: 1 within the inner cone, and 0 beyond the outer one.
+    """
+    nothing, one = np.float32(0.0), np.float32(1.0)
+    ax, ay, az, a, b = cone
+    cosine = -(x * ax + y * ay + z * az) / sqrt(x * x + y * y + z * z)
+    share = a * cosine + b
+    share = select(share > nothing, share, nothing)
+    share = select(share < one, share, one)
+    squared: Real = share * share
+    return squared
 
 
 @inlined
@@ -131,19 +198,45 @@ def emitted_ray(
         ox, oy, oz = radius * (x - 2.0 * dx), radius * (y - 2.0 * dy), radius * (z - 2.0 * dz)
     else:
         dx, dy, dz = sphere_direction(a, b)
+        if has_rows(lights.cone):
+            dx, dy, dz = _spot_direction(lights, s, l, a, b)
         if has_rows(lights.size):
             r = np.sqrt(gather(lights.size, s * lights.lit.shape[1] + l))
             ox, oy, oz = ox + r * dx, oy + r * dy, oz + r * dz
     return ox, oy, oz, dx, dy, dz
 
 
-def emitted_power(lights: LightArrays, s: int, radius: float) -> float:
-    """Power that source s emits into the scene, in units of its strength: through the disc, or in all directions.
+@inlined
+def _spot_direction(lights: LightArrays, s: int, l: int, a: Real, b: Real) -> Triple:
+    """Direction of a particle of a spot, with a density in proportion to `spot_share`; uniform without a cone.
+
+    Its cosine c is uniform between the inner cone and 1, and has the density of (a c + b)^2 between the cones.
+    """
+    ax, ay, az, slope, offset = source_at(lights, s, l).cone
+    if slope == 0.0:
+        return sphere_direction(a, b)
+    outer, width = -offset / slope, 1.0 / slope
+    edge, whole = width / 3.0, 1.0 - (outer + width)
+    at = b * (edge + whole)
+    c = outer + width * np.cbrt(at / edge) if at < edge else 1.0 - (at - edge)
+    x, y, z = _disc_point(ax, ay, az, a, max(1.0 - c * c, 0.0))
+    return x + c * ax, y + c * ay, z + c * az
+
+
+def emitted_power(lights: LightArrays, s: int, radius: float) -> Float64:
+    """Power that source s emits into the scene at each light position, (n_lights,), in units of its strength.
+
+    It goes through the disc, in all directions, or into a cone.
 
     Args:
         radius: of the scene.
     """
-    return float(np.pi * radius**2 if lights.kind[s] == DIRECTIONAL else 4 * np.pi)
+    everywhere = np.pi * radius**2 if lights.kind[s] == DIRECTIONAL else 4 * np.pi
+    if lights.cone.ndim == 1:
+        return np.full(lights.n_lights, everywhere)
+    slope, offset = lights.cone[s, 3:].astype(np.float64)
+    width = np.divide(1.0, slope, out=np.zeros_like(slope), where=slope > 0)
+    return np.where(slope > 0, 2 * np.pi * (width / 3 + 1 - width + offset * width), everywhere)
 
 
 @inlined

@@ -14,7 +14,7 @@ from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude, room_in
 from ..hits.hits import Hits, lift, ray_origin, reflects, reflects_in_lanes, triple
 from ..hits.rays import NO_RAYS, Rays
 from ..inputs.lights import DIRECTIONAL, LightArrays
-from ..inputs.shapes import source_point, vector_and_factor
+from ..inputs.shapes import source_at, source_in_lanes, source_point, vector_and_factor
 from ..kernels.kernel import has_rows, index, inlined, kernel, step
 from ..kernels.simd import (
     LANES,
@@ -47,24 +47,21 @@ def _geometry_of_lights(hits: Hits, i: int, lights: LightArrays, s: int, l: int)
     See `vector_and_factor`.
     """
     n_lights = lights.lit.shape[1]
-    at = 3 * s * n_lights + l
-    x, y = load(lights.vector, at), load(lights.vector, at + n_lights)
-    z, lit = load(lights.vector, at + 2 * n_lights), load(lights.lit, s * n_lights + l)
     p, g, m = triple(hits.position, i), triple(hits.geometric, i), triple(hits.shading, i)
     same = lane_numbers() * np.int32(0) + np.int32(i)  # q in lanes, which round as those of sixteen hits do
-    size, q = load(lights.size, s * n_lights + l), source_point(gather(hits.key, same), s)
-    x, y, z, factor = vector_and_factor(lights, s, x, y, z, size, p, g, m, q, lit)
+    q = source_point(gather(hits.key, same), s)
+    x, y, z, factor = vector_and_factor(lights, s, source_in_lanes(lights, s, l), p, g, m, q)
     return x, y, z, select(lane_numbers() < np.int32(n_lights - l), factor, np.float32(0.0))
 
 
 @inlined
 def vector_to_source(hits: Hits, i: int, lights: LightArrays, s: int, l: int) -> Triple:
     """Vector from hit i to source s at light position l, see `vector_and_factor`."""
-    at, p = lights.vector, triple(hits.position, i)
-    x, y, z = at[s, 0, l], at[s, 1, l], at[s, 2, l]
+    source, p = source_at(lights, s, l), triple(hits.position, i)
+    x, y, z = source.place
     if has_rows(lights.size):
-        g, m, size = triple(hits.geometric, i), triple(hits.shading, i), gather(lights.size, s * at.shape[2] + l)
-        x, y, z, _ = vector_and_factor(lights, s, x, y, z, size, p, g, m, source_point(hits.key[i], s), np.float32(1.0))
+        g, m = triple(hits.geometric, i), triple(hits.shading, i)
+        x, y, z, _ = vector_and_factor(lights, s, source, p, g, m, source_point(hits.key[i], s))
         return x, y, z
     return (-x, -y, -z) if lights.kind[s] == DIRECTIONAL else (x - p[0], y - p[1], z - p[2])
 
@@ -179,9 +176,7 @@ def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, ray
                     _trace_queue(tracer, rays, waiting, irradiance)
                     total, waiting = total + waiting, 0
                 # cos(theta) / d^2 of source s at light position l
-                a, shines, size = lights.vector, lights.lit[s, l], gather(lights.size, s * n_lights + l)
-                ax, ay, az = a[s, 0, l], a[s, 1, l], a[s, 2, l]
-                x, y, z, factor = vector_and_factor(lights, s, ax, ay, az, size, p, g, m, q, shines)
+                x, y, z, factor = vector_and_factor(lights, s, source_at(lights, s, l), p, g, m, q)
                 # queue the rays of hits that the source may reach
                 traced = wanted & (factor > np.float32(0.0))
                 if bits(traced) == 0:

@@ -31,7 +31,7 @@ def typed_warnings(job: Job) -> Iterator[str]:
         colours = {k: key.color for k, key in enumerate(source.keys) if isinstance(key, PointKey | DirectionalKey)}
         bad = {k: colour for k, colour in colours.items() if colour is not None and max(colour) > MOST_COLOUR}
         for k, colour in list(bad.items())[:1]:
-            strength = "intensity" if source.type == "point" else "irradiance"
+            strength = "irradiance" if source.type == "directional" else "intensity"
             more = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
             values = ", ".join(f"{value:g}" for value in colour)
             yield (

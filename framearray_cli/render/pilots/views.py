@@ -116,6 +116,7 @@ def _one_source(lights: LightArrays, s: int) -> LightArrays:
         strength=_with_room(lights.strength[one]),
         lit=_with_room(lights.lit[one]),
         size=_with_room(lights.size[one]),
+        cone=_with_room(lights.cone[one]),
     )
 
 

@@ -12,6 +12,8 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.light import LightTable
 from framearray_cli.job.placed import DirectionalKey, DirectionalSource, PointKey, PointSource
 from framearray_cli.job.sources import DomeSource, GridSource, SunSource
+from framearray_cli.job.spot import SpotKey, SpotSource
+from framearray_cli.job.values import SHORTEST
 
 from .curves import interpolate_keys
 from .directions import PARALLEL, interpolate_directions, unit
@@ -20,6 +22,19 @@ from .sun import NEVER, daylight, directions_to_sun, sun_path
 
 # What the manifest calls the vector, the strength and the size of a source, by its kind.
 _MANIFEST_KEYS = {"point": ("position", "intensity", "radius"), "directional": ("direction", "irradiance", "angle")}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cone:
+    """Where a spot shines, at n light positions.
+
+    Attributes:
+        axis: (n, 3) unit direction of the middle of its light.
+        angles_deg: (n, 2) from the axis: within the first it has its full intensity, beyond the second none.
+    """
+
+    axis: Float64
+    angles_deg: Float64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,6 +47,7 @@ class LightPath:
         intensity: (n, 3) linear RGB, times the source's colour: W/sr of a point, W/m2 of a directional source.
         size: (n,) radius of a point source, scene units, or the angle under which a directional one is seen, degrees;
             None of sources without size.
+        cone: of a spot, which is a point with a cone.
         notes: n tables with what else the manifest records of each position; or none.
     """
 
@@ -39,6 +55,7 @@ class LightPath:
     vector: Float64
     intensity: Float64
     size: Float64 | None = None
+    cone: Cone | None = None
     notes: tuple[dict[str, Any], ...] = ()
 
     def table(self, l: int) -> dict[str, Any]:
@@ -46,6 +63,9 @@ class LightPath:
         vector, strength, size = _MANIFEST_KEYS[self.kind]
         values = {"type": self.kind, vector: self.vector[l].tolist(), strength: self.intensity[l].tolist()}
         values |= {} if self.size is None else {size: float(self.size[l])}
+        if self.cone is not None:
+            inner, outer = self.cone.angles_deg[l].tolist()
+            values |= {"type": "spot", "direction": self.cone.axis[l].tolist(), "inner": inner, "outer": outer}
         return values | (self.notes[l] if self.notes else {})
 
     def at(self, positions: Sequence[int]) -> "LightPath":
@@ -56,6 +76,7 @@ class LightPath:
             vector=self.vector[rows],
             intensity=self.intensity[rows],
             size=None if self.size is None else self.size[rows],
+            cone=self.cone and Cone(axis=self.cone.axis[rows], angles_deg=self.cone.angles_deg[rows]),
             notes=tuple(self.notes[k] for k in rows) if self.notes else (),
         )
 
@@ -85,6 +106,8 @@ def place_source(job: Job, i: int, n: int, world_from_camera: Float64 | None) ->
             return _constant(
                 "point", grid_points(source.counts, source.corner, source.side, source.other_side), source, n
             )
+        case SpotSource():
+            return _place_spot(source.keys, job, f"light.sources[{i}]", n)
         case _:
             path = _interpolate(source.type, source.keys, n)
             return _in_space(source, path, job, world_from_camera)
@@ -109,6 +132,29 @@ def _place_dome(source: DomeSource, up_dir: Float64, n: int) -> LightPath:
     if source.radius is None:
         return _constant("directional", -to_light, source, n)
     return _constant("point", np.array(source.target) + source.radius * to_light, source, n)
+
+
+def _place_spot(keys: Sequence[SpotKey], job: Job, name: str, n: int) -> LightPath:
+    """Interpolate the keys of a spot; where they have targets, its axis follows the targets.
+
+    Raises:
+        JobError: the spot meets its target between two keys.
+    """
+    frames = [key.frame for key in keys]
+    path = _interpolate("point", keys, n)
+    targets, ways = [key.target for key in keys if key.target], [key.direction for key in keys if key.direction]
+    if targets:
+        way = interpolate_keys(frames, targets, n) - path.vector
+        if (meeting := np.flatnonzero(np.linalg.norm(way, axis=1) < SHORTEST)).size:
+            problem = (
+                f"{name}: expected a target away from the spot, got the same point at frame {meeting[0]}; move a key"
+            )
+            raise JobError(job.file or job.name, [problem])
+        axis = unit(way)
+    else:
+        axis = interpolate_directions(frames, ways, n)
+    cone = Cone(axis=axis, angles_deg=interpolate_keys(frames, [(key.inner, key.outer) for key in keys], n))
+    return replace(path, cone=cone)
 
 
 def _constant(
@@ -160,11 +206,11 @@ def _interpolate(
 ) -> LightPath:
     """Interpolate the keys of a point or directional source."""
     frames = [key.frame for key in keys]
-    places = [key.position if isinstance(key, PointKey) else key.direction for key in keys]
-    powers = [key.intensity if isinstance(key, PointKey) else key.irradiance for key in keys]
+    places = [key.direction if isinstance(key, DirectionalKey) else key.position for key in keys]
+    powers = [key.irradiance if isinstance(key, DirectionalKey) else key.intensity for key in keys]
     vector = (interpolate_keys if kind == "point" else interpolate_directions)(frames, places, n_lights)
     colors = [key.color if key.color is not None else (1.0, 1.0, 1.0) for key in keys]
     intensity = interpolate_keys(frames, powers, n_lights) * interpolate_keys(frames, colors, n_lights)
-    sizes = [key.radius if isinstance(key, PointKey) else key.angle for key in keys]
+    sizes = [key.angle if isinstance(key, DirectionalKey) else key.radius for key in keys]
     size = interpolate_keys(frames, [[size or 0.0] for size in sizes], n_lights)[:, 0] if any(sizes) else None
     return LightPath(kind=kind, vector=vector, intensity=intensity, size=size)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from framearray_cli.engine.inputs.lights import light_arrays
-from framearray_cli.engine.inputs.shapes import emitted_power, emitted_ray, vector_and_factor
+from framearray_cli.engine.inputs.shapes import emitted_power, emitted_ray, source_at, vector_and_factor
 from framearray_cli.scene.paths.paths import lights_without_groups
 from framearray_cli.scene.paths.placing import LightPath
 
@@ -26,8 +26,8 @@ def lights() -> Any:
 def factor(s: int, normal: Any = UP, shading: Any = None, lit: float = 1.0) -> float:
     """The factor of source s at the origin."""
     triples = [tuple(np.float32(x) for x in v) for v in ((0, 0, 0), normal, normal if shading is None else shading, UP)]
-    vector = (np.float32(x) for x in (LAMP, SUN)[s])
-    return float(vector_and_factor(lights(), s, *vector, np.float32(0), *triples, np.float32(lit))[3])
+    source = source_at(lights(), s, 0)._replace(lit=np.float32(lit))
+    return float(vector_and_factor(lights(), s, source, *triples)[3])
 
 
 @pytest.mark.parametrize("normal", [UP, TILTED])
@@ -48,8 +48,8 @@ def test_no_light_from_behind_either_normal_nor_of_a_dark_source(s: int) -> None
 def test_particles_carry_the_power_of_their_source() -> None:
     """A lamp of 1 W/sr emits 4 pi W; a sun of 1 W/m2 sends pi r^2 W through a disc as wide as the scene."""
     radius = 3.0
-    assert emitted_power(lights(), 0, radius) == pytest.approx(4 * np.pi)
-    assert emitted_power(lights(), 1, radius) == pytest.approx(np.pi * radius**2)
+    assert emitted_power(lights(), 0, radius) == pytest.approx([4 * np.pi])
+    assert emitted_power(lights(), 1, radius) == pytest.approx([np.pi * radius**2])
 
 
 def test_particles_start_at_the_lamp_or_on_a_disc_in_front_of_the_scene() -> None:

@@ -106,6 +106,15 @@ def test_lights_have_their_kind_colour_and_strength(tmp_path: Path) -> None:
         ("Sun", "directional", (3.0, 3.0, 3.0)),
         ("Beam", "spot", (1.0, 1.0, 1.0)),
     ]
+    assert [one.cone_deg for one in stage.lights] == [None, None, (0.0, pytest.approx(np.degrees(0.5)))]
+
+
+@pytest.mark.parametrize("cone", [{"outerConeAngle": 0}, {"innerConeAngle": 1.0}, {"outerConeAngle": 3.0}])
+def test_a_spot_with_impossible_cones_is_refused(cone: dict[str, float], tmp_path: Path) -> None:
+    glb = Glb()
+    glb.node(**light(glb, "spot", spot=cone))
+    with pytest.raises(SceneError, match="cone angles"):
+        read_stage(glb.save(tmp_path / "a.glb"))
 
 
 def test_what_the_default_scene_does_not_show_is_left_out(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support import tiny
 
+from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.domes import dome_directions
 from framearray_cli.scene.paths.paths import eyes, lights
@@ -49,6 +50,27 @@ def test_directions_of_a_dome_come_from_above_and_stay_at_the_last() -> None:
     assert (found.vector[:, 1] < 0).all()
     np.testing.assert_array_equal(found.vector[3:], found.vector[[2, 2]])
     np.testing.assert_array_equal(found.intensity, 2.0)
+
+
+def test_a_spot_follows_its_target_or_turns() -> None:
+    keys = [{"frame": 2 * k, "position": [0, 2, 0], "target": [2 * k, 0, 0], "intensity": 5} for k in (0, 1)]
+    found = path(type="spot", keys=[key | {"inner": 10, "outer": 20 + 10 * key["frame"]} for key in keys])
+    np.testing.assert_allclose(found.cone.axis, [[0, -1, 0], np.array([1, -2, 0]) / 5**0.5, [2**-0.5, -(2**-0.5), 0]])
+    np.testing.assert_allclose(found.cone.angles_deg, [[10, 20], [10, 30], [10, 40]])
+    assert found.table(2) == {
+        "type": "spot", "position": [0.0, 2.0, 0.0], "intensity": [5.0] * 3,
+        "direction": pytest.approx([2**-0.5, -(2**-0.5), 0.0]), "inner": 10.0, "outer": pytest.approx(40.0),
+    }  # fmt: skip
+    turned = path(
+        type="spot", keys=[{"frame": k, "position": [0, 2, 0], "direction": [k, -1, 0], "intensity": 5} for k in (0, 1)]
+    )
+    np.testing.assert_allclose(turned.at([1]).cone.axis, [[2**-0.5, -(2**-0.5), 0]])
+
+
+def test_a_spot_that_meets_its_target_is_an_error() -> None:
+    keys = [{"frame": 4 * k, "position": [k, 0, 0], "target": [1 - k, 0, 0], "intensity": 5} for k in (0, 1)]
+    with pytest.raises(JobError, match=r"light.sources\[0\]: expected a target away from the spot, got .* frame 2"):
+        path(type="spot", keys=keys)
 
 
 def test_a_grid_goes_row_by_row() -> None:

@@ -165,7 +165,7 @@ class LightWalks:
             flow = emitted_power(lights, s, radius)
             for l in range(n_lights):
                 if lights.lit[s, l]:
-                    power = flow * lights.strength[s, :, l] * lights.colour[l]
+                    power = float(flow[l]) * lights.strength[s, :, l] * lights.colour[l]
                     self._follow(work, Emitter(lights, s, l, radius), range(l, l + 1), power, (first, n), pool)
         if sky and self.background is not None:
             power = 4 * np.pi**2 * radius**2 * self.background

@@ -35,12 +35,14 @@ class StageLight:
 
     Attributes:
         intensity: (3,) linear RGB: candela of a point or spot, lux of a directional light.
+        cone_deg: of a spot: the angles from its axis up to which it is brightest, and beyond which it is dark.
     """
 
     name: str
     node: int
     kind: Literal["point", "directional", "spot"]
     intensity: tuple[float, float, float]
+    cone_deg: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -131,4 +133,13 @@ def _light(index: int, node: Tree, entry: Tree) -> StageLight:
     strength = float(entry.get("intensity", 1.0))
     red, green, blue = (max(strength * float(channel), 0.0) for channel in entry.get("color", (1.0, 1.0, 1.0)))
     name = str(node.get("name") or entry.get("name") or f"light {index}")
-    return StageLight(name=name, node=index, kind=kind, intensity=(red, green, blue))
+    cone = _cone_deg(entry.get("spot", {})) if kind == "spot" else None
+    return StageLight(name=name, node=index, kind=kind, intensity=(red, green, blue), cone_deg=cone)
+
+
+def _cone_deg(spot: Tree) -> tuple[float, float]:
+    """Read the angles of a spot [KHR_lights_punctual]."""
+    inner, outer = float(spot.get("innerConeAngle", 0.0)), float(spot.get("outerConeAngle", math.pi / 4))
+    if not 0 <= inner <= outer <= math.pi / 2 + 1e-6 or outer == 0:
+        raise ValueError(f"a spot has the cone angles {inner:g} and {outer:g}, expected 0 to pi / 2, in this order")
+    return math.degrees(inner), math.degrees(outer)

@@ -1,0 +1,81 @@
+"""Spots: points with a cone, along key frames."""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from framearray_cli.base.forms.table import Place, default_text, fail
+
+from .keys import key_problems
+from .placed import SIZES, PointKey
+from .sourcetable import SourceTable
+from .values import Direction, Point
+
+FLATTEST = 90.0  # degrees from the axis; a light that shines further back is no spot
+NARROWEST = 0.5  # degrees; single precision knows no narrower cones
+
+
+class SpotKey(PointKey):
+    """A spot at one light frame."""
+
+    direction: Direction | None = Field(
+        default=None,
+        description="The way the middle of its light goes. Any length. Given at every key of a source, or `target`.",
+        json_schema_extra=default_text("by `target`"),
+    )
+    target: Point | None = Field(
+        default=None,
+        description="Point that it shines at, in the coordinates of the scene file; it moves between keys.",
+        json_schema_extra=default_text("by `direction`"),
+    )
+    inner: float = Field(
+        default=0.0,
+        ge=0,
+        le=FLATTEST,
+        description="Angle from the axis up to which it has its full `intensity`, degrees; from there it falls off.",
+    )
+    outer: float = Field(
+        default=45.0, ge=NARROWEST, le=FLATTEST, description="Angle from the axis beyond which it is dark, degrees."
+    )
+
+    @model_validator(mode="after")
+    def _one_aim(self) -> "SpotKey":
+        problems: list[tuple[Place, str]] = []
+        if (self.direction is None) == (self.target is None):
+            found = "neither" if self.direction is None else "both"
+            problems.append(((), f"expected either `direction` or `target`, got {found}"))
+        if self.target is not None and self.target == self.position:
+            problems.append((("target",), "expected a point away from `position`, got the same point"))
+        if self.inner > self.outer:
+            problems.append((("inner",), f"expected at most {self.outer:g}, the angle `outer`, got {self.inner:g}"))
+        if problems:
+            fail(problems)
+        return self
+
+
+def _consistent_spot_keys(keys: tuple[SpotKey, ...]) -> tuple[SpotKey, ...]:
+    """Check the keys of one spot against each other."""
+    problems = key_problems(keys, "direction", "color", SIZES["point"])
+    aim = "direction" if keys[0].target is None else "target"
+    others = [k for k, key in enumerate(keys) if getattr(key, aim) is None]
+    problems += [((k, aim), "missing; keys[0] gives it, so every key of this list must") for k in others[:1]]
+    if problems:
+        fail(problems)
+    return keys
+
+
+class SpotSource(SourceTable):
+    """A lamp that shines into a cone, as KHR_lights_punctual of glTF defines it."""
+
+    type: Literal["spot"] = Field(description="Kind of source.")
+    keys: Annotated[tuple[SpotKey, ...], AfterValidator(_consistent_spot_keys)] = Field(
+        min_length=1,
+        strict=False,
+        description="The spot at some frames; between them all its values change smoothly, before the first and after "
+        "the last they stay as they are.",
+    )
+
+    @property
+    def count(self) -> int:
+        """Number of light positions that the keys reach."""
+        return self.keys[-1].frame + 1

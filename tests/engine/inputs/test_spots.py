@@ -1,0 +1,108 @@
+"""Spots: the share of their light by the formula of KHR_lights_punctual, and particles that carry it."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+from support.hits import points
+
+from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.hits.rays import room_for_tests
+from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
+from framearray_cli.engine.inputs.shapes import emitted_power, emitted_ray
+from framearray_cli.engine.terms.direct import direct
+from framearray_cli.scene.paths.paths import lights_without_groups
+from framearray_cli.scene.paths.placing import Cone, LightPath
+
+FAR = np.concatenate([tiny.box((90, -21, -1), (91, -20, 1)), tiny.box((-91, 20, -1), (-90, 21, 1))])
+CONES = [(0.0, 45.0), (20.0, 40.0), (30.0, 30.0), (0.0, 2.0), (60.0, 90.0)]
+RNG = np.random.default_rng(4)
+
+
+def spot(inner: float, outer: float, n: int = 16, radius: float | None = None) -> LightPath:
+    axis = np.add(RNG.normal(size=(n, 3)) * 0.3, (0, -1, 0))
+    return LightPath(
+        kind="point",
+        vector=np.add(RNG.uniform(-0.5, 0.5, (n, 3)), (0, 2, 0)),
+        intensity=np.ones((n, 3)),
+        size=None if radius is None else np.full(n, radius),
+        cone=Cone(axis=axis / np.linalg.norm(axis, axis=1, keepdims=True), angles_deg=np.tile((inner, outer), (n, 1))),
+    )
+
+
+def share(cosine: Any, inner: float, outer: float) -> Any:
+    """The formula of KHR_lights_punctual, in float64, with our least width of an edge."""
+    inner, outer = np.cos(np.radians((inner, outer)))
+    return np.clip((cosine - outer) / max(inner - outer, 0.001 * (1 - outer)), 0, 1) ** 2
+
+
+def arrays(*sources: LightPath) -> LightArrays:
+    return light_arrays(lights_without_groups(sources), np.zeros(3))
+
+
+def lit(places: Any, lights: LightArrays, neighbours: bool) -> Any:
+    hits = points(len(places), (0, 0, 0), (0.0, 1.0, 0.0))
+    hits.position[:], hits.key[:] = places, np.arange(len(places))
+    out = np.full((len(places), 1, lights.n_lights), np.nan, np.float32)
+    with EmbreeScene(tiny.scene_of(FAR)) as embree:
+        direct(hits, len(places), lights, embree.tracer, room_for_tests(4096, lights.n_lights), out, neighbours)
+    return out[:, 0].astype(np.float64)
+
+
+@pytest.mark.parametrize("neighbours", [True, False])
+@pytest.mark.parametrize(("inner", "outer"), CONES)
+def test_a_spot_lights_a_floor_by_the_formula(inner: float, outer: float, neighbours: bool) -> None:
+    source, reach = spot(inner, outer), max(np.tan(np.radians(min(outer, 50))) * 2.4, 0.1)
+    places = RNG.uniform(-reach, reach, (400, 3))
+    axis = source.cone.axis  # type: ignore[union-attr]  # it has a cone
+    places += np.tile(
+        source.vector - axis * (source.vector[:, 1:2] / axis[:, 1:2]), (25, 1)
+    )  # where it meets the floor
+    places[:, 1] = 0
+    found = lit(places, arrays(source), neighbours)
+    way = source.vector[None] - places[:, None]
+    d = np.linalg.norm(way, axis=-1)
+    cosine = -np.einsum("ijk,jk->ij", way, axis) / d
+    full = way[..., 1] / d**3
+    slope = 2 / (np.cos(np.radians(inner)) - np.cos(np.radians(outer)) + 0.001)
+    rounding = full * (1e-6 * slope + 1e-5)  # of the cosine, in single precision
+    assert (np.abs(found - full * share(cosine, inner, outer)) <= rounding).all()
+    assert (found > 0).any() and (outer == 90 or (found == 0).any())
+
+
+def test_spots_beside_other_sources_leave_them_alone() -> None:
+    lamp = LightPath(kind="point", vector=np.tile((0.1, 1.0, 0.0), (16, 1)), intensity=np.ones((16, 3)))
+    sun = LightPath(kind="directional", vector=np.tile((0.6, -0.8, 0.0), (16, 1)), intensity=np.ones((16, 3)))
+    source, places = spot(20, 40), RNG.uniform(-1, 1, (100, 3)) * (1, 0, 1)
+    together = lit(places, arrays(lamp, source, sun), True)
+    apart = sum(lit(places, arrays(one), True) for one in (lamp, source, sun))
+    np.testing.assert_allclose(together, apart, rtol=1e-6)
+    np.testing.assert_array_equal(together, lit(places, arrays(lamp, source, sun), False))
+    some = some_lights(arrays(lamp, source, sun), [5, 3])
+    np.testing.assert_array_equal(lit(places, some, True), together[:, [5, 3]])
+
+
+def test_a_spot_may_have_a_size() -> None:
+    """Far from the cones' edges it is the sphere's light times the share of the spot."""
+    wide = spot(60, 90, radius=0.1)
+    bare = LightPath(kind="point", vector=wide.vector, intensity=wide.intensity, size=wide.size)
+    places = wide.vector * (1, 0, 1)
+    found, sphere = (np.diag(lit(places, arrays(one), True)) for one in (wide, bare))
+    straight = -wide.cone.axis[:, 1] > 0.8  # type: ignore[union-attr]  # it has a cone
+    np.testing.assert_allclose(found[straight], sphere[straight], rtol=1e-6)
+    assert straight.any()
+
+
+@pytest.mark.parametrize(("inner", "outer"), CONES)
+def test_particles_have_the_density_and_the_power_of_the_spot(inner: float, outer: float) -> None:
+    """Their number within a cone is the integral of the share there, over the power: 8 parts, by a chi-square test."""
+    lights = arrays(spot(inner, outer, n=2))
+    axis = lights.cone[0, :3, 1].astype(np.float64)
+    cosine = np.array([np.dot(emitted_ray(lights, 0, 1, 1.0, a, b)[3:], axis) for a, b in RNG.random((8000, 2))])
+    at = np.linspace(np.cos(np.radians(outer)), 1, 80_001)
+    density = share((at[1:] + at[:-1]) / 2, inner, outer) * (at[1] - at[0])
+    assert emitted_power(lights, 0, 1.0)[1] == pytest.approx(2 * np.pi * density.sum(), rel=2e-3)
+    edges = np.interp(np.arange(1, 8) / 8, np.cumsum(density) / density.sum(), at[1:])
+    counts = np.bincount(np.searchsorted(edges, cosine), minlength=8)
+    assert ((counts - 1000) ** 2 / 1000).sum() < 26  # 7 degrees of freedom: one in 2,000 beyond
