@@ -16,6 +16,7 @@ CELLS, CONTINUED = 5, 16  # dimensions of the random numbers that move points, a
 MIRRORED = 1 << 17  # the dimension of what ray 0 chooses at mirrors
 LOCAL = 2  # the level that obscurances take their ambient light from
 STEPS = 4  # rays that follow one that was too short, at most
+MIXED = np.float32(0.2)  # short rays go on where this share of a cell's samples does not see its guard
 GUARD_END = 1 - 1e-3  # a ray to a guard ends this share of its length before it
 
 
@@ -54,7 +55,7 @@ class CellMap:
     def sees(self, position: Any, normal: Any, cell: Any) -> Any:
         """Whether points see the guards of cells, from as high above their surfaces."""
         guard = self.guard[cell]
-        start = position + guard[:, 3:] * normal
+        start = position + guard[:, 3:4] * normal
         return ~self.model.blocked(start, guard[:, :3] - start, GUARD_END)
 
     def find(self, position: Any, normal: Any, length: Any, shift: Any = 0.0) -> Any:
@@ -76,8 +77,9 @@ class CellMap:
         return found
 
     def short(self, position: Any, normal: Any, length: Any, shift: Any) -> Any:
-        """Whether rays are shorter than the finest cells, and would read doubtful ones."""
-        return (length < self.grid.edge) & (self.other[self.first(position, normal, length, shift)] >= 0)
+        """Whether rays are shorter than the finest cells, and would read ones whose guard many samples do not see."""
+        found = self.first(position, normal, length, shift)
+        return (length < self.grid.edge) & (self.other[found] >= 0) & (self.guard[found, 4] >= MIXED)
 
 
 def tangents(normal: Any) -> tuple[Any, Any]:

@@ -10,6 +10,8 @@ from ...kernels.kernel import inlined, kernel
 
 # Height of guards and of the points that look for them, in edges of the cell: above the curvature of most surfaces.
 GUARD_HEIGHT = 0.15
+# Columns of guards: a point, its height above the surface, and the share of samples in the cell that do not see it.
+HEIGHT, UNSEEN, GUARD_COLUMNS = 3, 4, 5
 # A ray to a guard ends at this fraction of the way.
 _FAR_END = np.float32(1.0 - 1e-3)
 
@@ -19,7 +21,7 @@ def write_guard_ray(
     guard: Float32, k: int, point: Triple, normal: Triple, rays: Rays, waiting: int, place: int
 ) -> None:
     """Write the ray from above a point to guard k into slot `waiting`; `place` is what it is for."""
-    height: Real = guard[k, 3]
+    height: Real = guard[k, HEIGHT]
     x, y, z = point[0] + height * normal[0], point[1] + height * normal[1], point[2] + height * normal[2]
     set_ray(rays.packets, waiting, x, y, z, guard[k, 0] - x, guard[k, 1] - y, guard[k, 2] - z, _FAR_END)
     rays.place[waiting] = place

@@ -16,7 +16,7 @@ from framearray_cli.base.arrays import Addresses, Flags, Float32, Float64, Int32
 
 from ...embree.packets import Tracer
 from ...hits.rays import room_for_tests
-from .guards import GUARD_HEIGHT, see_guards
+from .guards import GUARD_COLUMNS, GUARD_HEIGHT, HEIGHT, UNSEEN, see_guards
 from .samples import Samples
 from .table import ALL, FEWEST_SAMPLES, LEVELS, NOWHERE, Grid, cells_of_keys, empty_slots, fill_slots, write_keys
 
@@ -76,7 +76,7 @@ class PlaceWork:
         return keys
 
     def see(self, rows: Int32, guards: Float32) -> Flags:
-        """Whether each of some samples sees a guard, (n, 4)."""
+        """Whether each of some samples sees a guard, (n, GUARD_COLUMNS)."""
         seen = np.ones(len(rows), np.uint8)
 
         def test(first: int) -> None:
@@ -90,11 +90,11 @@ class PlaceWork:
         return seen.astype(bool)
 
     def guards(self, level: int, rows: Int32) -> Float32:
-        """The guards above some samples, (n, 4): a point, and its height."""
+        """The guards above some samples, (n, GUARD_COLUMNS), as if all samples saw them."""
         height = np.float32(GUARD_HEIGHT * self.grid.edge * 2**level)
-        found = np.empty((len(rows), 4), np.float32)
+        found = np.zeros((len(rows), GUARD_COLUMNS), np.float32)
         found[:, :3] = self.samples.position[rows] + height * self.samples.geometric[rows]
-        found[:, 3] = height
+        found[:, HEIGHT] = height
         return found
 
 
@@ -119,7 +119,7 @@ def find_places(work: PlaceWork) -> Places:
     return Places(
         slots=slots,
         other=np.concatenate([np.full(1, NOWHERE, np.int32), *(found.other for found in levels)]),
-        guard=np.concatenate([np.zeros((1, 4), np.float32), *(found.guard for found in levels)]),
+        guard=np.concatenate([np.zeros((1, GUARD_COLUMNS), np.float32), *(found.guard for found in levels)]),
         level=np.repeat(
             np.array([-1, *reversed(range(LEVELS))], np.int32), [1, *(len(found.sizes) for found in levels)]
         ),
@@ -133,7 +133,7 @@ def find_places(work: PlaceWork) -> Places:
 def _nowhere() -> Places:
     """The places of no samples: the cell of all surfaces only."""
     return Places(
-        slots=empty_slots(1), other=np.full(1, NOWHERE, np.int32), guard=np.zeros((1, 4), np.float32),
+        slots=empty_slots(1), other=np.full(1, NOWHERE, np.int32), guard=np.zeros((1, GUARD_COLUMNS), np.float32),
         level=np.full(1, -1, np.int32), first=np.zeros(2, np.int64), sample=np.zeros(0, np.int32), share=np.zeros(1),
         rays=0,
     )  # fmt: skip
@@ -178,7 +178,8 @@ def _find_level(work: PlaceWork, level: int, base: int, coarser: Int32) -> _Leve
     other = np.full(len(sizes), NOWHERE, np.int32)
     aside = np.flatnonzero(~seen & kept[group])[::-1]  # the first of a group wins
     other[one[group[aside]] - base] = own[order[aside]]
-    guards = np.zeros((len(sizes), 4), np.float32)
+    guards = np.zeros((len(sizes), GUARD_COLUMNS), np.float32)
+    guard[:, UNSEEN] = 1 - in_first / size
     guards[: int(kept.sum())] = guard[kept]
     found = _Level(
         keys=key[start[kept]], sizes=sizes, sample=order[joined], other=other, guard=guards, own=own, rays=rays

@@ -66,7 +66,7 @@ class Cells(NamedTuple):
         grid: borders of cells.
         slots: (2 n_slots,) hash table: keys, and the cell of each; n_slots is a power of two.
         other: (n_cells,) the cell that a ray reads which does not see the guard, or NOWHERE where all see it.
-        guard: (n_cells, 4) a point above a sample of the cell, and its height; see `guards.py`.
+        guard: (n_cells, GUARD_COLUMNS) a point above a sample of the cell; see `guards.py`.
         tint: (n_cells, 8) columns TINT: colour of the light, whose mean by `weights` is 1; MEAN: mean of `light` over
             all light positions of the job; CONSTANT: radiance E / pi of the light that is the same at all positions.
         light: (n_cells, channels, n_lights) irradiance by sources.
