@@ -71,8 +71,10 @@ def warning_lines(warnings: Sequence[str]) -> list[str]:
 
 
 def ambient_lines(figures: "AmbientFigures") -> list[str]:
-    """Describe the ambient light and its error."""
-    error = figures.error
+    """Describe the ambient light and its error; only the notes where images have none."""
+    error, notes = figures.error, [f"note: {note}" for note in figures.notes]
+    if figures.paths == 0:  # light from cells
+        return notes
     known = (
         f"standard error at most {error:.1%}, {counted(figures.paths, 'path')}"
         if error > 0
@@ -81,7 +83,7 @@ def ambient_lines(figures: "AmbientFigures") -> list[str]:
     lowest, highest = f"{figures.lowest:.4g}", f"{figures.highest:.4g}"
     return [
         f"ambient light: I_A {lowest if lowest == highest else f'{lowest} to {highest}'} ({known})",
-        *(f"note: {note}" for note in figures.notes),
+        *notes,
     ]
 
 

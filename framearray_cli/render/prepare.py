@@ -18,7 +18,7 @@ from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.random import lattice_steps
 from framearray_cli.engine.inputs.surfaces import Surfaces, near_depth, surfaces
 from framearray_cli.engine.kernels.clock import compile_clock
-from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.ambient.estimate import MIN_WALKS, Ambient
 from framearray_cli.engine.terms.ambient.fitted import ObscuranceCurve, ambient_by_fit
 from framearray_cli.engine.terms.ambient.from_eyes import EyeWalks, ambient_by_eye, fixed_ambient
 from framearray_cli.engine.terms.ambient.from_lights import LightWalks, ambient_by_light
@@ -245,6 +245,10 @@ def eye_cameras(prepared: Prepared) -> Cameras:
 
 def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Ambient:
     job, seed, world = prepared.job, prepared.job.seed, World(prepared.surfaces, embree.tracer)
+    if job.indirect.method == "cells":
+        # Images take none; in layers, the average reflectivity stands for what rays of W miss.
+        few = replace(_eye_walks(prepared, embree), paths=MIN_WALKS)
+        return replace(fixed_ambient(few, np.zeros(3, np.float32), prepared.threads), paths=0)
     if job.ambient.method == "light" and job.ambient.intensity is None:
         particles = LightWalks(
             seed=seed, paths=job.ambient.paths, world=world, lights=prepared.light_arrays, background=background

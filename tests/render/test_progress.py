@@ -86,6 +86,10 @@ def test_an_ambient_light_of_one_position_is_one_number() -> None:
     assert line == "ambient light: I_A 0.2853 (standard error at most 1.5%, 262,144 paths)"
 
 
+def test_light_from_cells_has_no_ambient_light() -> None:
+    assert ambient_lines(AmbientFigures(lowest=0, highest=0, error=0, paths=0, notes=("a note",))) == ["note: a note"]
+
+
 def test_lines_of_a_target_that_is_not_reached() -> None:
     first, note = target_lines(TARGET)
     assert first == (

@@ -57,11 +57,14 @@ class HitRecords:
     def light(self) -> Float32:
         """Direct irradiance, and that of cells, in units of the lights' colour, (n, n_lights, 1 or 3)."""
         direct: Float32 = np.swapaxes(self.irradiance, 1, 2)
-        if not self.indirect.shape[1]:
-            return direct
+        return direct + self.gathered if self.indirect.shape[1] else direct
+
+    @property
+    def gathered(self) -> Float32:
+        """Irradiance of cells, in units of the lights' colour, (n, n_lights, 3)."""
         known = np.where(self.indirect[:, LEVEL, None] > 0, self.indirect, np.float32(0.0))  # else not written
-        gathered = np.swapaxes(known[:, LIGHT:].reshape(self.irradiance.shape), 1, 2)
-        found: Float32 = direct + gathered * known[:, None, COLOUR : COLOUR + 3]
+        by_light = np.swapaxes(known[:, LIGHT:].reshape(self.irradiance.shape), 1, 2)
+        found: Float32 = by_light * known[:, None, COLOUR : COLOUR + 3]
         return found
 
     def part(self, span: slice) -> "HitRecords":

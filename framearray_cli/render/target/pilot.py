@@ -26,6 +26,7 @@ from framearray_cli.engine.hits.native import Samples, native_hits
 from framearray_cli.engine.hits.outer import outer_hits
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
 
 from ..automatic.probe import MOST_DENSE, evenly_spaced
 from ..prepare import Prepared
@@ -35,8 +36,8 @@ from .allot import FEWEST, Witnesses, allot
 PILOT_SEED = 1 << 40
 # Share of the variance between places in a pixel that is left with weights by area (docs/decisions/area-weights.md).
 AREA_SHARE = 0.4
-# Number of frames whose pilot hits judge the allotment.
-JUDGED = 32
+# Number of frames whose pilot hits judge the allotment, and of patches that show what the filter leaves.
+JUDGED, PATCHES = 32, 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +89,8 @@ def allot_hits(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> tuple
     # for a camera at rest, one frame stands for the whole window
     most = float(prepared.job.samples.most_hits * (2 * prepared.job.n_r + 1 if prepared.still else 1))
     with TracePool(setup, prepared.threads) as pool:
-        pilot = _Pilot(setup, ambient, blocks_of(setup.cams.width, setup.cams.height))
+        left = share_after_filter(replace(setup, seed=setup.seed + PILOT_SEED), pool)
+        pilot = _Pilot(setup, ambient, blocks_of(setup.cams.width, setup.cams.height), left)
         found = pool.run(pilot.measure, range(setup.n_frames))
         rays = pool.rays().total()
     radiance = float(np.mean([frame.radiance for frame in found]))
@@ -115,6 +117,32 @@ def allot_hits(prepared: Prepared, setup: FrameSetup, ambient: Ambient) -> tuple
     return replace(setup, allotment=allotment, per_pixel=means), target
 
 
+def share_after_filter(setup: FrameSetup, pool: TracePool) -> float:
+    """Measure the share of the variance of indirect light that the filter leaves, over patches of some frames."""
+    if not setup.smooth:
+        return 1.0
+    patches = -(-setup.n_pixels // HITS_TOGETHER)
+
+    def measure(c: int, scratch: Scratch) -> Float64:
+        first = int(np.random.default_rng((setup.seed, c)).integers(patches)) * HITS_TOGETHER
+        pixels = setup.order[first : first + HITS_TOGETHER]
+        light = np.empty((2, 2, len(pixels), setup.lights.n_lights, 3), np.float32)
+        for smooth in (False, True):
+            for half in range(2):
+                samples = Samples(setup.seed + half, pixels, per_pixel=1, first=0, halves=False)
+                packets, hits = scratch.hit_rays.packets, scratch.hits
+                native_hits(setup.cams, c, samples, 0, len(pixels), setup.world, setup.depth > 0, packets, hits)
+                records = setup.empty_records(len(pixels))
+                estimate_terms(setup, hits, len(pixels), scratch, records, "pilot", "pilot", smooth=smooth)
+                reflectivity = records.row[:, None, REFLECTIVITY : REFLECTIVITY + 3]
+                light[int(smooth), half] = reflectivity * records.gathered * setup.lights.colour
+        squares: Float64 = np.square(light[:, 0] - light[:, 1], dtype=np.float64).sum(axis=(1, 2, 3))
+        return squares
+
+    plain, smoothed = sum(pool.run(measure, evenly_spaced(setup.n_frames, PATCHES)))
+    return float(smoothed / plain) if plain > 0 else 1.0
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _FrameNoise:
     """Noise of a frame, as measured by the pilot.
@@ -133,8 +161,9 @@ class _FrameNoise:
 class _Pilot:
     """Two independent hits in each of two pixels per block: one pixel for each half of the pilot."""
 
-    def __init__(self, setup: FrameSetup, ambient: Ambient, blocks: Blocks) -> None:
+    def __init__(self, setup: FrameSetup, ambient: Ambient, blocks: Blocks, left: float) -> None:
         self.setup = replace(setup, seed=setup.seed + PILOT_SEED)
+        self.left = left
         self.ambient = ambient
         self.blocks = blocks
         self._judges = frozenset(evenly_spaced(setup.n_frames, JUDGED))
@@ -184,19 +213,26 @@ class _Pilot:
     def _variance(self, difference: Float32, records: HitRecords, pair: Int32) -> Float64:
         """Return the variance of one hit, mean over light positions and channels, from the difference of two, (n,).
 
-        Weights by area lower only what depends on the place in the pixel, not the noise of the obscurance rays.
+        Weights by area lower only what depends on the place in the pixel, not the noise of the obscurance rays; the
+        filter lowers only the latter.
 
         Args:
             difference: (n, n_lights, 3) of the radiance of the hits `pair`.
         """
-        if not self.setup.area:
+        if not self.setup.area and self.setup.cells is None:
             single: Float64 = np.square(difference, dtype=np.float64).mean(axis=(1, 2)) / 2
             return single
         row = records.row[pair]
         reflectivity, obscurance = (row[..., at : at + 3] for at in (REFLECTIVITY, OBSCURANCE))
-        of_rays = reflectivity.mean(axis=0) * (obscurance[0] - obscurance[1])
-        noise = of_rays[:, None] * self.ambient.intensity
-        squares = AREA_SHARE * np.square(difference - noise, dtype=np.float64) + np.square(noise, dtype=np.float64)
+        if self.setup.cells is None:
+            noise = (obscurance[0] - obscurance[1])[:, None] * self.ambient.intensity
+        else:
+            light = records.gathered * self.setup.lights.colour / np.float32(np.pi)
+            noise = light[pair[0]] - light[pair[1]]
+        noise = noise * reflectivity.mean(axis=0)[:, None]
+        of_place = AREA_SHARE if self.setup.area else 1.0
+        squares = of_place * np.square(difference - noise, dtype=np.float64)
+        squares += self.left * np.square(noise, dtype=np.float64)
         weighed: Float64 = squares.mean(axis=(1, 2)) / 2
         return weighed
 

@@ -172,3 +172,29 @@ def test_a_camera_at_rest_gets_the_hits_of_its_whole_window(tmp_path: Path) -> N
     assert setup.n_frames == 1 and setup.n_r == 0
     assert isinstance(setup.allotment, Allotment) and setup.allotment.hits.max() == 10
     assert target.capped > 0
+
+
+def told_over_true(passes: int) -> tuple[float, float]:
+    """The expected error over that of renders with other seeds and the same cells; and hits per pixel."""
+    cells = {"method": "cells", "samples": 2**14, "filter": passes}
+    inputs = tiny.prepared(
+        job(indirect=cells, samples={"error": 0.1, "obscurance": 2}, camera={"resolution": [16, 12]}),
+        tiny.room(mirrors=False),
+    )
+    with tiny.open_embree(inputs) as embree:
+        setup, ambient = tiny.plan_work(inputs, embree)
+        setup, target = allot_hits(inputs, setup, ambient)
+        assert target is not None
+        images = []
+        for seed in range(100, 108):
+            other = replace(setup, seed=seed)
+            with TracePool(other, 2) as pool:
+                images.append([frame.images for frame in tiny.frames_of(other, ambient, pool)])
+    true = float(np.var(images, axis=0, ddof=1).mean()) ** 0.5 / float(np.mean(images))
+    return target.expected / true, target.hits
+
+
+def test_the_filter_counts_in_the_error_that_is_expected() -> None:
+    (plain, more), (filtered, fewer) = (told_over_true(passes) for passes in (0, 2))
+    assert fewer < 0.8 * more
+    assert filtered == pytest.approx(plain, rel=0.2)

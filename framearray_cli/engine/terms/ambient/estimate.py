@@ -40,7 +40,7 @@ class Ambient:
         standard_error: (n_lights,) of I_A, relative to it, of the mean of the channels; 0 where I_A is 0 or given.
         reflectivity: (3,) average reflectivity over the surfaces that E averages; where there are none, over those
             that the eyes see.
-        paths: number of walks, or of particles per light position.
+        paths: number of walks, or of particles per light position; 0 where images have no ambient light.
         rays: number of rays traced.
         notes: messages for the user, e.g. that the estimate missed its target error.
         shared_s: seconds of preparing indirect light that do not grow with the number of light positions.
