@@ -66,11 +66,13 @@ def choose_shot(site: Site, stage: Stage, options: StartOptions, file: object) -
 
 
 def _walk_camera(site: Site, ends: Float64, options: StartOptions) -> Camera:
-    n = options.frames or EYES
     points = [round_points(end + site.centre, site.size) for end in ends]
-    last = {n - 1: points[1]} if n > 1 and points[1][0] != points[0][0] else {}
+    moves = points[1][0] != points[0][0]
+    n = (options.frames or EYES) if moves else 1
+    last = {n - 1: points[1]} if n > 1 else {}
     keys = tuple(EyeKey(frame=f, eye=eye, target=target) for f, (eye, target) in ({0: points[0]} | last).items())
-    about = ("a short walk; `target` is what the eye looks at",)
+    what = "a short walk" if moves else "an eye that stands still, as no way leads on; a second key makes it move"
+    about = (f"{what}; `target` is what the eye looks at",)
     return Camera(keys=keys, frames=n, fov_deg=ROOM_FOV, resolution=options.resolution or RESOLUTION, about=about)
 
 

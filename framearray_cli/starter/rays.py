@@ -51,12 +51,13 @@ class Probe:
     """A scene to trace rays in.
 
     Attributes:
-        turned: whether the front of a surface is the side from which its corners run clockwise.
+        turned: whether the front of a surface is the side from which its corners run clockwise; one for all, or one
+            for each triangle.
     """
 
     scene: Scene
     embree: EmbreeScene
-    turned: bool = False
+    turned: bool | NDArray[np.bool_] = False
 
     def trace(self, origins: Any, directions: Any) -> ProbeHits:
         """Trace rays; origins and directions are (n, 3) or (3,)."""
@@ -68,7 +69,8 @@ class Probe:
         missed = _rows(bits, TRIANGLE)[:n] == MISS
         triangle[missed] = -1
         against = (self.normals(triangle) * np.broadcast_to(directions, (n, 3))).sum(axis=1) < 0
-        front = (against != self.turned) & ~missed
+        turned = self.turned if isinstance(self.turned, bool) else self.turned[triangle]
+        front = (against != turned) & ~missed
         return ProbeHits(np.where(missed, np.inf, distance.astype(np.float64)), triangle, front)
 
     def normals(self, triangle: Int32) -> Float64:

@@ -16,7 +16,7 @@ from framearray_cli.scene.scene import Scene
 
 from .kind import reason_for_a_thing
 from .rays import Probe
-from .room import Room, bounds, find_room
+from .room import Room, bounds, find_room, turn_to_rooms
 from .scale import NAMES, Unit, guess_unit, lies_on_its_side, unit_of_a_thing
 
 MAY_LIE = (".obj", ".off")  # formats that do not say which axis points up, and are written with y or z
@@ -98,6 +98,10 @@ def _thing(site: Site, why: str, suffix: str, *, from_above: bool = False) -> Si
 def _find_inside(site: Site, file: Path, inside: bool | None) -> Site:
     probe, up, suffix = site.probe, site.up, file.suffix
     room, share = find_room(probe, up)
+    if facing := turn_to_rooms(probe, share):
+        other, more = find_room(facing, up)
+        if more > share:
+            probe, room, share = facing, other, more
     if inside:  # perhaps its faces are turned outwards, and only cupboards are closed from their fronts
         turned = replace(probe, turned=True)
         other, more = find_room(turned, up)
