@@ -18,8 +18,8 @@ POINTS, AROUND = 3000, 64
 ROUNDS, ENOUGH, TRIM = 3, 1500, 2  # further rounds of points, until there are enough inside; per cent left out per side
 # A point is inside if at least these shares of its rays hit, and of those that hit, hit a front.
 ENCLOSED, FRONTS = 0.7, 0.75
-# A point that sees this share of fronts, and less than FRONTS, is among surfaces that face both ways. They are turned if
-# at least that share of the bounds is: a flat with inverted walls has 88 %, other scenes that were tried up to 13 %.
+# A point that sees this share of fronts, and less than FRONTS, is among surfaces that face both ways. They are turned
+# if at least that share of the bounds is: a flat with inverted walls has 88 %, other scenes that were tried up to 13 %.
 MIXED, LEAST_MIXED = 0.2, 0.3
 MOST = 1600  # points kept, since every one is compared with every other
 UNDER_SKY = 0.55  # instead of ENCLOSED in a place that has no roof
