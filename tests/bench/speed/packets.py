@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.core.cases import FRAME_ARRAY, JOBS, Case, job_named, open_case, with_settings
+from bench.core.cases import JOBS, Case, job_named, open_case
 from bench.core.machine import describe
 from bench.core.markdown import grid
 from bench.core.results import RESULTS, Table, load, site_for
@@ -32,11 +32,10 @@ MOST_RAYS = 500_000  # of a kind
 def measure(name: str, quick: bool) -> Table:
     """Nanoseconds of thread time per ray of a job: kind -> width -> [not coherent, coherent]."""
     kinds: Table = {}
-    with open_case(job_named(name, quick)) as opened:
-        case = with_settings(opened, replace(FRAME_ARRAY.settings, weights="balance"))
+    with open_case(job_named(name, quick)) as case:
         c = case.setup.n_frames // 2
         expected = 4 * case.setup.n_pixels * case.setup.lights.n_lights
-        for recording in (record(case, c, expected), record_ambient(opened)):
+        for recording in (record(case, c, expected), record_ambient(case)):
             kinds |= _nanoseconds(case, recording, 1 if quick else RUNS)
     for kind, found in kinds.items():
         log(f"{name}: {kind}: " + ", ".join(f"{w}: {a:.1f} / {b:.1f} ns" for w, (a, b) in found["ns"].items()))
