@@ -1,10 +1,11 @@
 """What mirrors show: native hits followed from mirror to mirror. A reflected hit is a hit seen through a tint."""
 
+from itertools import pairwise
 from time import perf_counter
 
 import numpy as np
 
-from framearray_cli.base.arrays import Int32
+from framearray_cli.base.arrays import Int32, Rgb
 
 from ..hits.hits import Hits
 from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
@@ -21,35 +22,49 @@ from .threads import TracePool
 def mirror_paths(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
     """Follow hits 0 to n - 1 that are on mirrors; return pixels and records of the reflected hits of each bounce.
 
-    HITS_TOGETHER hits are followed at a time, through all bounces. Batches begin at multiples of these, so neither the
-    order of reflected hits nor which of their rays share a packet depends on the size of batches.
+    Rays of HITS_TOGETHER hits are reflected together, and what they meet at all bounces stands together. Batches begin
+    at multiples of these, so neither the order of reflected hits nor which rays share a packet depends on the size of
+    batches.
     """
-    found: list[tuple[Int32, HitRecords]] = []
     if count_mirrors(hits, n) == 0:
-        return found
+        return []
     started = perf_counter()
-    for first in range(0, n, HITS_TOGETHER):
-        some = Hits._make(array[first : first + HITS_TOGETHER] for array in hits)
-        found += _follow(setup, some, min(HITS_TOGETHER, n - first), scratch)
-    scratch.seconds["mirror"] += perf_counter() - started
-    return found
-
-
-def _follow(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
-    """Follow hits 0 to n - 1 from bounce to bounce."""
-    found: list[tuple[Int32, HitRecords]] = []
     throughput = np.ones((n, 3), np.float32)
+    ends = [*range(0, n, HITS_TOGETHER), n]  # of the hits that are reflected together
+    found: list[list[tuple[Int32, HitRecords]]] = [[] for _ in ends[1:]]
     for bounce in range(setup.depth):
-        m = count_mirrors(hits, n)
+        reflected, next_throughput = scratch.reflected[bounce % 2], scratch.throughput[bounce % 2]
+        ends = _reflect(setup, hits, throughput, ends, scratch, reflected, next_throughput)
+        m = ends[-1]
         if m == 0:
             break
-        reflected, next_throughput = scratch.reflected[bounce % 2], scratch.throughput[bounce % 2]
-        reflect(hits, n, throughput, setup.world, scratch.hit_rays.packets, reflected, next_throughput)
         scratch.rays["mirror"] += m
-        hits, n, throughput = reflected, m, next_throughput
-        records = setup.empty_records(m)
+        hits, throughput = reflected, next_throughput
+        records, pixels = setup.empty_records(m), reflected.pixel[:m].copy()
         estimate_terms(setup, hits, m, scratch, records, "mirror obscurance", "mirror shadow", throughput)
-        found.append((hits.pixel[:m].copy(), records))
+        for paths, (first, last) in zip(found, pairwise(ends), strict=True):
+            if first < last:
+                paths.append((pixels[first:last], records.part(slice(first, last))))
+    scratch.seconds["mirror"] += perf_counter() - started
+    return [path for paths in found for path in paths]
+
+
+def _reflect(
+    setup: FrameSetup, hits: Hits, throughput: Rgb, ends: list[int], scratch: Scratch, reflected: Hits, tint: Rgb
+) -> list[int]:
+    """Follow hits through one bounce, those between two `ends` together; return the ends of what they meet.
+
+    Args:
+        reflected, tint: overwritten, see `reflect`.
+    """
+    found = [0]
+    for first, last in pairwise(ends):
+        at, m = found[-1], 0
+        if first < last:
+            some, to = Hits._make(array[first:last] for array in hits), Hits._make(array[at:] for array in reflected)
+            packets = scratch.hit_rays.packets
+            m = reflect(some, last - first, throughput[first:last], setup.world, packets, to, tint[at:])
+        found.append(at + m)
     return found
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..hits.hits import empty_hits
 from ..hits.rays import room_for_hits, room_for_tests
+from ..kernels.simd import LANES
 from ..terms.cells.exact import PathScratch
 from ..terms.cells.lookups import room_for_gathering, room_for_near
 from ..terms.cells.mirrored import room_for_mirrors
@@ -45,7 +46,8 @@ class Scratch:
         self.hit_rays = room_for_hits(rays)
         self.test_rays = room_for_tests(RAYS, setup.lights.n_lights)
         self.hits = empty_hits(batch)
-        self.reflected = [empty_hits(batch) for _ in range(2 if setup.depth else 0)]
+        # kernels write sixteen hits at a time, here from any hit on
+        self.reflected = [empty_hits(batch + LANES) for _ in range(2 if setup.depth else 0)]
         self.throughput = [np.empty((batch, 3), np.float32) for _ in self.reflected]
         self.steps = room_for_steps(setup.lights.n_lights) if setup.shadow_step > 1 else None
         full = (0 if setup.keeps_all else batch, setup.lights.channels, setup.lights.n_lights)

@@ -44,7 +44,8 @@ def reflect(
         number of reflected hits, which is the number of rays.
     """
     m: int = _write_reflected_rays(hits, n, throughput, packets, reflected, reflected_throughput)
-    trace_hits(world, packets, m, coherent=True, near=0.0, mirrors=True, hits=reflected)
+    if m:
+        trace_hits(world, packets, m, coherent=True, near=0.0, mirrors=True, hits=reflected)
     return m
 
 
