@@ -27,8 +27,9 @@ from bench.speed import first, packets, processes, scaling, speed
 from bench.speed import page as table
 from bench.truth import flicker
 from bench.truth import run as truth
-from bench.truth.rendered import METHODS
-from bench.truth.traced import Place, trace_here
+from bench.truth.places import Place
+from bench.truth.rendered import METHODS, pace
+from bench.truth.traced import trace_here
 from bench.view import page as viewpage
 
 PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
@@ -40,6 +41,7 @@ OTHERS = (
     "truth",
     "flicker",
     "trace-place",
+    "pace",
     "scaling",
     "error",
     "packets",
@@ -66,7 +68,9 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=speed.RUNS, help="how often each thing is measured")
     parser.add_argument("--patience", type=float, default=0.0, help="seconds to wait for a busy machine, each time")
     parser.add_argument("--part", nargs="*", default=list(bias.MEASURES), choices=bias.MEASURES, help="for `bias`")
-    parser.add_argument("--method", nargs="*", default=[], choices=[*METHODS], help="for `truth`; all of them")
+    parser.add_argument(
+        "--method", nargs="*", default=[], choices=[*METHODS], help="for `truth`, all of them; and one for `pace`"
+    )
     parser.add_argument("--variant", default=FRAME_ARRAY.name, help="for `peak`")
     parser.add_argument("--resolution", help="for `peak`: 800x600")
     parser.add_argument("--frames", type=int, default=2, help="for `peak`")
@@ -87,6 +91,9 @@ def main() -> None:
     if args.what == "trace-place":
         job, c, l = args.jobs
         print(json.dumps(trace_here(Place(job=job, c=int(c), l=int(l)), args.quick, folder(args.quick))))
+        return
+    if args.what == "pace":
+        print(json.dumps({"ms": pace(args.jobs[0], args.method[0], args.quick)}))
         return
     if args.what == "view":
         viewpage.run(args.jobs, args.patience, args.quick)

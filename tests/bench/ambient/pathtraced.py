@@ -6,6 +6,7 @@ from a source or the background, by mirrors or not: it shows that both programs 
 """
 
 import subprocess
+import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -32,10 +33,15 @@ ROULETTE = 16  # vertices before a path may end by chance; there is no other end
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Traced:
-    """Pictures of one probe, (PASSES, h, w, 3): all light, and that which comes directly from sources or background."""
+    """Pictures of one probe, (PASSES, h, w, 3): all light, and that which comes directly from sources or background.
+
+    Attributes:
+        seconds: of tracing all light, compiling left out.
+    """
 
     total: Float32
     light: Float32
+    seconds: float
 
     def save(self, file: Path) -> None:
         """Keep them, half by half, with the standard errors of the means from the spread of all passes.
@@ -149,11 +155,14 @@ def pictures(mi: Any, prepared: Prepared, probe: Probe, samples: int, variant: s
     mi.set_variant(variant)
     lit, sensor = scene_of(mi, prepared, probe, sky=True), sensor_of(mi, prepared, probe.c)
     integrator = mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": ROULETTE})
-    total = []
+    total, spent = [], []
     for i in range(PASSES):
+        started = time.perf_counter()
         found = mi.render(lit, integrator=integrator, sensor=sensor, spp=each, seed=i + 1)
         total.append(np.array(found, np.float32)[..., :3])
-    return Traced(total=np.stack(total), light=np.stack(light))
+        spent.append(time.perf_counter() - started)
+    seconds = PASSES * float(np.median(spent[1:]))  # the first compiles
+    return Traced(total=np.stack(total), light=np.stack(light), seconds=seconds)
 
 
 def sensor_of(mi: Any, prepared: Prepared, c: int) -> Any:

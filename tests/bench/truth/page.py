@@ -12,7 +12,7 @@ from framearray_cli.base.arrays import Float32, Image
 from framearray_cli.base.colour import srgb8_from_linear
 
 from .compare import BLOCK, means
-from .traced import Place
+from .places import Place
 
 HEAD = f"""
 # Against the true light
@@ -26,7 +26,12 @@ samples; only the keys of indirect light differ.
 noise of ours included, over the mean indirect light. *Mean*: over that of the truth. Noise of the path-traced images is
 no part of any figure: errors against two independent halves of them are multiplied.
 """
-METHODS = ("obscurance", "obscurance, fit", "cells")
+TIMES = """
+*ms per image*: of interior frames of the job, all light positions, with writing; of Mitsuba rendering only. *Error*:
+all light, as above. The error of path tracing is its noise, which falls with the square root of its samples per pixel;
+fewer than one may have the error of ours.
+"""
+METHODS = ("obscurance", "obscurance, fit", "local", "cells")
 SHOWN = ("obscurance", "cells")
 WIDTH, GAP, QUALITY = 300, 4, 82  # of one picture and between two, pixels; of JPEG
 
@@ -42,7 +47,7 @@ def render(places: Sequence[Place], results: Path, site: Site) -> str:
     """The whole page; images without results are left out."""
     found = {place: table for place in places if (table := load(results, f"truth-{place.name}"))}
     compared = {place: table for place, table in found.items() if "noise" in table}
-    parts = [HEAD, "## Errors", _errors(compared)]
+    parts = [HEAD, "## Errors", _errors(compared), *_times(compared, results)]
     parts += _pictures(compared, results, site)
     skipped = {place.name: table["traced"]["skipped"] for place, table in found.items() if "skipped" in table["traced"]}
     if skipped:
@@ -62,6 +67,29 @@ def _errors(compared: Mapping[Place, Table]) -> str:
         noise = table["noise"]
         rows.append(["", "noise of the truth", percent(noise["all"]), "", percent(noise["indirect"]), ""])
     return grid(("image", "method", "all light", "mean", "indirect", "mean"), rows)
+
+
+def _times(compared: Mapping[Place, Table], results: Path) -> list[str]:
+    """Time per image, and that of path tracing for the same error."""
+    rows = []
+    for place, table in compared.items():
+        traced, pace = table["traced"], load(results, f"truth-pace-{place.job}") or {}
+        noise = table["noise"]["all"]
+        for method in METHODS:
+            one = table["methods"].get(method, {})
+            if "all" not in one or method not in pace or "seconds" not in traced or one["all"] <= 0:
+                continue
+            needed = (noise / one["all"]) ** 2  # samples for the same error, over those that were traced
+            ms = 1e3 * traced["seconds"] * needed
+            rows.append(
+                [
+                    f"{place.job}, c = {place.c}, l = {place.l}", f"`{method}`", number(pace[method]),
+                    percent(one["all"]), number(traced["samples"] * needed), number(ms),
+                    f"{number(ms / pace[method])}x",
+                ]
+            )  # fmt: skip
+    head = ("image", "method", "ms per image", "error", "Mitsuba: samples", "ms per image", "over ours")
+    return ["## Time at equal error", TIMES, grid(head, rows)] if rows else []
 
 
 def _pictures(compared: Mapping[Place, Table], results: Path, site: Site) -> list[str]:

@@ -2,27 +2,18 @@
 
 from collections.abc import Sequence
 
-from bench.core.cases import JOBS, job_named
 from bench.core.results import folder, load, save
+from bench.speed.processes import asked
 from bench.speed.speed import log
 
 from . import compare, page, rendered, traced
-from .traced import Place
-
-# Camera and light positions of the images, as shares of their paths.
-PLACES = ((0.4, 0.5), (0.75, 0.2))
-
-
-def places_of(name: str, quick: bool) -> list[Place]:
-    """The images of a job that are compared."""
-    job = job_named(name, quick)
-    return [Place(job=name, c=int(c * job.camera.frames), l=int(l * job.light.frames)) for c, l in PLACES]
+from .places import known_jobs, places_of
 
 
 def run(names: Sequence[str], quick: bool, methods: Sequence[str]) -> None:
     """Trace what is not traced, render by each method, and compare."""
-    out = folder(quick)
-    for place in (place for name in names or JOBS for place in places_of(name, quick)):
+    out, jobs = folder(quick), names or known_jobs()
+    for place in (place for name in jobs for place in places_of(name, quick)):
         table = load(out, f"truth-{place.name}") or {"traced": traced.trace(place, quick, out), "methods": {}}
         save(out, f"truth-{place.name}", table)
         if "skipped" in table["traced"]:
@@ -42,4 +33,11 @@ def run(names: Sequence[str], quick: bool, methods: Sequence[str]) -> None:
             log(f"{place.name}: {method}: {table['methods'][method]}")
         save(out, f"truth-{place.name}", table)
         page.keep(shown, place, out)
-    page.write([place for name in JOBS for place in places_of(name, quick)], quick)
+    options = ["--quick"] if quick else []
+    for name in jobs:
+        table = load(out, f"truth-pace-{name}") or {}
+        for method in methods or rendered.METHODS:
+            table[method] = asked("pace", name, "--method", method, *options)["ms"]
+            log(f"{name}: {method}: {table[method]:.3g} ms per image")
+        save(out, f"truth-pace-{name}", table)
+    page.write([place for name in known_jobs() for place in places_of(name, quick)], quick)

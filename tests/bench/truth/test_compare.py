@@ -1,9 +1,15 @@
 """Distances from a noisy truth: known errors come out, whatever the noise."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from bench.core.results import save
+
+from . import page
 from .compare import BLOCK, distance, means, noise
+from .places import Place
 from .traced import Truth
 
 H, W = 120, 160
@@ -38,3 +44,20 @@ def test_noise_is_that_of_the_mean_of_both_halves():
     found = noise(truth_of(image, image - 0.5, 0.4, rng))
     assert found["all"] == pytest.approx(0.4 / np.sqrt(2) / BLOCK / 2.0, rel=0.1)
     assert found["indirect"] == pytest.approx(0.4 / np.sqrt(2) / 0.5, rel=0.05)
+
+
+def test_the_time_at_equal_error_follows_from_the_noise(tmp_path: Path) -> None:
+    """Half the samples have 1.41 times the noise; the last two columns are milliseconds and a ratio."""
+    place = Place(job="kitchen", c=3, l=4)
+    table = {
+        "traced": {"samples": 128, "seconds": 2.0},
+        "noise": {"all": 0.02},
+        "methods": {"cells": {"all": 0.04}, "local": {"all": 0.02}},
+    }
+    save(tmp_path, "truth-pace-kitchen", {"cells": 5.0, "local": 4.0})
+    _, _, times = page._times({place: table}, tmp_path)
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in times.splitlines()[2:]]
+    assert [row[1:] for row in rows] == [
+        ["`local`", "4", "2 %", "128", "2,000", "500x"],
+        ["`cells`", "5", "4 %", "32", "500", "100x"],
+    ]

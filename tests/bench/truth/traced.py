@@ -9,28 +9,15 @@ import numpy as np
 
 from bench.ambient import pathtraced
 from bench.ambient.scenes import Probe
-from bench.core.cases import job_named
 from bench.core.results import Table
 from bench.speed.processes import asked
 from bench.speed.speed import log
 from framearray_cli.base.arrays import Float32
 from framearray_cli.render.prepare import prepare
 
+from .places import Place, job_of
+
 SAMPLES, QUICK_SAMPLES = 128, 32  # per pixel, in all
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """One image of a job: camera position c under light position l."""
-
-    job: str
-    c: int
-    l: int
-
-    @property
-    def name(self) -> str:
-        """In names of files and tables."""
-        return f"{self.job}-c{self.c}-l{self.l}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,7 +44,7 @@ def trace_here(place: Place, quick: bool, folder: Path) -> Table:
     mi, why = pathtraced.mitsuba_with(pathtraced.COMPILED)
     if why:
         return {"skipped": why}
-    prepared = prepare(job_named(place.job, quick))
+    prepared = prepare(job_of(place.job, quick))
     why = pathtraced.unknown(prepared.scene)
     if why:
         return {"skipped": why}
@@ -67,7 +54,7 @@ def trace_here(place: Place, quick: bool, folder: Path) -> Table:
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / f"truth-{place.name}.npz"
     traced.save(file)
-    return {"file": file.name, "version": mi.__version__, "samples": samples}
+    return {"file": file.name, "version": mi.__version__, "samples": samples, "seconds": traced.seconds}
 
 
 def read(file: Path) -> Truth:
