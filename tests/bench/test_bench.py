@@ -130,10 +130,13 @@ def test_a_resampled_light_path_keeps_its_ends_and_directions_stay_unit():
         vector=vector,
         strength=ones,
         lit=ones[:, 0],
+        size=np.arange(8, dtype=np.float32).reshape(2, 4),
+        cone=np.empty(0, np.float32),
         colour=np.ones((4, 3), np.float32),
     )
     found = resampled(lights, np.linspace(0, 3, 7))
-    assert found.n_lights == 7
+    assert found.n_lights == 7 and found.cone.shape == (0,)
+    np.testing.assert_allclose(found.size[:, 1], [0.5, 4.5], atol=1e-6)
     np.testing.assert_allclose(found.vector[:, :, ::2], vector, atol=1e-6)
     np.testing.assert_allclose(np.linalg.norm(found.vector[1], axis=0), 1, atol=1e-6)
     np.testing.assert_allclose(found.vector[0, :, 1], (path[:, 0] + path[:, 1]) / 2, atol=1e-6)

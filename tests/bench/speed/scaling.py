@@ -84,6 +84,8 @@ def resampled(lights: LightArrays, at: Float64) -> LightArrays:
         vector=vector,
         strength=_between(lights.strength, at, 2),
         lit=np.ceil(_between(lights.lit, at, 1)),
+        size=_between(lights.size, at, 1) if lights.size.ndim > 1 else lights.size,
+        cone=_between(lights.cone, at, 2) if lights.cone.ndim > 1 else lights.cone,
         colour=_between(lights.colour, at, 0),
     )
     return pad_lights(found)
