@@ -16,6 +16,8 @@ from framearray_cli.engine.hits.rays import room_for_hits
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.ambient.estimate import BATCH
 from framearray_cli.engine.terms.cells.gather import LIGHT
+from framearray_cli.engine.terms.cells.lookups import MOST_NEAR
+from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
 
 from .prepare import Prepared
 from .writer import BLOCKS, image_format
@@ -105,7 +107,19 @@ def window_memory(
         + frames * frames * 4
         + BLOCKS * (6 if image_format(job).composes_halves else 12) * n_lights
     )
-    return int(width * height * (held * per_hit + mirrored + per_image_pixel))
+    pixels = width * height * (held * per_hit + mirrored + per_image_pixel)
+    return int(pixels) + prepared.threads * _gathering_memory(prepared, n_lights)
+
+
+def _gathering_memory(prepared: Prepared, n_lights: int) -> int:
+    """Return the bytes per thread for light from cells that grow with the light positions; see `Scratch`."""
+    job, values = prepared.job, prepared.light_arrays.channels * n_lights
+    if job.indirect.method != "cells":
+        return 0
+    near = 2 * 2 * MOST_NEAR * values  # of rays too short for cells: irradiance, and what leaves
+    smooth = HITS_TOGETHER * values if job.indirect.filter and not job.indirect.exact else 0
+    paths = BATCH * (values + 3 * n_lights) if job.indirect.exact else 0
+    return 4 * (near + smooth + paths)
 
 
 def cells_memory(setup: FrameSetup, n_lights: int) -> int:

@@ -16,7 +16,9 @@ from framearray_cli.array.names import file_name
 from framearray_cli.array.pictures import Pictures, Relight
 from framearray_cli.array.record import read_records, record_files, seal, unseal
 from framearray_cli.base.errors import OutputError
+from framearray_cli.engine.frames.scratch import Scratch
 from framearray_cli.job.job import Job
+from framearray_cli.render.memory import _gathering_memory
 from framearray_cli.render.render import render
 
 
@@ -83,3 +85,19 @@ def test_other_cells_than_those_of_the_images_there_are_refused(scene: Path, tmp
     with pytest.raises(OutputError, match="expected the cells of the images that are there, got others"):
         render(job(scene, tmp_path, 2))
     assert images(tmp_path) == before
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_the_memory_of_threads_grows_with_the_light_positions_as_their_arrays_do(exact: bool) -> None:
+    keys = {"exact": True} if exact else {"samples": 1024}
+    sizes, expected = [], []
+    for frames in (16, 160):
+        inputs = tiny.prepared(tiny.job(indirect={"method": "cells", **keys}, light={"frames": frames}))
+        with tiny.planned(inputs) as (setup, _):
+            scratch = Scratch(setup, 2048)
+        kept = [*(scratch.near or ()), *([scratch.smooth] if scratch.smooth else [])]
+        arrays = [a for one in kept for a in one if isinstance(a, np.ndarray)]
+        arrays += [scratch.paths.work.sums, scratch.paths.work.irradiance] if scratch.paths else []
+        sizes.append(sum(array.nbytes for array in arrays))
+        expected.append(_gathering_memory(inputs, frames))
+    assert expected[1] - expected[0] == sizes[1] - sizes[0]
