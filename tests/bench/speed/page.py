@@ -9,11 +9,20 @@ from bench.core.results import Site, folder, limited, load, site_for
 from . import parts as pages
 from . import sweeps
 
+SCALING = "\n## Scaling\n"
+
 
 def write(quick: bool) -> None:
-    """Write the page and its plots from all results there are; quick results go beside themselves."""
+    """Write the page and its plots from all results there are; quick results go beside themselves.
+
+    Scaling, which has a command of its own, stays on the page where there are no results.
+    """
     page = site_for(quick).pages / (f"speed-{limited()}.md" if limited() else "speed.md")
-    page.write_text(render(folder(quick), site_for(quick)), encoding="utf-8")
+    text = render(folder(quick), site_for(quick))
+    if page.is_file() and SCALING not in text:
+        _, found, before = page.read_text(encoding="utf-8").partition(SCALING)
+        text += found + before
+    page.write_text(text, encoding="utf-8")
     print(page)
 
 
