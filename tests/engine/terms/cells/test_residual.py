@@ -42,7 +42,7 @@ def test_no_light_has_no_error() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["a sunlit floor under a table", "black and white surfaces"])
 def test_the_error_is_that_of_images(name: str) -> None:
-    """Of rooms that wide cells get wrong, with so many hits that their noise does not count."""
+    """Of rooms that wide cells get wrong, with enough hits to make their noise negligible."""
     room, many = LIT_ROOMS[name], {"hits": 32, "obscurance": 16}
     image, direct = rendered(room, indirect=CELLS, samples=many), rendered(room, ambient=DARK, samples=many)
     groups = paths_of(room, 512)
