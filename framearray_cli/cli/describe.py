@@ -120,4 +120,5 @@ def init_result(start: "Start", job_file: Path, scene: Path) -> InitResult:
         images=start.camera.frames * start.light_frames,
         inside=start.inside,
         about=tuple(start.about),
+        notes=start.notes,
     )

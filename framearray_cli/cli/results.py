@@ -175,7 +175,13 @@ class VerifyResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InitResult:
-    """The job that `init` wrote; `inside`: whether the scene was taken for a room; `about`: what it found."""
+    """The job that `init` wrote.
+
+    Attributes:
+        inside: whether the scene was taken for a room.
+        about: what `init` found.
+        notes: what of the scene was not understood or was approximated.
+    """
 
     job: str
     scene: str
@@ -184,6 +190,7 @@ class InitResult:
     images: int
     inside: bool
     about: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -165,11 +165,12 @@ def _share_lines(summary: "Summary", job: "Job") -> list[str]:
     return [f"{clipped:.1%} of the pixels {how}; {black:.1%} are black"]
 
 
-def on_disk_lines(on_disk: "OnDisk", wanted: int) -> list[str]:
-    """Describe the files of an array that are on disk already."""
-    lines = [f"damaged: {name}: {problem}" for name, problem in on_disk.damaged[:MOST_DAMAGED]]
-    if len(on_disk.damaged) > MOST_DAMAGED:
-        lines.append(f"damaged: {counted(len(on_disk.damaged) - MOST_DAMAGED, 'more file')}")
+def on_disk_lines(on_disk: "OnDisk", wanted: int, *, damaged: bool = True) -> list[str]:
+    """Describe the files of an array that are on disk already; `damaged`: list the damaged ones, too."""
+    listed = on_disk.damaged if damaged else ()
+    lines = [f"damaged: {name}: {problem}" for name, problem in listed[:MOST_DAMAGED]]
+    if len(listed) > MOST_DAMAGED:
+        lines.append(f"damaged: {counted(len(listed) - MOST_DAMAGED, 'more file')}")
     if on_disk.images:
         left = f"{wanted:,} {agree(wanted, 'is', 'are')} left" if wanted else "nothing is left to do"
         there = f"{counted(on_disk.images, 'image')} {agree(on_disk.images, 'is', 'are')}"

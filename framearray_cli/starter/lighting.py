@@ -14,7 +14,7 @@ from framearray_cli.scene.paths.sun import NEVER, daylight
 
 from .expose import find_factors
 from .lamps import choose_lamp_path
-from .model import LightKeys, LightSource, Start, SunDay, Vector, round_points, round_vector
+from .model import LightKeys, LightSource, Start, SunDay, Vector, round_points, round_vector, without_accents
 from .options import StartOptions, SunOption
 from .orbit import SUN_KEYS, key_frames, sun_directions
 from .site import Site
@@ -174,7 +174,7 @@ def _with_groups(start: Start, options: StartOptions) -> Start:
 
 def _group_name(name: str, taken: list[str]) -> str:
     """A name of a group like that of a light, which no other has."""
-    base = re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-")[:GROUP_LENGTH] or "lamp"
+    base = re.sub(r"[^A-Za-z0-9_-]+", "-", without_accents(name)).strip("-")[:GROUP_LENGTH] or "lamp"
     found, k = base, 1
     while found.lower() in (*TAKEN, *(other.lower() for other in taken)):
         k += 1

@@ -1,5 +1,6 @@
 """A first job before it is text: what was chosen, and why. All positions are in the scene file's own coordinates."""
 
+import unicodedata
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -113,6 +114,7 @@ class Start:
         unit: of length, as it seems: "m", "cm", "mm", "in" or "ft"; "" where nothing tells.
         format: of the images.
         about: comment lines at the top.
+        notes: what of the scene was not understood or was approximated, one sentence each.
     """
 
     name: str
@@ -128,11 +130,17 @@ class Start:
     materials: tuple[MaterialNote, ...]
     unit: str = ""
     format: str = "png"
+    notes: tuple[str, ...] = ()
 
     @property
     def outside(self) -> str:
         """The light of rays that meet nothing: average in a room, the sky for a thing under it."""
         return "average" if self.inside else "background"
+
+
+def without_accents(name: str) -> str:
+    """Return a name with plain letters in place of accented ones."""
+    return "".join(c for c in unicodedata.normalize("NFKD", name) if not unicodedata.combining(c))
 
 
 def round_vector(values: Any) -> Vector:

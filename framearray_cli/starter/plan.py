@@ -12,7 +12,7 @@ from framearray_cli.scene.scene import Scene, load_scene
 
 from .cameras import choose_shot
 from .lighting import add_lights
-from .model import MaterialNote, Start, Vector, round_vector
+from .model import MaterialNote, Start, Vector, round_vector, without_accents
 from .options import StartOptions
 from .site import Site, explored
 
@@ -51,6 +51,7 @@ def plan_start(file: Path, name: str, options: StartOptions) -> Start:
             about=shot.about or site.about,
             materials=_materials(scene),
             unit="" if site.unit is None else site.unit.name,
+            notes=scene.report.notes,
             format=options.image_format,
         )
         return add_lights(site, start, stage, options, shot.ends)
@@ -65,7 +66,7 @@ def _range(site: Site, inside: bool) -> float:
 
 def _job_name(name: str) -> str:
     """A name without characters that some file system refuses."""
-    name = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.")[:60]
+    name = re.sub(r"[^A-Za-z0-9._-]+", "-", without_accents(name)).strip("-.")[:60]
     return name if re.fullmatch(NAME, name) else "scene"
 
 

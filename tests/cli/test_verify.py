@@ -46,6 +46,7 @@ def test_every_flipped_byte_is_found_and_repaired(array, capsys):
     mended = run(capsys, "verify", "--repair", array)
     assert mended.code == 0
     assert f"6 of {N_FILES} files are missing or damaged\n" in mended.out, "no advice to type the same again"
+    assert all((mended.out + mended.err).count(name) == 1 for name in names), "each is named once"
     assert contents(array) == before
     assert run(capsys, "verify", "-q", array).code == 0
 

@@ -51,6 +51,20 @@ def test_every_source_of_the_file_is_a_group_with_a_name_of_its_own(tmp_path: Pa
     assert all(source.group is None for source in read_first_job_again(tmp_path).light.sources)
 
 
+def test_a_name_keeps_its_letters_without_their_accents(tmp_path: Path) -> None:
+    scene = lit_wall().save(tmp_path / "scene.glb")
+    assert init(scene, tmp_path / "Wohnung Süd.toml", StartOptions(frames=2)).name == "Wohnung-Sud"
+
+
+def test_what_is_missing_beside_the_scene_is_a_note(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "box.mtl").write_text("newmtl wall\nKd 0.5 0.5 0.5\nmap_Kd brick.png\n")
+    corners = "\n".join(f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 1))
+    faces = "\n".join(f"f {face}" for face in ("1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4"))
+    (tmp_path / "box.obj").write_text(f"mtllib box.mtl\n{corners}\nusemtl wall\n{faces}\n")
+    main(["init", str(tmp_path / "box.obj"), "-o", str(tmp_path / "box.toml"), "--frames", "2"])
+    assert "note: texture left out, brick.png: no such file beside the scene" in capsys.readouterr().err
+
+
 def read_first_job_again(folder: Path) -> Job:
     init(folder / "scene.glb", folder / "again.toml", StartOptions(frames=2))
     return read_job(folder / "again.toml")

@@ -113,7 +113,7 @@ def init(
                 sun=None if sun is None else SunOption(*sun),
             )
             start = run(scene, job_file, options, force=force)
-        screen.say(start.about)
+        screen.say([*start.about, *(f"note: {note}" for note in start.notes)])
     if job_file == STDOUT:
         say(out, to_text(start, job_file).splitlines())
         return

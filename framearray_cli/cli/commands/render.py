@@ -155,13 +155,18 @@ def render_on_screen(
     restart: bool = False,
     cameras: Sequence[int] | None = None,
     options: "WorkerOptions | None" = None,
+    repairs: bool = False,
 ) -> "RenderResult | None":
-    """Render, show the progress on the screen, and print the summary; return the result if `--json` wants it."""
+    """Render, show the progress on the screen, and print the summary; return the result if `--json` wants it.
+
+    Args:
+        repairs: whether damaged files were listed already.
+    """
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the scene")
         from framearray_cli.render.render import render as run
 
-        events = RenderingEvents(screen, job, strict=strict)
+        events = RenderingEvents(screen, job, strict=strict, repairs=repairs)
         try:
             with screen.compiling():
                 if options is None:
@@ -193,8 +198,8 @@ class RenderingEvents(PartEvents):
         printed: notes that were printed.
     """
 
-    def __init__(self, screen: Screen, job: "Job", *, strict: bool = False) -> None:
-        self._screen, self._job, self._strict = screen, job, strict
+    def __init__(self, screen: Screen, job: "Job", *, strict: bool = False, repairs: bool = False) -> None:
+        self._screen, self._job, self._strict, self._repairs = screen, job, strict, repairs
         self._total = 0
         self.printed: tuple[str, ...] = ()
 
@@ -223,7 +228,7 @@ class RenderingEvents(PartEvents):
 
     def scanned(self, on_disk: "OnDisk", wanted: int) -> None:
         self._total = wanted
-        self._screen.say(on_disk_lines(on_disk, wanted))
+        self._screen.say(on_disk_lines(on_disk, wanted, damaged=not self._repairs))
         self._screen.wait("estimating the ambient light")
 
     def planned(self, ambient: "Ambient") -> None:

@@ -59,7 +59,7 @@ def verify(
     print_result(lines, verify_result(found), quiet=quiet)
     folder = found.manifest.directory
     job = with_threads(job_of_table(found.manifest.job, folder / FILE_NAME, folder.absolute()), threads)
-    print_result([], verify_result(found, render_on_screen(job, quiet=quiet)))
+    print_result([], verify_result(found, render_on_screen(job, quiet=quiet, repairs=True)))
 
 
 def verified_lines(found: "Verification", *, repairs: bool = False) -> list[str]:
