@@ -22,6 +22,7 @@ POWERS = {
 }
 SUN_ANGLE = 0.53  # degrees; of the sun, seen from the Earth
 DIGITS = 6  # significant digits of positions and directions; an error of a thousandth of a pixel
+ROUNDING = 1e-12  # of its longest component: shorter ones are 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,7 +146,8 @@ def without_accents(name: str) -> str:
 
 def round_vector(values: Any) -> Vector:
     """Round three numbers to few enough digits to read, and enough to mean the same."""
-    x, y, z = (float(f"{float(value):.{DIGITS}g}") for value in values)
+    least = ROUNDING * max(abs(float(value)) for value in values)  # what a turned axis leaves in place of 0
+    x, y, z = (float(f"{float(value):.{DIGITS}g}") if abs(float(value)) > least else 0.0 for value in values)
     return x + 0.0, y + 0.0, z + 0.0  # no -0.0
 
 

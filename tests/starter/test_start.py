@@ -20,7 +20,7 @@ from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.scene.scene import load_scene
 from framearray_cli.starter import Start, StartOptions, expose, init
 from framearray_cli.starter.expose import CLIPPED, LUMINANCE, ROOM, solve_exposure
-from framearray_cli.starter.model import table_of
+from framearray_cli.starter.model import round_vector, table_of
 
 FEW = StartOptions(frames=3, lights=2)
 
@@ -73,6 +73,11 @@ def code_of(*arguments: str) -> int:
     except SystemExit as ended:
         return int(ended.code or 0)
     return 0
+
+
+def test_a_vector_is_rounded_to_what_a_person_would_write() -> None:
+    assert round_vector([1 / 3, -1.0, 2.2e-16]) == (0.333333, -1.0, 0.0)
+    assert round_vector([0.0, -0.0, 1e-9]) == (0.0, 0.0, 1e-9), "small only beside larger ones"
 
 
 def test_the_text_holds_the_choices(tmp_path: Path) -> None:
