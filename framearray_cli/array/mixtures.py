@@ -18,7 +18,8 @@ LINEAR = (".exr", ".tif")
 # Rounding of weights that sum to 1: of numbers with six digits in a file.
 MEAN_ERROR = 1e-4
 _STRENGTHS = ("intensity", "irradiance")
-_PLACES = ("type", "position", "direction", *_STRENGTHS)  # what the light of a source depends on
+_SHAPES = ("radius", "angle", "inner", "outer", "across", "width", "height", "two_sided")
+_PLACES = ("type", "position", "direction", *_STRENGTHS, *_SHAPES)  # what the light of a source depends on
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from framearray_cli.base.forms.table import Place, default_text, fail
 from framearray_cli.base.units import FARTHEST
 
 from .keys import MOST_EYES
+from .panel import DiscSource, RectSource
 from .placed import Angle, DirectionalKey, DirectionalSource, PointSource
 from .sourcetable import SourceTable
 from .spot import SpotSource
@@ -163,5 +164,6 @@ class SunSource(SourceTable):
 
 
 LightSource: TypeAlias = Annotated[
-    PointSource | DirectionalSource | SpotSource | SunSource | DomeSource | GridSource, Field(discriminator="type")
+    PointSource | DirectionalSource | SpotSource | RectSource | DiscSource | SunSource | DomeSource | GridSource,
+    Field(discriminator="type"),
 ]

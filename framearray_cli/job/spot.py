@@ -4,8 +4,9 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from framearray_cli.base.forms.table import Place, default_text, fail
+from framearray_cli.base.forms.table import default_text, fail
 
+from .aimed import aim_problems, same_choice_problems
 from .keys import key_problems
 from .placed import SIZES, PointKey
 from .sourcetable import SourceTable
@@ -40,12 +41,7 @@ class SpotKey(PointKey):
 
     @model_validator(mode="after")
     def _one_aim(self) -> "SpotKey":
-        problems: list[tuple[Place, str]] = []
-        if (self.direction is None) == (self.target is None):
-            found = "neither" if self.direction is None else "both"
-            problems.append(((), f"expected either `direction` or `target`, got {found}"))
-        if self.target is not None and self.target == self.position:
-            problems.append((("target",), "expected a point away from `position`, got the same point"))
+        problems = aim_problems(self)
         if self.inner > self.outer:
             problems.append((("inner",), f"expected at most {self.outer:g}, the angle `outer`, got {self.inner:g}"))
         if problems:
@@ -56,9 +52,7 @@ class SpotKey(PointKey):
 def _consistent_spot_keys(keys: tuple[SpotKey, ...]) -> tuple[SpotKey, ...]:
     """Check the keys of one spot against each other."""
     problems = key_problems(keys, "direction", "color", SIZES["point"])
-    aim = "direction" if keys[0].target is None else "target"
-    others = [k for k, key in enumerate(keys) if getattr(key, aim) is None]
-    problems += [((k, aim), "missing; keys[0] gives it, so every key of this list must") for k in others[:1]]
+    problems += same_choice_problems(keys, ("target", "direction"))
     if problems:
         fail(problems)
     return keys

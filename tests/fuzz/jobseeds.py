@@ -53,6 +53,27 @@ SPOTS = [
         "keys": [{"frame": 0, "position": [0, 1.9, 0], "direction": [0, -1, 0.2], "intensity": 3.0, "outer": 30.0}],
     },
 ]
+PANELS = [
+    {
+        "type": "rect",
+        "keys": [
+            {"frame": 2 * k, "position": [0.5, 1.9, k], "target": [0, 0, -k], "power": 30.0, "width": 1.0, "height": 1}
+            for k in range(2)
+        ],
+    },
+    {
+        "type": "rect",
+        "two_sided": True,
+        "keys": [
+            {"frame": 0, "position": [0, 1.9, 0], "direction": [0, -1, 0], "up": [1, 0, 0], "radiance": [3.0, 2.0, 1.0],
+             "width": 0.5, "height": 0.2, "color": "2700 K"}
+        ],
+    },
+    {
+        "type": "disc",
+        "keys": [{"frame": 0, "position": [0, 1.9, 0], "direction": [0, -1, 0.2], "radiance": 3.0, "radius": 0.2}],
+    },
+]  # fmt: skip
 GROUPED = {
     "frames": 2,
     "axes": {"lamps": 2},
@@ -99,7 +120,9 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
         ),
         "sun": tiny.table(camera=small, light={"sources": [SUN], "frames": 3}, ambient={"method": "fit", "paths": 64}),
         "year": tiny.table(camera=small, light={"sources": [YEAR], "frames": 6}),
-        "domes": tiny.table(camera=small, light={"sources": [DOME, LAMPS, GRID, IN_PICTURE, *SPOTS], "frames": 4}),
+        "domes": tiny.table(
+            camera=small, light={"sources": [DOME, LAMPS, GRID, IN_PICTURE, *SPOTS, *PANELS], "frames": 4}
+        ),
         "automatic": tiny.table(
             camera=small | tiny.WALK, samples={"hits": "auto", "obscurance": 4}, reuse={"n_r": "auto"}, output=EXR
         ),

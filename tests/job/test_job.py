@@ -177,6 +177,7 @@ def test_one_number_is_grey(table):
 
 
 RGB = "a number or 3 numbers of at least 0"
+KINDS_OF_SOURCES = '"point", "directional", "spot", "rect", "disc", "sun", "dome" or "grid"'
 WRONG = [
     ("name", "a/b", 'name: expected at most 100 letters, digits, ".", "_" or "-", the first a letter, digit or "_", '
      'got "a/b"'),
@@ -219,9 +220,9 @@ WRONG = [
     ("light.sources", [], "light.sources: expected a list of tables, at least 1, got 0"),
     ("light.sources", {}, "light.sources: expected a list of tables, got a table"),
     ("light.sources.0.type", "torch",
-     'light.sources[0].type: expected "point", "directional", "spot", "sun", "dome" or "grid", got "torch"'),
+     f'light.sources[0].type: expected {KINDS_OF_SOURCES}, got "torch"'),
     ("light.sources.0", {"keys": []},
-     'light.sources[0].type: missing; expected "point", "directional", "spot", "sun", "dome" or "grid"'),
+     f"light.sources[0].type: missing; expected {KINDS_OF_SOURCES}"),
     ("light.sources.0.keys", [],
      "light.sources[0].keys: expected a list of tables, at least 1, got 0; give `keys` or `file`"),
     ("light.sources.0.keys.0.color", 1,

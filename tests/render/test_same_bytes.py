@@ -33,6 +33,19 @@ SOFT = {
         {"type": "point", "keys": [{**key, "radius": 0.2} for key in tiny.TABLE["light"]["sources"][0]["keys"]]},
         {"type": "directional", "keys": [{**key, "angle": 5.0} for key in tiny.SUN["keys"]]},
         {"type": "spot", "keys": [{"frame": 0, "position": [0.5, 1.9, 0.5], "target": [0, 0, 0], "intensity": 9.0}]},
+        {
+            "type": "rect",
+            "keys": [
+                {
+                    "frame": 0,
+                    "position": [-0.5, 1.9, 0],
+                    "target": [0, 0, 0],
+                    "power": 30.0,
+                    "width": 0.5,
+                    "height": 0.2,
+                }
+            ],
+        },
     ]
 }
 

@@ -12,8 +12,9 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Int32, with_room
 from framearray_cli.scene.paths.paths import Lights
+from framearray_cli.scene.paths.placing import LightPath
 
-POINT, DIRECTIONAL = 0, 1
+POINT, DIRECTIONAL, RECT, DISC = 0, 1, 2, 3  # panels are last
 SHARPEST = 0.001  # width of a spot's edge, in cosines, over that of its cone
 KINDS = {"point": POINT, "directional": DIRECTIONAL}
 
@@ -22,14 +23,18 @@ class LightArrays(NamedTuple):
     """All sources of a job for kernels, which read packets of light positions; see `pad_lights`.
 
     Attributes:
-        kind: (n_sources,) POINT or DIRECTIONAL.
+        kind: (n_sources,) POINT, DIRECTIONAL, RECT or DISC.
         vector: (n_sources, 3, n_lights) position, centred, or the unit direction that light travels.
-        strength: (n_sources, channels, n_lights) W/sr or W/m2 in units of `colour`; 1 or 3 channels.
+        strength: (n_sources, channels, n_lights) W/sr or W/m2 in units of `colour`; 1 or 3 channels. A panel's
+            is that along its normal.
         lit: (n_sources, n_lights) 1 where a source shines, else 0.
         size: (n_sources, n_lights) the squared radius of a point source, or sin^2 of half the angle of a directional
             one; (0,) where no source has a size: kernels are then compiled without it.
         cone: (n_sources, 5, n_lights) the unit axis of a spot, and a and b of its falloff, see `spot_share`; 0, 0 and 1
             of other sources. (0,) where there are no spots: kernels are then compiled without them.
+        panel: (n_sources, 10, n_lights) of a rectangle or disc the half axes a and b, the unit normal, and the share of
+            its light that the back sends, times -1; 0 of other sources. (0,) where there are none of them: kernels are
+            then compiled without them.
         colour: (n_lights, 3) factor of a stored irradiance; ones if there are 3 channels.
     """
 
@@ -39,6 +44,7 @@ class LightArrays(NamedTuple):
     lit: Float32
     size: Float32
     cone: Float32
+    panel: Float32
     colour: Float32
 
     @property
@@ -78,15 +84,23 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
     else:
         strength, colour = intensity, np.ones_like(colour)
     found = LightArrays(
-        kind=np.array([KINDS[source.kind] for source in lights.sources], np.int32),
+        kind=np.array([_kind(source) for source in lights.sources], np.int32),
         vector=np.asarray(vector.transpose(0, 2, 1), np.float32),
         strength=np.asarray(strength.transpose(0, 2, 1), np.float32),
         lit=np.asarray((intensity > 0).any(axis=-1), np.float32),
         size=_sizes(lights),
         cone=_cones(lights),
+        panel=_panels(lights),
         colour=np.asarray(colour, np.float32),
     )
     return pad_lights(found)
+
+
+def _kind(source: LightPath) -> int:
+    """POINT, DIRECTIONAL, RECT or DISC."""
+    if source.panel is None:
+        return KINDS[source.kind]
+    return DISC if source.panel.round else RECT
 
 
 def _sizes(lights: Lights) -> Float32:
@@ -114,6 +128,19 @@ def _cones(lights: Lights) -> Float32:
     return found
 
 
+def _panels(lights: Lights) -> Float32:
+    """`LightArrays.panel`."""
+    if all(source.panel is None for source in lights.sources):
+        return np.empty(0, np.float32)
+    found = np.zeros((len(lights.sources), 10, lights.n), np.float32)
+    for rows, source in zip(found, lights.sources, strict=True):
+        if (panel := source.panel) is not None:
+            a, b = panel.half_axes
+            rows[:9] = np.concatenate([a, b, panel.axis], axis=1).T
+            rows[9] = -1.0 if panel.two_sided else 0.0
+    return found
+
+
 def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
     """The lights at some of their positions, in the same units."""
     some = list(at)
@@ -123,6 +150,7 @@ def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
         lit=lights.lit[:, some],
         size=lights.size[:, some] if lights.size.ndim > 1 else lights.size,
         cone=lights.cone[:, :, some] if lights.cone.ndim > 1 else lights.cone,
+        panel=lights.panel[:, :, some] if lights.panel.ndim > 1 else lights.panel,
         colour=lights.colour[some],
     )
     return pad_lights(found)

@@ -5,7 +5,8 @@ A further shape of light has its kind in `lights.py` and its formulas here; what
 A source with a size is a sphere or the disc of a sun. From P it fills a cone of directions about its centre; a hit
 draws one point q of the unit sphere per source, and q turns into a direction of the cone at every light position: its
 height along the cone's axis says how far from the axis, the rest of it to which side. So a hit sees each source
-under the same random numbers at all light positions, without axes that could turn or jump.
+under the same random numbers at all light positions, without axes that could turn or jump. Rectangles and discs are in
+`panels.py`.
 """
 
 from typing import NamedTuple
@@ -16,7 +17,8 @@ from framearray_cli.base.arrays import Float64, Real, Triple
 
 from ..kernels.kernel import has_rows, inlined
 from ..kernels.simd import gather, load, select, sqrt
-from .lights import DIRECTIONAL, LightArrays
+from .lights import DIRECTIONAL, RECT, LightArrays
+from .panels import PanelAt, panel_at, panel_in_lanes, panel_point, panel_ray, panel_sample
 from .random import SOURCES, r2, random_word, sphere_point
 
 
@@ -27,12 +29,14 @@ class SourceAt(NamedTuple):
         place: the source's position, or for a directional one the direction in which its light travels.
         size: not read where no source has a size.
         cone: axis, a and b; not read where there are no spots.
+        panel: half axes, normal and back; not read where there are no panels.
         lit: 1 where the source shines, else 0.
     """
 
     place: Triple
     size: Real
     cone: tuple[Real, Real, Real, Real, Real]
+    panel: PanelAt
     lit: Real
 
 
@@ -51,6 +55,7 @@ def source_at(lights: LightArrays, s: int, l: int) -> SourceAt:
             gather(lights.cone, five + 3 * n_lights),
             gather(lights.cone, five + 4 * n_lights),
         ),
+        panel_at(lights, s, l),
         lights.lit[s, l],
     )
 
@@ -70,14 +75,17 @@ def source_in_lanes(lights: LightArrays, s: int, l: int) -> SourceAt:
             load(lights.cone, five + 3 * n_lights),
             load(lights.cone, five + 4 * n_lights),
         ),
+        panel_in_lanes(lights, s, l),
         load(lights.lit, one),
     )
 
 
 @inlined
-def source_point(key: np.uint64, s: int) -> Triple:
-    """The point q of source s that the hit of a random key draws, on the unit sphere."""
+def source_point(lights: LightArrays, key: np.uint64, s: int) -> Triple:
+    """The point q of source s that the hit of a random key draws: on the unit sphere, or of a panel."""
     u, v = r2(random_word(key, SOURCES + s), 0)
+    if has_rows(lights.panel) and lights.kind[s] >= RECT:
+        return panel_point(lights.kind[s], u, v)
     return sphere_point(u, v)
 
 
@@ -90,18 +98,23 @@ def vector_and_factor(
     The irradiance is the factor times the strength: cos(theta) / d^2 for a point source, whose vector ends at the
     source, and cos(theta) for a directional one, whose vector has length 1. It is 0 where the source does not shine or
     lies behind either normal. Of a source with a size it is the estimate by one direction, see `_cone_sample`; a spot's
-    falls off towards its edge.
+    falls off towards its edge. Of a panel it is that of one of its points, see `panel_sample`.
 
     Args:
         source: source s at these light positions.
         p, g, m: points, geometric and shading normals.
-        q: see `source_point`; not read where no source has a size.
+        q: see `source_point`; not read where no source has a size or is a panel.
     """
-    (x, y, z), size, cone, lit = source
+    (x, y, z), size, cone, panel, lit = source
     kind, nothing, one = lights.kind[s], np.float32(0.0), np.float32(1.0)
     # the vector to the source: L - P, or against the light's direction
     sign, from_point = (-one, nothing) if kind == DIRECTIONAL else (one, one)
     x, y, z = sign * x - from_point * p[0], sign * y - from_point * p[1], sign * z - from_point * p[2]
+    if has_rows(lights.panel) and kind >= RECT:
+        x, y, z, factor = panel_sample(panel, x, y, z, q)
+        cosine = x * m[0] + y * m[1] + z * m[2]
+        in_front = (cosine > nothing) & (x * g[0] + y * g[1] + z * g[2] > nothing)
+        return x, y, z, select(in_front, cosine * factor * lit, nothing)
     if has_rows(lights.size):
         x, y, z, factor = _cone_sample(kind, x, y, z, size, q)
         cosine = x * m[0] + y * m[1] + z * m[2]
@@ -184,13 +197,15 @@ def _cone_sample(kind: int, x: Real, y: Real, z: Real, size: Real, q: Triple) ->
 
 @inlined
 def emitted_ray(
-    lights: LightArrays, s: int, l: int, radius: Real, a: Real, b: Real
+    lights: LightArrays, s: int, l: int, radius: Real, a: Real, b: Real, c: Real, d: Real
 ) -> tuple[Real, Real, Real, Real, Real, Real]:
-    """Origin and unit direction of a particle that source s emits at light position l, by two random numbers.
+    """Origin and unit direction of a particle that source s emits at light position l, by random numbers.
 
     A directional source emits particles from a disc as wide as the scene, of that radius, in front of it; a sphere
-    emits them along its normals.
+    emits them along its normals. Only panels use c and d.
     """
+    if has_rows(lights.panel) and lights.kind[s] >= RECT:
+        return panel_ray(lights, s, l, a, b, c, d)
     ox, oy, oz = lights.vector[s, 0, l], lights.vector[s, 1, l], lights.vector[s, 2, l]
     if lights.kind[s] == DIRECTIONAL:
         dx, dy, dz = lights.vector[s, 0, l], lights.vector[s, 1, l], lights.vector[s, 2, l]
@@ -226,11 +241,14 @@ def _spot_direction(lights: LightArrays, s: int, l: int, a: Real, b: Real) -> Tr
 def emitted_power(lights: LightArrays, s: int, radius: float) -> Float64:
     """Power that source s emits into the scene at each light position, (n_lights,), in units of its strength.
 
-    It goes through the disc, in all directions, or into a cone.
+    It goes through the disc, in all directions, into a cone, or from one side or both of a panel.
 
     Args:
         radius: of the scene.
     """
+    if lights.kind[s] >= RECT:
+        sides: Float64 = 1.0 - lights.panel[s, 9].astype(np.float64)
+        return np.pi * sides
     everywhere = np.pi * radius**2 if lights.kind[s] == DIRECTIONAL else 4 * np.pi
     if lights.cone.ndim == 1:
         return np.full(lights.n_lights, everywhere)

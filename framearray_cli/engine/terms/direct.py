@@ -49,7 +49,7 @@ def _geometry_of_lights(hits: Hits, i: int, lights: LightArrays, s: int, l: int)
     n_lights = lights.lit.shape[1]
     p, g, m = triple(hits.position, i), triple(hits.geometric, i), triple(hits.shading, i)
     same = lane_numbers() * np.int32(0) + np.int32(i)  # q in lanes, which round as those of sixteen hits do
-    q = source_point(gather(hits.key, same), s)
+    q = source_point(lights, gather(hits.key, same), s)
     x, y, z, factor = vector_and_factor(lights, s, source_in_lanes(lights, s, l), p, g, m, q)
     return x, y, z, select(lane_numbers() < np.int32(n_lights - l), factor, np.float32(0.0))
 
@@ -59,9 +59,9 @@ def vector_to_source(hits: Hits, i: int, lights: LightArrays, s: int, l: int) ->
     """Vector from hit i to source s at light position l, see `vector_and_factor`."""
     source, p = source_at(lights, s, l), triple(hits.position, i)
     x, y, z = source.place
-    if has_rows(lights.size):
+    if has_rows(lights.size) or has_rows(lights.panel):
         g, m = triple(hits.geometric, i), triple(hits.shading, i)
-        x, y, z, _ = vector_and_factor(lights, s, source, p, g, m, source_point(hits.key[i], s))
+        x, y, z, _ = vector_and_factor(lights, s, source, p, g, m, source_point(lights, hits.key[i], s))
         return x, y, z
     return (-x, -y, -z) if lights.kind[s] == DIRECTIONAL else (x - p[0], y - p[1], z - p[2])
 
@@ -169,7 +169,7 @@ def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, ray
         up = (e * g[0], e * g[1], e * g[2])
         key = load(hits.key, i)
         for s in range(lights.kind.shape[0]):
-            q = source_point(key, s)
+            q = source_point(lights, key, s)
             for l in range(n_lights):
                 # make room for sixteen rays
                 if waiting > capacity - LANES:

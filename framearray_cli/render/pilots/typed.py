@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from framearray_cli.job.job import Job
+from framearray_cli.job.panel import PanelKey
 from framearray_cli.job.placed import DirectionalKey, PointKey
 
 # Fields of view up to pi are what radians look like; a telescope's picture is rarely meant.
@@ -13,6 +14,7 @@ RADIANS = math.pi
 # Colours are factors from 0 to 1, some a little above; 100 are per cent, and 255 codes of 8 bits.
 MOST_COLOUR = 10.0
 COLOUR_REMEDY = "expected factors from 0 to 1: divide 8-bit codes by 255, and convert them from sRGB to linear values"
+_STRENGTHS = ("intensity", "irradiance", "power", "radiance")
 # Of the size of the scene: where surfaces obscure each other from farther away, all of them are obscured.
 FAR_RANGE = 10.0
 # Of the distance of what is seen: about a pixel of a picture with 300 rows. Closer surfaces look like one.
@@ -28,10 +30,10 @@ def typed_warnings(job: Job) -> Iterator[str]:
             f"degrees: set fov = {degrees:.3g}"
         )
     for i, source in enumerate(job.light.sources):
-        colours = {k: key.color for k, key in enumerate(source.keys) if isinstance(key, PointKey | DirectionalKey)}
-        bad = {k: colour for k, colour in colours.items() if colour is not None and max(colour) > MOST_COLOUR}
+        keys = {k: key for k, key in enumerate(source.keys) if isinstance(key, PointKey | DirectionalKey | PanelKey)}
+        bad = {k: key.color for k, key in keys.items() if key.color is not None and max(key.color) > MOST_COLOUR}
         for k, colour in list(bad.items())[:1]:
-            strength = "irradiance" if source.type == "directional" else "intensity"
+            strength = next(name for name in _STRENGTHS if getattr(keys[k], name, None) is not None)
             more = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
             values = ", ".join(f"{value:g}" for value in colour)
             yield (

@@ -117,6 +117,7 @@ def _one_source(lights: LightArrays, s: int) -> LightArrays:
         lit=_with_room(lights.lit[one]),
         size=_with_room(lights.size[one]),
         cone=_with_room(lights.cone[one]),
+        panel=_with_room(lights.panel[one]),
     )
 
 

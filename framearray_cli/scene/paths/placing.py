@@ -10,6 +10,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
 from framearray_cli.job.light import LightTable
+from framearray_cli.job.panel import DiscSource, PanelKey, RectSource
 from framearray_cli.job.placed import DirectionalKey, DirectionalSource, PointKey, PointSource
 from framearray_cli.job.sources import DomeSource, GridSource, SunSource
 from framearray_cli.job.spot import SpotKey, SpotSource
@@ -18,6 +19,7 @@ from framearray_cli.job.values import SHORTEST
 from .curves import interpolate_keys
 from .directions import PARALLEL, interpolate_directions, unit
 from .domes import dome_directions, grid_points
+from .panels import Panel, across_under, carry_across
 from .sun import NEVER, daylight, directions_to_sun, sun_path
 
 # What the manifest calls the vector, the strength and the size of a source, by its kind.
@@ -44,10 +46,12 @@ class LightPath:
     Attributes:
         kind: "point" or "directional".
         vector: (n, 3) position in scene units, or unit direction in which the light travels.
-        intensity: (n, 3) linear RGB, times the source's colour: W/sr of a point, W/m2 of a directional source.
+        intensity: (n, 3) linear RGB, times the source's colour: W/sr of a point, of a panel along its
+            normal; W/m2 of a directional source.
         size: (n,) radius of a point source, scene units, or the angle under which a directional one is seen, degrees;
             None of sources without size.
         cone: of a spot, which is a point with a cone.
+        panel: of a rectangle or disc, which is a point with a panel around it.
         notes: n tables with what else the manifest records of each position; or none.
     """
 
@@ -56,6 +60,7 @@ class LightPath:
     intensity: Float64
     size: Float64 | None = None
     cone: Cone | None = None
+    panel: Panel | None = None
     notes: tuple[dict[str, Any], ...] = ()
 
     def table(self, l: int) -> dict[str, Any]:
@@ -66,6 +71,7 @@ class LightPath:
         if self.cone is not None:
             inner, outer = self.cone.angles_deg[l].tolist()
             values |= {"type": "spot", "direction": self.cone.axis[l].tolist(), "inner": inner, "outer": outer}
+        values |= {} if self.panel is None else self.panel.table(l)
         return values | (self.notes[l] if self.notes else {})
 
     def at(self, positions: Sequence[int]) -> "LightPath":
@@ -77,6 +83,7 @@ class LightPath:
             intensity=self.intensity[rows],
             size=None if self.size is None else self.size[rows],
             cone=self.cone and Cone(axis=self.cone.axis[rows], angles_deg=self.cone.angles_deg[rows]),
+            panel=self.panel and self.panel.at(rows),
             notes=tuple(self.notes[k] for k in rows) if self.notes else (),
         )
 
@@ -108,6 +115,8 @@ def place_source(job: Job, i: int, n: int, world_from_camera: Float64 | None) ->
             )
         case SpotSource():
             return _place_spot(source.keys, job, f"light.sources[{i}]", n)
+        case RectSource() | DiscSource():
+            return _place_panel(source, job, f"light.sources[{i}]", n)
         case _:
             path = _interpolate(source.type, source.keys, n)
             return _in_space(source, path, job, world_from_camera)
@@ -140,21 +149,54 @@ def _place_spot(keys: Sequence[SpotKey], job: Job, name: str, n: int) -> LightPa
     Raises:
         JobError: the spot meets its target between two keys.
     """
-    frames = [key.frame for key in keys]
     path = _interpolate("point", keys, n)
-    targets, ways = [key.target for key in keys if key.target], [key.direction for key in keys if key.direction]
-    if targets:
-        way = interpolate_keys(frames, targets, n) - path.vector
-        if (meeting := np.flatnonzero(np.linalg.norm(way, axis=1) < SHORTEST)).size:
-            problem = (
-                f"{name}: expected a target away from the spot, got the same point at frame {meeting[0]}; move a key"
-            )
-            raise JobError(job.file or job.name, [problem])
-        axis = unit(way)
+    axis = _axes(keys, path.vector, job, name, "the spot")
+    angles = interpolate_keys([key.frame for key in keys], [(key.inner, key.outer) for key in keys], n)
+    return replace(path, cone=Cone(axis=axis, angles_deg=angles))
+
+
+def _place_panel(source: RectSource | DiscSource, job: Job, name: str, n: int) -> LightPath:
+    """Interpolate the keys of a rectangle or disc.
+
+    Raises:
+        JobError: it meets its target between two keys, or its `up` points along its normal.
+    """
+    keys = source.keys
+    frames = [key.frame for key in keys]
+    position = interpolate_keys(frames, [key.position for key in keys], n)
+    axis = _axes(keys, position, job, name, "the panel")
+    ups = [key.up for key in source.keys if key.up] if isinstance(source, RectSource) else []
+    across = across_under(axis, interpolate_directions(frames, ups, n)) if ups else carry_across(axis, _up(job))
+    if (flat := np.flatnonzero((across == 0).all(axis=1))).size:
+        problem = f"{name}: expected an `up` across the direction of the panel, got one along it at frame {flat[0]}"
+        raise JobError(job.file or job.name, [problem])
+    sides = interpolate_keys(frames, [key.sides for key in keys], n)
+    panel = Panel(
+        round=isinstance(source, DiscSource), axis=axis, across=across, sides=sides, two_sided=source.two_sided
+    )
+    colour = interpolate_keys(frames, [key.color if key.color is not None else (1.0, 1.0, 1.0) for key in keys], n)
+    if keys[0].power is not None:  # of one side: pi times the intensity along the normal
+        strength = interpolate_keys(frames, [key.power or () for key in keys], n) / (np.pi * (1 + source.two_sided))
     else:
-        axis = interpolate_directions(frames, ways, n)
-    cone = Cone(axis=axis, angles_deg=interpolate_keys(frames, [(key.inner, key.outer) for key in keys], n))
-    return replace(path, cone=cone)
+        strength = interpolate_keys(frames, [key.radiance or () for key in keys], n) * panel.area[:, None]
+    return LightPath(kind="point", vector=position, intensity=strength * colour, panel=panel)
+
+
+def _axes(keys: Sequence[SpotKey | PanelKey], position: Float64, job: Job, name: str, what: str) -> Float64:
+    """Compute the unit directions in which a source at n positions shines, by its keys; where they have targets, it
+    follows the targets.
+
+    Raises:
+        JobError: the source meets its target between two keys.
+    """
+    frames, n = [key.frame for key in keys], len(position)
+    if keys[0].target is None:
+        return interpolate_directions(frames, [key.direction for key in keys if key.direction], n)
+    way = interpolate_keys(frames, [key.target for key in keys if key.target], n) - position
+    if (meeting := np.flatnonzero(np.linalg.norm(way, axis=1) < SHORTEST)).size:
+        problem = f"{name}: expected a target away from {what}, got the same point at frame {meeting[0]}; move a key"
+        raise JobError(job.file or job.name, [problem])
+    return unit(way)
 
 
 def _constant(

@@ -118,6 +118,11 @@ def light_field(manifest: Manifest) -> LightField:
         )
     lights, k = next((lights, each[0]) for lights, each in zip(_axis_lights(manifest), sources, strict=True) if each)
     tables = [light.sources[k] for light in lights]
+    if shaped := {table["type"] for table in tables} - {"point", "directional"}:
+        raise OutputError(
+            f"{manifest.directory}: an environment needs light from points or directions, got a {min(shaped)}, which "
+            "does not shine to all sides"
+        )
     up = str(manifest.job.get("scene", {}).get("up", "y"))
     if all("direction" in table for table in tables):
         to_light = -np.array([table["direction"] for table in tables], np.float64)

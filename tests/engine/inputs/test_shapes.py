@@ -55,7 +55,7 @@ def test_particles_carry_the_power_of_their_source() -> None:
 def test_particles_start_at_the_lamp_or_on_a_disc_in_front_of_the_scene() -> None:
     both, radius = lights(), 3.0
     for a, b in np.random.default_rng(1).random((50, 2)):
-        lamp, sun = (np.array(emitted_ray(both, s, 0, radius, a, b)).reshape(2, 3) for s in (0, 1))
+        lamp, sun = (np.array(emitted_ray(both, s, 0, radius, a, b, 0.0, 0.0)).reshape(2, 3) for s in (0, 1))
         np.testing.assert_allclose(lamp[0], LAMP, rtol=1e-6)
         assert np.linalg.norm(lamp[1]) == pytest.approx(1, rel=1e-6)
         np.testing.assert_allclose(sun[1], SUN, rtol=1e-6)

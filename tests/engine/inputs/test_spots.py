@@ -99,7 +99,9 @@ def test_particles_have_the_density_and_the_power_of_the_spot(inner: float, oute
     """Their number within a cone is the integral of the share there, over the power: 8 parts, by a chi-square test."""
     lights = arrays(spot(inner, outer, n=2))
     axis = lights.cone[0, :3, 1].astype(np.float64)
-    cosine = np.array([np.dot(emitted_ray(lights, 0, 1, 1.0, a, b)[3:], axis) for a, b in RNG.random((8000, 2))])
+    cosine = np.array(
+        [np.dot(emitted_ray(lights, 0, 1, 1.0, a, b, 0.0, 0.0)[3:], axis) for a, b in RNG.random((8000, 2))]
+    )
     at = np.linspace(np.cos(np.radians(outer)), 1, 80_001)
     density = share((at[1:] + at[:-1]) / 2, inner, outer) * (at[1] - at[0])
     assert emitted_power(lights, 0, 1.0)[1] == pytest.approx(2 * np.pi * density.sum(), rel=2e-3)

@@ -9,6 +9,7 @@ from support import tiny
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.domes import dome_directions
+from framearray_cli.scene.paths.panels import carry_across
 from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.scene.paths.placing import LightPath
 
@@ -71,6 +72,60 @@ def test_a_spot_that_meets_its_target_is_an_error() -> None:
     keys = [{"frame": 4 * k, "position": [k, 0, 0], "target": [1 - k, 0, 0], "intensity": 5} for k in (0, 1)]
     with pytest.raises(JobError, match=r"light.sources\[0\]: expected a target away from the spot, got .* frame 2"):
         path(type="spot", keys=keys)
+
+
+RECT = {"position": [0, 2, 0], "width": 2.0, "height": 0.5}
+
+
+def test_the_strength_of_a_panel_is_that_along_its_normal() -> None:
+    """A panel of radiance L shines L A along its normal, and pi L A in all, twice that with two sides."""
+    aim = {"frame": 0, "direction": [0, -2, 0]}
+    np.testing.assert_allclose(path(type="rect", keys=[RECT | aim | {"radiance": [1, 2, 3]}]).intensity[0], [1, 2, 3])
+    np.testing.assert_allclose(
+        path(type="rect", keys=[RECT | aim | {"power": 3, "color": [1, 0, 1]}]).intensity[0],
+        np.multiply(3 / np.pi, [1, 0, 1]),
+    )
+    both = path(type="rect", two_sided=True, keys=[RECT | aim | {"power": 3}])
+    np.testing.assert_allclose(both.intensity[0], 3 / (2 * np.pi))
+    disc = path(type="disc", keys=[{"position": [0, 2, 0], "radius": 0.5, "radiance": 4} | aim])
+    np.testing.assert_allclose(disc.intensity[0], np.pi)
+    assert disc.table(0) == {
+        "type": "disc", "position": [0.0, 2.0, 0.0], "intensity": [pytest.approx(np.pi)] * 3,
+        "direction": [0.0, -1.0, 0.0], "radius": 0.5, "two_sided": False,
+    }  # fmt: skip
+    assert path(type="rect", keys=[RECT | aim | {"power": 1}]).table(0)["across"] == [1.0, 0.0, 0.0]
+
+
+def test_a_panel_changes_size_and_strength_along_its_keys() -> None:
+    keys = [
+        RECT | {"frame": 2 * k, "target": [2 * k, 0, 0], "radiance": 2 + 2 * k, "width": 1.0 + 2 * k} for k in (0, 1)
+    ]
+    found = path(type="rect", keys=keys)
+    np.testing.assert_allclose(found.panel.sides[:, 0], [1, 2, 3])
+    np.testing.assert_allclose(found.intensity[:, 0], [2 * 0.5, 3 * 1, 4 * 1.5])
+    np.testing.assert_allclose(found.at([1]).panel.axis, [np.array([1, -2, 0]) / 5**0.5])
+
+
+def test_axes_of_a_panel_move_smoothly_and_without_turning() -> None:
+    """Over the zenith and back: neighbours differ by the turn of the normal, and all axes stay at right angles."""
+    turn = np.linspace(0, 2 * np.pi, 200)
+    axis = np.stack([np.sin(turn), np.cos(turn), 0.1 * np.sin(3 * turn)], axis=1)
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    across = carry_across(axis, np.array([0.0, 1.0, 0.0]))
+    np.testing.assert_allclose((across * axis).sum(axis=1), 0, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(across, axis=1), 1)
+    steps = [np.linalg.norm(np.diff(vectors, axis=0), axis=1) for vectors in (across, axis)]
+    assert (steps[0] <= steps[1] + 1e-12).all()
+    np.testing.assert_allclose(
+        carry_across(np.array([(0, 0, 1.0), (0, 0, -1)]), np.array([0, 1.0, 0])), [(1, 0, 0)] * 2
+    )
+
+
+def test_up_turns_a_panel_and_must_lie_across_it() -> None:
+    keys = [RECT | {"frame": 0, "direction": [0, -1, 0], "power": 1, "up": [1, 5, 0]}]
+    np.testing.assert_allclose(path(type="rect", keys=keys).panel.half_axes[1], [[0.25, 0, 0]], atol=1e-12)
+    with pytest.raises(JobError, match=r"light.sources\[0\]: expected an `up` across .* frame 0"):
+        path(type="rect", keys=[keys[0] | {"up": [0, 3, 0]}])
 
 
 def test_a_grid_goes_row_by_row() -> None:

@@ -71,7 +71,8 @@ def _write_emitted_rays(
             a, b = r2(random_word(key, PIXEL), 0)
             dx, dy, dz = cosine_direction(np.float32(-x), np.float32(-y), np.float32(-z), a, b)
         else:
-            ox, oy, oz, dx, dy, dz = emitted_ray(lights, s, l, radius, a, b)
+            c, d = r2(random_word(key, PIXEL), 0)
+            ox, oy, oz, dx, dy, dz = emitted_ray(lights, s, l, radius, a, b, c, d)
         set_ray(packets, i, ox, oy, oz, dx, dy, dz, np.float32(np.inf))
         # the walk, with throughput 1
         hits.key[i] = key

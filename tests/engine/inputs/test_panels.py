@@ -1,0 +1,232 @@
+"""Rectangles and discs: the light of one random point per hit, on average that of the whole panel."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+from support.hits import points
+
+from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.hits.hits import Hits
+from framearray_cli.engine.hits.rays import room_for_tests
+from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
+from framearray_cli.engine.inputs.shapes import emitted_power, emitted_ray, source_point
+from framearray_cli.engine.terms.direct import direct
+from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
+from framearray_cli.scene.paths.panels import Panel
+from framearray_cli.scene.paths.paths import lights_without_groups
+from framearray_cli.scene.paths.placing import LightPath
+from framearray_cli.scene.scene import Scene
+
+P, UP = np.array([0.3, 0.1, -0.2]), (0.0, 1.0, 0.0)
+N = 40_000
+FAR = np.concatenate([tiny.box((90, -21, -1), (91, -20, 1)), tiny.box((-91, 20, -1), (-90, 21, 1))])
+RNG = np.random.default_rng(6)
+# Middles from P, and normals: in front of P, beside it, near, far, partly below its horizon, tilted.
+MIDDLES = np.array([(0, 1.5, 0), (1.2, 0.8, 0.3), (-0.3, 0.7, 0.4), (2, 6, -3), (1.5, 0.2, 0), (-1, 2, 1)])
+NORMALS = np.array([(0, -1, 0), (-1, -0.4, 0), (0.1, -1, -0.3), (-0.2, -1, 0.5), (-1, 0.1, 0.2), (0.1, -1, -0.7)])
+
+
+def panel(
+    width: float, height: float, *, middles: Any = MIDDLES, normals: Any = NORMALS, two_sided: bool = False
+) -> LightPath:
+    """A rectangle of radiance 1; width 0: a disc of that radius."""
+    n, axis = len(middles), normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    across = np.cross(axis, np.add(axis[:, [2, 0, 1]], (0.3, 0.1, 0.7)))
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    sides = (2 * height, 2 * height) if width == 0 else (width, height)
+    shape = Panel(round=width == 0, axis=axis, across=across, sides=np.tile(sides, (n, 1)), two_sided=two_sided)
+    return LightPath(
+        kind="point", vector=np.add(P, middles), intensity=np.tile(shape.area[:, None], (1, 3)), panel=shape
+    )
+
+
+def arrays(*sources: LightPath) -> LightArrays:
+    return light_arrays(lights_without_groups(sources), np.zeros(3))
+
+
+def hits_at(place: Any = P, n: int = N) -> Hits:
+    hits = points(n, place, UP)
+    hits.key[:] = np.arange(n)
+    return hits
+
+
+def lit(hits: Hits, lights: LightArrays, scene: Scene | None = None, neighbours: bool = True) -> Any:
+    """Irradiance (n, n_lights) in float64."""
+    n = len(hits.kind)
+    out = np.full((n, 1, lights.n_lights), np.nan, np.float32)
+    with EmbreeScene(scene or tiny.scene_of(FAR)) as embree:
+        direct(hits, n, lights, embree.tracer, room_for_tests(4096, lights.n_lights), out, neighbours)
+    return out[:, 0].astype(np.float64)
+
+
+def outline(source: LightPath, l: int, parts: int = 4000) -> Any:
+    """Corners of a panel, seen from P; a disc is a polygon of as much area."""
+    a, b = (axes[l] for axes in source.panel.half_axes)  # type: ignore[union-attr]  # it is a panel
+    middle = source.vector[l] - P
+    if not source.panel.round:  # type: ignore[union-attr]
+        return middle + np.array([-a - b, a - b, a + b, b - a])
+    turn = 2 * np.pi * np.arange(parts) / parts
+    wider = np.sqrt(2 * np.pi / parts / np.sin(2 * np.pi / parts))
+    return middle + wider * (np.cos(turn)[:, None] * a + np.sin(turn)[:, None] * b)
+
+
+def lambert(corners: Any) -> float:
+    """Irradiance of a floor at the origin by a polygon of radiance 1 above it, by Lambert's formula (1760).
+
+    Half the sum over edges of the angle under which the edge is seen, times the height of the unit normal of the plane
+    through it and the origin.
+    """
+    below = corners[:, 1] < 0  # cut the polygon at the horizon
+    kept: list[Any] = []
+    for v, w, v_below, w_below in zip(corners, np.roll(corners, -1, 0), below, np.roll(below, -1), strict=True):
+        kept += [] if v_below else [v]
+        kept += [v + (w - v) * v[1] / (v[1] - w[1])] if v_below != w_below else []
+    if not kept:
+        return 0.0
+    v = np.array(kept)
+    w = np.roll(v, -1, 0)
+    across = np.cross(v, w)
+    sine = np.linalg.norm(across, axis=1)
+    angle = np.arctan2(sine, (v * w).sum(axis=1))
+    heights = np.divide(across[:, 1], sine, out=np.zeros_like(sine), where=sine > 0)
+    return abs(float((angle * heights).sum())) / 2
+
+
+def test_lamberts_formula_has_known_values() -> None:
+    """A disc of radius r parallel to the floor at height h: pi r^2 / (h^2 + r^2); a wide ceiling: pi."""
+    turn = 2 * np.pi * np.arange(10_000) / 10_000
+    disc = np.stack([0.7 * np.cos(turn), np.full(10_000, 1.5), 0.7 * np.sin(turn)], axis=1)
+    assert lambert(disc) == pytest.approx(np.pi * 0.49 / (2.25 + 0.49), rel=1e-6)
+    assert lambert(np.array([(-1e4, 1, -1e4), (1e4, 1, -1e4), (1e4, 1, 1e4), (-1e4, 1, 1e4)])) == pytest.approx(np.pi)
+
+
+@pytest.mark.parametrize("two_sided", [False, True])
+@pytest.mark.parametrize(("width", "height"), [(1.2, 0.3), (0, 0.4)])
+def test_the_mean_is_lamberts_light_of_the_whole_panel(width: float, height: float, two_sided: bool) -> None:
+    """Within 3.5 standard errors, which are below 0.5 %."""
+    source = panel(width, height, two_sided=two_sided)
+    found = lit(hits_at(n=4 * N), arrays(source))
+    expected = np.array([lambert(outline(source, l)) for l in range(len(MIDDLES))])
+    error = found.std(axis=0) / np.sqrt(len(found))
+    assert (np.abs(found.mean(axis=0) - expected) <= 3.5 * error + 1e-5 * expected).all()
+    assert (error <= 0.005 * expected).all()
+
+
+@pytest.mark.parametrize("neighbours", [True, False])
+@pytest.mark.parametrize(("width", "height"), [(1.2, 0.3), (0, 0.4)])
+def test_each_hit_has_the_light_of_the_point_that_it_draws(width: float, height: float, neighbours: bool) -> None:
+    """The point by the map's own definition; the factor A cos cos / d^2."""
+    source, square = panel(width, height), arrays(panel(1, 1))
+    found = lit(hits_at(n=200), arrays(source), neighbours=neighbours)
+    for i in range(200):
+        at = np.array(source_point(square, np.uint64(i), 0)[:2], np.float64)
+        if width == 0:  # Shirley and Chiu: squares become circles, and their diagonals stay
+            steep = abs(at[1]) > abs(at[0])
+            radius, other = at[::-1] if steep else at
+            angle = np.pi / 4 * other / radius
+            at = radius * np.array([np.cos(angle), np.sin(angle)])[:: -1 if steep else 1]
+        for l in range(len(MIDDLES)):
+            a, b = (axes[l] for axes in source.panel.half_axes)  # type: ignore[union-attr]
+            way = MIDDLES[l] + at[0] * a + at[1] * b
+            d = np.linalg.norm(way)
+            cosines = max(way[1] / d, 0) * max(-way @ source.panel.axis[l] / d, 0)  # type: ignore[union-attr]
+            expected = source.intensity[l, 0] * cosines / d**2
+            assert found[i, l] == pytest.approx(expected, rel=2e-4, abs=2e-5)
+
+
+def test_far_away_a_panel_is_a_point_of_its_intensity() -> None:
+    middles, normals = MIDDLES[[0, 1, 3]], -MIDDLES[[0, 1, 3]]
+    for width, height in ((0.05, 0.02), (0, 0.03)):
+        source = panel(width, height, middles=middles, normals=normals)
+        bare = LightPath(kind="point", vector=source.vector, intensity=source.intensity)
+        found, point = (lit(hits_at(n=500), arrays(one)).mean(axis=0) for one in (source, bare))
+        np.testing.assert_allclose(found, point, rtol=0.01)
+
+
+def test_a_panel_shines_forwards_and_where_it_says_so_backwards() -> None:
+    """Points behind its plane, in its plane and in its middle."""
+    turned = panel(1.2, 0.3, normals=-NORMALS)
+    assert (lit(hits_at(n=300), arrays(turned)) == 0).all()
+    both = panel(1.2, 0.3, normals=-NORMALS, two_sided=True)
+    # the same points of the panel, if the width of the turned one runs backwards
+    front = lit(hits_at(n=300), arrays(panel(1.2, 0.3)))
+    back = lit(hits_at(n=20_000), arrays(both))
+    assert (np.abs(back.mean(axis=0) / front.mean(axis=0) - 1) < 0.2).all()
+    inside = panel(1.2, 0.3, middles=np.zeros((2, 3)), normals=np.array([(1.0, 0, 0), (0, -1.0, 0)]), two_sided=True)
+    assert (lit(hits_at(n=300), arrays(inside))[:, 1] == 0).all()
+    assert np.isfinite(lit(hits_at(n=300), arrays(inside))).all()
+
+
+def test_half_a_disc_behind_an_edge_gives_half_the_light() -> None:
+    wall = tiny.scene_of(np.concatenate([tiny.box((-5, 0.8, -5), (P[0], 0.81, 5)), FAR]))
+    source = panel(0, 0.3, middles=MIDDLES[[0]], normals=NORMALS[[0]])
+    found = lit(hits_at(), arrays(source), wall)[:, 0]
+    whole = lambert(outline(source, 0))
+    assert abs(found.mean() - whole / 2) < 3.5 * found.std() / np.sqrt(N) + 0.002 * whole
+
+
+def test_a_wall_that_a_panel_lies_on_does_not_hide_it() -> None:
+    ceiling = tiny.scene_of(np.concatenate([tiny.box((-5, P[1] + 1.5, -5), (5, 2.0, 5)), FAR]))
+    source = panel(1.2, 0.3, middles=MIDDLES[[0]], normals=NORMALS[[0]])
+    assert (lit(hits_at(n=2000), arrays(source), ceiling) > 0).all()
+
+
+def test_panels_beside_other_sources_leave_them_alone() -> None:
+    rect, disc = panel(1.2, 0.3), panel(0, 0.4, two_sided=True)
+    lamp = LightPath(kind="point", vector=P + MIDDLES + 1, intensity=np.ones((6, 3)), size=np.full(6, 0.1))
+    sun = LightPath(kind="directional", vector=np.tile((0.6, -0.8, 0.0), (6, 1)), intensity=np.ones((6, 3)))
+    together = lit(hits_at(n=500), arrays(sun, lamp))
+    assert (lit(hits_at(n=500), arrays(sun, lamp, rect, disc)) >= together).all()
+    dark = LightPath(kind="point", vector=rect.vector, intensity=rect.intensity * 0, panel=rect.panel)
+    np.testing.assert_allclose(lit(hits_at(n=500), arrays(sun, lamp, dark)), together, rtol=1e-6)
+    apart = lit(hits_at(n=500), arrays(dark, disc)) + lit(hits_at(n=500), arrays(rect))
+    np.testing.assert_allclose(lit(hits_at(n=500), arrays(rect, disc)), apart, rtol=1e-5)
+
+
+@pytest.mark.parametrize("n_lights", [5, 16, 48])
+def test_light_of_panels_is_the_same_to_the_last_bit_for_any_grouping(n_lights: int) -> None:
+    box = tiny.scene_of(np.concatenate([tiny.box((-2, 0.6, -2), (0.3, 0.7, 2)), FAR]))
+    hits = hits_at(n=203)
+    hits.position[:] += RNG.uniform(-1, 1, (203, 3)) * [1, 0, 1]
+    middles = np.add(RNG.uniform(-2, 2, (n_lights, 3)), (0, 3, 0))
+    normals = np.add(RNG.normal(size=(n_lights, 3)) * 0.4, (0, -1, 0))
+    lights = arrays(
+        panel(1.0, 0.5, middles=middles, normals=normals),
+        panel(0, 0.5, middles=-middles, normals=normals, two_sided=True),
+    )
+    together, apart = (lit(hits, lights, box, neighbours=nb) for nb in (True, False))
+    np.testing.assert_array_equal(together, apart)
+    chosen = [n_lights - 1, 0, 2]
+    np.testing.assert_allclose(lit(hits, some_lights(lights, chosen), box), together[:, chosen], rtol=1e-6)
+    with EmbreeScene(box) as embree:
+        out = np.empty((203, 1, n_lights), np.float32)
+        tests, steps = room_for_tests(4096, n_lights), room_for_steps(n_lights)
+        direct_by_steps(hits, 203, lights, 1, False, embree.tracer, tests, steps, out)
+    np.testing.assert_allclose(out[:, 0], together, rtol=1e-5, atol=1e-7)
+
+
+@pytest.mark.parametrize("two_sided", [False, True])
+@pytest.mark.parametrize(("width", "height"), [(1.2, 0.3), (0, 0.4)])
+def test_particles_start_on_the_panel_and_carry_its_power(width: float, height: float, two_sided: bool) -> None:
+    """Spread evenly over it and, about the normal, with cos^2 uniform: 8 parts each, by chi-square tests."""
+    source = panel(width, height, two_sided=two_sided)
+    lights, l, n = arrays(source), 3, 8000
+    assert emitted_power(lights, 0, 1.0)[l] == pytest.approx(np.pi * (1 + two_sided))
+    rays = np.array([emitted_ray(lights, 0, l, 1.0, *numbers) for numbers in RNG.random((n, 4))])
+    from_middle, direction = rays[:, :3] - source.vector[l], rays[:, 3:]
+    a, b = (axes[l] for axes in source.panel.half_axes)  # type: ignore[union-attr]
+    x, y, height_above = from_middle @ a / (a @ a), from_middle @ b / (b @ b), direction @ source.panel.axis[l]  # type: ignore[union-attr]
+    assert np.abs(from_middle @ source.panel.axis[l]).max() < 1e-3  # type: ignore[union-attr]
+    along = (x + 1) / 2 if width else x**2 + y**2
+    sideways = (y + 1) / 2 if width else np.arctan2(y, x) / (2 * np.pi) % 1
+    np.testing.assert_allclose(np.linalg.norm(direction, axis=1), 1, atol=1e-5)
+    for uniform in (along, sideways, height_above**2):
+        assert uniform.min() >= -1e-4 and uniform.max() <= 1 + 1e-4
+        counts = np.bincount(np.clip(uniform * 8, 0, 7).astype(int), minlength=8)
+        assert ((counts - n / 8) ** 2 / (n / 8)).sum() < 26  # 7 degrees of freedom: one in 2,000 beyond
+    if two_sided:
+        assert abs((height_above > 0).sum() - n / 2) < 3.5 * np.sqrt(n) / 2
+    else:
+        assert (height_above >= 0).all()

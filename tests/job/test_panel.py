@@ -1,0 +1,37 @@
+"""Wrong keys of rectangles and discs."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomli_w
+from support import tiny
+
+from framearray_cli.base.errors import JobError
+from framearray_cli.job.read import read_job
+
+DISC = {"frame": 0, "position": [1, 2, 3], "direction": [0, 0, 1], "radius": 1}
+RECT = {"frame": 0, "position": [1, 2, 3], "width": 1, "height": 2, "power": 3}
+WRONG = [
+    ({"type": "disc", "keys": [{"frame": 0, "position": [1, 2, 3], "target": [1, 2, 3], "radius": 0}]},
+     ["keys[0].radius: expected a number above 0, got 0"]),
+    ({"type": "rect", "keys": [RECT | {"target": [1, 2, 3], "radiance": 3}]},
+     ["keys[0].target: expected a point away from `position`, got the same point",
+      "keys[0]: expected either `power` or `radiance`, got both"]),
+    ({"type": "rect", "keys": [RECT | {"target": [1, 2, 0]}, RECT | {"frame": 1, "direction": [0, 0, 1]},
+                               {**RECT, "target": [1, 2, 0], "frame": 2, "up": [0, 1, 0]}]},
+     ["keys[0].up: missing; keys[2] gives it, so every key of this list must",
+      "keys[1].target: missing; keys[0] gives it, so every key of this list must"]),
+    ({"type": "disc", "keys": [DISC | {"power": 1}, DISC | {"frame": 1, "radiance": 1}]},
+     ["keys[1].power: missing; keys[0] gives it, so every key of this list must"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("source", "texts"), WRONG)
+def test_wrong_keys_of_panels(source: dict[str, Any], texts: list[str], tmp_path: Path) -> None:
+    file = tmp_path / "job.toml"
+    table = tiny.table() | {"light": {"sources": [source]}, "scene": {"file": "a.glb"}}
+    file.write_text(tomli_w.dumps(table), encoding="utf-8")
+    with pytest.raises(JobError) as caught:
+        read_job(file)
+    assert [problem.removeprefix("light.sources[0].") for problem in caught.value.problems] == texts
