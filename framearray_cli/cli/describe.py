@@ -12,6 +12,7 @@ from .results import (
     InitResult,
     RenderResult,
     SceneCounts,
+    StudyDay,
     UnfinishedCamera,
     VerifyResult,
 )
@@ -61,12 +62,19 @@ def check_result(estimate: "Estimate") -> CheckResult:
 
 
 def _array_size(prepared: "Prepared") -> ArraySize:
+    from framearray_cli.array.moments import day_spans
+
     return ArraySize(
         cameras=prepared.n_cameras,
         images_per_camera=prepared.n_lights,
         images=prepared.n_cameras * prepared.n_lights,
         resolution=prepared.job.camera.resolution,
         groups=tuple(GroupSize(name=one.name, positions=len(one.positions)) for one in prepared.lights.groups),
+        days=tuple(
+            StudyDay(axis=axis, first=day.first, last=day.last, start=day.start.isoformat(), stop=day.stop.isoformat())
+            for axis, moments in prepared.job.light.moments.items()
+            for day in day_spans(moments)
+        ),
     )
 
 

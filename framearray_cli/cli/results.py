@@ -32,6 +32,17 @@ class SceneCounts:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class StudyDay:
+    """A day of a sun study: the light axis, its first and last position, and their local date and time, ISO 8601."""
+
+    axis: str
+    first: int
+    last: int
+    start: str
+    stop: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ArraySize:
     """The size of an array.
 
@@ -41,6 +52,7 @@ class ArraySize:
         images: number in the array.
         resolution: width and height, pixels.
         groups: empty unless the job has groups of sources.
+        days: of suns; empty without.
     """
 
     cameras: int
@@ -48,6 +60,7 @@ class ArraySize:
     images: int
     resolution: tuple[int, int]
     groups: tuple[GroupSize, ...]
+    days: tuple[StudyDay, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

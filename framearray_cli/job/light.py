@@ -1,6 +1,7 @@
 """`[light]`: the light sources, and the groups and axes that they belong to."""
 
 from collections.abc import Sequence
+from datetime import datetime
 from typing import Annotated, NamedTuple
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
@@ -122,6 +123,16 @@ class LightTable(Table):
             fail([(("frames",), "expected none, as every source has an axis of its own; give `axes`")])
         fill(self, "axes", {axis: self.axes.get(axis, n + 1) for axis, n in last.items() if axis != MAIN_AXIS})
         return self
+
+    @property
+    def moments(self) -> dict[str, tuple[datetime, ...]]:
+        """Local date and time of all positions of each axis with a sun, by its name."""
+        found: dict[str, tuple[datetime, ...]] = {}
+        for source in self.sources:
+            if isinstance(source, SunSource):
+                n = self.axes[source.axis] if source.axis else self.frames
+                found.setdefault(source.axis or MAIN_AXIS, source.moments(n))
+        return found
 
     @property
     def groups(self) -> tuple[SourceGroup, ...]:

@@ -1,5 +1,6 @@
 """Kinds of light sources in a job; here those without key frames: domes, grids, and the sun."""
 
+from datetime import datetime
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
@@ -12,7 +13,7 @@ from .panel import DiscSource, RectSource
 from .placed import Angle, DirectionalKey, DirectionalSource, PointSource
 from .sourcetable import SourceTable
 from .spot import SpotSource
-from .times import Clock, Dates, Zone, clock_minutes
+from .times import Clock, Dates, Zone, clock_minutes, even_moments
 from .values import Colour, Direction, Emission, GridSize, Point
 
 ROUNDING = 1e-6  # of steps; a third of an hour ends after three of them
@@ -161,6 +162,10 @@ class SunSource(SourceTable):
             return 0
         minutes = clock_minutes(self.stop) - clock_minutes(self.start)
         return len(self.dates) * (int(minutes / self.step + ROUNDING) + 1)
+
+    def moments(self, n: int) -> tuple[datetime, ...]:
+        """Return the local date and time of n light positions."""
+        return even_moments(self.dates, self.start, self.stop, self.timezone, n, self.step)
 
 
 LightSource: TypeAlias = Annotated[

@@ -2,6 +2,7 @@
 
 import datetime
 import re
+from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import Annotated, TypeAlias
 from zoneinfo import ZoneInfo, available_timezones
@@ -102,6 +103,27 @@ def moment(date: str, clock: str, zone: datetime.tzinfo) -> datetime.datetime:
     """The moment at which clocks in a zone show a checked date and time."""
     day, time = datetime.date.fromisoformat(date), datetime.time.fromisoformat(clock)
     return datetime.datetime.combine(day, time, tzinfo=zone)
+
+
+def even_moments(
+    dates: Sequence[str], start: str, stop: str, timezone: str | float, n: int, step: float | None = None
+) -> tuple[datetime.datetime, ...]:
+    """Return n local moments: n / len(dates) on each day, evenly spaced from start to stop; one moment is the start.
+
+    Args:
+        dates, start, stop, timezone: as checked; clock times of that zone.
+        n: a multiple of the number of dates.
+        step: minutes from one moment to the next; None: so that the last is at the stop.
+    """
+    zone = zone_of(timezone)
+    moments: list[datetime.datetime] = []
+    for date in dates:
+        first = moment(date, start, zone).astimezone(datetime.UTC)  # in UTC, so that a clock change causes no jump
+        span = moment(date, stop, zone).astimezone(datetime.UTC) - first
+        each = n // len(dates)
+        parts = [datetime.timedelta(minutes=step) * k if step else span * (k / max(each - 1, 1)) for k in range(each)]
+        moments += [(first + part).astimezone(zone) for part in parts]
+    return tuple(moments)
 
 
 _DAY = {"type": "string", "format": "date"}

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from framearray_cli.array.moments import day_spans
 from framearray_cli.base.units import agree, counted, duration, size
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 
 MOST_DAMAGED = 5  # files listed by name
+MOST_DAYS = 12  # of a sun study, listed by date
 
 
 def size_lines(job: "Job") -> list[str]:
@@ -32,7 +34,20 @@ def size_lines(job: "Job") -> list[str]:
         groups = [f"{group.n:,} of {group.name}" for group in job.light.groups]
         lights = f"({' + '.join(groups)} + {unlit_images(job)} of ambient light and background)"
     shape = f"{counted(n_c, 'camera position')} x {lights} = {counted(n_images, 'image')} of {width} x {height}"
-    return [f"array: {shape}, some {size(rough_bytes(job))} of files"]
+    return [f"array: {shape}, some {size(rough_bytes(job))} of files", *_sun_lines(job)]
+
+
+def _sun_lines(job: "Job") -> list[str]:
+    """Say which light positions are which time of which day."""
+    from framearray_cli.array.manifest import MAIN_AXIS
+
+    lines = []
+    for axis, moments in job.light.moments.items():
+        spans, of = day_spans(moments), "" if axis == MAIN_AXIS else f" of {axis}"
+        lines += [f"sun: {span.text}: {span.indices_text}{of}" for span in spans[:MOST_DAYS]]
+        if (more := len(spans) - MOST_DAYS) > 0:
+            lines.append(f"sun: {counted(more, 'more day')}, the last {spans[-1].text}: {spans[-1].indices_text}{of}")
+    return lines
 
 
 def cost_lines(estimate: "Estimate") -> list[str]:

@@ -1,10 +1,13 @@
 """Choices along the axes of an array: places as options name them, or a few that are evenly spaced."""
 
 from collections.abc import Mapping, Sequence
+from datetime import datetime
+from functools import partial
 from itertools import product
 from typing import TypeAlias
 
 from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.moments import axis_moments, read_times
 from framearray_cli.array.places import read_axes, read_indices
 from framearray_cli.base.errors import JobError
 
@@ -43,7 +46,12 @@ def given_places(manifest: Manifest, light: str | None, at: Sequence[str]) -> di
         if first in given:
             raise JobError("--light", [f"expected either this or {given[first][0]}=..., got both"])
         given[first] = ("--light", light)
-    return given
+    moments = {axis: partial(_moments, manifest, axis) for axis in given}
+    return {axis: (option, read_times(option, text, moments[axis])) for axis, (option, text) in given.items()}
+
+
+def _moments(manifest: Manifest, axis: str) -> Sequence[datetime]:
+    return axis_moments(manifest).get(axis, ())
 
 
 def axes_of_groups(manifest: Manifest) -> Mapping[str, str]:

@@ -19,6 +19,7 @@ from framearray_cli.array.images.images import (
 )
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
 from framearray_cli.array.manifest_toml import read_manifest
+from framearray_cli.array.moments import position_name
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.array.places import MIDDLE_PLACE, read_indices
 from framearray_cli.array.present import REMEDY, list_present
@@ -102,7 +103,7 @@ def make_sheet(
     axis = side if side is not None else next(iter(manifest.axes))
     pictures, left_out = open_pictures(manifest, sums)
     lights, fixed = _read_lights(manifest, axis, light, at, rows)
-    names = [f"{axis} {l}" for l in lights]
+    names = [position_name(manifest, axis, l) for l in lights]
     if sums.collapses and axis == next(iter(manifest.axes)):
         lights, names = lights[:1], ["sum"]
     chosen, labels = choose_columns(manifest, cameras, columns), names if image_format.format in FOR_SCREENS else []
@@ -247,5 +248,7 @@ def _heads(manifest: Manifest, axis: str, fixed: LightIndices) -> Sequence[str]:
     counts = [str(n) if name == MAIN_AXIS else f"{n} of {name}" for name, n in manifest.axes.items()]
     size = " x ".join([str(manifest.n_cameras), *counts])
     text = f"{size} images,  {width} x {height} pixels"
-    others = [f"at {name} {l}" for name, l in zip(manifest.axes, fixed, strict=True) if name != axis]
+    others = [
+        f"at {position_name(manifest, name, l)}" for name, l in zip(manifest.axes, fixed, strict=True) if name != axis
+    ]
     return manifest.name, ",  ".join([text, *others])

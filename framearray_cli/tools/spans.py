@@ -4,14 +4,17 @@ The notation is that of `array/places.py`; n is the number of indices on an axis
 as "0-47" or "first-last", passes through all of them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from datetime import date, datetime
 from typing import Annotated, Any, TypeAlias
 
 from pydantic import PlainValidator, WithJsonSchema
 
+from framearray_cli.array.moments import TIME, put_indices, without_times
 from framearray_cli.array.places import (
     ALL_PLACES,
     PART,
+    PLACE,
     WANTED_PLACE,
     IndexPlace,
     is_notation,
@@ -23,14 +26,15 @@ from framearray_cli.array.places import (
 from framearray_cli.base.forms.table import fail
 from framearray_cli.base.forms.words import shown
 
-_PLACES_PATTERN = rf"^({ALL_PLACES}|{PART}(, ?{PART})*)$".replace("?:", "")  # JSON Schema knows plain groups
+_PART = PART.replace(PLACE, f"(?:{PLACE}|{TIME})")
+_PLACES_PATTERN = rf"^({ALL_PLACES}|{_PART}(, ?{_PART})*)$".replace("?:", "")  # JSON Schema knows plain groups
 _PLACE_SCHEMA: dict[str, Any] = {"anyOf": [{"type": "number"}, {"type": "string", "pattern": _PLACES_PATTERN}]}
 
 
 def _check_span(value: object) -> tuple[IndexPlace, ...]:
     """Check a span; a single place is a span that stays there."""
     many = isinstance(value, list | tuple)
-    places: Any = value if many else [value]
+    places: Any = [_plain(each) for each in (value if many else [value])]  # type: ignore[attr-defined]  # a list
     if not places:
         fail([((), "expected a place, or a list of places, got an empty list")])
     bad = [((k,), f"{WANTED_PLACE}, got {shown(place)}") for k, place in enumerate(places) if not _is_part(place)]
@@ -39,9 +43,14 @@ def _check_span(value: object) -> tuple[IndexPlace, ...]:
     return tuple(places)
 
 
+def _plain(value: object) -> object:
+    """Write TOML's own dates and times as text."""
+    return value.isoformat() if isinstance(value, date) else value  # a datetime is a date
+
+
 def _is_part(value: object) -> bool:
     """Return whether a value is a place, or a text that names several."""
-    return is_notation(value) if isinstance(value, str) else is_place(value)
+    return is_notation(without_times(value)) if isinstance(value, str) else is_place(value)
 
 
 Span: TypeAlias = Annotated[
@@ -51,13 +60,21 @@ Span: TypeAlias = Annotated[
 ]
 
 
-def resolve_span(key: str, span: Sequence[IndexPlace], n: int, axis: str, problems: list[str]) -> tuple[float, ...]:
+def resolve_span(
+    key: str,
+    span: Sequence[IndexPlace],
+    n: int,
+    axis: str,
+    problems: list[str],
+    moments: Callable[[], Sequence[datetime]] = tuple,
+) -> tuple[float, ...]:
     """Find the positions of a span's places on an axis of n indices.
 
     Args:
         key: where the span stands, for messages.
         axis: its name: "camera", "light" or that of another light axis.
         problems: receives a line for each place outside the axis.
+        moments: returns those of the positions, for places that are dates or times.
     """
     found: list[float] = []
     for place in span:
@@ -65,6 +82,8 @@ def resolve_span(key: str, span: Sequence[IndexPlace], n: int, axis: str, proble
         problem = ""
         if isinstance(place, str):
             try:
+                if without_times(place) != place:
+                    place = put_indices(place, moments())
                 positions = parse_places(place, n, axis, fractions=True)
             except ValueError as error:
                 problem = f"{key}: {error}"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from framearray_cli.array.moments import without_times
 from framearray_cli.array.places import is_notation
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms.toml import STDIN
@@ -228,6 +229,6 @@ class AssembleCommand(Command):
 
 def _are_places(word: str) -> bool:
     """Return whether the word behind `--light` belongs to it: neither an option nor an argument."""
-    return is_notation(word) or not (
+    return is_notation(without_times(word)) or not (
         not word or word.startswith("-") or word in MOVEMENTS or word.endswith(".toml") or os.path.exists(word)
     )

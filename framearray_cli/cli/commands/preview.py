@@ -1,10 +1,12 @@
 """`framearray render --preview`."""
 
 from collections.abc import Mapping, Sequence
+from datetime import datetime
 from typing import TYPE_CHECKING, cast
 
 import typer
 
+from framearray_cli.array.moments import moment_text, read_times
 from framearray_cli.array.places import MIDDLE_PLACE, read_axes, read_indices
 from framearray_cli.base.errors import JobError, OutputError
 
@@ -47,7 +49,10 @@ def preview_on_screen(
             raise JobError("--light", [f"expected either this or {given[first][0]}=..., got both"])
         given[first] = ("--light", light)
     wanted = {axis: given.get(axis, (f"--at {axis}", MIDDLE_PLACE)) for axis in axes}
-    places = {axis: _one(option, text, axes[axis], axis) for axis, (option, text) in wanted.items()}
+    moments = job.light.moments
+    places = {
+        axis: _one(option, text, axes[axis], axis, moments.get(axis, ())) for axis, (option, text) in wanted.items()
+    }
     with output_file(file, ".png", force=force or target is None) as part, Screen(err, quiet=quiet) as screen:
         screen.wait("rendering a preview")
         with screen.compiling():
@@ -56,7 +61,7 @@ def preview_on_screen(
         write_image(part, made.image, ImageFormat(format=image_format, exposure=exposure))
     if not is_stdout(str(file)):
         (height, width, _), full = made.image.shape, job.camera.resolution
-        shown = ", ".join([f"camera {c}", *(f"{axis} {l}" for axis, l in places.items())])
+        shown = ", ".join([f"camera {c}", *(f"{axis} {l}{_when(moments, axis, l)}" for axis, l in places.items())])
         lines = [f"{file}: {shown}, {width} x {height} of {full[0]} x {full[1]} pixels"]
         from ..results import PreviewResult
 
@@ -64,9 +69,14 @@ def preview_on_screen(
         print_result(lines, result, quiet=quiet)
 
 
-def _one(option: str, text: str, n: int, axis: str) -> int:
+def _when(moments: Mapping[str, Sequence[datetime]], axis: str, l: int) -> str:
+    """Word date and time of a light position, if it has some."""
+    return f", {moment_text(moments[axis][l])}" if axis in moments else ""
+
+
+def _one(option: str, text: str, n: int, axis: str, moments: Sequence[datetime] = ()) -> int:
     """Read one place."""
-    found = read_indices(option, text, n, axis)
+    found = read_indices(option, read_times(option, text, lambda: moments), n, axis)
     if len(found) > 1:
         raise JobError(option, [f"expected one place for the picture of --preview, got {len(found)}"])
     return found[0]

@@ -1,10 +1,13 @@
 """`framearray report`."""
 
+from collections.abc import Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from framearray_cli.array.moments import read_times
 from framearray_cli.array.places import CAMERA_AXIS, read_indices
 from framearray_cli.render.messages import scene_lines
 
@@ -90,7 +93,7 @@ def report(
 
         options = reporting.ReportOptions(
             cameras=_indices("--cameras", cameras, job.camera.frames),
-            lights=_indices("--light", light, job.light.frames, MAIN_AXIS),
+            lights=_indices("--light", light, job.light.frames, MAIN_AXIS, job.light.moments.get(MAIN_AXIS, ())),
             vary=dict(reporting.read_vary(option, job) for option in vary or ()),
             only=only,
             errors=error or (),
@@ -103,9 +106,11 @@ def report(
     print_result(report_lines(made), report_result(made), quiet=quiet)
 
 
-def _indices(option: str, texts: list[str] | None, n: int, axis: str = CAMERA_AXIS) -> tuple[int, ...]:
+def _indices(
+    option: str, texts: list[str] | None, n: int, axis: str = CAMERA_AXIS, moments: Sequence[datetime] = ()
+) -> tuple[int, ...]:
     """Return the indices that an option names; it may be repeated."""
-    return read_indices(option, ",".join(texts), n, axis) if texts else ()
+    return read_indices(option, read_times(option, ",".join(texts), lambda: moments), n, axis) if texts else ()
 
 
 def report_lines(made: "Report") -> list[str]:

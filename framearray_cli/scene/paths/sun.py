@@ -14,7 +14,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.extras import extra
-from framearray_cli.job.times import moment, zone_of
+from framearray_cli.job.times import even_moments, moment, zone_of
 
 PRESSURE_HPA, TEMPERATURE_C = 1013.25, 12.0  # of the air that bends the light, standard at sea level; pvlib's defaults
 REFRACTION_DEG = 0.5667  # at the horizon, pvlib's default
@@ -92,15 +92,7 @@ def sun_path(
     Raises:
         MissingExtraError: pvlib is not installed.
     """
-    zone = zone_of(timezone)
-    times: list[datetime] = []
-    for date in dates:
-        first = moment(date, start, zone).astimezone(UTC)  # spaced in UTC, so that a clock change causes no jump
-        span = moment(date, stop, zone).astimezone(UTC) - first
-        each = n // len(dates)
-        parts = [timedelta(minutes=step) * k if step else span * (k / max(each - 1, 1)) for k in range(each)]
-        times += [(first + part).astimezone(zone) for part in parts]
-    return sun_at(times, *place)
+    return sun_at(even_moments(dates, start, stop, timezone, n, step), *place)
 
 
 def daylight(date: str, timezone: str | float, place: tuple[float, float]) -> str:

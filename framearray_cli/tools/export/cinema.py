@@ -52,6 +52,7 @@ def _row(selection: Selection, frame: ExportedFrame) -> dict[str, Any]:
             if key in source:
                 row |= _vector(f"{name}_{key}", source[key], "rgb" if key in ("intensity", "irradiance") else "xyz")
         row |= {f"{name}_{key}": float(source[key]) for key in ("radius", "angle", "width", "height") if key in source}
+        row |= {f"{name}_time": str(source["time"])} if "time" in source else {}
     return row
 
 

@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from framearray_cli.array.manifest import MAIN_AXIS, Manifest
-from framearray_cli.array.mixtures import position_text
+from framearray_cli.array.mixtures import Mixture, position_text
+from framearray_cli.array.moments import moment_at, moment_text
+from framearray_cli.array.places import nearest_index
 from framearray_cli.base.arrays import Image
 from framearray_cli.base.colour import srgb8_from_linear
 
@@ -57,8 +59,14 @@ def screen_codes(image: Image, look: Look, text: str, bits: Literal[8, 16] = 8) 
 
 
 def shot_label(manifest: Manifest, shot: Shot) -> str:
-    """Word what a frame shows: "c 12  l 3", or "c 12  light 3.25  lamps 1" if there are several light axes."""
+    """Word what a frame shows: "c 12  l 3", or "c 12  light 3.25  lamps 1" if there are several light axes.
+
+    Under a sun date and time follow: those of the nearest position where two blend.
+    """
     axes = list(manifest.axes)
     names = ["l"] if axes == [MAIN_AXIS] else axes
     places = [f"{name} {position_text(position)}" for name, position in zip(names, shot.positions, strict=True)]
+    for axis, position in zip(axes, shot.positions, strict=True):
+        moment = None if isinstance(position, Mixture) else moment_at(manifest, axis, nearest_index(position))
+        places += [moment_text(moment)] if moment else []
     return "  ".join([f"c {shot.c}", *places])

@@ -10,6 +10,7 @@ import numpy as np
 
 from framearray_cli.array.images.images import FOR_SCREENS, format_name
 from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.moments import axis_moments, moment_text
 from framearray_cli.base.arrays import Float32, is_number
 from framearray_cli.base.hashing import line_digest
 
@@ -80,13 +81,19 @@ def _index(manifest: Manifest, streams: Sequence[Stream], layout: SheetLayout) -
         "resolution": list(manifest.resolution),
         "fps": manifest.fps,
         "n_cameras": manifest.n_cameras,
-        "axes": [{"name": name, "n": n} for name, n in manifest.axes.items()],
+        "axes": [_axis(manifest, name) for name in manifest.axes],
         "exposure": _exposure(manifest),
         "small": asdict(layout),
         "streams": [_stream(stream) for stream in streams],
         "background_ambient": list(manifest.background_ambient),
         "ambient": {group.name: [list(light.ambient) for light in group.lights] for group in manifest.groups},
     }
+
+
+def _axis(manifest: Manifest, name: str) -> dict[str, Any]:
+    """Describe a light axis; `times` only under a sun: the date and time of each position."""
+    times = [moment_text(moment) for moment in axis_moments(manifest).get(name, ())]
+    return {"name": name, "n": manifest.axes[name]} | ({"times": times} if times else {})
 
 
 def _exposure(manifest: Manifest) -> float:

@@ -200,7 +200,8 @@ class Page {
   showNumbers() {
     const { array, view } = this;
     const { nCameras, main } = array;
-    const text = `camera ${view.c} of 0-${nCameras - 1}, ${main.name} ${this.l} of 0-${main.n - 1}`;
+    const time = main.times ? `, ${main.times[this.l]}` : "";
+    const text = `camera ${view.c} of 0-${nCameras - 1}, ${main.name} ${this.l} of 0-${main.n - 1}${time}`;
     const [lacking, ranges] = array.contents.lacking;
     byId("lacking").hidden = !lacking;
     byId("lacking").textContent = `${lacking} of ${nCameras} camera positions lack images: ${ranges}`;
