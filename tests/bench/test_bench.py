@@ -132,6 +132,7 @@ def test_a_resampled_light_path_keeps_its_ends_and_directions_stay_unit():
         lit=ones[:, 0],
         size=np.arange(8, dtype=np.float32).reshape(2, 4),
         cone=np.empty(0, np.float32),
+        panel=np.empty(0, np.float32),
         colour=np.ones((4, 3), np.float32),
     )
     found = resampled(lights, np.linspace(0, 3, 7))

@@ -14,6 +14,8 @@ from framearray_cli.base.arrays import Float32, Float64, Int32, with_room
 from framearray_cli.scene.paths.paths import Lights
 from framearray_cli.scene.paths.placing import LightPath
 
+from .profiles import NONE, Profiles, profile_arrays
+
 POINT, DIRECTIONAL, RECT, DISC = 0, 1, 2, 3  # panels are last
 SHARPEST = 0.001  # width of a spot's edge, in cosines, over that of its cone
 KINDS = {"point": POINT, "directional": DIRECTIONAL}
@@ -36,6 +38,7 @@ class LightArrays(NamedTuple):
             its light that the back sends, times -1; 0 of other sources. (0,) where there are none of them: kernels are
             then compiled without them.
         colour: (n_lights, 3) factor of a stored irradiance; ones if there are 3 channels.
+        profiles: of lamps with measured light; kernels are compiled without them where there are none.
     """
 
     kind: Int32
@@ -46,6 +49,7 @@ class LightArrays(NamedTuple):
     cone: Float32
     panel: Float32
     colour: Float32
+    profiles: Profiles = NONE
 
     @property
     def channels(self) -> int:
@@ -66,7 +70,9 @@ def pad_lights(lights: LightArrays) -> LightArrays:
         room[:] = array
         return room
 
-    return LightArrays(*(copied(array) for array in lights))
+    profiles = lights.profiles._replace(frame=copied(lights.profiles.frame))
+    arrays: Any = (array if array is lights.profiles else copied(array) for array in lights)
+    return LightArrays(*arrays)._replace(profiles=profiles)
 
 
 def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
@@ -92,6 +98,7 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
         cone=_cones(lights),
         panel=_panels(lights),
         colour=np.asarray(colour, np.float32),
+        profiles=profile_arrays(lights),
     )
     return pad_lights(found)
 
@@ -143,7 +150,7 @@ def _panels(lights: Lights) -> Float32:
 
 def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
     """The lights at some of their positions, in the same units."""
-    some = list(at)
+    some, frame = list(at), lights.profiles.frame
     found = lights._replace(
         vector=lights.vector[:, :, some],
         strength=lights.strength[:, :, some],
@@ -152,5 +159,6 @@ def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
         cone=lights.cone[:, :, some] if lights.cone.ndim > 1 else lights.cone,
         panel=lights.panel[:, :, some] if lights.panel.ndim > 1 else lights.panel,
         colour=lights.colour[some],
+        profiles=lights.profiles._replace(frame=frame[:, :, some] if frame.ndim > 1 else frame),
     )
     return pad_lights(found)

@@ -19,6 +19,7 @@ from ..kernels.kernel import has_rows, inlined
 from ..kernels.simd import gather, load, select, sqrt
 from .lights import DIRECTIONAL, RECT, LightArrays
 from .panels import PanelAt, panel_at, panel_in_lanes, panel_point, panel_ray, panel_sample
+from .profiles import FLUX, POLAR, frame_at, frame_in_lanes, profile_direction, profile_share
 from .random import SOURCES, r2, random_word, sphere_point
 
 
@@ -31,6 +32,7 @@ class SourceAt(NamedTuple):
         cone: axis, a and b; not read where there are no spots.
         panel: half axes, normal and back; not read where there are no panels.
         lit: 1 where the source shines, else 0.
+        frame: of its profile, see `Profiles`; not read where there are none.
     """
 
     place: Triple
@@ -38,6 +40,7 @@ class SourceAt(NamedTuple):
     cone: tuple[Real, Real, Real, Real, Real]
     panel: PanelAt
     lit: Real
+    frame: tuple[Real, ...]
 
 
 @inlined
@@ -57,6 +60,7 @@ def source_at(lights: LightArrays, s: int, l: int) -> SourceAt:
         ),
         panel_at(lights, s, l),
         lights.lit[s, l],
+        frame_at(lights.profiles, s, l, n_lights),
     )
 
 
@@ -77,6 +81,7 @@ def source_in_lanes(lights: LightArrays, s: int, l: int) -> SourceAt:
         ),
         panel_in_lanes(lights, s, l),
         load(lights.lit, one),
+        frame_in_lanes(lights.profiles, s, l, n_lights),
     )
 
 
@@ -98,14 +103,15 @@ def vector_and_factor(
     The irradiance is the factor times the strength: cos(theta) / d^2 for a point source, whose vector ends at the
     source, and cos(theta) for a directional one, whose vector has length 1. It is 0 where the source does not shine or
     lies behind either normal. Of a source with a size it is the estimate by one direction, see `_cone_sample`; a spot's
-    falls off towards its edge. Of a panel it is that of one of its points, see `panel_sample`.
+    falls off towards its edge, and a lamp with a profile follows that. Of a panel it is that of one of its points, see
+    `panel_sample`.
 
     Args:
         source: source s at these light positions.
         p, g, m: points, geometric and shading normals.
         q: see `source_point`; not read where no source has a size or is a panel.
     """
-    (x, y, z), size, cone, panel, lit = source
+    (x, y, z), size, cone, panel, lit, frame = source
     kind, nothing, one = lights.kind[s], np.float32(0.0), np.float32(1.0)
     # the vector to the source: L - P, or against the light's direction
     sign, from_point = (-one, nothing) if kind == DIRECTIONAL else (one, one)
@@ -122,6 +128,8 @@ def vector_and_factor(
         factor = cosine * factor * lit
         if has_rows(lights.cone):
             factor = factor * spot_share(cone, x, y, z)
+        if has_rows(lights.profiles.frame) and lights.profiles.grid[s, POLAR] > 0:
+            factor = factor * profile_share(lights.profiles, s, frame, x, y, z)
         return x, y, z, select(in_front, factor, nothing)
     # cos(theta), not yet divided by d; the source counts in front of both normals
     cosine = x * m[0] + y * m[1] + z * m[2]
@@ -133,6 +141,8 @@ def vector_and_factor(
         factor = factor / (square * sqrt(square))
     if has_rows(lights.cone):
         factor = factor * spot_share(cone, x, y, z)
+    if has_rows(lights.profiles.frame) and lights.profiles.grid[s, POLAR] > 0:
+        factor = factor * profile_share(lights.profiles, s, frame, x, y, z)
     return x, y, z, select(in_front, factor, nothing)
 
 
@@ -215,6 +225,8 @@ def emitted_ray(
         dx, dy, dz = sphere_direction(a, b)
         if has_rows(lights.cone):
             dx, dy, dz = _spot_direction(lights, s, l, a, b)
+        if has_rows(lights.profiles.frame) and lights.profiles.grid[s, POLAR] > 0:
+            dx, dy, dz = profile_direction(lights.profiles, s, l, lights.lit.shape[1], a, b)
         if has_rows(lights.size):
             r = np.sqrt(gather(lights.size, s * lights.lit.shape[1] + l))
             ox, oy, oz = ox + r * dx, oy + r * dy, oz + r * dz
@@ -241,7 +253,7 @@ def _spot_direction(lights: LightArrays, s: int, l: int, a: Real, b: Real) -> Tr
 def emitted_power(lights: LightArrays, s: int, radius: float) -> Float64:
     """Power that source s emits into the scene at each light position, (n_lights,), in units of its strength.
 
-    It goes through the disc, in all directions, into a cone, or from one side or both of a panel.
+    It goes through the disc, in all directions, into a cone, as a profile says, or from one side or both of a panel.
 
     Args:
         radius: of the scene.
@@ -250,6 +262,8 @@ def emitted_power(lights: LightArrays, s: int, radius: float) -> Float64:
         sides: Float64 = 1.0 - lights.panel[s, 9].astype(np.float64)
         return np.pi * sides
     everywhere = np.pi * radius**2 if lights.kind[s] == DIRECTIONAL else 4 * np.pi
+    if lights.profiles.frame.ndim > 1 and lights.profiles.grid[s, POLAR] > 0:
+        return np.full(lights.n_lights, lights.profiles.grid[s, FLUX])
     if lights.cone.ndim == 1:
         return np.full(lights.n_lights, everywhere)
     slope, offset = lights.cone[s, 3:].astype(np.float64)

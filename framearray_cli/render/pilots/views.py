@@ -17,6 +17,7 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.hits import SURFACE, Hits
 from framearray_cli.engine.hits.native import Samples, native_hits
 from framearray_cli.engine.inputs.lights import LightArrays, some_lights
+from framearray_cli.engine.inputs.profiles import Profiles
 from framearray_cli.engine.inputs.random import lattice_steps
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.engine.terms.direct import direct
@@ -109,7 +110,7 @@ def _shrink(setup: FrameSetup, planes: Sequence[int], pixels: int) -> FrameSetup
 
 def _one_source(lights: LightArrays, s: int) -> LightArrays:
     """Return the lights without all sources but one."""
-    one = slice(s, s + 1)
+    one, (frame, grid, table) = slice(s, s + 1), lights.profiles
     return lights._replace(
         kind=lights.kind[one].copy(),
         vector=_with_room(lights.vector[one]),
@@ -118,6 +119,7 @@ def _one_source(lights: LightArrays, s: int) -> LightArrays:
         size=_with_room(lights.size[one]),
         cone=_with_room(lights.cone[one]),
         panel=_with_room(lights.panel[one]),
+        profiles=Profiles(_with_room(frame[one]), grid[one].copy(), table),
     )
 
 

@@ -20,6 +20,7 @@ from .curves import interpolate_keys
 from .directions import PARALLEL, interpolate_directions, unit
 from .domes import dome_directions, grid_points
 from .panels import Panel, across_under, carry_across
+from .profiles import Profile
 from .sun import NEVER, daylight, directions_to_sun, sun_path
 
 # What the manifest calls the vector, the strength and the size of a source, by its kind.
@@ -52,6 +53,7 @@ class LightPath:
             None of sources without size.
         cone: of a spot, which is a point with a cone.
         panel: of a rectangle or disc, which is a point with a panel around it.
+        profile: of a point whose light was measured; `intensity` is then its largest.
         notes: n tables with what else the manifest records of each position; or none.
     """
 
@@ -61,6 +63,7 @@ class LightPath:
     size: Float64 | None = None
     cone: Cone | None = None
     panel: Panel | None = None
+    profile: Profile | None = None
     notes: tuple[dict[str, Any], ...] = ()
 
     def table(self, l: int) -> dict[str, Any]:
@@ -84,6 +87,7 @@ class LightPath:
             size=None if self.size is None else self.size[rows],
             cone=self.cone and Cone(axis=self.cone.axis[rows], angles_deg=self.cone.angles_deg[rows]),
             panel=self.panel and self.panel.at(rows),
+            profile=self.profile and self.profile.at(rows),
             notes=tuple(self.notes[k] for k in rows) if self.notes else (),
         )
 

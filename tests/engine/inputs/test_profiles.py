@@ -1,0 +1,184 @@
+"""Measured lamps: the light of a table by its definition, in float64, and particles that carry it."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+from support.hits import points
+
+from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.hits.rays import room_for_tests
+from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
+from framearray_cli.engine.inputs.profiles import angle_of
+from framearray_cli.engine.inputs.shapes import emitted_power, emitted_ray
+from framearray_cli.engine.terms.direct import direct
+from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
+from framearray_cli.scene.paths.paths import lights_without_groups
+from framearray_cli.scene.paths.placing import LightPath
+from framearray_cli.scene.paths.profiles import Profile, Web
+
+FAR = np.concatenate([tiny.box((90, -21, -1), (91, -20, 1)), tiny.box((-91, 20, -1), (-90, 21, 1))])
+RNG = np.random.default_rng(5)
+CIRCLE = np.linspace(-180, 180, 25)
+
+
+def web(polar: Any, around: Any, sideways: bool = False) -> Web:
+    share = RNG.uniform(0.1, 1, (len(around), len(polar)))
+    if len(around) > 1 and around[-1] - around[0] == 360:
+        share[-1] = share[0]
+    return Web(
+        polar_deg=np.array(polar, float),
+        around_deg=np.array(around, float),
+        share=share / share.max(),
+        candela=1,
+        sideways=sideways,
+    )
+
+
+WEBS = {
+    "round": web([0, 10, 25, 40, 90], [0]),
+    "whole": web(np.linspace(0, 180, 19), CIRCLE),
+    "up": web(np.linspace(90, 180, 7), CIRCLE),
+    "uneven": web([0, 7.5, 33.3, 90, 180], [-180, -90, 15.25, 90, 180]),
+    "floodlight": web(np.linspace(60, 120, 13), np.linspace(-45, 45, 10), True),
+}
+
+
+def lamp(table: Web, n: int = 16, radius: float | None = None) -> LightPath:
+    axis = np.add(RNG.normal(size=(n, 3)) * 0.4, (0, -1, 0))
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    zero = np.cross(axis, RNG.normal(size=(n, 3)))
+    return LightPath(
+        kind="point",
+        vector=np.add(RNG.uniform(-0.5, 0.5, (n, 3)), (0, 1, 0)),
+        intensity=np.ones((n, 3)),
+        size=None if radius is None else np.full(n, radius),
+        profile=Profile(file="a.ies", web=table, axis=axis, zero=zero / np.linalg.norm(zero, axis=1, keepdims=True)),
+    )
+
+
+def share(source: LightPath, way: Any) -> Any:
+    """The share into directions (..., n, 3), by the definition of types C and B in LM-63-2002."""
+    profile = source.profile
+    assert profile is not None
+    table, axis, zero = profile.web, profile.axis, profile.zero
+    way = way / np.linalg.norm(way, axis=-1, keepdims=True)
+    # seen from above, a lamp that points down has its C plane of 90 degrees a quarter turn against the clock from C 0
+    side = np.cross(-axis, zero)
+    down, ahead, left = ((way * part).sum(axis=-1) for part in (axis, zero, side))
+    if table.sideways:
+        clockwise = np.degrees(np.arcsin(np.clip(-left, -1, 1)))  # horizontal angles of type B
+        polar, around = 90 + clockwise, np.degrees(np.arctan2(ahead, down))
+    else:
+        polar, around = np.degrees(np.arccos(np.clip(down, -1, 1))), np.degrees(np.arctan2(left, ahead))
+    t, a = table.polar_deg, table.around_deg
+    i = np.clip(np.searchsorted(t, polar, side="right") - 1, 0, len(t) - 2)
+    f = (polar - t[i]) / (t[i + 1] - t[i])
+    inside = (f >= 0) & (f <= 1)
+    if len(a) == 1:
+        return np.where(inside, table.share[0, i] * (1 - f) + table.share[0, i + 1] * f, 0)
+    j = np.clip(np.searchsorted(a, around, side="right") - 1, 0, len(a) - 2)
+    g = (around - a[j]) / (a[j + 1] - a[j])
+    rows = [table.share[k, i] * (1 - f) + table.share[k, i + 1] * f for k in (j, j + 1)]
+    return np.where(inside & (g >= 0) & (g <= 1), rows[0] * (1 - g) + rows[1] * g, 0)
+
+
+def arrays(*sources: LightPath) -> LightArrays:
+    return light_arrays(lights_without_groups(sources), np.zeros(3))
+
+
+def lit(places: Any, lights: LightArrays, neighbours: bool | None) -> Any:
+    """Irradiance (n, n_lights) of points that look up; None: by steps."""
+    n, hits = len(places), points(len(places), (0, 0, 0), (0.0, 1.0, 0.0))
+    hits.position[:], hits.key[:] = places, np.arange(n)
+    out, rays = np.full((n, 1, lights.n_lights), np.nan, np.float32), room_for_tests(4096, lights.n_lights)
+    with EmbreeScene(tiny.scene_of(FAR)) as embree:
+        if neighbours is None:
+            direct_by_steps(hits, n, lights, 4, False, embree.tracer, rays, room_for_steps(lights.n_lights), out)
+        else:
+            direct(hits, n, lights, embree.tracer, rays, out, neighbours)
+    return out[:, 0].astype(np.float64)
+
+
+def floor_points(n: int) -> Any:
+    return RNG.uniform(-3, 3, (n, 3)) * (1, 0.2, 1) - (0, 0.2, 0)
+
+
+@pytest.mark.parametrize("neighbours", [True, False])
+@pytest.mark.parametrize("name", WEBS)
+def test_a_measured_lamp_lights_points_by_its_table(name: str, neighbours: bool) -> None:
+    source, places = lamp(WEBS[name]), floor_points(600)
+    found = lit(places, arrays(source), neighbours)
+    way = source.vector[None] - places[:, None]
+    full = np.maximum(way[..., 1], 0) / np.linalg.norm(way, axis=-1) ** 3
+    wanted = full * share(source, -way)
+    # beside the outermost angles a table ends with a step, which rounding may move
+    steps = np.abs(found - wanted) > 2e-4 * full
+    assert steps.mean() < 1e-3
+    assert (wanted > 0).any()
+    np.testing.assert_array_equal(found, lit(places, arrays(source), not neighbours))
+
+
+def test_profiles_beside_other_sources_leave_them_alone() -> None:
+    bare = LightPath(kind="point", vector=np.tile((0.1, 1.0, 0.0), (16, 1)), intensity=np.ones((16, 3)))
+    sun = LightPath(kind="directional", vector=np.tile((0.6, -0.8, 0.0), (16, 1)), intensity=np.ones((16, 3)))
+    one, other, places = lamp(WEBS["whole"]), lamp(WEBS["floodlight"]), floor_points(100)
+    sources = (bare, one, sun, other)
+    together = lit(places, arrays(*sources), True)
+    np.testing.assert_allclose(together, sum(lit(places, arrays(each), True) for each in sources), rtol=1e-6)
+    np.testing.assert_array_equal(together, lit(places, arrays(*sources), None))
+    some = some_lights(arrays(*sources), [5, 3])
+    np.testing.assert_array_equal(lit(places, some, True), together[:, [5, 3]])
+
+
+def test_a_measured_lamp_may_have_a_size() -> None:
+    """On average over its points a small sphere lights as the point, as its table has no steps here."""
+    table = Web(
+        polar_deg=np.linspace(0, 180, 91),
+        around_deg=np.zeros(1),
+        share=(1 + np.cos(np.radians(np.linspace(0, 180, 91))))[None] / 2,
+        candela=1,
+        sideways=False,
+    )
+    source = lamp(table, n=16, radius=0.02)
+    place = np.zeros((20_000, 3))
+    found = lit(place, arrays(source), True)
+    point = LightPath(kind="point", vector=source.vector, intensity=source.intensity, profile=source.profile)
+    wanted = lit(place[:1], arrays(point), True)[0]
+    error = found.std(axis=0) / len(place) ** 0.5
+    assert (np.abs(found.mean(axis=0) - wanted) < 3.5 * error + 1e-3 * wanted).all()
+
+
+@pytest.mark.parametrize("name", WEBS)
+def test_particles_have_the_density_and_the_power_of_the_table(name: str) -> None:
+    """Their number in each of 32 parts of the sphere, against the integral of the share there: by a chi-square test."""
+    source = lamp(WEBS[name], n=2)
+    lights = arrays(source)
+    z = (np.arange(2000) + 0.5) / 1000 - 1
+    turn = (np.arange(800) + 0.5) / 400 * np.pi
+    r = np.sqrt(1 - z * z)[:, None]
+    ways = np.stack([r * np.cos(turn), np.broadcast_to(z[:, None], (2000, 800)), r * np.sin(turn)], axis=-1)
+    density = share(source.at([1]), ways[:, :, None])[..., 0]
+    assert emitted_power(lights, 0, 1.0)[1] == pytest.approx(4 * np.pi * density.mean(), rel=5e-3)
+    expected = density.reshape(4, 500, 8, 100).sum(axis=(1, 3)).ravel()
+    n = 20_000
+    expected *= n / expected.sum()
+    found = np.array([emitted_ray(lights, 0, 1, 1.0, a, b, 0.5, 0.5)[3:] for a, b in RNG.random((n, 2))])
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, atol=1e-5)
+    part = np.minimum((found[:, 1] + 1) * 2, 3).astype(int) * 8 + (
+        np.arctan2(found[:, 2], found[:, 0]) % (2 * np.pi) / (np.pi / 4)
+    ).astype(int).clip(0, 7)
+    counts = np.bincount(part, minlength=32)
+    used = expected > 5
+    assert counts[~used].sum() < 5 * 32
+    assert ((counts - expected)[used] ** 2 / expected[used]).sum() < 65  # 31 degrees of freedom: 1 in 3,000 beyond
+
+
+def test_angles_are_exact_to_single_precision() -> None:
+    at = np.linspace(-np.pi, np.pi, 4001)
+    for length in (1e-6, 1.0, 1e6):
+        x, y = (length * np.cos(at)).astype(np.float32), (length * np.sin(at)).astype(np.float32)
+        found = np.array([angle_of(b, a) for a, b in zip(x, y, strict=True)])
+        np.testing.assert_allclose(found, np.arctan2(y.astype(float), x.astype(float)), atol=4e-7)
+    assert angle_of(np.float32(0), np.float32(0)) == 0
