@@ -14,11 +14,12 @@ from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.inputs.lights import some_lights
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
+from framearray_cli.job.method import IndirectTable
 from framearray_cli.job.values import MOST_HITS
 from framearray_cli.render.automatic.choose import resolve_auto
-from framearray_cli.render.prepare import Prepared, open_embree, plan_work, prepare
+from framearray_cli.render.prepare import Prepared, open_embree, plan_work, prepare, prepared_from
 
-from .settings import Settings
+from .settings import Method, Settings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,6 +68,8 @@ def plan_case(prepared: Prepared) -> Iterator[Case]:
 def with_settings(case: Case, settings: Settings) -> Case:
     """Return the job with other settings, as if every frame were an interior one of its path.
 
+    They have the job's `indirect.method`, which `with_method` changes.
+
     Frames at the ends of a path have more native hits than others; here none has. Keep the ambient light. Scale the
     hits of pixels that see a mirror by the same share.
     """
@@ -79,17 +82,30 @@ def with_settings(case: Case, settings: Settings) -> Case:
         output=changed(job.output, layers=False),
     )
     prepared = replace(case.prepared, job=job)
-    setup, _ = plan_work(prepared, case.embree)
+    plain = replace(prepared, job=changed(job, indirect=IndirectTable()))  # cells are not built again
+    setup, _ = plan_work(plain, case.embree)
     middle = setup.per_pixel[setup.n_frames // 2]
     setup = replace(
         setup,
         lights=case.setup.lights,
         cells=case.setup.cells,
+        local=case.setup.local,
+        exact=case.setup.exact,
+        smooth=case.setup.smooth,
         kept=case.setup.kept,
         per_pixel=np.full_like(setup.per_pixel, middle),
         obscurance=setup.obscurance._replace(average=case.setup.obscurance.average),
     )
     return replace(case, prepared=prepared, setup=setup, settings=settings)
+
+
+def with_method(case: Case, method: Method) -> Case:
+    """Return the job with another way to find indirect light."""
+    settings = replace(case.settings, indirect=method)
+    old = case.prepared
+    prepared = prepared_from(settings.apply_to(old.job), old.scene, old.eyes, old.lights)
+    setup, ambient = plan_work(prepared, case.embree)
+    return replace(case, prepared=prepared, setup=setup, ambient=ambient, settings=settings)
 
 
 def with_lights(case: Case, l: Sequence[int]) -> Case:

@@ -1,19 +1,33 @@
 """The best front of error and time, the cheapest settings for an error, and the gain over images from scratch."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from .measure import Measured
-from .settings import SCRATCH
+from .settings import SCRATCH, NamedSettings
 
 # Settings reach an error if theirs is at most this many times as large: measured errors are noisy.
 SLACK = 1.02
 
 
+class Timed(Protocol):
+    """Settings that were measured, and their cost."""
+
+    @property
+    def named(self) -> NamedSettings: ...
+
+    @property
+    def ms(self) -> float: ...
+
+
+_Timed = TypeVar("_Timed", bound=Timed)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Advice:
+class Advice(Generic[_Timed]):
     """The cheapest settings for an error.
 
     Attributes:
@@ -22,24 +36,31 @@ class Advice:
     """
 
     error: float
-    best: Measured | None
+    best: _Timed | None
 
 
-def best_front(measured: Sequence[Measured]) -> list[Measured]:
-    """Return the settings that no others beat in both time and RMSE, the quickest first."""
-    front: list[Measured] = []
-    for one in sorted(measured, key=lambda m: (m.ms, m.quality.rmse)):
-        if not front or one.quality.rmse < front[-1].quality.rmse:
+def model_error(one: Measured) -> float:
+    """RMSE with respect to the reference of the job's own way to find indirect light."""
+    return one.quality.rmse
+
+
+def best_front(measured: Sequence[_Timed], error_of: Callable[[_Timed], float]) -> list[_Timed]:
+    """Return the settings that no others beat in both time and error, the quickest first."""
+    front: list[_Timed] = []
+    for one in sorted(measured, key=lambda m: (m.ms, error_of(m))):
+        if not front or error_of(one) < error_of(front[-1]):
             front.append(one)
     return front
 
 
-def advise(measured: Sequence[Measured], wanted: Sequence[float]) -> list[Advice]:
+def advise(
+    measured: Sequence[_Timed], wanted: Sequence[float], error_of: Callable[[_Timed], float]
+) -> list[Advice[_Timed]]:
     """Return the cheapest settings for each error, without those for single lights, which no job can have."""
     usable = [m for m in measured if not m.named.settings.one_light]
     found = []
     for error in wanted:
-        good = [m for m in usable if m.quality.rmse <= SLACK * error]
+        good = [m for m in usable if error_of(m) <= SLACK * error]
         found.append(Advice(error=error, best=min(good, key=lambda m: m.ms, default=None)))
     return found
 

@@ -2,7 +2,7 @@
 
 import statistics
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from .case import Case, with_lights, with_settings
 from .quality import Quality, compare_frames, mean_quality
 from .reference import Reference
 from .settings import NamedSettings, Settings
+from .truth import Truth, TruthError, compare_with_truth, mean_truth_error
 
 # Seeds of the two runs to compare with the two halves of a reference.
 SEEDS = (101, 202)
@@ -46,6 +47,7 @@ class Measured:
     Attributes:
         ms: wall time per image, before writing.
         quality: mean over all probe images.
+        truth: error with respect to true light, where the report has any.
         hits: accepted hits per pixel: mean and 1st percentile.
         example: (h, w, 3) the first probe image, of the first run.
     """
@@ -55,6 +57,21 @@ class Measured:
     quality: Quality
     hits: tuple[float, float]
     example: Float32
+    truth: TruthError | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasuredMethod:
+    """Cost and error of settings with another way to find indirect light.
+
+    Attributes:
+        ms: wall time per image, before writing.
+        truth: error with respect to true light.
+    """
+
+    named: NamedSettings
+    ms: float
+    truth: TruthError
 
 
 class TimedWindow(Window):
@@ -117,16 +134,20 @@ def render_frames(
 
 def measure(
     case: Case, named: NamedSettings, cameras: Sequence[Sequence[int]], lights: Sequence[int],
-    pairs: Sequence[tuple[int, int]], references: dict[int, Reference],
+    pairs: Sequence[tuple[int, int]], references: dict[int, Reference], truths: Mapping[int, Truth],
 ) -> Measured:  # fmt: skip
-    """Render the probe images of some settings twice, and compare them with the references."""
+    """Render the probe images of some settings twice, and compare them with the references, and with true light."""
     found, seconds, hits, example = [], [], [], None
+    true_errors: list[TruthError] = []
     for frames in cameras:
         runs = [render_frames(case, named.settings, frames, lights, seed) for seed in SEEDS]
         seconds += [r.seconds for r in runs]
         hits.append(runs[0].hits)
         pictures = (runs[0].images, runs[1].images)
         found += compare_frames(pictures, [references[c] for c in frames], case.ambient, lights, pairs)
+        for i, c in enumerate(frames):
+            if c in truths:
+                true_errors += compare_with_truth([pictures[0][i], pictures[1][i]], truths[c])
         example = runs[0].images[0, 0] if example is None else example
     assert example is not None
     all_hits = np.concatenate([h.ravel() for h in hits])
@@ -136,7 +157,25 @@ def measure(
         quality=mean_quality(found),
         hits=(float(all_hits.mean()), float(np.percentile(all_hits, 1))),
         example=example,
+        truth=mean_truth_error(true_errors),
     )
+
+
+def measure_method(
+    case: Case, named: NamedSettings, lights: Sequence[int], truths: Mapping[int, Truth]
+) -> MeasuredMethod | None:
+    """Render the frames that there are in true light with another method, and compare them; None where all is black.
+
+    Args:
+        case: of `with_method`.
+    """
+    runs = {c: render_frames(case, named.settings, [c], lights, SEEDS[0]) for c in truths}
+    found = [error for c, run in runs.items() for error in compare_with_truth([run.images[0]], truths[c])]
+    truth = mean_truth_error(found)
+    if truth is None:
+        return None
+    ms = 1e3 * statistics.median(run.seconds for run in runs.values()) / case.setup.lights.n_lights
+    return MeasuredMethod(named=named, ms=ms, truth=truth)
 
 
 def measure_single_lights(

@@ -8,11 +8,12 @@ from framearray_cli.base.files import whole_file
 
 from .crops import draw_crops, draw_maps
 from .front import times_faster
-from .measure import Measured
 from .plots import draw_plots
 from .run import Report
 from .settings import Settings
 from .tables import write_tables
+from .true_light import TrueMeasured
+from .truth import PATHS
 
 
 def write_report(report: Report) -> None:
@@ -24,6 +25,7 @@ def write_report(report: Report) -> None:
     import jinja2
 
     write_tables(report)
+    true_light = report.true_light
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
@@ -37,13 +39,15 @@ def write_report(report: Report) -> None:
         maps=draw_maps(report),
         rows=[(one, times_faster(one, report.measured), one in report.front) for one in report.measured],
         advice=[(one, advice_lines(one.best, report)) for one in report.advice],
+        true_advice=[(one, advice_lines(one.best, report)) for one in true_light.advice] if true_light else [],
+        paths=PATHS,
         cameras=[c for frames in report.probes.cameras for c in frames],
     )
     with whole_file(report.folder / "index.html") as part:
         part.write_text(text, encoding="utf-8")
 
 
-def advice_lines(best: Measured | None, report: Report) -> Sequence[str]:
+def advice_lines(best: TrueMeasured | None, report: Report) -> Sequence[str]:
     """Return the lines to paste into the job to get some settings; a comment where there are none."""
     if best is None:
         return ["# no tested settings reach it"]

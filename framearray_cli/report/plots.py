@@ -1,17 +1,21 @@
 """The door to matplotlib: a report's plots, as SVG."""
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from framearray_cli.base.files import write_bytes
 
-from .measure import Measured
+from .front import model_error
 from .run import Report
-from .settings import LIGHT_REUSE, SCRATCH
+from .settings import LIGHT_REUSE, METHODS, SCRATCH
+from .true_light import TrueMeasured, true_rmse
 
 COLOURS = {"job": "#c53030", LIGHT_REUSE: "#718096", SCRATCH: "#1a202c"}
+# A method is a line of its own, beside those that start at the job's settings.
+WHOLE_LINES = (LIGHT_REUSE, SCRATCH, *METHODS)
+_Point = TypeVar("_Point", bound=TrueMeasured)
 CYCLE = ("#2b6cb0", "#2f855a", "#b7791f", "#6b46c1", "#0987a0", "#b83280", "#9c4221", "#4a5568")
 
 
@@ -26,6 +30,7 @@ def draw_plots(report: Report) -> dict[str, str]:
     matplotlib.use("svg")
     matplotlib.rcParams.update({"svg.hashsalt": "framearray", "svg.fonttype": "none", "font.size": 9})
     plots: dict[str, Callable[[Report, Any], None]] = {
+        "true light and time": _plot_true_light,
         "error and time": _plot_error_and_time,
         "bias and noise": _plot_bias_and_noise,
         "by offset": _plot_offsets,
@@ -56,12 +61,11 @@ def _draw(file: Path, draw: Callable[[Report, Any], None], report: Report) -> bo
     return True
 
 
-def _families(report: Report) -> dict[str, list[Measured]]:
+def _families(measured: Sequence[_Point]) -> dict[str, list[_Point]]:
     """Return the points that a line joins, by family; a family that varies one setting starts at the job's own."""
-    own = report.measured[0]
-    families: dict[str, list[Measured]] = {}
-    for one in report.measured[1:]:
-        start = [] if one.named.family in (LIGHT_REUSE, SCRATCH) else [own]
+    families: dict[str, list[_Point]] = {}
+    for one in measured[1:]:
+        start = [] if one.named.family in WHOLE_LINES else [measured[0]]
         families.setdefault(one.named.family, start).append(one)
     return families
 
@@ -70,19 +74,36 @@ def _colour(family: str, i: int) -> str:
     return COLOURS.get(family, CYCLE[i % len(CYCLE)])
 
 
+def _plot_true_light(report: Report, axes: Any) -> None:
+    if report.true_light is None:
+        return
+    _plot_error(axes, report.true_light.measured, report.true_light.front, true_rmse)
+    axes.set_ylabel("RMSE with respect to true light, over its mean")
+
+
 def _plot_error_and_time(report: Report, axes: Any) -> None:
-    for i, (family, points) in enumerate(_families(report).items()):
+    _plot_error(axes, report.measured, report.front, model_error)
+    axes.set_ylabel("RMSE over the mean of the reference")
+
+
+def _plot_error(
+    axes: Any, measured: Sequence[_Point], front: Sequence[_Point], error_of: Callable[[_Point], float]
+) -> None:
+    """Draw error against time: a line per family, the best front, and a star at the job's own settings."""
+    for i, (family, points) in enumerate(_families(measured).items()):
         points = sorted(points, key=lambda m: m.ms)
-        times, errors = [m.ms for m in points], [m.quality.rmse for m in points]
-        axes.plot(times, errors, "o-", color=_colour(family, i), label=family, markersize=4, linewidth=1, alpha=0.8)
-    front = report.front
+        label = f'indirect.method = "{family}"' if family in METHODS else family
+        axes.plot(
+            [m.ms for m in points], [error_of(m) for m in points], "s-" if family in METHODS else "o-",
+            color=_colour(family, i), label=label, markersize=4, linewidth=1, alpha=0.8,
+        )  # fmt: skip
     axes.plot(
-        [m.ms for m in front], [m.quality.rmse for m in front], "-", color="#f6ad55", linewidth=5, alpha=0.5, zorder=0,
+        [m.ms for m in front], [error_of(m) for m in front], "-", color="#f6ad55", linewidth=5, alpha=0.5, zorder=0,
         label="best front",
     )  # fmt: skip
-    own = report.measured[0]
-    axes.plot([own.ms], [own.quality.rmse], "*", color=COLOURS["job"], markersize=13, label="as the job says")
-    axes.set(xscale="log", yscale="log", xlabel="ms per image", ylabel="RMSE over the mean of the reference")
+    own = measured[0]
+    axes.plot([own.ms], [error_of(own)], "*", color=COLOURS["job"], markersize=13, label="as the job says")
+    axes.set(xscale="log", yscale="log", xlabel="ms per image")
     axes.legend(fontsize=7, ncols=2)
 
 

@@ -15,12 +15,14 @@ from framearray_cli.job.job import Job
 
 from .case import Case, open_case
 from .flip import flip_map, require_extra
-from .front import Advice, advise, best_front
+from .front import Advice, advise, best_front, model_error
 from .measure import Measured, measure, measure_single_lights
 from .offsets import Offset, measure_offsets
 from .probes import Probes, choose_probes
 from .reference import Reference, make_reference, passes_for, reference_noise
-from .settings import NamedSettings, Settings, settings_to_try
+from .settings import NamedSettings, Settings, methods_to_try, settings_to_try
+from .true_light import TrueLight, compare_methods, render_truths
+from .truth import Truth, reason_without, true_places
 
 REFERENCES = "references"
 _MARKS = (REFERENCES, "table.toml")  # what the folder of an earlier report holds, even if it was stopped
@@ -36,6 +38,7 @@ class ReportOptions:
         vary: values to try by the job file's key; `only`: no other key is changed.
         errors: each RMSE to find the cheapest settings for; if empty, the job's own, half of it and twice as much.
         times: samples of a reference over those of a picture.
+        truth: whether images are compared with true light, too.
     """
 
     cameras: Sequence[int] = ()
@@ -44,6 +47,7 @@ class ReportOptions:
     only: bool = False
     errors: Sequence[float] = ()
     times: float = TIMES
+    truth: bool = True
 
 
 class ReportEvents:
@@ -67,6 +71,7 @@ class Report:
         settings: the job's own; `measured[0]` is their cost and error.
         reference_hits: native hits per pixel of the references.
         reference_noise: RMSE of the references themselves over their mean.
+        true_light: settings and methods with respect to true light; None: `without_truth` says why there is none.
         notes: on ambient and indirect light, such as how far light from cells is from that of paths.
         example: (h, w, 3) the reference of the first probe image.
         flip, signed: (h, w) error of the job's own settings in that image: HDR-FLIP, and I - R over the mean of R.
@@ -79,7 +84,9 @@ class Report:
     measured: tuple[Measured, ...]
     front: tuple[Measured, ...]
     offsets: tuple[Offset, ...]
-    advice: tuple[Advice, ...]
+    advice: tuple[Advice[Measured], ...]
+    true_light: TrueLight | None
+    without_truth: str
     reference_hits: int
     reference_noise: float
     notes: tuple[str, ...]
@@ -120,16 +127,21 @@ def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEv
         n_cameras = 1 if still else case.setup.n_frames
         tried = settings_to_try(case.settings, n_cameras, options.vary, only=options.only)
         frames = [c for run in chosen.cameras for c in run]
-        events.planned(len(frames), len(tried))
+        without = reason_without(job) if options.truth else "Nothing is compared with true light: --no-truth."
+        methods = {} if without else methods_to_try(case.settings, options.vary, only=options.only)
+        n_true = 0 if without else len(true_places(chosen)[0])
+        events.planned(len(frames) + n_true, len(tried) + sum(len(some) for some in methods.values()))
         passes = passes_for(options.times, case.settings.window_hits)
         references: dict[int, Reference] = {}
         for c in frames:
             references[c] = make_reference(case, c, chosen.lights, folder / REFERENCES, passes)
             events.done()
+        truths = {} if without else render_truths(case, chosen, folder / REFERENCES, events.done)
         measured: list[Measured] = []
         for named in tried:
-            measured.append(_measure_one(case, named, chosen, references, measured))
+            measured.append(_measure_one(case, named, chosen, references, truths, measured))
             events.done()
+        true_light = compare_methods(case, measured, methods, chosen, truths, options.errors, events.done)
         first, own = references[frames[0]], measured[0]
         right = first.image(0, case.ambient.intensity[chosen.lights[0]])
         wanted = options.errors or [share * own.quality.rmse for share in (2.0, 1.0, 0.5)]
@@ -139,9 +151,11 @@ def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEv
             settings=case.settings,
             probes=chosen,
             measured=tuple(measured),
-            front=tuple(best_front(measured)),
+            front=tuple(best_front(measured, model_error)),
             offsets=tuple(measure_offsets(case, frames[0], chosen.lights, first)),
-            advice=tuple(advise(measured, wanted)),
+            advice=tuple(advise(measured, wanted, model_error)),
+            true_light=true_light,
+            without_truth=without or ("" if true_light else "Nothing is compared with true light, which is black."),
             reference_hits=2 * first.hits,
             reference_noise=reference_noise(list(references.values()), case, chosen.lights),
             notes=case.ambient.notes,
@@ -152,12 +166,13 @@ def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEv
 
 
 def _measure_one(
-    case: Case, named: NamedSettings, chosen: Probes, references: dict[int, Reference], others: Sequence[Measured]
-) -> Measured:
+    case: Case, named: NamedSettings, chosen: Probes, references: dict[int, Reference], truths: dict[int, Truth],
+    others: Sequence[Measured],
+) -> Measured:  # fmt: skip
     """Measure some settings; `others` were measured before, with reuse among lights before without it."""
     cameras, lights = chosen.cameras, chosen.lights
     if not named.settings.one_light:
-        return measure(case, named, cameras, lights, chosen.light_pairs, references)
+        return measure(case, named, cameras, lights, chosen.light_pairs, references, truths)
     shared = replace(named.settings, one_light=False)
     twin = next(other for other in others if other.named.settings == shared)
     return measure_single_lights(case, named, cameras, lights, twin)

@@ -6,7 +6,7 @@ A setting is one line of a job file; the names of `Settings` are those of its ke
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from importlib.util import find_spec
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.table import changed
@@ -23,11 +23,22 @@ KEYS = {
     "samples.shadow_step": "shadow_step",
     "samples.shadow_unbiased": "shadow_unbiased",
     "denoise.obscurance": "denoise",
+    "indirect.method": "indirect",
 }
 # Keys in place of `samples.hits`; measured settings always give a number of hits.
 TARGET = (("samples", "error"), ("samples", "most_hits"))
+# Keys that other ways to find indirect light do not have, see `IndirectTable`.
+OWN_KEYS = {
+    "obscurance": ("cell", "samples", "filter", "exact"),
+    "local": ("filter", "exact"),
+    "cells": (),
+}
+METHOD_KEY = "indirect.method"
 # The fewest hits per pixel and frame that a job may have.
 FEWEST_HITS = 1 / 8
+
+
+Method: TypeAlias = Literal["obscurance", "local", "cells"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,6 +56,7 @@ class Settings:
     shadow_step: int
     shadow_unbiased: bool
     denoise: bool
+    indirect: Method = "obscurance"
     one_light: bool = False
 
     @staticmethod
@@ -72,7 +84,12 @@ class Settings:
         for table, values in tables.items():
             old = getattr(job, table)
             # the keys of the job file, and these; validation sets defaults that depend on other keys again
-            said = {name: getattr(old, name) for name in old.model_fields_set if (table, name) not in TARGET}
+            dropped = OWN_KEYS[self.indirect] if table == "indirect" else ()
+            said = {
+                name: getattr(old, name)
+                for name in old.model_fields_set
+                if (table, name) not in TARGET and name not in dropped
+            }
             updates[table] = type(old).model_validate({**said, **values})
         return changed(job, **updates)
 
@@ -100,6 +117,7 @@ class NamedSettings:
     settings: Settings
 
 
+METHODS: tuple[Method, ...] = ("obscurance", "local", "cells")
 LIGHT_REUSE, SCRATCH = "light reuse only", "from scratch"
 
 
@@ -122,10 +140,10 @@ def settings_to_try(
         "samples.hits": (0.5, 1, 2, 4, 8),
         "samples.obscurance": (1, 2, 5, 10, 20),
         "samples.shadow_step": (1, 2, 4, 8),
-        "denoise.obscurance": (False, True) if find_spec("pyoidn") else (False,),
+        "denoise.obscurance": (False, True) if find_spec("pyoidn") and base.indirect == "obscurance" else (False,),
     }
     for key, values in (vary if only else {**default_values, **vary}).items():
-        for value in values:
+        for value in values if key != METHOD_KEY else ():
             changed = replace(base, **{KEYS[key]: value})
             if changed.n_r <= longest and changed != base:
                 found.append(NamedSettings(name=f"{KEYS[key]} {_format_value(value)}", family=key, settings=changed))
@@ -134,6 +152,29 @@ def settings_to_try(
             wide = replace(base, hits=hits, n_r=n_r)
             found.append(NamedSettings(name=f"hits {hits:g}, n_r {n_r}", family="hits for n_r", settings=wide))
     return [*found, *baselines(base)]
+
+
+def methods_to_try(
+    base: Settings, vary: Mapping[str, Sequence[Any]], *, only: bool = False
+) -> dict[Method, list[NamedSettings]]:
+    """List settings with other ways to find indirect light, by method: with half, as many and twice the hits.
+
+    What they come near is the true light, and not the reference of the job's own way.
+    """
+    wanted = vary.get(METHOD_KEY, () if only else METHODS)
+    found: dict[Method, list[NamedSettings]] = {}
+    for method in [one for one in METHODS if one in wanted and one != base.indirect]:
+        same = replace(base, indirect=method, denoise=base.denoise and method == "obscurance")
+        counts = [hits for hits in (base.hits / 2, base.hits, 2 * base.hits) if hits >= FEWEST_HITS]
+        found[method] = [
+            NamedSettings(
+                name=method if hits == base.hits else f"{method}, hits {hits:g}",
+                family=method,
+                settings=replace(same, hits=hits),
+            )
+            for hits in counts
+        ]
+    return found
 
 
 def baselines(base: Settings) -> list[NamedSettings]:

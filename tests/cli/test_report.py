@@ -23,7 +23,10 @@ SMALL = {
     "reuse": {"n_r": 1},
     "samples": {"hits": 1, "obscurance": 2},
 }
-FEW = ("--vary", "samples.hits=2", "--vary", "samples.obscurance=4", "--vary", "samples.shadow_step=2", "--times", "20")
+FEW = (
+    "--vary", "samples.hits=2", "--vary", "samples.obscurance=4", "--vary", "samples.shadow_step=2", "--times", "20",
+    "--no-truth",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +39,10 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def report(capsys: pytest.CaptureFixture[str], folder: Path, *options: str) -> Result:
     return run(capsys, "report", folder / "job.toml", *options)
+
+
+def read_truth(place: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader((place / "truth.csv").read_text(encoding="utf-8").splitlines()))
 
 
 def read_rows(place: Path) -> list[dict[str, str]]:
@@ -63,6 +70,7 @@ def test_a_report_has_all_its_parts(made: Path, capsys: pytest.CaptureFixture[st
     assert [offset["offset"] for offset in table["offsets"]] == [-1, 0, 1]
     assert table["offsets"][1]["accepted"] == pytest.approx(1.0)  # every eye sees its own hits
     assert 0 < table["offsets"][0]["accepted"] < 1
+    assert not (place / "truth.csv").exists() and "true light: --no-truth" in page and "--no-truth" in result.out
     by_name = {row["name"]: float(row["rmse"]) for row in rows}
     assert by_name["hits 2"] < by_name["as the job says"] < by_name["n_r 0"]
     assert by_name["from scratch, 3 hits"] == pytest.approx(by_name["light reuse only, 3 hits"], rel=1e-6)
@@ -84,7 +92,48 @@ def test_a_document(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert [one["rmse"] for one in result["settings"]] == pytest.approx([float(row["rmse"]) for row in rows])
     assert [one["best"] for one in result["settings"]] == [row["on_the_front"] == "True" for row in rows]
     assert result["settings"][0]["lines"] == [] != result["settings"][1]["lines"]
+    assert result["true_light"] is None
     assert result["advice"] == [{"error": 1e-6, "settings": None}] and Path(result["page"]).is_file()
+
+
+def test_true_light(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Methods stand beside the job's own; the first plot and the first advice are with respect to true light."""
+    cells = {"method": "cells", "samples": 4096}
+    write_job(tmp_path, **(SMALL | {"indirect": cells, "light": {"frames": 1, "sources": [tiny.SUN]}}))
+    result = report(capsys, tmp_path, "--vary", "samples.hits=2", "--only", "--camera", "2", "--times", "2")
+    place = tmp_path / "out-report"
+    assert "with respect to true light" in result.out
+    assert len(list((place / "references").glob("truth-*.npz"))) == 1
+    assert [row["name"] for row in read_truth(place)] == [row["name"] for row in read_rows(place)]  # --only
+    options = ("--vary", "indirect.method=obscurance,cells", "--only", "--camera", "2", "--times", "2")
+    kept = {file: file.stat().st_mtime_ns for file in (place / "references").iterdir()}
+    found = json.loads(report(capsys, tmp_path, *options, "--error", "2", "--json").out)
+    assert {file: file.stat().st_mtime_ns for file in (place / "references").iterdir()} == kept
+    jsonschema.Draft202012Validator(document.results_schema()).validate(found)
+    rows, truth = read_truth(place), found["result"]["true_light"]
+    assert [row["name"] for row in rows][-3:] == ["obscurance, hits 0.5", "obscurance", "obscurance, hits 2"]
+    assert [one["rmse"] for one in truth["settings"]] == pytest.approx([float(row["rmse"]) for row in rows])
+    by_name = {row["name"]: float(row["rmse_of_squares"]) for row in rows}
+    assert by_name["as the job says"] < by_name["obscurance"]
+    assert [one["error"] for one in truth["advice"]] == [2.0] and truth["advice"][0]["settings"]["rmse"] < 2.04
+    assert truth["settings"][-2]["lines"] == ["[indirect]", 'method = "obscurance"']
+    page = (place / "index.html").read_text()
+    files = re.findall(r'(?:src|href)="([^"]+)"', page)
+    assert all((place / name).is_file() for name in files) and "truth.csv" in files
+    plots = [name for name in files if name.endswith(".svg")]
+    assert plots[:2] == ["true-light-and-time.svg", "error-and-time.svg"]
+    table = tomllib.loads((place / "table.toml").read_text())["truth"]
+    assert (table["cameras"], table["lights"]) == ([2], [0]) and table["reference"]["rmse"] > 0
+
+
+def test_a_job_without_true_light(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    job = write_job(tmp_path, **SMALL)
+    job.write_text(job.read_text().replace("paths = 512", "intensity = [0.1, 0.1, 0.1]"))
+    result = report(capsys, tmp_path, *FEW[:2], "--only", "--camera", "2", "--light", "0", "--times", "2")
+    assert result.code == 0 and "Nothing is compared with true light, because the job fixes" in result.out
+    place = tmp_path / "out-report"
+    assert "ambient.intensity" in (place / "index.html").read_text() and not (place / "truth.csv").exists()
+    assert "truth" not in tomllib.loads((place / "table.toml").read_text())
 
 
 def test_advice_is_for_the_errors_that_were_asked_for(made: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,7 +10,7 @@ from support import tiny
 from framearray_cli.base.errors import JobError, MissingExtraError
 from framearray_cli.report import flip, read_vary
 from framearray_cli.report.crops import _heat_map, _signed_map, _worst_crop
-from framearray_cli.report.front import advise, best_front, times_faster
+from framearray_cli.report.front import advise, best_front, model_error, times_faster
 from framearray_cli.report.measure import Measured
 from framearray_cli.report.probes import choose_probes
 from framearray_cli.report.quality import Quality, mean_quality
@@ -144,12 +144,12 @@ def test_probes_that_the_user_chooses() -> None:
 
 def test_no_settings_beat_the_front() -> None:
     points = [result("a", 2, 0.1), result("b", 1, 0.2), result("c", 3, 0.15), result("d", 4, 0.05), result("e", 2, 0.3)]
-    assert [one.named.name for one in best_front(points)] == ["b", "a", "d"]
+    assert [one.named.name for one in best_front(points, model_error)] == ["b", "a", "d"]
 
 
 def test_advice_is_the_cheapest_of_those_good_enough() -> None:
     points = [result("a", 2, 0.1), result("b", 1, 0.2), result("d", 4, 0.05), result("s", 0.1, 0.05, SCRATCH)]
-    found = advise(points, [0.2, 0.1, 0.0995, 0.06, 0.01])
+    found = advise(points, [0.2, 0.1, 0.0995, 0.06, 0.01], model_error)
     assert [one.best and one.best.named.name for one in found] == ["b", "a", "a", "d", None]
 
 

@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from framearray_cli.report.front import Advice
     from framearray_cli.report.measure import Measured
     from framearray_cli.report.run import Report
+    from framearray_cli.report.true_light import TrueLight, TrueMeasured
 
-    from ..report_result import AdvisedSettings, MeasuredSettings, ReportResult
+    from ..report_result import AdvisedSettings, MeasuredSettings, ReportResult, TrueLightResult, TrueSettings
 
 Folder = Annotated[
     Path | None,
@@ -58,6 +59,8 @@ Times = Annotated[
     typer.Option("--times", parser=number(1), help="Samples of a reference over those of a picture.", metavar="N"),
 ]
 
+Truth = Annotated[bool, typer.Option("--truth/--no-truth", help="Compare with true light, too.")]
+
 
 def report(
     job_file: JobFile,
@@ -68,6 +71,7 @@ def report(
     only: Only = False,
     error: Errors = None,
     times: Times = 100.0,
+    truth: Truth = True,
     threads: Threads = None,
     quiet: Quiet = False,
     json: Json = False,
@@ -98,6 +102,7 @@ def report(
             only=only,
             errors=error or (),
             times=times,
+            truth=truth,
         )
         beside = job.output.directory.with_name(f"{job.output.directory.name}-report")
         with screen.compiling():
@@ -117,11 +122,18 @@ def report_lines(made: "Report") -> list[str]:
     """Sum up a report: the job's own settings, and the cheapest ones for some errors."""
     from framearray_cli.report import advice_lines
 
-    own = made.measured[0]
-    lines = [f"as the job says: {own.ms:.3g} ms per image before writing, RMSE {own.quality.rmse:.1%}"]
-    for one in made.advice:
+    own, true_light = made.measured[0], made.true_light
+    true_error = f", {own.truth.rmse:.1%} with respect to true light" if true_light and own.truth else ""
+    lines = [f"as the job says: {own.ms:.3g} ms per image before writing, RMSE {own.quality.rmse:.1%}{true_error}"]
+    advice: list[tuple[Advice[Measured] | Advice[TrueMeasured], str]] = [(one, "") for one in made.advice]
+    if true_light:
+        advice = [(one, " with respect to true light") for one in true_light.advice] + advice
+    else:
+        lines.append(made.without_truth)
+    for one, to_what in advice:
         found = f"{one.best.named.name}, {one.best.ms:.3g} ms per image" if one.best else "nothing that was tried"
-        lines += [f"for an RMSE of {one.error:.1%}: {found}", *(f"  {line}" for line in advice_lines(one.best, made))]
+        lines.append(f"for an RMSE of {one.error:.1%}{to_what}: {found}")
+        lines += [f"  {line}" for line in advice_lines(one.best, made)]
     return [*lines, f"report: {made.folder / 'index.html'}"]
 
 
@@ -138,6 +150,40 @@ def report_result(made: "Report") -> "ReportResult":
         reference_error=float(made.reference_noise),
         settings=tuple(_settings(one, made) for one in made.measured),
         advice=tuple(_advised(one, made) for one in made.advice),
+        true_light=_true_light(made.true_light, made) if made.true_light else None,
+    )
+
+
+def _true_light(found: "TrueLight", made: "Report") -> "TrueLightResult":
+    from ..report_result import TrueAdvice, TrueLightResult
+
+    return TrueLightResult(
+        cameras=tuple(int(c) for c in found.cameras),
+        lights=tuple(int(l) for l in found.lights),
+        hits=found.hits,
+        noise=found.noise,
+        settings=tuple(_true_settings(one, made) for one in found.measured),
+        advice=tuple(
+            TrueAdvice(error=one.error, settings=_true_settings(one.best, made) if one.best else None)
+            for one in found.advice
+        ),
+    )
+
+
+def _true_settings(one: "TrueMeasured", made: "Report") -> "TrueSettings":
+    from framearray_cli.report.true_light import truth_of
+
+    from ..report_result import TrueSettings
+
+    error = truth_of(one)
+    return TrueSettings(
+        name=one.named.name,
+        lines=tuple(one.named.settings.lines(made.settings)),
+        ms=float(one.ms),
+        rmse=error.rmse,
+        rmse_error=error.rmse_error,
+        rmse_of_squares=error.coarse,
+        mean_off=error.mean_off,
     )
 
 
@@ -157,7 +203,7 @@ def _settings(one: "Measured", made: "Report") -> "MeasuredSettings":
     )
 
 
-def _advised(one: "Advice", made: "Report") -> "AdvisedSettings":
+def _advised(one: "Advice[Measured]", made: "Report") -> "AdvisedSettings":
     from ..report_result import AdvisedSettings
 
     return AdvisedSettings(error=one.error, settings=_settings(one.best, made) if one.best else None)

@@ -16,7 +16,7 @@ from bench.speed.speed import log
 from framearray_cli.report import ReportOptions, make_report, write_report
 from framearray_cli.report.crops import draw_crops
 
-PLOTS = ("error-and-time", "bias-and-noise", "by-offset", "flicker")
+PLOTS = ("true-light-and-time", "error-and-time", "bias-and-noise", "by-offset", "flicker")
 QUALITY = 88  # of the crops' JPG
 
 PAGE = """
@@ -28,7 +28,7 @@ The cost and the error of each setting of a job: the report of `framearray repor
 {reference_noise}. RMSE relative to the mean of the reference; ms per image before writing, of all
 {n_lights} light positions. Machine: {machine}.
 
-{summary}
+{truth}{summary}
 
 ![Error against time](../plots/report-{name}-error-and-time.svg)
 
@@ -88,15 +88,44 @@ def write(name: str) -> None:
         machine="{processor}, {cores} cores".format(**about["machine"]),
         reference_hits=table["reference"]["hits"],
         reference_noise=percent(table["reference"]["rmse"], 2),
+        truth=true_light(table, name),
         summary=summary(table),
         captions="; ".join(kept["captions"]),
         table=rows(table),
         advice=advice(table),
-        more="".join(f"\n![{plot}](../plots/report-{name}-{plot}.svg)\n" for plot in plots[2:]),
+        more="".join(f"\n![{plot}](../plots/report-{name}-{plot}.svg)\n" for plot in plots if plot in PLOTS[3:]),
     )
     page = DOCS.pages / f"report-{name}.md"
     page.write_text(words.rstrip() + "\n", encoding="utf-8")
     log(str(page))
+
+
+def true_light(table: Table, name: str) -> str:
+    """The plot of errors with respect to true light, and how near each method comes; empty without."""
+    truth = table.get("truth")
+    if truth is None:
+        return ""
+    own = table["settings"][0]["indirect"]
+    shown = [row for row in truth["settings"] if row["name"] == table["settings"][0]["name"] or row["indirect"] != own]
+    head = ("", "ms", "RMSE", "of 4 x 4 means", "mean off")
+    found = grid(
+        head,
+        [
+            [
+                row["name"],
+                number(row["ms"]),
+                percent(row["rmse"]),
+                percent(row["rmse_of_squares"]),
+                percent(row["mean_off"]),
+            ]
+            for row in shown
+        ],
+    )
+    return (
+        f"![Error with respect to true light against time](../plots/report-{name}-true-light-and-time.svg)\n\n"
+        f"*With respect to true light, by paths of the program's own: {len(truth['cameras'])} cameras under "
+        f"{len(truth['lights'])} light positions, {truth['reference']['hits']} hits per pixel.*\n\n{found}\n\n"
+    )
 
 
 def summary(table: Table) -> str:
