@@ -19,6 +19,7 @@ from bench.speed.speed import log
 from framearray_cli.base.arrays import Float32, Float64, Image
 from framearray_cli.engine.inputs.lights import DIRECTIONAL
 from framearray_cli.render.prepare import Prepared
+from framearray_cli.scene.paths.placing import LightPath
 from framearray_cli.scene.scene import Scene
 
 from .scenes import Probe, probe_named, resized
@@ -210,6 +211,8 @@ def scene_of(mi: Any, prepared: Prepared, probe: Probe, sky: bool) -> Any:
             table[f"light{s}"] = {
                 "type": "directional", "direction": source.vector[probe.l].tolist(), "irradiance": power
             }  # fmt: skip
+        elif source.panel is not None:
+            table |= _panel(mi, f"light{s}", source, probe.l, eye)
         else:
             position = (source.vector[probe.l] - eye).tolist()
             table[f"light{s}"] = {"type": "point", "position": position, "intensity": power}
@@ -217,6 +220,34 @@ def scene_of(mi: Any, prepared: Prepared, probe: Probe, sky: bool) -> Any:
     if sky and max(background) > 0:
         table["sky"] = {"type": "constant", "radiance": {"type": "rgb", "value": list(background)}}
     return mi.load_dict(table)
+
+
+def _panel(mi: Any, name: str, source: LightPath, l: int, eye: Float64) -> dict[str, Any]:
+    """The bright sides of a rectangle or disc, which let the rays of eyes through; see `_past_panels`."""
+    panel = source.panel
+    assert panel is not None
+    (a, b), axis = (axes[l] for axes in panel.half_axes), panel.axis[l]
+    radiance = {"type": "rgb", "value": (source.intensity[l] / panel.area[l]).tolist()}
+    sides = {}
+    for side in (1, -1) if panel.two_sided else (1,):
+        matrix = np.eye(4)
+        matrix[:3] = np.stack([side * a, b, side * axis, source.vector[l] - eye], axis=1)
+        sides[f"{name}{'-front' if side > 0 else '-back'}"] = {
+            "type": "disk" if panel.round else "rectangle",
+            "to_world": mi.ScalarTransform4f(matrix.tolist()),
+            "bsdf": {"type": "null"},
+            "emitter": {"type": "area", "radiance": radiance},
+        }
+    return sides
+
+
+def _past_panels(scene: Any, ray: Any, active: Any, panels: int) -> Any:
+    """What a ray meets first but for panels."""
+    hit = scene.ray_intersect(ray, active)
+    for _ in range(panels):
+        ray.o[hit.emitter(scene) != None] = hit.spawn_ray(ray.d).o  # noqa: E711  # of arrays
+        hit = scene.ray_intersect(ray, active)
+    return hit
 
 
 def _mesh(mi: Any, scene: Scene, m: int, origin: Float64) -> Any:
@@ -281,10 +312,11 @@ def _light(mi: Any, scene: Any, sensor: Any, prepared: Prepared, samples: int, s
     ray, _ = sensor.sample_ray(0.0, 0.0, place, mi.Point2f(0.5, 0.5))
     context, background = mi.BSDFContext(), mi.Color3f(list(prepared.job.scene.background))
     found, through, active = mi.Color3f(0), mi.Color3f(1), mi.Bool(True)
+    panels = sum(1 + source.panel.two_sided for source in prepared.lights.sources if source.panel is not None)
     depth = prepared.job.specular.depth if prepared.scene.has_mirrors else 0
     # no `minimum` and no roulette: older LLVMs cannot compile them
     for bounce in range(depth + 1):
-        hit = scene.ray_intersect(ray, active)
+        hit = _past_panels(scene, ray, active, panels)
         found += dr.select(active & ~hit.is_valid(), through * background, 0)
         active &= hit.is_valid()
         bsdf = hit.bsdf(ray)
