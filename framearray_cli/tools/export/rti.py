@@ -71,7 +71,7 @@ def write_lights(folder: Path, selection: Selection, files: Mapping[str, str]) -
 def to_light(manifest: Manifest, sources: list[dict[str, Any]]) -> Float64:
     """Return the unit direction to the one source of a picture, (3,), in the scene.
 
-    That to a point begins where the camera looks first, as in the job; without that at the origin.
+    That to a point begins in the middle of the lights, see `middle`.
     """
     (source,) = [source for source in sources if _vector_key(source)]
     if "direction" in source:
@@ -83,9 +83,15 @@ def to_light(manifest: Manifest, sources: list[dict[str, Any]]) -> Float64:
 
 
 def middle(manifest: Manifest) -> Float64:
-    """Return the point that the first camera key looks at, (3,)."""
+    """Return the middle of the lights, (3,).
+
+    That is the target of a dome or the centre of positions from a file, as the job has it; else the point that the
+    first camera key looks at.
+    """
+    sources = manifest.job.get("light", {}).get("sources") or [{}]
+    own = sources[0].get("target" if sources[0].get("type") == "dome" else "center") if len(sources) == 1 else None
     keys = manifest.job.get("camera", {}).get("keys") or [{}]
-    return np.asarray(keys[0].get("target", (0.0, 0.0, 0.0)), np.float64)
+    return np.asarray(own or keys[0].get("target") or (0.0, 0.0, 0.0), np.float64)
 
 
 def _vector_key(source: Mapping[str, Any]) -> str:
