@@ -10,7 +10,7 @@ from typing import Any
 
 from .camera import CameraKey
 from .keys import MOST_EYES
-from .rowfile import PlacedRow, RowFileError, csv_lines, load_json, read_text, refuse_frames, row_problems
+from .rowfile import PlacedRow, RowFileError, columns_text, csv_lines, load_json, read_text, refuse_frames, row_problems
 
 EYE_COLUMNS = ("eye_x", "eye_y", "eye_z")
 TARGET_COLUMNS = ("target_x", "target_y", "target_z")
@@ -44,9 +44,7 @@ def _csv_rows(text: str) -> list[PlacedRow]:
     with_up = any(name in header for name in UP_COLUMNS)
     wanted = EYE_COLUMNS + TARGET_COLUMNS + (UP_COLUMNS if with_up else ())
     if sorted(header) != sorted(wanted):
-        raise RowFileError(
-            f"row 1: expected the column names {', '.join(wanted)}, got {', '.join(header)[:200] or 'none'}"
-        )
+        raise RowFileError(f"row 1: expected the column names {', '.join(wanted)}, got {columns_text(header)}")
     rows = []
     for place, cells in lines:
         row = {"eye": [cells[name] for name in EYE_COLUMNS], "target": [cells[name] for name in TARGET_COLUMNS]}

@@ -22,6 +22,7 @@ from .rowfile import (
     PlacedRow,
     RowFileError,
     cell_value,
+    columns_text,
     csv_lines,
     load_json,
     read_data,
@@ -95,7 +96,7 @@ def _csv_rows(text: str, vector: str, strength: str, size: str) -> list[PlacedRo
     wanted = [name for columns in found.values() for name in columns] + single
     if sorted(header) != sorted(wanted) or (AT in found) == (vector in found):
         known = f"x, y, z or {', '.join(names[vector])}, and {strength} or {', '.join(names[strength])} where wanted"
-        raise RowFileError(f"row 1: expected the column names {known}, got {', '.join(header)[:200] or 'none'}")
+        raise RowFileError(f"row 1: expected the column names {known}, got {columns_text(header)}")
     rows = []
     for place, cells in lines:
         row: dict[str, Any] = {key: [cells[name] for name in columns] for key, columns in found.items()}

@@ -2,7 +2,7 @@
 
 import csv
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -11,9 +11,11 @@ from pydantic import ValidationError
 from framearray_cli.base.files import read_at_most
 from framearray_cli.base.forms.problems import append_count, problems_of
 from framearray_cli.base.forms.table import Table
+from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import counted
 
 LARGEST_ROW_FILE = 64 * 1024 * 1024  # bytes; MOST_EYES rows of nine long numbers are 20 MB
+LONGEST_HEADER = 200  # characters of column names that a message shows
 MOST_ROW_PROBLEMS = 10  # a column that is wrong is wrong in every row
 
 PlacedRow: TypeAlias = tuple[str, dict[str, Any]]  # "row 3" or "entry 3", and the table of a key without its frame
@@ -44,20 +46,31 @@ def read_text(path: Path) -> str:
         raise RowFileError("expected UTF-8 text, got another encoding; save the file as UTF-8") from error
 
 
-def csv_lines(text: str) -> tuple[list[str], list[tuple[str, dict[str, Any]]]]:
-    """Read a CSV file: the names of its columns, in small letters, and place and cells of each row by these names."""
+def csv_lines(text: str) -> tuple[list[str], Iterator[tuple[str, dict[str, Any]]]]:
+    """Read a CSV file: the names of its columns, in small letters, and place and cells of each row by these names.
+
+    Rows are checked as they are taken, so a caller that checks the names first reports wrong ones as such.
+    """
     try:
         reader = csv.reader(text.splitlines(), strict=True)
         lines = [(f"row {reader.line_num}", line) for line in reader if line]
     except csv.Error as error:
         raise RowFileError(f"not valid CSV: {error}") from error
     header = [name.strip().lower() for name in lines[0][1]] if lines else []
-    rows = []
-    for place, line in lines[1:]:
+    return header, _cells(header, lines[1:])
+
+
+def _cells(header: Sequence[str], lines: Sequence[tuple[str, Sequence[str]]]) -> Iterator[tuple[str, dict[str, Any]]]:
+    for place, line in lines:
         if len(line) != len(header):
             raise RowFileError(f"{place}: expected {counted(len(header), 'cell')}, got {len(line)}")
-        rows.append((place, dict(zip(header, map(cell_value, line), strict=True))))
-    return header, rows
+        yield place, dict(zip(header, map(cell_value, line), strict=True))
+
+
+def columns_text(header: Sequence[str]) -> str:
+    """Write the names of the columns of a file, shortened, for messages."""
+    text = ", ".join(header)
+    return shown(text) if not text.isprintable() or len(text) > LONGEST_HEADER else text or "none"
 
 
 def cell_value(cell: str) -> float | str:
