@@ -78,6 +78,7 @@ def lit(*sources: dict[str, Any], frames: int | None = None) -> dict[str, Any]:
     return {"frames": frames or max(source["keys"][-1]["frame"] for source in sources) + 1, "sources": list(sources)}
 
 
+PANEL = {"frame": 0, "power": 50.0, "radius": 0.5}
 EYE, TARGET = (1.5, 1.5, 1.7), (0.0, 0.8, -1.0)
 GOOD_LAMP = (-0.8, 2.2, 0.4), (0.8, 2.2, 0.4), (0.9, 2.0, -0.5)
 GOOD: dict[str, Any] = {
@@ -214,6 +215,11 @@ CASES = {
     ),
     "a lamp behind a wall": case(
         "surfaces hide the lamp at", scene={"wall": True}, light=lit(lamp((0, 2, -0.5), (0, 2, -1)))
+    ),
+    "a panel that faces a wall": case(
+        "light.sources[0] reaches nothing",
+        "shines past all that is seen, or surfaces hide it; turn it or move it",
+        light=lit({"type": "disc", "keys": [PANEL | {"position": [0, 1.5, 1.9], "direction": [0, 0, 1]}]}),
     ),
     "one lamp of two": case(
         "light.sources[1] reaches nothing", light=lit(lamp(*GOOD_LAMP), lamp((0, 0.5, -0.7), (0, 0.5, -0.8)))

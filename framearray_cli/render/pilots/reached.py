@@ -103,4 +103,6 @@ def _reason(setup: FrameSetup, prepared: Prepared, s: int, plane: int) -> str:
         )
     if _is_buried(setup, prepared, s, plane):
         return f"the lamp at {vector(values)} is inside a solid; move it into the open"
+    if prepared.lights.sources[s].shines_one_way:
+        return f"the lamp at {vector(values)} shines past all that is seen, or surfaces hide it; turn it or move it"
     return f"surfaces hide the lamp at {vector(values)} from all that is seen; move it to where the eyes are"

@@ -66,6 +66,11 @@ class LightPath:
     profile: Profile | None = None
     notes: tuple[dict[str, Any], ...] = ()
 
+    @property
+    def shines_one_way(self) -> bool:
+        """Whether it is a spot, or a panel with one bright side."""
+        return self.cone is not None or (self.panel is not None and not self.panel.two_sided)
+
     def table(self, l: int) -> dict[str, Any]:
         """Describe the source at position l as the manifest does."""
         vector, strength, size = _MANIFEST_KEYS[self.kind]

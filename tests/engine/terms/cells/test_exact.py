@@ -14,7 +14,12 @@ from framearray_cli.engine.terms.cells import exact
 EXACT = {"method": "cells", "exact": True}
 SKY = {"scene": {"background": [0.3, 0.4, 0.5]}}
 LAMP = tiny.TABLE["light"]["sources"][0]
-JOBS: dict[str, dict[str, Any]] = {"one colour of light": SKY, "three": {"light": {"sources": [LAMP, tiny.RED]}}}
+PANEL = {"frame": 0, "position": [-0.5, 1.9, 0], "target": [0, 0, 0], "power": 30.0, "width": 0.5, "height": 0.2}
+JOBS: dict[str, dict[str, Any]] = {
+    "one colour of light": SKY,
+    "three": {"light": {"sources": [LAMP, tiny.RED]}},
+    "a panel": {"light": {"sources": [LAMP, {"type": "rect", "keys": [PANEL]}]}},
+}
 
 
 def mean_of(image: Any) -> Any:
@@ -22,7 +27,7 @@ def mean_of(image: Any) -> Any:
     return image.mean(axis=(-3, -2, -1))
 
 
-@pytest.mark.parametrize("name", JOBS)
+@pytest.mark.parametrize("name", [*list(JOBS)[:2], pytest.param("a panel", marks=pytest.mark.slow)])
 def test_images_are_those_of_paths(name: str) -> None:
     inputs = [
         tiny.prepared(tiny.job(**JOBS[name], indirect=EXACT, samples={"hits": 16, "obscurance": 8}, seed=seed))
