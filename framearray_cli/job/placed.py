@@ -1,14 +1,16 @@
 """Points and directional sources, along key frames or from a file."""
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 
-from framearray_cli.base.forms.table import Table, default_text, fail
+from framearray_cli.base.forms.table import Place, Table, default_text, fail
 from framearray_cli.base.units import FARTHEST
 
 from .keys import MOST_EYES, key_problems
 from .sourcetable import SourceTable
+from .units import IES, LAMP_UNITS, SKY_UNITS, LampUnits, SkyUnits
 from .values import Colour, Direction, Emission, FileName, Point
 
 STRENGTHS = {"point": "intensity", "directional": "irradiance"}  # key of the strength of sources with a file
@@ -28,12 +30,20 @@ Radius: TypeAlias = Annotated[float, Field(ge=0, le=FARTHEST)]
 Angle: TypeAlias = Annotated[float, Field(ge=0, le=WIDEST)]
 
 
+_UP = "Only with `ies`: direction of horizontal angle 0 of the file, as far as the lamp's own direction allows."
+
+
 class PointKey(Table):
     """A point source at one light frame."""
 
     frame: int = Field(ge=0, lt=MOST_EYES, description="Number of the light position, counted from 0.")
     position: Point = Field(description="Position, in the coordinates of the scene file.")
-    intensity: Emission = Field(description="Radiant intensity, W/sr; one number means white.")
+    intensity: Emission | None = Field(
+        default=None,
+        description="Radiant intensity, W/sr unless `units` says otherwise; one number means white. With `ies` it is "
+        "the largest, and may be left out at every key.",
+        json_schema_extra=default_text("none; with `ies` that of the file"),
+    )
     color: Colour | None = Field(
         default=None,
         description="Multiplies `intensity` by channel; a temperature stands for the colour of a black body, of "
@@ -43,6 +53,11 @@ class PointKey(Table):
     radius: Radius | None = Field(
         default=None, description=_RADIUS + _AT_EVERY_KEY, json_schema_extra=default_text("0")
     )
+    up: Direction | None = Field(
+        default=None,
+        description=_UP + _AT_EVERY_KEY,
+        json_schema_extra=default_text("level at first, or x; the lamp moves without turning"),
+    )
 
 
 class DirectionalKey(Table):
@@ -51,7 +66,8 @@ class DirectionalKey(Table):
     frame: int = Field(ge=0, lt=MOST_EYES, description="Number of the light position, counted from 0.")
     direction: Direction = Field(description="The way the light travels: from the sun to the scene. Any length.")
     irradiance: Emission = Field(
-        description="Irradiance of a surface that faces the light, W/m2; one number means white."
+        description="Irradiance of a surface that faces the light, W/m2 unless `units` says otherwise; one number "
+        "means white."
     )
     color: Colour | None = Field(
         default=None,
@@ -64,7 +80,7 @@ class DirectionalKey(Table):
 
 def _consistent_light_keys(keys: Any) -> Any:
     """Check the keys of one source against each other."""
-    if problems := key_problems(keys, "direction", "color", *SIZES.values()):
+    if problems := key_problems(keys, "direction", "color", "intensity", "up", *SIZES.values()):
         fail(problems)
     return keys
 
@@ -77,6 +93,17 @@ def _one_of_both(keys: Any, info: ValidationInfo) -> Any:
     if not keys and not has_file and "file" in info.data:
         fail([((), "expected a list of tables, at least 1, got 0; give `keys` or `file`")])
     return keys
+
+
+def profile_problems(keys: Sequence[PointKey], *, has_profile: bool) -> list[tuple[Place, str]]:
+    """Check that lamps without a measured profile have all that it would say, and nothing that turns it."""
+    if has_profile:
+        return []
+    wanted = "missing; expected a number or 3 numbers of at least 0"
+    problems = [(("keys", k, "intensity"), wanted) for k, key in enumerate(keys) if key.intensity is None]
+    turned = next((k for k, key in enumerate(keys) if key.up is not None), None)
+    text = "expected it only beside `ies`, as other lamps of this kind look the same from all sides of their axis"
+    return [*problems, *([] if turned is None else [(("keys", turned, "up"), text)])]
 
 
 _KEYS = "between them all its values change smoothly, before the first and after the last they stay as they are."
@@ -106,7 +133,7 @@ class _PlacedSource(SourceTable):
 
 
 class PointSource(_PlacedSource):
-    """A lamp that shines equally in all directions: a point, or a sphere."""
+    """A lamp that shines equally in all directions, or down as its file says: a point, or a sphere."""
 
     type: Literal["point"] = Field(description="Kind of source.")
     intensity: Emission | None = Field(
@@ -119,6 +146,8 @@ class PointSource(_PlacedSource):
         description="Only beside `file`: colour of all its positions, if it has none.",
         json_schema_extra=default_text("that of the file, or 1"),
     )
+    ies: FileName | None = Field(default=None, description=IES, json_schema_extra=default_text("none"))
+    units: LampUnits | None = Field(default=None, description=LAMP_UNITS, json_schema_extra=default_text('"W/sr"'))
     radius: Radius | None = Field(
         default=None,
         description="Only beside `file`: radius of the lamp at all its positions, scene units, if it has none.",
@@ -147,6 +176,8 @@ class PointSource(_PlacedSource):
     @model_validator(mode="after")
     def _only_beside_file(self) -> "PointSource":
         _refuse_without_file(self, ("intensity", "color", "radius"))
+        if problems := profile_problems(self.keys, has_profile=self.ies is not None):
+            fail(problems)
         return self
 
 
@@ -154,6 +185,7 @@ class DirectionalSource(_PlacedSource):
     """A source infinitely far away, such as the sun."""
 
     type: Literal["directional"] = Field(description="Kind of source.")
+    units: SkyUnits | None = Field(default=None, description=SKY_UNITS, json_schema_extra=default_text('"W/m2"'))
     irradiance: Emission | None = Field(
         default=None,
         description="Only beside `file`: irradiance of a surface that faces the light, W/m2, at all its positions, if "

@@ -45,12 +45,13 @@ _DOME_LISTS = {
 }
 
 
-def read_positions(path: Path, kind: str, common: Mapping[str, Any]) -> list[dict[str, Any]]:
+def read_positions(path: Path, kind: str, common: Mapping[str, Any], *, strong: bool = False) -> list[dict[str, Any]]:
     """Read a file of light positions as key tables for frames 0, 1, 2 and so on.
 
     Args:
         kind: "point" or "directional".
         common: strength, colour and size of all positions, where the file gives none.
+        strong: whether the strength may be missing, as another file says it.
 
     Raises:
         RowFileError: the file is missing, has another format, or has rows that are no light positions.
@@ -70,9 +71,9 @@ def read_positions(path: Path, kind: str, common: Mapping[str, Any]) -> list[dic
     rows = [(place, _as_key(row, vector, kind)) for place, row in reader(path)]
     if not 1 <= len(rows) <= MOST_EYES:
         raise RowFileError(f"expected 1 to {MOST_EYES} light positions, got {len(rows)}")
-    if strength not in common and not any(strength in row for _, row in rows):
+    if not strong and strength not in common and not any(strength in row for _, row in rows):
         raise RowFileError(f"the file has no {strength}; give it beside `file`, as in {strength} = 10")
-    if problems := row_problems(rows, key, ("color", SIZES[kind]), common):
+    if problems := row_problems(rows, key, (strength, "color", SIZES[kind]), common):
         raise RowFileError(*problems)
     return [{"frame": frame, **common, **row} for frame, (_, row) in enumerate(rows)]
 

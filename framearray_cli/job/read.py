@@ -13,6 +13,7 @@ from framearray_cli.base.forms.toml import STDIN, shown_file
 from framearray_cli.base.forms.words import shown
 
 from .eyefile import read_eyes
+from .ies import read_photometry
 from .job import Job
 from .override import name_settings, put_settings, read_settings
 from .placed import SIZES, STRENGTHS
@@ -37,7 +38,7 @@ def read_job(path: Path, sets: Sequence[str] = ()) -> Job:
     job_file = shown_file(path) if path == STDIN else path.absolute()
     table, problems = _with_eyes(table, job_file)
     table, more = _with_positions(table, job_file)
-    problems += more
+    problems += more + _profile_problems(table, job_file)
     try:
         job = Job.model_validate(table, context={"job_file": job_file})
     except ValidationError as error:
@@ -120,6 +121,22 @@ def _with_positions(table: dict[str, Any], job_file: Path) -> tuple[dict[str, An
     return {**table, "light": {**light, "sources": found}}, problems
 
 
+def _profile_problems(table: dict[str, Any], job_file: Path) -> list[str]:
+    """Check the files of measured lamps, of sources that have them."""
+    light = table.get("light")
+    sources = light.get("sources") if isinstance(light, dict) else None
+    problems = []
+    for i, source in enumerate(sources if isinstance(sources, list) else ()):
+        name = source.get("ies") if isinstance(source, dict) and source.get("type") in ("point", "spot") else None
+        if not isinstance(name, str) or not name.strip() or "\0" in name:
+            continue  # none, or a problem that the validation of the job reports
+        try:
+            read_photometry(absolute(Path(name), job_file))
+        except RowFileError as error:
+            problems += [f"light.sources[{i}].ies: {shown(name)}: {problem}" for problem in error.args]
+    return problems
+
+
 def _with_rows(source: Any, place: str, job_file: Path, problems: list[str]) -> Any:
     """Replace `file` of one source, with the strength and colour beside it, if it is as it should be."""
     if not isinstance(source, dict) or "keys" in source or str(source.get("type")) not in STRENGTHS:
@@ -130,7 +147,7 @@ def _with_rows(source: Any, place: str, job_file: Path, problems: list[str]) -> 
     own = ("file", STRENGTHS[source["type"]], "color", SIZES[source["type"]])
     common = {key: source[key] for key in own[1:] if key in source}
     try:
-        keys = read_positions(absolute(Path(name), job_file), source["type"], common)
+        keys = read_positions(absolute(Path(name), job_file), source["type"], common, strong="ies" in source)
     except RowFileError as error:
         problems += [f"{place}: {shown(name)}: {problem}" for problem in error.args]
         return source

@@ -14,6 +14,7 @@ from .placed import Angle, DirectionalKey, DirectionalSource, PointSource
 from .sourcetable import SourceTable
 from .spot import SpotSource
 from .times import Clock, Dates, Zone, clock_minutes, even_moments
+from .units import SKY_UNITS, SkyUnits
 from .values import Colour, Direction, Emission, GridSize, Point
 
 ROUNDING = 1e-6  # of steps; a third of an hour ends after three of them
@@ -127,8 +128,10 @@ class SunSource(SourceTable):
         description="Direction in the scene that points north; its component along the up axis does not count.",
         json_schema_extra=default_text("-z in a scene with y up, y in one with z up, so that east is x"),
     )
+    units: SkyUnits | None = Field(default=None, description=SKY_UNITS, json_schema_extra=default_text('"W/m2"'))
     irradiance: Emission = Field(
-        description="Irradiance of a surface that faces the sun, W/m2; one number means white. Clear air lets about "
+        description="Irradiance of a surface that faces the sun, W/m2 unless `units` says otherwise; one number "
+        "means white. Clear air lets about "
         "1000 W/m2 through; choose what suits the exposure."
     )
     angle: Angle | None = Field(

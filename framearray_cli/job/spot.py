@@ -8,9 +8,10 @@ from framearray_cli.base.forms.table import default_text, fail
 
 from .aimed import aim_problems, same_choice_problems
 from .keys import key_problems
-from .placed import SIZES, PointKey
+from .placed import SIZES, PointKey, profile_problems
 from .sourcetable import SourceTable
-from .values import Direction, Point
+from .units import IES, LAMP_UNITS, LampUnits
+from .values import Direction, FileName, Point
 
 FLATTEST = 90.0  # degrees from the axis; a light that shines further back is no spot
 NARROWEST = 0.5  # degrees; single precision knows no narrower cones
@@ -53,21 +54,35 @@ def _consistent_spot_keys(keys: tuple[SpotKey, ...]) -> tuple[SpotKey, ...]:
     """Check the keys of one spot against each other."""
     problems = key_problems(keys, "direction", "color", SIZES["point"])
     problems += same_choice_problems(keys, ("target", "direction"))
+    problems += key_problems(keys, "none", "intensity", "up")
     if problems:
         fail(problems)
     return keys
 
 
 class SpotSource(SourceTable):
-    """A lamp that shines into a cone, as KHR_lights_punctual of glTF defines it."""
+    """A lamp that shines into a cone, as KHR_lights_punctual of glTF defines it, or as its file says."""
 
     type: Literal["spot"] = Field(description="Kind of source.")
+    ies: FileName | None = Field(default=None, description=IES, json_schema_extra=default_text("none"))
+    units: LampUnits | None = Field(default=None, description=LAMP_UNITS, json_schema_extra=default_text('"W/sr"'))
     keys: Annotated[tuple[SpotKey, ...], AfterValidator(_consistent_spot_keys)] = Field(
         min_length=1,
         strict=False,
         description="The spot at some frames; between them all its values change smoothly, before the first and after "
         "the last they stay as they are.",
     )
+
+    @model_validator(mode="after")
+    def _cone_or_profile(self) -> "SpotSource":
+        problems = profile_problems(self.keys, has_profile=self.ies is not None)
+        default = {name: SpotKey.model_fields[name].default for name in ("inner", "outer")}
+        for k, key in enumerate(self.keys if self.ies else ()):
+            text = "expected none beside `ies`, as the file says where the lamp shines"
+            problems += [(("keys", k, name), text) for name in default if getattr(key, name) != default[name]]
+        if problems:
+            fail(problems)
+        return self
 
     @property
     def count(self) -> int:

@@ -53,7 +53,8 @@ def unused_keys(prepared: Prepared) -> Iterator[tuple[str, str]]:
     if not prepared.scene.has_mirrors or job.specular.depth == 0:
         yield "specular", "hits"
     by_up = any(key.up is None for key in job.camera.keys)  # the model itself is not turned
-    if not by_up and all(source.type in PLACED_BY_KEYS for source in job.light.sources):
+    sources = job.light.sources
+    if not by_up and all(s.type in PLACED_BY_KEYS and not getattr(s, "ies", None) for s in sources):
         yield "scene", "up"
 
 
@@ -95,5 +96,9 @@ def job_fingerprint(prepared: Prepared, scene: str | None = None, table: dict[st
     table["scene"] = {key: value for key, value in table["scene"].items() if key not in ("file", "folders")}
     for section, key in metadata_of(table):
         table[section] = {**table[section], key: _DEFAULTS[section].model_fields[key].default}
+    if any(path.profile for path in prepared.lights.sources):  # what a file of a lamp says, not its name
+        webs = [path.profile and {"ies": path.profile.web.digest} for path in prepared.lights.sources]
+        sources = [source | (web or {}) for source, web in zip(table["light"]["sources"], webs, strict=True)]
+        table["light"] = table["light"] | {"sources": sources}
     scene = scene or scene_fingerprint(prepared)
     return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), scene.encode())

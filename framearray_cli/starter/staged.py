@@ -107,7 +107,8 @@ def _light_vectors(stage: Stage, light: StageLight, times: list[float]) -> Float
 def _convert_light(light: StageLight, vectors: Float64) -> LightKeys:
     n = len(vectors) if (vectors != vectors[0]).any() else 1
     unit = "lx" if light.kind == "directional" else "cd"
-    about = [f'the {light.kind} light "{light.name}" of the file, there {max(light.intensity):.4g} {unit}']
+    strength = f"{max(light.intensity):.4g} {unit} by KHR_lights_punctual"
+    about = [f'the {light.kind} light "{light.name}" of the file, there {strength}']
     cone = light.cone_deg
     return LightKeys(
         kind=light.kind,

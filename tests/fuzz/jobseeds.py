@@ -74,6 +74,10 @@ PANELS = [
         "keys": [{"frame": 0, "position": [0, 1.9, 0], "direction": [0, -1, 0.2], "radiance": 3.0, "radius": 0.2}],
     },
 ]  # fmt: skip
+UNITS = [
+    {**tiny.SUN, "units": "lux"},
+    {"type": "point", "units": "lm", "keys": [{"frame": 0, "position": [0, 2, 0], "intensity": 800.0}]},
+]
 GROUPED = {
     "frames": 2,
     "axes": {"lamps": 2},
@@ -119,6 +123,7 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
             output=EXR | {"compression": "zip", "half": "never"},
         ),
         "sun": tiny.table(camera=small, light={"sources": [SUN], "frames": 3}, ambient={"method": "fit", "paths": 64}),
+        "units": tiny.table(camera=small, light={"sources": UNITS, "frames": 3}),
         "year": tiny.table(camera=small, light={"sources": [YEAR], "frames": 6}),
         "domes": tiny.table(
             camera=small, light={"sources": [DOME, LAMPS, GRID, IN_PICTURE, *SPOTS, *PANELS], "frames": 4}

@@ -88,7 +88,7 @@ def _tables(web: Web, first: int) -> tuple[Float64, Float32]:
     row[POLAR_FROM], row[POLAR_SCALE] = np.radians(polar[0]), 1 / np.radians(polar[1] - polar[0])
     if len(around) > 1:
         row[AROUND_FROM], row[AROUND_SCALE] = np.radians(around[0]), 1 / np.radians(around[1] - around[0])
-    row[FLUX] = cells.sum()
+    row[FLUX] = web.flux
     row[CHOICE], row[CHOICE_POLAR], row[CHOICE_AROUND] = first + share.size, cells.shape[1], cells.shape[0]
     bands = np.cumsum(cells.sum(axis=0))
     within = np.cumsum(cells.T, axis=1)

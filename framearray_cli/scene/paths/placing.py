@@ -1,8 +1,8 @@
 """Sources of a job -> where they are, and how strong, at every light position."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -19,82 +19,12 @@ from framearray_cli.job.values import SHORTEST
 from .curves import interpolate_keys
 from .directions import PARALLEL, interpolate_directions, unit
 from .domes import dome_directions, grid_points
+from .lightpath import Cone as Cone
+from .lightpath import LightPath as LightPath
+from .measured import add_profile
 from .panels import Panel, across_under, carry_across
-from .profiles import Profile
 from .sun import NEVER, daylight, directions_to_sun, sun_path
-
-# What the manifest calls the vector, the strength and the size of a source, by its kind.
-_MANIFEST_KEYS = {"point": ("position", "intensity", "radius"), "directional": ("direction", "irradiance", "angle")}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Cone:
-    """Where a spot shines, at n light positions.
-
-    Attributes:
-        axis: (n, 3) unit direction of the middle of its light.
-        angles_deg: (n, 2) from the axis: within the first it has its full intensity, beyond the second none.
-    """
-
-    axis: Float64
-    angles_deg: Float64
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LightPath:
-    """One source at every light position l; in `Lights`, at every image plane.
-
-    Attributes:
-        kind: "point" or "directional".
-        vector: (n, 3) position in scene units, or unit direction in which the light travels.
-        intensity: (n, 3) linear RGB, times the source's colour: W/sr of a point, of a panel along its
-            normal; W/m2 of a directional source.
-        size: (n,) radius of a point source, scene units, or the angle under which a directional one is seen, degrees;
-            None of sources without size.
-        cone: of a spot, which is a point with a cone.
-        panel: of a rectangle or disc, which is a point with a panel around it.
-        profile: of a point whose light was measured; `intensity` is then its largest.
-        notes: n tables with what else the manifest records of each position; or none.
-    """
-
-    kind: Literal["point", "directional"]
-    vector: Float64
-    intensity: Float64
-    size: Float64 | None = None
-    cone: Cone | None = None
-    panel: Panel | None = None
-    profile: Profile | None = None
-    notes: tuple[dict[str, Any], ...] = ()
-
-    @property
-    def shines_one_way(self) -> bool:
-        """Whether it is a spot, or a panel with one bright side."""
-        return self.cone is not None or (self.panel is not None and not self.panel.two_sided)
-
-    def table(self, l: int) -> dict[str, Any]:
-        """Describe the source at position l as the manifest does."""
-        vector, strength, size = _MANIFEST_KEYS[self.kind]
-        values = {"type": self.kind, vector: self.vector[l].tolist(), strength: self.intensity[l].tolist()}
-        values |= {} if self.size is None else {size: float(self.size[l])}
-        if self.cone is not None:
-            inner, outer = self.cone.angles_deg[l].tolist()
-            values |= {"type": "spot", "direction": self.cone.axis[l].tolist(), "inner": inner, "outer": outer}
-        values |= {} if self.panel is None else self.panel.table(l)
-        return values | (self.notes[l] if self.notes else {})
-
-    def at(self, positions: Sequence[int]) -> "LightPath":
-        """Return the source at some of its positions, in their order."""
-        rows = list(positions)
-        return replace(
-            self,
-            vector=self.vector[rows],
-            intensity=self.intensity[rows],
-            size=None if self.size is None else self.size[rows],
-            cone=self.cone and Cone(axis=self.cone.axis[rows], angles_deg=self.cone.angles_deg[rows]),
-            panel=self.panel and self.panel.at(rows),
-            profile=self.profile and self.profile.at(rows),
-            notes=tuple(self.notes[k] for k in rows) if self.notes else (),
-        )
+from .units import in_units
 
 
 def in_camera_space(table: LightTable) -> bool:
@@ -115,7 +45,7 @@ def place_source(job: Job, i: int, n: int, world_from_camera: Float64 | None) ->
     source = job.light.sources[i]
     match source:
         case SunSource():
-            return _place_sun(source, job, f"light.sources[{i}]", n)
+            return in_units(_place_sun(source, job, f"light.sources[{i}]", n), source)
         case DomeSource():
             return _place_dome(source, _up(job), n)
         case GridSource():
@@ -123,12 +53,14 @@ def place_source(job: Job, i: int, n: int, world_from_camera: Float64 | None) ->
                 "point", grid_points(source.counts, source.corner, source.side, source.other_side), source, n
             )
         case SpotSource():
-            return _place_spot(source.keys, job, f"light.sources[{i}]", n)
+            return in_units(_place_spot(source, job, f"light.sources[{i}]", n), source)
         case RectSource() | DiscSource():
             return _place_panel(source, job, f"light.sources[{i}]", n)
         case _:
             path = _interpolate(source.type, source.keys, n)
-            return _in_space(source, path, job, world_from_camera)
+            if isinstance(source, PointSource) and source.ies:
+                path = add_profile(path, source, np.tile(-_up(job), (n, 1)), job, f"light.sources[{i}]")
+            return in_units(_in_space(source, path, job, world_from_camera), source)
 
 
 def _in_space(
@@ -152,14 +84,17 @@ def _place_dome(source: DomeSource, up_dir: Float64, n: int) -> LightPath:
     return _constant("point", np.array(source.target) + source.radius * to_light, source, n)
 
 
-def _place_spot(keys: Sequence[SpotKey], job: Job, name: str, n: int) -> LightPath:
+def _place_spot(source: SpotSource, job: Job, name: str, n: int) -> LightPath:
     """Interpolate the keys of a spot; where they have targets, its axis follows the targets.
 
     Raises:
-        JobError: the spot meets its target between two keys.
+        JobError: the spot meets its target between two keys, or see `add_profile`.
     """
+    keys = source.keys
     path = _interpolate("point", keys, n)
     axis = _axes(keys, path.vector, job, name, "the spot")
+    if source.ies:
+        return add_profile(path, source, axis, job, name)
     angles = interpolate_keys([key.frame for key in keys], [(key.inner, key.outer) for key in keys], n)
     return replace(path, cone=Cone(axis=axis, angles_deg=angles))
 
@@ -258,7 +193,7 @@ def _interpolate(
     """Interpolate the keys of a point or directional source."""
     frames = [key.frame for key in keys]
     places = [key.direction if isinstance(key, DirectionalKey) else key.position for key in keys]
-    powers = [key.irradiance if isinstance(key, DirectionalKey) else key.intensity for key in keys]
+    powers = [key.irradiance if isinstance(key, DirectionalKey) else key.intensity or (1.0,) * 3 for key in keys]
     vector = (interpolate_keys if kind == "point" else interpolate_directions)(frames, places, n_lights)
     colors = [key.color if key.color is not None else (1.0, 1.0, 1.0) for key in keys]
     intensity = interpolate_keys(frames, powers, n_lights) * interpolate_keys(frames, colors, n_lights)

@@ -1,16 +1,14 @@
 """Photometric profiles of lamps: the share of its largest intensity that a lamp sends into each direction."""
 
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.hashing import fingerprint
 from framearray_cli.job.ies import read_photometry
-
-from .directions import PARALLEL, unit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -22,6 +20,7 @@ class Web:
         around_deg: (m,) ascending angles about the pole, within -180 to 180; or one, where they make no difference.
         share: (m, n) of the largest intensity.
         candela: the largest intensity.
+        tilts: (k, 2) angles of the lamp from straight down, degrees, and factors of its light; or none.
         sideways: whether the pole is not the lamp's axis, but lies across it, as in photometry of type B.
     """
 
@@ -30,11 +29,30 @@ class Web:
     share: Float64
     candela: float
     sideways: bool
+    tilts: Float64 = field(default_factory=lambda: np.empty((0, 2)))
+
+    @property
+    def flux(self) -> float:
+        """The integral of the share over all directions, sr."""
+        start, end = np.radians(self.polar_deg[:-1]), np.radians(self.polar_deg[1:])
+        low, high = self.share[:, :-1], self.share[:, 1:]
+        # of a share that is linear in the angle, times its sine
+        parts = low * np.cos(start) - high * np.cos(end) + (high - low) * (np.sin(end) - np.sin(start)) / (end - start)
+        planes = parts.sum(axis=1)
+        if len(planes) == 1:
+            return float(2 * np.pi * planes[0])
+        return float(np.trapezoid(planes, np.radians(self.around_deg)))
+
+    def tilt_factors(self, tilt_deg: Float64) -> Float64:
+        """The factor of the lamp's light at angles from straight down, degrees, of any shape."""
+        if not len(self.tilts):
+            return np.ones_like(tilt_deg)
+        return np.asarray(np.interp(tilt_deg, *self.tilts.T))
 
     @property
     def digest(self) -> str:
         """Hash of the table."""
-        arrays = (self.polar_deg, self.around_deg, self.share)
+        arrays = (self.polar_deg, self.around_deg, self.share, np.array(self.candela), self.tilts)
         return fingerprint(*(np.ascontiguousarray(array).data for array in arrays), bytes([self.sideways]))
 
 
@@ -60,12 +78,15 @@ class Profile:
         rows = (across, self.axis, self.zero) if self.web.sideways else (self.axis, self.zero, across)
         return np.stack(rows, axis=1)
 
+    def table(self, l: int) -> dict[str, Any]:
+        """Describe the profile at position l as the manifest does."""
+        return {"type": "spot", "ies": self.file, "direction": self.axis[l].tolist(), "up": self.zero[l].tolist()}
+
     def at(self, positions: list[int]) -> "Profile":
         """Return the profile at some of its positions, in their order."""
         return replace(self, axis=self.axis[positions], zero=self.zero[positions])
 
 
-@cache
 def read_web(path: Path) -> Web:
     """Read an IES file.
 
@@ -92,6 +113,7 @@ def read_web(path: Path) -> Web:
         share=share / largest,
         candela=largest * found.factor,
         sideways=found.kind == "B",
+        tilts=np.array(found.tilts).reshape(-1, 2),
     )
 
 
@@ -120,34 +142,3 @@ def _whole_circle(horizontal: Float64, candela: Float64) -> tuple[Float64, Float
         a, b = around[-1], around[1] + 360
         values[0] = values[-1] + (values[1] - values[-1]) * (180 - a) / (b - a)
     return np.append(around, 180.0), np.append(values, values[:1], 0)
-
-
-def turn_across(axis: Float64, wanted: Float64, fallback: Float64, roll_deg: Float64, fixed: bool) -> Float64:
-    """Find directions of horizontal angle 0 along a path of axes, (n, 3) unit vectors across them.
-
-    Args:
-        axis: (n, 3).
-        wanted: (3,) direction that they come as close to as they can; at first or, if `fixed`, at every position.
-        fallback: (3,) the same where the axis lies along `wanted`.
-        roll_deg: (n,) further turn about the axis, clockwise as seen along it.
-    """
-    zero = np.empty_like(axis)
-    for l, way in enumerate(axis):
-        near = [wanted, *zero[l - 1 : l], fallback] if fixed or l == 0 else [_carried(zero[l - 1], axis[l - 1], way)]
-        level = [vector - (vector @ way) * way for vector in [*near, wanted, fallback]]
-        zero[l] = unit(next(vector for vector in level if np.linalg.norm(vector) > PARALLEL))
-    angle = np.radians(roll_deg)[:, None]
-    return np.cos(angle) * zero + np.sin(angle) * np.cross(axis, zero)
-
-
-def _carried(vector: Float64, start: Float64, end: Float64) -> Float64:
-    """Turn a vector as the shortest turn from `start` to `end` does; both are unit directions across it at first."""
-    middle = start + end
-    if np.linalg.norm(middle) <= PARALLEL:
-        return vector  # half a turn: about the vector itself
-    middle = unit(middle)
-    return _mirrored(_mirrored(vector, start), middle)  # two mirrors make a turn
-
-
-def _mirrored(vector: Float64, normal: Float64) -> Float64:
-    return vector - 2 * (vector @ normal) * normal

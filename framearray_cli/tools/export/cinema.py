@@ -48,7 +48,7 @@ def _row(selection: Selection, frame: ExportedFrame) -> dict[str, Any]:
     for k, source in enumerate(sources):
         name = "source" if len(sources) == 1 else f"source{k}"
         row[f"{name}_type"] = source["type"]
-        for key in ("position", "direction", "across", "intensity", "irradiance"):
+        for key in ("position", "direction", "across", "up", "intensity", "irradiance"):
             if key in source:
                 row |= _vector(f"{name}_{key}", source[key], "rgb" if key in ("intensity", "irradiance") else "xyz")
         row |= {f"{name}_{key}": float(source[key]) for key in ("radius", "angle", "width", "height") if key in source}

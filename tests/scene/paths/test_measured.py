@@ -1,0 +1,165 @@
+"""Lamps with a file: their intensity by the rules of LM-63, their turns along a path, and units."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+from support.iesfiles import TILT, VARIANTS, ies
+
+from framearray_cli.base.errors import JobError
+from framearray_cli.engine.inputs.lights import light_arrays
+from framearray_cli.engine.inputs.shapes import emitted_power
+from framearray_cli.job.ies import Photometry, read_photometry
+from framearray_cli.scene.paths.paths import lights, lights_without_groups
+from framearray_cli.scene.paths.placing import LightPath
+from framearray_cli.scene.paths.profiles import read_web
+
+RNG = np.random.default_rng(9)
+
+
+def placed(folder: Path, text: str, *keys: dict[str, Any], **source: Any) -> LightPath:
+    (folder / "lamp.ies").write_bytes(text.encode())
+    lamp = {
+        "type": "spot" if "target" in keys[0] or "direction" in keys[0] else "point",
+        "ies": str(folder / "lamp.ies"),
+    }
+    return place(lamp | source, *keys)
+
+
+def place(source: dict[str, Any], *keys: dict[str, Any]) -> LightPath:
+    frames = [{"frame": k, "position": [0.0, 2.0, 0.0]} | key for k, key in enumerate(keys)]
+    return lights(tiny.job(light={"sources": [source | {"keys": frames}]})).sources[0]
+
+
+def candela(found: Photometry, down: float, ahead: float, left: float) -> float:
+    """Into a direction, by the file's angles: those that it leaves out are mirror images of others."""
+    if found.kind == "B":
+        vertical, horizontal = np.degrees(np.arctan2(ahead, down)), np.degrees(np.arcsin(-left))
+        vertical = abs(vertical) if found.vertical_deg[0] == 0 else vertical
+        horizontal = abs(horizontal) if found.horizontal_deg[0] == 0 else horizontal
+    else:
+        vertical, horizontal = np.degrees(np.arccos(down)), np.degrees(np.arctan2(left, ahead)) % 360
+        first, last = found.horizontal_deg[0], found.horizontal_deg[-1]
+        if first == 90:
+            horizontal = horizontal if 90 <= horizontal <= 270 else (180 - horizontal) % 360
+        elif last == 90:
+            horizontal = min(horizontal % 180, 180 - horizontal % 180)
+        elif last == 180:
+            horizontal = min(horizontal, 360 - horizontal)
+        elif last == 0:
+            horizontal = 0.0
+    v, h = np.array(found.vertical_deg), np.array(found.horizontal_deg)
+    if not (v[0] <= vertical <= v[-1] and h[0] <= horizontal <= h[-1]):
+        return 0.0
+    rows = [np.interp(vertical, v, row) for row in found.candela]
+    return float(np.interp(horizontal, h, rows)) * found.factor
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_a_hanging_lamp_of_any_file_shines_as_the_file_says(name: str, tmp_path: Path) -> None:
+    """By its table with `up`, which is the direction of horizontal angle 0; against the clock from above is type C."""
+    path = placed(tmp_path, VARIANTS[name], {"up": [0.0, 0.0, 1.0]})
+    assert path.profile is not None
+    web, found = path.profile.web, read_photometry(tmp_path / "lamp.ies")
+    np.testing.assert_allclose(path.profile.axis[0], [0, -1, 0])
+    np.testing.assert_allclose(path.profile.zero[0], [0, 0, 1], atol=1e-12)
+    ways = RNG.normal(size=(300, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    pole, zero, side = path.profile.frames[0]
+    polar, around = np.degrees(np.arccos(ways @ pole)), np.degrees(np.arctan2(ways @ side, ways @ zero))
+    for k, (x, y, z) in enumerate(ways):
+        rows = [np.interp(polar[k], web.polar_deg, row, 0, 0) for row in web.share]
+        share = rows[0] if len(rows) == 1 else np.interp(around[k], web.around_deg, rows, 0, 0)
+        wanted = candela(found, -y, z, x)  # from above z goes to x against the clock
+        assert share * web.candela == pytest.approx(wanted, rel=1e-9, abs=1e-9 * web.candela)
+    assert path.intensity[0] == pytest.approx([web.candela / 683] * 3)
+    power = emitted_power(light_arrays(lights_without_groups([path]), np.zeros(3)), 0, 1.0)
+    mean = np.mean([candela(found, *way) for way in sphere()])
+    assert power[0] * web.candela == pytest.approx(4 * np.pi * mean, rel=5e-3)
+
+
+def sphere() -> Any:
+    """Many directions, each for the same solid angle."""
+    z, turn = np.meshgrid((np.arange(160) + 0.5) / 80 - 1, (np.arange(100) + 0.5) / 50 * np.pi)
+    r = np.sqrt(1 - z * z)
+    return np.stack([z, r * np.cos(turn), r * np.sin(turn)], axis=-1).reshape(-1, 3)
+
+
+def test_a_lamp_that_turns_carries_its_profile_along(tmp_path: Path) -> None:
+    """Without `up` it does not turn about its own axis: from one position to the next by the shortest way."""
+    keys = [{"frame": 0, "direction": [0.0, -1.0, 0.0]}, {"frame": 2, "direction": [1.0, 0.0, 0.0]}]
+    path = placed(tmp_path, ies(), *keys)
+    assert path.profile is not None
+    axis, zero = path.profile.axis, path.profile.zero
+    np.testing.assert_allclose(zero[0], [1, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(zero[2], [0, 1, 0], atol=1e-9)
+    assert np.abs((axis * zero).sum(axis=1)).max() < 1e-9
+    np.testing.assert_allclose(zero[1], [2**-0.5, 2**-0.5, 0], atol=1e-9)
+    with pytest.raises(
+        JobError, match="expected an `up` across the direction of the lamp, got one along it at frame 0"
+    ):
+        placed(tmp_path, ies(), {"direction": [0.0, -1.0, 0.0], "up": [0.0, 2.0, 0.0]})
+
+
+def test_tilted_lamps_have_the_factor_of_their_tilt(tmp_path: Path) -> None:
+    axis = {angle: [np.sin(np.radians(angle)), -np.cos(np.radians(angle)), 0.0] for angle in (0, 45, 67.5)}
+    found = [placed(tmp_path, ies(tilt=TILT), {"direction": axis[angle]}).intensity[0, 0] for angle in axis]
+    np.testing.assert_allclose(found, 1500 / 683 * np.array([1, 0.9, 0.7]))
+
+
+def test_intensity_is_the_largest_of_a_file_and_lumens_are_all_of_its_light(tmp_path: Path) -> None:
+    for units, wanted in ((None, 5.0), ("W/sr", 5.0), ("cd", 5 / 683)):
+        more = {} if units is None else {"units": units}
+        assert placed(tmp_path, ies(), {"intensity": 5.0}, **more).intensity[0] == pytest.approx([wanted] * 3)
+    path = placed(tmp_path, ies(), {"intensity": 800.0, "color": [1.0, 0.5, 0.25]}, units="lm")
+    power = emitted_power(light_arrays(lights_without_groups([path]), np.zeros(3)), 0, 1.0)[0]
+    assert power * path.intensity[0] * 683 == pytest.approx([800, 400, 200])
+    own = [placed(tmp_path, ies(), {}, **more).intensity[0, 0] for more in ({}, {"units": "cd"}, {"units": "lm"})]
+    assert own == pytest.approx([1500 / 683] * 3)
+
+
+LAMP, SPOT = {"type": "point"}, {"type": "spot"}
+SKY = {"type": "directional"}
+AIM = {"direction": [0.0, -1.0, 0.3]}
+CONE = 2 * np.pi * (1 - np.cos(0.5) + (np.cos(0.5) - np.cos(0.9)) / 3)
+
+
+@pytest.mark.parametrize(
+    ("source", "key", "units", "per_unit"),
+    [
+        (LAMP, {}, "W/sr", 1),
+        (LAMP, {}, "cd", 1 / 683),
+        (LAMP, {}, "lm", 1 / (683 * 4 * np.pi)),
+        (SPOT, AIM, "cd", 1 / 683),
+        (SPOT, AIM | {"inner": float(np.degrees(0.5)), "outer": float(np.degrees(0.9))}, "lm", 1 / 683 / CONE),
+        (SKY, AIM, "lux", 1 / 683),
+        (SKY, AIM, "W/m2", 1),
+    ],
+)
+def test_units_are_those_of_photometry(source: Any, key: dict[str, Any], units: str, per_unit: float) -> None:
+    strength = "irradiance" if source is SKY else "intensity"
+    if source is SKY:
+        found = lights(
+            tiny.job(light={"sources": [SKY | {"units": units, "keys": [key | {"frame": 0, strength: 3.0}]}]})
+        )
+        path = found.sources[0]
+    else:
+        path = place(source | {"units": units}, key | {strength: 3.0})
+    assert path.intensity[0] == pytest.approx([3 * per_unit] * 3)
+    if units == "lm":
+        power = emitted_power(light_arrays(lights_without_groups([path]), np.zeros(3)), 0, 1.0)[0]
+        assert power * path.intensity[0, 0] * 683 == pytest.approx(3, rel=1e-4)
+
+
+def test_positions_say_the_file_and_how_the_lamp_is_turned(tmp_path: Path) -> None:
+    table = placed(tmp_path, ies(), {"target": [0.0, 0.0, 2.0]}).table(0)
+    assert table["ies"] == "lamp.ies" and table["type"] == "spot"
+    np.testing.assert_allclose(table["direction"], [0, -(2**-0.5), 2**-0.5])
+    assert table["intensity"] == pytest.approx([1500 / 683] * 3)
+    hanging = placed(tmp_path, ies(), {}).table(0)
+    assert hanging["type"] == "spot" and hanging["direction"] == [0, -1, 0]
+    digests = {read_web(tmp_path / "lamp.ies").digest}
+    (tmp_path / "lamp.ies").write_text(ies(multiplier=2))
+    assert len(digests | {read_web(tmp_path / "lamp.ies").digest}) == 2
