@@ -181,3 +181,19 @@ def test_the_light_method_of_a_job_knows_the_background(tmp_path: Path) -> None:
         camera={"resolution": [16, 16], "fov": 60.0, "keys": [{"frame": 0, "eye": [0, 0, 3], "target": [0, 0, 0]}]},
     )  # fmt: skip
     assert ambient_of(job).intensity[0] == pytest.approx([1.0] * 3, rel=0.03)  # a body below an open sky: E = pi
+
+
+@pytest.mark.slow  # of compiling for panels; `tests/engine/inputs/test_panels.py` has the particles one by one
+@pytest.mark.parametrize(("kind", "size"), [("rect", {"width": 1.0, "height": 0.4}), ("disc", {"radius": 0.3})])
+def test_a_panel_spreads_its_power_over_a_closed_box(kind: str, size: dict[str, float], tmp_path: Path) -> None:
+    """Every bounce leaves the share R: E = P / (A (1 - R)), whatever the shape of the box and of the panel."""
+    key = {"frame": 0, "position": [0.5, 1.9, 1.0], "direction": [0.3, -1.0, 0.2], "power": 10.0}
+    job = make_job(
+        write_scene(tmp_path, box("Wall", [0, 0, 0], [3, 2.5, 2])), tmp_path / "out", materials={"Wall": 0.4},
+        camera={"resolution": [16, 16], "fov": 60.0, "keys": [{"frame": 0, "eye": [1, 1, 1], "target": [2, 1, 1]}]},
+        lights=[{"type": kind, "two_sided": kind == "disc", "keys": [key | size]}], ambient={"method": "light"},
+    )  # fmt: skip
+    right = 10.0 / (2 * (3 * 2.5 + 3 * 2 + 2.5 * 2) * (1 - 0.4))
+    found = irradiance(ambient_of(job))
+    assert found.error < 0.02 * right
+    assert abs(found.mean - right) < 3.5 * found.error
