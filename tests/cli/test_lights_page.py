@@ -1,0 +1,90 @@
+"""The examples of docs/guide/lights.md, as they are: every source is placed, every command of a sun study runs."""
+
+import re
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+from support import tiny
+from support.movies import plain
+from typer.testing import CliRunner
+
+from framearray_cli.array.manifest import ManifestLight
+from framearray_cli.array.manifest_toml import write_manifest
+from framearray_cli.cli.main import app
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import read_job
+from framearray_cli.scene.paths.domes import dome_directions
+from framearray_cli.scene.paths.paths import lights
+
+PAGE = Path(__file__).parents[2] / "docs" / "guide" / "lights.md"
+BLOCKS = re.findall(r"^```(toml|sh)\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+SOURCES = [block for language, block in BLOCKS if language == "toml" and "[[light.sources]]" in block]
+COMMANDS = [line for language, block in BLOCKS if language == "sh" for line in block.splitlines()]
+STUDY = [line for line in COMMANDS if re.search(r"\d{4}-\d\d-\d\d", line)]
+
+
+def job_with(folder: Path, text: str) -> Job:
+    """Read a job with the sources of an example, and the files that they name."""
+    ways = dome_directions(6, np.array([0.0, 1.0, 0.0]), whole=False).tolist()
+    (folder / "lamps.csv").write_text("\n".join(["x,y,z", *(",".join(map(repr, way)) for way in ways), ""]))
+    rows = [f"shot {k}.jpg {x} {y} {z}" for k, (x, y, z) in enumerate(ways)]
+    (folder / "coin.lp").write_text("\n".join([str(len(rows)), *rows, ""]))
+    rest = {key: value for key, value in tiny.table().items() if key != "light"} | {"scene": {"file": "a.glb"}}
+    table = tomli_w.dumps(rest)
+    (folder / "job.toml").write_text(f"{table}\n{text}", encoding="utf-8")
+    return read_job(folder / "job.toml")
+
+
+def example(start: str) -> str:
+    (found,) = [block for block in SOURCES if re.search(start, block)]
+    return found
+
+
+@pytest.mark.parametrize("text", SOURCES, ids=[re.findall(r'type = "(\w+)"', block)[0] for block in SOURCES])
+def test_every_example_is_a_light_path(text: str, tmp_path: Path) -> None:
+    if '.ies"' in text:
+        pytest.skip("measured profiles have tests of their own")
+    job = job_with(tmp_path, text)
+    placed = lights(job).sources
+    assert len(placed) == text.count("[[light.sources]]")
+    assert all(len(path.vector) == job.light.frames and np.isfinite(path.vector).all() for path in placed)
+
+
+def test_a_dome_of_96_lamps_is_one_source(tmp_path: Path) -> None:
+    job = job_with(tmp_path, example('type = "dome"'))
+    (dome,) = lights(job).sources
+    assert (job.light.frames, len(dome.vector)) == (96, 96)
+    np.testing.assert_allclose(np.linalg.norm(dome.vector - job.light.sources[0].target, axis=1), 2.0)  # type: ignore[union-attr]
+    lines = '[[light.sources]]\ntype = "dome"\npositions = 96\nirradiance = 3.0\n'
+    assert job_with(tmp_path, lines).light.frames == 96, "a table with three keys"
+
+
+def test_a_sun_study_has_the_positions_that_the_page_says(tmp_path: Path) -> None:
+    job = job_with(tmp_path, example("date ="))
+    assert "three days of 57 positions" in PAGE.read_text(encoding="utf-8")
+    assert job.light.frames == 3 * 57
+    times = [path["time"] for l in range(171) for path in [lights(job).sources[0].table(l)]][::57]
+    assert [time[:16] for time in times] == ["2026-03-20T06:00", "2026-06-21T06:00", "2026-12-21T06:00"]
+
+
+@pytest.mark.parametrize("command", STUDY)
+def test_commands_of_a_sun_study_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = re.sub(r"step = \d+.*", "step = 360", example("date ="))  # 06:00, 12:00 and 18:00
+    path = lights(job_with(tmp_path, text)).sources[0]
+    dark = (0.0, 0.0, 0.0)
+    at = [ManifestLight(ambient=dark, ambient_error=dark, sources=(path.table(l),)) for l in range(len(path.vector))]
+    write_manifest(tmp_path / "OUT", replace(plain(tmp_path / "OUT", 2, len(at)), lights=tuple(at)))
+    words = shlex.split(command)
+    result = CliRunner().invoke(app, words[1:], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / words[words.index("-o") + 1]).stat().st_size > 0
+
+
+def test_the_page_has_examples_of_both() -> None:
+    assert len(SOURCES) >= 5
+    assert {line.split()[1] for line in STUDY} == {"assemble", "sheet"}
