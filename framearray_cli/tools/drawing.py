@@ -18,8 +18,21 @@ SCALE = 400  # longest, pixels
 BLANK, STRIPE = "missing", 12  # an image that is not there: a word, and the distance of stripes in pixels
 
 
-def draw_sheet(tiles: Bytes, cameras: Sequence[int], labels: Sequence[str], heads: Sequence[str], width: int) -> Bytes:
-    """Put small images on a sheet with labels; the head line may widen it to `width`. Return (h, w, 3) sRGB codes."""
+def draw_sheet(
+    tiles: Bytes,
+    columns: Sequence[int],
+    labels: Sequence[str],
+    heads: Sequence[str],
+    width: int,
+    noun: str = "camera ",
+) -> Bytes:
+    """Put small images on a sheet with labels; return (h, w, 3) sRGB codes.
+
+    Args:
+        columns: a number over each column, with the noun before it where there is room.
+        labels: one per row.
+        width: pixels, to which the head line may widen the sheet.
+    """
     import PIL.Image
     import PIL.ImageDraw
 
@@ -38,11 +51,11 @@ def draw_sheet(tiles: Bytes, cameras: Sequence[int], labels: Sequence[str], head
     draw = PIL.ImageDraw.Draw(picture)
     _draw_heads(draw, heads, sheet_width)
     font, grey = typeface(LABEL_TEXT), (LABEL,) * 3
-    names = [f"camera {c}" for c in cameras]
-    if max(_length(name) for name in names) + LABEL_TEXT > step_x:
-        names = [str(c) for c in cameras]
-    stride = _label_stride(max(_length(name) for name in names) + LABEL_TEXT / 2, step_x)
-    for i in range(0, n_columns, stride):
+    names = [f"{noun}{c}" for c in columns]
+    if max(map(_length, names), default=0) + LABEL_TEXT > step_x:
+        names = [str(c) for c in columns]
+    stride = _label_stride(max(map(_length, names), default=0) + LABEL_TEXT / 2, step_x)
+    for i in range(0, len(names), stride):
         draw.text((left + i * step_x + tile_width / 2, top - 7), names[i], font=font, fill=grey, anchor="ms")
     for j in range(0, n_rows, _label_stride(LABEL_TEXT, step_y)):
         y = top + j * step_y + tile_height / 2

@@ -31,9 +31,10 @@ from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import agree, counted
 
 from .axes import LightIndices, evenly_spaced, given_places
-from .drawing import GAP, MARGIN, blank_tile, draw_sheet, gutter
+from .drawing import GAP, MARGIN, SHEET_GREY, blank_tile, draw_sheet, gutter
 from .mixing.mixer import SumOptions, open_pictures
 from .progress import Progress
+from .sheetlines import SheetLines, lay_out
 from .shrinking import area_mean
 
 MOST_COLUMNS, MOST_ROWS = 12, 8  # for an array of 192 x 48: 200 pixels per tile, on a sheet that fits a screen
@@ -72,6 +73,7 @@ def make_sheet(
     exposure: float = 0.0,
     side: str | None = None,
     at: Sequence[str] = (),
+    wrap: bool = False,
     sums: SumOptions = SumOptions(),  # noqa: B008  # frozen
     progress: Progress | None = None,
     dry_run: bool = False,
@@ -90,6 +92,7 @@ def make_sheet(
         exposure: stops added to PNG and JPEG.
         side: axis of light positions from top to bottom; None: the first.
         at: "AXIS=PLACES" for further axes; the default is a few of the shown one, and the middle of all others.
+        wrap: show one camera, the middle one if none is named, and its light positions line by line.
         sums: what pictures are sums of; those of all light positions leave one row of the first axis.
         progress: called after each image.
         dry_run: check everything but the pixels of images, and write nothing; the size is then (0, 0).
@@ -102,24 +105,44 @@ def make_sheet(
     image_format, manifest = sheet_format(target, exposure), read_manifest(out)
     axis = side if side is not None else next(iter(manifest.axes))
     pictures, left_out = open_pictures(manifest, sums)
-    lights, fixed = _read_lights(manifest, axis, light, at, rows)
-    names = [position_name(manifest, axis, l) for l in lights]
-    if sums.collapses and axis == next(iter(manifest.axes)):
-        lights, names = lights[:1], ["sum"]
-    chosen, labels = choose_columns(manifest, cameras, columns), names if image_format.format in FOR_SCREENS else []
-    tile = tile_size(manifest, len(chosen), width, labels)
+    lights, fixed = _read_lights(manifest, axis, light, at, columns * rows if wrap else rows)
+    lights, names = _name_rows(manifest, axis, lights, sums)
+    chosen = choose_columns(manifest, MIDDLE_PLACE if wrap and cameras is None else cameras, columns)
+    lines = lay_out(chosen, lights, names if image_format.format in FOR_SCREENS else [], columns if wrap else None)
+    tile = tile_size(manifest, lines.n_columns, width, lines.labels)
     places = _Places(chosen, lights, list(manifest.axes).index(axis), fixed)
     there, warnings = _find_images(pictures, places, left_out)
     if dry_run:
         return SheetResult(target=target, cameras=chosen, lights=lights, size=(0, 0), warnings=warnings)
     tiles = _read_tiles(pictures, places, there, tile, progress)
-    if labels:
-        shown = srgb8_from_linear(tiles * np.float32(2.0**exposure))
-        shown[~there] = blank_tile(*tile)
-        size = write_drawn(target, draw_sheet(shown, chosen, labels, _heads(manifest, axis, fixed), width))
+    if lines.labels:
+        shown = _screen_tiles(tiles, there, exposure)
+        size = _draw(target, shown, lines, _heads(manifest, axis, fixed, chosen[0] if wrap else None), width)
     else:
-        size = write_linear(target, tiles, image_format)
+        size = write_linear(target, lines.arrange(tiles, 0), image_format)
     return SheetResult(target=target, cameras=chosen, lights=lights, size=size, warnings=warnings)
+
+
+def _name_rows(
+    manifest: Manifest, axis: str, lights: tuple[int, ...], sums: SumOptions
+) -> tuple[tuple[int, ...], list[str]]:
+    """Return the light positions of the rows, one where they are summed, and their names."""
+    if sums.collapses and axis == next(iter(manifest.axes)):
+        return lights[:1], ["sum"]
+    return lights, [position_name(manifest, axis, l) for l in lights]
+
+
+def _screen_tiles(tiles: Float32, there: NDArray[np.bool_], exposure: float) -> Bytes:
+    """Return the sRGB codes of tiles, with blanks where no image is."""
+    shown = srgb8_from_linear(tiles * np.float32(2.0**exposure))
+    shown[~there] = blank_tile(tiles.shape[3], tiles.shape[2])
+    return shown
+
+
+def _draw(target: Path, tiles: Bytes, lines: SheetLines, heads: Sequence[str], width: int) -> tuple[int, int]:
+    """Write a sheet of tiles, (rows, columns, h, w, 3), with labels; return its width and height."""
+    shown = lines.arrange(tiles, SHEET_GREY)
+    return write_drawn(target, draw_sheet(shown, lines.columns, lines.labels, heads, width, lines.noun))
 
 
 def write_drawn(target: Path, codes: Bytes) -> tuple[int, int]:
@@ -242,8 +265,8 @@ def _read_tiles(
     return tiles
 
 
-def _heads(manifest: Manifest, axis: str, fixed: LightIndices) -> Sequence[str]:
-    """Word the head line: the name, and a text of counts."""
+def _heads(manifest: Manifest, axis: str, fixed: LightIndices, c: int | None) -> Sequence[str]:
+    """Word the head line: the name, and a text of counts; with the camera where all images are of one."""
     width, height = manifest.resolution
     counts = [str(n) if name == MAIN_AXIS else f"{n} of {name}" for name, n in manifest.axes.items()]
     size = " x ".join([str(manifest.n_cameras), *counts])
@@ -251,4 +274,5 @@ def _heads(manifest: Manifest, axis: str, fixed: LightIndices) -> Sequence[str]:
     others = [
         f"at {position_name(manifest, name, l)}" for name, l in zip(manifest.axes, fixed, strict=True) if name != axis
     ]
+    others += [] if c is None else [f"camera {c}"]
     return manifest.name, ",  ".join([text, *others])

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 MOST_WIDTH = 20_000  # pixels; more is taken for a typing error
 
+Columns = Annotated[int, typer.Option("--columns", parser=whole(1), help="Camera positions, at most.", metavar="N")]
+Wrap = Annotated[bool, typer.Option("--wrap", help="Light positions of one camera position, line by line.")]
+
 
 def sheet(
     array: ArrayFolder,
@@ -34,9 +37,7 @@ def sheet(
     ],
     cameras: Cameras = None,
     light: Light = None,
-    columns: Annotated[
-        int, typer.Option("--columns", parser=whole(1), help="Camera positions, at most.", metavar="N")
-    ] = 12,
+    columns: Columns = 12,
     rows: Annotated[int, typer.Option("--rows", parser=whole(1), help="Light positions, at most.", metavar="N")] = 8,
     width: Annotated[
         int,
@@ -52,6 +53,7 @@ def sheet(
         ),
     ] = None,
     at: At = None,
+    wrap: Wrap = False,
     sun_hours: Annotated[
         bool, typer.Option("--sun-hours", help="Hours of direct sun in false colour, a row per day of a sun study.")
     ] = False,
@@ -75,11 +77,11 @@ def sheet(
         both: dict[str, Any] = {"cameras": cameras, "columns": columns, "width": width, "dry_run": dry_run}
         progress = screen.counter("drawing", "image")
         if sun_hours:
-            _refuse_beside_hours(light=light, at=at, side=side, exposure=exposure, sums=sums.any)
+            _refuse_beside_hours(light=light, at=at, side=side, exposure=exposure, wrap=wrap, sums=sums.any)
             made = make_sun_sheet(array, part, progress=progress, **both)
         else:
             more: dict[str, Any] = {"rows": rows, "exposure": exposure, "side": side, "at": at or (), "sums": sums}
-            made = make_sheet(array, part, light=light, progress=progress, **both, **more)
+            made = make_sheet(array, part, light=light, wrap=wrap, progress=progress, **both, **more)
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
     _print_made(made, file, f"would {'replace' if there else 'write'}" if dry_run else "", quiet or is_stdout(target))
