@@ -44,6 +44,11 @@ def agree(n: int, one: str, many: str) -> str:
     return one if n == 1 else many
 
 
+def digits(value: float, n: int) -> str:
+    """Write a number with n significant digits; large ones without an exponent: "47000", "0.68"."""
+    return f"{float(f'{value + 0.0:.{n}g}'):.12g}"
+
+
 def duration(seconds: float) -> str:
     """A time in one or two units: "3 h 05 min", "2 min 07 s", "12.3 s"."""
     if seconds < 60:

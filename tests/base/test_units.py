@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 from framearray_cli.base.forms import text as tomltext
-from framearray_cli.base.units import GIB, MIB, agree, amount, counted, gibibytes, in_unit_of, size
+from framearray_cli.base.units import GIB, MIB, agree, amount, counted, digits, gibibytes, in_unit_of, size
 
 
 @pytest.mark.parametrize(
@@ -23,6 +23,21 @@ from framearray_cli.base.units import GIB, MIB, agree, amount, counted, gibibyte
 )
 def test_bytes(n_bytes: int, texts: tuple[str, ...]) -> None:
     assert (size(n_bytes), gibibytes(n_bytes), amount(n_bytes)) == texts
+
+
+@pytest.mark.parametrize(
+    ("value", "n", "text"),
+    [
+        (47012.0, 4, "47010"),
+        (2.6337e6, 3, "2630000"),
+        (0.68, 4, "0.68"),
+        (-0.0, 3, "0"),
+        (1e-5, 2, "1e-05"),
+        (1e20, 3, "1e+20"),
+    ],
+)
+def test_large_numbers_have_no_exponent(value: float, n: int, text: str) -> None:
+    assert digits(value, n) == text
 
 
 def test_a_negative_amount_is_zero() -> None:

@@ -122,7 +122,7 @@ CASES = {
         camera=camera(((0, 0.5, -0.7), (0, 0.5, -2)), ((0.1, 0.5, -0.7), (0, 0.5, -2))),
     ),
     "a path that ends in a solid": case(
-        "camera 4-5: the eye is inside a solid",
+        "cameras 4-5: the eye is inside a solid",
         camera=camera((EYE, TARGET), ((0, 0.5, -0.9), (0, 0.5, -2))),
     ),
     "a path through a solid": case(
@@ -130,7 +130,7 @@ CASES = {
         camera=camera((EYE, TARGET), ((-1.5, 0.5, -1.7), (0, 0.9, -1.2)), frames=12),
     ),
     "a path through a thin wall": case(
-        "camera 2-3: the eye passes through a surface",
+        "cameras 2-3: the eye passes through a surface",
         '"White"',
         "add keys",
         scene={"wall": True},
@@ -158,7 +158,7 @@ CASES = {
         camera=camera(((0, 0.9, 1), (0, 5, 4)), frames=1),
     ),
     "a path that leaves the scene": case(
-        "camera 3-5: nothing is seen",
+        "cameras 3-5: nothing is seen",
         scene=OPEN,
         camera=camera(((0, 1.5, 1.7), TARGET), ((0, 1.5, 1.7), (0, 1.5, 5)), frames=6),
     ),

@@ -53,11 +53,16 @@ def load_toml(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise JobError(path, [_backslash_problem(text, str(error)) or f"not valid TOML: {error}"]) from error
+        raise JobError(path, [_backslash_problem(text, str(error)) or _worded(str(error))]) from error
     except RecursionError as error:
         raise JobError(path, ["tables or lists are nested too deeply"]) from error
     except ValueError as error:  # a number with more digits than Python reads
         raise JobError(path, ["a number has too many digits"]) from error
+
+
+def _worded(message: str) -> str:
+    """Describe what is no TOML by the words of Python's reader, but for a key that is there already."""
+    return f"not valid TOML: {message.replace('Cannot overwrite a value', 'a key is given a second time')}"
 
 
 def _backslash_problem(text: str, message: str) -> str | None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from framearray_cli.array.images.images import FOR_SCREENS
 from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.base.units import digits
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.job.job import Job
 
@@ -50,9 +51,10 @@ def level_warnings(views: Views, setup: FrameSetup, prepared: Prepared, counted:
     bad = (clipped > MOSTLY_CLIPPED) & counted[:, None]
     if place := _place(bad, counted, views, prepared, np.ones(bad.shape[1], np.bool_)):
         bright = values[np.broadcast_to(bad[:, None] & views.surface[..., None], values.shape)]
+        middle = float(np.median(bright))
         yield (
             f"{place}: {float(clipped[bad].mean()):.0%} of the pixels that see surfaces are clipped: the middle one "
-            f"has {float(np.median(bright)):.3g}, and a screen shows up to 1; {_advice(job, float(np.median(bright)))}"
+            f"has {digits(middle, 3)}, and a screen shows up to 1; {_advice(job, middle)}"
         )
     yield from _dark_warnings(views, setup, prepared, values, counted, named)
 
@@ -147,6 +149,6 @@ def _sky_warnings(views: Views, job: Job, values: Float32) -> Iterator[str]:
     background, surfaces = float(np.median(sky)), float(np.median(values[views.surface]))
     if background > BRIGHT_SKY and background > OUTSHINES * surfaces:
         yield (
-            f"scene.background: {background:.3g}, where surfaces have {surfaces:.3g} and a screen shows up to 1: only "
-            "outlines are seen; lower the background, or strengthen the light"
+            f"scene.background: {digits(background, 3)}, where surfaces have {digits(surfaces, 3)} and a screen shows "
+            "up to 1: only outlines are seen; lower the background, or strengthen the light"
         )

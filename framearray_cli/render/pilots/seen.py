@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
+from framearray_cli.base.units import agree, digits
 from framearray_cli.engine.frames.setup import FrameSetup
 
 from ..prepare import Prepared
@@ -33,10 +34,14 @@ def buried_eyes(views: Views) -> Flags:
 
 
 def eyes_text(flagged: Flags, views: Views, prepared: Prepared) -> str:
-    """Name eyes: "camera 12-31"; all of them without numbers."""
+    """Name eyes: "cameras 12-31"; all of them without numbers."""
     if prepared.still or prepared.n_cameras == 1:
         return "the camera"
-    return "every camera position" if flagged.all() else f"camera {runs_text(list(flagged), list(views.eyes))}"
+    return "every camera position" if flagged.all() else _cameras(flagged, views)
+
+
+def _cameras(flagged: Flags, views: Views) -> str:
+    return f"{agree(int(flagged.sum()), 'camera', 'cameras')} {runs_text(list(flagged), list(views.eyes))}"
 
 
 def empty_warnings(views: Views, prepared: Prepared) -> Iterator[str]:
@@ -70,7 +75,7 @@ def _where(prepared: Prepared, views: Views, flagged: Flags) -> str:
     low, high = bounds(prepared)
     eye = prepared.eyes.position[views.eyes[int(flagged.argmax())]]
     away = float(np.linalg.norm(eye - np.clip(eye, low, high)))
-    beside = f"{away:,.4g} scene units outside" if away > 0 else "inside"
+    beside = f"{digits(away, 4)} scene units outside" if away > 0 else "inside"
     return f"The scene reaches from {vector(low)} to {vector(high)}; the eye at {vector(eye)} is {beside}"
 
 
@@ -98,7 +103,7 @@ def crossing_warnings(setup: FrameSetup, prepared: Prepared) -> Iterator[str]:
         name = scene.material_names[int(scene.material[triangle])]
         more = f", and through others {len(found) - 1} times more" if len(found) > 1 else ""
         yield (
-            f"camera {frame}-{min(frame + 1, prepared.n_cameras - 1)}: the eye passes through a surface of material "
+            f"cameras {frame}-{min(frame + 1, prepared.n_cameras - 1)}: the eye passes through a surface of material "
             f'"{name}"{more}; add keys that lead around it'
         )
 
@@ -112,4 +117,4 @@ def bounds(prepared: Prepared) -> tuple[Float64, Float64]:
 
 def vector(values: Float64) -> str:
     """Write a point: "[0.2, 1.45, -0.68]"."""
-    return f"[{', '.join(f'{float(value) + 0.0:.4g}' for value in values)}]"
+    return f"[{', '.join(digits(float(value), 4) for value in values)}]"

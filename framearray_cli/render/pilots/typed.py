@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from framearray_cli.base.units import digits
 from framearray_cli.job.job import Job
 from framearray_cli.job.panel import PanelKey
 from framearray_cli.job.placed import DirectionalKey, PointKey
@@ -65,9 +66,9 @@ def range_warnings(job: Job, size: float, distances: "np.ndarray") -> Iterator[s
 
 def _short(length: float) -> str:
     """Return a length with three digits, without an exponent where it has few."""
-    return f"{float(f'{length:.3g}'):g}"
+    return digits(length, 3)
 
 
 def _good_range(size: float) -> str:
     """Return about a quarter of a length, with one digit."""
-    return f"{float(f'{size / 4:.1g}'):g}"
+    return digits(size / 4, 1)
