@@ -110,8 +110,12 @@ def open_embree(prepared: Prepared, engine: Engine = "auto") -> EmbreeScene:
     return EmbreeScene(prepared.scene, engine)
 
 
-def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambient]:
-    """Estimate the ambient light and build the setup of all frames."""
+def plan_work(prepared: Prepared, embree: EmbreeScene, *, compare: bool = True) -> tuple[FrameSetup, Ambient]:
+    """Estimate the ambient light and build the setup of all frames.
+
+    Args:
+        compare: whether to note how far light from cells is from that of paths.
+    """
     job, scene = prepared.job, prepared.scene
     cams = eye_cameras(prepared)
     background = np.array(job.scene.background, np.float32)
@@ -157,12 +161,12 @@ def plan_work(prepared: Prepared, embree: EmbreeScene) -> tuple[FrameSetup, Ambi
     if job.indirect.exact:
         return replace(setup, cells=no_cells(setup.lights, background), exact=True), ambient
     if job.indirect.method != "obscurance":
-        return _with_cells(prepared, embree, setup, ambient)
+        return _with_cells(prepared, embree, setup, ambient, compare=compare)
     return setup, ambient
 
 
 def _with_cells(
-    prepared: Prepared, embree: EmbreeScene, setup: FrameSetup, ambient: Ambient
+    prepared: Prepared, embree: EmbreeScene, setup: FrameSetup, ambient: Ambient, *, compare: bool
 ) -> tuple[FrameSetup, Ambient]:
     """Solve the light of all cells, and note how far it is from that of paths."""
     job = prepared.job
@@ -185,10 +189,9 @@ def _with_cells(
     local = work.local is not None
     started = time.perf_counter()
     with compile_clock() as clock:
-        eyes = _eye_walks(prepared, embree)
-        accuracy = (
-            None if local else compare_with_paths(built.cells, eyes, setup.obscurance, setup.depth, prepared.threads)
-        )
+        eyes, accuracy = _eye_walks(prepared, embree), None
+        if compare and not local:
+            accuracy = compare_with_paths(built.cells, eyes, setup.obscurance, setup.depth, prepared.threads)
     shared_s = built.shared_s + time.perf_counter() - started - clock.seconds
     notes = (accuracy_text(accuracy),) if accuracy else ()
     setup = replace(setup, cells=built.cells, smooth=0 if local else job.indirect.filter, local=local)

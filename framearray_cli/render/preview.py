@@ -23,6 +23,8 @@ SHRINK = 4  # of both sides
 LEAST_SIDE = 320  # pixels of the longer side, unless the job has fewer; a smaller picture shows too little
 HITS = 8  # per pixel; without neighbours in a window, noise is then hardly seen at this size
 WALKS = 4096  # for the ambient light, which is then known to some hundredths
+# Walks for cells: in one small picture under one light position, more change less than another seed does.
+CELL_SAMPLES = 2**16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +67,7 @@ def render_preview(job: Job, c: int, places: Mapping[str, int]) -> Preview:
     prepared = prepared_from(prepared.job, prepared.scene, all_eyes.at([c]), chosen)
     require_least_memory(prepared)
     with open_embree(prepared) as embree:
-        setup, ambient = plan_work(prepared, embree)
+        setup, ambient = plan_work(prepared, embree, compare=False)
         image = np.empty((1, setup.cams.height, setup.cams.width, 3), np.float32)
         with TracePool(setup, prepared.threads) as pool:
             window = Window(setup, ambient, pool)
@@ -86,6 +88,7 @@ def _small(job: Job) -> Job:
         samples=SamplesTable(hits=HITS, obscurance=job.samples.obscurance),
         reuse=changed(job.reuse, n_r=0),
         specular=changed(job.specular, hits=min(job.specular.hits, HITS)),
+        indirect=changed(job.indirect, samples=min(job.indirect.samples, CELL_SAMPLES)),
         ambient=changed(job.ambient, paths=paths),
     )
 

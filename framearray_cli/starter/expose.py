@@ -21,6 +21,7 @@ from .model import Start, table_of, validate_job
 PICTURES = 3  # eyes and light positions that are rendered, at most
 SIZE = (64, 48)  # pixels
 WALKS = 4096  # for the ambient light, which is then known to some hundredths
+CELL_SAMPLES = 2**15  # for cells that a few small pictures see
 HITS = 8  # per pixel; the mean of three pictures is then known to a hundredth
 CLIPPED = 0.03  # largest share of surface pixels that may clip
 LEAST, MOST = 1e-12, 1e12  # bounds of the factor
@@ -92,6 +93,7 @@ def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[F
     table = table_of(start)
     table["camera"]["resolution"] = list(SIZE)
     table |= {"samples": {"hits": HITS}, "reuse": {"n_r": 0}, "ambient": {"paths": WALKS}}
+    table["indirect"] |= {"samples": CELL_SAMPLES}
     job = validate_job(table, start.file)
     job_eyes, job_lights = eyes(job), lights(job)
     some = _spread_indices(job_eyes.n)
@@ -101,7 +103,7 @@ def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[F
     )
     # several eyes are rendered even if they coincide: their mean has less noise
     prepared = replace(prepared_from(job, scene, few_eyes, few_lights), still=few_eyes.n == 1)
-    setup, ambient = plan_work(prepared, embree)
+    setup, ambient = plan_work(prepared, embree, compare=False)
     shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
     found: list[Images] = []
     with TracePool(setup, prepared.threads) as pool:

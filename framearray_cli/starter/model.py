@@ -21,6 +21,7 @@ POWERS = {
     "spot": ("position", "intensity"),
 }
 SUN_ANGLE = 0.53  # degrees; of the sun, seen from the Earth
+INDIRECT = "cells"  # see docs/decisions/first-job.md
 DIGITS = 6  # significant digits of positions and directions; an error of a thousandth of a pixel
 ROUNDING = 1e-12  # of its longest component: shorter ones are 0
 
@@ -181,6 +182,7 @@ def table_of(start: Start) -> dict[str, Any]:
             "sources": [source_table(source) for source in start.sources],
         },
         "obscurance": {"range": start.range, "outside": start.outside},
+        "indirect": {"method": INDIRECT},
         "output": {"format": start.format},
     }
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from framearray_cli.base.forms.text import inline, inline_floats, quoted
 
-from .model import POWERS, SUN_ANGLE, Camera, LightSource, MaterialNote, Start, SunDay, source_keys
+from .model import INDIRECT, POWERS, SUN_ANGLE, Camera, LightSource, MaterialNote, Start, SunDay, source_keys
 
 MOST_STEPS_UP = 2  # largest number of leading ".." of a relative scene name; beyond, it is absolute
 COLUMN = 42  # of comments behind keys
@@ -53,6 +53,9 @@ def to_text(start: Start, job_file: Path) -> str:
             "[obscurance]",
             _line("range", f"{start.range:g}", "how far surfaces darken and colour each other, scene units"),
             _line("outside", quoted(start.outside), _outside(start)),
+            "",
+            "[indirect]",
+            _line("method", quoted(INDIRECT), 'all bounces of light; "obscurance": less true, half the time'),
             "",
             "[output]",
             _line("directory", quoted(f"out/{start.name}"), "relative to this file"),
