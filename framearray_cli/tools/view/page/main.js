@@ -200,7 +200,7 @@ class Page {
   showNumbers() {
     const { array, view } = this;
     const { nCameras, main } = array;
-    const time = main.times ? `, ${main.times[this.l]}` : "";
+    const time = main.times ? `, ${main.times[this.l].replace(" ", "\u00a0")}` : ""; // on one line
     const text = `camera ${view.c} of 0-${nCameras - 1}, ${main.name} ${this.l} of 0-${main.n - 1}${time}`;
     const [lacking, ranges] = array.contents.lacking;
     byId("lacking").hidden = !lacking;
