@@ -11,6 +11,7 @@ from framearray_cli.base.units import FARTHEST
 from .aimed import aim_problems, same_choice_problems
 from .keys import MOST_EYES, key_problems
 from .sourcetable import SourceTable
+from .units import PANEL_UNITS, UNITS_OF_PANELS, PanelUnits
 from .values import Colour, Direction, Emission, Point
 
 Length: TypeAlias = Annotated[float, Field(gt=0, le=FARTHEST)]
@@ -34,13 +35,14 @@ class PanelKey(Table):
     )
     power: Emission | None = Field(
         default=None,
-        description="Power of all its light, W; one number means white. Given at every key of a source, or `radiance`.",
+        description="Power of all its light, W unless `units` says otherwise; one number means white. Given at every "
+        "key of a source, or `radiance`.",
         json_schema_extra=default_text("by `radiance`"),
     )
     radiance: Emission | None = Field(
         default=None,
-        description="Radiance, W/(m2 sr), the same everywhere and to all sides; one number means white. A larger panel "
-        "shines more.",
+        description="Radiance, W/(m2 sr) unless `units` says otherwise, the same everywhere and to all sides; one "
+        "number means white. A larger panel shines more.",
         json_schema_extra=default_text("by `power`"),
     )
     color: Colour | None = Field(
@@ -111,11 +113,28 @@ class _PanelSource(SourceTable):
         default=False, description="Whether the back shines as the front does. The `power` is that of both sides."
     )
 
+    units: PanelUnits | None = Field(
+        default=None, description=PANEL_UNITS, json_schema_extra=default_text('"W" or "W/(m2 sr)"')
+    )
+
+    @model_validator(mode="after")
+    def _units_of_the_strength(self) -> "_PanelSource":
+        strength = "power" if self._keys[0].power is not None else "radiance"
+        known = UNITS_OF_PANELS[strength]
+        if self.units is not None and self.units not in known:
+            units = " or ".join(f'"{unit}"' for unit in known)
+            fail([(("units",), f'expected {units}, as the keys give `{strength}`, got "{self.units}"')])
+        return self
+
+    @property
+    def _keys(self) -> Sequence[PanelKey]:
+        keys: Sequence[PanelKey] = self.keys  # type: ignore[attr-defined]  # of the subclasses
+        return keys
+
     @property
     def count(self) -> int:
         """Number of light positions that the keys reach."""
-        last: int = self.keys[-1].frame  # type: ignore[attr-defined]  # of the subclasses
-        return last + 1
+        return self._keys[-1].frame + 1
 
 
 class RectSource(_PanelSource):

@@ -64,6 +64,7 @@ PANELS = [
     {
         "type": "rect",
         "two_sided": True,
+        "units": "cd/m2",
         "keys": [
             {"frame": 0, "position": [0, 1.9, 0], "direction": [0, -1, 0], "up": [1, 0, 0], "radiance": [3.0, 2.0, 1.0],
              "width": 0.5, "height": 0.2, "color": "2700 K"}

@@ -24,6 +24,10 @@ WRONG = [
       "keys[1].target: missing; keys[0] gives it, so every key of this list must"]),
     ({"type": "disc", "keys": [DISC | {"power": 1}, DISC | {"frame": 1, "radiance": 1}]},
      ["keys[1].power: missing; keys[0] gives it, so every key of this list must"]),
+    ({"type": "disc", "units": "cd/m2", "keys": [DISC | {"power": 1}]},
+     ['units: expected "W" or "lm", as the keys give `power`, got "cd/m2"']),
+    ({"type": "disc", "units": "lm", "keys": [DISC | {"radiance": 1}]},
+     ['units: expected "W/(m2 sr)" or "cd/m2", as the keys give `radiance`, got "lm"']),
 ]  # fmt: skip
 
 

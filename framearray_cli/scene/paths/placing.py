@@ -55,7 +55,7 @@ def place_source(job: Job, i: int, n: int, world_from_camera: Float64 | None) ->
         case SpotSource():
             return in_units(_place_spot(source, job, f"light.sources[{i}]", n), source)
         case RectSource() | DiscSource():
-            return _place_panel(source, job, f"light.sources[{i}]", n)
+            return in_units(_place_panel(source, job, f"light.sources[{i}]", n), source)
         case _:
             path = _interpolate(source.type, source.keys, n)
             if isinstance(source, PointSource) and source.ies:

@@ -1,29 +1,33 @@
 """Photometric units: lumens, candela and lux -> watts per steradian or square metre."""
 
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
+from framearray_cli.job.panel import DiscSource, RectSource
 from framearray_cli.job.placed import DirectionalSource, PointSource
 from framearray_cli.job.sources import SunSource
 from framearray_cli.job.spot import SpotSource
 
 from .lightpath import LightPath
 
+AnyPanel: TypeAlias = RectSource | DiscSource
 LUMENS_PER_WATT = 683.0  # of light of 555 nm, by the definition of the candela; renderers take it for all light
 
 
-def in_units(path: LightPath, source: PointSource | DirectionalSource | SpotSource | SunSource) -> LightPath:
+def in_units(path: LightPath, source: PointSource | DirectionalSource | SpotSource | SunSource | AnyPanel) -> LightPath:
     """Turn the strengths of a source from the units of its job into W/sr or W/m2.
 
     Lumens are those of all light that the lamp sends out: its intensity in candela is their number over the solid
     angle that would send out as much if it were lit evenly. What a file says of a lamp is in W/sr already.
     """
     own = isinstance(source, PointSource | SpotSource) and source.keys[0].intensity is None
-    if own or source.units in (None, "W/sr", "W/m2"):
+    if own or source.units in (None, "W/sr", "W/m2", "W", "W/(m2 sr)"):
         return path
-    per_unit = 1 / LUMENS_PER_WATT / (_solid_angles(path) if source.units == "lm" else np.ones(len(path.vector)))
+    by_angle = source.units == "lm" and path.panel is None  # a panel's are of its power, not of an intensity
+    per_unit = 1 / LUMENS_PER_WATT / (_solid_angles(path) if by_angle else np.ones(len(path.vector)))
     return replace(path, intensity=path.intensity * per_unit[:, None])
 
 

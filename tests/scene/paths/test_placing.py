@@ -96,6 +96,17 @@ def test_the_strength_of_a_panel_is_that_along_its_normal() -> None:
     assert path(type="rect", keys=[RECT | aim | {"power": 1}]).table(0)["across"] == [1.0, 0.0, 0.0]
 
 
+@pytest.mark.parametrize(
+    ("strength", "units", "per_unit"),
+    [("power", "W", 1), ("power", "lm", 1 / 683), ("radiance", "W/(m2 sr)", 1), ("radiance", "cd/m2", 1 / 683)],
+)
+def test_a_panel_has_photometric_units(strength: str, units: str, per_unit: float) -> None:
+    """The light of a panel is its power, pi times the intensity along its normal, and its area is 1."""
+    keys = [RECT | {"frame": 0, "direction": [0, -2, 0], strength: 3.0}]
+    found = path(type="rect", units=units, keys=keys).intensity[0]
+    np.testing.assert_allclose(found, 3 * per_unit / (np.pi if strength == "power" else 1))
+
+
 def test_a_panel_changes_size_and_strength_along_its_keys() -> None:
     keys = [
         RECT | {"frame": 2 * k, "target": [2 * k, 0, 0], "radiance": 2 + 2 * k, "width": 1.0 + 2 * k} for k in (0, 1)
