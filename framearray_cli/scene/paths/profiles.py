@@ -80,7 +80,12 @@ class Profile:
 
     def table(self, l: int) -> dict[str, Any]:
         """Describe the profile at position l as the manifest does."""
-        return {"type": "spot", "ies": self.file, "direction": self.axis[l].tolist(), "up": self.zero[l].tolist()}
+        return {
+            "type": "spot",
+            "ies": self.file,
+            "direction": (self.axis[l] + 0.0).tolist(),
+            "up": (self.zero[l] + 0.0).tolist(),
+        }
 
     def at(self, positions: list[int]) -> "Profile":
         """Return the profile at some of its positions, in their order."""

@@ -182,3 +182,26 @@ def test_angles_are_exact_to_single_precision() -> None:
         found = np.array([angle_of(b, a) for a, b in zip(x, y, strict=True)])
         np.testing.assert_allclose(found, np.arctan2(y.astype(float), x.astype(float)), atol=4e-7)
     assert angle_of(np.float32(0), np.float32(0)) == 0
+
+
+@pytest.mark.parametrize("name", ["whole", "floodlight"])
+def test_all_light_of_a_lamp_arrives_at_the_walls_around_it(name: str) -> None:
+    """The integral of the irradiance over a closed box is the lamp's flux: the closed form, and that of particles."""
+    source, n = lamp(WEBS[name], n=1), 20_000
+    lights = arrays(source)
+    total, variance = 0.0, 0.0
+    for axis in range(3):
+        for side in (-2.0, 2.0):  # around a lamp at a height of 1
+            places, normal = RNG.uniform(-2, 2, (n, 3)), np.zeros(3)
+            places[:, axis], normal[axis] = side, -np.sign(side)
+            hits = points(n, (0, 0, 0), normal)
+            hits.position[:] = np.add(places, (0, 1, 0))
+            out = np.full((n, 1, 1), np.nan, np.float32)
+            with EmbreeScene(tiny.scene_of(FAR)) as embree:
+                direct(hits, n, lights, embree.tracer, room_for_tests(4096, 1), out, True)
+            total += 16 * float(out.mean(dtype=np.float64))
+            variance += 16**2 * float(out.var(dtype=np.float64)) / n
+    wanted = WEBS[name].flux
+    assert emitted_power(lights, 0, 1.0)[0] == pytest.approx(wanted)
+    assert abs(total - wanted) < 3 * variance**0.5 + 1e-4 * wanted
+    assert variance**0.5 < 0.01 * wanted
