@@ -11,8 +11,9 @@ from support.program import names, run, write_job
 from support.tiny import SUN, TABLE, WALK
 
 from framearray_cli.array.images.images import read_image
+from framearray_cli.engine.terms.cells.build import build_cells
 from framearray_cli.job.read import read_job
-from framearray_cli.render.preview import render_preview
+from framearray_cli.render.preview import CELL_SAMPLES, render_preview
 
 LAMP = TABLE["light"]["sources"][0]
 LARGE = WALK | {"resolution": [640, 160]}
@@ -36,6 +37,28 @@ def test_it_shows_what_the_array_will_show(tmp_path, capsys):
     other = read_image(tmp_path / "out" / "tiny.c0003.l000.exr")
     assert np.corrcoef(picture.ravel(), other.ravel())[0, 1] < np.corrcoef(picture.ravel(), image.ravel())[0, 1]
     assert names(tmp_path / "out") == before
+
+
+def test_light_from_cells_is_shown_with_fewer_samples(tmp_path, capsys, monkeypatch):
+    """As bright as the array, in which cells have as many samples as the job says."""
+    cells = {"method": "cells", "samples": 2**17, "filter": 0}
+    job = write_job(tmp_path, samples={"hits": 64}, indirect=cells, output={"format": "exr"})
+    assert run(capsys, "render", "-q", job).code == 0
+    built = []
+
+    def count(work):
+        built.append(work.count)
+        return build_cells(work)
+
+    monkeypatch.setattr("framearray_cli.render.prepare.build_cells", count)
+    picture = render_preview(read_job(job), 0, {"light": 1}).image
+    assert built == [CELL_SAMPLES] and cells["samples"] > CELL_SAMPLES
+    image = read_image(tmp_path / "out" / "tiny.c0000.l001.exr")
+    assert abs(picture.mean() / image.mean() - 1) < 0.05
+    few = job.read_text().replace(str(2**17), "2048")
+    job.write_text(few)
+    render_preview(read_job(job), 0, {"light": 1})
+    assert built == [CELL_SAMPLES, 2048]
 
 
 def test_it_lies_beside_the_folder_and_is_replaced(tmp_path, capsys):
