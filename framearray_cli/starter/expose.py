@@ -93,7 +93,8 @@ def _render_radiance(start: Start, scene: Scene, embree: EmbreeScene) -> tuple[F
     table = table_of(start)
     table["camera"]["resolution"] = list(SIZE)
     table |= {"samples": {"hits": HITS}, "reuse": {"n_r": 0}, "ambient": {"paths": WALKS}}
-    table["indirect"] |= {"samples": CELL_SAMPLES}
+    if table["indirect"]["method"] == "cells":
+        table["indirect"] |= {"samples": CELL_SAMPLES}
     job = validate_job(table, start.file)
     job_eyes, job_lights = eyes(job), lights(job)
     some = _spread_indices(job_eyes.n)
