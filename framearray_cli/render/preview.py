@@ -1,7 +1,7 @@
 """One picture of an array, small and with few hits: a first look at a job, within seconds."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.method import SamplesTable
 from framearray_cli.job.sourcetable import MAIN_AXIS
 from framearray_cli.scene.paths.paths import Lights, eyes, lights, lights_without_groups
-from framearray_cli.scene.paths.placing import LightPath
 
 from .automatic.choose import require_least_memory
 from .prepare import Prepared, open_embree, plan_work, prepare, prepared_from
@@ -63,8 +62,7 @@ def render_preview(job: Job, c: int, places: Mapping[str, int]) -> Preview:
     """
     all_eyes, all_lights = eyes(job), lights(job)
     prepared = prepare(_small(job))
-    chosen = lights_without_groups([_at(all_lights, i, places) for i in range(len(all_lights.sources))])
-    prepared = prepared_from(prepared.job, prepared.scene, all_eyes.at([c]), chosen)
+    prepared = prepared_from(prepared.job, prepared.scene, all_eyes.at([c]), lights_of_preview(all_lights, places))
     require_least_memory(prepared)
     with open_embree(prepared) as embree:
         setup, ambient = plan_work(prepared, embree, compare=False)
@@ -93,9 +91,11 @@ def _small(job: Job) -> Job:
     )
 
 
-def _at(lights: Lights, i: int, places: Mapping[str, int]) -> LightPath:
-    """Return source i at one light position."""
-    group = next((group for group in lights.groups if i in group.sources), None)
-    row = places[MAIN_AXIS] if group is None else group.positions.start + places[group.axis]
-    source = lights.sources[i]
-    return replace(source, vector=source.vector[[row]], intensity=source.intensity[[row]], notes=())
+def lights_of_preview(lights: Lights, places: Mapping[str, int]) -> Lights:
+    """Return all sources at one light position along each axis, without groups."""
+
+    def row(i: int) -> int:
+        group = next((group for group in lights.groups if i in group.sources), None)
+        return places[MAIN_AXIS] if group is None else group.positions.start + places[group.axis]
+
+    return lights_without_groups([source.at([row(i)]) for i, source in enumerate(lights.sources)])

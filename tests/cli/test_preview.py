@@ -7,13 +7,16 @@ from pathlib import Path
 import numpy as np
 import PIL.Image
 import pytest
+from support.iesfiles import ies
 from support.program import names, run, write_job
 from support.tiny import SUN, TABLE, WALK
 
 from framearray_cli.array.images.images import read_image
+from framearray_cli.engine.inputs.lights import light_arrays, some_lights
 from framearray_cli.engine.terms.cells.build import build_cells
 from framearray_cli.job.read import read_job
-from framearray_cli.render.preview import CELL_SAMPLES, render_preview
+from framearray_cli.render.preview import CELL_SAMPLES, lights_of_preview, render_preview
+from framearray_cli.scene.paths.paths import lights
 
 LAMP = TABLE["light"]["sources"][0]
 LARGE = WALK | {"resolution": [640, 160]}
@@ -59,6 +62,26 @@ def test_light_from_cells_is_shown_with_fewer_samples(tmp_path, capsys, monkeypa
     job.write_text(few)
     render_preview(read_job(job), 0, {"light": 1})
     assert built == [CELL_SAMPLES, 2048]
+
+
+def test_lights_of_every_shape_are_taken_at_one_position(tmp_path):
+    """A sphere, a spot, a rectangle and a measured lamp, which all change from one position to the next."""
+    (tmp_path / "lamp.ies").write_text(ies())
+    keys = [{"frame": 0, "position": [0.1, 1.5, 0]}, {"frame": 4, "position": [0.5, 1.2, 0.2]}]
+    strong = [key | {"intensity": 3.0 + key["frame"]} for key in keys]
+    aimed = [key | {"target": [0.3, 0.1 * key["frame"], 0]} for key in strong]
+    flat = [key | {"direction": [0, -1, 0.2 * key["frame"]], "width": 0.3, "height": 0.2, "power": 2.0} for key in keys]
+    sources = [
+        {"type": "point", "keys": [key | {"radius": 0.1 + 0.01 * key["frame"]} for key in strong]},
+        {"type": "spot", "keys": [key | {"inner": 5, "outer": 20 + key["frame"]} for key in aimed]},
+        {"type": "rect", "keys": flat},
+        {"type": "spot", "keys": aimed, "ies": "lamp.ies"},
+    ]
+    whole = lights(read_job(write_job(tmp_path, light={"frames": 5, "sources": sources})))
+    wanted, centre = some_lights(light_arrays(whole, np.zeros(3)), [3]), np.zeros(3)
+    for one, other in zip(wanted, light_arrays(lights_of_preview(whole, {"light": 3}), centre), strict=True):
+        for a, b in zip(one, other, strict=True) if isinstance(one, tuple) else ((one, other),):
+            assert np.array_equal(a, b)
 
 
 def test_it_lies_beside_the_folder_and_is_replaced(tmp_path, capsys):
