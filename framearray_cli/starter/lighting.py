@@ -43,7 +43,10 @@ def add_lights(site: Site, start: Start, stage: Stage, options: StartOptions, en
         return _with_groups(_under_the_sun(site, start, options, ends, options.sun), options)
     sources, n = convert_lights(stage, options.lights)
     if sources:
-        own = replace(start, sources=sources, light_frames=n, about=(*start.about, "The file brings its own lights."))
+        brings = "The file brings its own lights."
+        if n == 1 and (options.lights or 1) > 1:
+            brings = f"{brings} They stand still: one light position; a second key in the job makes a light move."
+        own = replace(start, sources=sources, light_frames=n, about=(*start.about, brings))
         if (factors := find_factors(own, site.probe.scene, site.probe.embree)) is not None:
             return _with_groups(_scale_lights(own, *factors), options)
         dark = "The lights of the file light nothing that its pictures show, so others were chosen."

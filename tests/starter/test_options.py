@@ -51,6 +51,12 @@ def test_every_source_of_the_file_is_a_group_with_a_name_of_its_own(tmp_path: Pa
     assert all(source.group is None for source in read_first_job_again(tmp_path).light.sources)
 
 
+def test_lights_at_rest_have_one_position_whatever_is_asked_for(tmp_path: Path) -> None:
+    start = init(lit_wall().save(tmp_path / "scene.glb"), tmp_path / "job.toml", StartOptions(frames=2, lights=12))
+    assert start.light_frames == 1
+    assert any("They stand still: one light position" in line for line in start.about)
+
+
 def test_a_name_keeps_its_letters_without_their_accents(tmp_path: Path) -> None:
     scene = lit_wall().save(tmp_path / "scene.glb")
     assert init(scene, tmp_path / "Wohnung Süd.toml", StartOptions(frames=2)).name == "Wohnung-Sud"
