@@ -29,7 +29,7 @@ class Cluster:
         self.scheduler = self._run("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
         self.workers: list[subprocess.Popen[bytes]] = []
         end = time.monotonic() + 60
-        while not self._file.exists():
+        while not (self._file.exists() and self._file.read_bytes().endswith(b"}")):  # it is there before it is written
             assert self.scheduler.poll() is None and time.monotonic() < end
             time.sleep(0.02)
         self.address = str(json.loads(self._file.read_text())["address"])
