@@ -10,7 +10,6 @@ import pytest
 from numba import types
 from numba.core import codegen
 
-from framearray_cli.engine.kernels import cache as kernelcache
 from framearray_cli.engine.kernels import start
 from framearray_cli.engine.kernels.kernel import kernel, step
 
@@ -23,15 +22,6 @@ import scipy
 from framearray_cli.engine.terms.mirrors import count_mirrors
 print(sorted(order.tolist()) == list(range(16)), loaded)
 """
-
-
-@pytest.fixture
-def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """An empty folder for kernels; later tests find theirs again."""
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    kernelcache.kernel_folder.cache_clear()
-    yield tmp_path
-    kernelcache.kernel_folder.cache_clear()
 
 
 def doubled(x: int) -> int:

@@ -3,10 +3,13 @@
 from typing import Any
 
 import numpy as np
+import pytest
 from numba.core import untyped_passes
 
 from framearray_cli.engine.kernels import pipeline, start
 from framearray_cli.engine.kernels.kernel import inlined, kernel
+
+pytestmark = pytest.mark.usefixtures("own_cache")  # what an earlier run compiled counts for nothing
 
 SCALE = 3
 
