@@ -5,23 +5,16 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.hits import points
+from support.irradiance import FAR, N, P, arrays, hits_at, lit
 
 from framearray_cli.engine.embree import EmbreeScene
-from framearray_cli.engine.hits.hits import Hits
 from framearray_cli.engine.hits.rays import room_for_tests
-from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
+from framearray_cli.engine.inputs.lights import some_lights
 from framearray_cli.engine.inputs.shapes import emitted_power, emitted_ray, source_point
-from framearray_cli.engine.terms.direct import direct
 from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
 from framearray_cli.scene.paths.panels import Panel
-from framearray_cli.scene.paths.paths import lights_without_groups
 from framearray_cli.scene.paths.placing import LightPath
-from framearray_cli.scene.scene import Scene
 
-P, UP = np.array([0.3, 0.1, -0.2]), (0.0, 1.0, 0.0)
-N = 40_000
-FAR = np.concatenate([tiny.box((90, -21, -1), (91, -20, 1)), tiny.box((-91, 20, -1), (-90, 21, 1))])
 RNG = np.random.default_rng(6)
 # Middles from P, and normals: in front of P, beside it, near, far, partly below its horizon, tilted.
 MIDDLES = np.array([(0, 1.5, 0), (1.2, 0.8, 0.3), (-0.3, 0.7, 0.4), (2, 6, -3), (1.5, 0.2, 0), (-1, 2, 1)])
@@ -40,25 +33,6 @@ def panel(
     return LightPath(
         kind="point", vector=np.add(P, middles), intensity=np.tile(shape.area[:, None], (1, 3)), panel=shape
     )
-
-
-def arrays(*sources: LightPath) -> LightArrays:
-    return light_arrays(lights_without_groups(sources), np.zeros(3))
-
-
-def hits_at(place: Any = P, n: int = N) -> Hits:
-    hits = points(n, place, UP)
-    hits.key[:] = np.arange(n)
-    return hits
-
-
-def lit(hits: Hits, lights: LightArrays, scene: Scene | None = None, neighbours: bool = True) -> Any:
-    """Irradiance (n, n_lights) in float64."""
-    n = len(hits.kind)
-    out = np.full((n, 1, lights.n_lights), np.nan, np.float32)
-    with EmbreeScene(scene or tiny.scene_of(FAR)) as embree:
-        direct(hits, n, lights, embree.tracer, room_for_tests(4096, lights.n_lights), out, neighbours)
-    return out[:, 0].astype(np.float64)
 
 
 def outline(source: LightPath, l: int, parts: int = 4000) -> Any:

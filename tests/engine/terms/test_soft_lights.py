@@ -6,24 +6,17 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.hits import points
+from support.irradiance import FAR, N, P, arrays, hits_at, lit
 
 from framearray_cli.engine.embree import EmbreeScene
-from framearray_cli.engine.hits.hits import Hits
 from framearray_cli.engine.hits.rays import room_for_tests
-from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
+from framearray_cli.engine.inputs.lights import some_lights
 from framearray_cli.engine.inputs.shapes import source_point
-from framearray_cli.engine.terms.direct import direct
 from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
-from framearray_cli.scene.paths.paths import lights_without_groups
 from framearray_cli.scene.paths.placing import LightPath
-from framearray_cli.scene.scene import Scene
 
-P, UP = np.array([0.3, 0.1, -0.2]), (0.0, 1.0, 0.0)
 LAMPS = np.array([(0.2, 1.5, 0.3), (2.0, 0.9, 0.1), (-1.0, 3.0, 1.0), (0.3, 1.1, -0.2)] * 4)
 WAYS = np.array([(0.0, -1.0, 0.0), (1.0, -1.0, 0.2), (1.0, -0.3, 0.5), (-0.2, -1.0, 0.9)] * 4)
-N = 40_000
-FAR = np.concatenate([tiny.box((90, -21, -1), (91, -20, 1)), tiny.box((-91, 20, -1), (-90, 21, 1))])
 
 
 def lamps(radius: float, positions: Any = LAMPS) -> LightPath:
@@ -36,26 +29,7 @@ def suns(angle: float, ways: Any = WAYS) -> LightPath:
     return LightPath(kind="directional", vector=unit, intensity=np.ones((len(unit), 3)), size=np.full(len(unit), angle))
 
 
-def arrays(*sources: LightPath) -> LightArrays:
-    return light_arrays(lights_without_groups(sources), np.zeros(3))
-
-
 NO_PANELS = arrays(lamps(1.0))
-
-
-def hits_at(place: Any = P, n: int = N, first: int = 0) -> Hits:
-    hits = points(n, place, UP)
-    hits.key[:] = np.arange(first, first + n)
-    return hits
-
-
-def lit(hits: Hits, lights: LightArrays, scene: Scene | None = None, neighbours: bool = True) -> Any:
-    """Irradiance (n, n_lights) in float64."""
-    n = len(hits.kind)
-    out = np.full((n, 1, lights.n_lights), np.nan, np.float32)
-    with EmbreeScene(scene or tiny.scene_of(FAR)) as embree:
-        direct(hits, n, lights, embree.tracer, room_for_tests(4096, lights.n_lights), out, neighbours)
-    return out[:, 0].astype(np.float64)
 
 
 def twin(kind: str, vector: Any, size: float, q: Any) -> tuple[Any, float]:
