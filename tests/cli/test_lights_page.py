@@ -18,6 +18,7 @@ from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.cli.main import app
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
+from framearray_cli.job.sources import DomeSource
 from framearray_cli.scene.paths.domes import dome_directions
 from framearray_cli.scene.paths.paths import lights
 
@@ -58,7 +59,9 @@ def test_a_dome_of_96_lamps_is_one_source(tmp_path: Path) -> None:
     job = job_with(tmp_path, example('type = "dome"'))
     (dome,) = lights(job).sources
     assert (job.light.frames, len(dome.vector)) == (96, 96)
-    np.testing.assert_allclose(np.linalg.norm(dome.vector - job.light.sources[0].target, axis=1), 2.0)  # type: ignore[union-attr]
+    source = job.light.sources[0]
+    assert isinstance(source, DomeSource)
+    np.testing.assert_allclose(np.linalg.norm(dome.vector - source.target, axis=1), 2.0)
     lines = '[[light.sources]]\ntype = "dome"\npositions = 96\nirradiance = 3.0\n'
     assert job_with(tmp_path, lines).light.frames == 96, "a table with three keys"
 

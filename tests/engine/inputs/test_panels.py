@@ -35,11 +35,16 @@ def panel(
     )
 
 
+def shape_of(source: LightPath) -> Panel:
+    assert source.panel is not None
+    return source.panel
+
+
 def outline(source: LightPath, l: int, parts: int = 4000) -> Any:
     """Corners of a panel, seen from P; a disc is a polygon of as much area."""
-    a, b = (axes[l] for axes in source.panel.half_axes)  # type: ignore[union-attr]  # it is a panel
+    a, b = (axes[l] for axes in shape_of(source).half_axes)
     middle = source.vector[l] - P
-    if not source.panel.round:  # type: ignore[union-attr]
+    if not shape_of(source).round:
         return middle + np.array([-a - b, a - b, a + b, b - a])
     turn = 2 * np.pi * np.arange(parts) / parts
     wider = np.sqrt(2 * np.pi / parts / np.sin(2 * np.pi / parts))
@@ -102,10 +107,10 @@ def test_each_hit_has_the_light_of_the_point_that_it_draws(width: float, height:
             angle = np.pi / 4 * other / radius
             at = radius * np.array([np.cos(angle), np.sin(angle)])[:: -1 if steep else 1]
         for l in range(len(MIDDLES)):
-            a, b = (axes[l] for axes in source.panel.half_axes)  # type: ignore[union-attr]
+            a, b = (axes[l] for axes in shape_of(source).half_axes)
             way = MIDDLES[l] + at[0] * a + at[1] * b
             d = np.linalg.norm(way)
-            cosines = max(way[1] / d, 0) * max(-way @ source.panel.axis[l] / d, 0)  # type: ignore[union-attr]
+            cosines = max(way[1] / d, 0) * max(-way @ shape_of(source).axis[l] / d, 0)
             expected = source.intensity[l, 0] * cosines / d**2
             assert found[i, l] == pytest.approx(expected, rel=2e-4, abs=2e-5)
 
@@ -190,9 +195,9 @@ def test_particles_start_on_the_panel_and_carry_its_power(width: float, height: 
     assert emitted_power(lights, 0, 1.0)[l] == pytest.approx(np.pi * (1 + two_sided))
     rays = np.array([emitted_ray(lights, 0, l, 1.0, *numbers) for numbers in RNG.random((n, 4))])
     from_middle, direction = rays[:, :3] - source.vector[l], rays[:, 3:]
-    a, b = (axes[l] for axes in source.panel.half_axes)  # type: ignore[union-attr]
-    x, y, height_above = from_middle @ a / (a @ a), from_middle @ b / (b @ b), direction @ source.panel.axis[l]  # type: ignore[union-attr]
-    assert np.abs(from_middle @ source.panel.axis[l]).max() < 1e-3  # type: ignore[union-attr]
+    a, b = (axes[l] for axes in shape_of(source).half_axes)
+    x, y, height_above = from_middle @ a / (a @ a), from_middle @ b / (b @ b), direction @ shape_of(source).axis[l]
+    assert np.abs(from_middle @ shape_of(source).axis[l]).max() < 1e-3
     along = (x + 1) / 2 if width else x**2 + y**2
     sideways = (y + 1) / 2 if width else np.arctan2(y, x) / (2 * np.pi) % 1
     np.testing.assert_allclose(np.linalg.norm(direction, axis=1), 1, atol=1e-5)
