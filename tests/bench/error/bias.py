@@ -21,7 +21,7 @@ from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.engine.inputs.cameras import Cameras
 
 from .camera_paths import CAMERAS, MIDDLE, N_R, seen_by
-from .regions import Mask, regions
+from .regions import Mask, edges_of_shadows, regions
 from .squares import products, squares
 
 PLACES = (0.4, 0.6)  # of the camera path
@@ -33,8 +33,9 @@ EPSILON = 0.01  # of relative squares: (I - R)^2 / (R^2 + EPSILON)
 USUAL = 2  # native hits per pixel and frame, as in jobs
 # Times as many runs as the cabin needs: patches of sunlight make most of the noise.
 MORE = {"kitchen": 9, "stairs": 2, "cabin": 1}
-# Parts of a picture beside those of `regions`: all of it, and all of it with relative squares.
+# Parts of a picture beside those of `regions`: all of it, all of it with relative squares, and edges of shadows.
 WHOLE, RELATIVE = "all", "relative"
+SHADOWS = "shadow edges"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,16 +141,19 @@ def _add_frame(case: Case, c: int, camera: str, plan: Plan, sums: Sums) -> None:
     right, geometry = reference(case, cams, plan.parts)
     scale = right.mean(axis=(0, 2, 3, 4))[:, None, None, None]  # the mean of each picture
     dark = 1 / np.sqrt(np.square(right.mean(axis=0)) + EPSILON)
-    masks: Mapping[str, Mask] = {}
+    masks: dict[str, Mask] = {}  # (h, w), or (n_lights, h, w)
     for hits in sorted(plan.hits, key=lambda hits: hits != USUAL):  # it shows first which pixels rest on few hits
         for weights in reversed(WEIGHTS):
             images, share = runs(case, cams, weights, hits, plan.seeds(weights, hits))
-            masks = masks or regions(*geometry, share, cams, MIDDLE, N_R)
+            if not masks:
+                masks = dict(regions(*geometry, share, cams, MIDDLE, N_R))
+                masks[SHADOWS] = edges_of_shadows(right.mean(axis=0), *geometry)
             sums.add(weights, hits, WHOLE, images / scale, right / scale)
             sums.add(weights, hits, RELATIVE, images * dark, right * dark)
             for part, mask in masks.items():
                 if mask.any():
-                    sums.add(weights, hits, part, (images / scale)[:, :, mask], (right / scale)[:, :, mask])
+                    where = np.broadcast_to(mask, right.shape[1:4])
+                    sums.add(weights, hits, part, (images / scale)[:, where], (right / scale)[:, where])
 
 
 def reference(case: Case, cams: Cameras, parts: int) -> tuple[Float32, tuple[Float32, Float32, Float32]]:

@@ -10,7 +10,7 @@ from bench.core.markdown import grid, number, percent
 from bench.core.plots import draw_bias
 from bench.core.results import Site, Table, folder, load, site_for
 
-from .bias import EPSILON, LIGHTS, OWN, RELATIVE, USUAL, WHOLE
+from .bias import EPSILON, LIGHTS, OWN, RELATIVE, SHADOWS, USUAL, WHOLE
 from .camera_paths import CAMERAS, CLOSE, N_R, NEARER, SPEED
 
 ALLOWED = 3  # standard errors that a bound leaves to chance
@@ -37,17 +37,23 @@ Ambient light, average reflectivity and light positions are the same in runs and
 """
 
 BY_AREA = f"""
-Weights `area` ([note](../decisions/area-weights.md)) beside `balance`, in the whole picture and in three of its parts
-(see below); {USUAL} hits per pixel and frame.
+Weights `area` ([note](../decisions/area-weights.md)) beside the others, in the whole picture and in four of its parts
+(see below); {USUAL} hits per pixel and frame. *RMSE*: of one run of `area`; *of it bias*: the share of its square that
+is bias.
 """
-BESIDE = ("silhouettes", "textures", "disocclusions")
+AREA_BLURS = """
+So with few hits `area` has a bias that `balance` has not. Hits beyond the border of a pixel stand for cells along it,
+which blurs edges and textures by a fraction of the distance between hits.
+"""
+BESIDE = ("silhouettes", "textures", SHADOWS, "disocclusions")
 
 BY_PART = f"""
 With {USUAL} hits. *Silhouettes*: inverse depth bends by 5 % or normals part by 18 degrees between neighbours.
 *Textures*: reflectivity steps by 0.03. *Grazing angles*: more than 75.5 degrees from the normal. *Frame edges*: where
 the picture of another eye of the window ends. These three exclude silhouettes. *Disocclusions*: pixels that rest on
-fewer than 70 % of the hits that they would have if every eye of the window saw them; they may be silhouettes.
-*Share*: of the pixels.
+fewer than 70 % of the hits that they would have if every eye of the window saw them; they may be silhouettes. *Shadow
+edges*: under each light position the pixels where light jumps, but neither normal nor depth does; they may also be in
+any other part. *Share*: of the pixels.
 """
 
 BY_HITS = """
@@ -142,12 +148,15 @@ def _by_area(found: Mapping[tuple[str, str], Table]) -> list[str]:
     rows = []
     for (job, camera), table in found.items():
         for part in (WHOLE, *BESIDE):
-            both = [row_of(table, weights, USUAL, part) for weights in ("balance", "area")]
-            if balance_and_area := [row for row in both if row]:
-                name = f"{job}, {camera}" if part == WHOLE else part
-                rows.append([name, *(_millionths(row) for row in balance_and_area), _root(balance_and_area[-1])])
-    rows = [row for row in rows if len(row) == 4]  # results of the time before weights by area have three cells
-    return ["## Weights by area", BY_AREA, grid(["", "`balance`", "`area`", "root"], rows)] if rows else []
+            all_three = [row_of(table, weights, USUAL, part) for weights in ("average", "balance", "area")]
+            three = [row for row in all_three if row]
+            if len(three) == len(all_three):  # results of the time before weights by area have two
+                name, area = (f"{job}, {camera}", three[-1]) if part == WHOLE else (part, three[-1])
+                square = area["bias"] + area["variance"]
+                cells = [percent(math.sqrt(square), 3), percent(max(area["bias"], 0.0) / square, 2)]
+                rows.append([name, str(area["runs"]), *(_millionths(row) for row in three), *cells])
+    head = ["", "runs", "`average`", "`balance`", "`area`", "RMSE", "of it bias"]
+    return ["## Weights by area", BY_AREA, grid(head, rows), AREA_BLURS] if rows else []
 
 
 def _by_part(found: Mapping[tuple[str, str], Table]) -> list[str]:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Float32, Float64
 from framearray_cli.engine.inputs.cameras import Cameras
+from framearray_cli.report.metrics import shadow_edges
 
 Mask: TypeAlias = NDArray[np.bool_]
 
@@ -17,6 +18,7 @@ BEND, COSINE = 0.05, 0.95
 STEP = 0.03
 GRAZING = 0.25  # cosine between normal and direction to the eye, below which a surface is seen at a grazing angle
 BORDER = 1.5  # pixels from where another eye's picture ends
+DARK = 0.02  # the least reflectivity that radiance is divided by, to find light
 FEW = 0.7  # of the hits that a pixel would rest on if every eye of its window saw its surface
 
 
@@ -42,6 +44,16 @@ def regions(
     }
     found["the rest"] = ~np.logical_or.reduce(list(found.values()))
     return found
+
+
+def edges_of_shadows(images: Float32, normal: Float32, depth: Float32, reflectivity: Float32) -> Mask:
+    """Pixels where light jumps under each light position, but neither normal nor depth does, (n_lights, h, w).
+
+    Args:
+        images: (n_lights, h, w, 3), with little noise; the others as in `regions`.
+    """
+    light = images.mean(axis=-1) / np.maximum(reflectivity.mean(axis=-1), DARK)
+    return np.stack([shadow_edges(one, normal, depth) for one in light])
 
 
 def _looks(cams: Cameras, c: int) -> Float64:

@@ -4,7 +4,7 @@ import numpy as np
 
 from framearray_cli.engine.inputs.cameras import Cameras
 
-from .regions import regions
+from .regions import edges_of_shadows, regions
 
 H, W, F = 40, 60, 50.0
 
@@ -67,3 +67,16 @@ def test_frame_edges_are_where_the_picture_of_another_eye_ends():
     depth[:] = 0  # an infinitely far point lies in one direction from both
     found = regions(normal, depth, reflectivity, np.ones((H, W)), cams, 0, 1)["frame edges"]
     assert np.flatnonzero(found[H // 2]).tolist() == [0, W - 1]
+
+
+def test_edges_of_shadows_are_where_light_jumps_but_nothing_else():
+    normal, depth, reflectivity = floor_and_wall()
+    reflectivity[:, :20] = 0.25  # a texture, which is no shadow
+    light = np.ones((2, H, W, 1), np.float32)
+    light[1, :, 40:] = 0.2  # a shadow, under the second light position only
+    light[:, 33:] *= 0.5  # the corner, which is a silhouette
+    found = edges_of_shadows(light * reflectivity, normal, depth, reflectivity)
+    assert found.shape == (2, H, W)
+    assert not found[0].any()
+    assert found[1, 5:25, 39:41].all()
+    assert found[1, 5:25].sum() == 2 * 20
