@@ -21,8 +21,7 @@ from framearray_cli.cli import signals as interrupts
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of other kinds there")
 
-# seconds on an idle machine: where code of others catches every exception, the program raises its own again once
-PROMPT = 2 * interrupts.PATIENCE + 1.0
+PROMPT = 2.0  # seconds on an idle machine
 ASLEEP = 40  # polls in a row, 5 ms each, that find a process asleep where it waits for input
 # long enough to be stopped at every stage: a minute of walks, then hours of frames
 LONG = {
