@@ -10,7 +10,7 @@ from bench.core.markdown import grid, number, percent
 from bench.core.plots import draw_bias
 from bench.core.results import Site, Table, folder, load, site_for
 
-from .bias import EPSILON, LIGHTS, OWN, RELATIVE, SHADOWS, USUAL, WHOLE
+from .bias import EPSILON, LIGHTS, OWN, RELATIVE, SHADOWS, USUAL, WEIGHTS, WHOLE
 from .camera_paths import CAMERAS, CLOSE, N_R, NEARER, SPEED
 
 ALLOWED = 3  # standard errors that a bound leaves to chance
@@ -145,17 +145,17 @@ Two frames of each path; {USUAL} hits per pixel and frame; references of {first[
 
 
 def _by_area(found: Mapping[tuple[str, str], Table]) -> list[str]:
-    """Weights by area beside `balance`, in the parts of the picture that all jobs have."""
+    """Weights by area beside the others, in the parts of the picture that all jobs have."""
     rows = []
     for (job, camera), table in found.items():
         for part in (WHOLE, *BESIDE):
-            all_three = [row_of(table, weights, USUAL, part) for weights in ("average", "balance", "area")]
-            three = [row for row in all_three if row]
-            if len(three) == len(all_three):  # results of the time before weights by area have two
-                name, area = (f"{job}, {camera}", three[-1]) if part == WHOLE else (part, three[-1])
-                square = area["bias"] + area["variance"]
-                cells = [percent(math.sqrt(square), 3), percent(max(area["bias"], 0.0) / square, 2)]
-                rows.append([name, str(area["runs"]), *(_millionths(row) for row in three), *cells])
+            found_rows = [row for weights in WEIGHTS if (row := row_of(table, weights, USUAL, part))]
+            if len(found_rows) < len(WEIGHTS):  # results of the time before weights by area
+                continue
+            area, name = found_rows[-1], f"{job}, {camera}" if part == WHOLE else part
+            square = area["bias"] + area["variance"]
+            cells = [percent(math.sqrt(square), 3), percent(max(area["bias"], 0.0) / square, 2)]
+            rows.append([name, str(area["runs"]), *(_millionths(row) for row in found_rows), *cells])
     head = ["", "runs", "`average`", "`balance`", "`area`", "RMSE", "of it bias"]
     return ["## Weights by area", BY_AREA, grid(head, rows), AREA_BLURS] if rows else []
 

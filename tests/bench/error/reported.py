@@ -60,10 +60,9 @@ reference of {hits:,} hits per pixel, whose own error is subtracted; both relati
 The reported error is only the sampling error. The error of `average` where frames see a place differently is the same
 in both halves: with many hits, where noise is small, true errors of `average` stay above the reported ones. `balance`
 has no such error. `area` blurs outlines a little, in both halves alike, so that with very many hits true errors are
-larger, too; with half a hit per frame, more than the error is reported.
-With fewer than four hits per frame, whole frames form the halves, and a part of the difference between frames is
-reported as noise. The error of I_A, which all pixels share, is not included; the manifest has it for every light
-position.
+larger, too; with half a hit per frame, more than the error is reported. With fewer than four hits per frame, whole
+frames form the halves, and a part of the difference between frames is reported as noise. The error of I_A, which all
+pixels share, is not included; the manifest has it for every light position.
 """
 
 
