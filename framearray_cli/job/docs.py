@@ -71,20 +71,22 @@ The first row is camera position 0, the next 1, and so on.
 """
 
 POSITION_FILE = """\
-A `file` of light positions replaces `keys` of points and directional sources. Row k is light position k, from 0.
+A `file` of light positions replaces `keys` of points, spots, panels and directional sources. Row k is light position k,
+from 0.
 
 - `.csv`: a row that names the columns, in any order: `x,y,z`; or `position_x,...` or `direction_x,...`, as in keys.
-  Optionally `intensity` or `intensity_r,intensity_g,intensity_b` (of directional sources `irradiance`), and
-  `color_r,color_g,color_b`.
+  Optionally the strength, as `intensity` or `intensity_r,intensity_g,intensity_b`; `color` (a factor or `3200 K`) or
+  `color_r,color_g,color_b`; and what else the keys of that type have: `radius`, `target_x,target_y,target_z`, `width`.
 - `.json`: a list of `[x, y, z]`, or of keys without `frame`: `[{"position": [0, 2, 1], "intensity": 5}, ...]`.
 - `.npy`: a NumPy array of n x 3 numbers.
 - `.lp`, of reflectance imaging: the number of rows, then one row per image: its name, x, y, z.
 - `.dome`, of RelightLab: JSON with `directions`, `positions`, `positionsSphere` or `positions3d`, as its
   `lightConfiguration` says. Its sizes and LED corrections are not used.
 
-x, y and z say where the light is: the position of a point, and of a directional source the way from the object to the
+x, y and z say where the light is: the position of a lamp, and of a directional source the way from the object to the
 light, against the `direction` of keys. Files of reflectance imaging hold them in the axes of the picture: give
-`space = "camera"`. A source without strengths in its file needs `intensity` or `irradiance` beside `file`.
+`space = "camera"`, which turns targets and directions, too. What a file does not say stands beside `file` and holds for
+all positions: a strength, `color`, the size, and where a spot or panel shines.
 
 ```toml
 [[light.sources]]

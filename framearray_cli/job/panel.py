@@ -1,4 +1,4 @@
-"""Panels: rectangles and discs that shine, along key frames."""
+"""Panels: rectangles and discs that shine, along key frames or from a file."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal, TypeAlias
@@ -10,7 +10,7 @@ from framearray_cli.base.units import FARTHEST
 
 from .aimed import aim_problems, same_choice_problems
 from .keys import MOST_EYES, key_problems
-from .sourcetable import SourceTable
+from .rowsource import KEYS, ROWS, PlacedLamp, beside_file, one_of_both
 from .units import PANEL_UNITS, UNITS_OF_PANELS, PanelUnits
 from .values import Colour, Direction, Emission, Point
 
@@ -94,19 +94,13 @@ class DiscKey(PanelKey):
 def _consistent_keys(keys: Sequence[PanelKey]) -> Sequence[PanelKey]:
     """Check the keys of one panel against each other."""
     problems = key_problems(keys, "direction", "color", "up")
-    problems += same_choice_problems(keys, ("target", "direction"), ("power", "radiance"))
+    problems += same_choice_problems(keys, ("target", "direction"), ("power", "radiance")) if keys else []
     if problems:
         fail(problems)
     return keys
 
 
-_KEYS = (
-    "The panel at some frames; between them all its values change smoothly, before the first and after the last they "
-    "stay as they are."
-)
-
-
-class _PanelSource(SourceTable):
+class _PanelSource(PlacedLamp):
     """What rectangles and discs have."""
 
     two_sided: bool = Field(
@@ -117,8 +111,16 @@ class _PanelSource(SourceTable):
         default=None, description=PANEL_UNITS, json_schema_extra=default_text('"W" or "W/(m2 sr)"')
     )
 
+    power: Emission | None = beside_file("power of all its light, W unless `units` says otherwise", "by `radiance`")
+    radiance: Emission | None = beside_file("radiance, W/(m2 sr) unless `units` says otherwise", "by `power`")
+    color: Colour | None = beside_file("colour at all its positions", "1")
+    direction: Direction | None = beside_file("the way its front faces at all positions", "by `target`")
+    target: Point | None = beside_file("point that its front faces from all positions", "by `direction`")
+
     @model_validator(mode="after")
     def _units_of_the_strength(self) -> "_PanelSource":
+        if not self._keys:
+            return self
         strength = "power" if self._keys[0].power is not None else "radiance"
         known = UNITS_OF_PANELS[strength]
         if self.units is not None and self.units not in known:
@@ -131,18 +133,20 @@ class _PanelSource(SourceTable):
         keys: Sequence[PanelKey] = self.keys  # type: ignore[attr-defined]  # of the subclasses
         return keys
 
-    @property
-    def count(self) -> int:
-        """Number of light positions that the keys reach."""
-        return self._keys[-1].frame + 1
-
 
 class RectSource(_PanelSource):
     """A flat lamp, a window or a screen: a rectangle that shines evenly. Nothing shows it, and it hides nothing."""
 
     type: Literal["rect"] = Field(description="Kind of source.")
-    keys: Annotated[tuple[RectKey, ...], AfterValidator(_consistent_keys)] = Field(
-        min_length=1, strict=False, description=_KEYS
+    width: Length | None = beside_file("width at all its positions, scene units")
+    height: Length | None = beside_file("height at all its positions, scene units")
+    up: Direction | None = beside_file("direction in which the height runs", "that of the first position")
+    keys: Annotated[tuple[RectKey, ...], AfterValidator(_consistent_keys), AfterValidator(one_of_both)] = Field(
+        default=(),
+        validate_default=True,
+        strict=False,
+        description=f"The panel at some frames; {KEYS}",
+        json_schema_extra=ROWS,
     )
 
 
@@ -150,6 +154,11 @@ class DiscSource(_PanelSource):
     """A disc that shines evenly. Nothing shows it, and it hides nothing."""
 
     type: Literal["disc"] = Field(description="Kind of source.")
-    keys: Annotated[tuple[DiscKey, ...], AfterValidator(_consistent_keys)] = Field(
-        min_length=1, strict=False, description=_KEYS
+    radius: Length | None = beside_file("radius at all its positions, scene units")
+    keys: Annotated[tuple[DiscKey, ...], AfterValidator(_consistent_keys), AfterValidator(one_of_both)] = Field(
+        default=(),
+        validate_default=True,
+        strict=False,
+        description=f"The panel at some frames; {KEYS}",
+        json_schema_extra=ROWS,
     )

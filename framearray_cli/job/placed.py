@@ -3,18 +3,16 @@
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from framearray_cli.base.forms.table import Place, Table, default_text, fail
 from framearray_cli.base.units import FARTHEST
 
 from .keys import MOST_EYES, key_problems
-from .sourcetable import SourceTable
+from .rowsource import KEYS, ROWS, PlacedLamp, PlacedSource, beside_file, one_of_both
 from .units import IES, LAMP_UNITS, SKY_UNITS, LampUnits, SkyUnits
 from .values import Colour, Direction, Emission, FileName, Point
 
-STRENGTHS = {"point": "intensity", "directional": "irradiance"}  # key of the strength of sources with a file
-SIZES = {"point": "radius", "directional": "angle"}  # key of their size
 WIDEST = 90.0  # degrees; a source of the sky that is wider is no sun
 
 _RADIUS = (
@@ -80,18 +78,8 @@ class DirectionalKey(Table):
 
 def _consistent_light_keys(keys: Any) -> Any:
     """Check the keys of one source against each other."""
-    if problems := key_problems(keys, "direction", "color", "intensity", "up", *SIZES.values()):
+    if problems := key_problems(keys, "direction", "color", "intensity", "up", "radius", "angle"):
         fail(problems)
-    return keys
-
-
-def _one_of_both(keys: Any, info: ValidationInfo) -> Any:
-    """Check that a source has either keys or a file."""
-    has_file = info.data.get("file") is not None
-    if has_file and keys:
-        fail([((), "expected either `keys` or `file`, got both")])
-    if not keys and not has_file and "file" in info.data:
-        fail([((), "expected a list of tables, at least 1, got 0; give `keys` or `file`")])
     return keys
 
 
@@ -106,120 +94,49 @@ def profile_problems(keys: Sequence[PointKey], *, has_profile: bool) -> list[tup
     return [*problems, *([] if turned is None else [(("keys", turned, "up"), text)])]
 
 
-_KEYS = "between them all its values change smoothly, before the first and after the last they stay as they are."
-_ROWS = default_text("the rows of `file`") | {"minItems": 1}
-
-
-class _PlacedSource(SourceTable):
-    """Sources with key frames, or with a file that has one position per row."""
-
-    file: FileName | None = Field(
-        default=None,
-        description="CSV, JSON, .npy, or .lp or .dome of reflectance imaging: one light position per row, instead of "
-        "`keys`.",
-        json_schema_extra=default_text("none"),
-    )
-    space: Literal["scene", "camera"] | None = Field(
-        default=None,
-        description='Axes of the positions and directions. "camera": x to the right in the first picture, y up in it, '
-        "z towards the camera, as reflectance imaging has them.",
-        json_schema_extra=default_text('"scene"'),
-    )
-
-    @property
-    def count(self) -> int:
-        """Number of light positions that the keys reach."""
-        return self.keys[-1].frame + 1 if self.keys else 0  # type: ignore[attr-defined]  # of the subclasses
-
-
-class PointSource(_PlacedSource):
+class PointSource(PlacedLamp):
     """A lamp that shines equally in all directions, or down as its file says: a point, or a sphere."""
 
     type: Literal["point"] = Field(description="Kind of source.")
-    intensity: Emission | None = Field(
-        default=None,
-        description="Only beside `file`: radiant intensity of all its positions, W/sr, if it has none.",
-        json_schema_extra=default_text("that of the file"),
+    intensity: Emission | None = beside_file(
+        "radiant intensity of all its positions, W/sr unless `units` says otherwise"
     )
-    color: Colour | None = Field(
-        default=None,
-        description="Only beside `file`: colour of all its positions, if it has none.",
-        json_schema_extra=default_text("that of the file, or 1"),
-    )
+    color: Colour | None = beside_file("colour of all its positions", "1")
     ies: FileName | None = Field(default=None, description=IES, json_schema_extra=default_text("none"))
     units: LampUnits | None = Field(default=None, description=LAMP_UNITS, json_schema_extra=default_text('"W/sr"'))
-    radius: Radius | None = Field(
-        default=None,
-        description="Only beside `file`: radius of the lamp at all its positions, scene units, if it has none.",
-        json_schema_extra=default_text("that of the file, or 0"),
-    )
-    scale: float | None = Field(
-        default=None,
-        gt=0,
-        le=FARTHEST,
-        description="Scene units per unit of the positions.",
-        json_schema_extra=default_text("1"),
-    )
-    center: Point | None = Field(
-        default=None,
-        description="Where the positions have their origin, in the coordinates of the scene file.",
-        json_schema_extra=default_text('the origin; with space = "camera" the first target of the camera'),
-    )
-    keys: Annotated[tuple[PointKey, ...], AfterValidator(_consistent_light_keys), AfterValidator(_one_of_both)] = Field(
+    radius: Radius | None = beside_file("radius of the lamp at all its positions, scene units", "0")
+    up: Direction | None = beside_file("direction of horizontal angle 0 of `ies`", "level at first, or x")
+    keys: Annotated[tuple[PointKey, ...], AfterValidator(_consistent_light_keys), AfterValidator(one_of_both)] = Field(
         default=(),
         validate_default=True,
         strict=False,
-        description=f"The source at some frames; {_KEYS}",
-        json_schema_extra=_ROWS,
+        description=f"The source at some frames; {KEYS}",
+        json_schema_extra=ROWS,
     )
 
     @model_validator(mode="after")
-    def _only_beside_file(self) -> "PointSource":
-        _refuse_without_file(self, ("intensity", "color", "radius"))
+    def _whole_without_profile(self) -> "PointSource":
         if problems := profile_problems(self.keys, has_profile=self.ies is not None):
             fail(problems)
         return self
 
 
-class DirectionalSource(_PlacedSource):
+class DirectionalSource(PlacedSource):
     """A source infinitely far away, such as the sun."""
 
     type: Literal["directional"] = Field(description="Kind of source.")
     units: SkyUnits | None = Field(default=None, description=SKY_UNITS, json_schema_extra=default_text('"W/m2"'))
-    irradiance: Emission | None = Field(
-        default=None,
-        description="Only beside `file`: irradiance of a surface that faces the light, W/m2, at all its positions, if "
-        "it has none.",
-        json_schema_extra=default_text("that of the file"),
+    irradiance: Emission | None = beside_file(
+        "irradiance of a surface that faces the light, W/m2 unless `units` says otherwise, at all its positions"
     )
-    color: Colour | None = Field(
-        default=None,
-        description="Only beside `file`: colour of all its positions, if it has none.",
-        json_schema_extra=default_text("that of the file, or 1"),
+    color: Colour | None = beside_file("colour of all its positions", "1")
+    angle: Angle | None = beside_file("angle under which the source is seen, degrees", "0")
+    keys: Annotated[tuple[DirectionalKey, ...], AfterValidator(_consistent_light_keys), AfterValidator(one_of_both)] = (
+        Field(
+            default=(),
+            validate_default=True,
+            strict=False,
+            description=f"The source at some frames; {KEYS}",
+            json_schema_extra=ROWS,
+        )
     )
-    angle: Angle | None = Field(
-        default=None,
-        description="Only beside `file`: angle under which the source is seen, degrees, if the file has none.",
-        json_schema_extra=default_text("that of the file, or 0"),
-    )
-    keys: Annotated[
-        tuple[DirectionalKey, ...], AfterValidator(_consistent_light_keys), AfterValidator(_one_of_both)
-    ] = Field(
-        default=(),
-        validate_default=True,
-        strict=False,
-        description=f"The source at some frames; {_KEYS}",
-        json_schema_extra=_ROWS,
-    )
-
-    @model_validator(mode="after")
-    def _only_beside_file(self) -> "DirectionalSource":
-        _refuse_without_file(self, ("irradiance", "color", "angle"))
-        return self
-
-
-def _refuse_without_file(source: _PlacedSource, names: tuple[str, ...]) -> None:
-    if source.file is None:
-        text = "expected it only beside `file`, as `keys` have their own"
-        if problems := [((name,), text) for name in names if getattr(source, name) is not None]:
-            fail(problems)

@@ -1,11 +1,11 @@
 """`file` of a light source: one light position per row -> key frames.
 
-CSV: the first row names the columns x, y, z, or those of a key: position_x ..., direction_x ...; optionally intensity
-or irradiance, or these with _r, _g, _b, color_r, color_g, color_b, and radius or angle. JSON: a list of `[x, y, z]`, or
-of the tables of keys. `.npy`: an array (n, 3). `.lp`, of reflectance imaging: the number of rows, then one row per
-image: its name, x, y, z. `.dome`, of RelightLab: JSON with `directions` or positions.
+CSV: the first row names the columns x, y, z, or those of a key: position_x ..., direction_x ...; optionally a strength
+and color, or these with _r, _g, _b, and what else keys of that type hold, such as target_x ... and radius. JSON: a list
+of `[x, y, z]`, or of the tables of keys. `.npy`: an array (n, 3). `.lp`, of reflectance imaging: the number of rows,
+then one row per image: its name, x, y, z. `.dome`, of RelightLab: JSON with `directions` or positions.
 
-x, y, z say where the light is: the position of a point, and of a directional source the way from the object to it.
+x, y, z say where the light is: the position of a lamp, and of a directional source the way from the object to it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -17,7 +17,8 @@ from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import counted
 
 from .keys import MOST_EYES
-from .placed import SIZES, DirectionalKey, PointKey
+from .panel import DiscKey, RectKey
+from .placed import DirectionalKey, PointKey
 from .rowfile import (
     PlacedRow,
     RowFileError,
@@ -30,12 +31,17 @@ from .rowfile import (
     refuse_frames,
     row_problems,
 )
+from .rowsource import FORMS, RowForm
+from .spot import SpotKey
 
 AXES = ("x", "y", "z")
 AT = "at"  # where the light is, until its kind is known
-_KEYS: Mapping[str, tuple[str, str, type[Table]]] = {
-    "point": ("position", "intensity", PointKey),
-    "directional": ("direction", "irradiance", DirectionalKey),
+_KEYS: Mapping[str, type[Table]] = {
+    "point": PointKey,
+    "directional": DirectionalKey,
+    "spot": SpotKey,
+    "rect": RectKey,
+    "disc": DiscKey,
 }
 # Lists of a .dome by what its `lightConfiguration` says, newest names first.
 _DOME_LISTS = {
@@ -49,17 +55,17 @@ def read_positions(path: Path, kind: str, common: Mapping[str, Any], *, strong: 
     """Read a file of light positions as key tables for frames 0, 1, 2 and so on.
 
     Args:
-        kind: "point" or "directional".
-        common: strength, colour and size of all positions, where the file gives none.
+        kind: type of the source, one of `FORMS`.
+        common: values of all positions, where the file gives none.
         strong: whether the strength may be missing, as another file says it.
 
     Raises:
         RowFileError: the file is missing, has another format, or has rows that are no light positions.
     """
-    vector, strength, key = _KEYS[kind]
+    form = FORMS[kind]
     readers: dict[str, Callable[[Path], list[PlacedRow]]] = {
-        ".csv": lambda file: _csv_rows(read_text(file), vector, strength, SIZES[kind]),
-        ".json": lambda file: _json_rows(read_text(file), vector),
+        ".csv": lambda file: _csv_rows(read_text(file), form),
+        ".json": lambda file: _json_rows(read_text(file), form.vector),
         ".lp": lambda file: _lp_rows(read_text(file)),
         ".dome": lambda file: _dome_rows(read_text(file), kind),
         ".npy": lambda file: _npy_rows(read_data(file)),
@@ -68,12 +74,13 @@ def read_positions(path: Path, kind: str, common: Mapping[str, Any], *, strong: 
     if reader is None:
         known = ", ".join(readers)
         raise RowFileError(f'expected a file name that ends in one of {known}, got "{path.suffix}"')
-    rows = [(place, _as_key(row, vector, kind)) for place, row in reader(path)]
+    rows = [(place, _as_key(row, form.vector, kind)) for place, row in reader(path)]
     if not 1 <= len(rows) <= MOST_EYES:
         raise RowFileError(f"expected 1 to {MOST_EYES} light positions, got {len(rows)}")
-    if not strong and strength not in common and not any(strength in row for _, row in rows):
-        raise RowFileError(f"the file has no {strength}; give it beside `file`, as in {strength} = 10")
-    if problems := row_problems(rows, key, (strength, "color", SIZES[kind]), common):
+    if not strong and not any(name in row for name in form.strengths for row in (common, *(row for _, row in rows))):
+        wanted = " or ".join(form.strengths)
+        raise RowFileError(f"the file has no {wanted}; give it beside `file`, as in {form.strengths[0]} = 10")
+    if problems := row_problems(rows, _KEYS[kind], form.values, common):
         raise RowFileError(*problems)
     return [{"frame": frame, **common, **row} for frame, (_, row) in enumerate(rows)]
 
@@ -88,15 +95,16 @@ def _as_key(row: dict[str, Any], vector: str, kind: str) -> dict[str, Any]:
     return {vector: at, **{key: value for key, value in row.items() if key != AT}}
 
 
-def _csv_rows(text: str, vector: str, strength: str, size: str) -> list[PlacedRow]:
+def _csv_rows(text: str, form: RowForm) -> list[PlacedRow]:
     header, lines = csv_lines(text)
-    names = {AT: list(AXES), vector: [f"{vector}_{axis}" for axis in AXES]}
-    names |= {key: [f"{key}_{channel}" for channel in "rgb"] for key in (strength, "color")}
+    names = {AT: list(AXES)} | {key: [f"{key}_{axis}" for axis in AXES] for key in (form.vector, *form.vectors)}
+    names |= {key: [f"{key}_{channel}" for channel in "rgb"] for key in (*form.strengths, "color")}
     found = {key: columns for key, columns in names.items() if any(name in header for name in columns)}
-    single = [key for key in (strength, "color", size) if key in header and key not in found]
+    single = [key for key in (*form.strengths, "color", *form.numbers) if key in header and key not in found]
     wanted = [name for columns in found.values() for name in columns] + single
-    if sorted(header) != sorted(wanted) or (AT in found) == (vector in found):
-        known = f"x, y, z or {', '.join(names[vector])}, and {strength} or {', '.join(names[strength])} where wanted"
+    if sorted(header) != sorted(wanted) or (AT in found) == (form.vector in found):
+        strengths = " or ".join(f"{name} or {', '.join(names[name])}" for name in form.strengths)
+        known = f"x, y, z or {', '.join(names[form.vector])}, and {strengths} where wanted"
         raise RowFileError(f"row 1: expected the column names {known}, got {columns_text(header)}")
     rows = []
     for place, cells in lines:
@@ -134,8 +142,8 @@ def _lp_rows(text: str) -> list[PlacedRow]:
 
 
 def _dome_rows(text: str, kind: str) -> list[PlacedRow]:
-    """Read a .dome file: for a point source its positions, else its directions if it has some."""
-    table = load_json(text)
+    """Read a .dome file: for a lamp its positions, else its directions if it has some."""
+    table, lamp = load_json(text), kind != "directional"
     if not isinstance(table, dict):
         raise RowFileError(f"expected an object with directions or positions, got {shown(table)}")
     configuration = table.get("lightConfiguration", "directional")
@@ -143,10 +151,10 @@ def _dome_rows(text: str, kind: str) -> list[PlacedRow]:
         known = ", ".join(_DOME_LISTS)
         raise RowFileError(f"lightConfiguration: expected one of {known}, got {shown(configuration)}")
     positions = ("positions3d", "positionsSphere", "positions")
-    names = [*_DOME_LISTS[configuration], *(positions if kind == "point" else ("directions", *positions))]
+    names = [*_DOME_LISTS[configuration], *(positions if lamp else ("directions", *positions))]
     name = next((name for name in names if table.get(name)), None)
-    if name is None or (kind == "point" and name == "directions"):
-        remedy = 'expected positions; use type = "directional" for directions' if kind == "point" else "expected some"
+    if name is None or (lamp and name == "directions"):
+        remedy = 'expected positions; use type = "directional" for directions' if lamp else "expected some"
         raise RowFileError(f"the file has no {'positions' if kind == 'point' else 'directions or positions'}; {remedy}")
     entries = table[name]
     if not isinstance(entries, list):

@@ -16,9 +16,9 @@ from .eyefile import read_eyes
 from .ies import read_photometry
 from .job import Job
 from .override import name_settings, put_settings, read_settings
-from .placed import SIZES, STRENGTHS
 from .positionfile import read_positions
 from .rowfile import RowFileError
+from .rowsource import FORMS
 from .values import absolute
 
 
@@ -139,12 +139,12 @@ def _profile_problems(table: dict[str, Any], job_file: Path) -> list[str]:
 
 def _with_rows(source: Any, place: str, job_file: Path, problems: list[str]) -> Any:
     """Replace `file` of one source, with the strength and colour beside it, if it is as it should be."""
-    if not isinstance(source, dict) or "keys" in source or str(source.get("type")) not in STRENGTHS:
+    if not isinstance(source, dict) or "keys" in source or str(source.get("type")) not in FORMS:
         return source  # nothing to replace, or a problem that the validation of the job reports
     name = source.get("file")
     if not isinstance(name, str) or not name.strip() or "\0" in name:
         return source
-    own = ("file", STRENGTHS[source["type"]], "color", SIZES[source["type"]])
+    own = ("file", *FORMS[source["type"]].values)
     common = {key: source[key] for key in own[1:] if key in source}
     try:
         keys = read_positions(absolute(Path(name), job_file), source["type"], common, strong="ies" in source)

@@ -1,6 +1,6 @@
-"""Spots: points with a cone, along key frames."""
+"""Spots: points with a cone, along key frames or from a file."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -8,13 +8,15 @@ from framearray_cli.base.forms.table import default_text, fail
 
 from .aimed import aim_problems, same_choice_problems
 from .keys import key_problems
-from .placed import SIZES, PointKey, profile_problems
-from .sourcetable import SourceTable
+from .placed import PointKey, Radius, profile_problems
+from .rowsource import KEYS, ROWS, PlacedLamp, beside_file, one_of_both
 from .units import IES, LAMP_UNITS, LampUnits
-from .values import Direction, FileName, Point
+from .values import Colour, Direction, Emission, FileName, Point
 
 FLATTEST = 90.0  # degrees from the axis; a light that shines further back is no spot
 NARROWEST = 0.5  # degrees; single precision knows no narrower cones
+Inner: TypeAlias = Annotated[float, Field(ge=0, le=FLATTEST)]
+Outer: TypeAlias = Annotated[float, Field(ge=NARROWEST, le=FLATTEST)]
 
 
 class SpotKey(PointKey):
@@ -30,15 +32,11 @@ class SpotKey(PointKey):
         description="Point that it shines at, in the coordinates of the scene file; it moves between keys.",
         json_schema_extra=default_text("by `direction`"),
     )
-    inner: float = Field(
+    inner: Inner = Field(
         default=0.0,
-        ge=0,
-        le=FLATTEST,
         description="Angle from the axis up to which it has its full `intensity`, degrees; from there it falls off.",
     )
-    outer: float = Field(
-        default=45.0, ge=NARROWEST, le=FLATTEST, description="Angle from the axis beyond which it is dark, degrees."
-    )
+    outer: Outer = Field(default=45.0, description="Angle from the axis beyond which it is dark, degrees.")
 
     @model_validator(mode="after")
     def _one_aim(self) -> "SpotKey":
@@ -52,25 +50,36 @@ class SpotKey(PointKey):
 
 def _consistent_spot_keys(keys: tuple[SpotKey, ...]) -> tuple[SpotKey, ...]:
     """Check the keys of one spot against each other."""
-    problems = key_problems(keys, "direction", "color", SIZES["point"])
-    problems += same_choice_problems(keys, ("target", "direction"))
+    problems = key_problems(keys, "direction", "color", "radius")
+    problems += same_choice_problems(keys, ("target", "direction")) if keys else []
     problems += key_problems(keys, "none", "intensity", "up")
     if problems:
         fail(problems)
     return keys
 
 
-class SpotSource(SourceTable):
+class SpotSource(PlacedLamp):
     """A lamp that shines into a cone, as KHR_lights_punctual of glTF defines it, or as its file says."""
 
     type: Literal["spot"] = Field(description="Kind of source.")
     ies: FileName | None = Field(default=None, description=IES, json_schema_extra=default_text("none"))
     units: LampUnits | None = Field(default=None, description=LAMP_UNITS, json_schema_extra=default_text('"W/sr"'))
-    keys: Annotated[tuple[SpotKey, ...], AfterValidator(_consistent_spot_keys)] = Field(
-        min_length=1,
+    intensity: Emission | None = beside_file(
+        "radiant intensity of all its positions, W/sr unless `units` says otherwise"
+    )
+    color: Colour | None = beside_file("colour of all its positions", "1")
+    direction: Direction | None = beside_file("the way the middle of its light goes at all positions", "by `target`")
+    target: Point | None = beside_file("point that it shines at from all positions", "by `direction`")
+    up: Direction | None = beside_file("direction of horizontal angle 0 of `ies`", "level at first, or x")
+    radius: Radius | None = beside_file("radius of the lamp at all its positions, scene units", "0")
+    inner: Inner | None = beside_file("angle from the axis up to which it has its full intensity, degrees", "0")
+    outer: Outer | None = beside_file("angle from the axis beyond which it is dark, degrees", "45")
+    keys: Annotated[tuple[SpotKey, ...], AfterValidator(_consistent_spot_keys), AfterValidator(one_of_both)] = Field(
+        default=(),
+        validate_default=True,
         strict=False,
-        description="The spot at some frames; between them all its values change smoothly, before the first and after "
-        "the last they stay as they are.",
+        description=f"The spot at some frames; {KEYS}",
+        json_schema_extra=ROWS,
     )
 
     @model_validator(mode="after")
@@ -83,8 +92,3 @@ class SpotSource(SourceTable):
         if problems:
             fail(problems)
         return self
-
-    @property
-    def count(self) -> int:
-        """Number of light positions that the keys reach."""
-        return self.keys[-1].frame + 1

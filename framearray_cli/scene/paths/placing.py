@@ -10,8 +10,9 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
 from framearray_cli.job.light import LightTable
-from framearray_cli.job.panel import DiscSource, PanelKey, RectSource
-from framearray_cli.job.placed import DirectionalKey, DirectionalSource, PointKey, PointSource
+from framearray_cli.job.panel import DiscSource, PanelKey, RectKey, RectSource
+from framearray_cli.job.placed import DirectionalKey, PointKey, PointSource
+from framearray_cli.job.rowsource import PlacedLamp, PlacedSource
 from framearray_cli.job.sources import DomeSource, GridSource, SunSource
 from framearray_cli.job.spot import SpotKey, SpotSource
 from framearray_cli.job.values import SHORTEST
@@ -29,7 +30,7 @@ from .units import in_units
 
 def in_camera_space(table: LightTable) -> bool:
     """Return whether any source has its positions in the axes of the first camera."""
-    return any(isinstance(s, PointSource | DirectionalSource) and s.space == "camera" for s in table.sources)
+    return any(isinstance(s, PlacedSource) and s.space == "camera" for s in table.sources)
 
 
 def place_source(job: Job, i: int, n: int, world_from_camera: Float64 | None) -> LightPath:
@@ -53,27 +54,32 @@ def place_source(job: Job, i: int, n: int, world_from_camera: Float64 | None) ->
                 "point", grid_points(source.counts, source.corner, source.side, source.other_side), source, n
             )
         case SpotSource():
-            return in_units(_place_spot(source, job, f"light.sources[{i}]", n), source)
+            return in_units(_place_spot(source, job, f"light.sources[{i}]", n, world_from_camera), source)
         case RectSource() | DiscSource():
-            return in_units(_place_panel(source, job, f"light.sources[{i}]", n), source)
+            return in_units(_place_panel(source, job, f"light.sources[{i}]", n, world_from_camera), source)
         case _:
-            path = _interpolate(source.type, source.keys, n)
+            path = _moved(_interpolate(source.type, source.keys, n), source, job, world_from_camera)
             if isinstance(source, PointSource) and source.ies:
-                path = add_profile(path, source, np.tile(-_up(job), (n, 1)), job, f"light.sources[{i}]")
-            return in_units(_in_space(source, path, job, world_from_camera), source)
+                down = np.tile(-_up(job), (n, 1))
+                ups = _turned(_ups(source.keys, n), source, world_from_camera)
+                path = add_profile(path, source, (down, ups), job, f"light.sources[{i}]")
+            return in_units(path, source)
 
 
-def _in_space(
-    source: PointSource | DirectionalSource, path: LightPath, job: Job, world_from_camera: Float64 | None
-) -> LightPath:
+def _moved(path: LightPath, source: PlacedSource, job: Job, world_from_camera: Float64 | None) -> LightPath:
     """Turn, scale and move the positions of a source into the coordinates of the scene file."""
-    in_camera = source.space == "camera"
-    vector = path.vector if not in_camera or world_from_camera is None else path.vector @ world_from_camera.T
-    if isinstance(source, PointSource):
-        center = source.center or (job.camera.keys[0].target if in_camera else None)
+    vector = _turned(path.vector, source, world_from_camera)
+    if isinstance(source, PlacedLamp):
+        center = source.center or (job.camera.keys[0].target if source.space == "camera" else None)
         vector = vector * source.scale if source.scale else vector
         vector = vector + np.array(center) if center else vector
     return replace(path, vector=vector)
+
+
+def _turned(vectors: Float64, source: PlacedSource, world_from_camera: Float64 | None) -> Float64:
+    """Turn vectors of a source, (n, 3), into the axes of the scene file."""
+    in_camera = source.space == "camera" and world_from_camera is not None
+    return vectors @ world_from_camera.T if in_camera and world_from_camera is not None else vectors
 
 
 def _place_dome(source: DomeSource, up_dir: Float64, n: int) -> LightPath:
@@ -84,7 +90,7 @@ def _place_dome(source: DomeSource, up_dir: Float64, n: int) -> LightPath:
     return _constant("point", np.array(source.target) + source.radius * to_light, source, n)
 
 
-def _place_spot(source: SpotSource, job: Job, name: str, n: int) -> LightPath:
+def _place_spot(source: SpotSource, job: Job, name: str, n: int, world_from_camera: Float64 | None) -> LightPath:
     """Interpolate the keys of a spot; where they have targets, its axis follows the targets.
 
     Raises:
@@ -92,14 +98,17 @@ def _place_spot(source: SpotSource, job: Job, name: str, n: int) -> LightPath:
     """
     keys = source.keys
     path = _interpolate("point", keys, n)
-    axis = _axes(keys, path.vector, job, name, "the spot")
+    axis = _turned(_axes(keys, path.vector, job, name, "the spot"), source, world_from_camera)
+    path = _moved(path, source, job, world_from_camera)
     if source.ies:
-        return add_profile(path, source, axis, job, name)
+        return add_profile(path, source, (axis, _turned(_ups(keys, n), source, world_from_camera)), job, name)
     angles = interpolate_keys([key.frame for key in keys], [(key.inner, key.outer) for key in keys], n)
     return replace(path, cone=Cone(axis=axis, angles_deg=angles))
 
 
-def _place_panel(source: RectSource | DiscSource, job: Job, name: str, n: int) -> LightPath:
+def _place_panel(
+    source: RectSource | DiscSource, job: Job, name: str, n: int, world_from_camera: Float64 | None
+) -> LightPath:
     """Interpolate the keys of a rectangle or disc.
 
     Raises:
@@ -108,9 +117,11 @@ def _place_panel(source: RectSource | DiscSource, job: Job, name: str, n: int) -
     keys = source.keys
     frames = [key.frame for key in keys]
     position = interpolate_keys(frames, [key.position for key in keys], n)
-    axis = _axes(keys, position, job, name, "the panel")
-    ups = [key.up for key in source.keys if key.up] if isinstance(source, RectSource) else []
-    across = across_under(axis, interpolate_directions(frames, ups, n)) if ups else carry_across(axis, _up(job))
+    axis = _turned(_axes(keys, position, job, name, "the panel"), source, world_from_camera)
+    ups = (
+        _turned(_ups(source.keys, n), source, world_from_camera) if isinstance(source, RectSource) else np.empty((0, 3))
+    )
+    across = across_under(axis, ups) if len(ups) else carry_across(axis, _up(job))
     if (flat := np.flatnonzero((across == 0).all(axis=1))).size:
         problem = f"{name}: expected an `up` across the direction of the panel, got one along it at frame {flat[0]}"
         raise JobError(job.file or job.name, [problem])
@@ -123,7 +134,15 @@ def _place_panel(source: RectSource | DiscSource, job: Job, name: str, n: int) -
         strength = interpolate_keys(frames, [key.power or () for key in keys], n) / (np.pi * (1 + source.two_sided))
     else:
         strength = interpolate_keys(frames, [key.radiance or () for key in keys], n) * panel.area[:, None]
-    return LightPath(kind="point", vector=position, intensity=strength * colour, panel=panel)
+    path = LightPath(kind="point", vector=position, intensity=strength * colour, panel=panel)
+    return _moved(path, source, job, world_from_camera)
+
+
+def _ups(keys: Sequence[PointKey | RectKey], n: int) -> Float64:
+    """Interpolate the `up` of keys, (n, 3); (0, 3) where they have none."""
+    if keys[0].up is None:
+        return np.empty((0, 3))
+    return interpolate_directions([key.frame for key in keys], [key.up for key in keys if key.up], n)
 
 
 def _axes(keys: Sequence[SpotKey | PanelKey], position: Float64, job: Job, name: str, what: str) -> Float64:

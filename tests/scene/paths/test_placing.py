@@ -68,6 +68,19 @@ def test_a_spot_follows_its_target_or_turns() -> None:
     np.testing.assert_allclose(turned.at([1]).cone.axis, [[2**-0.5, -(2**-0.5), 0]])
 
 
+def test_a_spot_in_the_axes_of_the_picture_is_the_spot_in_those_of_the_scene() -> None:
+    """The camera looks along -x: what is right of it lies towards -z; the origin is its target."""
+    camera = {"keys": [{"frame": 0, "eye": [4, 1, 2], "target": [1, 1, 2]}]}
+    key = {"frame": 0, "position": [1, 0, 2], "target": [1, 1, 0], "intensity": 5}
+    found = path(camera=camera, type="spot", space="camera", scale=0.5, keys=[key])
+    np.testing.assert_allclose(found.vector, [[1 + 1, 1, 2 - 0.5]], atol=1e-12)
+    np.testing.assert_allclose(found.cone.axis, [np.array([-2, 1, 0]) / 5**0.5], atol=1e-12)
+    aimed = RECT | {"frame": 0, "direction": [0, 0, -1], "up": [0, 1, 0], "power": 1.0}
+    panel = path(camera=camera, type="rect", space="camera", keys=[aimed]).panel
+    np.testing.assert_allclose(panel.axis, [[-1, 0, 0]], atol=1e-12)
+    np.testing.assert_allclose(panel.half_axes[1] / 0.25, [[0, 1, 0]], atol=1e-12)
+
+
 def test_a_spot_that_meets_its_target_is_an_error() -> None:
     keys = [{"frame": 4 * k, "position": [k, 0, 0], "target": [1 - k, 0, 0], "intensity": 5} for k in (0, 1)]
     with pytest.raises(JobError, match=r"light.sources\[0\]: expected a target away from the spot, got .* frame 2"):
