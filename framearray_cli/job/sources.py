@@ -134,6 +134,9 @@ class SunSource(SourceTable):
         "means white. Clear air lets about "
         "1000 W/m2 through; choose what suits the exposure."
     )
+    color: Colour | None = Field(
+        default=None, description="Multiplies `irradiance` by channel.", json_schema_extra=default_text("1")
+    )
     angle: Angle | None = Field(
         default=None,
         description="Angle under which the sun is seen, degrees: 0.53 is right, and gives shadows soft edges at the "

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import PlainValidator, ValidationInfo, WithJsonSchema
 
-from framearray_cli.base.blackbody import black_body
 from framearray_cli.base.forms.table import Float3, fail
+from framearray_cli.base.forms.temperature import EXAMPLE, SCHEMA, temperature_colour
 from framearray_cli.base.forms.words import range_text, shown
 from framearray_cli.base.units import FARTHEST
 
@@ -94,20 +94,14 @@ def absolute(path: Path, job_file: Path | None) -> Path:
     return Path(os.path.realpath(whole.parent)) / path.name
 
 
-COLDEST, HOTTEST = 1000, 40000  # kelvin; below, only red light is left; above, nothing changes
-
-
 def _colour(value: object) -> tuple[Any, ...]:
     """Check factors by channel, or read a colour temperature."""
     if not isinstance(value, str):
         return _vector(3, 0.0, MOST_EMISSION, grey=True)(value)
-    match = re.fullmatch(r"\s*([0-9]{1,6}(?:\.[0-9]{1,6})?)\s*K\s*", value)
-    if not match:
-        fail([((), f'expected a number, 3 numbers or a temperature such as "3200 K", got {shown(value)}')])
-    kelvin = float(match[1])
-    if not COLDEST <= kelvin <= HOTTEST:
-        fail([((), f"expected a temperature from {COLDEST} to {HOTTEST} K, got {shown(value)}")])
-    return black_body(kelvin)
+    found = temperature_colour(value)
+    if found is None:
+        fail([((), f"expected a number, 3 numbers or {EXAMPLE}, got {shown(value)}")])
+    return found
 
 
 _UNITS = {
@@ -188,9 +182,9 @@ Colour: TypeAlias = Annotated[
             "anyOf": [
                 {"type": "number", "minimum": 0},
                 {"type": "array", "items": {"type": "number", "minimum": 0}, "minItems": 3, "maxItems": 3},
-                {"type": "string", "pattern": r"^\s*[0-9]{1,6}(\.[0-9]{1,6})?\s*K\s*$"},
+                SCHEMA,
             ],
-            "x-words": 'a number or 3 numbers of at least 0, or a temperature such as "3200 K"',
+            "x-words": f"a number or 3 numbers of at least 0, or {EXAMPLE}",
         }
     ),
 ]

@@ -195,7 +195,7 @@ def _place_sun(source: SunSource, job: Job, name: str, n: int) -> LightPath:
     return LightPath(
         kind="directional",
         vector=-directions_to_sun(sun, up_dir, unit(north_vec)),
-        intensity=sun.is_up[:, None] * np.array(source.irradiance),
+        intensity=sun.is_up[:, None] * np.array(source.irradiance) * np.array(source.color or 1.0),
         size=np.full(n, source.angle) if source.angle else None,
         notes=tuple(
             {"azimuth": round(azimuth, 4), "elevation": round(elevation, 4), "time": time.isoformat(timespec="seconds")}

@@ -12,6 +12,7 @@ from framearray_cli.array.pictures import AS_RENDERED, Relight
 from framearray_cli.array.places import percent
 from framearray_cli.base.forms.schema import toml_key
 from framearray_cli.base.forms.table import Float3, Place, Table, fail
+from framearray_cli.base.forms.temperature import EXAMPLE, SCHEMA, temperature_colour
 from framearray_cli.base.forms.words import shown
 
 STRONGEST = 1e6  # times the rendered light; half floats overflow before that
@@ -77,11 +78,19 @@ def _found(item: Mapping[str, object], key: str) -> str:
 
 
 def _wanted(grey_only: bool) -> str:
-    return f"a number {'' if grey_only else 'or 3 numbers '}from 0 to {STRONGEST:.0f}"
+    bounds = f"from 0 to {STRONGEST:.0f}"
+    return f"a number {bounds}" if grey_only else f"a number or 3 numbers {bounds}, or {EXAMPLE}"
 
 
 def _value(value: object, grey_only: bool, place: Place) -> Float3:
-    """Check one number, or three."""
+    """Check one number, or three, or read a temperature."""
+    if isinstance(value, str) and not grey_only:
+        try:
+            found = temperature_colour(value)
+        except ValidationError as error:
+            fail([(place, detail["msg"]) for detail in error.errors()])
+        if found is not None:
+            return found
     numbers = [value] * 3 if not isinstance(value, list) else [] if grey_only else value
     good = [isinstance(x, int | float) and not isinstance(x, bool) and 0 <= x <= STRONGEST for x in numbers]
     if len(numbers) != 3 or not all(good):
@@ -93,7 +102,7 @@ def _value(value: object, grey_only: bool, place: Place) -> Float3:
 def _schema(grey_only: bool) -> WithJsonSchema:
     number = {"type": "number", "minimum": 0, "maximum": STRONGEST}
     vector = {"type": "array", "items": number, "minItems": 3, "maxItems": 3}
-    value: dict[str, Any] = number if grey_only else {"anyOf": [number, vector]}
+    value: dict[str, Any] = number if grey_only else {"anyOf": [number, vector, SCHEMA]}
     time = {"anyOf": [{"type": "number", "minimum": 0}, {"type": "string"}]}
     key = {"type": "object", "properties": {"time": time, "value": value}, "required": ["time", "value"]}
     return WithJsonSchema({"anyOf": [value, {"type": "array", "items": key, "minItems": 1}]})
@@ -112,7 +121,9 @@ class LightChange(Table):
     """The factor of the light of a group, or of ambient light: intensity times colour."""
 
     intensity: Intensity = Field(default=ONE, description="Factor; 0 turns the light off.")
-    color: Colour = Field(default=ONE, description="Factor of red, green and blue, or one for all.")
+    color: Colour = Field(
+        default=ONE, description="Factor of red, green and blue, one for all, or a temperature in kelvin."
+    )
 
 
 def relights(

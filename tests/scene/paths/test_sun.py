@@ -14,6 +14,7 @@ from support import tiny
 
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures
+from framearray_cli.base.blackbody import black_body
 from framearray_cli.base.errors import JobError, MissingExtraError
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.job.job import Job
@@ -137,6 +138,11 @@ def test_below_the_horizon_it_does_not_shine() -> None:
     np.testing.assert_array_equal(path.intensity, np.where(elevation > 0, 3.0, 0.0)[:, None] * np.ones(3))
     arrays = light_arrays(lights(job(start="00:00", stop="12:00", frames=13)), np.zeros(3))
     np.testing.assert_array_equal(arrays.lit[0], elevation > 0)
+
+
+def test_a_sun_has_a_colour() -> None:
+    plain, warm = (lights(job(**given)).sources[0] for given in ({}, {"color": "3200 K"}))
+    np.testing.assert_allclose(warm.intensity, plain.intensity * black_body(3200.0))
 
 
 def test_a_day_has_its_published_length() -> None:

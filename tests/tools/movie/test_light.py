@@ -15,6 +15,7 @@ from framearray_cli.array.images.images import read_image
 from framearray_cli.array.images.png import read_codes
 from framearray_cli.array.manifest import BACKGROUND, Manifest
 from framearray_cli.array.pictures import AS_RENDERED, Pictures, Relight
+from framearray_cli.base.blackbody import black_body
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.read import read_job
 from framearray_cli.tools.movie.assemble import assemble_movie
@@ -133,27 +134,53 @@ def test_wrong_light_is_reported_before_anything_is_written(array: Manifest, tmp
     assert sorted(file.name for file in tmp_path.iterdir()) == ["out", "path.toml", "plain"]
 
 
+A_COLOUR = 'a number or 3 numbers from 0 to 1000000, or a temperature such as "3200 K"'
+
+
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("intensity = -1", "groups.g.intensity: expected a number from 0 to 1000000, got -1"),
-        ("intensity = [1, 2, 3]", "groups.g.intensity: expected a number from 0 to 1000000, got [1, 2, 3]"),
-        ("color = [1, 2]", "groups.g.color: expected a number or 3 numbers from 0 to 1000000, got [1, 2]"),
-        ("color = []", "groups.g.color: expected a number or 3 numbers from 0 to 1000000, got a list of 0 values"),
-        ("colour = 1", 'groups.g.colour: unknown key; did you mean "color"?'),
+        ("intensity = -1", "intensity: expected a number from 0 to 1000000, got -1"),
+        ("intensity = [1, 2, 3]", "intensity: expected a number from 0 to 1000000, got [1, 2, 3]"),
+        ('intensity = "3200 K"', 'intensity: expected a number from 0 to 1000000, got "3200 K"'),
+        ("color = [1, 2]", f"color: expected {A_COLOUR}, got [1, 2]"),
+        ("color = []", f"color: expected {A_COLOUR}, got a list of 0 values"),
+        ('color = "warm"', f'color: expected {A_COLOUR}, got "warm"'),
+        ('color = "90 K"', 'color: expected a temperature from 1000 to 40000 K, got "90 K"'),
+        (
+            "color = [{ time = 0, value = '5000 C' }]",
+            f'color[0].value: expected {A_COLOUR}, got "5000 C"',
+        ),
+        (
+            "color = [{ time = 0, value = '99000 K' }]",
+            'color[0].value: expected a temperature from 1000 to 40000 K, got "99000 K"',
+        ),
+        ("colour = 1", 'colour: unknown key; did you mean "color"?'),
         (
             "intensity = [{ time = 'x', value = 1 }]",
-            'groups.g.intensity[0].time: expected seconds, or a percentage such as "50%", got "x"',
+            'intensity[0].time: expected seconds, or a percentage such as "50%", got "x"',
         ),
-        ("intensity = [{ time = 0 }]", "groups.g.intensity[0].value: missing; expected a number from 0 to 1000000"),
-        ("color = [{ time = 0, value = 1, at = 2 }]", "groups.g.color[0].at: unknown key; known here: time, value"),
-        ("color = [{ time = 0, value = 1 }, 2]", "groups.g.color[1]: expected a table with time and value, got 2"),
+        ("intensity = [{ time = 0 }]", "intensity[0].value: missing; expected a number from 0 to 1000000"),
+        ("color = [{ time = 0, value = 1, at = 2 }]", "color[0].at: unknown key; known here: time, value"),
+        ("color = [{ time = 0, value = 1 }, 2]", "color[1]: expected a table with time and value, got 2"),
     ],
 )
 def test_messages(tmp_path: Path, text: str, problem: str) -> None:
     with pytest.raises(JobError) as caught:
         load_movie_path(path_file(tmp_path, f"[[segments]]\nframes = 1\n[groups.g]\n{text}\n"))
-    assert list(caught.value.problems) == [problem]
+    assert list(caught.value.problems) == [f"groups.g.{problem}"]
+
+
+def test_a_temperature_is_the_colour_of_a_black_body() -> None:
+    keys = [{"time": 0, "value": "2700 K"}, {"time": 2, "value": [1, 1, 1]}]
+    found = lit([0.0, 1.0, 2.0], groups={"a": {"color": "6500 K", "intensity": 2}, "b": {"color": keys}})
+    assert found[0].groups["a"] == pytest.approx(np.multiply(2, black_body(6500.0)))
+    warm = black_body(2700.0)
+    assert [found[k].groups["b"] for k in range(3)] == [
+        pytest.approx(warm),
+        pytest.approx((np.array(warm) + 1) / 2),
+        GREY,
+    ]
 
 
 def test_the_example_with_light_fits_an_array_with_its_groups(array: Manifest) -> None:
