@@ -1,5 +1,6 @@
 """Small frame arrays written by hand; every image differs from its neighbours."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,25 @@ def plain(folder: Path, *, n_c: int = N_C, n_l: int = N_L, layers: bool = True) 
             write_layers(layers_path(manifest, c), layer_channels(c))
     write_manifest(folder, manifest)
     return manifest
+
+
+def circled(folder: Path) -> Manifest:
+    """The images of `plain`, under light from north, east, south, west and above."""
+    ways = [(0, 0, -1), (1, 0, 0), (0, 0, 1), (-1, 0, 0), (0, 1, 0)]
+    manifest = plain(folder, layers=False)
+    tables = [{"type": "directional", "direction": [-x for x in way], "irradiance": [1.0] * 3} for way in ways]
+    lights = tuple(replace(light, sources=(table,)) for light, table in zip(manifest.lights, tables, strict=True))
+    manifest = replace(manifest, lights=lights)
+    write_manifest(folder, manifest)
+    return manifest
+
+
+def write_sky(file: Path, top: float = 20.0) -> Path:
+    """Write a map with a bright sun low in the north."""
+    panorama = np.full((16, 32, 3), 0.05, np.float32)
+    panorama[5, 16] = [top, 0.8 * top, 0.5 * top]
+    write_image(file, panorama, FLOAT)
+    return file
 
 
 def layer_channels(c: int) -> dict[str, Image]:

@@ -10,6 +10,7 @@ from framearray_cli.base.units import agree, counted, size
 
 from ..options import ArrayFolder, Force, Json, Quiet, ThreadsOfNoJob, output_path
 from ..screen import Screen, err, print_document, print_result
+from ..summing import Environment
 from ..values import whole
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ def view(
         str | None,
         typer.Option("--cache", help="Folder for prepared pictures; default: OUT/.view.", metavar="FOLDER"),
     ] = None,
+    environment: Environment = None,
     threads: ThreadsOfNoJob = None,
     force: Force = False,
     quiet: Quiet = False,
@@ -42,8 +44,9 @@ def view(
     from ..array_results import PageResult, ServerResult
 
     workers = threads or available_cores()
-    tiles = open_tiles(array, output_path(cache, "--cache") if cache is not None else None, workers)
+    tiles = open_tiles(array, output_path(cache, "--cache") if cache is not None else None, workers, environment)
     with Screen(err, quiet=quiet) as screen:
+        screen.say(f"warning: {text}" for text in (tiles.turning.warnings if tiles.turning else ()))
         screen.say(_lacking_lines(tiles, "the page marks them" if target else "the page shows them as they come"))
         if target is not None:
             screen.count("preparing", tiles.n_pictures, "picture")

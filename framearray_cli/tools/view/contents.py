@@ -10,7 +10,7 @@ by camera, for those of which some sources are there: first and last light posit
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from itertools import groupby
 from typing import Any
@@ -37,20 +37,25 @@ def scan_sources(manifest: Manifest, streams: Sequence[Stream]) -> dict[str, Sou
 
 
 def contents_table(
-    manifest: Manifest, streams: Sequence[Stream], sources: dict[str, Source], index: str, *, live: bool
+    n_cameras: int,
+    streams: Sequence[Stream],
+    sources_of: Callable[[Stream, int], Sequence[Source | None]],
+    index: str,
+    *,
+    live: bool,
 ) -> dict[str, Any]:
     """Return the content of `contents.json`.
 
     Args:
-        sources: see `scan_sources`.
+        sources_of: a stream and a camera -> the source of each of its pictures.
         index: its digest.
     """
     table: dict[str, Any] = {}
     lacking: set[int] = set()
     for stream in streams:
         stamps, missing = [], {}
-        for c in range(manifest.n_cameras):
-            found = [sources.get(source_name(manifest, stream, c, l)) for l in range(stream.n)]
+        for c in range(n_cameras):
+            found = sources_of(stream, c)
             stamps.append(stamp_of("", found)[:8])
             if not all(found):
                 lacking.add(c)

@@ -15,6 +15,7 @@ from framearray_cli.base.arrays import Float32, is_number
 from framearray_cli.base.hashing import line_digest
 
 from .streams import LAYERS, Stream
+from .turning import STEP_DEG, Turning
 
 INDEX_FORMAT = 2  # of the index and the tiles; a new number discards those that exist
 SMALL_PIXELS = 100 * 75  # of a small picture, about: a quarter of 400 x 300 per side
@@ -67,9 +68,13 @@ def sheet_layout(resolution: tuple[int, int], n: int) -> SheetLayout:
     return SheetLayout(factor=factor, width=small[0], height=small[1], columns=columns)
 
 
-def index_table(manifest: Manifest, streams: Sequence[Stream], layout: SheetLayout) -> dict[str, Any]:
+def index_table(
+    manifest: Manifest, streams: Sequence[Stream], layout: SheetLayout, turning: Turning | None = None
+) -> dict[str, Any]:
     """Return the content of `index.json`; `digest` is that of all the rest."""
     table = _index(manifest, streams, layout)
+    if turning is not None:
+        table |= {"axes": [turning.axis], "environment": {"file": turning.file.name, "step": STEP_DEG}}
     return {**table, "digest": line_digest(json.dumps(table).encode()).decode()}
 
 

@@ -16,27 +16,32 @@ from framearray_cli.base.files import make_folder
 from .export import check_target, export_page
 from .server import PageServer
 from .tiles import Tiles
+from .turning import KEY, make_turning
 
 CACHE_FOLDER = ".view"  # of the tiles, beside the images
 
 
-def open_tiles(out: Path, cache: Path | None, threads: int) -> Tiles:
+def open_tiles(out: Path, cache: Path | None, threads: int, environment: Path | None = None) -> Tiles:
     """Read an array's manifest and open its tiles.
 
     Args:
         out: output folder of a render, or its manifest.
         cache: folder of the tiles; None: beside the images.
         threads: that read images at once.
+        environment: map that lights the pictures, and turns, in place of light positions.
 
     Raises:
-        OutputError: the manifest cannot be read, or the folder cannot be written to.
+        OutputError: the manifest or the map cannot be read, the array cannot be lit by a map, or the folder cannot be
+            written to.
     """
     manifest = read_manifest(out)
+    turning = make_turning(manifest, environment) if environment is not None else None
     require_writer("jpg")
     folder = manifest.directory / CACHE_FOLDER if cache is None else cache
+    folder = folder / KEY if turning else folder
     try:
         make_folder(folder)
-        return Tiles(manifest, folder, threads)
+        return Tiles(manifest, folder, threads, turning=turning)
     except OutputError as error:
         if cache is None:
             error.add_note("--cache FOLDER keeps what the page needs elsewhere")

@@ -15,12 +15,14 @@ from framearray_cli.base.errors import OutputError
 
 from .coding import PLAIN_CODING, Coding, coding_for, data_coding
 
-Role = Literal["image", "group", "ambient", "background", "layer"]
+Role = Literal["image", "group", "ambient", "background", "layer", "environment"]
+ReadPicture = Callable[[int, int], Float32]  # of a camera, at a light position
 ReadLayers = Callable[[Path], dict[str, Float32]]
 
 # Pictures sampled over the array to choose the coding: 3 to 8 ms each, before the page opens.
 SAMPLES = 24
 LAYER_SAMPLES = 6  # layer files are larger: 20 ms each
+SUM_SAMPLES = 2  # a sum reads all images of a camera
 # Layers by name in the file: name on the page, channels, and whether exposure applies.
 LAYERS = {
     "obscurance": ("Obscurance", "RGB", True),
@@ -123,34 +125,36 @@ def read_values(manifest: Manifest, stream: Stream, c: int, l: int, read_layers:
     return values
 
 
-def choose_coding(manifest: Manifest, stream: Stream, read_layers: ReadLayers) -> Coding:
+def choose_coding(manifest: Manifest, stream: Stream, read: ReadPicture) -> Coding:
     """Choose the coding of a stream from a sample of those of its pictures that exist."""
     if stream.key == "normal" and stream.role == "layer":
         return Coding(scale=0.0, low=-1.0, high=1.0)
     if _is_clipped(manifest, stream):
         return PLAIN_CODING
-    largest = max((float(values.max()) for values in _sample_values(manifest, stream, read_layers)), default=0.0)
+    largest = max((float(values.max()) for values in _sample_values(manifest, stream, read)), default=0.0)
     if stream.role == "layer" and not LAYERS[stream.key][2]:
         return data_coding(largest)
     return coding_for(largest)
 
 
-def _sample_values(manifest: Manifest, stream: Stream, read_layers: ReadLayers) -> Iterator[Image]:
+def _sample_values(manifest: Manifest, stream: Stream, read: ReadPicture) -> Iterator[Image]:
     """Read a few pictures of a stream, spread over cameras and lights."""
     total = manifest.n_cameras * stream.n
     # Steps of the golden ratio: even steps could meet the same few lights again and again.
-    count = LAYER_SAMPLES if stream.role == "layer" else SAMPLES
+    count = {"layer": LAYER_SAMPLES, "environment": SUM_SAMPLES}.get(stream.role, SAMPLES)
     numbers = {int(total * ((k * 0.6180339887498949) % 1)) for k in range(min(count, total))}
     for number in sorted(numbers):
         try:
-            yield read_values(manifest, stream, *divmod(number, stream.n), read_layers)
+            yield read(*divmod(number, stream.n))
         except OutputError:  # not rendered yet, or damaged; `Tiles.prepare` reports it
             continue
 
 
 def _is_clipped(manifest: Manifest, stream: Stream) -> bool:
     """Return whether the array's images clip radiance at 1."""
-    return stream.role != "layer" and format_name(source_file(manifest, stream, 0, 0)) in FOR_SCREENS
+    return (
+        stream.role not in ("layer", "environment") and format_name(source_file(manifest, stream, 0, 0)) in FOR_SCREENS
+    )
 
 
 def _channels(name: str, letters: str) -> list[str]:

@@ -11,13 +11,13 @@ missing, and appear at any time and in any order.
 import json
 import shutil
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from framearray_cli.array.images.images import read_layers
 from framearray_cli.array.manifest import FILE_NAME, Manifest, layers_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.present import list_present
+from framearray_cli.base.arrays import Float32
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, write_bytes
 
@@ -32,8 +33,10 @@ from .coding import Coding, encode
 from .contents import contents_table, scan_sources
 from .index import index_table, sheet_layout
 from .stamps import Source, is_fresh, source_of, stamp_of, write_tile
-from .streams import Stream, choose_coding, layer_streams, read_values, source_file, streams_of
+from .streams import Stream, choose_coding, layer_streams, read_values, source_name, streams_of
+from .turning import Turning, make_turning
 
+ReadTurned: TypeAlias = Callable[[int, int], Float32]
 INDEX_FILE = "index.json"
 TILES_FOLDER = "tiles"
 TILES_DEPEND_ON = ("format", "fingerprint", "resolution", "n_cameras", "axes", "small", "streams")  # keys of the index
@@ -49,16 +52,27 @@ class Tiles:
         streams: of the array, with their codings.
     """
 
-    def __init__(self, manifest: Manifest, folder: Path, threads: int = 1, *, discard: bool = True) -> None:
+    def __init__(
+        self,
+        manifest: Manifest,
+        folder: Path,
+        threads: int = 1,
+        *,
+        discard: bool = True,
+        turning: Turning | None = None,
+    ) -> None:
         """Choose the codings, and write the index.
 
         Args:
             discard: delete tiles of other codings, which nobody may be making meanwhile.
+            turning: environment that lights the pictures in place of light positions.
 
         Raises:
             OutputError: the folder cannot be written to.
         """
         self.manifest, self.folder, self._threads = manifest, folder, threads
+        self.turning = turning
+        self._read_turned = self.turning.reader() if self.turning else None
         self._read_layers = lru_cache(KEPT_LAYER_FILES)(read_layers)
         self._manifest_source = source_of(manifest.directory / FILE_NAME)
         self.streams = self._with_codings()
@@ -68,7 +82,7 @@ class Tiles:
         self._slots = threading.BoundedSemaphore(threads)
         self.stopping = threading.Event()
         self._n_sources = list_present(manifest).count()
-        table = index_table(manifest, self.streams, self.layout)
+        table = index_table(manifest, self.streams, self.layout, self.turning)
         self._digest: str = table["digest"]
         old = _read_index(folder / INDEX_FILE)
         if discard and _tile_keys(old) != _tile_keys(table):
@@ -78,8 +92,18 @@ class Tiles:
 
     def contents(self, *, live: bool) -> dict[str, Any]:
         """Return the table of `contents.json`."""
-        sources = scan_sources(self.manifest, self.streams)
-        return contents_table(self.manifest, self.streams, sources, self._digest, live=live)
+        found = scan_sources(self.manifest, streams_of(self.manifest) + self._layers)
+
+        def sources_of(stream: Stream, c: int) -> list[Source | None]:
+            if self.turning is not None and stream.role == "environment":
+                return [self.turning.source(c, found.get)] * stream.n
+            return [found.get(source_name(self.manifest, stream, c, l)) for l in range(stream.n)]
+
+        return contents_table(self.manifest.n_cameras, self.streams, sources_of, self._digest, live=live)
+
+    @property
+    def _layers(self) -> list[Stream]:
+        return [stream for stream in self.streams if stream.role == "layer"]
 
     def renewed(self) -> "Tiles":
         """Return these tiles, or new ones if the array has changed so much that index and codings must be chosen anew.
@@ -96,11 +120,12 @@ class Tiles:
         found, before = list_present(manifest).count(), self._n_sources
         if same and (found <= before or found < 2 * before):
             return self
-        return Tiles(manifest, self.folder, self._threads, discard=False)
+        turning = make_turning(manifest, self.turning.file) if self.turning else None
+        return Tiles(manifest, self.folder, self._threads, discard=False, turning=turning)
 
     def _with_codings(self) -> list[Stream]:
         manifest = self.manifest
-        found = streams_of(manifest)
+        found = [self.turning.stream] if self.turning else streams_of(manifest)
         for c in range(manifest.n_cameras if manifest.layers else 0):
             with suppress(OutputError):  # not rendered yet, or damaged
                 found += layer_streams(self._read_layers(layers_path(manifest, c)))
@@ -114,7 +139,14 @@ class Tiles:
         return [replace(stream, coding=codings[stream.key]) for stream in found]
 
     def _codings(self, streams: Sequence[Stream]) -> dict[str, Coding]:
-        return {stream.key: choose_coding(self.manifest, stream, self._read_layers) for stream in streams}
+        return {stream.key: choose_coding(self.manifest, stream, partial(self._read, stream)) for stream in streams}
+
+    def _read(self, stream: Stream, c: int, l: int, turned: ReadTurned | None = None) -> Float32:
+        """Read a picture of the array, or one under the environment."""
+        turned = turned or self._read_turned
+        if stream.role == "environment" and turned is not None:
+            return turned(c, l)
+        return read_values(self.manifest, stream, c, l, self._read_layers)
 
     @property
     def n_pictures(self) -> int:
@@ -139,12 +171,12 @@ class Tiles:
         if l is not None:
             stamp = self._stamp(stream, [self._source(stream, c, l)])
             if not is_fresh(path, stamp):
-                values = read_values(self.manifest, stream, c, l, self._read_layers)
-                write_tile(path, encode(values, stream.coding), stamp)
+                write_tile(path, encode(self._read(stream, c, l), stream.coding), stamp)
             return path
         stamp = self._stamp(stream, self._sources(stream, c))
         if not stamp:
-            raise OutputError(f"{source_file(self.manifest, stream, c, 0)}: no such file")
+            missing = self.turning.names(c)[0] if self.turning else source_name(self.manifest, stream, c, 0)
+            raise OutputError(f"{self.manifest.directory / missing}: no such file")
         if not is_fresh(path, stamp):
             with self._slots:
                 problems = self.prepare(stream, c)
@@ -167,13 +199,14 @@ class Tiles:
             if not fulls or (all(fulls) and is_fresh(sheet_path, self._stamp(stream, sources))):
                 return problems
             sheet = np.zeros((*self.layout.sheet(stream.n), 3), np.uint8)
+            turned = self.turning.reader() if self.turning else None  # two threads would drop each other's files
             for l, stamp in enumerate(stamps):
                 if self.stopping.is_set():
                     return problems
                 if not stamp:
                     continue
                 try:
-                    values = read_values(self.manifest, stream, c, l, self._read_layers)
+                    values = self._read(stream, c, l, turned)
                 except OutputError as problem:
                     problems.append(problem)
                     sources[l] = None  # the sheet is made again when it can be read
@@ -187,13 +220,19 @@ class Tiles:
             return problems
 
     def _source(self, stream: Stream, c: int, l: int) -> Source | None:
-        return source_of(source_file(self.manifest, stream, c, l))
+        folder = self.manifest.directory
+        if self.turning is not None and stream.role == "environment":
+            return self.turning.source(c, lambda name: source_of(folder / name))
+        return source_of(folder / source_name(self.manifest, stream, c, l))
 
     def _sources(self, stream: Stream, c: int) -> list[Source | None]:
+        if stream.role == "environment":
+            return [self._source(stream, c, 0)] * stream.n
         return [self._source(stream, c, l) for l in range(stream.n)]
 
     def _stamp(self, stream: Stream, sources: Sequence[Source | None]) -> str:
-        return stamp_of(repr((self.manifest.fingerprint, stream.coding, self.layout)), sources)
+        weights = (self.turning.digest,) if self.turning and stream.role == "environment" else ()
+        return stamp_of(repr((self.manifest.fingerprint, stream.coding, self.layout, *weights)), sources)
 
 
 def _tile_keys(index: Any) -> Any:
