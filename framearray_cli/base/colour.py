@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from .arrays import Bytes, Float32
 
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of red, green and blue (Rec. 709)
+
 
 def srgb_from_linear(linear: NDArray[Any]) -> NDArray[Any]:
     """Encode linear values with the sRGB curve; values outside [0, 1] are clipped.

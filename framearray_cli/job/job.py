@@ -246,6 +246,7 @@ class Job(Table):
             )
         self._check_groups()
         self._check_cells()
+        self._check_environments()
         if self.samples.halves and self._window_hits < 2:
             fail([(("samples", "halves"), "expected at least two hits for each pixel of an image")])
         job_file = (info.context or {}).get("job_file")
@@ -263,6 +264,12 @@ class Job(Table):
         if self.indirect.method != "obscurance" and self.denoise.obscurance:
             problem = f'expected false with indirect.method = "{self.indirect.method}", which shows no obscurance'
             fail([(("denoise", "obscurance"), problem)])
+
+    def _check_environments(self) -> None:
+        """Refuse particles from environments."""
+        by_light = self.ambient.method == "light" and self.ambient.intensity is None
+        if by_light and self.indirect.method != "cells" and "environment" in {s.type for s in self.light.sources}:
+            fail([(("ambient", "method"), 'expected "eye" or "fit": environments emit no particles')])
 
     def _check_groups(self) -> None:
         """Refuse settings that light stored by group does not allow."""

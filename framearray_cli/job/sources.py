@@ -8,6 +8,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from framearray_cli.base.forms.table import Place, default_text, fail
 from framearray_cli.base.units import FARTHEST
 
+from .environment import EnvironmentSource
 from .keys import MOST_EYES
 from .panel import DiscSource, RectSource
 from .placed import Angle, DirectionalKey, DirectionalSource, PointSource
@@ -175,6 +176,14 @@ class SunSource(SourceTable):
 
 
 LightSource: TypeAlias = Annotated[
-    PointSource | DirectionalSource | SpotSource | RectSource | DiscSource | SunSource | DomeSource | GridSource,
+    PointSource
+    | DirectionalSource
+    | SpotSource
+    | RectSource
+    | DiscSource
+    | SunSource
+    | DomeSource
+    | GridSource
+    | EnvironmentSource,
     Field(discriminator="type"),
 ]

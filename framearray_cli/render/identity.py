@@ -18,6 +18,7 @@ from framearray_cli.base.hashing import fingerprint
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.job.method import ObscuranceTable, SamplesTable
 from framearray_cli.job.read import job_table
+from framearray_cli.scene.paths.lightpath import LightPath
 
 from .prepare import Prepared
 
@@ -96,9 +97,15 @@ def job_fingerprint(prepared: Prepared, scene: str | None = None, table: dict[st
     table["scene"] = {key: value for key, value in table["scene"].items() if key not in ("file", "folders")}
     for section, key in metadata_of(table):
         table[section] = {**table[section], key: _DEFAULTS[section].model_fields[key].default}
-    if any(path.profile for path in prepared.lights.sources):  # what a file of a lamp says, not its name
-        webs = [path.profile and {"ies": path.profile.web.digest} for path in prepared.lights.sources]
-        sources = [source | (web or {}) for source, web in zip(table["light"]["sources"], webs, strict=True)]
+    files = [_file_digests(path) for path in prepared.lights.sources]
+    if any(files):  # what a file of a lamp or an environment says, not its name
+        sources = [source | digests for source, digests in zip(table["light"]["sources"], files, strict=True)]
         table["light"] = table["light"] | {"sources": sources}
     scene = scene or scene_fingerprint(prepared)
     return fingerprint(json.dumps(table, sort_keys=True, default=str).encode(), scene.encode())
+
+
+def _file_digests(path: LightPath) -> dict[str, str]:
+    """The keys of a source that name files, with a hash of what these say."""
+    found = {"ies": path.profile.web.digest} if path.profile else {}
+    return found | ({"file": path.environment.panorama.digest} if path.environment else {})

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from framearray_cli.base.arrays import Float64, Images
-from framearray_cli.base.colour import srgb_from_linear
+from framearray_cli.base.colour import LUMINANCE, srgb_from_linear
 from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
@@ -25,7 +25,6 @@ CELL_SAMPLES = 2**15  # for cells that a few small pictures see
 HITS = 8  # per pixel; the mean of three pictures is then known to a hundredth
 CLIPPED = 0.03  # largest share of surface pixels that may clip
 LEAST, MOST = 1e-12, 1e12  # bounds of the factor
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of Rec. 709
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

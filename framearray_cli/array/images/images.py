@@ -15,14 +15,15 @@ from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes, Float32, Image
 from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
-from framearray_cli.base.errors import MissingExtraError, OutputError
+from framearray_cli.base.errors import MissingExtraError
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.files import write_bytes
+from framearray_cli.base.openimage import oiio, read_pixels, read_rgb
 from framearray_cli.base.units import counted
 
 from . import plain_exr
 from .attributes import Attributes
-from .exr import OIIO_NAMES, oiio, read_pixels, spec_of, write_pixels
+from .exr import OIIO_NAMES, spec_of, write_pixels
 from .png import can_encode, encode_jpeg, encode_png, read_codes
 
 Extension = Literal["exr", "png", "tif", "jpg"]
@@ -225,10 +226,7 @@ def read_image(path: Path) -> Image:
     """
     if format_name(path) in FOR_SCREENS:
         return linear_from_srgb8(read_codes(path))
-    names, pixels = read_pixels(path)
-    if not {"R", "G", "B"} <= set(names):
-        raise OutputError(f"{path}: expected channels R, G, B, found {', '.join(names)}")
-    return np.ascontiguousarray(pixels[..., [names.index(name) for name in "RGB"]])
+    return read_rgb(path)
 
 
 def read_layers(path: Path) -> dict[str, Float32]:

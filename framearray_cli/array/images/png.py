@@ -14,10 +14,10 @@ import numpy as np
 from framearray_cli.base.arrays import Bytes
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, require_file
+from framearray_cli.base.openimage import check_size
 
 from .attributes import Attributes
 
-MOST_PIXELS = 16384**2  # of an image; no job may have more
 _PNG_HEAD, _JPEG_HEAD = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
 # What Pillow raises for broken files, beside OSError.
 _PILLOW_ERRORS = (SyntaxError, ValueError, EOFError, IndexError, KeyError, TypeError, struct.error, zlib.error)
@@ -66,12 +66,6 @@ def can_encode(name: str) -> bool:
     import PIL.features
 
     return bool(PIL.features.check_codec("jpg" if name == "jpg" else "zlib"))
-
-
-def check_size(path: Path, width: int, height: int) -> None:
-    """Refuse a size beyond any job, which a few bytes can claim, before memory is allocated for it."""
-    if width * height > MOST_PIXELS:
-        raise OutputError(f"{path}: damaged: it says that it has {width} x {height} pixels, more than any job")
 
 
 def encode_png(codes: Bytes, attributes: Attributes) -> memoryview:

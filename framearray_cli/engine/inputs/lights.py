@@ -14,6 +14,7 @@ from framearray_cli.base.arrays import Float32, Float64, Int32, with_room
 from framearray_cli.scene.paths.paths import Lights
 from framearray_cli.scene.paths.placing import LightPath
 
+from .maps import NO_MAPS, Maps, map_arrays
 from .profiles import NONE, Profiles, profile_arrays
 
 POINT, DIRECTIONAL, RECT, DISC = 0, 1, 2, 3  # panels are last
@@ -39,6 +40,7 @@ class LightArrays(NamedTuple):
             then compiled without them.
         colour: (n_lights, 3) factor of a stored irradiance; ones if there are 3 channels.
         profiles: of lamps with measured light; kernels are compiled without them where there are none.
+        maps: of environments, which are DIRECTIONAL with a map, likewise.
     """
 
     kind: Int32
@@ -50,6 +52,7 @@ class LightArrays(NamedTuple):
     panel: Float32
     colour: Float32
     profiles: Profiles = NONE
+    maps: Maps = NO_MAPS
 
     @property
     def channels(self) -> int:
@@ -71,7 +74,8 @@ def pad_lights(lights: LightArrays) -> LightArrays:
         return room
 
     profiles = lights.profiles._replace(frame=copied(lights.profiles.frame))
-    arrays: Any = (array if array is lights.profiles else copied(array) for array in lights)
+    own = (lights.profiles, lights.maps)
+    arrays: Any = (array if any(array is one for one in own) else copied(array) for array in lights)
     return LightArrays(*arrays)._replace(profiles=profiles)
 
 
@@ -85,7 +89,10 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
     largest = colour.max(axis=-1, keepdims=True)
     colour = np.divide(colour, largest, out=np.ones_like(colour), where=largest > 0)
     scalar = intensity.max(axis=-1, keepdims=True)
-    if np.allclose(scalar * colour, intensity, rtol=1e-6, atol=0.0):  # beyond that, float32 would show the difference
+    coloured = any(path.environment and not path.environment.panorama.is_grey for path in lights.sources)
+    if not coloured and np.allclose(
+        scalar * colour, intensity, rtol=1e-6, atol=0.0
+    ):  # beyond that, float32 would show the difference
         strength = scalar
     else:
         strength, colour = intensity, np.ones_like(colour)
@@ -99,6 +106,7 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
         panel=_panels(lights),
         colour=np.asarray(colour, np.float32),
         profiles=profile_arrays(lights),
+        maps=map_arrays(lights.sources),
     )
     return pad_lights(found)
 

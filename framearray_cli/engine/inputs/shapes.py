@@ -18,6 +18,7 @@ from framearray_cli.base.arrays import Float64, Real, Triple
 from ..kernels.kernel import has_rows, inlined
 from ..kernels.simd import gather, load, select, sqrt
 from .lights import DIRECTIONAL, RECT, LightArrays
+from .maps import MASK, map_point, map_vector
 from .panels import PanelAt, panel_at, panel_in_lanes, panel_point, panel_ray, panel_sample
 from .profiles import FLUX, POLAR, frame_at, frame_in_lanes, profile_direction, profile_share
 from .random import SOURCES, r2, random_word, sphere_point
@@ -87,7 +88,9 @@ def source_in_lanes(lights: LightArrays, s: int, l: int) -> SourceAt:
 
 @inlined
 def source_point(lights: LightArrays, key: np.uint64, s: int) -> Triple:
-    """The point q of source s that the hit of a random key draws: on the unit sphere, or of a panel."""
+    """The point q of source s that the hit of a random key draws: on the unit sphere, of a panel, or of a map."""
+    if has_rows(lights.maps.tint) and lights.maps.grid[s, MASK] > 0:
+        return map_point(lights.maps, s, key)
     u, v = r2(random_word(key, SOURCES + s), 0)
     if has_rows(lights.panel) and lights.kind[s] >= RECT:
         return panel_point(lights.kind[s], u, v)
@@ -102,9 +105,9 @@ def vector_and_factor(
 
     The irradiance is the factor times the strength: cos(theta) / d^2 for a point source, whose vector ends at the
     source, and cos(theta) for a directional one, whose vector has length 1. It is 0 where the source does not shine or
-    lies behind either normal. Of a source with a size it is the estimate by one direction, see `_cone_sample`; a spot's
-    falls off towards its edge, and a lamp with a profile follows that. Of a panel it is that of one of its points, see
-    `panel_sample`.
+    lies behind either normal. Of a source with a size it is the estimate by one direction, see `_cone_sample`, of a map
+    too, see `maps.py`; a spot's falls off towards its edge, and a lamp with a profile follows that. Of a panel it is
+    that of one of its points, see `panel_sample`.
 
     Args:
         source: source s at these light positions.
@@ -113,6 +116,11 @@ def vector_and_factor(
     """
     (x, y, z), size, cone, panel, lit, frame = source
     kind, nothing, one = lights.kind[s], np.float32(0.0), np.float32(1.0)
+    if has_rows(lights.maps.tint) and lights.maps.grid[s, MASK] > 0:
+        x, y, z = map_vector(lights.maps, source.place, q)
+        cosine = x * m[0] + y * m[1] + z * m[2]
+        in_front = (cosine > nothing) & (x * g[0] + y * g[1] + z * g[2] > nothing)
+        return x, y, z, select(in_front, cosine * lit, nothing)
     # the vector to the source: L - P, or against the light's direction
     sign, from_point = (-one, nothing) if kind == DIRECTIONAL else (one, one)
     x, y, z = sign * x - from_point * p[0], sign * y - from_point * p[1], sign * z - from_point * p[2]

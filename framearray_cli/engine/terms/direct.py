@@ -14,6 +14,7 @@ from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude, room_in
 from ..hits.hits import Hits, lift, ray_origin, reflects, reflects_in_lanes, triple
 from ..hits.rays import NO_RAYS, Rays
 from ..inputs.lights import DIRECTIONAL, LightArrays
+from ..inputs.maps import map_texel, map_tint
 from ..inputs.shapes import source_at, source_in_lanes, source_point, vector_and_factor
 from ..kernels.kernel import has_rows, index, inlined, kernel, step
 from ..kernels.simd import (
@@ -59,7 +60,7 @@ def vector_to_source(hits: Hits, i: int, lights: LightArrays, s: int, l: int) ->
     """Vector from hit i to source s at light position l, see `vector_and_factor`."""
     source, p = source_at(lights, s, l), triple(hits.position, i)
     x, y, z = source.place
-    if has_rows(lights.size) or has_rows(lights.panel):
+    if has_rows(lights.size) or has_rows(lights.panel) or has_rows(lights.maps.tint):
         g, m = triple(hits.geometric, i), triple(hits.shading, i)
         x, y, z, _ = vector_and_factor(lights, s, source, p, g, m, source_point(lights, hits.key[i], s))
         return x, y, z
@@ -84,11 +85,13 @@ class _RayStart(NamedTuple):
         origin: the point, slightly above the hit.
         up: vector from the hit to that point.
         first_value: index of the hit's first value in the flat array of irradiances.
+        texel: of the source's map, if it has one.
     """
 
     origin: Triple
     up: Triple
     first_value: int
+    texel: int
 
 
 @inlined
@@ -124,7 +127,8 @@ def _queue(
     append(reached, lane_numbers() + np.int32(start.first_value + l), rays.place, waiting)
     for channel in range(channels):
         strength = load(lights.strength, (s * channels + channel) * n_lights + l)
-        append(reached, factor * strength, rays.value, channel * rays.value.shape[1] + waiting)
+        tint = map_tint(lights.maps, s, start.texel, channel)
+        append(reached, factor * strength * tint, rays.value, channel * rays.value.shape[1] + waiting)
     found: int = waiting + popcount(reached)
     return found
 
@@ -170,6 +174,7 @@ def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, ray
         key = load(hits.key, i)
         for s in range(lights.kind.shape[0]):
             q = source_point(lights, key, s)
+            texel = map_texel(lights.maps, s, key)
             for l in range(n_lights):
                 # make room for sixteen rays
                 if waiting > capacity - LANES:
@@ -189,8 +194,8 @@ def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, ray
                 # with the irradiance that each carries
                 append(traced, at * np.int32(channels * n_lights) + np.int32(l), rays.place, waiting)
                 for channel in range(channels):
-                    strength = lights.strength[s, channel, l]
-                    append(traced, factor * strength, rays.value, channel * rays.value.shape[1] + waiting)
+                    value = factor * lights.strength[s, channel, l] * map_tint(lights.maps, s, texel, channel)
+                    append(traced, value, rays.value, channel * rays.value.shape[1] + waiting)
                 waiting += popcount(traced)
     _trace_queue(tracer, rays, waiting, irradiance)
     return total + waiting
@@ -207,8 +212,9 @@ def _direct_by_lights(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, r
     for i in range(n):
         if not reflects(hits, i):
             continue
-        start = _RayStart(ray_origin(hits, i), lift(hits, i), i * channels * n_lights)
         for s in range(lights.kind.shape[0]):
+            texel = map_texel(lights.maps, s, hits.key[i])
+            start = _RayStart(ray_origin(hits, i), lift(hits, i), i * channels * n_lights, texel)
             for l in range(0, n_lights, LANES):
                 # make room for sixteen rays
                 if waiting > capacity - LANES:

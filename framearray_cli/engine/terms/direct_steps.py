@@ -19,6 +19,7 @@ from ..embree.packets import Tracer, is_blocked, occlude, room_in, set_ray
 from ..hits.hits import Hits, lift, ray_origin, reflects
 from ..hits.rays import NO_RAYS, Rays
 from ..inputs.lights import DIRECTIONAL, LightArrays
+from ..inputs.maps import map_texel, map_tint
 from ..inputs.random import STEPS, mix, random_word
 from ..kernels.kernel import inlined, kernel, step
 from .direct import FAR_END, TO, vector_to_source, write_geometry
@@ -291,8 +292,9 @@ def direct_by_steps(
             # E_direct: geometry factor, visibility and strength, summed over sources
             for b in range(size):
                 for channel in range(channels):
+                    tint = map_tint(lights.maps, s, map_texel(lights.maps, s, hits.key[first + b]), channel)
                     for l in range(n_lights):
                         sum_so_far = irradiance[first + b, channel, l] if s > 0 else np.float32(0.0)
                         seen = tests.factor[b, l] * tests.visible[b, l]
-                        irradiance[first + b, channel, l] = sum_so_far + seen * lights.strength[s, channel, l]
+                        irradiance[first + b, channel, l] = sum_so_far + seen * (lights.strength[s, channel, l] * tint)
     return total

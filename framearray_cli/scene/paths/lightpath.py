@@ -7,6 +7,7 @@ from typing import Any, Literal
 from framearray_cli.base.arrays import Float64
 
 from .panels import Panel
+from .panorama import Environment
 from .profiles import Profile
 
 # What the manifest calls the vector, the strength and the size of a source, by its kind.
@@ -40,6 +41,8 @@ class LightPath:
         cone: of a spot, which is a point with a cone.
         panel: of a rectangle or disc, which is a point with a panel around it.
         profile: of a point whose light was measured; `intensity` is then its largest.
+        environment: of a map all around, which is a directional source whose `vector` is the way that the light of the
+            middle of the map travels; `intensity` is then its radiance, integrated over all directions.
         notes: n tables with what else the manifest records of each position; or none.
     """
 
@@ -50,6 +53,7 @@ class LightPath:
     cone: Cone | None = None
     panel: Panel | None = None
     profile: Profile | None = None
+    environment: Environment | None = None
     notes: tuple[dict[str, Any], ...] = ()
 
     @property
@@ -60,6 +64,8 @@ class LightPath:
 
     def table(self, l: int) -> dict[str, Any]:
         """Describe the source at position l as the manifest does."""
+        if self.environment is not None:
+            return self.environment.table(l)
         vector, strength, size = _MANIFEST_KEYS[self.kind]
         values = {"type": self.kind, vector: self.vector[l].tolist(), strength: self.intensity[l].tolist()}
         values |= {} if self.size is None else {size: float(self.size[l])}
@@ -81,5 +87,6 @@ class LightPath:
             cone=self.cone and Cone(axis=self.cone.axis[rows], angles_deg=self.cone.angles_deg[rows]),
             panel=self.panel and self.panel.at(rows),
             profile=self.profile and self.profile.at(rows),
+            environment=self.environment and self.environment.at(rows),
             notes=tuple(self.notes[k] for k in rows) if self.notes else (),
         )

@@ -8,6 +8,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import JobError
+from framearray_cli.job.environment import EnvironmentSource
 from framearray_cli.job.job import Job
 from framearray_cli.job.light import LightTable
 from framearray_cli.job.panel import DiscSource, PanelKey, RectKey, RectSource
@@ -20,6 +21,7 @@ from framearray_cli.job.values import SHORTEST
 from .curves import interpolate_keys
 from .directions import PARALLEL, interpolate_directions, unit
 from .domes import dome_directions, grid_points
+from .environments import place_environment
 from .lightpath import Cone as Cone
 from .lightpath import LightPath as LightPath
 from .measured import add_profile
@@ -40,7 +42,7 @@ def place_source(job: Job, i: int, n: int, world_from_camera: Float64 | None) ->
         world_from_camera: (3, 3) axes of the first camera, where a source needs them.
 
     Raises:
-        JobError: a sun that never shines, or whose north points up.
+        JobError: a sun that never shines, or whose north points up; a broken environment map.
         MissingExtraError: it is a sun, and pvlib is not installed.
     """
     source = job.light.sources[i]
@@ -55,6 +57,8 @@ def place_source(job: Job, i: int, n: int, world_from_camera: Float64 | None) ->
             )
         case SpotSource():
             return in_units(_place_spot(source, job, f"light.sources[{i}]", n, world_from_camera), source)
+        case EnvironmentSource():
+            return place_environment(source, job, f"light.sources[{i}]", n)
         case RectSource() | DiscSource():
             return in_units(_place_panel(source, job, f"light.sources[{i}]", n, world_from_camera), source)
         case _:

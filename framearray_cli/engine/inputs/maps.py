@@ -1,0 +1,213 @@
+"""Environment maps: the direction that a hit draws, in proportion to luminance times solid angle.
+
+The radiance is the same all over a texel. A texel is chosen by an alias table [Walker77], a point in it uniformly, so
+that the estimate of irradiance is the same for every texel but for its colour: the luminance of the whole map,
+integrated over all directions, times (r, g, b) / luminance of the texel. Nothing here depends on the light position:
+that only turns the direction.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from framearray_cli.base.arrays import Float32, Float64, Int32, Real, Triple
+from framearray_cli.base.colour import LUMINANCE
+from framearray_cli.scene.paths.lightpath import LightPath
+
+from ..kernels.kernel import has_rows, inlined
+from ..kernels.simd import gather, integers, reals, select, sqrt
+from .random import SOURCES, UNIT_24, r2, random_word
+
+# Columns of `Maps.grid`: first slot of the alias table and the number of slots - 1; first tint; width and height in
+# texels; first number of `angles`.
+SLOT, MASK, TINT, WIDTH, HEIGHT, ANGLE = range(6)
+COLUMNS = 6
+MOST_ROWS = 1024  # of texels: a fifth of a degree; finer maps are averaged
+TOGETHER = 64  # rows that are averaged together, which takes less memory
+FEWEST_ROWS = 8  # so that angles within a texel are small
+WITHIN = (1 << 20) + (1 << 19)  # and what follows: streams of the places within texels of sources 0, 1, ...
+
+
+class Maps(NamedTuple):
+    """Maps of all environments, in the form that kernels read.
+
+    Attributes:
+        grid: (n_sources, COLUMNS) where the numbers of a source stand; zeros of sources without a map, whose texel is
+            then the first, which is white.
+        share: (n_slots,) the share of a slot's own texel; `other`: (n_slots,) the texel that has the rest.
+        tint: (n_texels, 3) (r, g, b) over luminance; (0,) where no source has a map: kernels are then compiled without
+            them.
+        angles: of each map the cosines and sines of the middles of columns, in pairs, and of rows the sines of all
+            edges, from the top.
+        up: (3,) unit, up in the scene.
+    """
+
+    grid: Int32
+    share: Float32
+    other: Int32
+    tint: Float32
+    angles: Float32
+    up: Float32
+
+
+NO_MAPS = Maps(
+    np.empty((0, COLUMNS), np.int32), np.zeros(1, np.float32), np.zeros(1, np.int32), np.empty(0, np.float32),
+    np.zeros(2, np.float32), np.zeros(3, np.float32),
+)  # fmt: skip
+
+
+def map_arrays(sources: tuple[LightPath, ...]) -> Maps:
+    """Make the arrays of all maps; sources with the same file share one."""
+    if all(source.environment is None for source in sources):
+        return NO_MAPS
+    grid = np.zeros((len(sources), COLUMNS), np.int32)
+    shares, others, tints, angles = [np.full(1, 2.0)], [np.zeros(1, np.int64)], [np.ones(3)], [np.zeros(2)]
+    known: dict[str, Any] = {}
+    up = np.zeros(3)
+    for s, source in enumerate(sources):
+        if (environment := source.environment) is None:
+            continue
+        panorama, up = environment.panorama, environment.up
+        if panorama.digest not in known:
+            texels = lit_texels(panorama.pixels)
+            height, width, _ = texels.shape
+            share, other = alias_table(texel_powers(texels).ravel())
+            starts = (sum(map(len, each)) for each in (shares, tints, angles))
+            slot, tint, angle = starts
+            known[panorama.digest] = (slot, len(share) - 1, tint // 3, width, height, angle)
+            luminance = (texels @ LUMINANCE)[..., None]
+            shares.append(share)
+            others.append(other)
+            tints.append(np.divide(texels, luminance, out=np.zeros_like(texels), where=luminance > 0).ravel())
+            angles.append(_angles(width, height))
+        grid[s] = known[panorama.digest]
+    return Maps(
+        grid,
+        np.concatenate(shares).astype(np.float32),
+        np.concatenate(others).astype(np.int32),
+        np.concatenate(tints).reshape(-1, 3).astype(np.float32),
+        np.concatenate(angles).astype(np.float32),
+        up.astype(np.float32),
+    )
+
+
+def lit_texels(pixels: Float32) -> Float64:
+    """The texels by which a map shines, (rows, 2 rows, 3): those of the file, means of them, or repetitions."""
+    if len(pixels) > MOST_ROWS:
+        columns = np.arange(pixels.shape[1] + 1.0)
+        wanted = np.linspace(0, columns[-1], 2 * MOST_ROWS + 1)
+        parts = (pixels[k : k + TOGETHER].swapaxes(0, 1).astype(np.float64) for k in range(0, len(pixels), TOGETHER))
+        found = np.concatenate([_means(part, columns, wanted).swapaxes(0, 1) for part in parts])
+        edges = np.sin(np.linspace(np.pi / 2, -np.pi / 2, len(found) + 1))
+        found = _means(found, -edges, -np.sin(np.linspace(np.pi / 2, -np.pi / 2, MOST_ROWS + 1)))
+    else:
+        found = pixels.astype(np.float64)
+    times = -(-FEWEST_ROWS // len(found))
+    return np.ascontiguousarray(found.repeat(times, axis=0).repeat(times, axis=1))
+
+
+def _means(rows: Float64, edges: Float64, wanted: Float64) -> Float64:
+    """Means of rows that lie between rising edges over wider spans."""
+    width = np.diff(edges).reshape(-1, 1, 1)
+    sums = np.concatenate([np.zeros_like(rows[:1]), np.cumsum(rows * width, axis=0)])
+    at = np.clip(np.searchsorted(edges, wanted, side="right") - 1, 0, len(rows) - 1)
+    reached = sums[at] + (wanted - edges[at]).reshape(-1, 1, 1) * rows[at]
+    return np.asarray(np.maximum(np.diff(reached, axis=0), 0.0) / np.diff(wanted).reshape(-1, 1, 1))
+
+
+def texel_powers(texels: Float64) -> Float64:
+    """Luminance times solid angle of each texel, (rows, columns)."""
+    height, width, _ = texels.shape
+    sines = np.sin(np.linspace(np.pi / 2, -np.pi / 2, height + 1))
+    return np.asarray((texels @ LUMINANCE) * (sines[:-1] - sines[1:])[:, None] * (2 * np.pi / width))
+
+
+def alias_table(weights: Float64) -> tuple[Float64, Any]:
+    """Shares and other items of 2^k slots, by which items are drawn in proportion to their weights [Walker77].
+
+    Items below the mean are filled up in their order by those above it, in theirs; so running sums of what is missing
+    and of what is left say who fills whom.
+    """
+    n = 1 << max(len(weights) - 1, 1).bit_length()
+    share = np.zeros(n)
+    share[: len(weights)] = weights * (n / weights.sum())
+    other = np.arange(n)
+    few, many = np.flatnonzero(share < 1), np.flatnonzero(share >= 1)
+    missing, left = np.cumsum(1 - share[few]), np.cumsum(share[many] - 1)
+    filler = np.searchsorted(left, missing - (1 - share[few]), side="right")
+    other[few] = many[np.minimum(filler, len(many) - 1)]
+    # an item above the mean that gives away more than it can keeps the rest, and the next one fills it up
+    spender = np.searchsorted(missing, left, side="right")
+    spent = (spender < len(few)) & (np.arange(len(many)) < len(many) - 1)
+    share[many] = np.where(spent, np.clip(1 + left - np.append(missing, 0.0)[spender], 0, 1), 1.0)
+    other[many[:-1]] = np.where(spent[:-1], many[1:], many[:-1])
+    return share, other
+
+
+def _angles(width: int, height: int) -> Float64:
+    """See `Maps.angles`."""
+    azimuth = ((np.arange(width) + 0.5) / width - 0.5) * 2 * np.pi
+    columns = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1).ravel()
+    return np.concatenate([columns, np.sin(np.linspace(np.pi / 2, -np.pi / 2, height + 1))])
+
+
+@inlined
+def map_texel(maps: Maps, s: int, key: np.uint64) -> Any:
+    """The texel of source s that the hit of a random key draws; 0 of sources without a map."""
+    if not has_rows(maps.tint):
+        return integers(key) & np.int32(0)
+    word, grid = random_word(key, SOURCES + s), maps.grid
+    slot = integers(word) & np.int32(grid[s, MASK])
+    chance = reals((integers(word >> np.uint64(32)) >> np.int32(8)) & np.int32(0xFFFFFF)) * UNIT_24
+    at = slot + np.int32(grid[s, SLOT])
+    return select(chance < gather(maps.share, at), slot, gather(maps.other, at))
+
+
+@inlined
+def map_tint(maps: Maps, s: int, texel: Any, channel: int) -> Any:
+    """(r, g, b) over luminance of a texel; 1 where no source has a map."""
+    if not has_rows(maps.tint):
+        return reals(texel & np.int32(0)) + np.float32(1.0)
+    found: Real = gather(maps.tint, (texel + np.int32(maps.grid[s, TINT])) * np.int32(3) + np.int32(channel))
+    return found
+
+
+@inlined
+def map_point(maps: Maps, s: int, key: np.uint64) -> Triple:
+    """The unit direction to a point of the texel of a hit: towards the middle of the map, east of it, and up."""
+    one, half, nothing = np.float32(1.0), np.float32(0.5), np.float32(0.0)
+    texel, grid = map_texel(maps, s, key), maps.grid
+    u, v = r2(random_word(key, WITHIN + s), 0)
+    width, first = np.int32(grid[s, WIDTH]), np.int32(grid[s, ANGLE])
+    row = integers((reals(texel) + half) / np.float32(grid[s, WIDTH]))
+    column = texel - row * width
+    # the height, uniform between the edges of the row
+    edge = first + np.int32(2) * width + row
+    top = gather(maps.angles, edge)
+    z = top + v * (gather(maps.angles, edge + np.int32(1)) - top)
+    level2 = one - z * z
+    level = sqrt(select(level2 > nothing, level2, nothing))
+    # the azimuth, at most pi / 16 from the middle of the column
+    angle = (u - half) * (np.float32(2 * np.pi) / np.float32(grid[s, WIDTH]))
+    square = angle * angle
+    cosine = one - square * (half - square * np.float32(1 / 24))
+    sine = angle * (one - square * (np.float32(1 / 6) - square * np.float32(1 / 120)))
+    at = first + np.int32(2) * column
+    c, d = gather(maps.angles, at), gather(maps.angles, at + np.int32(1))
+    return level * (c * cosine - d * sine), level * (d * cosine + c * sine), z
+
+
+@inlined
+def map_vector(maps: Maps, place: Triple, q: Triple) -> Triple:
+    """Turn the direction q of a map into the scene.
+
+    Args:
+        place: direction in which the light of its middle travels.
+    """
+    ux, uy, uz = maps.up[0], maps.up[1], maps.up[2]
+    x, y, z = -place[0], -place[1], -place[2]
+    return (
+        q[0] * x + q[1] * (y * uz - z * uy) + q[2] * ux,
+        q[0] * y + q[1] * (z * ux - x * uz) + q[2] * uy,
+        q[0] * z + q[1] * (x * uy - y * ux) + q[2] * uz,
+    )

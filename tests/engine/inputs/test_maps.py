@@ -1,0 +1,189 @@
+"""Environments: the light of one random direction per hit, on average that of the whole map."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+from support.hits import points
+from support.irradiance import FAR, UP, N, P, hits_at
+
+from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.hits.hits import Hits
+from framearray_cli.engine.hits.rays import room_for_tests
+from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
+from framearray_cli.engine.inputs.maps import alias_table, lit_texels, map_point, texel_powers
+from framearray_cli.engine.terms.direct import direct
+from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
+from framearray_cli.scene.paths.lightpath import LightPath
+from framearray_cli.scene.paths.panorama import Environment, Panorama, norths
+from framearray_cli.scene.paths.paths import lights_without_groups
+
+RNG = np.random.default_rng(8)
+TURNS = np.array([0.0, 70.0, 200.0, 359.0, -30.0])
+TILTED = np.array([0.48, 0.6, -0.64])
+
+
+def environment(pixels: Any, turns_deg: Any = TURNS, factor: Any = (1.0, 1.0, 1.0)) -> LightPath:
+    """A map over a scene with y up."""
+    panorama, n = Panorama(file="sky.exr", pixels=np.asarray(pixels, np.float32)), len(turns_deg)
+    factors = np.tile(np.array(factor, np.float64), (n, 1))
+    around = Environment(panorama=panorama, rotation_deg=np.array(turns_deg), factor=factors, up=np.array(UP))
+    return LightPath(
+        kind="directional", vector=-norths("y", around.rotation_deg), intensity=factors * panorama.flux,
+        environment=around,
+    )  # fmt: skip
+
+
+def arrays(*sources: LightPath) -> LightArrays:
+    return light_arrays(lights_without_groups(sources), np.zeros(3))
+
+
+def lit(hits: Hits, lights: LightArrays, neighbours: bool = True) -> Any:
+    """Irradiance (n, channels, n_lights) in float64."""
+    n = len(hits.kind)
+    out = np.full((n, lights.channels, lights.n_lights), np.nan, np.float32)
+    with EmbreeScene(tiny.scene_of(FAR)) as embree:
+        direct(hits, n, lights, embree.tracer, room_for_tests(4096, lights.n_lights), out, neighbours)
+    return out.astype(np.float64)
+
+
+def irradiance(pixels: Any, normal: Any, turn_deg: float) -> Any:
+    """E = integral of L cos over the sphere, by 40 x 80 points in each texel; y up, the middle of the map is -z."""
+    fine = np.asarray(pixels, np.float64).repeat(40, axis=0).repeat(40, axis=1)
+    height, width, _ = fine.shape
+    up = np.pi / 2 - (np.arange(height) + 0.5) / height * np.pi
+    around = ((np.arange(width) + 0.5) / width - 0.5) * 2 * np.pi + np.radians(turn_deg)
+    x = np.cos(up)[:, None] * np.sin(around)
+    z = -np.cos(up)[:, None] * np.cos(around)
+    cosine = x * normal[0] + np.sin(up)[:, None] * normal[1] + z * normal[2]
+    solid_angle = np.cos(up) * (np.pi / height) * (2 * np.pi / width)
+    return np.einsum("yx,yxk->k", np.maximum(cosine, 0) * solid_angle[:, None], fine)
+
+
+def agree(found: Any, wanted: Any, facing: float = 0.0) -> None:
+    """Means over hits (n, ...) within 3.5 standard errors, and half a per cent of them or of a facing surface's."""
+    mean, error = found.mean(axis=0), found.std(axis=0) / np.sqrt(len(found))
+    wanted = np.broadcast_to(wanted, mean.shape)
+    assert (np.abs(mean - wanted) <= 3.5 * error + 1e-5 * np.abs(wanted)).all()
+    np.testing.assert_allclose(mean, wanted, rtol=5e-3, atol=5e-3 * facing)
+
+
+@pytest.mark.parametrize("normal", [UP, TILTED])
+def test_one_colour_lights_like_an_open_sky(normal: Any) -> None:
+    """E = pi L, in each channel."""
+    lights = arrays(environment(np.full((4, 8, 3), (0.5, 1.0, 2.0))))
+    hits = points(4 * N, P, normal)
+    agree(lit(hits, lights), np.pi * np.array([0.5, 1.0, 2.0])[:, None] * np.ones(5))
+
+
+def test_one_bright_texel_is_a_sun() -> None:
+    """E cos of a directional source from its middle within 0.5 %, and exactly the integral over the texel."""
+    pixels = np.zeros((64, 128, 3), np.float32)
+    pixels[12, 70] = 1000.0
+    lights = arrays(environment(pixels))
+    assert lights.channels == 1
+    top, bottom = (np.pi / 2 - k / 64 * np.pi for k in (12, 13))
+    middle, turned = (top + bottom) / 2, np.radians(TURNS) + (70.5 / 128 - 0.5) * 2 * np.pi
+    power = 1000.0 * (np.sin(top) - np.sin(bottom)) * 2 * np.pi / 128
+    to_sun = power * np.stack(
+        [np.cos(middle) * np.sin(turned), np.full(5, np.sin(middle)), -np.cos(middle) * np.cos(turned)]
+    )
+    level = 1000.0 * ((top - bottom) / 2 + (np.sin(2 * top) - np.sin(2 * bottom)) / 4) * 2 * np.sin(np.pi / 128)
+    height = 1000.0 * (np.sin(top) ** 2 - np.sin(bottom) ** 2) / 2 * 2 * np.pi / 128
+    whole = np.stack([level * np.sin(turned), np.full(5, height), -level * np.cos(turned)])
+    for normal in (UP, TILTED):
+        for neighbours in (True, False):
+            found = lit(points(N, P, normal), lights, neighbours)
+            agree(found, np.maximum(normal @ whole, 0), power)
+            by_sun = np.maximum(normal @ to_sun, 0)
+            np.testing.assert_allclose(found.mean(axis=0)[0], by_sun, rtol=5e-3, atol=5e-3 * power)
+
+
+@pytest.mark.parametrize("neighbours", [True, False])
+@pytest.mark.parametrize("normal", [UP, TILTED])
+def test_any_map_lights_as_quadrature_says(neighbours: bool, normal: Any) -> None:
+    """Random colours from 0 to bright, beside a panel of light without a map."""
+    pixels = RNG.random((6, 12, 3)) ** 6 * (1.0, 2.0, 4.0)
+    lights = arrays(environment(pixels, factor=(2.0, 1.0, 0.5)))
+    found = lit(points(8 * N, P, normal), lights, neighbours)
+    wanted = np.stack([irradiance(pixels, normal, turn) for turn in TURNS], axis=1) * [[2.0], [1.0], [0.5]]
+    mean, error = found.mean(axis=0), found.std(axis=0) / np.sqrt(len(found))
+    assert (np.abs(mean - wanted) <= 3.5 * error).all()
+    assert (error < 0.02 * wanted).all()
+
+
+def test_a_hit_draws_the_same_direction_under_every_turn() -> None:
+    """That of one position, turned; the readable twin of the draw."""
+    pixels = RNG.random((8, 16, 3)) ** 4
+    maps = arrays(environment(pixels)).maps
+    share, other = alias_table(texel_powers(lit_texels(np.asarray(pixels, np.float32))).ravel())
+    for key in range(200):
+        q = np.array(map_point(maps, 0, np.uint64(key)), np.float64)
+        texel, u, v = drawn(key, share, other)
+        row, column = divmod(texel, 16)
+        top, bottom = np.sin(np.pi / 2 - np.pi * row / 8), np.sin(np.pi / 2 - np.pi * (row + 1) / 8)
+        z, azimuth = top + v * (bottom - top), ((column + u) / 16 - 0.5) * 2 * np.pi
+        level = np.sqrt(1 - z * z)
+        np.testing.assert_allclose(q, [level * np.cos(azimuth), level * np.sin(azimuth), z], atol=2e-6)
+
+
+def drawn(key: int, share: Any, other: Any) -> tuple[int, float, float]:
+    """The texel of source 0 that a hit draws, and the place in it, with Python's integers."""
+    word = mix(key + (1 << 20) * 0x9E3779B97F4A7C15)
+    slot, chance = word % len(share), (word >> 40) / 2**24
+    texel = slot if chance < np.float32(share[slot]) else int(other[slot])
+    place = mix(key + ((1 << 20) + (1 << 19)) * 0x9E3779B97F4A7C15)
+    return texel, (place % 2**32 >> 8) / 2**24, (place >> 40) / 2**24
+
+
+def mix(z: int) -> int:
+    """SplitMix64's finaliser."""
+    z %= 2**64
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9 % 2**64
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EB % 2**64
+    return z ^ (z >> 31)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 7, 64, 1000])
+def test_an_alias_table_draws_in_proportion_to_weights(n: int) -> None:
+    for weights in (np.ones(n), RNG.random(n) ** 8, np.eye(n)[n // 2], RNG.random(n) * (RNG.random(n) < 0.5) + 1e-9):
+        share, other = alias_table(weights)
+        assert len(share) >= max(n, 2) and len(share) & (len(share) - 1) == 0
+        assert (share >= 0).all() and (share <= 1).all()
+        found = np.bincount(np.arange(len(share)), share, len(share))
+        found += np.bincount(other, 1 - share, len(share))
+        np.testing.assert_allclose(found[:n] / len(share), weights / weights.sum(), atol=1e-12)
+        assert found[n:].max(initial=0) < 1e-9
+
+
+def test_a_fine_map_is_averaged_by_solid_angle() -> None:
+    """Its light stays, in every part of the sphere."""
+    pixels = RNG.random((1536, 3072, 3)).astype(np.float32)
+    texels = lit_texels(pixels)
+    assert texels.shape == (1024, 2048, 3)
+    np.testing.assert_allclose(texel_powers(texels).sum(), Panorama(file="", pixels=pixels).flux, rtol=1e-9)
+    coarse = texel_powers(texels).reshape(8, 128, 16, 128).sum(axis=(1, 3))
+    np.testing.assert_allclose(
+        coarse, texel_powers(pixels.astype(np.float64)).reshape(8, 192, 16, 192).sum(axis=(1, 3)), rtol=1e-9
+    )
+
+
+def test_shadow_steps_test_the_same_rays() -> None:
+    lights = arrays(environment(RNG.random((8, 16, 3))), environment(RNG.random((4, 8, 3))))
+    hits = hits_at(n=203)
+    together = lit(hits, lights)
+    with EmbreeScene(tiny.scene_of(FAR)) as embree:
+        out = np.empty((203, 3, 5), np.float32)
+        tests, steps = room_for_tests(4096, 5), room_for_steps(5)
+        direct_by_steps(hits, 203, lights, 2, False, embree.tracer, tests, steps, out)
+    np.testing.assert_allclose(out, together, rtol=1e-5, atol=1e-6)
+
+
+def test_a_lamp_beside_a_map_shines_as_by_itself() -> None:
+    """Its texel is white."""
+    lamp = LightPath(kind="point", vector=np.tile(np.add(P, (0.2, 1.5, 0.1)), (5, 1)), intensity=np.ones((5, 3)))
+    sky = environment(np.full((2, 4, 3), (0.2, 0.4, 0.9)))
+    hits = hits_at(n=64)
+    both, alone = lit(hits, arrays(sky, lamp)), lit(hits, arrays(sky))
+    np.testing.assert_allclose(both - alone, np.broadcast_to(lit(hits, arrays(lamp)), both.shape), rtol=1e-4)

@@ -1,0 +1,115 @@
+"""Environment maps in jobs: placed along the light path, checked before anything is traced."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+
+from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.base.errors import JobError
+from framearray_cli.base.openimage import oiio
+from framearray_cli.engine.inputs.lights import light_arrays
+from framearray_cli.job.job import Job
+from framearray_cli.render.identity import job_fingerprint
+from framearray_cli.scene.paths.lightpath import LightPath
+from framearray_cli.scene.paths.paths import lights
+
+SKY = np.full((4, 8, 3), (0.5, 1.0, 2.0), np.float32)
+
+
+def save(folder: Path, pixels: Any, name: str = "sky.exr") -> Path:
+    if name.endswith(".exr") and np.isfinite(pixels).all():
+        write_image(folder / name, np.asarray(pixels, np.float32), ImageFormat(half="never"))
+        return folder / name
+    library = oiio()
+    spec = library.ImageSpec(*pixels.shape[1::-1], pixels.shape[2], "float")
+    output = library.ImageOutput.create(str(folder / name))
+    assert output.open(str(folder / name), spec) and output.write_image(pixels.astype(np.float32)) and output.close()
+    return folder / name
+
+
+def job_of(file: Path, *keys: dict[str, Any], **changes: Any) -> Job:
+    found = [{"frame": k} | key for k, key in enumerate(keys or ({},))]
+    return tiny.job(
+        light={"frames": len(found), "sources": [{"type": "environment", "file": str(file), "keys": found}]}, **changes
+    )
+
+
+def placed(file: Path, *keys: dict[str, Any], **changes: Any) -> LightPath:
+    return lights(job_of(file, *keys, **changes)).sources[0]
+
+
+def test_its_middle_is_north_and_turns_over_east(tmp_path: Path) -> None:
+    keys = [{"rotation": 0, "color": 1}, {"rotation": 90, "intensity": 2, "color": [1, 0.5, 0]}]
+    path = placed(save(tmp_path, SKY), *keys)
+    np.testing.assert_allclose(path.vector, [(0, 0, 1), (-1, 0, 0)], atol=1e-12)
+    flux = 4 * np.pi * (0.2126 * 0.5 + 0.7152 * 1.0 + 0.0722 * 2.0)
+    np.testing.assert_allclose(path.intensity, [(flux, flux, flux), (2 * flux, flux, 0)])
+    assert path.table(1) == {"type": "environment", "file": "sky.exr", "rotation": 90.0, "intensity": [2.0, 1.0, 0.0]}
+    up = placed(tmp_path / "sky.exr", *keys, scene={"up": "z"})
+    np.testing.assert_allclose(up.vector, [(0, -1, 0), (-1, 0, 0)], atol=1e-12)
+
+
+def test_turns_between_keys_are_even(tmp_path: Path) -> None:
+    path = placed(save(tmp_path, SKY), {"rotation": 0}, {"rotation": 180})
+    assert path.environment is not None
+    np.testing.assert_allclose(path.environment.rotation_deg, [0, 180])
+    assert path.at([1]).table(0)["rotation"] == 180
+
+
+@pytest.mark.parametrize("name", ["sky.hdr", "sky.tif", "sky.exr"])
+def test_formats_of_linear_light_are_read(name: str, tmp_path: Path) -> None:
+    path = placed(save(tmp_path, SKY, name))
+    assert path.environment is not None
+    np.testing.assert_allclose(path.environment.panorama.pixels, SKY, rtol=4e-3)  # HDR has 8 bits per channel
+    assert light_arrays(lights(job_of(tmp_path / name)), np.zeros(3)).channels == 3
+
+
+def test_the_fingerprint_holds_the_map_and_not_its_name(tmp_path: Path) -> None:
+    def digest(name: str, pixels: Any) -> str:
+        return job_fingerprint(tiny.prepared(job_of(save(tmp_path, pixels, name))), "scene")
+
+    assert digest("a.exr", SKY) == digest("b.exr", SKY)
+    assert digest("a.exr", SKY) != digest("a.exr", SKY * np.float32(1.5))
+
+
+def bad(value: float) -> Any:
+    pixels = SKY.copy()
+    pixels[1, 3, 2] = value
+    return pixels
+
+
+@pytest.mark.parametrize(
+    ("pixels", "problem"),
+    [
+        (bad(-0.1), "expected radiance from 0 to 1e+20, got 0.5, 1, -0.1 at column 3, row 1, and 1 such pixel in all"),
+        (bad(np.nan), "expected radiance from 0 to 1e+20, got 0.5, 1, nan at column 3, row 1, and 1 such pixel in all"),
+        (bad(np.inf), "expected radiance from 0 to 1e+20, got 0.5, 1, inf at column 3, row 1, and 1 such pixel in all"),
+        (SKY[:, :7], "expected a panorama, twice as wide as high, got 7 x 4 pixels"),
+        (np.zeros((4, 8, 3)), "expected an environment that shines, got radiance 0 everywhere"),
+    ],
+)
+def test_what_is_no_radiance_is_refused(pixels: Any, problem: str, tmp_path: Path) -> None:
+    file = save(tmp_path, pixels)
+    with pytest.raises(JobError) as error:
+        placed(file)
+    assert error.value.problems == (f"light.sources[0].file: sky.exr: {problem}",)
+
+
+def test_broken_files_are_refused_with_their_key(tmp_path: Path) -> None:
+    good = save(tmp_path, SKY).read_bytes()
+    cases = {"cut.exr": good[:-40], "text.exr": b"no image", "sky.png": good, "empty.hdr": b""}
+    for name, data in cases.items():
+        (tmp_path / name).write_bytes(data)
+        with pytest.raises(JobError, match=rf"^tiny: light\.sources\[0\]\.file: {name}: \S.*[^.]$") as error:
+            placed(tmp_path / name)
+        assert "Traceback" not in str(error.value) and "\n" not in str(error.value)
+    with pytest.raises(JobError, match=r"light\.sources\[0\]\.file: none\.exr: no such file"):
+        placed(tmp_path / "none.exr")
+
+
+def test_particles_from_environments_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="environments emit no particles"):
+        job_of(tmp_path / "sky.exr", ambient={"method": "light"})
