@@ -15,6 +15,7 @@ from ..terms.cells.local import read_cells
 from ..terms.cells.smooth import smooth_light
 from ..terms.direct import direct
 from ..terms.direct_steps import direct_by_steps
+from ..terms.environments import has_environments, see_environments
 from ..terms.obscurance import obscurance
 from .records import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, HitRecords, lit_bit
 from .scratch import Scratch
@@ -63,6 +64,8 @@ def estimate_terms(
         )  # fmt: skip
         if not setup.keeps_all:
             out.irradiance[:n] = irradiance[:n, :, setup.kept.start : setup.kept.stop]
+    if has_environments(setup.lights):
+        see_environments(hits, n, setup.lights, setup.kept.start, scratch.test_rays, out.irradiance)
     scratch.rays[shadow_kind] += rays
     write_rows(hits, n, setup.background, scratch.obscurance, skylight, throughput, out.irradiance, out.row)
     scratch.seconds[obscurance_kind] += middle - started

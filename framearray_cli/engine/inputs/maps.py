@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Float64, Int32, Real, Triple
+from framearray_cli.base.arrays import Float32, Float64, Int32, Real, Rgb, Triple
 from framearray_cli.base.colour import LUMINANCE
 from framearray_cli.scene.paths.lightpath import LightPath
 
@@ -19,9 +19,9 @@ from ..kernels.simd import gather, integers, reals, select, sqrt
 from .random import SOURCES, UNIT_24, r2, random_word
 
 # Columns of `Maps.grid`: first slot of the alias table and the number of slots - 1; first tint; width and height in
-# texels; first number of `angles`.
-SLOT, MASK, TINT, WIDTH, HEIGHT, ANGLE = range(6)
-COLUMNS = 6
+# texels; first number of `angles`; first pixel, width and height of what eyes see.
+SLOT, MASK, TINT, WIDTH, HEIGHT, ANGLE, SEEN, SEEN_WIDTH, SEEN_HEIGHT = range(9)
+COLUMNS = 9
 MOST_ROWS = 1024  # of texels: a fifth of a degree; finer maps are averaged
 TOGETHER = 64  # rows that are averaged together, which takes less memory
 FEWEST_ROWS = 8  # so that angles within a texel are small
@@ -40,6 +40,8 @@ class Maps(NamedTuple):
         angles: of each map the cosines and sines of the middles of columns, in pairs, and of rows the sines of all
             edges, from the top.
         up: (3,) unit, up in the scene.
+        seen: (n_pixels, 3) radiance of all maps as eyes see it.
+        inverse: (n_sources,) 1 over the luminance of a map, integrated over all directions; 0 of sources without one.
     """
 
     grid: Int32
@@ -48,11 +50,13 @@ class Maps(NamedTuple):
     tint: Float32
     angles: Float32
     up: Float32
+    seen: Rgb
+    inverse: Float32
 
 
 NO_MAPS = Maps(
     np.empty((0, COLUMNS), np.int32), np.zeros(1, np.float32), np.zeros(1, np.int32), np.empty(0, np.float32),
-    np.zeros(2, np.float32), np.zeros(3, np.float32),
+    np.zeros(2, np.float32), np.zeros(3, np.float32), np.empty((0, 3), np.float32), np.empty(0, np.float32),
 )  # fmt: skip
 
 
@@ -62,8 +66,9 @@ def map_arrays(sources: tuple[LightPath, ...]) -> Maps:
         return NO_MAPS
     grid = np.zeros((len(sources), COLUMNS), np.int32)
     shares, others, tints, angles = [np.full(1, 2.0)], [np.zeros(1, np.int64)], [np.ones(3)], [np.zeros(2)]
+    seen: list[Rgb] = []
     known: dict[str, Any] = {}
-    up = np.zeros(3)
+    up, inverse = np.zeros(3), np.zeros(len(sources), np.float32)
     for s, source in enumerate(sources):
         if (environment := source.environment) is None:
             continue
@@ -74,13 +79,15 @@ def map_arrays(sources: tuple[LightPath, ...]) -> Maps:
             share, other = alias_table(texel_powers(texels).ravel())
             starts = (sum(map(len, each)) for each in (shares, tints, angles))
             slot, tint, angle = starts
-            known[panorama.digest] = (slot, len(share) - 1, tint // 3, width, height, angle)
+            places = (slot, len(share) - 1, tint // 3, width, height, angle)
+            known[panorama.digest] = (*places, sum(map(len, seen)), *panorama.pixels.shape[1::-1])
+            seen.append(panorama.pixels.reshape(-1, 3))
             luminance = (texels @ LUMINANCE)[..., None]
             shares.append(share)
             others.append(other)
             tints.append(np.divide(texels, luminance, out=np.zeros_like(texels), where=luminance > 0).ravel())
             angles.append(_angles(width, height))
-        grid[s] = known[panorama.digest]
+        grid[s], inverse[s] = known[panorama.digest], 1 / panorama.flux
     return Maps(
         grid,
         np.concatenate(shares).astype(np.float32),
@@ -88,6 +95,8 @@ def map_arrays(sources: tuple[LightPath, ...]) -> Maps:
         np.concatenate(tints).reshape(-1, 3).astype(np.float32),
         np.concatenate(angles).astype(np.float32),
         up.astype(np.float32),
+        np.ascontiguousarray(np.concatenate(seen) if len(seen) > 1 else seen[0]),
+        inverse,
     )
 
 

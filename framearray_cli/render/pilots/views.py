@@ -120,7 +120,7 @@ def _one_source(lights: LightArrays, s: int) -> LightArrays:
         cone=_with_room(lights.cone[one]),
         panel=_with_room(lights.panel[one]),
         profiles=Profiles(_with_room(frame[one]), grid[one].copy(), table),
-        maps=lights.maps._replace(grid=lights.maps.grid[one].copy()),
+        maps=lights.maps._replace(grid=lights.maps.grid[one].copy(), inverse=lights.maps.inverse[one].copy()),
     )
 
 
