@@ -135,7 +135,7 @@ class _PanelSource(PlacedLamp):
 
 
 class RectSource(_PanelSource):
-    """A flat lamp, a window or a screen: a rectangle that shines evenly. Nothing shows it, and it hides nothing."""
+    """A flat lamp, a window or a screen: a rectangle that shines evenly. It hides nothing."""
 
     type: Literal["rect"] = Field(description="Kind of source.")
     width: Length | None = beside_file("width at all its positions, scene units")
@@ -151,7 +151,7 @@ class RectSource(_PanelSource):
 
 
 class DiscSource(_PanelSource):
-    """A disc that shines evenly. Nothing shows it, and it hides nothing."""
+    """A disc that shines evenly. It hides nothing."""
 
     type: Literal["disc"] = Field(description="Kind of source.")
     radius: Length | None = beside_file("radius at all its positions, scene units")

@@ -17,7 +17,7 @@ WIDEST = 90.0  # degrees; a source of the sky that is wider is no sun
 
 _RADIUS = (
     "Radius of a lamp that is a sphere, scene units: shadows get soft edges, at the same cost. `intensity` stays that "
-    "of the whole lamp. A point inside it gets none of its light, and nothing shows the lamp itself."
+    "of the whole lamp. A point inside it gets none of its light."
 )
 _ANGLE = (
     "Angle under which the source is seen, degrees: shadows get soft edges, at the same cost; the sun's is 0.53. "

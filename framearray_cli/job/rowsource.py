@@ -8,7 +8,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from framearray_cli.base.forms.table import default_text, fail
 from framearray_cli.base.units import FARTHEST
 
-from .sourcetable import SourceTable
+from .sourcetable import ShownSource
 from .values import FileName, Point
 
 
@@ -66,7 +66,7 @@ def one_of_both(keys: Any, info: ValidationInfo) -> Any:
     return keys
 
 
-class PlacedSource(SourceTable):
+class PlacedSource(ShownSource):
     """Sources with key frames, or with a file that has one position per row."""
 
     file: FileName | None = Field(

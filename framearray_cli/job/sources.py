@@ -12,7 +12,7 @@ from .environment import EnvironmentSource
 from .keys import MOST_EYES
 from .panel import DiscSource, RectSource
 from .placed import Angle, DirectionalKey, DirectionalSource, PointSource
-from .sourcetable import SourceTable
+from .sourcetable import ShownSource, SourceTable
 from .spot import SpotSource
 from .times import Clock, Dates, Zone, clock_minutes, even_moments
 from .units import SKY_UNITS, SkyUnits
@@ -102,7 +102,7 @@ class GridSource(SourceTable):
         return self.counts[0] * self.counts[1]
 
 
-class SunSource(SourceTable):
+class SunSource(ShownSource):
     """The sun over a place on Earth on one day; below the horizon it shines 0. It needs the extra `sun`."""
 
     type: Literal["sun"] = Field(description="Kind of source.")

@@ -3,7 +3,7 @@
 import re
 from typing import Annotated, TypeAlias
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from framearray_cli.base.forms.table import Table, default_text, fail
 from framearray_cli.base.forms.words import shown
@@ -46,3 +46,30 @@ class SourceTable(Table):
         "serve N_c x N_1 x N_2 pictures. Key frames count along it.",
         json_schema_extra=default_text("that of all other sources"),
     )
+
+
+_SIZES = {"point": "radius", "spot": "radius", "directional": "angle", "sun": "angle"}  # rectangles and discs have one
+
+
+class ShownSource(SourceTable):
+    """Sources with a shape that pictures may show."""
+
+    visible: bool | None = Field(
+        default=None,
+        description="Whether eyes and mirrors see its shape, which needs a size (`radius` or `angle`). It hides "
+        "nothing: its light is added to what lies behind it.",
+        json_schema_extra=default_text("false"),
+    )
+
+    @model_validator(mode="after")
+    def _has_a_shape(self) -> "ShownSource":
+        kind = str(getattr(self, "type", ""))
+        size, keys = _SIZES.get(kind), getattr(self, "keys", ())
+        if not self.visible:
+            return self
+        if getattr(self, "ies", None) is not None:
+            fail([(("visible",), "expected none beside `ies`, as the file does not say what the lamp looks like")])
+        if size and (keys or kind == "sun") and not any(getattr(table, size, None) for table in (self, *keys)):
+            what = f"`{size}` of at least one key above 0" if keys else f"`{size}` above 0"
+            fail([(("visible",), f"expected {what}, as a source without size has no shape")])
+        return self

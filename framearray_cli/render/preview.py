@@ -16,6 +16,7 @@ from framearray_cli.job.sourcetable import MAIN_AXIS
 from framearray_cli.scene.paths.paths import Lights, eyes, lights, lights_without_groups
 
 from .automatic.choose import require_least_memory
+from .lamps import draw_visible
 from .prepare import Prepared, open_embree, plan_work, prepare, prepared_from
 
 SHRINK = 4  # of both sides
@@ -71,6 +72,7 @@ def render_preview(job: Job, c: int, places: Mapping[str, int]) -> Preview:
             window = Window(setup, ambient, pool)
             for j in ready_frames(window, setup, [0], pool):
                 window.compose(j, image)
+                draw_visible(prepared, setup, j, range(1), image, pool)
     return Preview(image=image[0], c=c, places=places, prepared=prepared)
 
 

@@ -15,11 +15,13 @@ from framearray_cli.array.integrity import OnDisk
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.array.record import Entry, RecordWriter, read_records, record_file
+from framearray_cli.base.arrays import Images
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.units import agree, counted
 from framearray_cli.engine.embree import Engine
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.composed import Composed
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
@@ -27,6 +29,7 @@ from framearray_cli.job.job import Job
 
 from .group_sums import group_sums
 from .identity import cells_digest, require_same_cells
+from .lamps import draw_visible
 from .manifest import initial_manifest
 from .memory import light_blocks, mirror_share, require_memory
 from .pace import Expected, Pace, block_work, eye_work, plane_cost, total_work
@@ -139,11 +142,17 @@ def _render_block(run: "_Run", setup: FrameSetup, ambient: Ambient, lights: rang
         i_a = i_a.for_lights(lights)
     with run.open_pool(setup) as pool, run.open_writer(target, lights) as writer:
         window = Window(setup, i_a, pool)
+
+        def compose(j: int, images: Images) -> Composed:
+            composed = window.compose(j, images)
+            composed.beyond += draw_visible(run.prepared, setup, j, lights, composed.images, pool)
+            return composed
+
         for j in ready_frames(window, setup, [0] if still else wanted, pool, lambda c: run.found(eye_work(setup, c))):
             images = writer.block()
-            composed = window.compose(j, images)
+            composed = compose(j, images)
             if composed.beyond and target.format.half == "auto":  # too bright for halves: some will be floats
-                composed = window.compose(j, np.empty(images.shape, np.float32))
+                composed = compose(j, np.empty(images.shape, np.float32))
             run.composed(len(lights))
             writer.write(composed, wanted if still else [j], images)
         writer.finish()

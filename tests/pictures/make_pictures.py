@@ -133,6 +133,19 @@ def contact_sheet(width: int, folder: Path) -> Image.Image:
         return image.convert("RGB")
 
 
+def visible_lamps(width: int, folder: Path) -> Image.Image:
+    """The cabin with a sphere of 8 cm that eyes see, at three light positions, and a panel in the ceiling."""
+    table = job_table(cut(read_job(ROOT / "jobs" / "cabin.toml"), [60], [20, 26, 32], folder))
+    lamp = table["light"]["sources"][0] | {"visible": True}
+    lamp["keys"] = [key | {"radius": 0.08} for key in lamp["keys"]]
+    panel = {"frame": 0, "position": [0.0, 2.0, -2.2], "direction": [0.0, -1.0, 0.0], "width": 0.3, "height": 1.2}
+    rect = {"type": "rect", "visible": True, "keys": [panel | {"radiance": [4.0, 4.4, 5.0]}]}
+    table["light"]["sources"] = [lamp, rect]
+    render(Job.model_validate(table))
+    rendered = read_manifest(folder)
+    return sheet([[picture(read_image(image_path(rendered, shown_eye(0), l)), width) for l in range(3)]])
+
+
 def evening(folder: Path) -> Path:
     """Render jobs/kitchen-evening.toml, whole."""
     job = read_job(ROOT / "jobs" / "kitchen-evening.toml")
@@ -161,6 +174,7 @@ def main() -> None:
             "terms": terms(280, out / "terms"),
             "reuse": reuse(420, out / "reuse"),
             "sheet": contact_sheet(900, out / "sheet"),
+            "visible-lamps": visible_lamps(300, out / "visible"),
             "relight": relit(280, evening(out / "evening"), out / "relight"),
         }
         for name, image in made.items():

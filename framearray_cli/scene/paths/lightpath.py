@@ -44,6 +44,7 @@ class LightPath:
         environment: of a map all around, which is a directional source whose `vector` is the way that the light of the
             middle of the map travels; `intensity` is then its radiance, integrated over all directions.
         notes: n tables with what else the manifest records of each position; or none.
+        visible: whether eyes see its shape.
     """
 
     kind: Literal["point", "directional"]
@@ -55,6 +56,7 @@ class LightPath:
     profile: Profile | None = None
     environment: Environment | None = None
     notes: tuple[dict[str, Any], ...] = ()
+    visible: bool = False
 
     @property
     def shines_one_way(self) -> bool:

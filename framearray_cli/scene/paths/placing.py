@@ -14,7 +14,8 @@ from framearray_cli.job.light import LightTable
 from framearray_cli.job.panel import DiscSource, PanelKey, RectKey, RectSource
 from framearray_cli.job.placed import DirectionalKey, PointKey, PointSource
 from framearray_cli.job.rowsource import PlacedLamp, PlacedSource
-from framearray_cli.job.sources import DomeSource, GridSource, SunSource
+from framearray_cli.job.sources import DomeSource, GridSource, LightSource, SunSource
+from framearray_cli.job.sourcetable import ShownSource
 from framearray_cli.job.spot import SpotKey, SpotSource
 from framearray_cli.job.values import SHORTEST
 
@@ -46,6 +47,11 @@ def place_source(job: Job, i: int, n: int, world_from_camera: Float64 | None) ->
         MissingExtraError: it is a sun, and pvlib is not installed.
     """
     source = job.light.sources[i]
+    path = _place(source, job, i, n, world_from_camera)
+    return replace(path, visible=True) if isinstance(source, ShownSource) and source.visible else path
+
+
+def _place(source: LightSource, job: Job, i: int, n: int, world_from_camera: Float64 | None) -> LightPath:
     match source:
         case SunSource():
             return in_units(_place_sun(source, job, f"light.sources[{i}]", n), source)

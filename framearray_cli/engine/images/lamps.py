@@ -1,0 +1,166 @@
+"""Lamps that eyes see: the shapes of sources, drawn into composed images.
+
+A lamp hides nothing, so its radiance is added to what lies behind it: sums of light positions stay right, and what
+mirrors show follows the same rule. A pixel that may show a lamp gets SAMPLES eye rays; they are traced once, whatever
+the number of light positions, and followed over mirrors. What they meet of each shape is a formula.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from framearray_cli.base.arrays import Flags, Float32, Float64, Images, Int32
+from framearray_cli.scene.paths.lightpath import LightPath
+
+from ..frames.scratch import Scratch
+from ..frames.setup import FrameSetup
+from ..frames.threads import TracePool
+from ..hits.hits import ESCAPED, SURFACE, Hits
+from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
+from ..terms.mirrors import reflect
+from .band import HALF_MAX
+from .shapes import Bound, bound_of, radiance_along
+
+SAMPLES = 16  # eye rays per pixel at the edge of a lamp
+ROUND = 1.0  # pixels by which a lamp's outline is widened before pixels are chosen
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Paths:
+    """Straight parts of eye paths: n rays.
+
+    Attributes:
+        origin: (n, 3) or (3,), centred.
+        direction: (n, 3) unit.
+        reach: (n,) distance to the surface that they meet; infinite where they meet none.
+        tint: (n, 3) product of the mirrors before.
+        number: (n,) number of the eye ray.
+    """
+
+    origin: Float64
+    direction: Float64
+    reach: Float64
+    tint: Float32
+    number: Int32
+
+
+def draw_lamps(
+    setup: FrameSetup,
+    sources: Sequence[LightPath],
+    centre: Float64,
+    planes: range,
+    c: int,
+    images: Images,
+    pool: TracePool,
+) -> int:
+    """Add the visible sources to the images of eye c.
+
+    Args:
+        centre: of the scene.
+        planes: image planes of `images`.
+        images: (n_planes, height, width, 3), float32 or float16.
+
+    Returns:
+        the number of values beyond the largest half, if images are halves; they are cut to it.
+    """
+    lit = [(s, k) for s in sources for k, l in enumerate(planes) if s.intensity[l].any()]
+    bounds = [bound_of(s, planes[k], centre, setup.cams.position[c].astype(np.float64)) for s, k in lit]
+    pixels, inside = _pixels_of(setup, c, bounds, pool)
+    flat = images.reshape(len(images), setup.n_pixels, 3)
+    samples = Samples(setup.seed, pixels, SAMPLES, 0)
+
+    def draw(first: int, scratch: Scratch) -> int:
+        n = min(pool.batch, len(pixels) * SAMPLES - first)
+        extra_hits(setup.cams, c, samples, first, n, setup.world, scratch.hit_rays.packets, scratch.hits)
+        scratch.rays["native"] += n
+        parts, beyond = _follow(setup, c, n, scratch), 0
+        at = slice(first // SAMPLES, (first + n) // SAMPLES)
+        for i, (source, k) in enumerate(lit):
+            seen = np.zeros((n, 3), np.float32)
+            for bounce, part in enumerate(parts):
+                rows = np.flatnonzero(np.repeat(inside[i, at], SAMPLES)) if bounce == 0 else np.arange(len(part.number))
+                if len(rows):
+                    _add(seen, part, rows, source, planes[k], centre)
+            if seen.any():
+                beyond += _put(flat[k], pixels[at], seen.reshape(-1, SAMPLES, 3).mean(axis=1))
+        return beyond
+
+    return sum(pool.run(draw, range(0, len(pixels) * SAMPLES, pool.batch)))
+
+
+def _add(seen: Float32, part: Paths, rows: NDArray[Any], source: LightPath, l: int, centre: Float64) -> None:
+    """Add what some rays of a part see of a source to the light of their eye rays."""
+    origin = part.origin if part.origin.ndim == 1 else part.origin[rows]
+    found = radiance_along(source, l, centre, origin, part.direction[rows], part.reach[rows])
+    seen[part.number[rows]] += found * part.tint[rows]  # a part has at most one ray of each eye ray
+
+
+def _put(image: Float32, pixels: Int32, light: Float32) -> int:
+    """Add light to pixels; return the number of values that halves cannot hold, which are cut."""
+    total = image[pixels].astype(np.float32) + light
+    if image.dtype != np.float16:
+        image[pixels] = total
+        return 0
+    image[pixels] = np.minimum(total, HALF_MAX)
+    return int((total > HALF_MAX).sum())
+
+
+def _pixels_of(setup: FrameSetup, c: int, bounds: Sequence[Bound], pool: TracePool) -> tuple[Int32, Flags]:
+    """Choose the pixels of eye c that may show a lamp.
+
+    Returns:
+        the pixels, and for each lamp whether they may show it without mirrors, (n_bounds, n_pixels).
+    """
+    cams = setup.cams
+    x = (np.arange(cams.width) + 0.5 - 0.5 * cams.width) / cams.focal
+    y = (0.5 * cams.height - np.arange(cams.height) - 0.5) / cams.focal
+    rays = cams.forward[c] + x[None, :, None] * cams.right[c] + y[:, None, None] * cams.up[c]
+    rays = (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).reshape(-1, 3).astype(np.float32)
+    margin = ROUND / cams.focal
+    inside = np.empty((len(bounds), setup.n_pixels), np.bool_)
+    for row, (way, angle) in zip(inside, bounds, strict=True):
+        widest = min(angle + margin, np.pi)
+        row[:] = rays @ way.astype(np.float32) >= np.float32(np.cos(widest) - 1e-6)
+    wanted = inside.any(axis=0)
+    if setup.depth:
+        flags = np.zeros(setup.n_pixels, np.uint8)
+
+        def flag(first: int, scratch: Scratch) -> None:
+            n = min(pool.batch, setup.n_pixels - first)
+            pilot_hits(cams, c, setup.order, first, n, setup.world, scratch.hit_rays.packets, scratch.hits)
+            flag_mirrors(scratch.hits, n, cams.width, cams.height, flags)
+
+        pool.run(flag, range(0, setup.n_pixels, pool.batch))
+        wanted |= flags > 0
+    pixels = np.flatnonzero(wanted).astype(np.int32)
+    return pixels, inside[:, pixels]
+
+
+def _follow(setup: FrameSetup, c: int, n: int, scratch: Scratch) -> list[Paths]:
+    """Follow eye rays 0 to n - 1, which found the hits of the scratch, over mirrors; return their straight parts."""
+    eye, hits = setup.cams.position[c].astype(np.float64), scratch.hits
+    tint, number = np.ones((n, 3), np.float32), np.arange(n, dtype=np.int32)
+    parts = [_part(hits, n, eye, tint, number)]
+    for bounce in range(setup.depth):
+        mirrors = (hits.kind[:n] == SURFACE) & (hits.specular[:n] > 0).any(axis=1)
+        if not mirrors.any():
+            break
+        origin = hits.position[:n][mirrors].astype(np.float64)
+        reflected, next_tint = scratch.reflected[bounce % 2], scratch.throughput[bounce % 2]
+        n = reflect(hits, n, tint, setup.world, scratch.hit_rays.packets, reflected, next_tint)
+        hits, tint, number = reflected, next_tint[:n].copy(), number[mirrors]
+        scratch.rays["mirror"] += n
+        parts.append(_part(hits, n, origin, tint, number))
+    return parts
+
+
+def _part(hits: Hits, n: int, origin: Float64, tint: Float32, number: Int32) -> Paths:
+    """The rays that found hits 0 to n - 1."""
+    direction = hits.incoming[:n].astype(np.float64)
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    reach = ((hits.position[:n] - origin) * direction).sum(axis=1)
+    reach[hits.kind[:n] == ESCAPED] = np.inf
+    return Paths(origin=origin, direction=direction, reach=reach, tint=tint, number=number)
