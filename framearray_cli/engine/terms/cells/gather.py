@@ -77,7 +77,7 @@ def _prefetch_cells(cells: Cells, rays: Rays, k: int, n_rays: int, room: GatherS
         prefetch(cells.light.ctypes.data + bytes_of_light * cell, bytes_of_light)
 
 
-@kernel
+@inlined
 def _sum_cells(
     cells: Cells, rays: Rays, n: int, first_ray: int, n_rays: int, all_rays: int, room: GatherScratch,
     near: NearHits, out: Gathered,
@@ -140,7 +140,7 @@ def _sum_cells(
                 indirect[hit, COLOUR + channel] = hue if channels == 1 else np.float32(1.0)
 
 
-@kernel
+@inlined
 def _gather_hits(
     hits: Hits, world: World, lights: LightArrays, cells: Cells, rays: Rays, n: int, settings: GatherSettings,
     room: GatherScratch, tests: Rays, near: tuple[NearHits, NearHits], mirrors: MirrorScratch, out: Gathered,
@@ -151,8 +151,6 @@ def _gather_hits(
     Returns:
         number of rays.
     """
-    if n == 0:
-        return 0
     of_w = settings.obscurance
     total = NO_RAYS
     surfaces, tracer = world
@@ -208,23 +206,16 @@ def gather_cells(
         wanted = reflects_in_lanes(hits, first, n)
         compress(wanted, lane_numbers() + np.int32(first), rays.place, waiting)
         waiting += popcount(wanted)
-        # gather at a full list, and move what is left to its start
-        if waiting >= fit:
+        # gather at a full list; at the end of hits that belong together, see `obscurance`, at all that are left
+        ends = (first + LANES) % HITS_TOGETHER == 0 or first + LANES >= n
+        while waiting >= fit or (ends and waiting > 0):
+            some = min(waiting, fit)
             total += _gather_hits(
-                hits, world, lights, cells, rays, fit, settings, room, tests, near, mirrors, out, neighbours
+                hits, world, lights, cells, rays, some, settings, room, tests, near, mirrors, out, neighbours
             )  # fmt: skip
-            waiting -= fit
+            waiting -= some
             for k in range(waiting):
-                rays.place[k] = rays.place[fit + k]
-        # start afresh, see `obscurance`
-        if (first + LANES) % HITS_TOGETHER == 0:
-            total += _gather_hits(
-                hits, world, lights, cells, rays, waiting, settings, room, tests, near, mirrors, out, neighbours
-            )  # fmt: skip
-            waiting = NO_RAYS
-    total += _gather_hits(
-        hits, world, lights, cells, rays, waiting, settings, room, tests, near, mirrors, out, neighbours
-    )  # fmt: skip
+                rays.place[k] = rays.place[some + k]
     return total
 
 

@@ -175,7 +175,7 @@ def _write_keys(cells: Cells, rays: Rays, first: int, n: int, room: GatherScratc
         prefetch(cells.slots.ctypes.data + _SLOT_BYTES * first_slot(key, n_slots), _SLOT_BYTES)
 
 
-@kernel
+@inlined
 def find_cells(
     hits: Hits, surfaces: Surfaces, tracer: Tracer, cells: Cells, rays: Rays, n: int, first_ray: int, n_rays: int,
     room: GatherScratch, tests: Rays, near: NearHits, reach: float,

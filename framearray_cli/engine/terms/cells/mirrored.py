@@ -81,7 +81,7 @@ def find_ends(
     return kept, reflected
 
 
-@kernel
+@inlined
 def follow_mirrors(
     hits: Hits, world: World, rays: Rays, n: int, first_ray: int, n_rays: int, room: MirrorScratch
 ) -> tuple[int, int]:
@@ -185,7 +185,7 @@ def _put_hit(rays: Rays, room: MirrorScratch, i: int) -> None:
     rays.packets[ray // width, TFAR, ray % width] += room.length[k]
 
 
-@kernel
+@inlined
 def put_back(rays: Rays, n: int, room: MirrorScratch, reflectivity: Float32) -> None:
     """Restore the packets of the n rays that met mirrors, and give each its weight, instead of R(Q)."""
     width = width_of_packets()

@@ -27,7 +27,7 @@ from .table import CONSTANT, MEAN, NOWHERE, TINT, Cells
 MOST_STEPS = 4
 
 
-@kernel
+@inlined
 def light_near(
     world: World, lights: LightArrays, cells: Cells, n: int, once: ObscuranceSettings, reach: float,
     room: GatherScratch, tests: Rays, near: NearHits, other: NearHits, mirrors: MirrorScratch,
