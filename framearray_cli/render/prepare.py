@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32
+from framearray_cli.base.arrays import Float32, Rgb
 from framearray_cli.base.memory import available_cores, resident_memory
 from framearray_cli.engine.embree import EmbreeScene, Engine
 from framearray_cli.engine.frames.passes import frame_hits, frames_per_turn
@@ -116,16 +116,29 @@ def plan_work(prepared: Prepared, embree: EmbreeScene, *, compare: bool = True) 
     Args:
         compare: whether to note how far light from cells is from that of paths.
     """
-    job, scene = prepared.job, prepared.scene
-    cams = eye_cameras(prepared)
-    background = np.array(job.scene.background, np.float32)
+    job, background = prepared.job, np.array(prepared.job.scene.background, np.float32)
     ambient = _name_groups(_ambient(prepared, embree, background), prepared.lights)
-    n_r = job.n_r
+    setup = frame_setup(prepared, embree, ambient.reflectivity)
+    if job.indirect.exact:
+        return replace(setup, cells=no_cells(setup.lights, background), exact=True), ambient
+    if job.indirect.method != "obscurance":
+        return _with_cells(prepared, embree, setup, ambient, compare=compare)
+    return setup, ambient
+
+
+def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> FrameSetup:
+    """Build the setup of all frames, with obscurances for indirect light.
+
+    Args:
+        reflectivity: (3,) the average of the scene's surfaces.
+    """
+    job, scene, n_r = prepared.job, prepared.scene, prepared.job.n_r
+    cams, background = eye_cameras(prepared), np.array(job.scene.background, np.float32)
     if prepared.still:  # one frame, with the hits that its whole window would have
         cams = cams._replace(**{name: getattr(cams, name)[:1] for name in ("position", "right", "up", "forward")})
     step_x, step_y = lattice_steps(job.samples.obscurance)
     mirrors = scene.has_mirrors and job.specular.depth > 0
-    setup = FrameSetup(
+    return FrameSetup(
         cams=cams,
         surfaces=prepared.surfaces,
         tracer=embree.tracer,
@@ -140,7 +153,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene, *, compare: bool = True) 
             step_y=step_y,
             coherent=job.reuse.weights == "area",  # other jobs keep their images, to the last bit
             sky=job.obscurance.outside == "background",
-            average=ambient.reflectivity,
+            average=reflectivity,
             background=background,
         ),
         seed=job.seed,
@@ -158,11 +171,6 @@ def plan_work(prepared: Prepared, embree: EmbreeScene, *, compare: bool = True) 
         denoise=job.denoise.obscurance,
         halves=_halves(job, still=prepared.still),
     )
-    if job.indirect.exact:
-        return replace(setup, cells=no_cells(setup.lights, background), exact=True), ambient
-    if job.indirect.method != "obscurance":
-        return _with_cells(prepared, embree, setup, ambient, compare=compare)
-    return setup, ambient
 
 
 def _with_cells(

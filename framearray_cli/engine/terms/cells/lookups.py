@@ -16,7 +16,7 @@ from ...hits.hits import Hits, decode_hits, empty_hits
 from ...hits.rays import NO_RAYS, ORDER, Rays, room_for_hits
 from ...inputs.random import CONTINUED, random_word
 from ...inputs.surfaces import Surfaces, geometric_normal, position_at, total_at
-from ...kernels.kernel import inlined, kernel, prefetch
+from ...kernels.kernel import inlined, prefetch
 from ...kernels.simd import LANES, integers, load_row, select, store, width_of_packets
 from .guards import UNSEEN, choose_slots, write_guard_ray
 from .table import ALL, NOWHERE, TINT, Cells, cell_of_key, coarser_cell, first_slot, key_of, level_of, side_of

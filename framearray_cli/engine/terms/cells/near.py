@@ -15,7 +15,7 @@ from ...embree.packets import intersect
 from ...hits.hits import World, record_hits
 from ...hits.rays import RANK, Rays
 from ...inputs.lights import LightArrays
-from ...kernels.kernel import inlined, kernel
+from ...kernels.kernel import inlined
 from ...kernels.simd import LANES, load, store
 from ..direct import direct
 from ..obscurance_rays import ObscuranceSettings, write_obscurance_rays
