@@ -17,6 +17,7 @@ _TESTS = Path(__file__).parent
 
 def pytest_configure() -> None:
     """Set up each process that runs tests."""
+    os.environ.setdefault("FRAMEARRAY_COMPILERS", "1")  # the processes of tests take all cores
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         # a shell in the background has it ignored, and programs that tests start would inherit that
         signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -39,7 +39,7 @@ DOORS = {
     "scipy": ("scene/paths/curves", "engine/images/standard_error", "engine/frames/blocks", "tools/mixing/environment"),
     "psutil": ("base/memory",),
     "xxhash": ("base/hashing",),
-    "filelock": ("array/lock",),
+    "filelock": ("array/lock", "engine/kernels/claims"),
     "pvlib": ("scene/paths/sun",),
     "distributed": ("render/parts/",),
 }

@@ -10,13 +10,15 @@ from pathlib import Path
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.files import require_new, write_bytes
 from framearray_cli.base.forms.kinds import mistaken
+from framearray_cli.render.beside import FLOATS
+from framearray_cli.render.beside import offer_beside as offer
 
-from .model import Start, table_of, validate_job
+from .model import INDIRECT, WEIGHTS, Start, table_of, validate_job
 from .options import Format, StartOptions, SunOption
 from .plan import plan_start
 from .text import to_text
 
-__all__ = ["STDOUT", "Format", "Start", "StartOptions", "SunOption", "check_files", "init", "to_text"]
+__all__ = ["STDOUT", "Format", "Start", "StartOptions", "SunOption", "check_files", "init", "offer_beside", "to_text"]
 
 STDOUT = Path("-")
 
@@ -39,6 +41,11 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
     if job_file != STDOUT:
         write_bytes(job_file, to_text(start, job_file).encode("utf-8"))
     return start
+
+
+def offer_beside() -> None:
+    """Have a second process compile kernels that a first job needs, should any be missing."""
+    offer({"indirect": {"method": INDIRECT}, "reuse": {"weights": WEIGHTS}} | FLOATS)
 
 
 def check_files(scene: Path, job_file: Path, *, force: bool) -> None:

@@ -11,7 +11,18 @@ from typing import Any
 
 from framearray_cli.base.forms.text import inline, inline_floats, quoted
 
-from .model import INDIRECT, POWERS, SUN_ANGLE, Camera, LightSource, MaterialNote, Start, SunDay, source_keys
+from .model import (
+    INDIRECT,
+    POWERS,
+    SUN_ANGLE,
+    WEIGHTS,
+    Camera,
+    LightSource,
+    MaterialNote,
+    Start,
+    SunDay,
+    source_keys,
+)
 
 MOST_STEPS_UP = 2  # largest number of leading ".." of a relative scene name; beyond, it is absolute
 COLUMN = 42  # of comments behind keys
@@ -48,7 +59,7 @@ def to_text(start: Start, job_file: Path) -> str:
             "",
             "[reuse]",
             _line("n_r", "3", "frames before and after that share their samples"),
-            _line("weights", quoted("area"), "a sample weighs as much as the part of the pixel that it stands for"),
+            _line("weights", quoted(WEIGHTS), "a sample weighs as much as the part of the pixel that it stands for"),
             "",
             "[obscurance]",
             _line("range", f"{start.range:g}", "how far surfaces darken and colour each other, scene units"),

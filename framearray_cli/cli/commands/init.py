@@ -98,9 +98,10 @@ def init(
         return
     with Screen(err, quiet=quiet) as screen:
         screen.wait("exploring the scene")
-        from framearray_cli.starter import STDOUT, StartOptions, SunOption, to_text
+        from framearray_cli.starter import STDOUT, StartOptions, SunOption, offer_beside, to_text
         from framearray_cli.starter import init as run
 
+        offer_beside()
         with screen.compiling(INIT_KERNELS):
             options = StartOptions(
                 camera=camera,

@@ -92,7 +92,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
         if n_normals:
             normal[span], depth[span] = _normals_and_depths(setup.cams, c, hits, m)
         estimate_terms(setup, hits, m, scratch, records.part(span), "obscurance", "shadow", smooth=True)
-        _find_outer(setup, c, m, scratch, frames, pixel[:, span], weight[:, span], within[:, span])
+        find_outer(setup, c, m, scratch, frames, pixel[:, span], weight[:, span], within[:, span])
         return mirror_paths(setup, hits, m, scratch) if setup.depth else []
 
     tasks = [(part, first, m) for part in parts for first, m in pool.batches(part.n)]
@@ -195,7 +195,7 @@ def _normals_and_depths(cams: Cameras, c: int, hits: Hits, n: int) -> tuple[Floa
     return hits.shading[:n], np.where(hits.kind[:n] == SURFACE, depth, np.float32(0.0))
 
 
-def _find_outer(
+def find_outer(
     setup: FrameSetup, c: int, n: int, scratch: Scratch, frames: range, pixel: Int32, weight: Float32, within: Bytes
 ) -> None:
     """Find the pixel of each frame that sees native hits 0 to n - 1 of eye c, and the weights and places of the hits.

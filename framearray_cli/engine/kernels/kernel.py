@@ -25,7 +25,10 @@ from numba import types
 from numba.core import caching, cgutils, compiler
 from numba.extending import intrinsic
 
+from . import beside
 from .cache import kernel_folder
+from .claims import Claim
+from .clock import counted_as_compiled
 from .load import KernelCache, KernelFiles
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -88,6 +91,7 @@ class _LazyCache:
 
     def __init__(self, function: Any, *, counts: bool) -> None:
         self._function, self._counts = function, counts
+        self._claim = Claim(function)
         self._opened: Any = None
 
     @property
@@ -108,12 +112,27 @@ class _LazyCache:
             load_numba()
             context.refresh()  # loads what counts references
         found = self.cache.load_overload(signature, context)
-        if found is None:
-            load_numba()  # numba compiles it now
+        if found is not None:
+            if beside.is_from_beside(Path(self.cache._cache_file._index_path)):
+                with counted_as_compiled(self._function):
+                    return found
+            return found
+        beside.start()
+        load_numba()  # numba compiles it now, unless another process does
+        return self._compiled_elsewhere(signature, context)
+
+    def _compiled_elsewhere(self, signature: Any, context: Any) -> Any:
+        """Return the machine code if another process has just compiled it; else None, and this one has the claim."""
+        if self.cache_path is None or not self._claim.take(Path(self.cache_path)):
+            return None
+        found = self.cache.load_overload(signature, context)
+        if found is not None:
+            self._claim.give_back()
         return found
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
         self.cache.save_overload(signature, compiled)
+        self._claim.give_back()
 
     def flush(self) -> None:
         self.cache.flush()

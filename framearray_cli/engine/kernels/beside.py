@@ -1,0 +1,75 @@
+"""A second process that compiles kernels beside this one: most of that is Python, of which a process runs one thread.
+
+The command line says what it would run (`offer`), in the order that suits it. It starts at once if no kernel is on
+disk, else when the first is missing (`start`). What it compiles lies on disk when this process comes to it
+(`claims.py`). It ends with this one.
+"""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from framearray_cli.base.memory import available_cores, free_memory
+
+from .cache import kept_kernels, kernel_folder
+
+# Processes that compile; 1: no other.
+PROCESSES = "FRAMEARRAY_COMPILERS"
+# Free memory without which there is no second process, bytes; it takes a third.
+NEEDS = 2**30
+
+_offered: list[str] = []
+_started: list[tuple[float, subprocess.Popen[bytes]]] = []
+
+
+def offer(code: str, arguments: Sequence[str] = ()) -> None:
+    """Say what the second process runs, if kernels must be compiled at all and a core is free for it.
+
+    Args:
+        code: Python code, which calls `end_with_parent` first.
+    """
+    if os.environ.get(PROCESSES) != "1" and available_cores() > 1 and sys.executable and kernel_folder():
+        _offered[:] = [sys.executable, "-c", code, *arguments]
+        if not kept_kernels():
+            start()
+
+
+def start() -> None:
+    """Start the second process, once."""
+    if not _offered or free_memory() < NEEDS:
+        return
+    command, _offered[:] = list(_offered), []
+    package = Path(__file__).parents[3]  # where this program was imported from
+    paths = [str(package), *filter(None, [os.environ.get("PYTHONPATH")])]
+    more = {PROCESSES: "1", "PYTHONPATH": os.pathsep.join(paths), "PYTHONSAFEPATH": "1"}
+    with suppress(OSError):  # no memory, or no more processes: this one compiles all
+        process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            env=os.environ | more,
+        )  # fmt: skip
+        _started.append((time.time(), process))
+
+
+def is_from_beside(file: Path) -> bool:
+    """Whether a kernel was put on disk since the second process started."""
+    with suppress(OSError):
+        return bool(_started) and file.stat().st_mtime >= _started[0][0]
+    return False
+
+
+def end_with_parent() -> None:
+    """End this process, at once, as soon as the one that started it is gone; a Ctrl-C is meant for that one."""
+    import signal
+    import threading
+
+    def wait() -> None:
+        with suppress(OSError):
+            os.read(0, 1)  # returns when the other end is closed, however the parent ended
+        os._exit(0)
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=wait, daemon=True).start()

@@ -1,0 +1,98 @@
+"""The second process that compiles: when it starts, and that it ends with the first."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from framearray_cli.engine.kernels import beside
+
+PARENT = """
+import subprocess, sys
+from framearray_cli.engine.kernels import beside
+beside.offer("from framearray_cli.engine.kernels.beside import end_with_parent; end_with_parent()\\n"
+             "import time; time.sleep(60)")
+beside.start()
+print(beside._started[0][1].pid, flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def offered(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The command that a test offered; a second core is free."""
+    found: list[str] = []
+    monkeypatch.delenv(beside.PROCESSES, raising=False)
+    monkeypatch.setattr(beside, "available_cores", lambda: 2)
+    monkeypatch.setattr(beside, "kept_kernels", lambda: 36)
+    monkeypatch.setattr(beside, "kernel_folder", lambda: Path())
+    monkeypatch.setattr(beside, "_offered", found)
+    monkeypatch.setattr(beside, "_started", [])
+    return found
+
+
+@pytest.mark.parametrize("killed", [False, True])
+def test_it_ends_with_the_process_that_started_it(tmp_path: Path, killed: bool) -> None:
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    environment.pop(beside.PROCESSES, None)
+    if beside.available_cores() < 2:
+        pytest.skip("one core")
+    parent = subprocess.Popen(
+        [sys.executable, "-c", PARENT], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+    )
+    assert parent.stdout is not None
+    child = psutil.Process(int(parent.stdout.readline()))
+    assert child.is_running()
+    if killed:
+        parent.kill()
+    parent.communicate("")
+    child.wait(timeout=20)
+
+
+def test_nothing_is_offered_where_no_core_is_free(offered: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(beside, "available_cores", lambda: 1)
+    beside.offer("pass")
+    assert offered == []
+    monkeypatch.setattr(beside, "available_cores", lambda: 2)
+    monkeypatch.setenv(beside.PROCESSES, "1")
+    beside.offer("pass")
+    assert offered == []
+
+
+def test_it_starts_once_and_only_when_a_kernel_is_missing(
+    offered: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    started: list[list[str]] = []
+
+    class Process:
+        def __init__(self, command: list[str], **_options: Any) -> None:
+            started.append(command)
+
+    monkeypatch.setattr(subprocess, "Popen", Process)
+    beside.offer("pass", ["argument"])
+    assert started == []
+    beside.start()
+    beside.start()
+    assert [command[1:] for command in started] == [["-c", "pass", "argument"]]
+    monkeypatch.setattr(beside, "kept_kernels", lambda: 0)
+    beside.offer("pass")
+    assert len(started) == 2, "on an empty disk at once"
+    old, new = tmp_path / "old", tmp_path / "new"
+    old.write_text("")
+    os.utime(old, (time.time() - 100,) * 2)
+    new.write_text("")
+    os.utime(new, (time.time() + 1,) * 2)
+    assert not beside.is_from_beside(old)
+    assert beside.is_from_beside(new)
+
+
+def test_it_does_not_start_without_memory(offered: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(beside, "free_memory", lambda: beside.NEEDS - 1)
+    beside.offer("pass")
+    beside.start()
+    assert beside._started == []
