@@ -24,7 +24,7 @@ FORMAT, FORMAT_OF_GROUPS = 1, 2
 
 MOST_NAMES = 5  # of arrays in a message
 
-_VECTORS = ("position", "direction", "across", "up", "intensity", "irradiance")  # of a source
+_VECTORS = ("position", "direction", "across", "up", "intensity", "irradiance", "radiance")  # of a source
 
 
 def write_manifest(directory: Path, manifest: Manifest) -> Path:

@@ -10,6 +10,7 @@ from framearray_cli.base.units import FARTHEST
 
 from .environment import EnvironmentSource
 from .keys import MOST_EYES
+from .mesh import MeshSource
 from .panel import DiscSource, RectSource
 from .placed import Angle, DirectionalKey, DirectionalSource, PointSource
 from .sourcetable import ShownSource, SourceTable
@@ -181,6 +182,7 @@ LightSource: TypeAlias = Annotated[
     | SpotSource
     | RectSource
     | DiscSource
+    | MeshSource
     | SunSource
     | DomeSource
     | GridSource

@@ -5,6 +5,7 @@ from typing import Literal, TypeAlias
 LampUnits: TypeAlias = Literal["W/sr", "cd", "lm"]
 SkyUnits: TypeAlias = Literal["W/m2", "lux"]
 PanelUnits: TypeAlias = Literal["W", "lm", "W/(m2 sr)", "cd/m2"]
+RadianceUnits: TypeAlias = Literal["W/(m2 sr)", "cd/m2"]
 UNITS_OF_PANELS = {"power": ("W", "lm"), "radiance": ("W/(m2 sr)", "cd/m2")}
 
 LAMP_UNITS = (

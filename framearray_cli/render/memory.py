@@ -10,6 +10,7 @@ from framearray_cli.base.memory import free_memory, resident_memory
 from framearray_cli.base.units import gibibytes, in_unit_of
 from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.hits.emission import EMISSION_COLUMNS
 from framearray_cli.engine.hits.hits import empty_hits
 from framearray_cli.engine.hits.native import flag_mirrors, pilot_hits
 from framearray_cli.engine.hits.rays import room_for_hits
@@ -93,6 +94,7 @@ def window_memory(
     weighed = 5 if job.reuse.weights == "area" else 4 if job.reuse.weights == "balance" and n_r > 0 else 0
     values = prepared.light_arrays.channels * n_lights
     per_record = 4 * (values + LANES + (LIGHT + values if job.indirect.method != "obscurance" else 0))
+    per_record += 4 * EMISSION_COLUMNS * (prepared.light_arrays.emitters.span.size > 0)
     per_hit = per_record + 16 * job.output.layers + frames * (4 + weighed)
     # a frame's mirror hits wait for N_r frames; twice while the lists of all batches are joined, and chains add some
     mirrored = mirror_share * job.specular.hits * (n_r + 3) * per_record

@@ -14,6 +14,7 @@ from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.images.denoise import require_denoiser
 from framearray_cli.engine.inputs.cameras import Cameras, cameras
+from framearray_cli.engine.inputs.emitters import emitters
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.random import lattice_steps
 from framearray_cli.engine.inputs.surfaces import Surfaces, near_depth, surfaces
@@ -32,6 +33,8 @@ from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Eyes, Lights, eyes, lights
 from framearray_cli.scene.paths.planes import Plane
 from framearray_cli.scene.scene import Scene, load_scene
+
+from .shining import with_emission
 
 # Least native hits per pixel that are sampled in two halves.
 FEWEST_SPLIT = 4
@@ -75,7 +78,7 @@ def prepare(job: Job) -> Prepared:
     """Read the scene of a job and place its eyes and lights.
 
     Raises:
-        JobError: a path is invalid.
+        JobError: a path is invalid, or a material that shines, see `prepared_from`.
         SceneError: the scene cannot be read or rendered.
     """
     if job.denoise.obscurance:
@@ -86,8 +89,13 @@ def prepare(job: Job) -> Prepared:
 
 
 def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepared:
-    """Put together a job, its scene, and the eyes and lights to render: those of the job, or a few of them."""
-    arrays = light_arrays(lights, scene.centre)
+    """Put together a job, its scene, and the eyes and lights to render: those of the job, or a few of them.
+
+    Raises:
+        JobError: a material that shines is missing, has no triangles or emits nothing.
+    """
+    lights = with_emission(job, lights, scene)
+    arrays = light_arrays(lights, scene.centre, emitters(lights, scene))
     return Prepared(
         job=job,
         scene=scene,

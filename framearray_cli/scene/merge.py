@@ -23,14 +23,12 @@ def add_untextured_variants(
     new_parts, new_materials = [], list(materials)
     for part in parts:
         material = materials[part.material]
-        textured = max(material.texture, material.specular_texture, material.alpha_texture) >= 0
+        textured = material.textured
         if part.uvs is None and textured:
             notes.add("meshes without texture coordinates show no texture", material.name)
             if part.material not in variants:
                 variants[part.material] = len(new_materials)
-                new_materials.append(
-                    replace(material, texture=-1, specular_texture=-1, alpha_texture=-1, alpha_cutoff=0.0)
-                )
+                new_materials.append(material.without_textures())
             part = replace(part, material=variants[part.material])
         new_parts.append(part)
     return new_parts, new_materials

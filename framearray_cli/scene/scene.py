@@ -57,6 +57,8 @@ class Scene:
         specular: (m, 3) mirror reflectivity, before texture and corner colour.
         reflectivity_texture: (m,) texture that multiplies `reflectivity`, or -1.
         specular_texture: (m,) texture that multiplies `specular`, or -1.
+        emission: (m, 3) radiance that surfaces emit, before texture; as the file gives it.
+        emission_texture: (m,) texture that multiplies `emission`, or -1.
         alpha: (m,) opacity factor, multiplied with the alpha of `alpha_texture`.
         alpha_texture: (m,) texture whose alpha is the mask, or -1.
         alpha_cutoff: (m,) a point of a masked triangle is absent where alpha < cutoff.
@@ -77,6 +79,8 @@ class Scene:
     specular: Rgb
     reflectivity_texture: Int32
     specular_texture: Int32
+    emission: Rgb
+    emission_texture: Int32
     alpha: Float32
     alpha_texture: Int32
     alpha_cutoff: Float32
@@ -131,7 +135,7 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
     normals, uvs, colours = _empty(3), _empty(2), _empty(3)
     if merged.normals is not None and merged.has_normals[keep].any():
         normals = unit_normals(rows_of(merged.normals, keep), merged.has_normals[keep], corners, notes)
-    textured = max((max(m.texture, m.specular_texture, m.alpha_texture) for m in materials), default=-1) >= 0
+    textured = any(m.textured for m in materials)
     if merged.uvs is not None and textured:
         uvs = wrap_uvs(rows_of(merged.uvs, keep), notes)
     if merged.colours is not None:
@@ -152,6 +156,8 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
         specular=np.array([m.specular for m in materials], dtype=np.float32),
         reflectivity_texture=np.array([m.texture for m in materials], dtype=np.int32),
         specular_texture=np.array([m.specular_texture for m in materials], dtype=np.int32),
+        emission=np.array([m.emission for m in materials], dtype=np.float32),
+        emission_texture=np.array([m.emission_texture for m in materials], dtype=np.int32),
         alpha=np.array([m.alpha for m in materials], dtype=np.float32),
         alpha_texture=np.array([m.alpha_texture for m in materials], dtype=np.int32),
         alpha_cutoff=cutoff,

@@ -75,6 +75,23 @@ PANELS = [
         "keys": [{"frame": 0, "position": [0, 1.9, 0], "direction": [0, -1, 0.2], "radiance": 3.0, "radius": 0.2}],
     },
 ]  # fmt: skip
+MESHES = [
+    {
+        "type": "mesh",
+        "material": "Smooth",
+        "units": "cd/m2",
+        "keys": [
+            {"frame": 0, "radiance": 600.0, "color": "2700 K"},
+            {"frame": 2, "radiance": [0.0, 0.0, 9.0], "color": [1, 1, 1]},
+        ],
+    },
+    {
+        "type": "mesh",
+        "material": "Plain",
+        "two_sided": False,
+        "keys": [{"frame": 0, "radiance": [0.5, 1.0, 2.0]}],
+    },
+]
 UNITS = [
     {**tiny.SUN, "units": "lux"},
     {"type": "point", "units": "lm", "keys": [{"frame": 0, "position": [0, 2, 0], "intensity": 800.0}]},
@@ -127,7 +144,7 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
         "units": tiny.table(camera=small, light={"sources": UNITS, "frames": 3}),
         "year": tiny.table(camera=small, light={"sources": [YEAR], "frames": 6}),
         "domes": tiny.table(
-            camera=small, light={"sources": [DOME, LAMPS, GRID, IN_PICTURE, *SPOTS, *PANELS], "frames": 4}
+            camera=small, light={"sources": [DOME, LAMPS, GRID, IN_PICTURE, *SPOTS, *PANELS, *MESHES], "frames": 4}
         ),
         "automatic": tiny.table(
             camera=small | tiny.WALK, samples={"hits": "auto", "obscurance": 4}, reuse={"n_r": "auto"}, output=EXR

@@ -177,7 +177,7 @@ def test_one_number_is_grey(table):
 
 
 RGB = "a number or 3 numbers of at least 0"
-KINDS_OF_SOURCES = '"point", "directional", "spot", "rect", "disc", "sun", "dome", "grid" or "environment"'
+KINDS_OF_SOURCES = '"point", "directional", "spot", "rect", "disc", "mesh", "sun", "dome", "grid" or "environment"'
 WRONG = [
     ("name", "a/b", 'name: expected at most 100 letters, digits, ".", "_" or "-", the first a letter, digit or "_", '
      'got "a/b"'),

@@ -25,7 +25,7 @@ from .passes import Pass
 from .records import BY_SAMPLE, HitRecords, HitsByPixel
 from .scratch import Scratch
 from .setup import FrameSetup
-from .shading import estimate_terms
+from .shading import estimate_terms, find_emission
 from .threads import TracePool
 
 
@@ -126,6 +126,7 @@ def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> lis
     def find_batch(first: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
         m = min(pool.batch, n - first)
         extra_hits(setup.cams, c, samples, first, m, setup.world, scratch.hit_rays.packets, scratch.hits)
+        find_emission(setup, scratch, 0, m)
         scratch.rays["native"] += m
         estimate_terms(setup, scratch.hits, m, scratch, records.part(slice(first, first + m)), "obscurance", "shadow")
         return mirror_paths(setup, scratch.hits, m, scratch) if setup.depth else []
@@ -184,6 +185,7 @@ def _find_native(setup: FrameSetup, c: int, part: Pass, first: int, n: int, scra
     samples = Samples(setup.seed, part.pixels, part.per_pixel, part.first_sample, setup.halves == BY_SAMPLE)
     packets = scratch.hit_rays.packets
     native_hits(setup.cams, c, samples, first, n, setup.world, setup.depth > 0, packets, scratch.hits)
+    find_emission(setup, scratch, 0, n)
     scratch.rays["native"] += n
     scratch.seconds["native"] += perf_counter() - started
 

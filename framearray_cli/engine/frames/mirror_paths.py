@@ -15,7 +15,7 @@ from .passes import Pass, half_sizes
 from .records import HitRecords
 from .scratch import Scratch
 from .setup import FrameSetup
-from .shading import estimate_terms
+from .shading import estimate_terms, find_emission
 from .threads import TracePool
 
 
@@ -64,6 +64,7 @@ def _reflect(
             some, to = Hits._make(array[first:last] for array in hits), Hits._make(array[at:] for array in reflected)
             packets = scratch.hit_rays.packets
             m = reflect(some, last - first, throughput[first:last], setup.world, packets, to, tint[at:])
+            find_emission(setup, scratch, at, m)
         found.append(at + m)
     return found
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32, with_room
 
+from ..hits.emission import EMISSION_COLUMNS, SOURCE, TEXTURE
 from ..kernels.kernel import inlined
 from ..kernels.simd import LANES
 from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
@@ -41,16 +42,19 @@ class HitRecords:
             with a bit per packet of light positions, see `lit_bit`, set where any irradiance is not zero; HALF, 1 for
             an odd sample of its pixel, else 0.
         irradiance: (n, channels, n_lights) E[l].
+        emission: (n, EMISSION_COLUMNS) what the hit sends out itself, tinted by mirrors, see `record_emission`; (n, 0)
+            where nothing shines.
         indirect: (n, LIGHT + channels n_lights) indirect light read from cells, see `gather_cells`; (n, 0) without.
     """
 
     row: Float32
     irradiance: Float32
     indirect: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
+    emission: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
 
     @property
     def arrays(self) -> dict[str, Float32]:
-        """The arrays by name; `indirect` only if it has columns."""
+        """The arrays by name; `indirect` and `emission` only if they have columns."""
         return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name).shape[1]}
 
     @property
@@ -67,9 +71,22 @@ class HitRecords:
         found: Float32 = by_light * known[:, None, COLOUR : COLOUR + 3]
         return found
 
+    def own_light(self, strength: Float32, colour: Float32) -> Float32:
+        """Radiance that the hits send out themselves, (n, n_lights, 3); (n, 1, 3) zeros where nothing shines.
+
+        Args:
+            strength, colour: of `LightArrays`.
+        """
+        if not self.emission.shape[1]:
+            return np.zeros((len(self.row), 1, 3), np.float32)
+        source = self.emission[:, SOURCE].astype(np.int64)
+        radiance = np.swapaxes(strength, 1, 2)[np.maximum(source, 0)] * colour
+        found: Float32 = radiance * self.emission[:, None, TEXTURE:]
+        return found
+
     def part(self, span: slice) -> "HitRecords":
         """The records of some of the hits; shares memory."""
-        return HitRecords(row=self.row[span], irradiance=self.irradiance[span], indirect=self.indirect[span])
+        return HitRecords(**{f.name: getattr(self, f.name)[span] for f in fields(self)})
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -95,6 +112,7 @@ def empty_records(
     channels: int,
     n_lights: int,
     columns: int = 0,
+    shining: bool = False,
     take: Callable[[str, tuple[int, ...], Any], Any] = fresh_array,
 ) -> HitRecords:
     """Allocate records of n hits; contents are arbitrary.
@@ -103,10 +121,12 @@ def empty_records(
         channels: of irradiance, 1 or 3.
         n_lights: light positions whose irradiance is stored.
         columns: of `indirect`.
+        shining: whether hits may send out light themselves.
         take: returns an array for a name, shape and dtype; by default a new one.
     """
     return HitRecords(
         row=take("row", (n, LANES), np.float32),
         irradiance=take("irradiance", (n, channels, n_lights), np.float32),
         indirect=take("indirect", (n, columns), np.float32) if columns else np.empty((n, 0), np.float32),
+        emission=take("emission", (n, EMISSION_COLUMNS), np.float32) if shining else np.empty((n, 0), np.float32),
     )

@@ -4,6 +4,7 @@ from collections import Counter, defaultdict
 
 import numpy as np
 
+from ..hits.emission import EMISSION_COLUMNS
 from ..hits.hits import empty_hits
 from ..hits.rays import room_for_hits, room_for_tests
 from ..kernels.simd import LANES
@@ -35,6 +36,7 @@ class Scratch:
         gather, near: of gather rays, and of those too short for cells; and `constant`: (batch, 3) the light that cells
             have at every light position, `closeness`: (batch,) of their rays; None and empty without cells.
         mirrors: of gather rays that meet mirrors; empty without.
+        emission: (batch, EMISSION_COLUMNS) of the hits, see `record_emission`; (0, ...) where nothing shines.
         paths: of indirect light by paths; None without.
         smooth: of the filter of indirect light; None without.
         rays: number of rays traced by kind; `seconds`: by stage.
@@ -65,6 +67,7 @@ class Scratch:
         self.mirrors = room_for_mirrors(min(rays, RAYS_TOGETHER), setup.depth if near else 0)
         self.closeness = np.empty(batch if near else 0, np.float32)
         self.constant = np.empty((batch if setup.cells is not None else 0, 3), np.float32)
+        self.emission = np.empty((batch if setup.shines else 0, EMISSION_COLUMNS), np.float32)
         self.paths = PathScratch(setup.lights) if setup.exact else None
         self.smooth = room_for_smoothing(setup.lights.channels * len(setup.kept)) if setup.smooth else None
         self.rays: Counter[str] = Counter()

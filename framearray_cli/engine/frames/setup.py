@@ -117,6 +117,11 @@ class FrameSetup:
         return self.lights.channels, len(self.kept)
 
     @property
+    def shines(self) -> bool:
+        """Whether any surface of the scene shines."""
+        return self.lights.emitters.span.size > 0
+
+    @property
     def keeps_all(self) -> bool:
         """Whether the light of all positions is stored."""
         return len(self.kept) == self.lights.n_lights
@@ -142,7 +147,7 @@ class FrameSetup:
         """Allocate records of n hits; see `empty_records` in `records.py`."""
         channels, n_lights = self.stored_light
         columns = 0 if self.cells is None else LIGHT + channels * n_lights
-        return empty_records(n, channels, n_lights, columns, take or fresh_array)
+        return empty_records(n, channels, n_lights, columns, self.shines, take or fresh_array)
 
     def eyes_of(self, j: int) -> range:
         """The window of frame j: the eyes whose hits it shows."""

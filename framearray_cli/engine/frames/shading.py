@@ -6,6 +6,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Rgb
 
+from ..hits.emission import TEXTURE, record_emission
 from ..hits.hits import ESCAPED, Hits
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, bits, load
@@ -39,7 +40,7 @@ def estimate_terms(
     """Estimate W, the light-independent radiance and E[l] of hits 0 to n - 1.
 
     Args:
-        out: overwritten.
+        out: overwritten; of `scratch.emission`, see `find_emission`, what the hits send out.
         obscurance_kind, shadow_kind: kinds of rays and stages to count the cost under.
         throughput: (>= n, 3) the tint t of the mirrors on the way to each hit, or (0, 3) without mirrors.
         smooth: whether hits in a row are neighbours in the image, and their indirect light is filtered.
@@ -67,9 +68,20 @@ def estimate_terms(
     if has_environments(setup.lights):
         see_environments(hits, n, setup.lights, setup.kept.start, scratch.test_rays, out.irradiance)
     scratch.rays[shadow_kind] += rays
+    if setup.shines:
+        out.emission[:n] = scratch.emission[:n]
+        if len(throughput):
+            out.emission[:n, TEXTURE:] *= throughput[:n]
     write_rows(hits, n, setup.background, scratch.obscurance, skylight, throughput, out.irradiance, out.row)
     scratch.seconds[obscurance_kind] += middle - started
     scratch.seconds[shadow_kind] += perf_counter() - middle
+
+
+def find_emission(setup: FrameSetup, scratch: Scratch, first: int, n: int) -> None:
+    """Find what the n hits whose rays are still in `scratch.hit_rays` send out; they are hits `first` and following."""
+    if setup.shines:
+        packets, found = scratch.hit_rays.packets, scratch.emission[first:]
+        record_emission(setup.lights.emitters, setup.tracer, packets, n, found)
 
 
 def _estimate_indirect(

@@ -9,11 +9,12 @@ import numpy as np
 from framearray_cli.base.arrays import Addresses, Real
 
 from ..frames.records import HALF, LIT, REFLECTIVITY, WEIGHT, lit_bit
+from ..hits.emission import EMISSION_COLUMNS, SOURCE, TEXTURE
 from ..kernels.kernel import index, inlined, integer_at, kernel, prefetch, real_at
 from ..kernels.simd import LANES, lane_numbers, lanes_from, load, reals, store
 from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
 from .band import HITS_AT_ONCE, INVERSE_PI, Band
-from .sources import GATHERED, IRRADIANCE, ODD_SCALE, OF, ORDER, ROW, SCALE, SHARES, START, WEIGHTS
+from .sources import EMISSION, GATHERED, IRRADIANCE, ODD_SCALE, OF, ORDER, ROW, SCALE, SHARES, START, WEIGHTS
 
 # Prefetch the irradiance of the hit that comes this many hits later, and the row of the one twice as far ahead: memory
 # answers in about the time that the sums of this many hits take.
@@ -64,13 +65,14 @@ def accumulate(
                 total = total + lanes_from(row) * w
                 # 4. Note where the light of a hit is, and its share w R / pi.
                 lit, gathered = int(real_at(row, LIT)), _light_from_cells(source, hit, channels * n_lights)
-                if (lit == 0 and gathered == 0) or n_lights == 0:
+                own = _own_light(source, hit)
+                if (lit == 0 and gathered == 0 and own == 0) or n_lights == 0:
                     continue
                 if waiting >= HITS_AT_ONCE:
                     _add_light(band, i, waiting, channels, n_lights, fresh)
                     waiting, fresh = 0, False
                 direct = source[IRRADIANCE] + 4 * channels * n_lights * hit
-                waiting = _note_light(band, waiting, lit, direct, gathered, row, w)
+                waiting = _note_light(band, waiting, lit, direct, gathered, own, row, w)
 
         # 5. Divide by sum(w) for means, else add to the band; then sum the direct light of the hits that still wait.
         if mean:
@@ -147,11 +149,13 @@ def _light_from_cells(source: Addresses, hit: int, values: int) -> int:
 
 
 @inlined
-def _note_light(band: Band, waiting: int, lit: int, direct: int, gathered: int, row: int, w: Real) -> int:
-    """Note the direct light of a lit hit with its share w R / pi, and its light from cells with w R c / pi.
+def _note_light(band: Band, waiting: int, lit: int, direct: int, gathered: int, own: int, row: int, w: Real) -> int:
+    """Note the direct light of a lit hit with its share w R / pi, its light from cells with w R c / pi, and its own.
+
+    Of what the hit sends out itself the share is w times its texture, and the light is the strength of its source.
 
     Args:
-        waiting: length of the queue; direct, gathered: addresses of the light, gathered 0 for none.
+        waiting: length of the queue; direct, gathered, own: addresses of the light, gathered and own 0 for none.
 
     Returns:
         the new length.
@@ -169,7 +173,23 @@ def _note_light(band: Band, waiting: int, lit: int, direct: int, gathered: int, 
             share = w * INVERSE_PI * real_at(row, REFLECTIVITY + channel)
             band.shares[at, channel] = share * real_at(gathered, COLOUR + channel)
         waiting += 1
+    if own != 0:
+        at = index(waiting)
+        band.places[at], band.lit[at] = band.strength[int(real_at(own, SOURCE))], -1
+        for channel in range(3):
+            band.shares[at, channel] = w * real_at(own, TEXTURE + channel)
+        waiting += 1
     return waiting
+
+
+@inlined
+def _own_light(source: Addresses, hit: int) -> int:
+    """The address of what a hit sends out itself, see `record_emission`; 0 for nothing."""
+    address = 0
+    if source[EMISSION] != 0:
+        at = source[EMISSION] + 4 * EMISSION_COLUMNS * hit
+        address = at if real_at(at, SOURCE) >= 0.0 else 0
+    return address
 
 
 @inlined

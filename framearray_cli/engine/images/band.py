@@ -47,9 +47,13 @@ class Band(NamedTuple):
             colour.
         sums: (n_pixels, LANES) sums of w row, see `HitRecords`.
         hits: (n_pixels,) number of hits.
-        places: (HITS_AT_ONCE + 1,) address of the irradiance of a hit, or of its indirect light from cells.
-        shares: (HITS_AT_ONCE + 1, 3) w R / pi of a hit, times its colour c for indirect light.
-        lit: (HITS_AT_ONCE + 1,) LIT of a hit.
+        places: (HITS_AT_ONCE + 2,) address of the irradiance of a hit, of its indirect light from cells, or of the
+            strength of what shines there.
+        shares: (HITS_AT_ONCE + 2, 3) w R / pi of a hit, times its colour c for indirect light; w and the texture of
+            what shines.
+        lit: (HITS_AT_ONCE + 2,) LIT of a hit.
+        strength: (n_sources,) addresses of the strengths of all sources, (channels, n_lights) each, for hits that send
+            out light themselves; (0,) where nothing shines.
     """
 
     direct: Float32
@@ -58,6 +62,7 @@ class Band(NamedTuple):
     places: Addresses
     shares: Float32
     lit: Addresses
+    strength: Addresses
 
 
 class Finish(NamedTuple):
@@ -76,19 +81,21 @@ class Finish(NamedTuple):
     lowest: Real
 
 
-# Number of lit hits whose direct light is summed together; with cells one more, as a hit has light of two kinds.
+# Number of lit hits whose direct light is summed together, and two more, as a hit may have light of three kinds.
 HITS_AT_ONCE = 64
+NOTHING_SHINES: Addresses = np.empty(0, np.int64)
 
 
-def empty_band(n_pixels: int, n_lights: int) -> Band:
+def empty_band(n_pixels: int, n_lights: int, strength: Addresses = NOTHING_SHINES) -> Band:
     """Allocate the sums of n_pixels pixels."""
     return Band(
         direct=with_room((n_pixels, 3, -(-n_lights // LANES) * LANES), np.float32),
         sums=with_room((n_pixels, LANES), np.float32),
         hits=np.empty(n_pixels, np.int32),
-        places=np.empty(HITS_AT_ONCE + 1, np.int64),
-        shares=np.empty((HITS_AT_ONCE + 1, 3), np.float32),
-        lit=np.empty(HITS_AT_ONCE + 1, np.int64),
+        places=np.empty(HITS_AT_ONCE + 2, np.int64),
+        shares=np.empty((HITS_AT_ONCE + 2, 3), np.float32),
+        lit=np.empty(HITS_AT_ONCE + 2, np.int64),
+        strength=strength,
     )
 
 

@@ -22,7 +22,7 @@ from ..frames.threads import TracePool
 from ..terms.ambient.estimate import Ambient
 from .accumulate import accumulate
 from .area_weights import AreaWeights
-from .band import Band, Finish, as_stored, empty_band
+from .band import NOTHING_SHINES, Band, Finish, as_stored, empty_band
 from .compose import Pixels, Summands, average_native, compose_differences, compose_pixels, weigh_halves
 from .composed import Composed, layers_of
 from .denoise import denoise_obscurance
@@ -55,7 +55,8 @@ class Window:
         self._frames: dict[int, FrameHits] = {}
         self._holes: dict[int, list[tuple[HitsByPixel, HitRecords]]] = {}
         self._area = AreaWeights((setup.cams.width, setup.cams.height))
-        self._bands = [empty_band(BAND_PIXELS, len(setup.kept)) for _ in range(pool.threads)]
+        self._strength, strength = _strengths(setup)
+        self._bands = [empty_band(BAND_PIXELS, len(setup.kept), strength) for _ in range(pool.threads)]
 
     def add(self, frame: FrameHits) -> None:
         """Add the hits of the next eye of the path."""
@@ -260,3 +261,13 @@ class Window:
         for by_pixel, _ in holes[:1] if len(n_native) else []:
             n_native += np.diff(by_pixel.start)
         return np.reciprocal(np.maximum(n_native, 1), dtype=np.float32)
+
+
+def _strengths(setup: FrameSetup) -> tuple[Float32, Addresses]:
+    """The strengths of all sources at the kept lights, and the address of each one's; empty where nothing shines."""
+    if not setup.shines:
+        return np.empty(0, np.float32), NOTHING_SHINES
+    kept = setup.lights.strength[:, :, setup.kept.start : setup.kept.stop]
+    found: Float32 = with_room(kept.shape, np.float32, fill=0)
+    found[:] = kept
+    return found, found.ctypes.data + found.strides[0] * np.arange(len(found), dtype=np.int64)

@@ -14,22 +14,24 @@ from framearray_cli.base.arrays import Float32, Float64, Int32, with_room
 from framearray_cli.scene.paths.paths import Lights
 from framearray_cli.scene.paths.placing import LightPath
 
+from .emitters import NONE as NO_EMITTERS
+from .emitters import Emitters
 from .maps import NO_MAPS, Maps, map_arrays
 from .profiles import NONE, Profiles, profile_arrays
 
-POINT, DIRECTIONAL, RECT, DISC = 0, 1, 2, 3  # panels are last
+POINT, DIRECTIONAL, RECT, DISC, MESH = 0, 1, 2, 3, 4  # panels are last but meshes
 SHARPEST = 0.001  # width of a spot's edge, in cosines, over that of its cone
-KINDS = {"point": POINT, "directional": DIRECTIONAL}
+KINDS = {"point": POINT, "directional": DIRECTIONAL, "mesh": MESH}
 
 
 class LightArrays(NamedTuple):
     """All sources of a job for kernels, which read packets of light positions; see `pad_lights`.
 
     Attributes:
-        kind: (n_sources,) POINT, DIRECTIONAL, RECT or DISC.
+        kind: (n_sources,) POINT, DIRECTIONAL, RECT, DISC or MESH.
         vector: (n_sources, 3, n_lights) position, centred, or the unit direction that light travels.
         strength: (n_sources, channels, n_lights) W/sr or W/m2 in units of `colour`; 1 or 3 channels. A panel's
-            is that along its normal.
+            is that along its normal, a mesh's its radiance.
         lit: (n_sources, n_lights) 1 where a source shines, else 0.
         size: (n_sources, n_lights) the squared radius of a point source, or sin^2 of half the angle of a directional
             one; (0,) where no source has a size: kernels are then compiled without it.
@@ -41,6 +43,7 @@ class LightArrays(NamedTuple):
         colour: (n_lights, 3) factor of a stored irradiance; ones if there are 3 channels.
         profiles: of lamps with measured light; kernels are compiled without them where there are none.
         maps: of environments, which are DIRECTIONAL with a map, likewise.
+        emitters: the triangles of meshes.
     """
 
     kind: Int32
@@ -53,6 +56,7 @@ class LightArrays(NamedTuple):
     colour: Float32
     profiles: Profiles = NONE
     maps: Maps = NO_MAPS
+    emitters: Emitters = NO_EMITTERS
 
     @property
     def channels(self) -> int:
@@ -74,25 +78,29 @@ def pad_lights(lights: LightArrays) -> LightArrays:
         return room
 
     profiles = lights.profiles._replace(frame=copied(lights.profiles.frame))
-    own = (lights.profiles, lights.maps)
-    arrays: Any = (array if any(array is one for one in own) else copied(array) for array in lights)
+    arrays: Any = (array if isinstance(array, tuple) else copied(array) for array in lights)
     return LightArrays(*arrays)._replace(profiles=profiles)
 
 
-def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
-    """Make the arrays of all lights that kernels read, with one channel if that suffices."""
+def light_arrays(lights: Lights, centre: Float64, emitters: Emitters = NO_EMITTERS) -> LightArrays:
+    """Make the arrays of all lights that kernels read, with one channel if that suffices.
+
+    Args:
+        emitters: of the sources that are meshes.
+    """
     intensity = np.stack([source.intensity for source in lights.sources])  # (n_sources, n_lights, 3)
     vector = np.stack(
-        [source.vector if source.kind == "directional" else source.vector - centre for source in lights.sources]
+        [source.vector - centre if source.kind == "point" else source.vector for source in lights.sources]
     )
     colour = intensity.sum(axis=0)
     largest = colour.max(axis=-1, keepdims=True)
     colour = np.divide(colour, largest, out=np.ones_like(colour), where=largest > 0)
     scalar = intensity.max(axis=-1, keepdims=True)
-    coloured = any(path.environment and not path.environment.panorama.is_grey for path in lights.sources)
-    if not coloured and np.allclose(
-        scalar * colour, intensity, rtol=1e-6, atol=0.0
-    ):  # beyond that, float32 would show the difference
+    coloured = emitters.coloured or any(
+        path.environment and not path.environment.panorama.is_grey for path in lights.sources
+    )
+    # beyond that, float32 would show the difference
+    if not coloured and np.allclose(scalar * colour, intensity, rtol=1e-6, atol=0.0):
         strength = scalar
     else:
         strength, colour = intensity, np.ones_like(colour)
@@ -107,12 +115,13 @@ def light_arrays(lights: Lights, centre: Float64) -> LightArrays:
         colour=np.asarray(colour, np.float32),
         profiles=profile_arrays(lights),
         maps=map_arrays(lights.sources),
+        emitters=emitters,
     )
     return pad_lights(found)
 
 
 def _kind(source: LightPath) -> int:
-    """POINT, DIRECTIONAL, RECT or DISC."""
+    """POINT, DIRECTIONAL, RECT, DISC or MESH."""
     if source.panel is None:
         return KINDS[source.kind]
     return DISC if source.panel.round else RECT

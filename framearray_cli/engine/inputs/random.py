@@ -20,6 +20,7 @@ PIXEL, HEMISPHERE, CHOICE, STEPS, OTHER_HALF, CELLS = 0, 1, 2, 3, 4, 5
 CONTINUED = 16  # and what follows: streams of the points that rays 0, 1, ... of a hit meet
 MIRRORED = 1 << 17  # likewise: what rays 0, 1, ... of a hit choose at mirrors
 SOURCES = 1 << 20  # and what follows: streams of the points of sources 0, 1, ...
+EMITTERS = 1 << 21  # likewise: of the triangles of meshes that shine
 PIXEL_SAMPLE = (1 << 16) - 1  # sample index, used by no hit, of numbers that all samples of a pixel share
 HOLE_SAMPLE = (1 << 16) - 2  # sample index of the hit of a pixel that no other hit reaches
 

@@ -197,6 +197,19 @@ def total_at(s: Surfaces, triangle: int, u: Real, v: Real) -> Triple:
 
 
 @inlined
+def emission_at(s: Surfaces, texture: int, triangle: int, u: Real, v: Real) -> Triple:
+    """What a texture says of the light of a triangle at barycentric (u, v); 1 without one (-1)."""
+    one, textured = np.float32(1.0), texture >= np.int32(0)
+    red = green = blue = u * np.float32(0.0) + one
+    if popcount(textured) > 0:
+        w = one - u - v
+        tu, tv = _interpolate(s.uvs, triangle, 2, 0, u, v, w), _interpolate(s.uvs, triangle, 2, 1, u, v, w)
+        r, g, b, _ = texture_at(s, select(textured, texture, np.int32(0)), tu, tv)
+        red, green, blue = select(textured, r, red), select(textured, g, green), select(textured, b, blue)
+    return red, green, blue
+
+
+@inlined
 def is_cut_out(s: Surfaces, triangle: int, u: Real, v: Real) -> bool:
     """Whether the alpha mask of a triangle removes the point (u, v)."""
     m = s.material[triangle]

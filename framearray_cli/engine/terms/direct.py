@@ -13,7 +13,7 @@ from framearray_cli.base.arrays import Float32, Real, Triple
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude, room_in
 from ..hits.hits import Hits, lift, ray_origin, reflects, reflects_in_lanes, triple
 from ..hits.rays import NO_RAYS, Rays
-from ..inputs.lights import DIRECTIONAL, LightArrays
+from ..inputs.lights import DIRECTIONAL, MESH, LightArrays
 from ..inputs.maps import map_texel, map_tint
 from ..inputs.shapes import source_at, source_in_lanes, source_point, vector_and_factor
 from ..kernels.kernel import has_rows, index, inlined, kernel, step
@@ -32,11 +32,8 @@ from ..kernels.simd import (
     store_row,
     triples_at,
 )
+from .direct_meshes import FAR_END, FROM, REACH, TO, add_emitters
 
-# A shadow ray ends at this fraction of the distance to the light: a surface that the light lies on must not hide it.
-FAR_END = np.float32(1.0 - 1e-4)
-# Rows of queued rays: origin, vector to the light, length in units of that vector.
-FROM, TO, REACH = 0, 3, 6
 # With at most this many light positions a step takes sixteen hits, even those that lie apart.
 FEW_LIGHTS = 8
 
@@ -173,6 +170,8 @@ def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, ray
         up = (e * g[0], e * g[1], e * g[2])
         key = load(hits.key, i)
         for s in range(lights.kind.shape[0]):
+            if lights.kind[s] == MESH:
+                continue
             q = source_point(lights, key, s)
             texel = map_texel(lights.maps, s, key)
             for l in range(n_lights):
@@ -213,6 +212,8 @@ def _direct_by_lights(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, r
         if not reflects(hits, i):
             continue
         for s in range(lights.kind.shape[0]):
+            if lights.kind[s] == MESH:
+                continue
             texel = map_texel(lights.maps, s, hits.key[i])
             start = _RayStart(ray_origin(hits, i), lift(hits, i), i * channels * n_lights, texel)
             for l in range(0, n_lights, LANES):
@@ -249,6 +250,7 @@ def direct(
         for channel in range(channels):
             for l in range(n_lights):
                 irradiance[i, channel, l] = 0.0
+    total: int = add_emitters(hits, n, lights.kind, lights.strength, lights.emitters, tracer, rays, irradiance)
     if neighbours or n_lights <= FEW_LIGHTS:
-        return _direct_by_hits(hits, n, lights, tracer, rays, irradiance)
-    return _direct_by_lights(hits, n, lights, tracer, rays, irradiance)
+        return total + _direct_by_hits(hits, n, lights, tracer, rays, irradiance)
+    return total + _direct_by_lights(hits, n, lights, tracer, rays, irradiance)

@@ -18,11 +18,12 @@ from framearray_cli.base.arrays import Float32, Int32
 from ..embree.packets import Tracer, is_blocked, occlude, room_in, set_ray
 from ..hits.hits import Hits, lift, ray_origin, reflects
 from ..hits.rays import NO_RAYS, Rays
-from ..inputs.lights import DIRECTIONAL, LightArrays
+from ..inputs.lights import DIRECTIONAL, MESH, LightArrays
 from ..inputs.maps import map_texel, map_tint
 from ..inputs.random import STEPS, mix, random_word
 from ..kernels.kernel import inlined, kernel, step
-from .direct import FAR_END, TO, vector_to_source, write_geometry
+from .direct import vector_to_source, write_geometry
+from .direct_meshes import FAR_END, TO, add_emitters
 
 # Hits per block: enough to fill packets in the later rounds, which have fewer rays.
 BLOCK_HITS = 128
@@ -33,7 +34,7 @@ class StepTests(NamedTuple):
 
     Attributes:
         factor: (BLOCK_HITS, n_lights) geometry factor of the irradiance, 0 where the source is not in front.
-        visible: (BLOCK_HITS, n_lights) visibility of the source: 0 or 1, or beyond where `unbiased` corrected it.
+        visible: (BLOCK_HITS, n_lights) visibility of the source: 0, 1, or beyond where `unbiased` corrected it.
         intervals: (2, n, 2) first and last test of intervals whose ends differ: those of this round, of the next.
         checks: (n, 2) tests of agreed intervals, and the number of positions that each represents.
         in_front: (BLOCK_HITS,) number of positions in front of each hit.
@@ -259,16 +260,9 @@ def _check_agreed(
 
 @kernel
 def direct_by_steps(
-    hits: Hits,
-    n: int,
-    lights: LightArrays,
-    step: int,
-    unbiased: bool,
-    tracer: Tracer,
-    rays: Rays,
-    tests: StepTests,
+    hits: Hits, n: int, lights: LightArrays, step: int, unbiased: bool, tracer: Tracer, rays: Rays, tests: StepTests,
     irradiance: Float32,
-) -> int:
+) -> int:  # fmt: skip
     """Compute the irradiance E_direct of each light position at hits 0 to n - 1, with shadow rays to some positions.
 
     Args:
@@ -279,12 +273,13 @@ def direct_by_steps(
     Returns:
         number of shadow rays.
     """
-    channels, n_lights = irradiance.shape[1], irradiance.shape[2]
-    total = 0  # rays traced
+    total, channels, n_lights = 0, irradiance.shape[1], irradiance.shape[2]  # total: rays traced
     for first in range(0, n, BLOCK_HITS):
         size = min(BLOCK_HITS, n - first)
+        irradiance[first : first + size] = 0.0
         for s in range(lights.kind.shape[0]):
-            # visibility of source s at every light position
+            if lights.kind[s] == MESH:
+                continue
             total += _test_steps(hits, first, size, lights, s, step, tracer, rays, tests)
             n_intervals, n_checks = _compare_tests(hits, first, size, step, unbiased, tests)
             total += _bisect(hits, first, n_intervals, lights, s, tracer, rays, tests)
@@ -294,7 +289,7 @@ def direct_by_steps(
                 for channel in range(channels):
                     tint = map_tint(lights.maps, s, map_texel(lights.maps, s, hits.key[first + b]), channel)
                     for l in range(n_lights):
-                        sum_so_far = irradiance[first + b, channel, l] if s > 0 else np.float32(0.0)
                         seen = tests.factor[b, l] * tests.visible[b, l]
-                        irradiance[first + b, channel, l] = sum_so_far + seen * (lights.strength[s, channel, l] * tint)
-    return total
+                        irradiance[first + b, channel, l] += seen * (lights.strength[s, channel, l] * tint)
+    meshes: int = add_emitters(hits, n, lights.kind, lights.strength, lights.emitters, tracer, rays, irradiance)
+    return total + meshes

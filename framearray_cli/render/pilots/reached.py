@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.inputs.lights import DIRECTIONAL
+from framearray_cli.engine.inputs.lights import DIRECTIONAL, MESH
 
 from ..prepare import Prepared
 from .positions import lights_text
@@ -81,13 +81,16 @@ def _name(prepared: Prepared, s: int) -> str:
 
 def _is_buried(setup: FrameSetup, prepared: Prepared, s: int, plane: int) -> bool:
     position = np.asarray(setup.lights.vector[s, :, plane])
-    return bool(setup.lights.kind[s] != DIRECTIONAL) and is_inside_solid(setup, prepared.scene, position)
+    return bool(setup.lights.kind[s] not in (DIRECTIONAL, MESH)) and is_inside_solid(setup, prepared.scene, position)
 
 
 def _reason(setup: FrameSetup, prepared: Prepared, s: int, plane: int) -> str:
     """Say why a source lights nothing, and the remedy."""
     values = prepared.lights.sources[s].vector[plane]
     low, high = bounds(prepared)
+    if (emitter := prepared.lights.sources[s].emitter) is not None:
+        sides = "" if emitter.two_sided else ", or it shines the other way; try two_sided = true"
+        return f'surfaces hide the material "{emitter.material}" from all that is seen{sides}'
     if setup.lights.kind[s] == DIRECTIONAL:
         axis = 2 if prepared.job.scene.up == "z" else 1
         if values[axis] > 0:

@@ -12,7 +12,7 @@ from framearray_cli.engine.frames.mirror_paths import mirror_paths
 from framearray_cli.engine.frames.records import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY, HitRecords
 from framearray_cli.engine.frames.scratch import Scratch
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.shading import estimate_terms
+from framearray_cli.engine.frames.shading import estimate_terms, find_emission
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.hits import SURFACE, Hits
 from framearray_cli.engine.hits.native import Samples, native_hits
@@ -121,6 +121,7 @@ def _one_source(lights: LightArrays, s: int) -> LightArrays:
         panel=_with_room(lights.panel[one]),
         profiles=Profiles(_with_room(frame[one]), grid[one].copy(), table),
         maps=lights.maps._replace(grid=lights.maps.grid[one].copy(), inverse=lights.maps.inverse[one].copy()),
+        emitters=lights.emitters._replace(span=lights.emitters.span[one], back=lights.emitters.back[one]),
     )
 
 
@@ -151,6 +152,7 @@ class _Look:
         n = setup.n_pixels
         samples = Samples(setup.seed, setup.order, 1, 0, False)
         native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, hits)
+        find_emission(setup, scratch, 0, n)
         surface = hits.kind[:n] == SURFACE
         back = surface & from_behind(self._scene, met_triangles(setup.tracer, packets, n), hits.incoming[:n])
         distance = np.linalg.norm(hits.position[:n] - setup.cams.position[c], axis=1)
@@ -189,6 +191,10 @@ class _Look:
         rgb = {at: records.row[:, None, at : at + 3] for at in (LIGHT_INDEPENDENT, INDIRECT, REFLECTIVITY)}
         by_plane = records.light * self._setup.lights.colour / np.float32(np.pi)
         together = np.stack([by_plane[:, list(planes)].sum(axis=1) for planes in self._positions.together], axis=1)
+        if self._setup.shines:
+            by_plane = records.own_light(self._setup.lights.strength, self._setup.lights.colour)
+            own = np.stack([by_plane[:, list(planes)].sum(axis=1) for planes in self._positions.together], axis=1)
+            rgb[LIGHT_INDEPENDENT] = rgb[LIGHT_INDEPENDENT] + own
         radiance: Float32 = rgb[LIGHT_INDEPENDENT] + rgb[REFLECTIVITY] * together
         if self._setup.cells is None:
             radiance += rgb[INDIRECT] * self._ambient.astype(np.float32)

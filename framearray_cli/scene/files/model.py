@@ -1,7 +1,7 @@
 """What every reader of scene files returns: parts, materials, textures and notes, in the file's own coordinates."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from framearray_cli.base.arrays import Bytes, Float32, Float64
 from framearray_cli.base.units import counted
@@ -20,6 +20,8 @@ class Material:
         specular: mirror part, linear RGB in [0, 1].
         texture: base colour texture; multiplies `reflectivity`.
         specular_texture: multiplies `specular`.
+        emission: radiance of what the surface emits, linear RGB; as the file gives it.
+        emission_texture: multiplies `emission`.
         alpha: opacity factor, multiplied with the alpha of `alpha_texture`.
         alpha_cutoff: a point is absent where alpha is below it; 0 for an opaque material.
         left_out: why its triangles are left out ("transmissive", "cut out"), or "".
@@ -30,10 +32,22 @@ class Material:
     specular: tuple[float, float, float] = (0.0, 0.0, 0.0)
     texture: int = -1
     specular_texture: int = -1
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    emission_texture: int = -1
     alpha: float = 1.0
     alpha_texture: int = -1
     alpha_cutoff: float = 0.0
     left_out: str = ""
+
+    @property
+    def textured(self) -> bool:
+        """Whether it needs texture coordinates."""
+        return max(self.texture, self.specular_texture, self.alpha_texture, self.emission_texture) >= 0
+
+    def without_textures(self) -> "Material":
+        """Return the material for meshes without texture coordinates."""
+        bare = replace(self, texture=-1, specular_texture=-1, emission_texture=-1)
+        return replace(bare, alpha_texture=-1, alpha_cutoff=0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

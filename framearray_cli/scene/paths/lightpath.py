@@ -10,6 +10,22 @@ from .panels import Panel
 from .panorama import Environment
 from .profiles import Profile
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Emitter:
+    """The surfaces of a material that shine.
+
+    Attributes:
+        flat: whether the source has the same radiance everywhere, in place of the emission of the scene file.
+        absolute: whether the intensity of the source is radiance; else it multiplies the emission of the scene file.
+    """
+
+    material: str
+    two_sided: bool
+    flat: bool
+    absolute: bool
+
+
 # What the manifest calls the vector, the strength and the size of a source, by its kind.
 _MANIFEST_KEYS = {"point": ("position", "intensity", "radius"), "directional": ("direction", "irradiance", "angle")}
 
@@ -32,10 +48,10 @@ class LightPath:
     """One source at every light position l; in `Lights`, at every image plane.
 
     Attributes:
-        kind: "point" or "directional".
-        vector: (n, 3) position in scene units, or unit direction in which the light travels.
+        kind: "point", "directional" or "mesh".
+        vector: (n, 3) position in scene units, or unit direction in which the light travels; zeros of a mesh.
         intensity: (n, 3) linear RGB, times the source's colour: W/sr of a point, of a panel along its
-            normal; W/m2 of a directional source.
+            normal; W/m2 of a directional source; W/(m2 sr) of a mesh, see `Emitter`.
         size: (n,) radius of a point source, scene units, or the angle under which a directional one is seen, degrees;
             None of sources without size.
         cone: of a spot, which is a point with a cone.
@@ -43,11 +59,12 @@ class LightPath:
         profile: of a point whose light was measured; `intensity` is then its largest.
         environment: of a map all around, which is a directional source whose `vector` is the way that the light of the
             middle of the map travels; `intensity` is then its radiance, integrated over all directions.
+        emitter: of a mesh.
         notes: n tables with what else the manifest records of each position; or none.
         visible: whether eyes see its shape.
     """
 
-    kind: Literal["point", "directional"]
+    kind: Literal["point", "directional", "mesh"]
     vector: Float64
     intensity: Float64
     size: Float64 | None = None
@@ -55,6 +72,7 @@ class LightPath:
     panel: Panel | None = None
     profile: Profile | None = None
     environment: Environment | None = None
+    emitter: Emitter | None = None
     notes: tuple[dict[str, Any], ...] = ()
     visible: bool = False
 
@@ -68,6 +86,13 @@ class LightPath:
         """Describe the source at position l as the manifest does."""
         if self.environment is not None:
             return self.environment.table(l)
+        if self.emitter is not None:
+            return {
+                "type": "mesh",
+                "material": self.emitter.material,
+                "radiance": self.intensity[l].tolist(),
+                "two_sided": self.emitter.two_sided,
+            }
         vector, strength, size = _MANIFEST_KEYS[self.kind]
         values = {"type": self.kind, vector: self.vector[l].tolist(), strength: self.intensity[l].tolist()}
         values |= {} if self.size is None else {size: float(self.size[l])}

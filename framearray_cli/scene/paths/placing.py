@@ -11,6 +11,7 @@ from framearray_cli.base.errors import JobError
 from framearray_cli.job.environment import EnvironmentSource
 from framearray_cli.job.job import Job
 from framearray_cli.job.light import LightTable
+from framearray_cli.job.mesh import MeshSource
 from framearray_cli.job.panel import DiscSource, PanelKey, RectKey, RectSource
 from framearray_cli.job.placed import DirectionalKey, PointKey, PointSource
 from framearray_cli.job.rowsource import PlacedLamp, PlacedSource
@@ -24,6 +25,7 @@ from .directions import PARALLEL, interpolate_directions, unit
 from .domes import dome_directions, grid_points
 from .environments import place_environment
 from .lightpath import Cone as Cone
+from .lightpath import Emitter
 from .lightpath import LightPath as LightPath
 from .measured import add_profile
 from .panels import Panel, across_under, carry_across
@@ -65,6 +67,8 @@ def _place(source: LightSource, job: Job, i: int, n: int, world_from_camera: Flo
             return in_units(_place_spot(source, job, f"light.sources[{i}]", n, world_from_camera), source)
         case EnvironmentSource():
             return place_environment(source, job, f"light.sources[{i}]", n)
+        case MeshSource():
+            return in_units(_place_mesh(source, n), source)
         case RectSource() | DiscSource():
             return in_units(_place_panel(source, job, f"light.sources[{i}]", n, world_from_camera), source)
         case _:
@@ -153,6 +157,17 @@ def _ups(keys: Sequence[PointKey | RectKey], n: int) -> Float64:
     if keys[0].up is None:
         return np.empty((0, 3))
     return interpolate_directions([key.frame for key in keys], [key.up for key in keys if key.up], n)
+
+
+def _place_mesh(source: MeshSource, n: int) -> LightPath:
+    """Interpolate the strength of a material that shines; the scene says where it is."""
+    frames, white = [key.frame for key in source.keys] or [0], (1.0, 1.0, 1.0)
+    strengths = [key.radiance or key.intensity or white for key in source.keys] or [white]
+    colours = [key.color if key.color is not None else white for key in source.keys] or [white]
+    own = source.has_radiance
+    emitter = Emitter(material=source.material, two_sided=source.two_sided, flat=own, absolute=own)
+    intensity = interpolate_keys(frames, strengths, n) * interpolate_keys(frames, colours, n)
+    return LightPath(kind="mesh", vector=np.zeros((n, 3)), intensity=intensity, emitter=emitter)
 
 
 def _axes(keys: Sequence[SpotKey | PanelKey], position: Float64, job: Job, name: str, what: str) -> Float64:

@@ -6,6 +6,7 @@ from typing import TypeAlias
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
+from framearray_cli.job.mesh import MeshSource
 from framearray_cli.job.panel import DiscSource, RectSource
 from framearray_cli.job.placed import DirectionalSource, PointSource
 from framearray_cli.job.sources import SunSource
@@ -17,7 +18,9 @@ AnyPanel: TypeAlias = RectSource | DiscSource
 LUMENS_PER_WATT = 683.0  # of light of 555 nm, by the definition of the candela; renderers take it for all light
 
 
-def in_units(path: LightPath, source: PointSource | DirectionalSource | SpotSource | SunSource | AnyPanel) -> LightPath:
+def in_units(
+    path: LightPath, source: PointSource | DirectionalSource | SpotSource | SunSource | AnyPanel | MeshSource
+) -> LightPath:
     """Turn the strengths of a source from the units of its job into W/sr or W/m2.
 
     Lumens are those of all light that the lamp sends out: its intensity in candela is their number over the solid

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support import tiny
 from support.irradiance import FAR, N, P, arrays, hits_at, lit
+from support.panels import lambert
 
 from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
@@ -49,28 +50,6 @@ def outline(source: LightPath, l: int, parts: int = 4000) -> Any:
     turn = 2 * np.pi * np.arange(parts) / parts
     wider = np.sqrt(2 * np.pi / parts / np.sin(2 * np.pi / parts))
     return middle + wider * (np.cos(turn)[:, None] * a + np.sin(turn)[:, None] * b)
-
-
-def lambert(corners: Any) -> float:
-    """Irradiance of a floor at the origin by a polygon of radiance 1 above it, by Lambert's formula (1760).
-
-    Half the sum over edges of the angle under which the edge is seen, times the height of the unit normal of the plane
-    through it and the origin.
-    """
-    below = corners[:, 1] < 0  # cut the polygon at the horizon
-    kept: list[Any] = []
-    for v, w, v_below, w_below in zip(corners, np.roll(corners, -1, 0), below, np.roll(below, -1), strict=True):
-        kept += [] if v_below else [v]
-        kept += [v + (w - v) * v[1] / (v[1] - w[1])] if v_below != w_below else []
-    if not kept:
-        return 0.0
-    v = np.array(kept)
-    w = np.roll(v, -1, 0)
-    across = np.cross(v, w)
-    sine = np.linalg.norm(across, axis=1)
-    angle = np.arctan2(sine, (v * w).sum(axis=1))
-    heights = np.divide(across[:, 1], sine, out=np.zeros_like(sine), where=sine > 0)
-    return abs(float((angle * heights).sum())) / 2
 
 
 def test_lamberts_formula_has_known_values() -> None:

@@ -1,0 +1,139 @@
+"""Direct light of surfaces that shine: one shadow ray per hit and mesh, which serves all light positions.
+
+The point that a hit draws does not move, and neither does what hides it: under each light position the same light
+arrives, times the strength of the mesh.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from framearray_cli.base.arrays import Float32, Int32
+
+from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude, room_in
+from ..hits.hits import Hits, reflects_in_lanes
+from ..hits.rays import NO_RAYS, Rays
+from ..inputs.emitters import Emitters, emitted_colour, emitter_point, emitter_sample
+from ..inputs.lights import MESH
+from ..kernels.kernel import index, inlined, step
+from ..kernels.optional import chosen_by_type, step_or_zero
+from ..kernels.simd import (
+    LANES,
+    append,
+    bits,
+    ctz,
+    lane_numbers,
+    load,
+    load_row,
+    popcount,
+    store_row,
+    triples_at,
+)
+
+# A shadow ray ends at this fraction of the distance to the light: a surface that the light lies on must not hide it.
+FAR_END = np.float32(1.0 - 1e-4)
+# Rows of queued rays: origin, vector to the light, length in units of that vector.
+FROM, TO, REACH = 0, 3, 6
+
+
+@inlined
+def _shines(kind: Int32, strength: Float32, s: int) -> bool:
+    """Whether source s is a mesh that shines at any light position."""
+    if kind[s] != MESH:
+        return False
+    for channel in range(strength.shape[1]):
+        for l in range(strength.shape[2]):
+            if strength[s, channel, l] > 0.0:
+                return True
+    return False
+
+
+@step
+def _trace_meshes(tracer: Tracer, rays: Rays, n: int, strength: Float32, irradiance: Float32) -> None:
+    """Trace the n queued shadow rays, and add the light of those that nothing blocks, at all light positions."""
+    room = rays.row.shape[1]
+    for first in range(0, n, LANES):
+        for axis in range(3):
+            store_row(rays.packets, first, ORIGIN + axis, load(rays.row, (FROM + axis) * room + first))
+            store_row(rays.packets, first, DIRECTION + axis, load(rays.row, (TO + axis) * room + first))
+        store_row(rays.packets, first, TFAR, FAR_END)
+    occlude(tracer, rays.packets, n, True)
+    n_sources, channels, n_lights = strength.shape
+    for first in range(0, n, LANES):
+        arrived = bits(~(load_row(rays.packets, first, TFAR) < np.float32(0.0)))
+        while arrived != 0:
+            ray = first + ctz(arrived)
+            arrived &= arrived - 1
+            place = rays.place[index(ray)]
+            hit, s = place // n_sources, place % n_sources
+            for channel in range(channels):
+                carried = rays.value[channel, index(ray)]
+                for l in range(n_lights):
+                    irradiance[index(hit), channel, l] += carried * strength[index(s), channel, l]
+
+
+@step
+def light_of_meshes(
+    hits: Hits, n: int, kind: Int32, strength: Float32, emitters: Emitters, tracer: Tracer, rays: Rays,
+    irradiance: Float32,
+) -> int:  # fmt: skip
+    """Add the irradiance of all meshes that shine at hits 0 to n - 1; hits that reflect nothing get none.
+
+    Args:
+        kind, strength: of `LightArrays`.
+        rays: scratch; the kernel traces as many rays together as it holds.
+        irradiance: (n, channels, n_lights).
+
+    Returns:
+        number of shadow rays.
+    """
+    capacity, row, room, n_sources = room_in(rays.packets), rays.row, rays.row.shape[1], kind.shape[0]
+    channels = strength.shape[1]
+    # Loop state
+    waiting = NO_RAYS  # rays in the queue
+    total = NO_RAYS  #   rays traced
+    for i in range(0, n, LANES):
+        # points P, their normals, and the offset from P to where rays start
+        at, wanted = lane_numbers() + np.int32(i), reflects_in_lanes(hits, i, n)
+        p, g, m = triples_at(hits.position, i), triples_at(hits.geometric, i), triples_at(hits.shading, i)
+        e, key = load(hits.offset, i), load(hits.key, i)
+        up = (e * g[0], e * g[1], e * g[2])
+        for s in range(n_sources):
+            if not _shines(kind, strength, s):
+                continue
+            if waiting > capacity - LANES:
+                _trace_meshes(tracer, rays, waiting, strength, irradiance)
+                total, waiting = total + waiting, 0
+            # the points y that the hits draw
+            drawn = emitter_point(emitters, key, s)
+            x, y, z, factor = emitter_sample(emitters, s, drawn, p, g, m)
+            traced = wanted & (factor > np.float32(0.0))
+            if bits(traced) == 0:
+                continue
+            # rays to them
+            to = (x, y, z)
+            for axis in range(3):
+                append(traced, p[axis] + up[axis], row, (FROM + axis) * room + waiting)
+                append(traced, to[axis] - up[axis], row, (TO + axis) * room + waiting)
+            append(traced, at * np.int32(n_sources) + np.int32(s), rays.place, waiting)
+            # and the light that they carry per strength
+            if channels == 1:
+                append(traced, factor, rays.value, waiting)
+            else:
+                colour = emitted_colour(emitters, drawn)
+                for channel in range(3):
+                    append(traced, factor * colour[channel], rays.value, channel * rays.value.shape[1] + waiting)
+            waiting += popcount(traced)
+    _trace_meshes(tracer, rays, waiting, strength, irradiance)
+    return total + waiting
+
+
+def _add_emitters_of(
+    typingctx: Any, hits: Any, n: Any, kind: Any, strength: Any, emitters: Any, tracer: Any, rays: Any, irradiance: Any
+) -> Any:
+    """`light_of_meshes`, or 0 where no mesh shines."""
+    given = (hits, n, kind, strength, emitters, tracer, rays, irradiance)
+    return step_or_zero(typingctx, light_of_meshes, given, emitters[0])
+
+
+add_emitters: Any = chosen_by_type(_add_emitters_of)

@@ -1,0 +1,160 @@
+"""Meshes that shine: one random point per hit, by area times brightness, on average the light of the whole mesh."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+from support.irradiance import FAR, N, P, hits_at
+from support.panels import lambert
+
+from framearray_cli.engine.embree import EmbreeScene
+from framearray_cli.engine.hits.rays import room_for_tests
+from framearray_cli.engine.inputs.emitters import NONE, emitters
+from framearray_cli.engine.inputs.lights import LightArrays, light_arrays, some_lights
+from framearray_cli.engine.terms.direct import direct
+from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
+from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.paths.lightpath import Emitter, LightPath
+from framearray_cli.scene.paths.paths import lights_without_groups
+from framearray_cli.scene.scene import Scene, build_scene
+
+QUAD = np.array([(-0.6, 1.5, -0.3), (0.6, 1.5, -0.3), (0.6, 1.5, 0.3), (-0.6, 1.5, 0.3)])  # above P, its front down
+WALLS = tiny.box((-4, -1, -4), (4, 5, 4))
+
+
+def scene_with(lamp: Any, *, hides: Any = FAR, textures: Any = (), **more: Any) -> Scene:
+    """A scene of two materials, "rest" and "lamp"; `more` are arrays of `Part` of the lamp."""
+    material = Material(name="lamp", emission=(1.0, 1.0, 1.0), emission_texture=0 if len(textures) else -1)
+    parts = (Part(material=0, corners=np.asarray(hides, float)), Part(material=1, corners=lamp, **more))
+    meshes = Meshes(
+        parts=parts, materials=(Material(name="rest"), material), textures=tuple(textures), dropped={}, notes=()
+    )
+    return build_scene(meshes, {})
+
+
+def mesh(intensity: Any = ((1.0,) * 3,), *, two_sided: bool = True) -> LightPath:
+    emitter = Emitter(material="lamp", two_sided=two_sided, flat=False, absolute=True)
+    return LightPath(
+        kind="mesh", vector=np.zeros((len(intensity), 3)), intensity=np.array(intensity, float), emitter=emitter
+    )
+
+
+def arrays(scene: Scene, *sources: LightPath) -> LightArrays:
+    lights = lights_without_groups(sources)
+    return light_arrays(lights, scene.centre, emitters(lights, scene))
+
+
+def lit(scene: Scene, lights: LightArrays, n: int = N, neighbours: bool = True, steps: bool = False) -> Any:
+    """Irradiance at P, (n, channels, n_lights) in float64."""
+    hits = hits_at(P - scene.centre, n)
+    out = np.full((n, lights.channels, lights.n_lights), np.nan, np.float32)
+    room = room_for_tests(4096, lights.n_lights)
+    with EmbreeScene(scene) as embree:
+        if steps:
+            tests = room_for_steps(lights.n_lights)
+            direct_by_steps(hits, n, lights, 2, False, embree.tracer, room, tests, out)
+        else:
+            direct(hits, n, lights, embree.tracer, room, out, neighbours)
+    return out.astype(np.float64)
+
+
+def check_mean(found: Any, expected: float) -> None:
+    """Within 3.5 standard errors, which are below 0.5 %."""
+    error = found.std() / np.sqrt(len(found))
+    assert abs(found.mean() - expected) <= 3.5 * error + 1e-5 * expected
+    assert error <= 0.005 * expected
+
+
+def test_a_quad_has_lamberts_light() -> None:
+    scene = scene_with(tiny.quad(*(QUAD + P)))
+    check_mean(lit(scene, arrays(scene, mesh()))[:, 0, 0], lambert(QUAD))
+
+
+def test_triangles_of_all_sizes_are_drawn_by_their_area() -> None:
+    """The quad cut into strips of 1, 1/2, 1/4, ... of what is left, and a second quad beside it."""
+    cuts = np.append(1 - 0.5 ** np.arange(9), 1.0)
+    edge = [QUAD[0] + t * (QUAD[1] - QUAD[0]) for t in cuts]
+    across = QUAD[3] - QUAD[0]
+    strips = [tiny.quad(a, b, b + across, a + across) for a, b in pairwise(edge)]
+    beside = np.add(QUAD, (1.5, 0.0, 0.2))
+    scene = scene_with(np.concatenate([*strips, tiny.quad(*beside)]) + P)
+    check_mean(lit(scene, arrays(scene, mesh()))[:, 0, 0], lambert(QUAD) + lambert(beside))
+
+
+def test_the_back_shines_only_if_both_sides_do() -> None:
+    for corners, front in ((QUAD, True), (QUAD[::-1], False)):
+        scene = scene_with(tiny.quad(*(corners + P)))
+        one_side = lit(scene, arrays(scene, mesh(two_sided=False)), 400)
+        both = lit(scene, arrays(scene, mesh()), 400)
+        np.testing.assert_array_equal(one_side, both if front else 0 * both)
+        assert both.mean() > 0
+
+
+def test_one_ray_serves_all_light_positions() -> None:
+    """Each has its strength times the same light; one without strength has none; without any there is no ray."""
+    scene = scene_with(tiny.quad(*(QUAD + P)))
+    lights = arrays(scene, mesh([(1, 1, 1), (3, 3, 3), (0, 0, 0)]))
+    found = lit(scene, lights, 300)
+    np.testing.assert_allclose(found[:, 0, 1], 3 * found[:, 0, 0], rtol=1e-6)
+    assert (found[:, 0, 2] == 0).all() and (found[:, 0, 0] > 0).all()
+    hits, room = hits_at(P - scene.centre, 300), room_for_tests(4096, 3)
+    out = np.empty((300, 1, 3), np.float32)
+    with EmbreeScene(scene) as embree:
+        assert direct(hits, 300, lights, embree.tracer, room, out, True) == 300
+        assert direct(hits, 300, some_lights(lights, [2]), embree.tracer, room, out[:, :, :1].copy(), True) == 0
+
+
+def test_what_stands_between_hides_half() -> None:
+    wall = tiny.box(np.add(P, (-5, 0.8, -5)), np.add(P, (0, 0.81, 5)))
+    scene = scene_with(tiny.quad(*(QUAD + P)), hides=np.concatenate([wall, FAR]))
+    check_mean(lit(scene, arrays(scene, mesh()), 2 * N)[:, 0, 0], lambert(QUAD) / 2)
+
+
+def test_the_same_bits_for_any_grouping_and_beside_other_sources() -> None:
+    scene = scene_with(tiny.quad(*(QUAD + P)), hides=np.concatenate([WALLS, FAR]))
+    strength = np.linspace(0.5, 2, 12)[:, None] * (1, 1, 1)
+    lamp = LightPath(kind="point", vector=np.tile(np.add(P, (1.0, 2.0, 0.0)), (12, 1)), intensity=strength)
+    together = arrays(scene, lamp, mesh(strength))
+    found = lit(scene, together, 200)
+    np.testing.assert_array_equal(lit(scene, together, 200, neighbours=False), found)
+    np.testing.assert_allclose(lit(scene, together, 200, steps=True), found, rtol=1e-5)
+    # streams have the numbers of sources, so the mesh is the second one here, too
+    dark = LightPath(kind="point", vector=lamp.vector, intensity=0 * strength)
+    alone, others = (lit(scene, arrays(scene, *pair), 200) for pair in ((dark, mesh(strength)), (lamp, dark)))
+    assert alone.mean() > 0 and others.mean() > 0
+    np.testing.assert_allclose(found, alone + others, rtol=1e-5)
+
+
+@pytest.mark.parametrize("size", [1, 4])
+def test_a_texture_colours_the_light(size: int) -> None:
+    """Texels of a quad, each a small quad of its own; the first is black and none is seen past the borders."""
+    texels = tiny.checks(size, seed=3)
+    if size > 1:
+        texels[0, 0, :3] = 0
+    texels = np.kron(texels, np.ones((16, 16, 1), np.uint8))  # so that blending at borders is of no account
+    uvs = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], float)
+    scene = scene_with(tiny.quad(*(QUAD + P)), textures=(texels,), uvs=uvs)
+    lights = arrays(scene, mesh())
+    assert lights.channels == 3
+    found = lit(scene, lights, 4 * N)[:, :, 0]
+    expected = np.zeros(3)
+    linear = np.where(texels / 255 <= 0.04045, texels / 255 / 12.92, ((texels / 255 + 0.055) / 1.055) ** 2.4)
+    right, up = QUAD[1] - QUAD[0], QUAD[3] - QUAD[0]
+    for j in range(size):
+        for i in range(size):
+            corner = QUAD[0] + right * i / size + up * (size - 1 - j) / size
+            part = [corner, corner + right / size, corner + (right + up) / size, corner + up / size]
+            expected += linear[16 * j, 16 * i, :3] * lambert(np.array(part))
+    for channel in range(3):
+        error = found[:, channel].std() / np.sqrt(len(found))
+        # the borders are blended over one texel of 16, which moves light by less than a hundredth of a part
+        assert abs(found[:, channel].mean() - expected[channel]) <= 3.5 * error + 1e-3 * expected[channel]
+
+
+def test_without_meshes_there_are_no_arrays() -> None:
+    scene = scene_with(tiny.quad(*(QUAD + P)))
+    lamp = LightPath(kind="point", vector=np.ones((2, 3)), intensity=np.ones((2, 3)))
+    assert emitters(lights_without_groups([lamp]), scene) is NONE
+    assert not NONE.coloured

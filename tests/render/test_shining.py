@@ -1,0 +1,147 @@
+"""Materials that sources let shine: what the scene file says of them, and messages."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+
+from framearray_cli.base.errors import JobError
+from framearray_cli.job.job import Job
+from framearray_cli.render.prepare import Prepared
+from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.scene import Scene, build_scene
+
+WALLS = tiny.box((-2, 0, -2), (2, 2.5, 2))
+LAMP = tiny.quad((-0.6, 2.2, -0.3), (0.6, 2.2, -0.3), (0.6, 2.2, 0.3), (-0.6, 2.2, 0.3))  # its front down
+SCREEN = tiny.quad((-0.8, 0.5, -1.9), (0.8, 0.5, -1.9), (0.8, 1.5, -1.9), (-0.8, 1.5, -1.9))
+MIRROR = tiny.quad((-1.9, 0.2, -1.5), (-1.9, 0.2, 1.5), (-1.9, 2.0, 1.5), (-1.9, 2.0, -1.5))
+MATERIALS = (
+    Material(name="Walls", reflectivity=(0.5, 0.5, 0.5)),
+    Material(name="Lamp", reflectivity=(0.0, 0.0, 0.0), emission=(3.0, 2.0, 1.0)),
+    Material(name="Screen", reflectivity=(0.2, 0.2, 0.2), emission=(1.0, 1.0, 1.0), emission_texture=0),
+    Material(name="Mirror", reflectivity=(0.0, 0.0, 0.0), specular=(0.9, 0.8, 0.7)),
+    Material(name="Unused", emission=(1.0, 1.0, 1.0)),
+)
+UVS = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], float)
+
+
+def room(lamp: Any = LAMP) -> Scene:
+    texels = np.kron(tiny.checks(2, seed=3), np.ones((16, 16, 1), np.uint8))
+    parts = (
+        Part(material=0, corners=WALLS),
+        Part(material=1, corners=lamp),
+        Part(material=2, corners=SCREEN, uvs=UVS),
+        Part(material=3, corners=MIRROR),
+    )
+    return build_scene(Meshes(parts=parts, materials=MATERIALS, textures=(texels,), dropped={}, notes=()), {})
+
+
+def mesh(material: str, *keys: dict[str, Any], **more: Any) -> dict[str, Any]:
+    return {"type": "mesh", "material": material, "keys": list(keys), **more}
+
+
+def inputs(*sources: dict[str, Any], scene: Scene | None = None, frames: int = 1, **more: Any) -> Prepared:
+    table = tiny.table(light={"frames": frames, "sources": list(sources)}, **more)
+    if "intensity" in table["ambient"]:
+        del table["ambient"]["paths"]
+    return tiny.prepared(Job.model_validate(table), scene or room())
+
+
+@pytest.mark.parametrize(
+    ("sources", "texts"),
+    [
+        ([mesh("Lmap"), mesh("Lamp", group="g", axis="b")],
+         ['light.sources[0].material: expected a material of the scene, got "Lmap"; it has Lamp, Walls, ']),
+        ([mesh("Unused")],
+         ['light.sources[0].material: expected a material that some triangle of the scene has, got "Unused"']),
+        ([mesh("Walls", {"frame": 0, "intensity": 3})],
+         ['light.sources[0].material: expected a material that emits light, got "Walls", whose emission in the scene']),
+        ([mesh("Lamp"), mesh("Lamp")],
+         ["light.sources[1].material: expected a material that no other source has, got that of light.sources[0]"]),
+    ],
+)  # fmt: skip
+def test_materials_that_cannot_shine(sources: list[dict[str, Any]], texts: list[str]) -> None:
+    with pytest.raises(JobError) as caught:
+        inputs(*sources)
+    assert len(caught.value.problems) == len(texts)
+    assert all(problem.startswith(text) for problem, text in zip(caught.value.problems, texts, strict=True))
+
+
+def test_particles_from_meshes_are_refused() -> None:
+    with pytest.raises(JobError, match=r'ambient\.method: expected "eye" or "fit"'):
+        inputs(mesh("Lamp"), ambient={"method": "light"})
+
+
+def test_the_emission_of_the_scene_is_multiplied() -> None:
+    found = inputs(mesh("Lamp", {"frame": 0, "intensity": 2.0, "color": [1, 1, 0]}), scene=room())
+    np.testing.assert_allclose(found.lights.sources[0].intensity, [[6, 4, 0]])
+    assert found.light_arrays.channels == 1
+    assert inputs(mesh("Screen")).light_arrays.channels == 3
+
+
+EYE = {"keys": [{"frame": 0, "eye": [0.2, 1.1, 1.7], "target": [0.0, 1.3, -1.9]}], "resolution": [48, 36]}
+
+
+def rendered(prepared: Prepared) -> Any:
+    """(n_lights, height, width, 3) of the only frame."""
+    return tiny.render_frames(prepared).images[0].astype(np.float64)
+
+
+def test_eyes_see_the_emission_under_each_light_position() -> None:
+    """Directly and by a mirror: where the lamp fills a pixel, its radiance, and that times the mirror's."""
+    keys = [{"frame": 0, "intensity": 1.0}, {"frame": 1, "intensity": 0.0}, {"frame": 2, "intensity": [0, 5, 0]}]
+    up = {"keys": [{"frame": 0, "eye": [0.2, 1.1, 1.7], "target": [0.0, 2.2, 0.0]}], "resolution": [48, 36]}
+    images = rendered(inputs(mesh("Lamp", *keys), frames=3, camera=up))
+    lamp = np.isclose(images[0], [3, 2, 1], rtol=1e-5).all(axis=-1)
+    assert lamp.sum() > 20
+    np.testing.assert_allclose(images[1][lamp], 0, atol=1e-6)
+    np.testing.assert_allclose(images[2][lamp], np.tile([0, 10, 0], (lamp.sum(), 1)), rtol=1e-5)
+    aside = {"keys": [{"frame": 0, "eye": [1.0, 1.1, 1.0], "target": [-1.9, 1.7, 0.4]}], "resolution": [96, 72]}
+    mirrored = rendered(inputs(mesh("Lamp", *keys), frames=3, camera=aside, specular={"depth": 2}))
+    seen = np.isclose(mirrored[0], [2.7, 1.6, 0.7], rtol=1e-5).all(axis=-1)
+    assert seen.sum() > 5
+    np.testing.assert_allclose(mirrored[2][seen], np.tile([0, 8, 0], (seen.sum(), 1)), rtol=1e-5)
+
+
+def test_a_texture_is_seen() -> None:
+    """Beside reflected light: the difference of two strengths is the texture, and what it lights elsewhere."""
+    images = rendered(inputs(mesh("Screen", {"frame": 0, "intensity": 1.0}), camera=EYE, samples={"hits": 64}))
+    plain = rendered(inputs(mesh("Screen", {"frame": 0, "radiance": 1.0}), camera=EYE, samples={"hits": 64}))
+    texels = tiny.checks(2, seed=3)[..., :3] / 255
+    linear = np.where(texels <= 0.04045, texels / 12.92, ((texels + 0.055) / 1.055) ** 2.4)
+    # centres of the quarters of the screen, 16 pixels above and below, by the plain one
+    bright = (plain[0] >= 1.0).all(axis=-1)
+    rows, columns = np.flatnonzero(bright.any(axis=1)), np.flatnonzero(bright.any(axis=0))
+    for j in range(2):
+        for i in range(2):
+            y, x = rows[(1 + 2 * j) * len(rows) // 4], columns[(1 + 2 * i) * len(columns) // 4]
+            # what it reflects is at most 0.2 of what the walls send back
+            assert (images[0, y, x] >= linear[j, i] * 0.999).all()
+            assert (images[0, y, x] <= linear[j, i] + 0.15).all()
+
+
+def test_a_quad_lights_as_a_rectangle_does() -> None:
+    """Pictures of a room under the same light: means agree within 3 standard errors of the difference."""
+    # the ceiling above sees no light of either
+    rect = {"frame": 0, "position": [0, 2.2, 0], "direction": [0, -1, 0], "radiance": [3, 2, 1]}
+    rect |= {"width": 1.2, "height": 0.6, "up": [0, 0, 1]}
+    look = {"keys": [{"frame": 0, "eye": [0.2, 1.1, 1.7], "target": [0.2, 0.4, -1.0]}], "resolution": [48, 36]}
+    more: dict[str, Any] = {"camera": look, "samples": {"hits": 32}, "ambient": {"intensity": 0.0}}
+    found = rendered(inputs(mesh("Lamp", {"frame": 0, "intensity": 1.0}, two_sided=False), **more))[0]
+    # the quad stays where it is, and is dark: it hides the same
+    expected = rendered(inputs({"type": "rect", "keys": [rect]}, **more))[0]
+    lamp = (expected == 0).all(axis=-1) | np.isclose(found, [3, 2, 1]).all(axis=-1)
+    difference = (found - expected)[~lamp]
+    error = difference.std(axis=0) / np.sqrt(len(difference))
+    assert expected[~lamp].mean() > 0.01 and len(difference) > 1000
+    assert (np.abs(difference.mean(axis=0)) <= 3 * error).all()
+    assert (error <= 0.01 * expected[~lamp].mean(axis=0)).all()
+
+
+def test_other_jobs_hold_nothing_of_it() -> None:
+    lamp = {"type": "point", "keys": [{"frame": 0, "position": [0, 1, 0], "intensity": 1.0}]}
+    with tiny.planned(inputs(lamp)) as (setup, _):
+        assert not setup.shines
+        assert setup.empty_records(5).emission.shape == (5, 0)
+        assert "emission" not in setup.empty_records(5).arrays
