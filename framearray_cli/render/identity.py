@@ -97,7 +97,7 @@ def job_fingerprint(prepared: Prepared, scene: str | None = None, table: dict[st
     table["scene"] = {key: value for key, value in table["scene"].items() if key not in ("file", "folders")}
     for section, key in metadata_of(table):
         table[section] = {**table[section], key: _DEFAULTS[section].model_fields[key].default}
-    files = [_file_digests(path) for path in prepared.lights.sources]
+    files = [_file_digests(path) for path in prepared.lights.sources if path.part_of is None]
     if any(files):  # what a file of a lamp or an environment says, not its name
         sources = [source | digests for source, digests in zip(table["light"]["sources"], files, strict=True)]
         table["light"] = table["light"] | {"sources": sources}

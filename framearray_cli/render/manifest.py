@@ -107,7 +107,7 @@ def _lights(
         ManifestLight(
             ambient=tuple(i_a[l].tolist()),
             ambient_error=tuple((i_a[l] * float(ambient.standard_error[l])).tolist()),
-            sources=tuple(source.table(l) for source in sources),
+            sources=tuple(source.table(l) for source in sources if source.part_of is None),
         )
         for l in positions
     )

@@ -13,6 +13,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Float64, Int32, Real, Rgb, Triple
 from framearray_cli.base.colour import LUMINANCE
 from framearray_cli.scene.paths.lightpath import LightPath
+from framearray_cli.scene.paths.panorama import SUNS, texel_powers
 
 from ..kernels.kernel import has_rows, inlined
 from ..kernels.simd import gather, integers, reals, select, sqrt
@@ -22,9 +23,6 @@ from .random import SOURCES, UNIT_24, r2, random_word
 # texels; first number of `angles`; first pixel, width and height of what eyes see.
 SLOT, MASK, TINT, WIDTH, HEIGHT, ANGLE, SEEN, SEEN_WIDTH, SEEN_HEIGHT = range(9)
 COLUMNS = 9
-MOST_ROWS = 1024  # of texels: a fifth of a degree; finer maps are averaged
-TOGETHER = 64  # rows that are averaged together, which takes less memory
-FEWEST_ROWS = 8  # so that angles within a texel are small
 WITHIN = (1 << 20) + (1 << 19)  # and what follows: streams of the places within texels of sources 0, 1, ...
 
 
@@ -67,27 +65,29 @@ def map_arrays(sources: tuple[LightPath, ...]) -> Maps:
     grid = np.zeros((len(sources), COLUMNS), np.int32)
     shares, others, tints, angles = [np.full(1, 2.0)], [np.zeros(1, np.int64)], [np.ones(3)], [np.zeros(2)]
     seen: list[Rgb] = []
-    known: dict[str, Any] = {}
+    known: dict[tuple[str, str], Any] = {}
     up, inverse = np.zeros(3), np.zeros(len(sources), np.float32)
     for s, source in enumerate(sources):
         if (environment := source.environment) is None:
             continue
-        panorama, up = environment.panorama, environment.up
-        if panorama.digest not in known:
-            texels = lit_texels(panorama.pixels)
+        panorama, part, up = environment.panorama, environment.part, environment.up
+        if (panorama.digest, part) not in known:
+            texels = panorama.part(part)
             height, width, _ = texels.shape
             share, other = alias_table(texel_powers(texels).ravel())
-            starts = (sum(map(len, each)) for each in (shares, tints, angles))
-            slot, tint, angle = starts
+            slot, tint, angle = (sum(map(len, each)) for each in (shares, tints, angles))
             places = (slot, len(share) - 1, tint // 3, width, height, angle)
-            known[panorama.digest] = (*places, sum(map(len, seen)), *panorama.pixels.shape[1::-1])
-            seen.append(panorama.pixels.reshape(-1, 3))
+            visible = panorama.pixels if part != SUNS else panorama.pixels[:0, :0]  # eyes see them with the rest
+            known[panorama.digest, part] = (*places, sum(map(len, seen)), *visible.shape[1::-1])
+            seen.append(visible.reshape(-1, 3))
             luminance = (texels @ LUMINANCE)[..., None]
             shares.append(share)
             others.append(other)
-            tints.append(np.divide(texels, luminance, out=np.zeros_like(texels), where=luminance > 0).ravel())
+            tints.append(
+                np.divide(texels, luminance, out=np.zeros_like(luminance * texels), where=luminance > 0).ravel()
+            )
             angles.append(_angles(width, height))
-        grid[s], inverse[s] = known[panorama.digest], 1 / panorama.flux
+        grid[s], inverse[s] = known[panorama.digest, part], 1 / environment.flux
     return Maps(
         grid,
         np.concatenate(shares).astype(np.float32),
@@ -98,37 +98,6 @@ def map_arrays(sources: tuple[LightPath, ...]) -> Maps:
         np.ascontiguousarray(np.concatenate(seen) if len(seen) > 1 else seen[0]),
         inverse,
     )
-
-
-def lit_texels(pixels: Float32) -> Float64:
-    """The texels by which a map shines, (rows, 2 rows, 3): those of the file, means of them, or repetitions."""
-    if len(pixels) > MOST_ROWS:
-        columns = np.arange(pixels.shape[1] + 1.0)
-        wanted = np.linspace(0, columns[-1], 2 * MOST_ROWS + 1)
-        parts = (pixels[k : k + TOGETHER].swapaxes(0, 1).astype(np.float64) for k in range(0, len(pixels), TOGETHER))
-        found = np.concatenate([_means(part, columns, wanted).swapaxes(0, 1) for part in parts])
-        edges = np.sin(np.linspace(np.pi / 2, -np.pi / 2, len(found) + 1))
-        found = _means(found, -edges, -np.sin(np.linspace(np.pi / 2, -np.pi / 2, MOST_ROWS + 1)))
-    else:
-        found = pixels.astype(np.float64)
-    times = -(-FEWEST_ROWS // len(found))
-    return np.ascontiguousarray(found.repeat(times, axis=0).repeat(times, axis=1))
-
-
-def _means(rows: Float64, edges: Float64, wanted: Float64) -> Float64:
-    """Means of rows that lie between rising edges over wider spans."""
-    width = np.diff(edges).reshape(-1, 1, 1)
-    sums = np.concatenate([np.zeros_like(rows[:1]), np.cumsum(rows * width, axis=0)])
-    at = np.clip(np.searchsorted(edges, wanted, side="right") - 1, 0, len(rows) - 1)
-    reached = sums[at] + (wanted - edges[at]).reshape(-1, 1, 1) * rows[at]
-    return np.asarray(np.maximum(np.diff(reached, axis=0), 0.0) / np.diff(wanted).reshape(-1, 1, 1))
-
-
-def texel_powers(texels: Float64) -> Float64:
-    """Luminance times solid angle of each texel, (rows, columns)."""
-    height, width, _ = texels.shape
-    sines = np.sin(np.linspace(np.pi / 2, -np.pi / 2, height + 1))
-    return np.asarray((texels @ LUMINANCE) * (sines[:-1] - sines[1:])[:, None] * (2 * np.pi / width))
 
 
 def alias_table(weights: Float64) -> tuple[Float64, Any]:

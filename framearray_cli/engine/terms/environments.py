@@ -11,7 +11,7 @@ from framearray_cli.base.arrays import Float32, Real, Triple
 from ..hits.hits import ESCAPED, Hits, triple
 from ..hits.rays import Rays
 from ..inputs.lights import LightArrays
-from ..inputs.maps import MASK, SEEN, SEEN_HEIGHT, SEEN_WIDTH, Maps
+from ..inputs.maps import SEEN, SEEN_HEIGHT, SEEN_WIDTH, Maps
 from ..inputs.profiles import angle_of
 from ..kernels.kernel import index, inlined, kernel
 from ..kernels.simd import LANES, floor, gather, integers, load, select, sqrt, store
@@ -41,7 +41,7 @@ def see_environments(hits: Hits, n: int, lights: LightArrays, first: int, rays: 
         for channel in range(3):
             hits.reflectivity[i, channel] = 1.0
         for s in range(lights.kind.shape[0]):
-            if lights.maps.grid[s, MASK] == 0:
+            if lights.maps.grid[s, SEEN_WIDTH] == 0:
                 continue
             for l in range(0, n_kept, LANES):
                 at = 3 * s * n_lights + first + l

@@ -30,6 +30,8 @@ def light_warnings(views: Views, setup: FrameSetup, prepared: Prepared) -> Itera
     for s in range(len(on)):
         if not on[s].any() or (reached[s] & on[s]).all():
             continue
+        if not joint and prepared.lights.sources[s].part_of is not None:  # the sky around a hidden sun may do
+            continue
         name = "every source" if joint else _name(prepared, s)
         dark = on[s] & ~reached[s]
         if not reached[s].any():
@@ -75,8 +77,10 @@ def _reached(views: Views) -> Flags:
 
 
 def _name(prepared: Prepared, s: int) -> str:
-    group = prepared.job.light.sources[s].group
-    return f"light.sources[{s}]" + (f' of group "{group}"' if group else "")
+    part_of = prepared.lights.sources[s].part_of
+    i = s if part_of is None else part_of
+    group = prepared.job.light.sources[i].group
+    return f"light.sources[{i}]" + (f' of group "{group}"' if group else "")
 
 
 def _is_buried(setup: FrameSetup, prepared: Prepared, s: int, plane: int) -> bool:

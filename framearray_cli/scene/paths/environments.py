@@ -1,5 +1,7 @@
 """Environments of a job -> their maps, turns and strengths at every light position."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from framearray_cli.base.errors import JobError, OutputError
@@ -8,7 +10,7 @@ from framearray_cli.job.job import Job
 
 from .curves import interpolate_keys
 from .lightpath import LightPath
-from .panorama import Environment, norths, read_panorama
+from .panorama import REST, SUNS, Environment, norths, read_panorama
 
 
 def place_environment(source: EnvironmentSource, job: Job, name: str, n: int) -> LightPath:
@@ -34,3 +36,16 @@ def place_environment(source: EnvironmentSource, job: Job, name: str, n: int) ->
         intensity=factor * panorama.flux,
         environment=environment,
     )
+
+
+def cut_suns(path: LightPath, i: int) -> tuple[LightPath, ...]:
+    """Divide source i into its map without suns and these, so that each hit sends a ray to both; or return it as it is.
+
+    Without that hits would draw the sky so rarely, and with so much weight, that it would be noise.
+    """
+    whole = path.environment
+    if whole is None or not whole.panorama.has_suns:
+        return (path,)
+    parts = [replace(whole, part=part) for part in (REST, SUNS)]
+    rest, suns = (replace(path, environment=one, intensity=path.intensity * (one.flux / whole.flux)) for one in parts)
+    return rest, replace(suns, part_of=i)

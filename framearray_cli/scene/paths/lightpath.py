@@ -60,6 +60,7 @@ class LightPath:
         environment: of a map all around, which is a directional source whose `vector` is the way that the light of the
             middle of the map travels; `intensity` is then its radiance, integrated over all directions.
         emitter: of a mesh.
+        part_of: the source whose suns it holds, cut from its map; None: it is a source of the job.
         notes: n tables with what else the manifest records of each position; or none.
         visible: whether eyes see its shape.
     """
@@ -73,6 +74,7 @@ class LightPath:
     profile: Profile | None = None
     environment: Environment | None = None
     emitter: Emitter | None = None
+    part_of: int | None = None
     notes: tuple[dict[str, Any], ...] = ()
     visible: bool = False
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Float64
+from framearray_cli.base.arrays import Flags, Float32, Float64
 from framearray_cli.base.colour import LUMINANCE
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.hashing import fingerprint
@@ -20,6 +20,13 @@ from framearray_cli.base.units import counted
 from framearray_cli.job.values import MOST_EMISSION
 
 LINEAR_MAPS = (".exr", ".hdr", ".tif", ".tiff")
+MOST_ROWS = 1024  # of texels: a fifth of a degree; finer maps are averaged
+TOGETHER = 64  # rows that are averaged together, which takes less memory
+FEWEST_ROWS = 8  # so that angles within a texel are small
+WHOLE, REST, SUNS = "whole", "rest", "suns"  # parts of a map
+# Texels are suns if they are so many times as bright as the mean of the map, and hold a share of its light within these
+# bounds: with less they are not worth a shadow ray, with more nothing is left beside them.
+BRIGHT, LEAST_SUNS, MOST_SUNS = 100.0, 0.05, 0.999
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -29,20 +36,39 @@ class Panorama:
     Attributes:
         file: name of its file.
         pixels: (h, 2 h, 3) radiance, finite and at least 0.
+        texels: (rows, 2 rows, 3) by which it shines; `is_sun`: those that may be a source of their own.
     """
 
     file: str
     pixels: Float32
     digest: str = field(init=False)
+    texels: Float32 = field(init=False)
+    is_sun: Flags = field(init=False)
 
     def __post_init__(self) -> None:
+        texels = lit_texels(self.pixels)
+        luminance, powers = texels @ LUMINANCE, texel_powers(texels)
+        is_sun = luminance > BRIGHT * powers.sum() / (4 * np.pi)
         object.__setattr__(self, "digest", fingerprint(np.ascontiguousarray(self.pixels).data))
+        object.__setattr__(self, "texels", texels)
+        object.__setattr__(self, "is_sun", is_sun)
 
     @property
     def flux(self) -> float:
         """Luminance integrated over all directions."""
-        rows = self.pixels.mean(axis=1, dtype=np.float64) @ LUMINANCE
-        return float(2 * np.pi * -np.diff(np.sin(np.linspace(np.pi / 2, -np.pi / 2, len(rows) + 1))) @ rows)
+        return float(texel_powers(self.texels).sum())
+
+    @property
+    def has_suns(self) -> bool:
+        """Whether a few texels hold much of the light, and not all of it."""
+        powers = texel_powers(self.texels)
+        return LEAST_SUNS < float(powers[self.is_sun].sum() / powers.sum()) < MOST_SUNS
+
+    def part(self, name: str) -> Float32:
+        """The texels of the suns or of the rest, black elsewhere; or all."""
+        if name == WHOLE:
+            return self.texels
+        return np.where(self.is_sun[..., None] == (name == SUNS), self.texels, np.float32(0.0))
 
     @property
     def is_grey(self) -> bool:
@@ -58,12 +84,19 @@ class Environment:
         rotation_deg: (n,) turn from north over east: clockwise, as seen from above.
         factor: (n, 3) of its radiance.
         up: (3,) unit, up in the scene.
+        part: of its texels that shine: WHOLE, SUNS or the REST.
     """
 
     panorama: Panorama
     rotation_deg: Float64
     factor: Float64
     up: Float64
+    part: str = WHOLE
+
+    @property
+    def flux(self) -> float:
+        """Luminance of the part, integrated over all directions."""
+        return float(texel_powers(self.panorama.part(self.part)).sum())
 
     def table(self, l: int) -> dict[str, Any]:
         """Describe the environment at position l as the manifest does."""
@@ -114,3 +147,34 @@ def norths(up: str, rotation_deg: Float64) -> Float64:
     turn, zero = np.radians(rotation_deg), np.zeros(len(rotation_deg))
     east, north = np.sin(turn), np.cos(turn)
     return np.stack([east, north, zero] if up == "z" else [east, zero, -north], axis=1)
+
+
+def lit_texels(pixels: Float32) -> Float32:
+    """The texels by which a map shines, (rows, 2 rows, 3): those of the file, means of them, or repetitions."""
+    if len(pixels) > MOST_ROWS:
+        columns = np.arange(pixels.shape[1] + 1.0)
+        wanted = np.linspace(0, columns[-1], 2 * MOST_ROWS + 1)
+        parts = (pixels[k : k + TOGETHER].swapaxes(0, 1).astype(np.float64) for k in range(0, len(pixels), TOGETHER))
+        found = np.concatenate([_means(part, columns, wanted).swapaxes(0, 1) for part in parts])
+        edges = np.sin(np.linspace(np.pi / 2, -np.pi / 2, len(found) + 1))
+        found = _means(found, -edges, -np.sin(np.linspace(np.pi / 2, -np.pi / 2, MOST_ROWS + 1)))
+    else:
+        found = pixels.astype(np.float64)
+    times = -(-FEWEST_ROWS // len(found))
+    return np.ascontiguousarray(found.repeat(times, axis=0).repeat(times, axis=1), np.float32)
+
+
+def _means(rows: Float64, edges: Float64, wanted: Float64) -> Float64:
+    """Means of rows that lie between rising edges over wider spans."""
+    width = np.diff(edges).reshape(-1, 1, 1)
+    sums = np.concatenate([np.zeros_like(rows[:1]), np.cumsum(rows * width, axis=0)])
+    at = np.clip(np.searchsorted(edges, wanted, side="right") - 1, 0, len(rows) - 1)
+    reached = sums[at] + (wanted - edges[at]).reshape(-1, 1, 1) * rows[at]
+    return np.asarray(np.maximum(np.diff(reached, axis=0), 0.0) / np.diff(wanted).reshape(-1, 1, 1))
+
+
+def texel_powers(texels: Float32) -> Float64:
+    """Luminance times solid angle of each texel, (rows, columns)."""
+    height, width, _ = texels.shape
+    sines = np.sin(np.linspace(np.pi / 2, -np.pi / 2, height + 1))
+    return np.asarray((texels @ LUMINANCE) * (sines[:-1] - sines[1:])[:, None] * (2 * np.pi / width))

@@ -12,6 +12,7 @@ from framearray_cli.job.job import Job
 
 from .curves import interpolate_keys
 from .directions import PARALLEL, interpolate_directions, unit
+from .environments import cut_suns
 from .placing import LightPath, in_camera_space, place_source
 from .planes import Plane, group_planes, picture_planes
 
@@ -129,7 +130,8 @@ def lights(job: Job) -> Lights:
     table = job.light
     turn = eyes(job).world_from_camera[0, :3, :3] if in_camera_space(table) else None
     if not table.groups:
-        return lights_without_groups([place_source(job, i, table.frames, turn) for i in range(len(table.sources))])
+        sources = [place_source(job, i, table.frames, turn) for i in range(len(table.sources))]
+        return _with_suns(lights_without_groups(sources))
     planes = group_planes(sum(group.n for group in table.groups), background=any(job.scene.background))
     groups, found, first = [], {}, 0
     for group in table.groups:
@@ -138,7 +140,22 @@ def lights(job: Job) -> Lights:
         for i in group.sources:
             found[i] = _confine(place_source(job, i, group.n, turn), positions, len(planes))
         first = positions.stop
-    return Lights(sources=tuple(found[i] for i in sorted(found)), groups=tuple(groups), planes=planes)
+    return _with_suns(Lights(sources=tuple(found[i] for i in sorted(found)), groups=tuple(groups), planes=planes))
+
+
+def _with_suns(found: Lights) -> Lights:
+    """Add the suns of environments behind all sources, as sources of the same groups."""
+    parts = [cut_suns(path, i) for i, path in enumerate(found.sources)]
+    suns = [path for _, *more in parts for path in more]
+    if not suns:
+        return found
+
+    def extended(group: LightGroup) -> LightGroup:
+        more = (len(parts) + k for k, path in enumerate(suns) if path.part_of in group.sources)
+        return replace(group, sources=(*group.sources, *more))
+
+    sources = (*(first for first, *_ in parts), *suns)
+    return replace(found, sources=sources, groups=tuple(map(extended, found.groups)))
 
 
 def _confine(path: LightPath, positions: range, n: int) -> LightPath:

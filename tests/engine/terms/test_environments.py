@@ -92,3 +92,20 @@ def test_mirrors_show_the_map(tmp_path: Path) -> None:
     images = tiny.render_frames(tiny.prepared(job, scene)).images[0]
     for l in range(len(TURNS)):
         np.testing.assert_allclose(images[l], np.broadcast_to([0.9, 0.8, 0.7 * 4 * (1 + l)], (3, 4, 3)), rtol=1e-4)
+
+
+def test_suns_are_seen_once(tmp_path: Path) -> None:
+    """With a sun that is a source of its own."""
+    pixels = np.full((32, 64, 3), 1.0, np.float32)
+    pixels[4:6, 10:12] = 500.0
+    scene = tiny.scene_of(tiny.box((0, 0, 8), (0.1, 0.1, 8.1)))
+    keys = [{"frame": 0, "eye": [0.0, 0.0, 0.0], "target": [-0.9, 1.6, 0.5]}]
+    job = job_with(tmp_path / "sky.exr", pixels, camera={"keys": keys, "fov": 100.0}, samples={"hits": 64})
+    inputs = tiny.prepared(job, scene)
+    assert len(inputs.lights.sources) == 2
+    image = tiny.render_frames(inputs).images[0, 0].reshape(-1, 3)
+    finer = job_with(tmp_path / "sky.exr", pixels, camera={"keys": keys, "fov": 100.0, "resolution": [240, 180]})
+    wanted = seen(pixels, ways(finer, scene), 0.0) * (1.0, 0.5, 1.0)
+    np.testing.assert_allclose(np.median(image, axis=0), [1.0, 0.5, 1.0], rtol=1e-4)
+    np.testing.assert_allclose(image.mean(axis=0), wanted.mean(axis=0), rtol=0.05)
+    assert wanted.mean() > 1.5  # 0.83 without the sun

@@ -13,7 +13,9 @@ from framearray_cli.base.openimage import oiio
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.job.job import Job
 from framearray_cli.render.identity import job_fingerprint
+from framearray_cli.render.preview import lights_of_preview
 from framearray_cli.scene.paths.lightpath import LightPath
+from framearray_cli.scene.paths.panorama import texel_powers
 from framearray_cli.scene.paths.paths import lights
 
 SKY = np.full((4, 8, 3), (0.5, 1.0, 2.0), np.float32)
@@ -113,3 +115,44 @@ def test_broken_files_are_refused_with_their_key(tmp_path: Path) -> None:
 def test_particles_from_environments_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="environments emit no particles"):
         job_of(tmp_path / "sky.exr", ambient={"method": "light"})
+
+
+def with_sun() -> Any:
+    """Three texels are 1,000 times as bright as the others."""
+    pixels = np.full((64, 128, 3), (0.5, 1.0, 2.0), np.float32)
+    pixels[20, 30:33] = 2000.0
+    return pixels
+
+
+def test_suns_become_sources_of_their_own(tmp_path: Path) -> None:
+    """They follow the sources of the job, belong to the same group, and the manifest keeps to one."""
+    file = save(tmp_path, with_sun())
+    sky = {"type": "environment", "file": str(file), "keys": [{"frame": 0}, {"frame": 1, "rotation": 90}]}
+    job = tiny.job(
+        light={"sources": [sky | {"group": "sky"}, tiny.RED | {"group": "lamp", "axis": "lamps"}]},
+        output={"format": "exr"},
+    )
+    found = lights(job)
+    rest, lamp, suns = found.sources
+    assert (rest.part_of, lamp.part_of, suns.part_of) == (None, None, 0)
+    assert [group.sources for group in found.groups] == [(0, 2), (1,)]
+    assert rest.environment is not None and suns.environment is not None
+    whole = texel_powers(with_sun())
+    assert suns.intensity[0] == pytest.approx([whole[20, 30:33].sum()] * 3, rel=1e-5)
+    assert rest.intensity[0] + suns.intensity[0] == pytest.approx([whole.sum()] * 3, rel=1e-5)
+    assert (suns.vector == rest.vector).all()
+    assert rest.table(1) == {"type": "environment", "file": "sky.exr", "rotation": 90.0, "intensity": [1.0, 1.0, 1.0]}
+    assert job_fingerprint(tiny.prepared(job), "scene")
+    previewed = lights_of_preview(found, {"light": 1, "lamps": 0})
+    assert [path.environment and path.environment.rotation_deg.tolist() for path in previewed.sources] == [
+        [90],
+        None,
+        [90],
+    ]
+
+
+def test_a_map_without_suns_or_with_nothing_else_stays_whole(tmp_path: Path) -> None:
+    only = np.zeros((64, 128, 3), np.float32)
+    only[20, 30] = 1.0
+    for pixels in (SKY, only):
+        assert len(lights(job_of(save(tmp_path, pixels))).sources) == 1
