@@ -10,13 +10,13 @@ from support import oracle_random as rnd
 from support.oracle import Oracle, reflect
 from support.oracle_scene import Model, Points, dot
 
-LEVELS, COARSEST, SHARE = 7, 4, 0.3  # levels, the coarsest that rays read, edge of cells per length of a ray
+LEVELS, COARSEST, SHARE = 7, 4, 0.15  # levels, the coarsest that rays read, edge of cells per length of a ray
 BITS = 19  # of a key per axis
 CELLS, CONTINUED = 5, 16  # dimensions of the random numbers that move points, and of those of where ray 0 ends
 MIRRORED = 1 << 17  # the dimension of what ray 0 chooses at mirrors
 LOCAL = 2  # the level that obscurances take their ambient light from
 STEPS = 4  # rays that follow one that was too short, at most
-MIXED = np.float32(0.2)  # short rays go on where this share of a cell's samples does not see its guard
+NEAR = 1.0  # rays shorter than this many edges of the finest cells go on
 GUARD_END = 1 - 1e-3  # a ray to a guard ends this share of its length before it
 
 
@@ -76,10 +76,9 @@ class CellMap:
             found = np.where((wanted <= level) & (found == 0), here, found)
         return found
 
-    def short(self, position: Any, normal: Any, length: Any, shift: Any) -> Any:
-        """Whether rays are shorter than the finest cells, and would read ones whose guard many samples do not see."""
-        found = self.first(position, normal, length, shift)
-        return (length < self.grid.edge) & (self.other[found] >= 0) & (self.guard[found, 4] >= MIXED)
+    def short(self, length: Any) -> Any:
+        """Whether rays are too short for the finest cells."""
+        return length < NEAR * self.grid.edge
 
 
 def tangents(normal: Any) -> tuple[Any, Any]:
@@ -161,7 +160,7 @@ class CellOracle(Oracle):
         where = points.position[met], points.geometric[met], distance[met], 0.0  # not shifted
         cell, short, r = np.full(len(dirs), -1), np.zeros(len(dirs), bool), np.zeros((len(dirs), 3))
         if len(met):
-            cell[met], short[met] = self.places.find(*where), self.places.short(*where) & (not last)
+            cell[met], short[met] = self.places.find(*where), self.places.short(distance[met]) & (not last)
             cell[short] = self.places.first(*where)[short[met]]
         r[met] = self.model.total(triangle[met], uv[met])
         r[triangle < 0] = 1

@@ -33,7 +33,7 @@ from .table import CONSTANT, MEAN, NOWHERE, TINT, Cells
 COLOUR, LEVEL, LIGHT = 0, 3, 4
 
 
-# Rays shorter than this share of the finest cells' edge read no doubtful cell.
+# Rays shorter than this many edges of the finest cells read no cell.
 NEAR = 1.0
 # What a hit reads is prefetched this many hits before.
 AHEAD = 2

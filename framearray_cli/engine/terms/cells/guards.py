@@ -10,8 +10,8 @@ from ...kernels.kernel import inlined, kernel
 
 # Height of guards and of the points that look for them, in edges of the cell: above the curvature of most surfaces.
 GUARD_HEIGHT = 0.15
-# Columns of guards: a point, its height above the surface, and the share of samples in the cell that do not see it.
-HEIGHT, UNSEEN, GUARD_COLUMNS = 3, 4, 5
+# Columns of guards: a point, and its height above the surface.
+HEIGHT, GUARD_COLUMNS = 3, 4
 # A ray to a guard ends at this fraction of the way.
 _FAR_END = np.float32(1.0 - 1e-3)
 

@@ -1,8 +1,7 @@
 """Where gather rays land: the cells that they read, and those among them that are too short for any cell.
 
-A ray that is shorter than a cell is wide meets a surface that may have little in common with the rest of its cell: the
-other side of a fold, or the inside of a crack. Where many samples of the cell do not see its guard, such rays are kept,
-see `near.py`.
+A short ray meets a surface that may have little in common with the rest of its cell: the other side of a fold, or the
+inside of a crack. Such rays are kept, see `near.py`.
 """
 
 from typing import NamedTuple
@@ -18,13 +17,11 @@ from ...inputs.random import CONTINUED, random_word
 from ...inputs.surfaces import Surfaces, geometric_normal, position_at, total_at
 from ...kernels.kernel import inlined, prefetch
 from ...kernels.simd import LANES, integers, load_row, select, store, width_of_packets
-from .guards import UNSEEN, choose_slots, write_guard_ray
+from .guards import choose_slots, write_guard_ray
 from .table import ALL, NOWHERE, TINT, Cells, cell_of_key, coarser_cell, first_slot, key_of, level_of, side_of
 
 # Rays that are kept together, of those traced together; the rest read cells.
 MOST_NEAR = 2048
-# Short rays are kept in cells whose guard this share of samples does not see.
-MIXED = np.float32(0.2)
 # Rays between those whose triangles are prefetched and those that are looked up; bytes of a triangle and of a slot.
 _AHEAD, _TRIANGLE_BYTES, _SLOT_BYTES = 2 * LANES, 36, 16
 
@@ -183,7 +180,7 @@ def find_cells(
     """Find the cells that traced rays 0 to n - 1 read, and R(Q); n_rays rows of 16 rays belong to the same hits.
 
     Args:
-        near: keeps rays shorter than `reach` in mixed cells, as many as fit; their cell is then `near_cell(k)`.
+        near: keeps rays shorter than `reach`, as many as fit; their cell is then `near_cell(k)`.
 
     Returns:
         number of rays kept.
@@ -211,19 +208,18 @@ def find_cells(
             if found == ALL:
                 found = coarser_cell(cells.grid, cells.slots, room.level[lane], room.side[lane], point)
             room.cell[first + lane] = found
-            if cells.other[found] == NOWHERE:
+            short = rays.value[0, first + lane] < reach and kept < near.place.shape[0]
+            if cells.other[found] == NOWHERE and not short:
                 continue
             # the ray as it was written, before rays were sorted by direction: its hit, and its number there
             written = rays.number[ORDER, first + lane]
             k, ray = written // (LANES * n_rays) * LANES + written % LANES, first_ray + written // LANES % n_rays
-            # the queue holds rays to the guards of doubtful cells
-            mixed = cells.guard[found, UNSEEN] >= MIXED
-            if mixed and rays.value[0, first + lane] < reach and kept < near.place.shape[0]:
+            if short:
                 near.hits.key[kept] = random_word(hits.key[rays.place[k]], CONTINUED + ray)
                 _keep_ray(rays, first + lane, found, near, kept)
                 room.cell[first + lane] = near_cell(kept)
                 kept += 1
-            else:
+            else:  # the queue holds rays to the guards of doubtful cells
                 write_guard_ray(cells.guard, found, point, normal, tests, waiting, first + lane)
                 waiting += 1
     choose_slots(tracer, tests, waiting, cells.other, room.cell)

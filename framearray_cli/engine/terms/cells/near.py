@@ -1,8 +1,7 @@
 """Light at the ends of gather rays that are too short for any cell.
 
-Where a ray is shorter than the cell it would read, and much of that cell lies on the other side of something, the light
-at its end Q is found there: direct light by shadow rays, and other light by gather rays that go on until one is long
-enough.
+Where a ray is shorter than the finest cells are wide, the light at its end Q is found there: direct light by
+shadow rays, and other light by gather rays that go on until one is long enough.
 
     E(Q_1)[l] = E_direct(Q_1)[l] (1 + R(Q_2) + R(Q_2) R(Q_3) + ...) + R(Q_2) ... R(Q_n) E(cell of Q_n)[l]
 

@@ -16,7 +16,7 @@ from framearray_cli.base.arrays import Addresses, Flags, Float32, Float64, Int32
 
 from ...embree.packets import Tracer
 from ...hits.rays import room_for_tests
-from .guards import GUARD_COLUMNS, GUARD_HEIGHT, HEIGHT, UNSEEN, see_guards
+from .guards import GUARD_COLUMNS, GUARD_HEIGHT, HEIGHT, see_guards
 from .samples import Samples
 from .table import ALL, FEWEST_SAMPLES, LEVELS, NOWHERE, Grid, cells_of_keys, empty_slots, fill_slots, write_keys
 
@@ -179,7 +179,6 @@ def _find_level(work: PlaceWork, level: int, base: int, coarser: Int32) -> _Leve
     aside = np.flatnonzero(~seen & kept[group])[::-1]  # the first of a group wins
     other[one[group[aside]] - base] = own[order[aside]]
     guards = np.zeros((len(sizes), GUARD_COLUMNS), np.float32)
-    guard[:, UNSEEN] = 1 - in_first / size
     guards[: int(kept.sum())] = guard[kept]
     found = _Level(
         keys=key[start[kept]], sizes=sizes, sample=order[joined], other=other, guard=guards, own=own, rays=rays

@@ -34,7 +34,7 @@ COARSEST_READ = 4
 # A cell with fewer samples is left out of the table, and a coarser one takes its place.
 FEWEST_SAMPLES = 4
 # Share of a ray's length that the edge of the cell it reads has.
-EDGE_OF_LENGTH = 0.3
+EDGE_OF_LENGTH = 0.15
 ALL = 0  # the cell of all surfaces together
 NOWHERE = -1  # in place of a cell, for a ray that left the scene
 # Bits of a key per axis; places this many cells apart share a cell.
