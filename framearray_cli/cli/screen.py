@@ -39,7 +39,7 @@ out, err = _Console(), _Console(stderr=True)
 
 # Plain lines show in a log file that work goes on, without filling it up.
 SECONDS_BETWEEN_LINES = 5.0
-RENDER_KERNELS, INIT_KERNELS = 35, 28  # that the commands compile first; jobs differ by a few
+RENDER_KERNELS, INIT_KERNELS = 35, 33  # that the commands compile first; jobs differ by a few
 
 
 def _make_bar(console: Console, left: Callable[[], str]) -> "Progress":

@@ -19,6 +19,7 @@ from framearray_cli.engine.frames.no_hits import (
     load_gathering,
     load_mirrors,
     load_outer,
+    load_textures,
 )
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
@@ -93,6 +94,7 @@ def compile_for(tables: dict[str, Any]) -> None:
             if prepared.job.indirect.method == "cells":
                 load_gathering(setup)
             load_direct(setup)
+            load_textures(setup)
             _load_composing(prepared, setup)
             load_outer(setup)
             load_mirrors(setup)

@@ -21,7 +21,7 @@ POWERS = {
     "spot": ("position", "intensity"),
 }
 SUN_ANGLE = 0.53  # degrees; of the sun, seen from the Earth
-WEIGHTS, INDIRECT = "area", "obscurance"  # see docs/decisions/first-job.md
+WEIGHTS, INDIRECT = "area", "cells"  # see docs/decisions/first-job.md
 DIGITS = 6  # significant digits of positions and directions; an error of a thousandth of a pixel
 ROUNDING = 1e-12  # of its longest component: shorter ones are 0
 

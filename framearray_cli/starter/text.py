@@ -66,7 +66,7 @@ def to_text(start: Start, job_file: Path) -> str:
             _line("outside", quoted(start.outside), _outside(start)),
             "",
             "[indirect]",
-            _line("method", quoted(INDIRECT), '"cells": all bounces of light, much nearer to paths; twice the time'),
+            _line("method", quoted(INDIRECT), 'all bounces of light; "obscurance": an approximation, in half the time'),
             "",
             "[output]",
             _line("directory", quoted(f"out/{start.name}"), "relative to this file"),

@@ -94,7 +94,7 @@ def evaluate_rays(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int, settin
     return varied
 
 
-@step
+@kernel
 def apply_textures(surfaces: Surfaces, tracer: Tracer, rays: Rays, n: int) -> None:
     """Multiply the value of listed rays 0 to n - 1 by R(Q), looked up where each ray meets its surface."""
     if n == 0:
