@@ -78,22 +78,19 @@ def prepare(job: Job) -> Prepared:
     """Read the scene of a job and place its eyes and lights.
 
     Raises:
-        JobError: a path is invalid, or a material that shines, see `prepared_from`.
+        JobError: a path is invalid, or a material cannot shine, see `with_emission`.
         SceneError: the scene cannot be read or rendered.
     """
     if job.denoise.obscurance:
         require_denoiser()
     job_eyes, job_lights = eyes(job), lights(job)
-    scene = load_scene(job.scene.file, job.scene.materials, job.scene.folders, _scene_memory(job))
+    shining, file = {path.emitter.material for path in job_lights.sources if path.emitter}, job.scene
+    scene = load_scene(file.file, file.materials, file.folders, _scene_memory(job), shining)
     return prepared_from(job, scene, job_eyes, job_lights)
 
 
 def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepared:
-    """Put together a job, its scene, and the eyes and lights to render: those of the job, or a few of them.
-
-    Raises:
-        JobError: a material that shines is missing, has no triangles or emits nothing.
-    """
+    """Put together a job, its scene, and the eyes and lights to render, or raise a JobError as `with_emission`."""
     lights = with_emission(job, lights, scene)
     arrays = light_arrays(lights, scene.centre, emitters(lights, scene))
     return Prepared(

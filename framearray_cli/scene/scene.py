@@ -1,6 +1,6 @@
 """Scene: the plain arrays that kernels read, centred in float64 before they become float32."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -59,6 +59,7 @@ class Scene:
         specular_texture: (m,) texture that multiplies `specular`, or -1.
         emission: (m, 3) radiance that surfaces emit, before texture; as the file gives it.
         emission_texture: (m,) texture that multiplies `emission`, or -1.
+        one_sided: (m,) whether only the front of surfaces emits, by the file.
         alpha: (m,) opacity factor, multiplied with the alpha of `alpha_texture`.
         alpha_texture: (m,) texture whose alpha is the mask, or -1.
         alpha_cutoff: (m,) a point of a masked triangle is absent where alpha < cutoff.
@@ -81,6 +82,7 @@ class Scene:
     specular_texture: Int32
     emission: Rgb
     emission_texture: Int32
+    one_sided: Bytes
     alpha: Float32
     alpha_texture: Int32
     alpha_cutoff: Float32
@@ -100,6 +102,7 @@ def load_scene(
     overrides: Mapping[str, Override] | None = None,
     folders: Sequence[Path] = (),
     memory: int | None = None,
+    shining: Container[str] = (),
 ) -> Scene:
     """Read a scene file, clean it and move it to its own centre.
 
@@ -108,11 +111,12 @@ def load_scene(
         overrides: by material name; a value replaces factor, texture and corner colours of that part.
         folders: where files that the scene names may lie, beside its own folder.
         memory: bytes that reading may allocate; None: all free memory.
+        shining: names of the materials whose emission is read; that of others is 0.
 
     Raises:
         SceneError: a file that cannot be read, holds nothing to render, or lacks an overridden material.
     """
-    meshes = read_meshes(file, folders, memory)
+    meshes = read_meshes(file, folders, memory, shining)
     try:
         return build_scene(meshes, overrides or {})
     except SceneError as error:
@@ -158,6 +162,7 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
         specular_texture=np.array([m.specular_texture for m in materials], dtype=np.int32),
         emission=np.array([m.emission for m in materials], dtype=np.float32),
         emission_texture=np.array([m.emission_texture for m in materials], dtype=np.int32),
+        one_sided=np.array([m.one_sided for m in materials], dtype=np.uint8),
         alpha=np.array([m.alpha for m in materials], dtype=np.float32),
         alpha_texture=np.array([m.alpha_texture for m in materials], dtype=np.int32),
         alpha_cutoff=cutoff,

@@ -14,9 +14,10 @@ from framearray_cli.scene.paths.sun import NEVER, daylight
 
 from .expose import find_factors
 from .lamps import choose_lamp_path
-from .model import LightKeys, LightSource, Start, SunDay, Vector, round_points, round_vector, without_accents
+from .model import LightKeys, LightSource, MeshLight, Start, SunDay, Vector, round_points, round_vector, without_accents
 from .options import StartOptions, SunOption
 from .orbit import SUN_KEYS, key_frames, sun_directions
+from .shining import mesh_lights
 from .site import Site
 from .staged import convert_lights
 
@@ -42,16 +43,18 @@ def add_lights(site: Site, start: Start, stage: Stage, options: StartOptions, en
     if options.sun is not None:
         return _with_groups(_under_the_sun(site, start, options, ends, options.sun), options)
     sources, n = convert_lights(stage, options.lights)
+    meshes, faint = mesh_lights(site.probe.scene)
+    start = replace(start, about=(*start.about, *faint))
     if sources:
         brings = "The file brings its own lights."
         if n == 1 and (options.lights or 1) > 1:
             brings = f"{brings} They stand still: one light position; a second key in the job makes a light move."
-        own = replace(start, sources=sources, light_frames=n, about=(*start.about, brings))
+        own = replace(start, sources=(*sources, *meshes), light_frames=n, about=(*start.about, brings))
         if (factors := find_factors(own, site.probe.scene, site.probe.embree)) is not None:
             return _with_groups(_scale_lights(own, *factors), options)
         dark = "The lights of the file light nothing that its pictures show, so others were chosen."
         start = replace(start, about=(*start.about, dark))
-    return _with_groups(_try_lights(site, start, options, ends, ()), options)
+    return _with_groups(_try_lights(site, start, options, ends, meshes), options)
 
 
 def _under_the_sun(site: Site, start: Start, options: StartOptions, ends: Float64, sun: SunOption) -> Start:
@@ -103,7 +106,7 @@ def _without_ends(first: str, last: str) -> tuple[str, str]:
 def _try_lights(site: Site, start: Start, options: StartOptions, ends: Float64, more: tuple[LightSource, ...]) -> Start:
     """Add the first of some lights that lights what is seen."""
     for source, n in _lights_to_try(site, start, ends, options.lights or LIGHTS):
-        n = options.lights or LIGHTS if more else n
+        n = options.lights or LIGHTS if any(isinstance(one, SunDay) for one in more) else n
         chosen = replace(start, sources=(*more, source), light_frames=n)
         if (factors := find_factors(chosen, site.probe.scene, site.probe.embree)) is not None:
             return _scale_lights(chosen, *factors)
@@ -159,6 +162,8 @@ def _scale_lights(start: Start, factor: float, sky: float) -> Start:
     def scaled(source: LightSource) -> LightSource:
         if isinstance(source, SunDay):
             return replace(source, power=strong(source.power, factor))
+        if isinstance(source, MeshLight):
+            return replace(source, intensity=float(f"{source.intensity * factor:.3g}"))
         return replace(source, powers=tuple(strong(power, factor) for power in source.powers))
 
     return replace(start, sources=tuple(map(scaled, start.sources)), background=strong(start.background, sky))

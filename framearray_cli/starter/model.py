@@ -94,7 +94,24 @@ class SunDay:
     group: str | None = None
 
 
-LightSource = LightKeys | SunDay
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeshLight:
+    """A material that shines.
+
+    Attributes:
+        intensity: multiplies the emission of the scene file.
+        two_sided: whether the back shines, too.
+    """
+
+    material: str
+    intensity: float
+    two_sided: bool
+    about: tuple[str, ...]
+    name: str
+    group: str | None = None
+
+
+LightSource = LightKeys | SunDay | MeshLight
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,6 +226,9 @@ def source_table(source: LightSource) -> dict[str, Any]:
     group = {"group": source.group} if source.group else {}
     if isinstance(source, LightKeys):
         return {"type": source.kind, **group, "keys": source_keys(source)}
+    if isinstance(source, MeshLight):
+        own = {"material": source.material, "two_sided": source.two_sided}
+        return {"type": "mesh", **group, **own, "keys": [{"frame": 0, "intensity": source.intensity}]}
     return {
         "type": "sun",
         **group,

@@ -14,6 +14,7 @@ from .cameras import choose_shot
 from .lighting import add_lights
 from .model import MaterialNote, Start, Vector, round_vector, without_accents
 from .options import StartOptions
+from .shining import AllNames
 from .site import Site, explored
 
 LINEAR = ("exr", "tif")  # formats whose images can be added up
@@ -35,7 +36,7 @@ def plan_start(file: Path, name: str, options: StartOptions) -> Start:
     if options.groups and options.image_format not in LINEAR:
         problem = f'--groups: expected --format exr or tif, as groups are added up afterwards, got "{options.format}"'
         raise JobError(str(file), [problem])
-    scene, stage = load_scene(file), read_stage(file)
+    scene, stage = load_scene(file, shining=AllNames()), read_stage(file)
     with explored(scene, file, options.inside) as site:
         shot = choose_shot(site, stage, options, file)
         start = Start(

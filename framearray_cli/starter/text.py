@@ -19,6 +19,7 @@ from .model import (
     Camera,
     LightSource,
     MaterialNote,
+    MeshLight,
     Start,
     SunDay,
     source_keys,
@@ -127,6 +128,14 @@ def _source(source: LightSource) -> list[str]:
     group = [_line("group", quoted(source.group), "stored separately, to change it afterwards")] if source.group else []
     if isinstance(source, SunDay):
         return [_line("type", '"sun"', "by place and time"), *group, *_sun(source)]
+    if isinstance(source, MeshLight):
+        return [
+            _line("type", '"mesh"', "surfaces of the scene that shine"),
+            *group,
+            _line("material", quoted(source.material), "its name in the scene file"),
+            _line("two_sided", str(source.two_sided).lower(), "whether the back shines, too"),
+            _line("keys", f"[{{ frame = 0, intensity = {source.intensity!r} }}]", "times the emission of the file"),
+        ]
     power = POWERS[source.kind][1]
     unit = "W/m2 of a surface that faces the light" if power == "irradiance" else "W/sr"
     lines = [

@@ -102,7 +102,7 @@ def _draw(scene: Scene, triangles: Int32, texture: Int32) -> tuple[Int32, Float3
     """`Emitters.end` and `Emitters.weight` of the triangles of a source."""
     corners = scene.corners[triangles].astype(np.float64)
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    bright = _brightness(scene, triangles, texture[scene.material[triangles]])
+    bright = brightness(scene, triangles, texture[scene.material[triangles]])
     mean = (area * bright).sum() / area.sum()
     share = area * np.maximum(bright, FAINTEST * mean) if mean > 0 else area
     end = np.round(np.cumsum(share) / share.sum() * MANY).astype(np.int32)
@@ -111,7 +111,7 @@ def _draw(scene: Scene, triangles: Int32, texture: Int32) -> tuple[Int32, Float3
     return end, weight.astype(np.float32)
 
 
-def _brightness(scene: Scene, triangles: Int32, texture: Int32) -> Float64:
+def brightness(scene: Scene, triangles: Int32, texture: Int32) -> Float64:
     """The mean of the texture of each triangle over its channels, 1 without one."""
     found = np.ones(len(triangles))
     if not len(scene.uvs):

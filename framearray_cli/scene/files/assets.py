@@ -1,6 +1,7 @@
 """Read the files that a scene file names (buffers, material libraries, images), only from folders that it may use."""
 
 import os
+from collections.abc import Container
 from dataclasses import dataclass, field
 from pathlib import Path, PureWindowsPath
 from urllib.parse import unquote
@@ -23,12 +24,14 @@ class Assets:
     """What a scene may use: the folder of its file with everything below, folders that the job adds, and memory.
 
     Attributes:
+        shining: names of the materials whose emission is read; that of others is left out.
         refused: names of files that lie elsewhere, in the order in which the scene named them.
     """
 
     folder: Path
     folders: tuple[Path, ...] = ()
     limit: Limit = field(default_factory=Limit)
+    shining: Container[str] = ()
     refused: list[str] = field(default_factory=list)
 
     def read(self, name: str) -> bytes:

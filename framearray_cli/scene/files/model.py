@@ -22,6 +22,7 @@ class Material:
         specular_texture: multiplies `specular`.
         emission: radiance of what the surface emits, linear RGB; as the file gives it.
         emission_texture: multiplies `emission`.
+        one_sided: whether only the front emits, where corners run counter-clockwise.
         alpha: opacity factor, multiplied with the alpha of `alpha_texture`.
         alpha_cutoff: a point is absent where alpha is below it; 0 for an opaque material.
         left_out: why its triangles are left out ("transmissive", "cut out"), or "".
@@ -34,6 +35,7 @@ class Material:
     specular_texture: int = -1
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
     emission_texture: int = -1
+    one_sided: bool = False
     alpha: float = 1.0
     alpha_texture: int = -1
     alpha_cutoff: float = 0.0

@@ -2,7 +2,7 @@
 
 import logging
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -33,18 +33,21 @@ ESCAPED = "; in double quotes TOML reads a backslash as an escape, such as \\n a
 MAX_REASON = 200  # characters of a library's own message that an error repeats
 
 
-def read_meshes(file: Path, folders: Sequence[Path] = (), memory: int | None = None) -> Meshes:
+def read_meshes(
+    file: Path, folders: Sequence[Path] = (), memory: int | None = None, shining: Container[str] = ()
+) -> Meshes:
     """Read a scene file of any format.
 
     Args:
         folders: where files that the scene names may lie, beside its own folder.
         memory: bytes that reading may take; None: all that are free.
+        shining: names of the materials whose emission is read.
 
     Raises:
         SceneError: the file is missing, a folder, of an unknown kind, broken, without triangles or too large, or names
             files elsewhere.
     """
-    assets = _assets(file, folders, memory)
+    assets = _assets(file, folders, memory, shining)
     extension = file.suffix[1:].lower()
     with _quiet() as messages, np.errstate(all="ignore"), _scene_errors(file, extension):
         meshes = _read(_bytes_of(file, assets.limit), extension, assets)
@@ -69,7 +72,7 @@ def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
     extension = file.suffix[1:].lower()
     if extension not in ("glb", "gltf"):
         return Stage()
-    assets = _assets(file, folders, None)
+    assets = _assets(file, folders, None, ())
     with np.errstate(all="ignore"), _scene_errors(file, extension):
         gltf = open_gltf(_bytes_of(file, assets.limit), assets)
         check_readable(gltf)
@@ -101,9 +104,9 @@ def _scene_errors(file: Path, extension: str) -> Iterator[None]:
         raise SceneError(f"{name}: broken, or not {extension.upper()} ({reason}); export it anew") from error
 
 
-def _assets(file: Path, folders: Sequence[Path], memory: int | None) -> Assets:
+def _assets(file: Path, folders: Sequence[Path], memory: int | None, shining: Container[str]) -> Assets:
     limit = Limit() if memory is None else Limit(most=memory)
-    return Assets(folder=file.parent, folders=tuple(folders), limit=limit)
+    return Assets(folder=file.parent, folders=tuple(folders), limit=limit, shining=shining)
 
 
 def _bytes_of(file: Path, limit: Limit) -> bytes:

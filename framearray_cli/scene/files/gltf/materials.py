@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float64
+from framearray_cli.base.colour import linear_from_srgb
 
 from ..assets import AssetError, Assets
 from ..materials import CUTOFF, Opacity, Rgb3, blended_opacity, make_material, masked_opacity
@@ -16,9 +17,10 @@ from ..textures import TextureTable
 from .container import Gltf, uri_bytes
 from .values import Tree
 
+STRENGTH = "KHR_materials_emissive_strength"
 MIRROR_ROUGHNESS = 0.1  # up to it a metal is a mirror
 GLOSSY_SPECULAR = 0.2  # a specular factor (old extension) above it means metal; dielectrics have 0.04
-KNOWN = {"KHR_materials_transmission", "KHR_materials_pbrSpecularGlossiness"}
+KNOWN = {"KHR_materials_transmission", "KHR_materials_pbrSpecularGlossiness", STRENGTH}
 SILENT = {"KHR_materials_ior", "KHR_materials_volume"}  # they only matter inside glass, which is left out
 REPEAT = 10497
 
@@ -68,19 +70,28 @@ def _material(
     else:
         diffuse, specular = _glossy(name, base, gloss, notes)
     opacity = _opacity(name, entry, float(base[3]), texture, source, notes)
-    _note_ignored(name, entry, notes)
+    _note_ignored(name, entry, name in assets.shining, notes)
     mirror_texture = texture if gloss is None else -1
     material = make_material(name, diffuse, specular, opacity, notes, texture=texture, mirror_texture=mirror_texture)
+    if name in assets.shining:
+        material, own = _shining(material, entry, None if texture < 0 else info, source, notes)
+        texture, info = (texture, info) if texture >= 0 else (material.emission_texture, own)
     if texture < 0 or info is None:
         return GltfMaterial(material=material)
-    transform: Tree = (info.get("extensions") or {}).get("KHR_texture_transform") or {}
-    uv_set: int = {"texCoord": 0, **info, **transform}["texCoord"]  # the transform's own set wins
+    uv_set, transform = _places(info)
     return GltfMaterial(
         material=material,
         uv_set=uv_set,
         uv_matrix=uv_matrix(transform),
         repeats=source.repeats(info),
     )
+
+
+def _places(info: Tree) -> tuple[int, Tree]:
+    """The set of texture coordinates that a texture info reads, and their transform."""
+    transform: Tree = (info.get("extensions") or {}).get("KHR_texture_transform") or {}
+    uv_set: int = {"texCoord": 0, **info, **transform}["texCoord"]  # the transform's own set wins
+    return uv_set, transform
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +145,29 @@ class ImageFinder:
             return uri_bytes(entry["uri"], self.assets)
 
         return read
+
+
+def _shining(
+    material: Material, entry: Tree, base: Tree | None, source: ImageFinder, notes: Notes
+) -> tuple[Material, Tree | None]:
+    """Add what a material emits [KHR_materials_emissive_strength]; also return the info of its texture, if any.
+
+    Args:
+        base: info of the texture of its colour, whose texture coordinates the emission must share.
+    """
+    strength = float(((entry.get("extensions") or {}).get(STRENGTH) or {}).get("emissiveStrength", 1.0))
+    emission = np.array(entry.get("emissiveFactor") or (0.0, 0.0, 0.0), dtype=np.float64) * strength
+    emission = np.where(np.isfinite(emission), np.maximum(emission, 0.0), 0.0)
+    info: Tree | None = entry.get("emissiveTexture")
+    material = replace(material, one_sided=not entry.get("doubleSided", False))
+    if info is None or not emission.any():
+        return replace(material, emission=_rgb(emission)), None
+    if base is not None and _places(base) != _places(info):
+        mean = source.mean(info)
+        notes.add("emissive textures with texture coordinates of their own count by their mean", material.name)
+        emission = emission if mean is None else emission * linear_from_srgb(mean[:3])
+        return replace(material, emission=_rgb(emission)), None
+    return replace(material, emission=_rgb(emission), emission_texture=source.index(info)), info
 
 
 def _metal(name: str, base: Float64, pbr: Tree, source: ImageFinder, notes: Notes) -> tuple[Rgb3, Rgb3]:
@@ -196,9 +230,9 @@ def uv_matrix(transform: Tree) -> Float64 | None:
     return np.column_stack([turn * scale, offset])
 
 
-def _note_ignored(name: str, entry: Tree, notes: Notes) -> None:
+def _note_ignored(name: str, entry: Tree, shines: bool, notes: Notes) -> None:
     emissive = entry.get("emissiveFactor")
-    if emissive is not None and max(emissive) > 0:
+    if not shines and emissive is not None and max(emissive) > 0:
         notes.add("emission is left out", name)
     if entry.get("normalTexture") is not None:
         notes.add("normal maps are left out", name)

@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ..assets import Assets
 from ..materials import Opacity, Rgb3, blended_opacity, make_material
@@ -77,8 +77,11 @@ def to_material(
             kd = (kd[0] + ks[0], kd[1] + ks[1], kd[2] + ks[2])
             notes.add("rough metals are taken as diffuse", name)
     opacity = _opacity(name, values, texture, assets, textures, notes)
-    _note_ignored(name, values, use, notes)
+    shines = name in assets.shining
+    _note_ignored(name, values, use, shines, notes)
     material = make_material(name, kd, specular, opacity, notes, texture=texture)
+    if shines and (ke := _rgb(values, "ke")) is not None:
+        material = replace(material, emission=(max(ke[0], 0.0), max(ke[1], 0.0), max(ke[2], 0.0)))
     return material, use if texture >= 0 else None
 
 
@@ -112,9 +115,9 @@ def _opacity(
     return opacity
 
 
-def _note_ignored(name: str, values: Mapping[str, str], use: MapUse | None, notes: Notes) -> None:
+def _note_ignored(name: str, values: Mapping[str, str], use: MapUse | None, shines: bool, notes: Notes) -> None:
     ke = _rgb(values, "ke")
-    if ke is not None and max(ke) > 0:
+    if not shines and ke is not None and max(ke) > 0:
         notes.add("emission is left out", name)
     for key in IGNORED_MAPS:
         if key in values:

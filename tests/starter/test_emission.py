@@ -1,0 +1,85 @@
+"""Emission of a file in a first job: with every kind of lamp beside it, alone, and of very many materials."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from support.scenes import Glb, png
+from support.staged import QUARTER, light
+
+from framearray_cli.array.images.images import read_image
+from framearray_cli.job.read import read_job
+from framearray_cli.render.render import render
+from framearray_cli.scene.paths.paths import lights
+from framearray_cli.starter import StartOptions, init
+
+FEW = StartOptions(frames=2, resolution=(48, 36))
+SCREEN = np.array([[-1, 0.8, -1.95], [1, 0.8, -1.95], [1, 1.8, -1.95], [-1, 1.8, -1.95]], np.float32)
+UVS = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
+TEXELS = np.array([[[255, 40, 40], [40, 255, 40]], [[40, 40, 255], [255, 255, 255]]], np.uint8)
+STRENGTH = {"KHR_materials_emissive_strength": {"emissiveStrength": 5.0}}
+EYE = {"type": "perspective", "perspective": {"yfov": 1.1}}
+
+
+def room() -> Glb:
+    """A room of 5 x 2.5 x 4 with a screen at its back, and a camera that looks at it."""
+    glb = Glb()
+    walls = glb.material("Walls", {"baseColorFactor": [0.7, 0.7, 0.6, 1.0]})
+    corners = np.array([[x, y, z] for x in (-2.5, 2.5) for y in (0, 2.5) for z in (-2, 2)], np.float32)
+    sides = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    faces = np.array([[a, b, c, a, c, d] for a, b, c, d in sides], np.uint16).ravel()
+    glb.node(glb.mesh(walls, positions=corners, faces=faces))
+    glb.texture(png(np.kron(TEXELS, np.ones((8, 8, 1), np.uint8))))
+    shines = {"emissiveFactor": [1.0, 1.0, 1.0], "emissiveTexture": {"index": 0}, "extensions": STRENGTH}
+    screen = glb.material("Screen", {"baseColorFactor": [0.1, 0.1, 0.1, 1.0]}, **shines)
+    glb.node(glb.mesh(screen, positions=SCREEN, TEXCOORD_0=glb.accessor(UVS)))
+    glb.node(name="Eye", translation=[0.0, 1.2, 1.6], camera=glb.add("cameras", EYE))
+    return glb
+
+
+def sources(folder: Path, glb: Glb) -> tuple[Any, Any, Any]:
+    """The first job of a file, its sources, and the job."""
+    scene = glb.save(folder / "scene.glb")
+    start = init(scene, folder / "job.toml", FEW)
+    job = read_job(folder / "job.toml")
+    return start, job.light.sources, job
+
+
+def test_every_light_of_a_file_becomes_a_source_and_the_screen_is_seen(tmp_path: Path) -> None:
+    """Where the screen is, pictures show the colours of its texture, brighter than the walls."""
+    glb = room()
+    glb.node(name="Lamp", translation=[0.0, 2.2, 0.0], **light(glb, intensity=3.0))
+    glb.node(name="Beam", translation=[-1.0, 2.0, 1.0], **light(glb, "spot", intensity=5.0))
+    glb.node(name="Sun", rotation=[-QUARTER, 0.0, 0.0, QUARTER], **light(glb, "directional", intensity=3.0))
+    _, found, job = sources(tmp_path, glb)
+    assert [source.type for source in found] == ["point", "spot", "directional", "mesh"]
+    factor = found[0].keys[0].intensity[0] / 3.0
+    np.testing.assert_allclose(found[3].keys[0].intensity[0], factor, rtol=0.01)
+    assert not found[3].two_sided  # as materials of glTF are unless they say so
+    assert found[3].material == "Screen"
+    render(job)
+    file = next((tmp_path / "out").rglob("*c0000.l000.png"))
+    picture = np.asarray(read_image(file), np.float64)
+    screen = picture[8:22, 12:36]
+    quarters = [screen[:6, :10], screen[:6, -10:], screen[-6:, :10], screen[-6:, -10:]]
+    strongest = [int(quarter.mean(axis=(0, 1)).argmax()) for quarter in quarters[:3]]
+    assert strongest == [0, 1, 2]
+    assert quarters[3].mean() > 1.5 * picture[28:].mean()
+
+
+def test_emission_alone_gets_a_light_that_moves(tmp_path: Path) -> None:
+    _, found, job = sources(tmp_path, room())
+    assert found[0].type == "mesh" and found[1].type in ("point", "directional")
+    assert lights(job).n == 12
+
+
+def test_faint_materials_are_left_out_and_named(tmp_path: Path) -> None:
+    glb = room()
+    for k in range(3):
+        led = glb.material(f"Led {k}", emissiveFactor=[1.0, 0.0, 0.0])
+        corners = np.array([[0, 0, 0], [0.02, 0, 0], [0.02, 0.02, 0], [0, 0.02, 0]])
+        small = np.add(corners, [k / 9, 1, -1])
+        glb.node(glb.mesh(led, positions=small.astype(np.float32)))
+    start, found, _ = sources(tmp_path, glb)
+    assert [source.material for source in found if source.type == "mesh"] == ["Screen"]
+    assert "the emission of faint materials is left out: Led 0, Led 1, Led 2" in start.about
