@@ -20,6 +20,7 @@ from .maps import NO_MAPS, Maps, map_arrays
 from .profiles import NONE, Profiles, profile_arrays
 
 POINT, DIRECTIONAL, RECT, DISC, MESH = 0, 1, 2, 3, 4  # panels are last but meshes
+PANEL_ROWS = 12
 SHARPEST = 0.001  # width of a spot's edge, in cosines, over that of its cone
 KINDS = {"point": POINT, "directional": DIRECTIONAL, "mesh": MESH}
 
@@ -37,9 +38,9 @@ class LightArrays(NamedTuple):
             one; (0,) where no source has a size: kernels are then compiled without it.
         cone: (n_sources, 5, n_lights) the unit axis of a spot, and a and b of its falloff, see `spot_share`; 0, 0 and 1
             of other sources. (0,) where there are no spots: kernels are then compiled without them.
-        panel: (n_sources, 10, n_lights) of a rectangle or disc the half axes a and b, the unit normal, and the share of
-            its light that the back sends, times -1; 0 of other sources. (0,) where there are none of them: kernels are
-            then compiled without them.
+        panel: (n_sources, PANEL_ROWS, n_lights) of a rectangle or disc the half axes a and b, the unit normal, the
+            share of its light that the back sends, times -1, and the lengths of a and b; 0 of other sources. (0,) where
+            there are none of them: kernels are then compiled without them.
         colour: (n_lights, 3) factor of a stored irradiance; ones if there are 3 channels.
         profiles: of lamps with measured light; kernels are compiled without them where there are none.
         maps: of environments, which are DIRECTIONAL with a map, likewise.
@@ -156,12 +157,13 @@ def _panels(lights: Lights) -> Float32:
     """`LightArrays.panel`."""
     if all(source.panel is None for source in lights.sources):
         return np.empty(0, np.float32)
-    found = np.zeros((len(lights.sources), 10, lights.n), np.float32)
+    found = np.zeros((len(lights.sources), PANEL_ROWS, lights.n), np.float32)
     for rows, source in zip(found, lights.sources, strict=True):
         if (panel := source.panel) is not None:
             a, b = panel.half_axes
             rows[:9] = np.concatenate([a, b, panel.axis], axis=1).T
             rows[9] = -1.0 if panel.two_sided else 0.0
+            rows[10:] = panel.sides.T / 2
     return found
 
 

@@ -1,32 +1,46 @@
 """Rectangles and discs: the point of a panel that a hit draws, and the particles that it emits.
 
-A panel has the same radiance L everywhere and to all sides of its front. The irradiance of a surface is on average
+A panel has the same radiance L everywhere and to all sides of its front. The irradiance of a surface at P is the
+integral over its area of
 
-    L A cos(theta) cos(theta_l) / d^2
+    L cos(theta) cos(theta_l) / d^2
 
-over points spread evenly over its area A: theta at the surface, theta_l at the panel, d between them. The strength of a
-panel is L A, its intensity along the normal, so that one that is far away is a point of that intensity.
+theta at the surface, theta_l at the panel, d between them. Points are spread nearly as the solid angle is that they are
+seen under: over x, along the width, evenly by the angle under which P sees it [Kulla12], and for given x over y, along
+the height, evenly by the solid angle, which is proportional to y / d. So no point is so near that its light is a speck.
+The strength of a panel is L A, its intensity along the normal, so that far away it is a point of that intensity.
 """
+
+import math
+from typing import Any
 
 import numpy as np
 
 from framearray_cli.base.arrays import Real, Triple
 
 from ..kernels.kernel import inlined
-from ..kernels.simd import gather, load, select
-from .lights import DISC, LightArrays
+from ..kernels.simd import gather, load, select, sqrt
+from .lights import DISC, PANEL_ROWS, LightArrays
+from .profiles import angle_of
 from .random import cosine_direction, disc
 
 # Particles start at this share of the half axes in front of a panel, so that none meets a wall that the panel lies on.
 AHEAD = 1e-4
 
-PanelAt = tuple[Real, Real, Real, Real, Real, Real, Real, Real, Real, Real]
+# A point within this share of its size of a panel's plane gets no light from it: single precision knows no better.
+FLATTEST = 1e-6
+
+# Taylor series of sin(x) / x and cos(x), in x^2.
+SINE = tuple(np.float32((-1) ** k / math.factorial(2 * k + 1)) for k in range(7))
+COSINE = tuple(np.float32((-1) ** k / math.factorial(2 * k)) for k in range(7))
+
+PanelAt = tuple[Real, Real, Real, Real, Real, Real, Real, Real, Real, Real, Real, Real]
 
 
 @inlined
 def panel_at(lights: LightArrays, s: int, l: int) -> PanelAt:
     """The rows of source s at light position l; see `LightArrays.panel`."""
-    n, at = lights.lit.shape[1], 10 * s * lights.lit.shape[1] + l
+    n, at = lights.lit.shape[1], PANEL_ROWS * s * lights.lit.shape[1] + l
     return (
         gather(lights.panel, at),
         gather(lights.panel, at + n),
@@ -38,13 +52,15 @@ def panel_at(lights: LightArrays, s: int, l: int) -> PanelAt:
         gather(lights.panel, at + 7 * n),
         gather(lights.panel, at + 8 * n),
         gather(lights.panel, at + 9 * n),
+        gather(lights.panel, at + 10 * n),
+        gather(lights.panel, at + 11 * n),
     )
 
 
 @inlined
 def panel_in_lanes(lights: LightArrays, s: int, l: int) -> PanelAt:
     """The rows of source s at light positions l to l + 15."""
-    n, at = lights.lit.shape[1], 10 * s * lights.lit.shape[1] + l
+    n, at = lights.lit.shape[1], PANEL_ROWS * s * lights.lit.shape[1] + l
     return (
         load(lights.panel, at),
         load(lights.panel, at + n),
@@ -56,6 +72,8 @@ def panel_in_lanes(lights: LightArrays, s: int, l: int) -> PanelAt:
         load(lights.panel, at + 7 * n),
         load(lights.panel, at + 8 * n),
         load(lights.panel, at + 9 * n),
+        load(lights.panel, at + 10 * n),
+        load(lights.panel, at + 11 * n),
     )
 
 
@@ -70,20 +88,79 @@ def panel_point(kind: int, u: Real, v: Real) -> Triple:
 
 
 @inlined
-def panel_sample(panel: PanelAt, x: Real, y: Real, z: Real, q: Triple) -> tuple[Real, Real, Real, Real]:
-    """The vector from P to the point q of a panel, and cos(theta_l) / d^3: 0 where the panel shows no bright side.
+def panel_sample(kind: int, panel: PanelAt, x: Real, y: Real, z: Real, q: Triple) -> tuple[Real, Real, Real, Real]:
+    """The vector from P to a point of a panel, and the factor of its irradiance, over the vector's length.
+
+    The factor is the estimate without cos(theta); it is 0 where the panel shows no bright side.
 
     Args:
+        kind: RECT or DISC.
         x, y, z: vector from P to the panel's middle.
+        q: see `panel_point`.
     """
-    ax, ay, az, bx, by, bz, nx, ny, nz, back = panel
-    x, y, z = x + q[0] * ax + q[1] * bx, y + q[0] * ay + q[1] * by, z + q[0] * az + q[1] * bz
-    square = x * x + y * y + z * z
-    # d cos(theta_l) in front of the panel; behind it, that of the back
+    nothing, one, two, tiny = np.float32(0.0), np.float32(1.0), np.float32(2.0), np.float32(1e-30)
+    # no branch among lanes: compilers would fuse products and sums here and not there, for one grouping of hits only
+    disc_only = one if kind == DISC else nothing
+    ax, ay, az, bx, by, bz, nx, ny, nz, back, wide, high = panel
+    # the panel from P: its middle, and the height of P above its plane
+    cx, cy = (x * ax + y * ay + z * az) / wide, (x * bx + y * by + z * bz) / high
     height = -(x * nx + y * ny + z * nz)
-    behind = back * height
-    inverse = np.float32(1.0) / square
-    return x, y, z, select(height > behind, height, behind) * inverse * inverse
+    side = select(height > nothing, one, -back)
+    h = select(height > nothing, height, -height)
+    least = np.float32(FLATTEST) * (wide + high)
+    side, h = select(h > least, side, nothing), select(h > least, h, least)
+    # x along the width: even by the angle at the distance e of the strip that the panel lies in
+    beside = select(cy > nothing, cy, -cy) - high
+    beside = select(beside > nothing, beside, nothing)
+    e2 = h * h + beside * beside
+    e, x0 = sqrt(e2), cx - wide
+    whole = angle_of(two * wide * e, e2 + x0 * (cx + wide))
+    sine, cosine = sine_and_cosine(whole * (q[0] + one) / two)
+    px = e * (x0 * cosine + e * sine) / (e * cosine - x0 * sine)
+    u = (px - cx) / wide
+    u = select(u > -one, u, -one)
+    u = select(u < one, u, one)
+    px = cx + u * wide
+    # the heights y0 to y1 of the panel at x, and the chord on which v was drawn; 1 of a rectangle
+    rest = one - disc_only * u * u
+    reach = sqrt(select(rest > nothing, rest, nothing))
+    drawn = (one - disc_only * q[0]) * (one + disc_only * q[0])
+    chord = sqrt(select(drawn > tiny, drawn, tiny))
+    v = q[1] / chord
+    y0, y1 = cy - reach * high, cy + reach * high
+    # y: even in y / d, which rises by `rise` from y0 to y1
+    d2 = px * px + h * h
+    r0, r1 = sqrt(d2 + y0 * y0), sqrt(d2 + y1 * y1)
+    one_side = y0 * y1 > nothing
+    sum_of = select(one_side, y1 * r0 + y0 * r1, one)
+    rise = select(one_side, d2 * np.float32(4.0) * reach * high * cy / (sum_of * r0 * r1), y1 / r1 - y0 / r0)
+    h0, step = y0 / r0, rise * (v + one) / two
+    level = d2 / (r0 * r0) - step * (two * h0 + step)
+    py = sqrt(d2) * (h0 + step) / sqrt(select(level > tiny, level, tiny))
+    py = select(py > y0, py, y0)
+    py = select(py < y1, py, y1)
+    w = (py - cy) / high
+    density = np.float32(4.0) * chord * wide * high * sqrt(d2 + py * py)
+    factor = side * whole * rise * h * (px * px + e2) / (e * d2 * density)
+    return x + u * ax + w * bx, y + u * ay + w * by, z + u * az + w * bz, factor
+
+
+@inlined
+def sine_and_cosine(angle: Real) -> tuple[Real, Real]:
+    """Sine and cosine of an angle from 0 to pi, by the series of its half, to 6e-8."""
+    half, one, two = np.float32(0.5) * angle, np.float32(1.0), np.float32(2.0)
+    s = half * half
+    sine = half * _series(s, SINE)
+    cosine = _series(s, COSINE)
+    return two * sine * cosine, one - two * sine * sine
+
+
+@inlined
+def _series(s: Real, terms: Any) -> Real:
+    """A polynomial of seven terms."""
+    a, b, c, d, e, f, g = terms
+    found: Real = a + s * (b + s * (c + s * (d + s * (e + s * (f + s * g)))))
+    return found
 
 
 @inlined
@@ -91,7 +168,7 @@ def panel_ray(
     lights: LightArrays, s: int, l: int, a: Real, b: Real, c: Real, d: Real
 ) -> tuple[Real, Real, Real, Real, Real, Real]:
     """Origin and unit direction of a particle of a panel: from a point by a and b, by the cosine of its direction."""
-    ax, ay, az, bx, by, bz, nx, ny, nz, back = panel_at(lights, s, l)
+    ax, ay, az, bx, by, bz, nx, ny, nz, back, _, _ = panel_at(lights, s, l)
     x, y, _ = panel_point(lights.kind[s], np.float32(a), np.float32(b))
     ahead = np.float32(AHEAD) * np.sqrt(ax * ax + ay * ay + az * az + bx * bx + by * by + bz * bz)
     # both sides shine: the first half of the numbers c is for the back

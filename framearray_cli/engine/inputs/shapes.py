@@ -125,7 +125,7 @@ def vector_and_factor(
     sign, from_point = (-one, nothing) if kind == DIRECTIONAL else (one, one)
     x, y, z = sign * x - from_point * p[0], sign * y - from_point * p[1], sign * z - from_point * p[2]
     if has_rows(lights.panel) and kind >= RECT:
-        x, y, z, factor = panel_sample(panel, x, y, z, q)
+        x, y, z, factor = panel_sample(kind, panel, x, y, z, q)
         cosine = x * m[0] + y * m[1] + z * m[2]
         in_front = (cosine > nothing) & (x * g[0] + y * g[1] + z * g[2] > nothing)
         return x, y, z, select(in_front, cosine * factor * lit, nothing)
