@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 import threading
 from contextlib import suppress
 from types import FrameType
@@ -13,16 +14,34 @@ from framearray_cli.engine.kernels.clock import is_compiling
 from .screen import err, say
 
 PATIENCE = 1.0  # seconds that threads have to end after a signal
+MOMENT = 0.02  # seconds until `Stopped` is raised where it can be
 # Modules with callbacks from C and optional imports, which catch every exception.
 FORGETFUL = ("numba", "llvmlite", "importlib", "_frozen_importlib", "_frozen_importlib_external")
+# Where Python's own locks are just taken or released: an exception would leave them locked for ever, and threads that
+# wait for them would end a pool only after the second try. None of these functions waits long.
+TAKING_LOCKS = ("__enter__", "__exit__", "_release_save", "_acquire_restore")
 
 
 def listen() -> None:
     """Turn signals into `Stopped` from now on; under `nohup` go on when the terminal closes."""
+    watch_for_lost()
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)  # Windows lacks the last
         if number is not None and (name != "SIGHUP" or signal.getsignal(number) != signal.SIG_IGN):
             signal.signal(number, stop)
+
+
+def watch_for_lost() -> None:
+    """Raise `Stopped` again in a moment where Python cannot raise it, in a destructor for instance."""
+    hook = sys.unraisablehook
+
+    def lost(what: "sys.UnraisableHookArgs") -> None:
+        if isinstance(what.exc_value, Stopped) and hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, MOMENT)
+        else:
+            hook(what)
+
+    sys.unraisablehook = lost
 
 
 def stop(signum: int, frame: FrameType | None) -> None:
@@ -39,15 +58,20 @@ def stop(signum: int, frame: FrameType | None) -> None:
 
 def _interrupt(signum: int, frame: FrameType | None) -> None:
     """Raise `Stopped`; where it would be caught and lost now, raise it in a moment, and again if it is lost."""
-    busy = False
+    busy = _takes_lock(frame)
     while frame is not None and not busy:
         busy = frame.f_globals.get("__name__", "").partition(".")[0] in FORGETFUL
         frame = frame.f_back
     if hasattr(signal, "setitimer"):
-        signal.setitimer(signal.ITIMER_REAL, 0.02 if busy else 2 * PATIENCE)
+        signal.setitimer(signal.ITIMER_REAL, MOMENT if busy else 2 * PATIENCE)
         if busy:
             return
     raise Stopped(signum)
+
+
+def _takes_lock(frame: FrameType | None) -> bool:
+    """Whether the innermost function takes or releases a lock of `threading`."""
+    return frame is not None and frame.f_globals.get("__name__") == "threading" and frame.f_code.co_name in TAKING_LOCKS
 
 
 def _exit_now(stopped: Stopped) -> None:

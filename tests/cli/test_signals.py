@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 import tomllib
 from collections.abc import Callable
@@ -178,6 +179,41 @@ def test_an_exception_is_not_raised_where_it_would_be_forgotten(module):
     assert inside == [arrive]
     with pytest.raises(interrupts.Stopped):
         time.sleep(5)
+    signal.setitimer(signal.ITIMER_REAL, 0)
+
+
+def test_a_lock_is_never_left_locked():
+    """A signal while a lock is taken or released: threads that wait for it later would end a pool only after 2 s."""
+    for k in range(20):
+        lock, number = threading.Condition(threading.Lock()), signal.SIGTERM
+        previous = signal.signal(number, interrupts.stop)
+        timer = threading.Timer(0.001 + 0.0002 * k, os.kill, [os.getpid(), number])
+        try:
+            timer.start()
+            with pytest.raises(interrupts.Stopped):
+                while True:
+                    with lock:
+                        pass
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            timer.join()
+            signal.signal(number, previous)
+        assert lock.acquire(blocking=False), f"in run {k}"
+
+
+def test_an_exception_lost_in_a_destructor_is_raised_again(monkeypatch):
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+    interrupts.watch_for_lost()
+    started = time.monotonic()
+
+    class Dies:
+        def __del__(self) -> None:
+            interrupts.stop(signal.SIGTERM, sys._getframe())
+
+    with pytest.raises(interrupts.Stopped):
+        Dies()
+        time.sleep(5)
+    assert time.monotonic() - started < 1
     signal.setitimer(signal.ITIMER_REAL, 0)
 
 
