@@ -202,10 +202,11 @@ class CellOracle(Oracle):
                 words[i] = rnd.mix([words[i]])[0]
         return start, dirs, way, weight
 
-    def followed(self, points: Points) -> tuple[Any, Any, Any]:
-        """From points that short rays met, on to a long one: 1 + R + R R + ..., the product of all R, and the cell."""
+    def followed(self, points: Points, l: int) -> tuple[Any, Any, Any]:
+        """From points that short rays met, on to a long one: direct light of all points in units of the lights' colour,
+        the product of all R, and the cell."""
         n = len(points)
-        series, through, end = np.ones((n, 3)), np.ones((n, 3)), np.full(n, -1)
+        light, through, end = self.units_of_light(points, l), np.ones((n, 3)), np.full(n, -1)
         root = np.arange(n)
         for step in range(STEPS if n else 0):
             words = rnd.bits(points.key, rnd.HEMISPHERE)
@@ -214,12 +215,19 @@ class CellOracle(Oracle):
             own = np.arange(len(points))
             points, r, cell, short = self.landed(points, own, np.zeros(len(own), int), dirs, step == STEPS - 1)
             through[root] *= r
-            series[root[short]] += through[root[short]]
+            light[root[short]] += through[root[short]] * self.units_of_light(points[short], l)
             end[root[~short]] = cell[~short]
             points, root = points[short], root[short]
             if not len(root):
                 break
-        return series, through, end
+        return light, through, end
+
+    def units_of_light(self, points: Points, l: int) -> Any:
+        """E_direct, (n, 3), over the colour of the light; one number, three times, where cells have one channel."""
+        unit = self.inputs.light_arrays.colour[l]
+        at = [0, 1, 2] if self.cells.light.shape[1] == 3 else [unit.argmax()] * 3
+        direct = self.irradiance(points, l)[:, at]
+        return np.divide(direct, unit[at], out=0 * direct, where=unit[at] > 0)
 
     def gathered(self, hits: Points, l: int) -> tuple[Any, Any]:
         """E_indirect[l] by sources, and the radiance that is the same under every light, (n, 3) each."""
@@ -230,10 +238,7 @@ class CellOracle(Oracle):
         tint, missed = cells.tint.astype(np.float64), k < 0
         hue = np.where(missed[:, None], 0.0, r * tint[k, :3] * tint[k, 3:4])
         through, end, own = np.ones((len(k), 3)), k.copy(), np.zeros((len(k), 3))
-        series, through[short], end[short] = self.followed(points[short])
-        at = [0, 1, 2] if channels == 3 else [unit_of_light.argmax()]  # where all channels are the same times the unit
-        direct = self.irradiance(points[short], l)[:, at]
-        own[short] = series * np.divide(direct, unit_of_light[at], out=0 * direct, where=unit_of_light[at] > 0)
+        own[short], through[short], end[short] = self.followed(points[short], l)
         same = r * through * np.where((end < 0)[:, None], self.background, tint[end, 4:7])
         read = np.where((end < 0)[:, None], 0.0, r * through * tint[end, :3])
         if channels == 3:

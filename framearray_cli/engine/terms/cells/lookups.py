@@ -53,8 +53,8 @@ class NearHits(NamedTuple):
         rays, room: their packets, then those of one more ray from each Q.
         root: (MOST_NEAR,) the kept ray whose path goes through Q; `start`, `own`: (MOST_NEAR,) `place` and `cell` of
             the rays that paths begin with.
-        through: (3, MOST_NEAR) product of the reflectivities of the path after Q; `series`: (3, MOST_NEAR) 1 plus that
-            product up to each further point; `end`: (MOST_NEAR,) the cell at the end of the path, or NOWHERE.
+        through: (3, MOST_NEAR) product of the reflectivities of the path so far, that of Q included.
+        end: (MOST_NEAR,) the cell at the end of the path, or NOWHERE.
         irradiance: (MOST_NEAR, channels, n_lights) E_direct(Q) of all lights that are computed; `first`: the first of
             those that cells have.
         light: (MOST_NEAR, channels, n_lights or more, a multiple of LANES) what leaves Q, times pi.
@@ -71,7 +71,6 @@ class NearHits(NamedTuple):
     start: Int32
     own: Int32
     through: Rgb
-    series: Rgb
     end: Int32
     irradiance: Float32
     first: int
@@ -106,7 +105,6 @@ def room_for_near(channels: int, n_lights: int, kept: range) -> NearHits:
         start=np.empty(n, np.int32),
         own=np.empty(n, np.int32),
         through=np.empty((3, n), np.float32),
-        series=np.empty((3, n), np.float32),
         end=np.empty(n, np.int32),
         irradiance=with_room((n, channels, n_lights), np.float32),
         first=kept.start,

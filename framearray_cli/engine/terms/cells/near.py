@@ -3,16 +3,14 @@
 Where a ray is shorter than the finest cells are wide, the light at its end Q is found there: direct light by
 shadow rays, and other light by gather rays that go on until one is long enough.
 
-    E(Q_1)[l] = E_direct(Q_1)[l] (1 + R(Q_2) + R(Q_2) R(Q_3) + ...) + R(Q_2) ... R(Q_n) E(cell of Q_n)[l]
-
-The points Q_2 to Q_(n-1) lie in the same crack as Q_1, so its direct light stands for theirs.
+    E(Q_1)[l] = E_direct(Q_1)[l] + R(Q_2) E_direct(Q_2)[l] + ... + R(Q_2) ... R(Q_n) E(cell of Q_n)[l]
 """
 
 import numpy as np
 
 from ...embree.packets import intersect
 from ...hits.hits import World, record_hits
-from ...hits.rays import RANK, Rays
+from ...hits.rays import NO_RAYS, RANK, Rays
 from ...inputs.lights import LightArrays
 from ...kernels.kernel import inlined
 from ...kernels.simd import LANES, load, store
@@ -46,16 +44,22 @@ def light_near(
         return 0
     tracer = world.tracer
     record_hits(world, near.rays.packets, n, False, near.hits)
-    total = direct(near.hits, n, lights, tracer, tests, near.irradiance, False)
     for k in range(n):
         near.root[k], near.start[k], near.own[k] = k, near.place[k], near.cell[k]
         for channel in range(3):
-            near.through[channel, k] = near.series[channel, k] = 1.0
+            near.through[channel, k] = room.reflectivity[channel, near.place[k]]
+        for channel in range(near.light.shape[1]):
+            for l in range(near.light.shape[2]):
+                near.light[k, channel, l] = 0.0
+    total = NO_RAYS
     here, there = near, other
     left = n  # rays that were too short
     for step in range(MOST_STEPS):
+        # direct light of the points, and one more ray from each
+        total += direct(here.hits, left, lights, tracer, tests, here.irradiance, False)
         for k in range(left):
             here.rays.place[k] = k
+            _add_direct(cells, here, k, near)
         write_obscurance_rays(here.hits, here.rays, left, 0, 1, once, False)
         intersect(tracer, here.rays.packets, left, False)
         total += left
@@ -71,7 +75,7 @@ def light_near(
         record_hits(world, there.rays.packets, kept, False, there.hits)
         here, there, left = there, here, kept
     for k in range(n):
-        _add_up(cells, k, room, near)
+        _add_end(cells, k, room, near)
     return total
 
 
@@ -86,37 +90,48 @@ def _go_on(here: NearHits, k: int, near: NearHits, there: NearHits) -> None:
         near.end[root] = cell
     for channel in range(3):
         near.through[channel, root] *= here.room.reflectivity[channel, ray]
-        if cell < NOWHERE:
-            near.series[channel, root] += near.through[channel, root]
 
 
 @inlined
-def _add_up(cells: Cells, k: int, room: GatherScratch, near: NearHits) -> None:
-    """Write what leaves the end of kept ray k, from its direct light and from the cell at the end of its path."""
-    channels, n_lights, total_lights = cells.light.shape[1], cells.light.shape[2], near.irradiance.shape[2]
-    ray, own, cell = near.start[k], near.own[k], near.end[k]
+def _add_direct(cells: Cells, here: NearHits, k: int, near: NearHits) -> None:
+    """Add the direct light at point k to that of the kept ray that the point belongs to."""
+    channels, n_lights, total_lights = cells.light.shape[1], cells.light.shape[2], here.irradiance.shape[2]
+    root = here.root[k]
+    for channel in range(channels):
+        weight = near.through[channel, root]
+        if channels == 1:
+            weight = np.float32(0.0)
+            for other in range(3):
+                weight += cells.weights[other] * near.through[other, root]
+        for l in range(0, n_lights, LANES):
+            to = (root * channels + channel) * near.light.shape[2] + l
+            found = load(here.irradiance, (k * channels + channel) * total_lights + near.first + l) * weight
+            store(near.light, to, load(near.light, to) + found)
+
+
+@inlined
+def _add_end(cells: Cells, k: int, room: GatherScratch, near: NearHits) -> None:
+    """Add the light of the cell at the end of the path of kept ray k."""
+    channels, n_lights = cells.light.shape[1], cells.light.shape[2]
+    own, cell = near.own[k], near.end[k]
     missed = cell == NOWHERE
     cell = 0 if missed else cell
     # 1. What has no l.
     for channel in range(3):
-        r = room.reflectivity[channel, ray]
+        r = room.reflectivity[channel, near.start[k]]
         near.hue[k, channel] = r * cells.tint[own, TINT + channel] * cells.tint[own, MEAN]
         arrives = cells.background[channel] if missed else cells.tint[cell, CONSTANT + channel]
-        near.constant[k, channel] = r * near.through[channel, k] * arrives
-    # 2. R(Q) E(Q)[l], or its mean over channels, sixteen light positions at a time.
+        near.constant[k, channel] = near.through[channel, k] * arrives
+    # 2. Light by sources, or its mean over channels, sixteen light positions at a time.
+    if missed:
+        return
     for channel in range(channels):
-        of_direct = of_cell = np.float32(0.0)
-        if channels == 3:
-            r = room.reflectivity[channel, ray]
-            of_direct, of_cell = r * near.series[channel, k], r * near.through[channel, k]
-        else:
+        weight = near.through[channel, k]
+        if channels == 1:
+            weight = np.float32(0.0)
             for other in range(3):
-                r = cells.weights[other] * room.reflectivity[other, ray]
-                of_direct += r * near.series[other, k]
-                of_cell += r * near.through[other, k] * cells.tint[cell, TINT + other]
+                weight += cells.weights[other] * near.through[other, k] * cells.tint[cell, TINT + other]
         for l in range(0, n_lights, LANES):
-            direct_at = (k * channels + channel) * total_lights + near.first + l
-            found = load(near.irradiance, direct_at) * of_direct
-            if not missed:
-                found = found + load(cells.light, (cell * channels + channel) * n_lights + l) * of_cell
-            store(near.light, (k * channels + channel) * near.light.shape[2] + l, found)
+            to = (k * channels + channel) * near.light.shape[2] + l
+            found = load(cells.light, (cell * channels + channel) * n_lights + l) * weight
+            store(near.light, to, load(near.light, to) + found)
