@@ -58,6 +58,7 @@ class LightKeys:
     Attributes:
         aims: of a spot: the way the middle of its light goes.
         cone_deg: of a spot: its angles `inner` and `outer`.
+        ies: of a measured lamp, a spot without cone: its file; and `ups` the direction of its horizontal angle 0.
         name: for a group.
     """
 
@@ -68,6 +69,8 @@ class LightKeys:
     about: tuple[str, ...]
     aims: tuple[Vector, ...] = ()
     cone_deg: tuple[float, float] | None = None
+    ies: Path | None = None
+    ups: tuple[Vector, ...] = ()
     name: str = "lamp"
     group: str | None = None
 
@@ -225,7 +228,8 @@ def source_table(source: LightSource) -> dict[str, Any]:
     """The table of a source."""
     group = {"group": source.group} if source.group else {}
     if isinstance(source, LightKeys):
-        return {"type": source.kind, **group, "keys": source_keys(source)}
+        ies = {"ies": str(source.ies)} if source.ies else {}
+        return {"type": source.kind, **group, **ies, "keys": source_keys(source)}
     if isinstance(source, MeshLight):
         own = {"material": source.material, "two_sided": source.two_sided}
         return {"type": "mesh", **group, **own, "keys": [{"frame": 0, "intensity": source.intensity}]}
@@ -250,6 +254,9 @@ def source_keys(source: LightKeys) -> list[dict[str, Any]]:
         {"frame": frame, place: list(vector), power: list(strength)}
         for frame, vector, strength in zip(source.frames, source.vectors, source.powers, strict=True)
     ]
+    if source.ies is not None:
+        aims = zip(keys, source.aims, source.ups, strict=True)
+        return [key | {"direction": list(aim), "up": list(up)} for key, aim, up in aims]
     if source.cone_deg is None:
         return keys
     inner, outer = source.cone_deg

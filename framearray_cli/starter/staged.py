@@ -101,7 +101,8 @@ def _light_vectors(stage: Stage, light: StageLight, times: list[float]) -> Float
     if light.kind == "point":
         return place
     way = _normalize(-matrices[:, :3, 2], light.name)
-    return way if light.kind == "directional" else np.concatenate([place, way], axis=1)
+    across = [_normalize(matrices[:, :3, 0], light.name)] if light.profile else []  # of horizontal angle 0
+    return way if light.kind == "directional" else np.concatenate([place, way, *across], axis=1)
 
 
 def _convert_light(light: StageLight, vectors: Float64) -> LightKeys:
@@ -110,13 +111,17 @@ def _convert_light(light: StageLight, vectors: Float64) -> LightKeys:
     strength = f"{max(light.intensity):.4g} {unit} by KHR_lights_punctual"
     about = [f'the {light.kind} light "{light.name}" of the file, there {strength}']
     cone = light.cone_deg
+    if light.profile is not None:
+        about = [f'the lamp "{light.name}" of the file, there {max(light.intensity):.4g} cd by EXT_lights_ies']
     return LightKeys(
         kind=light.kind,
         frames=tuple(range(n)),
         vectors=tuple(round_vector(vector[:3]) for vector in vectors[:n]),
         powers=(light.intensity,) * n,
         about=tuple(about),
-        aims=tuple(round_vector(vector[3:]) for vector in vectors[:n]) if cone else (),
+        aims=tuple(round_vector(vector[3:6]) for vector in vectors[:n]) if light.kind == "spot" else (),
+        ies=light.profile,
+        ups=tuple(round_vector(vector[6:]) for vector in vectors[:n]) if light.profile else (),
         cone_deg=(round(min(cone), 4), round(max(max(cone), NARROWEST), 4)) if cone else None,
         name=light.name,
     )

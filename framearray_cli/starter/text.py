@@ -52,7 +52,7 @@ def to_text(start: Start, job_file: Path) -> str:
             "",
             *_camera(start.camera),
             "",
-            *_lights(start),
+            *_lights(start, job_file),
             "",
             "[samples]",
             _line("hits", "2", "samples per pixel and frame; more: less noise, more time"),
@@ -116,15 +116,15 @@ def _camera(camera: Camera) -> list[str]:
     ]
 
 
-def _lights(start: Start) -> list[str]:
+def _lights(start: Start, job_file: Path) -> list[str]:
     positions = _line("frames", str(start.light_frames), "positions of the light; each gives one picture per eye")
     lines = ["[light]", positions]
     for source in start.sources:
-        lines += ["", "[[light.sources]]", *_comments(source.about), *_source(source)]
+        lines += ["", "[[light.sources]]", *_comments(source.about), *_source(source, job_file)]
     return lines
 
 
-def _source(source: LightSource) -> list[str]:
+def _source(source: LightSource, job_file: Path) -> list[str]:
     group = [_line("group", quoted(source.group), "stored separately, to change it afterwards")] if source.group else []
     if isinstance(source, SunDay):
         return [_line("type", '"sun"', "by place and time"), *group, *_sun(source)]
@@ -145,6 +145,7 @@ def _source(source: LightSource) -> list[str]:
             '"point": a lamp; "spot": in a cone; "directional": the sun; "sun": by place and time',
         ),
         *group,
+        *([_line("ies", quoted(scene_name(source.ies, job_file)), "how it shines by direction")] if source.ies else []),
         f"keys = [                                  # {power}: red, green, blue, {unit}",
         *(f"  {_inline(key)}," for key in source_keys(source)),
         "]",

@@ -35,15 +35,23 @@ class Assets:
     refused: list[str] = field(default_factory=list)
 
     def read(self, name: str) -> bytes:
-        """Return the bytes of a file that the scene names.
+        """Return the bytes of a file that the scene names; see `locate`.
+
+        Raises:
+            AssetError: missing, elsewhere, or unreadable.
+            SceneError: larger than the memory that may be used.
+        """
+        return self._bytes(self.locate(name), shorten(name))
+
+    def locate(self, name: str) -> Path:
+        """Return the path of a file that the scene names.
 
         Accepts Windows paths, percent codes, quotes and `file:`. Exporters often write paths of another machine: where
         the named path does not exist, or leads elsewhere, a file of the same name directly in one of the folders is
         read instead. Links are followed, and must not lead elsewhere either.
 
         Raises:
-            AssetError: missing, elsewhere, or unreadable.
-            SceneError: larger than the memory that may be used.
+            AssetError: missing, or elsewhere.
         """
         shown = shorten(name)
         clean = name.strip().strip('"')
@@ -56,7 +64,7 @@ class Assets:
                 elif not any(_below(_real(whole), allowed) for allowed in self._roots(lexical=False)):
                     outside = True
                 elif _is_file(whole):
-                    return self._bytes(whole, shown)
+                    return whole
         if outside or _leads_away(clean):
             if shown not in self.refused:
                 self.refused.append(shown)

@@ -76,7 +76,7 @@ def read_stage(file: Path, folders: Sequence[Path] = ()) -> Stage:
     with np.errstate(all="ignore"), _scene_errors(file, extension):
         gltf = open_gltf(_bytes_of(file, assets.limit), assets)
         check_readable(gltf)
-        return read_gltf_stage(gltf)
+        return read_gltf_stage(gltf, assets)
 
 
 @contextmanager

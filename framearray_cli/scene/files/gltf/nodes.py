@@ -76,8 +76,10 @@ def used_materials(gltf: Gltf) -> set[int]:
 def note_unread(gltf: Gltf, notes: Notes) -> None:
     """Note what the file contains and the renderer does not show."""
     for extension in sorted(set(gltf.tree.get("extensionsUsed") or []) - HANDLED):
-        if extension != "KHR_lights_punctual" and not extension.startswith("KHR_materials_"):  # noted elsewhere
-            notes.add(f"{extension} is left out")
+        if extension == "EXT_lights_image_based":
+            notes.add(f'{extension} is left out, as its cube maps are no panorama; give one to a source "environment"')
+        elif extension not in ("KHR_lights_punctual", "EXT_lights_ies") and not extension.startswith("KHR_materials_"):
+            notes.add(f"{extension} is left out")  # the others are noted elsewhere
     if _moves_meshes(gltf):
         notes.add("animations of meshes are left out; they stand in their rest pose")
     if gltf.items("skins"):

@@ -3,15 +3,20 @@
 import math
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from framearray_cli.base.arrays import Float64
+from framearray_cli.job.ies import read_photometry
+from framearray_cli.job.rowfile import RowFileError
 
+from ..assets import AssetError, Assets
 from .container import Gltf
 from .motion import Motion, read_motion
 from .values import Tree
 
 PUNCTUAL = "KHR_lights_punctual"
+MEASURED = "EXT_lights_ies"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,6 +41,7 @@ class StageLight:
     Attributes:
         intensity: (3,) linear RGB: candela of a point or spot, lux of a directional light.
         cone_deg: of a spot: the angles from its axis up to which it is brightest, and beyond which it is dark.
+        profile: IES file of a spot without a cone; `intensity` is that of its brightest direction.
     """
 
     name: str
@@ -43,6 +49,7 @@ class StageLight:
     kind: Literal["point", "directional", "spot"]
     intensity: tuple[float, float, float]
     cone_deg: tuple[float, float] | None = None
+    profile: Path | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,7 +76,7 @@ class Stage:
         return self.motion.span(nodes) if self.motion else None
 
 
-def read_gltf_stage(gltf: Gltf) -> Stage:
+def read_gltf_stage(gltf: Gltf, assets: Assets) -> Stage:
     """Find the cameras and lights of the file's default scene.
 
     Raises:
@@ -88,6 +95,10 @@ def read_gltf_stage(gltf: Gltf) -> Stage:
         punctual = (node.get("extensions") or {}).get(PUNCTUAL)
         if punctual is not None:
             lights.append(_light(index, node, lights_table[punctual["light"]]))
+        measured = (node.get("extensions") or {}).get(MEASURED)
+        if measured is not None:
+            light = _measured(index, node, measured, gltf, assets, notes)
+            lights += [light] if light else []
     return Stage(cameras=tuple(cameras), lights=tuple(lights), motion=motion, notes=tuple(notes))
 
 
@@ -135,6 +146,31 @@ def _light(index: int, node: Tree, entry: Tree) -> StageLight:
     name = str(node.get("name") or entry.get("name") or f"light {index}")
     cone = _cone_deg(entry.get("spot", {})) if kind == "spot" else None
     return StageLight(name=name, node=index, kind=kind, intensity=(red, green, blue), cone_deg=cone)
+
+
+def _measured(
+    index: int, node: Tree, instance: Tree, gltf: Gltf, assets: Assets, notes: list[str]
+) -> StageLight | None:
+    """Read a lamp with a file of its light [EXT_lights_ies], or note why it cannot be used."""
+    name = str(node.get("name") or f"light {index}")
+    try:
+        entry = gltf.tree["extensions"][MEASURED]["lights"][instance["light"]]
+        uri = entry.get("uri")
+        if not isinstance(uri, str) or uri.startswith("data:"):
+            notes.append(f"light {name}: its IES file lies inside the scene file and is left out; save it beside it")
+            return None
+        file = assets.locate(uri)
+        web = read_photometry(file)
+        peak = web.factor * max(map(max, web.candela)) * float(instance.get("multiplier", 1.0))
+        red, green, blue = (max(peak * float(channel), 0.0) for channel in instance.get("color", (1.0, 1.0, 1.0)))
+        return StageLight(name=name, node=index, kind="spot", intensity=(red, green, blue), profile=file)
+    except AssetError as error:
+        notes.append(f"light {name}: is left out: {error}")
+    except RowFileError as error:
+        notes.append(f"light {name}: is left out: {uri}: {error.args[0]}")
+    except (LookupError, TypeError, ValueError, AttributeError):
+        notes.append(f"light {name}: its {MEASURED} is broken and is left out")
+    return None
 
 
 def _cone_deg(spot: Tree) -> tuple[float, float]:
