@@ -8,6 +8,7 @@ import pytest
 from support import tiny
 
 from framearray_cli.array.images.images import ImageFormat, write_image
+from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.job.job import Job
 
 RNG = np.random.default_rng(4)
@@ -109,3 +110,17 @@ def test_suns_are_seen_once(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.median(image, axis=0), [1.0, 0.5, 1.0], rtol=1e-4)
     np.testing.assert_allclose(image.mean(axis=0), wanted.mean(axis=0), rtol=0.05)
     assert wanted.mean() > 1.5  # 0.83 without the sun
+
+
+@pytest.mark.parametrize("shadow_step", [1, 2])
+def test_blocks_of_positions_show_the_same(tmp_path: Path, pixels: Any, shadow_step: int) -> None:
+    """To the last bit, in a room with mirrors; with shadow steps all positions are computed and some are kept."""
+    inputs = tiny.prepared(job_with(tmp_path / "sky.exr", pixels, samples={"shadow_step": shadow_step}))
+    with tiny.planned(inputs) as (setup, ambient):
+        parts = []
+        for block in (range(0, 3), range(0, 1), range(1, 3)):
+            part = setup.for_lights(block)
+            i_a = ambient.for_lights(block) if part.keeps_all else ambient
+            with TracePool(part, 1) as pool:
+                parts.append(tiny.frames_of(part, i_a, pool)[0].images)
+    np.testing.assert_array_equal(parts[0], np.concatenate(parts[1:]))
