@@ -4,9 +4,12 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomli_w
 from bench.core.results import ROOT
 from support import tiny
+
+from framearray_cli.array.images.images import ImageFormat, write_image
 
 SUN = {
     "type": "sun",
@@ -23,6 +26,10 @@ SUN = {
 YEAR = SUN | {"date": ["2026-03-20", "2026-06-21"], "step": 180.0}
 DOME = {"type": "dome", "positions": 3, "shape": "sphere", "top": [0.1, 1, 0], "irradiance": 2.0, "color": "3200 K"}
 LAMPS = {"type": "dome", "positions": 2, "target": [0.1, 0.9, 0.2], "radius": 1.5, "intensity": [4.0, 3.0, 2.0]}
+TURNS = [
+    {"frame": 0, "rotation": -30.0, "intensity": 2.0, "color": "5000 K"},
+    {"frame": 2, "rotation": 90, "intensity": [1.0, 0.5, 0.2], "color": [1.0, 0.9, 0.8]},
+]
 GRID = {
     "type": "grid",
     "counts": [2, 2],
@@ -120,6 +127,7 @@ EXR = {"format": "exr"}
 def tables(scene: str) -> dict[str, dict[str, Any]]:
     """Small jobs by name; between them they use every key of the schema."""
     small = {"resolution": [12, 9]}
+    sky = {"type": "environment", "file": str(Path(scene).with_name("sky.exr")), "keys": TURNS}
     jobs = {
         "plain": tiny.table(camera=small),
         "cells": tiny.table(camera=small, indirect={"method": "cells", "samples": 1024, "cell": 0.2}),
@@ -146,6 +154,7 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
         "domes": tiny.table(
             camera=small, light={"sources": [DOME, LAMPS, GRID, IN_PICTURE, *SPOTS, *PANELS, *MESHES], "frames": 4}
         ),
+        "panorama": tiny.table(camera=small, light={"sources": [sky], "frames": 3}),
         "automatic": tiny.table(
             camera=small | tiny.WALK, samples={"hits": "auto", "obscurance": 4}, reuse={"n_r": "auto"}, output=EXR
         ),
@@ -190,5 +199,6 @@ def texts(scene: str) -> list[str]:
 
 
 def with_scene(folder: Path) -> Path:
-    """The scene of all of them."""
+    """The scene of all of them; beside it the environment of one."""
+    write_image(folder / "sky.exr", np.full((4, 8, 3), (0.2, 0.5, 1.0), np.float32), ImageFormat())
     return tiny.save_glb(tiny.room_meshes(), folder / "tiny.glb")
