@@ -13,6 +13,7 @@ from support.iesfiles import ies
 from support.movies import plain
 from typer.testing import CliRunner
 
+from framearray_cli.array.images.images import ImageFormat, write_image
 from framearray_cli.array.manifest import ManifestLight
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.cli.main import app
@@ -36,6 +37,7 @@ def job_with(folder: Path, text: str) -> Job:
     rows = [f"shot {k}.jpg {x} {y} {z}" for k, (x, y, z) in enumerate(ways)]
     (folder / "coin.lp").write_text("\n".join([str(len(rows)), *rows, ""]))
     (folder / "floodlight.ies").write_text(ies())
+    write_image(folder / "sky.exr", np.ones((4, 8, 3), np.float32), ImageFormat())
     rest = {key: value for key, value in tiny.table().items() if key != "light"} | {"scene": {"file": "a.glb"}}
     table = tomli_w.dumps(rest)
     (folder / "job.toml").write_text(f"{table}\n{text}", encoding="utf-8")
