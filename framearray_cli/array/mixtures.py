@@ -18,7 +18,20 @@ LINEAR = (".exr", ".tif")
 # Rounding of weights that sum to 1: of numbers with six digits in a file.
 MEAN_ERROR = 1e-4
 _STRENGTHS = ("intensity", "irradiance", "radiance")
-_SHAPES = ("radius", "angle", "inner", "outer", "across", "width", "height", "two_sided", "up", "ies", "material")
+_SHAPES = (
+    "radius",
+    "angle",
+    "inner",
+    "outer",
+    "across",
+    "width",
+    "height",
+    "two_sided",
+    "up",
+    "ies",
+    "material",
+    "rotation",
+)
 _PLACES = ("type", "position", "direction", *_STRENGTHS, *_SHAPES)  # what the light of a source depends on
 
 

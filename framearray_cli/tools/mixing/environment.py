@@ -24,6 +24,8 @@ ROWS = 128  # of the map that is summed: cells of 1.4 degrees, where domes have 
 LINEAR_MAPS = (".exr", ".hdr", ".tif", ".tiff")
 # Points whose distances to the middle of the fitted sphere differ by more than this share lie on none.
 ROUNDNESS = 0.05
+# Why light of a type stands for no direction; other types shine one way.
+_MISFITS = {"environment": "comes from all sides", "mesh": "comes from surfaces of the scene"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -120,8 +122,8 @@ def light_field(manifest: Manifest) -> LightField:
     tables = [light.sources[k] for light in lights]
     if shaped := {table["type"] for table in tables} - {"point", "directional"}:
         raise OutputError(
-            f"{manifest.directory}: an environment needs light from points or directions, got a {min(shaped)}, which "
-            "does not shine to all sides"
+            f"{manifest.directory}: an environment needs light from points or directions, got type {min(shaped)!r}, "
+            f"which {_MISFITS.get(min(shaped), 'does not shine to all sides')}"
         )
     up = str(manifest.job.get("scene", {}).get("up", "y"))
     if all("direction" in table for table in tables):

@@ -12,7 +12,7 @@ from support.movies import grouped, plain
 from framearray_cli.array.images.images import ImageFormat, read_image, read_layers, write_image
 from framearray_cli.array.manifest import Manifest, ManifestLight, image_path
 from framearray_cli.array.manifest_toml import write_manifest
-from framearray_cli.array.mixtures import Mixture, constant_sources
+from framearray_cli.array.mixtures import Mixture
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.scene.paths.domes import dome_directions
@@ -149,16 +149,17 @@ def test_points_on_no_sphere_are_refused(array: Manifest, positions: Any) -> Non
 def test_lamps_that_shine_one_way_light_no_environment(array: Manifest) -> None:
     ways = dome_directions(6, UP, whole=False)
     spots = [directional(way) | {"type": "spot", "position": way.tolist(), "intensity": [8.0] * 3} for way in ways]
-    with pytest.raises(OutputError, match="needs light from points or directions, got a spot, which does not shine"):
+    with pytest.raises(OutputError, match="from points or directions, got type 'spot', which does not shine to all"):
         light_field(with_sources(array, spots))
 
 
-@pytest.mark.parametrize("change", [{"width": 2.0}, {"two_sided": True}, {"across": [0.0, 0.0, 1.0]}])
-def test_a_panel_that_changes_its_shape_is_not_constant(array: Manifest, change: dict[str, Any]) -> None:
-    panel = {"type": "rect", "position": [0.0] * 3, "intensity": [1.0] * 3, "width": 1.0, "two_sided": False}
-    stays = with_sources(array, [panel] * 6)
-    assert constant_sources(stays.lights) == [0]
-    assert constant_sources(with_sources(array, [panel, panel | change] * 3).lights) == []
+def test_light_from_all_sides_or_surfaces_lights_no_environment(array: Manifest) -> None:
+    turning = [{"type": "environment", "rotation": 60.0 * l, "intensity": [1.0] * 3} for l in range(6)]
+    with pytest.raises(OutputError, match="got type 'environment', which comes from all sides"):
+        light_field(with_sources(array, turning))
+    shining = [{"type": "mesh", "material": "Lamp", "radiance": [float(l)] * 3} for l in range(6)]
+    with pytest.raises(OutputError, match="got type 'mesh', which comes from surfaces of the scene"):
+        light_field(with_sources(array, shining))
 
 
 def test_light_from_elsewhere_is_named(array: Manifest, tmp_path: Path) -> None:
