@@ -5,13 +5,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tomli_w
 from support import tiny
-from support.iesfiles import TILT, VARIANTS, ies
+from support.iesfiles import DOWN, TILT, VARIANTS, ies
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.engine.inputs.shapes import emitted_power
 from framearray_cli.job.ies import Photometry, read_photometry
+from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.paths import lights, lights_without_groups
 from framearray_cli.scene.paths.placing import LightPath
 from framearray_cli.scene.paths.profiles import read_web
@@ -151,6 +153,37 @@ def test_units_are_those_of_photometry(source: Any, key: dict[str, Any], units: 
     if units == "lm":
         power = emitted_power(light_arrays(lights_without_groups([path]), np.zeros(3)), 0, 1.0)[0]
         assert power * path.intensity[0, 0] * 683 == pytest.approx(3, rel=1e-4)
+
+
+def test_a_measured_lamp_at_the_positions_of_a_file(tmp_path: Path) -> None:
+    """The photometry of one file from the places, targets and strengths of another, as from the same keys."""
+    (tmp_path / "lamp.ies").write_text(ies(DOWN, [0, 60, 120, 180]))
+    spots = "x,y,z,target_x,target_y,target_z,intensity\n0,2,0,0,0,2,5\n1,2,0,0,0,0,6\n"
+    (tmp_path / "spots.csv").write_text(spots)
+    (tmp_path / "lamps.lp").write_text("2\na.jpg 0 2 0\nb.jpg 1 2 0\n")
+    up = [0.0, 0.0, 1.0]
+    sources: list[dict[str, Any]] = [
+        {"type": "spot", "ies": "lamp.ies", "file": "spots.csv"},
+        {"type": "point", "ies": "lamp.ies", "file": "lamps.lp", "up": up},
+    ]
+    file = tmp_path / "job.toml"
+    file.write_text(tomli_w.dumps(tiny.table() | {"light": {"sources": sources}, "scene": {"file": "a.glb"}}))
+    spot, lamp = lights(read_job(file)).sources
+    at = [{"position": [0.0, 2.0, 0.0]}, {"position": [1.0, 2.0, 0.0]}]
+    aims = [{"target": [0.0, 0.0, 2.0], "intensity": 5.0}, {"target": [0.0, 0.0, 0.0], "intensity": 6.0}]
+    text = (tmp_path / "lamp.ies").read_text()
+    by_keys = placed(tmp_path, text, *(place | aim for place, aim in zip(at, aims, strict=True)))
+    hanging = placed(tmp_path, text, *(place | {"up": up} for place in at))
+    for found, wanted in ((spot, by_keys), (lamp, hanging)):
+        assert found.profile is not None and wanted.profile is not None
+        assert found.profile.web.digest == wanted.profile.web.digest
+        np.testing.assert_array_equal(found.vector, [place["position"] for place in at])
+        np.testing.assert_allclose(found.intensity, wanted.intensity[:2])
+        np.testing.assert_allclose(found.profile.axis, wanted.profile.axis[:2], atol=1e-12)
+        np.testing.assert_allclose(found.profile.zero, wanted.profile.zero[:2], atol=1e-12)
+    assert spot.intensity[:, 0] == pytest.approx([5, 6])
+    brightest = max(map(max, read_photometry(tmp_path / "lamp.ies").candela))
+    assert lamp.intensity[:, 0] == pytest.approx([brightest / 683] * 2)
 
 
 def test_positions_say_the_file_and_how_the_lamp_is_turned(tmp_path: Path) -> None:
