@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
+from support.handmade import write_sky
 
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.mixtures import check_mixture, constant_parts
@@ -80,6 +81,54 @@ def test_groups_add_what_stays_only_once(scene: Path, tmp_path: Path, dome: Pict
     check_mixture(groups.manifest, mixture)
     whole = rendered(scene, tmp_path / "whole", [*at_once(dome, WEIGHTS), SUN], background=sky).picture(0, (0,))
     np.testing.assert_allclose(groups.picture(0, (mixture,)), whole, rtol=2e-5, atol=2e-6)
+
+
+STRENGTHS = np.array([[1.0, 0.5, 0.25], [0.0, 2.0, 1.0], [0.5, 0.0, 0.0], [2.0, 1.0, 0.5]])  # along the axis
+
+
+def new_source(kind: str, strengths: Any, sky: Path) -> dict[str, Any]:
+    """A lit surface, a map or a lamp with a size, in its place, of one strength per key."""
+    places: dict[str, dict[str, Any]] = {
+        "mesh": {"material": "Smooth"},
+        "environment": {"file": str(sky)},
+        "rect": {"position": [0.2, 2.3, 0.0], "direction": [0.0, -1.0, 0.2], "width": 0.8, "height": 0.4},
+        "point": {"position": [-0.5, 1.8, 0.6], "radius": 0.1},
+    }
+    of_source = {key: value for key, value in places[kind].items() if key in ("material", "file")}
+    of_key = {key: value for key, value in places[kind].items() if key not in of_source}
+    strength = "intensity" if kind in ("environment", "point") else "radiance"
+    keys = [{"frame": k, strength: list(map(float, value)), **of_key} for k, value in enumerate(strengths)]
+    return (
+        {"type": kind, **of_source, "visible": True, "keys": keys}
+        if of_key
+        else {"type": kind, **of_source, "keys": keys}
+    )
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "mesh",
+        "environment",
+        pytest.param("rect", marks=pytest.mark.slow),
+        pytest.param("point", marks=pytest.mark.slow),
+    ],
+)
+def test_a_sum_knows_sources_with_a_size_and_those_that_eyes_see(
+    scene: Path, tmp_path: Path, dome: Pictures, kind: str
+) -> None:
+    """They keep their place, so the render of all at once draws the same points of them."""
+    sky = write_sky(tmp_path / "sky.exr", top=2.0)  # no texel is a sun, which would be a source behind all others
+    mixture = mixture_of(WEIGHTS)
+    for stays in (False, True):
+        strengths = STRENGTHS[:1] if stays else STRENGTHS
+        total = strengths[0] if stays else (WEIGHTS * STRENGTHS).sum(axis=0)
+        sources = [new_source(kind, strengths, sky) | {"group": "new"}, DOME | {"group": "dome"}]
+        groups = rendered(scene, tmp_path / f"groups{stays}", sources, background=[0.1, 0.2, 0.3])
+        check_mixture(groups.manifest, mixture)
+        at = [new_source(kind, [total], sky), *at_once(dome, WEIGHTS)]
+        whole = rendered(scene, tmp_path / f"whole{stays}", at, background=[0.1, 0.2, 0.3]).picture(0, (0,))
+        np.testing.assert_allclose(groups.picture(0, (mixture,)), whole, rtol=5e-5, atol=5e-6)
 
 
 def test_what_stays_is_found_in_the_manifest(scene: Path, tmp_path: Path, dome: Pictures) -> None:
