@@ -16,6 +16,8 @@ from .selection import ExportedFrame, Selection, axis_keys, rigid_pose, sources_
 
 TABLE_FILE = "data.csv"
 DATABASE_SUFFIX = ".cdb"
+STRENGTHS = ("intensity", "irradiance", "radiance")
+NUMBERS = ("radius", "angle", "inner", "outer", "width", "height", "rotation")
 
 
 def write_table(folder: Path, selection: Selection, files: Mapping[str, str]) -> None:
@@ -48,10 +50,11 @@ def _row(selection: Selection, frame: ExportedFrame) -> dict[str, Any]:
     for k, source in enumerate(sources):
         name = "source" if len(sources) == 1 else f"source{k}"
         row[f"{name}_type"] = source["type"]
-        for key in ("position", "direction", "across", "up", "intensity", "irradiance"):
+        row |= {f"{name}_{key}": str(source[key]) for key in ("material", "file", "ies") if key in source}
+        for key in ("position", "direction", "across", "up", *STRENGTHS):
             if key in source:
-                row |= _vector(f"{name}_{key}", source[key], "rgb" if key in ("intensity", "irradiance") else "xyz")
-        row |= {f"{name}_{key}": float(source[key]) for key in ("radius", "angle", "width", "height") if key in source}
+                row |= _vector(f"{name}_{key}", source[key], "rgb" if key in STRENGTHS else "xyz")
+        row |= {f"{name}_{key}": float(source[key]) for key in NUMBERS if key in source}
         row |= {f"{name}_time": str(source["time"])} if "time" in source else {}
     return row
 

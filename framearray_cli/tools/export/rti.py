@@ -30,7 +30,12 @@ def check_lights(selection: Selection) -> None:
     """
     manifest = selection.manifest
     for lights in selection.lights:
-        found = [source for source in sources_at(manifest, lights) if _vector_key(source)]
+        found = sources_at(manifest, lights)
+        if len(found) == 1 and not _vector_key(found[0]):
+            raise OutputError(
+                f"{manifest.directory}: expected a source with a position or a direction, as an .lp has one direction "
+                f"per picture, got type {found[0]['type']!r}"
+            )
         if len(found) != 1:
             raise OutputError(
                 f"{manifest.directory}: expected one source per picture, as an .lp has one direction per picture, got "

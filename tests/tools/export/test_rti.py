@@ -1,6 +1,7 @@
 """Export for reflectance imaging: an `.lp` that our own jobs, and the rules of the format, read back."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +83,18 @@ def test_light_from_above_and_from_the_camera(tmp_path: Path) -> None:
 def test_several_sources_are_refused(n: int, tmp_path: Path) -> None:
     manifest = write_array(plain_manifest(tmp_path / "out", lights=[light(l, n) for l in range(3)]))
     with pytest.raises(OutputError, match=f"expected one source per picture, .*, got {n} at light position 0"):
+        export_array(manifest.directory, tmp_path / "rti", "rti")
+
+
+SHINING = {"type": "mesh", "material": "Lamp", "radiance": [1.0] * 3, "two_sided": True}
+
+
+@pytest.mark.parametrize(("n", "found"), [(0, "with a position or a direction, .*, got type 'mesh'"), (1, "got 2 at")])
+def test_surfaces_that_shine_are_refused(n: int, found: str, tmp_path: Path) -> None:
+    at = [light(l, n) for l in range(3)]
+    with_mesh = [replace(each, sources=(*each.sources, SHINING)) for each in at]
+    manifest = write_array(plain_manifest(tmp_path / "out", lights=with_mesh))
+    with pytest.raises(OutputError, match=found):
         export_array(manifest.directory, tmp_path / "rti", "rti")
 
 
