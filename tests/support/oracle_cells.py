@@ -256,15 +256,15 @@ class LocalOracle(CellOracle):
     """Renders single images of a job whose obscurances have the ambient light of cells."""
 
     def gathered(self, hits: Points, l: int) -> tuple[Any, Any]:
-        """E_indirect[l] by sources, and the radiance that is the same under every light: W times what cells hold."""
+        """E_indirect[l] by sources, and the radiance that has no l: W times what cells hold, and S."""
         cells, met = self.cells, np.flatnonzero(hits.surface)
-        obscurance, _ = self.obscurance(hits)
+        obscurance, same = self.obscurance(hits)
         along, across = tangents(hits.geometric)
         random = rnd.points(rnd.bits(hits.key, CELLS), np.zeros(len(hits)), rnd.sequence()) - 0.5
         shift = random[:, :1] * along + random[:, 1:] * across
         length = np.full(len(met), 2**LOCAL * self.cells.grid.edge / SHARE)  # of a ray that reads this level
         k = self.places.find(hits.position[met], hits.geometric[met], length, shift[met])
-        light, same = np.zeros((len(hits), 3)), np.zeros((len(hits), 3))
+        light = np.zeros((len(hits), 3))
         light[met] = obscurance[met] * cells.tint[k, :3] * cells.light[k, :, l] * self.inputs.light_arrays.colour[l]
-        same[met] = obscurance[met] * cells.tint[k, 4:7]
+        same[met] += obscurance[met] * cells.tint[k, 4:7]
         return light, same

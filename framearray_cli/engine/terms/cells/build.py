@@ -239,7 +239,11 @@ def _direct_light(
 
 
 def _constant_light(work: CellWork, members: Members, samples: Samples, pool: ThreadPoolExecutor) -> Float64:
-    """The irradiance of all cells by the background, (n_cells, 3)."""
+    """The irradiance of all cells by the background, (n_cells, 3); without its direct part where hits see that."""
     escaped = np.isinf(samples.length)[:, None] * samples.reflectivity
     by_sample = np.ascontiguousarray(np.pi * escaped * work.background, np.float32)[:, :, None]
-    return solve(members, mean_by_cell(members, by_sample, pool), pool)[:, :, 0].astype(np.float64)
+    own = mean_by_cell(members, by_sample, pool)
+    found = solve(members, own, pool)
+    if work.local and work.local.sky:
+        found -= own
+    return found[:, :, 0].astype(np.float64)

@@ -3,7 +3,8 @@
     L_indirect(P, l) = R(P) I_A(k, l) W(P),        I_A(k, l) = E_indirect(k, l) / (pi W(k))        k: the cell of P
 
 E_indirect(k, l) is the mean over samples of cell k of the light that their links bring, and W(k) the mean of R(y) rho
-over the same links. No ray is traced at P but those of W.
+over the same links. No ray is traced at P but those of W. The background that these rays see with `outside =
+"background"`, S, is known at P: links that see it bring nothing then, and W does not count them.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -23,7 +24,7 @@ from .guards import choose_slots, write_guard_ray
 from .lookups import GatherScratch
 from .samples import Samples
 from .sweeps import Members, mean_by_cell
-from .table import CONSTANT, MEAN, NOWHERE, TINT, Cells, find_cell, shifts, side_of
+from .table import ALL, CONSTANT, MEAN, NOWHERE, TINT, Cells, find_cell, shifts, side_of
 
 # Cells of this level are read: 4 h_0 wide. Their samples are enough for a mean, and small rooms have several.
 LOCAL_LEVEL = 2
@@ -53,6 +54,8 @@ def obscurance_of_cells(members: Members, samples: Samples, curve: ObscuranceCur
 def per_obscurance(cells: Cells, obscurance: Rgb) -> Cells:
     """The cells with the light that arrives per W, in place of the light that arrives.
 
+    Where W is 0, as if no link meets anything under an open sky, it is that of all surfaces together.
+
     Args:
         obscurance: (n_cells, 3) W.
     """
@@ -65,6 +68,8 @@ def per_obscurance(cells: Cells, obscurance: Rgb) -> Cells:
         level = hue @ cells.weights.astype(np.float64)
         cells.light[:] *= level[:, None, None]
         cells.tint[:, TINT : TINT + 3] = hue / level[:, None]
+    unknown = ~obscurance.any(axis=1)
+    cells.light[unknown], cells.tint[unknown] = cells.light[ALL], cells.tint[ALL]
     cells.tint[:, MEAN] = cells.light.mean(axis=(1, 2), dtype=np.float64)
     return cells
 
@@ -73,7 +78,7 @@ def per_obscurance(cells: Cells, obscurance: Rgb) -> Cells:
 def read_cells(
     hits: Hits, n: int, cells: Cells, tracer: Tracer, room: GatherScratch, tests: Rays, out: Gathered
 ) -> int:
-    """Read the light of hits 0 to n - 1 from their cells, times W, which is known; see `Gathered`.
+    """Read the light of hits 0 to n - 1 from their cells, times W, which is known, as S is; see `Gathered`.
 
     Hits are moved within their surfaces by up to half a cell, at random. Returns the number of rays to guards.
     """
@@ -86,7 +91,7 @@ def read_cells(
         out.light[i, LEVEL] = 0.0
         room.cell[i] = NOWHERE
         for channel in range(3):
-            out.constant[i, channel] = 0.0
+            out.constant[i, channel] = out.skylight[i, channel] if out.skylight.shape[0] else np.float32(0.0)
         if not reflects(hits, i):
             continue
         p, g = hits.position, hits.geometric
@@ -112,7 +117,7 @@ def read_cells(
         for channel in range(3):
             w = out.obscurance[i, channel]
             out.light[i, COLOUR + channel] = w * cells.tint[cell, TINT + channel]
-            out.constant[i, channel] = w * cells.tint[cell, CONSTANT + channel]
+            out.constant[i, channel] += w * cells.tint[cell, CONSTANT + channel]
             mean += cells.weights[channel] * out.light[i, COLOUR + channel]
         out.light[i, LEVEL] = mean * cells.tint[cell, MEAN]
         for channel in range(channels):

@@ -51,7 +51,9 @@ def test_cells_hold_what_arrives_per_obscurance() -> None:
 
 
 @pytest.mark.parametrize(
-    "changes", [{}, SKY, {"light": {"sources": [LAMP, tiny.SUN, tiny.RED]}}], ids=["", "sky", "rgb"]
+    "changes",
+    [{}, SKY, {**SKY, "obscurance": {"outside": "background"}}, {"light": {"sources": [LAMP, tiny.SUN, tiny.RED]}}],
+    ids=["", "sky", "sky seen from hits", "rgb"],
 )
 def test_every_pixel_is_that_of_the_twin(changes: dict[str, Any]) -> None:
     with built(tiny.room(mirrors=False), **LOCAL, **changes) as case, TracePool(case.setup, 2) as pool:
