@@ -4,7 +4,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Generic, TypeAlias, TypeVar
 
 from pydantic import Field, PlainValidator, ValidationError, WithJsonSchema
 
@@ -16,6 +16,8 @@ from framearray_cli.base.forms.temperature import EXAMPLE, SCHEMA, temperature_c
 from framearray_cli.base.forms.words import shown
 
 STRONGEST = 1e6  # times the rendered light; half floats overflow before that
+WIDEST = 1e5  # light positions
+LONGEST_NAME = 1000  # letters
 LONGEST_S = 1e6  # seconds; a later key frame is a typing error
 
 
@@ -26,42 +28,65 @@ class LightCurve:
     keys: tuple[tuple[float | str, Float3], ...]
 
 
-def _curve(grey_only: bool) -> Callable[[object], LightCurve]:
-    """Make the check of a value or a list of key frames.
+@dataclass(frozen=True, slots=True)
+class FileCurve:
+    """Key frames whose values are files.
 
-    Args:
-        grey_only: a value is one number; else it may be three.
+    Attributes:
+        files: one per key frame.
+        places: a place among the files, from 0; between two key frames both count.
     """
 
-    def check(value: object) -> LightCurve:
-        if not (isinstance(value, list) and any(isinstance(item, dict) for item in value)):
-            return LightCurve(((0.0, _value(value, grey_only, ())),))
-        problems: list[tuple[Place, str]] = []
-        keys = [_key(item, grey_only, k, problems) for k, item in enumerate(value)]
-        if problems:
-            fail(problems)
-        return LightCurve(tuple(keys))
-
-    return check
+    files: tuple[str, ...]
+    places: LightCurve
 
 
-def _key(item: object, grey_only: bool, k: int, problems: list[tuple[Place, str]]) -> tuple[float | str, Float3]:
+Value = TypeVar("Value", Float3, str)
+
+
+@dataclass(frozen=True, slots=True)
+class _Kind(Generic[Value]):
+    """What a curve holds.
+
+    Attributes:
+        check: of one value, at its place in the key.
+        wanted: how messages name it.
+        instead: what stands for a broken one.
+    """
+
+    check: Callable[[object, Place], Value]
+    wanted: str
+    instead: Value
+
+
+def _keys(value: object, kind: _Kind[Value]) -> tuple[tuple[float | str, Value], ...]:
+    """Check a value, or a list of key frames."""
+    if not (isinstance(value, list) and any(isinstance(item, dict) for item in value)):
+        return ((0.0, kind.check(value, ())),)
+    problems: list[tuple[Place, str]] = []
+    keys = [_key(item, kind, k, problems) for k, item in enumerate(value)]
+    if problems:
+        fail(problems)
+    return tuple(keys)
+
+
+def _key(item: object, kind: _Kind[Value], k: int, problems: list[tuple[Place, str]]) -> tuple[float | str, Value]:
     """Check one key frame."""
+    value = kind.instead
     if not isinstance(item, dict):
         problems.append(((k,), f"expected a table with time and value, got {shown(item)}"))
-        return 0.0, (0.0, 0.0, 0.0)
+        return 0.0, value
     for name in item.keys() - {"time", "value"}:
         problems.append(((k, name), "unknown key; known here: time, value"))
     time: Any = item.get("time")
-    value = (0.0, 0.0, 0.0)
     if not _is_time(time):
         problems.append(((k, "time"), f'expected seconds, or a percentage such as "50%", {_found(item, "time")}'))
         time = 0.0
     if "value" not in item:
-        problems.append(((k, "value"), f"missing; expected {_wanted(grey_only)}"))
+        problems.append(((k, "value"), f"missing; expected {kind.wanted}"))
     else:
         try:
-            value = _value(item["value"], grey_only, (k, "value"))
+            value = kind.check(item["value"], (k, "value"))
         except ValidationError as error:
             problems += [(detail["loc"], detail["msg"]) for detail in error.errors()]
     return time if isinstance(time, str) else float(time), value
@@ -77,39 +102,79 @@ def _found(item: Mapping[str, object], key: str) -> str:
     return f"got {shown(item[key])}" if key in item else "got none"
 
 
-def _wanted(grey_only: bool) -> str:
-    bounds = f"from 0 to {STRONGEST:.0f}"
-    return f"a number {bounds}" if grey_only else f"a number or 3 numbers {bounds}, or {EXAMPLE}"
+def _number(low: float, high: float) -> _Kind[Float3]:
+    """One number within bounds, as a grey value."""
+    wanted = f"a number from {low:.0f} to {high:.0f}"
+
+    def check(value: object, place: Place) -> Float3:
+        if not (isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high):
+            fail([(place, f"expected {wanted}, got {shown(value)}")])
+        return (float(value),) * 3
+
+    return _Kind(check, wanted, (0.0, 0.0, 0.0))
 
 
-def _value(value: object, grey_only: bool, place: Place) -> Float3:
+def _check_color(value: object, place: Place) -> Float3:
     """Check one number, or three, or read a temperature."""
-    if isinstance(value, str) and not grey_only:
+    if isinstance(value, str):
         try:
             found = temperature_colour(value)
         except ValidationError as error:
             fail([(place, detail["msg"]) for detail in error.errors()])
         if found is not None:
             return found
-    numbers = [value] * 3 if not isinstance(value, list) else [] if grey_only else value
+    numbers: list[Any] = value if isinstance(value, list) else [value] * 3
     good = [isinstance(x, int | float) and not isinstance(x, bool) and 0 <= x <= STRONGEST for x in numbers]
     if len(numbers) != 3 or not all(good):
-        fail([(place, f"expected {_wanted(grey_only)}, got {shown(value)}")])
-    r, g, b = (float(x) for x in numbers)  # type: ignore[arg-type]  # checked above
+        fail([(place, f"expected {_COLOR_WANTED}, got {shown(value)}")])
+    r, g, b = (float(x) for x in numbers)
     return r, g, b
 
 
-def _schema(grey_only: bool) -> WithJsonSchema:
-    number = {"type": "number", "minimum": 0, "maximum": STRONGEST}
-    vector = {"type": "array", "items": number, "minItems": 3, "maxItems": 3}
-    value: dict[str, Any] = number if grey_only else {"anyOf": [number, vector, SCHEMA]}
+def _check_file(value: object, place: Place) -> str:
+    if not (isinstance(value, str) and 0 < len(value) <= LONGEST_NAME):
+        fail([(place, f"expected {_FILE_WANTED}, got {shown(value)}")])
+    return value
+
+
+_COLOR_WANTED = f"a number or 3 numbers from 0 to {STRONGEST:.0f}, or {EXAMPLE}"
+_COLOR = _Kind(_check_color, _COLOR_WANTED, (0.0, 0.0, 0.0))
+_FILE_WANTED = "the name of a file"
+_FILE = _Kind(_check_file, _FILE_WANTED, "")
+_INTENSITY, _WIDTH = _number(0, STRONGEST), _number(1, WIDEST)
+
+
+def _check_files(value: object) -> FileCurve:
+    keys = _keys(value, _FILE)
+    places = tuple((time, (float(k),) * 3) for k, (time, _) in enumerate(keys))
+    return FileCurve(tuple(file for _, file in keys), LightCurve(places))
+
+
+def _schema(value: dict[str, Any]) -> WithJsonSchema:
     time = {"anyOf": [{"type": "number", "minimum": 0}, {"type": "string"}]}
     key = {"type": "object", "properties": {"time": time, "value": value}, "required": ["time", "value"]}
     return WithJsonSchema({"anyOf": [value, {"type": "array", "items": key, "minItems": 1}]})
 
 
-Intensity: TypeAlias = Annotated[LightCurve, PlainValidator(_curve(True)), _schema(True)]
-Colour: TypeAlias = Annotated[LightCurve, PlainValidator(_curve(False)), _schema(False)]
+_STRENGTH_SCHEMA: dict[str, Any] = {"type": "number", "minimum": 0, "maximum": STRONGEST}
+_VECTOR_SCHEMA = {"type": "array", "items": _STRENGTH_SCHEMA, "minItems": 3, "maxItems": 3}
+
+Intensity: TypeAlias = Annotated[
+    LightCurve, PlainValidator(lambda value: LightCurve(_keys(value, _INTENSITY))), _schema(_STRENGTH_SCHEMA)
+]
+Colour: TypeAlias = Annotated[
+    LightCurve,
+    PlainValidator(lambda value: LightCurve(_keys(value, _COLOR))),
+    _schema({"anyOf": [_STRENGTH_SCHEMA, _VECTOR_SCHEMA, SCHEMA]}),
+]
+Width: TypeAlias = Annotated[
+    LightCurve,
+    PlainValidator(lambda value: LightCurve(_keys(value, _WIDTH))),
+    _schema({"type": "number", "minimum": 1, "maximum": WIDEST}),
+]
+Files: TypeAlias = Annotated[
+    FileCurve, PlainValidator(_check_files), _schema({"type": "string", "minLength": 1, "maxLength": LONGEST_NAME})
+]
 
 Degrees: TypeAlias = Intensity  # bounds suit a thousand turns
 

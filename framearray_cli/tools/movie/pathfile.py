@@ -15,7 +15,7 @@ from framearray_cli.base.forms.table import Place, Table, check_with, fail
 from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_SECONDS, frame_rate
 
 from ..spans import Span
-from .curves import NOT_TURNED, ONE, Degrees, Intensity, LightChange
+from .curves import NOT_TURNED, ONE, Degrees, Files, Intensity, LightChange, Width
 from .easing import Ease
 
 MOST_FRAMES = 1_000_000  # eleven hours at 24 frames per second; more is a typing error
@@ -98,14 +98,18 @@ class MoviePath(Table):
     environment: EnvironmentLight | None = Field(
         default=None, description="An environment in place of the light positions of the first axis."
     )
-    soft: float | None = Field(
-        default=None, ge=1, le=1e5, description="Number of light positions whose mean takes the place of one."
+    soft: Width | None = Field(default=None, description="Number of light positions whose mean takes the place of one.")
+    weights: Files | None = Field(
+        default=None,
+        description="CSV file with the weight of each light position of the first axis; relative to the folder of the "
+        "path file. Between two key frames both files count.",
     )
 
     @model_validator(mode="after")
     def _one_sum(self) -> "MoviePath":
-        if self.environment is not None and self.soft is not None:
-            fail([(("soft",), "expected either environment or soft, got both")])
+        given = [key for key in ("environment", "soft", "weights") if getattr(self, key) is not None]
+        if len(given) > 1:
+            fail([((given[1],), f"expected either {given[0]} or {given[1]}, got both")])
         return self
 
     @field_validator("segments")
