@@ -1,14 +1,17 @@
 """Surfaces that shine: the triangles of materials that sources of type "mesh" name.
 
-A hit draws one point y of each such source, by the area of its triangles times how bright they are. The irradiance by a
+A hit draws points y of each such source, by the area of its triangles times how bright they are. The irradiance by a
 point y is
 
     L(y) cos(theta) cos(theta_l) / (d^2 p(y))        theta at the surface, theta_l at y, d between them
 
-with p(y) the density of the draw per area. Neither y nor the shadow ray to it depends on the light position, so one ray
+with p(y) the density of the draw per area. The hit keeps one of `CANDIDATES` points, with a chance proportional to this
+value without L, and takes the mean value of them all for it: on average the same light [Talbot05], and only where all
+points show their back is it 0. Neither y nor the shadow ray to it depends on the light position, so one ray
 serves them all. The strength of a mesh in `LightArrays` is the radiance that multiplies its texture.
 """
 
+import math
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -19,7 +22,7 @@ from framearray_cli.scene.paths.paths import Lights
 from framearray_cli.scene.scene import Scene
 
 from ..kernels.kernel import inlined
-from ..kernels.simd import gather, integers, select, sqrt
+from ..kernels.simd import gather, integers, reals, select, sqrt
 from .random import EMITTERS, SOURCES, r2, random_word
 from .surfaces import Surfaces, emission_at, position_at, surfaces
 
@@ -28,6 +31,10 @@ MANY = 1 << 24  # a random number that chooses a triangle is one of so many
 TEXTURE_POINTS = 8
 # A triangle is drawn as if it were at least this bright, in units of the mean: a texture is known at some points only.
 FAINTEST = 0.05
+# Points of which a hit keeps one. Half of a closed surface faces away from any place.
+CANDIDATES = 4
+# How far apart they are in the table: the golden ratio. Parts of models often lie a power of two of triangles apart.
+APART = round((math.sqrt(5) - 1) / 2 * MANY)
 
 
 class Emitters(NamedTuple):
@@ -133,7 +140,7 @@ def brightness(scene: Scene, triangles: Int32, texture: Int32) -> Float64:
 
 
 class EmitterPoint(NamedTuple):
-    """The point y of a mesh that a hit draws.
+    """A point y of a mesh.
 
     Attributes:
         row: of its triangle in `Emitters`.
@@ -146,19 +153,52 @@ class EmitterPoint(NamedTuple):
 
 
 @inlined
-def emitter_point(emitters: Emitters, key: np.uint64, s: int) -> EmitterPoint:
-    """The point of mesh s that the hit of a random key draws, or the hits in lanes."""
+def kept_point(
+    emitters: Emitters, key: np.uint64, s: int, p: Triple, g: Triple, m: Triple
+) -> tuple[EmitterPoint, Triple, Real]:
+    """The point y of mesh s that the hit of a random key keeps, or the hits in lanes.
+
+    Args:
+        p, g, m: points P, geometric and shading normals.
+
+    Returns:
+        y, the vector from P to it, and the mean factor of all points drawn, see `emitter_sample`.
+    """
+    one, tiny = np.float32(1.0), np.float32(1e-30)
+    word, place = random_word(key, EMITTERS + s), random_word(key, SOURCES + s)
+    choice = reals(integers(word >> np.uint64(40)) & np.int32(MANY - 1)) * np.float32(1.0 / MANY)
+    kept = emitter_point(emitters, word, place, s, 0)
+    x, y, z, total = emitter_sample(emitters, s, kept, p, g, m)
+    for i in range(1, CANDIDATES):
+        other = emitter_point(emitters, word, place, s, i)
+        ox, oy, oz, factor = emitter_sample(emitters, s, other, p, g, m)
+        total = total + factor
+        share = factor / select(total > tiny, total, tiny)
+        taken = choice < share
+        # what is left of a random number that has decided is a random number
+        rest = one - share
+        choice = select(taken, choice / select(taken, share, one), (choice - share) / select(taken, one, rest))
+        kept = EmitterPoint(
+            select(taken, other.row, kept.row), select(taken, other.u, kept.u), select(taken, other.v, kept.v)
+        )
+        x, y, z = select(taken, ox, x), select(taken, oy, y), select(taken, oz, z)
+    return kept, (x, y, z), total * np.float32(1.0 / CANDIDATES)
+
+
+@inlined
+def emitter_point(emitters: Emitters, word: np.uint64, place: np.uint64, s: int, i: int) -> EmitterPoint:
+    """Point i of mesh s that a hit draws: the triangle by the bits of a random word, its place in that by another's."""
     one = np.float32(1.0)
-    wanted = (integers(random_word(key, EMITTERS + s)) >> np.int32(8)) & np.int32(MANY - 1)
+    wanted = ((integers(word) >> np.int32(8)) + np.int32(i) * np.int32(APART)) & np.int32(MANY - 1)
     # bisection: the first row whose end lies beyond the number
-    low = integers(wanted) * np.int32(0) + emitters.span[s, 0]
+    low = wanted * np.int32(0) + emitters.span[s, 0]
     count = emitters.span[s, 1]
     while count > 1:
         half = count // 2
         beyond = gather(emitters.end, low + np.int32(half - 1)) > wanted
         low = select(beyond, low, low + np.int32(half))
         count -= half
-    a, b = r2(random_word(key, SOURCES + s), 0)
+    a, b = r2(place, i)
     root = sqrt(a)
     return EmitterPoint(low, root * (one - b), root * b)
 

@@ -13,7 +13,7 @@ from framearray_cli.base.arrays import Float32, Int32
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude, room_in
 from ..hits.hits import Hits, reflects_in_lanes
 from ..hits.rays import NO_RAYS, Rays
-from ..inputs.emitters import Emitters, emitted_colour, emitter_point, emitter_sample
+from ..inputs.emitters import Emitters, emitted_colour, kept_point
 from ..inputs.lights import MESH
 from ..kernels.kernel import index, inlined, step
 from ..kernels.optional import chosen_by_type, step_or_zero
@@ -104,14 +104,12 @@ def light_of_meshes(
             if waiting > capacity - LANES:
                 _trace_meshes(tracer, rays, waiting, strength, irradiance)
                 total, waiting = total + waiting, 0
-            # the points y that the hits draw
-            drawn = emitter_point(emitters, key, s)
-            x, y, z, factor = emitter_sample(emitters, s, drawn, p, g, m)
+            # the points y that the hits keep
+            kept, to, factor = kept_point(emitters, key, s, p, g, m)
             traced = wanted & (factor > np.float32(0.0))
             if bits(traced) == 0:
                 continue
             # rays to them
-            to = (x, y, z)
             for axis in range(3):
                 append(traced, p[axis] + up[axis], row, (FROM + axis) * room + waiting)
                 append(traced, to[axis] - up[axis], row, (TO + axis) * room + waiting)
@@ -120,7 +118,7 @@ def light_of_meshes(
             if channels == 1:
                 append(traced, factor, rays.value, waiting)
             else:
-                colour = emitted_colour(emitters, drawn)
+                colour = emitted_colour(emitters, kept)
                 for channel in range(3):
                     append(traced, factor * colour[channel], rays.value, channel * rays.value.shape[1] + waiting)
             waiting += popcount(traced)
