@@ -16,7 +16,7 @@ from .placed import Angle, DirectionalKey, DirectionalSource, PointSource
 from .sourcetable import ShownSource, SourceTable
 from .spot import SpotSource
 from .times import Clock, Dates, Zone, clock_minutes, even_moments
-from .units import SKY_UNITS, SkyUnits
+from .units import LAMP_UNITS, SKY_UNITS, UNITS_OF_DOMES, DomeUnits, LampUnits, SkyUnits
 from .values import Colour, Direction, Emission, GridSize, Point
 
 ROUNDING = 1e-6  # of steps; a third of an hour ends after three of them
@@ -43,13 +43,20 @@ class DomeSource(SourceTable):
     )
     intensity: Emission | None = Field(
         default=None,
-        description="Radiant intensity of each point, W/sr; needs `radius`.",
+        description="Radiant intensity of each point, W/sr unless `units` says otherwise; needs `radius`.",
         json_schema_extra=default_text("none"),
     )
     irradiance: Emission | None = Field(
         default=None,
-        description="Irradiance of a surface that faces the light, W/m2; without `radius`.",
+        description="Irradiance of a surface that faces the light, W/m2 unless `units` says otherwise; without "
+        "`radius`.",
         json_schema_extra=default_text("none"),
+    )
+    units: DomeUnits | None = Field(
+        default=None,
+        description="Unit of `intensity` or `irradiance`; lumens are those of all light of a point. A watt of light "
+        "is 683 lumens.",
+        json_schema_extra=default_text('"W/sr" or "W/m2"'),
     )
     color: Colour | None = Field(
         default=None, description="Multiplies the strength by channel.", json_schema_extra=default_text("1")
@@ -64,6 +71,9 @@ class DomeSource(SourceTable):
             problems.append(((wanted,), f"missing; expected a number or 3 numbers, {about}"))
         if getattr(self, other) is not None:
             problems.append(((other,), f"expected no value {about}, whose strength is `{wanted}`"))
+        if self.units is not None and self.units not in UNITS_OF_DOMES[wanted]:
+            known = " or ".join(f'"{unit}"' for unit in UNITS_OF_DOMES[wanted])
+            problems.append((("units",), f'expected {known} {about}, got "{self.units}"'))
         if problems:
             fail(problems)
         return self
@@ -87,7 +97,10 @@ class GridSource(SourceTable):
     corner: Point = Field(description="First point, in the coordinates of the scene file.")
     side: Direction = Field(description="From the first point to the last of the first row.")
     other_side: Direction = Field(description="From the first point to the first of the last row.")
-    intensity: Emission = Field(description="Radiant intensity of each point, W/sr; one number means white.")
+    intensity: Emission = Field(
+        description="Radiant intensity of each point, W/sr unless `units` says otherwise; one number means white."
+    )
+    units: LampUnits | None = Field(default=None, description=LAMP_UNITS, json_schema_extra=default_text('"W/sr"'))
     color: Colour | None = Field(
         default=None, description="Multiplies `intensity` by channel.", json_schema_extra=default_text("1")
     )

@@ -6,6 +6,8 @@ LampUnits: TypeAlias = Literal["W/sr", "cd", "lm"]
 SkyUnits: TypeAlias = Literal["W/m2", "lux"]
 PanelUnits: TypeAlias = Literal["W", "lm", "W/(m2 sr)", "cd/m2"]
 RadianceUnits: TypeAlias = Literal["W/(m2 sr)", "cd/m2"]
+DomeUnits: TypeAlias = Literal["W/sr", "cd", "lm", "W/m2", "lux"]
+UNITS_OF_DOMES = {"intensity": ("W/sr", "cd", "lm"), "irradiance": ("W/m2", "lux")}
 UNITS_OF_PANELS = {"power": ("W", "lm"), "radiance": ("W/(m2 sr)", "cd/m2")}
 
 LAMP_UNITS = (

@@ -58,11 +58,10 @@ def _place(source: LightSource, job: Job, i: int, n: int, world_from_camera: Flo
         case SunSource():
             return in_units(_place_sun(source, job, f"light.sources[{i}]", n), source)
         case DomeSource():
-            return _place_dome(source, _up(job), n)
+            return in_units(_place_dome(source, _up(job), n), source)
         case GridSource():
-            return _constant(
-                "point", grid_points(source.counts, source.corner, source.side, source.other_side), source, n
-            )
+            points = grid_points(source.counts, source.corner, source.side, source.other_side)
+            return in_units(_constant("point", points, source, n), source)
         case SpotSource():
             return in_units(_place_spot(source, job, f"light.sources[{i}]", n, world_from_camera), source)
         case EnvironmentSource():

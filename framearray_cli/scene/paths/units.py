@@ -9,7 +9,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.job.mesh import MeshSource
 from framearray_cli.job.panel import DiscSource, RectSource
 from framearray_cli.job.placed import DirectionalSource, PointSource
-from framearray_cli.job.sources import SunSource
+from framearray_cli.job.sources import DomeSource, GridSource, SunSource
 from framearray_cli.job.spot import SpotSource
 
 from .lightpath import LightPath
@@ -19,7 +19,8 @@ LUMENS_PER_WATT = 683.0  # of light of 555 nm, by the definition of the candela;
 
 
 def in_units(
-    path: LightPath, source: PointSource | DirectionalSource | SpotSource | SunSource | AnyPanel | MeshSource
+    path: LightPath,
+    source: PointSource | DirectionalSource | SpotSource | SunSource | DomeSource | GridSource | AnyPanel | MeshSource,
 ) -> LightPath:
     """Turn the strengths of a source from the units of its job into W/sr or W/m2.
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli_w
+from pydantic import ValidationError
 from support import tiny
 from support.iesfiles import DOWN, TILT, VARIANTS, ies
 
@@ -153,6 +154,33 @@ def test_units_are_those_of_photometry(source: Any, key: dict[str, Any], units: 
     if units == "lm":
         power = emitted_power(light_arrays(lights_without_groups([path]), np.zeros(3)), 0, 1.0)[0]
         assert power * path.intensity[0, 0] * 683 == pytest.approx(3, rel=1e-4)
+
+
+GRID = {"type": "grid", "counts": [2, 2], "corner": [0, 1, 0], "side": [1, 0, 0], "other_side": [0, 0, 1]}
+DOME = {"type": "dome", "positions": 4}
+
+
+@pytest.mark.parametrize(
+    ("source", "units", "per_unit"),
+    [
+        (GRID | {"intensity": 3.0}, "lm", 1 / (683 * 4 * np.pi)),
+        (DOME | {"radius": 2.0, "intensity": 3.0}, "cd", 1 / 683),
+        (DOME | {"irradiance": 3.0}, "lux", 1 / 683),
+        (DOME | {"irradiance": 3.0}, "W/m2", 1),
+    ],
+)
+def test_units_of_grids_and_domes(source: dict[str, Any], units: str, per_unit: float) -> None:
+    (path,) = lights(tiny.job(light={"frames": 4, "sources": [source | {"units": units}]})).sources
+    np.testing.assert_allclose(path.intensity, 3 * per_unit)
+
+
+def test_units_of_a_dome_that_are_of_other_light() -> None:
+    for more, wanted in (
+        ({"irradiance": 3.0, "units": "lm"}, '"W/m2" or "lux" without `radius`, got "lm"'),
+        ({"radius": 2.0, "intensity": 3.0, "units": "lux"}, '"W/sr" or "cd" or "lm" with `radius`, got "lux"'),
+    ):
+        with pytest.raises(ValidationError, match=f"expected {wanted}"):
+            tiny.job(light={"sources": [DOME | more]})
 
 
 def test_a_measured_lamp_at_the_positions_of_a_file(tmp_path: Path) -> None:
