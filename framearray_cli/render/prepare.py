@@ -196,7 +196,7 @@ def _with_cells(
         count=job.indirect.samples,
         edge=job.indirect.cell,
         threads=prepared.threads,
-        local=_curve(job) if job.indirect.method == "local" else None,
+        local=setup.obscurance if job.indirect.method == "local" else None,
     )
     built = build_cells(work)
     local = work.local is not None

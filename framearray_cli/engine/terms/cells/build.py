@@ -17,8 +17,8 @@ from ...hits.rays import Rays, room_for_tests
 from ...inputs.lights import LightArrays, some_lights
 from ...kernels.clock import compile_clock
 from ..ambient.estimate import BATCH
-from ..ambient.fitted import ObscuranceCurve
 from ..direct import direct
+from ..obscurance_rays import ObscuranceSettings
 from .local import obscurance_of_cells, per_obscurance
 from .places import Places, PlaceWork, find_places
 from .samples import Samples, SampleWalks, draw_samples
@@ -67,7 +67,7 @@ class CellWork:
     count: int
     edge: float | None
     threads: int
-    local: ObscuranceCurve | None = None
+    local: ObscuranceSettings | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -18,7 +18,8 @@ from ...hits.hits import Hits, reflects
 from ...hits.rays import NO_RAYS, Rays
 from ...inputs.random import CELLS, r2, random_word
 from ...kernels.kernel import kernel
-from ..ambient.fitted import ObscuranceCurve, rho_of
+from ..ambient.fitted import rho_of
+from ..obscurance_rays import ObscuranceSettings
 from .gather import COLOUR, LEVEL, LIGHT, Gathered
 from .guards import choose_slots, write_guard_ray
 from .lookups import GatherScratch
@@ -32,20 +33,20 @@ LOCAL_LEVEL = 2
 _LEAST = 1e-3
 
 
-def obscurance_of_cells(members: Members, samples: Samples, curve: ObscuranceCurve, pool: ThreadPoolExecutor) -> Rgb:
-    """W of each cell, (n_cells, 3), by the links of its samples.
+def obscurance_of_cells(
+    members: Members, samples: Samples, settings: ObscuranceSettings, pool: ThreadPoolExecutor
+) -> Rgb:
+    """W of each cell, (n_cells, 3), by the links of its samples, with all settings that W of hits has.
 
-    Links that meet nothing within d_max count with the average reflectivity of what links meet, as in `obscurance`;
-    with the background outside, those that leave the scene count 0.
+    Links that meet nothing within d_max count with the average reflectivity; with the background outside, those that
+    leave the scene count 0.
     """
-    x = np.minimum(samples.length / curve.d_max, 1.0).astype(np.float32)
+    x = np.minimum(samples.length / settings.d_max, 1.0).astype(np.float32)
     openness = np.empty_like(x)
-    rho_of(curve.falloff, curve.tau, x, openness)
-    met = np.isfinite(samples.length)
-    average = samples.reflectivity[met].mean(axis=0, dtype=np.float64) if met.any() else np.zeros(3)
-    value = np.where((x < 1)[:, None], openness[:, None] * samples.reflectivity, average.astype(np.float32))
-    if curve.sky:
-        value = np.where(met[:, None], np.where((x < 1)[:, None], value, samples.reflectivity), np.float32(0.0))
+    rho_of(settings.falloff, settings.tau, x, openness)
+    value = np.where((x < 1)[:, None], openness[:, None] * samples.reflectivity, settings.average)
+    if settings.sky:
+        value[np.isinf(samples.length)] = 0.0
     by_sample = np.ascontiguousarray(value, np.float32)[:, :, None]
     found: Rgb = mean_by_cell(members, by_sample, pool)[:, :, 0]
     return found
