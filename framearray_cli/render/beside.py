@@ -7,6 +7,7 @@ then the others, as far as they are left.
 import json
 import sys
 import tempfile
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -64,6 +65,7 @@ _JOB: dict[str, Any] = {
 }
 # Tables of a job that the choice of kernels may depend on; the rest is that of the room.
 _KEPT = ("samples", "reuse", "indirect", "ambient", "output")
+NO_TABLES: Mapping[str, Any] = {}
 FLOATS = {"output": {"format": "png"}}  # for images that are composed as float32
 _FEW = 4096  # walks that sample the cells of the room
 
@@ -72,6 +74,16 @@ def tables_for(job: Job) -> dict[str, Any]:
     """The tables of a job that decide which kernels it needs."""
     table = job_table(job)
     return {name: table[name] for name in _KEPT if name in table}
+
+
+def offer_for(job: Job, more: Mapping[str, Any] = NO_TABLES) -> None:
+    """Have a second process compile kernels for a job, should any be missing; not for one that wants one thread.
+
+    Args:
+        more: tables that replace those of the job.
+    """
+    if job.render.threads != 1:
+        offer_beside(tables_for(job) | dict(more))
 
 
 def offer_beside(tables: dict[str, Any]) -> None:

@@ -36,10 +36,10 @@ def check(
     with Screen(err) as screen:
         screen.show(size_lines(job))  # before the scene is read: a wrong number is seen at once
         screen.wait("reading the scene")
-        from framearray_cli.render.beside import offer_beside, tables_for
+        from framearray_cli.render.beside import offer_for
         from framearray_cli.render.estimate import check as run
 
-        offer_beside(tables_for(job))
+        offer_for(job)
         with screen.compiling():
             estimate = run(job, CheckingEvents(screen))
     warnings = [] if strict else warning_lines(estimate.warnings)

@@ -31,7 +31,7 @@ def preview_on_screen(
 ) -> None:
     """Render one small picture into a file of its own."""
     from framearray_cli.array.images.images import FOR_SCREENS, ImageFormat, format_name, require_writer, write_image
-    from framearray_cli.render.beside import FLOATS, offer_beside, tables_for
+    from framearray_cli.render.beside import FLOATS, offer_for
     from framearray_cli.render.preview import light_axes, render_preview
 
     folder = job.output.directory
@@ -56,7 +56,7 @@ def preview_on_screen(
     }
     with output_file(file, ".png", force=force or target is None) as part, Screen(err, quiet=quiet) as screen:
         screen.wait("rendering a preview")
-        offer_beside(tables_for(job) | FLOATS)
+        offer_for(job, FLOATS)
         with screen.compiling():
             made = render_preview(job, c, places)
         exposure = job.output.exposure if name in FOR_SCREENS else 0.0

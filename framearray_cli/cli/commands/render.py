@@ -164,10 +164,10 @@ def render_on_screen(
     """
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the scene")
-        from framearray_cli.render.beside import offer_beside, tables_for
+        from framearray_cli.render.beside import offer_for
         from framearray_cli.render.render import render as run
 
-        offer_beside(tables_for(job))
+        offer_for(job)
         events = RenderingEvents(screen, job, strict=strict, repairs=repairs)
         try:
             with screen.compiling():

@@ -82,9 +82,9 @@ def report(
         screen.wait("reading the scene")
         from framearray_cli import report as reporting
         from framearray_cli.array.manifest import MAIN_AXIS
-        from framearray_cli.render.beside import FLOATS, offer_beside, tables_for
+        from framearray_cli.render.beside import FLOATS, offer_for
 
-        offer_beside(tables_for(job) | FLOATS)
+        offer_for(job, FLOATS)
 
         class MeasuringEvents(reporting.ReportEvents):
             """Print the scene, then a progress bar."""
