@@ -17,6 +17,7 @@ from ..terms.cells.smooth import smooth_light
 from ..terms.direct import direct
 from ..terms.direct_steps import direct_by_steps
 from ..terms.environments import has_environments, see_environments
+from ..terms.looks import look_around, looking
 from ..terms.obscurance import obscurance
 from .records import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, HitRecords, lit_bit
 from .scratch import Scratch
@@ -56,7 +57,10 @@ def estimate_terms(
     skylight = scratch.skylight if setup.cells is None else scratch.constant
     middle = perf_counter()
     if scratch.steps is None:
-        rays = direct(hits, n, setup.lights, setup.tracer, scratch.test_rays, out.irradiance, neighbours)
+        lights = looking(setup.lights) if has_environments(setup.lights) else setup.lights
+        rays = direct(hits, n, lights, setup.tracer, scratch.test_rays, out.irradiance, neighbours)
+        if has_environments(lights):
+            rays += look_around(hits, n, lights, setup.tracer, scratch.test_rays, out.irradiance)
     else:
         irradiance = out.irradiance if setup.keeps_all else scratch.irradiance
         rays = direct_by_steps(

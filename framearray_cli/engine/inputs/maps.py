@@ -40,6 +40,9 @@ class Maps(NamedTuple):
         up: (3,) unit, up in the scene.
         seen: (n_pixels, 3) radiance of all maps as eyes see it.
         inverse: (n_sources,) 1 over the luminance of a map, integrated over all directions; 0 of sources without one.
+        density: (n_texels,) with which a direction in the texel is drawn, per steradian.
+        looks: (n_sources,) number of rays that look for a map beside the one that is drawn from it, over pi; see
+            `terms/looks.py`. 0: none.
     """
 
     grid: Int32
@@ -50,11 +53,14 @@ class Maps(NamedTuple):
     up: Float32
     seen: Rgb
     inverse: Float32
+    density: Float32
+    looks: Float32
 
 
 NO_MAPS = Maps(
     np.empty((0, COLUMNS), np.int32), np.zeros(1, np.float32), np.zeros(1, np.int32), np.empty(0, np.float32),
     np.zeros(2, np.float32), np.zeros(3, np.float32), np.empty((0, 3), np.float32), np.empty(0, np.float32),
+    np.ones(1, np.float32), np.empty(0, np.float32),
 )  # fmt: skip
 
 
@@ -65,6 +71,7 @@ def map_arrays(sources: tuple[LightPath, ...]) -> Maps:
     grid = np.zeros((len(sources), COLUMNS), np.int32)
     shares, others, tints, angles = [np.full(1, 2.0)], [np.zeros(1, np.int64)], [np.ones(3)], [np.zeros(2)]
     seen: list[Rgb] = []
+    densities = [np.ones(1)]
     known: dict[tuple[str, str], Any] = {}
     up, inverse = np.zeros(3), np.zeros(len(sources), np.float32)
     for s, source in enumerate(sources):
@@ -81,6 +88,7 @@ def map_arrays(sources: tuple[LightPath, ...]) -> Maps:
             known[panorama.digest, part] = (*places, sum(map(len, seen)), *visible.shape[1::-1])
             seen.append(visible.reshape(-1, 3))
             luminance = (texels @ LUMINANCE)[..., None]
+            densities.append(luminance.ravel() / texel_powers(texels).sum())
             shares.append(share)
             others.append(other)
             tints.append(
@@ -97,6 +105,8 @@ def map_arrays(sources: tuple[LightPath, ...]) -> Maps:
         up.astype(np.float32),
         np.ascontiguousarray(np.concatenate(seen) if len(seen) > 1 else seen[0]),
         inverse,
+        np.concatenate(densities).astype(np.float32),
+        np.zeros(len(sources), np.float32),
     )
 
 
@@ -148,6 +158,16 @@ def map_tint(maps: Maps, s: int, texel: Any, channel: int) -> Any:
         return reals(texel & np.int32(0)) + np.float32(1.0)
     found: Real = gather(maps.tint, (texel + np.int32(maps.grid[s, TINT])) * np.int32(3) + np.int32(channel))
     return found
+
+
+@inlined
+def map_share(maps: Maps, s: int, texel: Any, cosine: Any, channel: int) -> Any:
+    """`map_tint` times the weight of the drawn direction beside those that look around: p / (p + n cos(theta) / pi)."""
+    one, tint = np.float32(1.0), map_tint(maps, s, texel, channel)
+    if not has_rows(maps.tint):
+        return tint * select(cosine > one, one, one)  # as many lanes as below
+    density = gather(maps.density, texel + np.int32(maps.grid[s, TINT]))
+    return tint * (density / (density + maps.looks[s] * cosine))
 
 
 @inlined

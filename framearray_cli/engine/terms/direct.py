@@ -14,7 +14,7 @@ from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude, room_in
 from ..hits.hits import Hits, lift, ray_origin, reflects, reflects_in_lanes, triple
 from ..hits.rays import NO_RAYS, Rays
 from ..inputs.lights import DIRECTIONAL, MESH, LightArrays
-from ..inputs.maps import map_texel, map_tint
+from ..inputs.maps import map_share, map_texel
 from ..inputs.shapes import source_at, source_in_lanes, source_point, vector_and_factor
 from ..kernels.kernel import has_rows, index, inlined, kernel, step
 from ..kernels.simd import (
@@ -124,7 +124,7 @@ def _queue(
     append(reached, lane_numbers() + np.int32(start.first_value + l), rays.place, waiting)
     for channel in range(channels):
         strength = load(lights.strength, (s * channels + channel) * n_lights + l)
-        tint = map_tint(lights.maps, s, start.texel, channel)
+        tint = map_share(lights.maps, s, start.texel, factor, channel)
         append(reached, factor * strength * tint, rays.value, channel * rays.value.shape[1] + waiting)
     found: int = waiting + popcount(reached)
     return found
@@ -193,7 +193,8 @@ def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, ray
                 # with the irradiance that each carries
                 append(traced, at * np.int32(channels * n_lights) + np.int32(l), rays.place, waiting)
                 for channel in range(channels):
-                    value = factor * lights.strength[s, channel, l] * map_tint(lights.maps, s, texel, channel)
+                    tint = map_share(lights.maps, s, texel, factor, channel)
+                    value = factor * lights.strength[s, channel, l] * tint
                     append(traced, value, rays.value, channel * rays.value.shape[1] + waiting)
                 waiting += popcount(traced)
     _trace_queue(tracer, rays, waiting, irradiance)

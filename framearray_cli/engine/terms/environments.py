@@ -50,7 +50,9 @@ def see_environments(hits: Hits, n: int, lights: LightArrays, first: int, rays: 
                     -load(lights.vector, at + n_lights),
                     -load(lights.vector, at + 2 * n_lights),
                 )
-                u, v = _place(lights.maps, s, to, d)
+                u, v = place_in_map(
+                    lights.maps, to, d, lights.maps.grid[s, SEEN_WIDTH], lights.maps.grid[s, SEEN_HEIGHT]
+                )
                 for channel in range(channels):
                     strength = load(lights.strength, (s * channels + channel) * n_lights + first + l)
                     store(rays.value, 0, PI * strength * _blended(lights.maps, s, u, v, channel))
@@ -59,8 +61,8 @@ def see_environments(hits: Hits, n: int, lights: LightArrays, first: int, rays: 
 
 
 @inlined
-def _place(maps: Maps, s: int, to: Triple, d: Triple) -> tuple[Real, Real]:
-    """Column and row, counted from the middles of the first, that a direction d sees.
+def place_in_map(maps: Maps, to: Triple, d: Triple, width: int, rows: int) -> tuple[Real, Real]:
+    """Column and row, counted from the middles of the first, that a direction d sees of a map of that size.
 
     Args:
         to: directions to the middle of the map.
@@ -71,9 +73,9 @@ def _place(maps: Maps, s: int, to: Triple, d: Triple) -> tuple[Real, Real]:
     east = d[0] * (y * up[2] - z * up[1]) + d[1] * (z * up[0] - x * up[2]) + d[2] * (x * up[1] - y * up[0])
     height = d[0] * up[0] + d[1] * up[1] + d[2] * up[2]
     elevation = angle_of(height, sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - height * height))
-    half, width, rows = np.float32(0.5), np.float32(maps.grid[s, SEEN_WIDTH]), np.float32(maps.grid[s, SEEN_HEIGHT])
-    u = (angle_of(east, north) / (PI + PI) + half) * width - half
-    return u, (half - elevation / PI) * rows - half
+    half = np.float32(0.5)
+    u = (angle_of(east, north) / (PI + PI) + half) * np.float32(width) - half
+    return u, (half - elevation / PI) * np.float32(rows) - half
 
 
 @inlined

@@ -7,38 +7,22 @@ import pytest
 from support import tiny
 from support.hits import points
 from support.irradiance import FAR, UP, N, P, hits_at
+from support.panoramas import TURNS, arrays, environment, irradiance
 
 from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.engine.hits.hits import Hits
 from framearray_cli.engine.hits.rays import room_for_tests
-from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
+from framearray_cli.engine.inputs.lights import LightArrays
 from framearray_cli.engine.inputs.maps import alias_table, map_point
 from framearray_cli.engine.terms.direct import direct
 from framearray_cli.engine.terms.direct_steps import direct_by_steps, room_for_steps
 from framearray_cli.scene.paths.environments import cut_suns
 from framearray_cli.scene.paths.lightpath import LightPath
-from framearray_cli.scene.paths.panorama import Environment, Panorama, lit_texels, norths, texel_powers
-from framearray_cli.scene.paths.paths import lights_without_groups
+from framearray_cli.scene.paths.panorama import lit_texels, texel_powers
 from framearray_cli.scene.scene import Scene
 
 RNG = np.random.default_rng(8)
-TURNS = np.array([0.0, 70.0, 200.0, 359.0, -30.0])
 TILTED = np.array([0.48, 0.6, -0.64])
-
-
-def environment(pixels: Any, turns_deg: Any = TURNS, factor: Any = (1.0, 1.0, 1.0)) -> LightPath:
-    """A map over a scene with y up."""
-    panorama, n = Panorama(file="sky.exr", pixels=np.asarray(pixels, np.float32)), len(turns_deg)
-    factors = np.tile(np.array(factor, np.float64), (n, 1))
-    around = Environment(panorama=panorama, rotation_deg=np.array(turns_deg), factor=factors, up=np.array(UP))
-    return LightPath(
-        kind="directional", vector=-norths("y", around.rotation_deg), intensity=factors * panorama.flux,
-        environment=around,
-    )  # fmt: skip
-
-
-def arrays(*sources: LightPath) -> LightArrays:
-    return light_arrays(lights_without_groups(sources), np.zeros(3))
 
 
 def lit(hits: Hits, lights: LightArrays, neighbours: bool = True, scene: Scene | None = None) -> Any:
@@ -48,19 +32,6 @@ def lit(hits: Hits, lights: LightArrays, neighbours: bool = True, scene: Scene |
     with EmbreeScene(scene or tiny.scene_of(FAR)) as embree:
         direct(hits, n, lights, embree.tracer, room_for_tests(4096, lights.n_lights), out, neighbours)
     return out.astype(np.float64)
-
-
-def irradiance(pixels: Any, normal: Any, turn_deg: float) -> Any:
-    """E = integral of L cos over the sphere, by 40 x 80 points in each texel; y up, the middle of the map is -z."""
-    fine = np.asarray(pixels, np.float64).repeat(40, axis=0).repeat(40, axis=1)
-    height, width, _ = fine.shape
-    up = np.pi / 2 - (np.arange(height) + 0.5) / height * np.pi
-    around = ((np.arange(width) + 0.5) / width - 0.5) * 2 * np.pi + np.radians(turn_deg)
-    x = np.cos(up)[:, None] * np.sin(around)
-    z = -np.cos(up)[:, None] * np.cos(around)
-    cosine = x * normal[0] + np.sin(up)[:, None] * normal[1] + z * normal[2]
-    solid_angle = np.cos(up) * (np.pi / height) * (2 * np.pi / width)
-    return np.einsum("yx,yxk->k", np.maximum(cosine, 0) * solid_angle[:, None], fine)
 
 
 def agree(found: Any, wanted: Any, facing: float = 0.0) -> None:

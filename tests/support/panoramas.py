@@ -1,0 +1,41 @@
+"""Environments for tests, over scenes with y up, and their irradiance by quadrature."""
+
+from typing import Any
+
+import numpy as np
+
+from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
+from framearray_cli.scene.paths.lightpath import LightPath
+from framearray_cli.scene.paths.panorama import Environment, Panorama, norths
+from framearray_cli.scene.paths.paths import lights_without_groups
+from support.irradiance import UP
+
+TURNS = np.array([0.0, 70.0, 200.0, 359.0, -30.0])
+
+
+def environment(pixels: Any, turns_deg: Any = TURNS, factor: Any = (1.0, 1.0, 1.0)) -> LightPath:
+    """A map that turns."""
+    panorama, n = Panorama(file="sky.exr", pixels=np.asarray(pixels, np.float32)), len(turns_deg)
+    factors = np.tile(np.array(factor, np.float64), (n, 1))
+    around = Environment(panorama=panorama, rotation_deg=np.array(turns_deg), factor=factors, up=np.array(UP))
+    return LightPath(
+        kind="directional", vector=-norths("y", around.rotation_deg), intensity=factors * panorama.flux,
+        environment=around,
+    )  # fmt: skip
+
+
+def arrays(*sources: LightPath) -> LightArrays:
+    return light_arrays(lights_without_groups(sources), np.zeros(3))
+
+
+def irradiance(pixels: Any, normal: Any, turn_deg: float) -> Any:
+    """E = integral of L cos over the sphere, by 40 x 80 points in each texel; the middle of the map is -z."""
+    fine = np.asarray(pixels, np.float64).repeat(40, axis=0).repeat(40, axis=1)
+    height, width, _ = fine.shape
+    up = np.pi / 2 - (np.arange(height) + 0.5) / height * np.pi
+    around = ((np.arange(width) + 0.5) / width - 0.5) * 2 * np.pi + np.radians(turn_deg)
+    x = np.cos(up)[:, None] * np.sin(around)
+    z = -np.cos(up)[:, None] * np.cos(around)
+    cosine = x * normal[0] + np.sin(up)[:, None] * normal[1] + z * normal[2]
+    solid_angle = np.cos(up) * (np.pi / height) * (2 * np.pi / width)
+    return np.einsum("yx,yxk->k", np.maximum(cosine, 0) * solid_angle[:, None], fine)
