@@ -142,6 +142,7 @@ def test_a_quad_lights_as_a_rectangle_does() -> None:
     assert (error <= 0.01 * expected.mean(axis=(0, 1))).all()
 
 
+@pytest.mark.slow
 def test_cells_bring_its_light_on_as_that_of_a_rectangle() -> None:
     """Neighbours share errors of cells, so the error comes from pictures of several seeds: Student's t, 1 in 1,000."""
     pairs = np.array([pair(seed=k, indirect=tiny.CELLS) for k in range(8)]).mean(axis=(2, 3))  # (8, 2, 3)

@@ -108,7 +108,7 @@ def new_source(kind: str, strengths: Any, sky: Path) -> dict[str, Any]:
 @pytest.mark.parametrize(
     "kind",
     [
-        "mesh",
+        pytest.param("mesh", marks=pytest.mark.slow),
         "environment",
         pytest.param("rect", marks=pytest.mark.slow),
         pytest.param("point", marks=pytest.mark.slow),

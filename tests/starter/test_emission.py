@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from support.scenes import Glb, png
 from support.staged import QUARTER, light
 
@@ -18,6 +19,7 @@ SCREEN = np.array([[-1, 0.8, -1.95], [1, 0.8, -1.95], [1, 1.8, -1.95], [-1, 1.8,
 UVS = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
 TEXELS = np.array([[[255, 40, 40], [40, 255, 40]], [[40, 40, 255], [255, 255, 255]]], np.uint8)
 STRENGTH = {"KHR_materials_emissive_strength": {"emissiveStrength": 5.0}}
+pytestmark = pytest.mark.usefixtures("obscurances")
 EYE = {"type": "perspective", "perspective": {"yfov": 1.1}}
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from starter.test_emission import room
 from support.scenes import Glb
 from support.staged import QUARTER
@@ -13,6 +14,7 @@ from framearray_cli.scene.paths.paths import lights
 from framearray_cli.starter import StartOptions, init
 
 IES = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 2 3 1 1 2 0 0 0\n1 1 10\n0 45 90\n0\n300 200 0\n"
+pytestmark = pytest.mark.usefixtures("obscurances")
 FEW = StartOptions(frames=2, resolution=(48, 36))
 DOWN = [-QUARTER, 0.0, 0.0, QUARTER]  # -z turned to -y
 

@@ -89,6 +89,7 @@ def test_equal_positions_of_lights_are_one(tmp_path: Path) -> None:
     assert read_first_job(still.save(tmp_path / "still" / "scene.glb"), lights=5).light.frames == 1
 
 
+@pytest.mark.usefixtures("obscurances")
 def test_a_sun_over_a_place_shines_in_every_picture(tmp_path: Path) -> None:
     pytest.importorskip("pvlib")
     scene = rooms.street().save(tmp_path / "street.glb")

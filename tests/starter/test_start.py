@@ -207,6 +207,7 @@ def test_a_camera_is_chosen_by_its_name(tmp_path: Path) -> None:
         init(tmp_path / "scene.glb", tmp_path / "other.toml", StartOptions(camera="Middle"))
 
 
+@pytest.mark.usefixtures("obscurances")
 def test_lights_of_the_file_keep_their_places_and_relative_strengths(tmp_path: Path) -> None:
     glb = room()
     lamp = glb.node(name="Lamp", **light(glb, intensity=1000.0, color=[1.0, 0.5, 0.25]))

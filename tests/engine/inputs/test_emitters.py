@@ -151,6 +151,7 @@ def test_what_stands_between_hides_half() -> None:
     check_mean(lit(scene, arrays(scene, mesh()), 2 * N)[:, 0, 0], lambert(QUAD) / 2)
 
 
+@pytest.mark.slow
 def test_the_same_bits_for_any_grouping_and_beside_other_sources() -> None:
     scene = scene_with(tiny.quad(*(QUAD + P)), hides=np.concatenate([WALLS, FAR]))
     strength = np.linspace(0.5, 2, 12)[:, None] * (1, 1, 1)

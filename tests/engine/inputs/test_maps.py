@@ -140,6 +140,7 @@ def test_a_fine_map_is_averaged_by_solid_angle() -> None:
     np.testing.assert_allclose(coarse, texel_powers(pixels).reshape(8, 192, 16, 192).sum(axis=(1, 3)), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_shadow_steps_test_the_same_rays() -> None:
     lights = arrays(environment(RNG.random((8, 16, 3))), environment(RNG.random((4, 8, 3))))
     hits = hits_at(n=203)
