@@ -164,8 +164,9 @@ def render_on_screen(
     """
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the scene")
+        # first: in the other order Python takes and returns memory thousands of times while numba loads, for 0.13 s
+        from framearray_cli.render.render import render as run  # isort: skip
         from framearray_cli.render.beside import offer_for
-        from framearray_cli.render.render import render as run
 
         offer_for(job)
         events = RenderingEvents(screen, job, strict=strict, repairs=repairs)
