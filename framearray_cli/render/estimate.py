@@ -10,6 +10,7 @@ from framearray_cli.array.folder import Identity, conflict_text, differences, fr
 from framearray_cli.base.memory import free_memory, peak_memory, resident_memory
 from framearray_cli.engine.embree_c import rays_together
 from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.kernels.beside import stop as stop_compiling_beside
 from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
@@ -102,16 +103,17 @@ def check(job: Job, events: RenderEvents | None = None) -> Estimate:
             setup, target = allot_hits(few, setup, ambient)
             if target:
                 events.allotted(target)
-            target_seconds = now() - before_target
+            planning = ambient_seconds + now() - before_target
             pixels = _trial_pixels(setup)
-            first, second = (run_trial(few, setup, ambient, int(p)) for p in (FIRST_SHARE * pixels, pixels))
+            first = run_trial(few, setup, ambient, int(FIRST_SHARE * pixels))
+            stop_compiling_beside()
+            second = run_trial(few, setup, ambient, int(pixels))
             blocks, frames, left_out = _block_memory(prepared, few, setup)
             resident, available = resident_memory(), free_memory()
     more = max(left_out + max(frames, peak - resident if setup.cells else 0), ambient_memory(prepared))
     disk = int(_frame_bytes(first, second, setup.n_pixels, prepared.n_lights) * prepared.n_cameras)
     free = free_space(job.output.directory)
     whole, _ = all_lights(prepared, MOST_LIGHTS, replace(setup, cells=None), ambient)
-    planning = ambient_seconds + target_seconds
     seconds = before + planning_seconds(planning, ambient.shared_s, prepared.n_lights / few.n_lights)
     return Estimate(
         prepared=prepared,

@@ -23,6 +23,7 @@ from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.composed import Composed
 from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.kernels.beside import stop as stop_compiling_beside
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
@@ -104,6 +105,7 @@ def _plan(
     setup, ambient = plan_work(prepared, session.embree)
     events.planned(ambient)
     sample = load_kernels(prepared, setup, ambient)
+    stop_compiling_beside()
     events.loaded()
     warnings = _look(session, setup, ambient, events) if pilots else session.known_warnings()
     setup, target = allot_hits(prepared, setup, ambient)

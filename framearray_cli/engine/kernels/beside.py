@@ -54,6 +54,14 @@ def start() -> None:
         _started.append((time.time(), process))
 
 
+def stop() -> None:
+    """End the second process, and start none from now on: all kernels are there, and frames take every core."""
+    _offered.clear()
+    for _, process in _started:
+        if process.stdin is not None:
+            process.stdin.close()
+
+
 def is_from_beside(file: Path) -> bool:
     """Whether a kernel was put on disk since the second process started."""
     with suppress(OSError):

@@ -19,6 +19,9 @@ beside.offer("from framearray_cli.engine.kernels.beside import end_with_parent; 
              "import time; time.sleep(60)")
 beside.start()
 print(beside._started[0][1].pid, flush=True)
+if sys.argv[1] == "stopped":
+    beside.stop()
+    beside._started[0][1].wait(10)
 sys.stdin.read()
 """
 
@@ -36,20 +39,22 @@ def offered(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("killed", [False, True])
-def test_it_ends_with_the_process_that_started_it(tmp_path: Path, killed: bool) -> None:
+@pytest.mark.parametrize("how", ["stopped", "ended", "killed"])
+def test_it_ends_when_asked_and_with_the_process_that_started_it(tmp_path: Path, how: str) -> None:
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
     environment.pop(beside.PROCESSES, None)
     if beside.available_cores() < 2:
         pytest.skip("one core")
     parent = subprocess.Popen(
-        [sys.executable, "-c", PARENT], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+        [sys.executable, "-c", PARENT, how], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
     )
     assert parent.stdout is not None
     child = psutil.Process(int(parent.stdout.readline()))
-    assert child.is_running()
-    if killed:
+    if how == "killed":
         parent.kill()
+    if how == "stopped":
+        child.wait(timeout=20)
+        assert parent.poll() is None
     parent.communicate("")
     child.wait(timeout=20)
 
