@@ -12,6 +12,7 @@ from .errors import OutputError
 from .extras import extra
 
 MOST_PIXELS = 16384**2  # of an image; no job may have more
+LINEAR_MAPS = (".exr", ".hdr", ".tif", ".tiff")
 # Of EXR, TIFF, large TIFF and Radiance.
 _HEADS = (b"\x76\x2f\x31\x01", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+", b"#?RA", b"#?RG")
 
@@ -60,6 +61,21 @@ def read_rgb(path: Path) -> Float32:
     if not {"R", "G", "B"} <= set(names):
         raise OutputError(f"{path}: expected channels R, G, B, found {', '.join(names)}")
     return np.ascontiguousarray(pixels[..., [names.index(name) for name in "RGB"]])
+
+
+def read_environment(path: Path) -> Float32:
+    """Read an environment map, a panorama of linear radiance, (h, 2 h, 3).
+
+    Raises:
+        OutputError: as `read_rgb`, or the file has another format or shape.
+    """
+    if path.suffix.lower() not in LINEAR_MAPS:
+        raise OutputError(f"{path}: expected an environment map with linear light, {', '.join(LINEAR_MAPS)}")
+    pixels = read_rgb(path)
+    height, width, _ = pixels.shape
+    if width != 2 * height:
+        raise OutputError(f"{path}: expected a panorama, twice as wide as high, got {width} x {height} pixels")
+    return pixels
 
 
 def check_size(path: Path, width: int, height: int) -> None:

@@ -34,6 +34,8 @@ def listen() -> None:
 def watch_for_lost() -> None:
     """Raise `Stopped` again in a moment where Python cannot raise it, in a destructor for instance."""
     hook = sys.unraisablehook
+    if getattr(hook, "__module__", None) == __name__:  # already
+        return
 
     def lost(what: "sys.UnraisableHookArgs") -> None:
         if isinstance(what.exc_value, Stopped) and hasattr(signal, "setitimer"):

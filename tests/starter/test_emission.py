@@ -1,4 +1,4 @@
-"""Emission of a file in a first job: with every kind of lamp beside it, alone, and of very many materials."""
+"""Emission of a file in a first job: with every kind of lamp beside it, by itself, and of very many materials."""
 
 from pathlib import Path
 from typing import Any

@@ -26,7 +26,7 @@ from ..kernels.simd import gather, integers, reals, select, sqrt
 from .random import EMITTERS, SOURCES, r2, random_word
 from .surfaces import Surfaces, emission_at, position_at, surfaces
 
-MANY = 1 << 24  # a random number that chooses a triangle is one of so many
+MANY = 1 << 24  # random numbers that choose a triangle are below
 # Points of a triangle, per side, at which its texture is read for the draw.
 TEXTURE_POINTS = 8
 # A triangle is drawn as if it were at least this bright, in units of the mean: a texture is known at some points only.

@@ -29,16 +29,17 @@ class Claim:
         Returns:
             whether another process had it; it has probably put the kernel on disk.
         """
-        from filelock import FileLock, Timeout
+        from filelock import FileLock
 
         if self._lock is None:
             self._lock = FileLock(folder / f"{self._function.__name__}-{self._function.__code__.co_firstlineno}.lock")
-        with suppress(OSError, NotImplementedError):
+        with suppress(OSError, NotImplementedError):  # a folder, or a file system, without locks
             folder.mkdir(parents=True, exist_ok=True)
             try:
                 self._lock.acquire(timeout=0)
-            except Timeout:
-                self._wait(Timeout)
+            except TimeoutError:
+                with counted_as_compiled(self._function), suppress(TimeoutError):
+                    self._lock.acquire(timeout=PATIENCE, poll_interval=0.02)
                 return True
         return False
 
@@ -46,7 +47,3 @@ class Claim:
         """Let other processes go on."""
         if self._lock is not None:
             self._lock.release()
-
-    def _wait(self, expired: type[Exception]) -> None:
-        with counted_as_compiled(self._function), suppress(expired):
-            self._lock.acquire(timeout=PATIENCE, poll_interval=0.02)

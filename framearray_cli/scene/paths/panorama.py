@@ -15,16 +15,15 @@ from framearray_cli.base.arrays import Flags, Float32, Float64
 from framearray_cli.base.colour import LUMINANCE
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.hashing import fingerprint
-from framearray_cli.base.openimage import read_rgb
+from framearray_cli.base.openimage import read_environment
 from framearray_cli.base.units import counted
 from framearray_cli.job.values import MOST_EMISSION
 
-LINEAR_MAPS = (".exr", ".hdr", ".tif", ".tiff")
 MOST_ROWS = 1024  # of texels: a fifth of a degree; finer maps are averaged
 TOGETHER = 64  # rows that are averaged together, which takes less memory
 FEWEST_ROWS = 8  # so that angles within a texel are small
 WHOLE, REST, SUNS = "whole", "rest", "suns"  # parts of a map
-# Texels are suns if they are so many times as bright as the mean of the map, and hold a share of its light within these
+# Texels are suns if they are BRIGHT times as bright as the mean of the map, and hold a share of its light within these
 # bounds: with less they are not worth a shadow ray, with more nothing is left beside them.
 BRIGHT, LEAST_SUNS, MOST_SUNS = 100.0, 0.05, 0.999
 
@@ -119,12 +118,7 @@ def read_panorama(path: Path) -> Panorama:
     Raises:
         OutputError: it is missing or damaged, is no panorama, or holds values that are no radiance.
     """
-    if path.suffix.lower() not in LINEAR_MAPS:
-        raise OutputError(f"{path}: expected an environment map with linear light, {', '.join(LINEAR_MAPS)}")
-    pixels = read_rgb(path)
-    height, width, _ = pixels.shape
-    if width != 2 * height:
-        raise OutputError(f"{path}: expected a panorama, twice as wide as high, got {width} x {height} pixels")
+    pixels = read_environment(path)
     wrong = ~(np.isfinite(pixels) & (pixels >= 0) & (pixels <= MOST_EMISSION)).all(axis=-1)
     if wrong.any():
         y, x = (int(k) for k in np.argwhere(wrong)[0])

@@ -11,17 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
-from framearray_cli.array.images.images import read_image
 from framearray_cli.array.manifest import Manifest, ManifestLight
 from framearray_cli.array.mixtures import constant_sources, is_constant
 from framearray_cli.base.arrays import Float64, Image
 from framearray_cli.base.errors import OutputError
+from framearray_cli.base.openimage import read_environment
 from framearray_cli.base.units import counted
 
 from ..shrinking import area_mean
 
 ROWS = 128  # of the map that is summed: cells of 1.4 degrees, where domes have positions every 10 or 20
-LINEAR_MAPS = (".exr", ".hdr", ".tif", ".tiff")
 # Points whose distances to the middle of the fitted sphere differ by more than this share lie on none.
 ROUNDNESS = 0.05
 # Why light of a type stands for no direction; other types shine one way.
@@ -49,15 +48,10 @@ def read_map(file: Path) -> Image:
     Raises:
         OutputError: it is missing or damaged, is no panorama, or holds values that are no radiance.
     """
-    if file.suffix.lower() not in LINEAR_MAPS:
-        raise OutputError(f"{file}: expected an environment map with linear light, {', '.join(LINEAR_MAPS)}")
-    image = read_image(file)
-    height, width, _ = image.shape
-    if width != 2 * height:
-        raise OutputError(f"{file}: expected a panorama, twice as wide as high, got {width} x {height} pixels")
+    image = read_environment(file)
     if not np.isfinite(image).all() or image.min() < 0:
         raise OutputError(f"{file}: expected radiance of at least 0, got values that are negative or not finite")
-    return area_mean(image, 2 * ROWS, ROWS) if height > ROWS else image
+    return area_mean(image, 2 * ROWS, ROWS) if len(image) > ROWS else image
 
 
 def environment_weights(field: LightField, panorama: Image, rotate_deg: float) -> tuple[Float64, float]:
