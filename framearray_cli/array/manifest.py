@@ -208,6 +208,12 @@ class Manifest:
         return not isinstance(indirect, dict) or indirect.get("method", "obscurance") == "obscurance"
 
     @property
+    def has_sun_hours(self) -> bool:
+        """Whether the layers hold hours of direct sun."""
+        output = self.job.get("output")
+        return bool(self.layers) and isinstance(output, dict) and output.get("sun_hours") is True
+
+    @property
     def n_lights(self) -> int:
         """N_l: light positions along the first axis."""
         return next(iter(self.axes.values()))

@@ -13,7 +13,8 @@ from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_v
 
 from framearray_cli.base.forms.table import Float3, Place, Table, default_text, fail, fill
 from framearray_cli.base.forms.words import shown
-from framearray_cli.base.units import LEAST_FPS, MOST_FPS, MOST_STOPS, MOST_THREADS
+from framearray_cli.base.sundays import SunDay
+from framearray_cli.base.units import MOST_THREADS
 
 from .camera import CameraTable
 from .light import LightTable
@@ -28,6 +29,8 @@ from .method import (
     SamplesTable,
     SpecularTable,
 )
+from .output import OutputTable
+from .study import study_days, study_problems
 from .values import MOST_HITS, Auto, Emission, FileName, MemorySize, Reflectivity, absolute
 
 Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; in every other format y is up
@@ -90,48 +93,6 @@ class SceneTable(Table):
         if "up" not in self.model_fields_set:
             fill(self, "up", "z" if self.file.suffix.lower() in Z_UP_FORMATS else "y")
         return self
-
-
-class OutputTable(Table):
-    """What is written."""
-
-    directory: FileName = Field(
-        default=Path(),
-        description="Folder for images and manifest.",
-        json_schema_extra=default_text('"../out/" and the job\'s name'),
-    )
-    format: Literal["exr", "png", "tif", "jpg"] = Field(
-        default="exr",
-        description="Image format. EXR and TIFF hold linear radiance; PNG and JPEG are sRGB, clipped to 0..1.",
-    )
-    fps: float = Field(
-        default=24.0,
-        ge=LEAST_FPS,
-        le=MOST_FPS,
-        description="Frames per second, stored in the images and used for movies.",
-    )
-    compression: Literal["none", "rle", "zip", "zips", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"] = Field(
-        default="none",
-        description="Compression of EXR. zip saves a third of the space and makes a render up to 1.6 times as long. "
-        "pxr24, b44, b44a, dwaa and dwab lose precision.",
-    )
-    half: Literal["auto", "always", "never"] = Field(
-        default="auto",
-        description='EXR with 16 bits per channel. "auto": 32 bits for an image with values above 65504, which 16 bits '
-        'cannot hold. "always": clip such values to 65504. "never": always 32 bits.',
-    )
-    quality: int = Field(default=95, ge=1, le=100, description="Quality of JPEG.")
-    exposure: float = Field(
-        default=0.0,
-        ge=-MOST_STOPS,
-        le=MOST_STOPS,
-        description="Brightens PNG and JPEG by 2 to this power (stops). EXR and TIFF stay as they are.",
-    )
-    layers: bool = Field(
-        default=True,
-        description="Also write one multi-channel EXR per camera: obscurance, indirect, reflectivity, normal, depth, "
-        "sample count.",
-    )
 
 
 class RenderTable(Table):
@@ -217,6 +178,11 @@ class Job(Table):
         return _resolved("samples.hits", self.samples.hits)
 
     @property
+    def sun_days(self) -> tuple[SunDay, ...]:
+        """The days whose hours of sun are layers; none unless `output.sun_hours` asks for them."""
+        return study_days(self.light) if self.output.sun_hours and self.output.layers else ()
+
+    @property
     def _window_frames(self) -> int:
         """Number of frames in a full window, 2 N_r + 1; with the default N_r for "auto"."""
         n_r = DEFAULT_N_R if self.reuse.n_r == "auto" else self.reuse.n_r
@@ -247,6 +213,8 @@ class Job(Table):
         self._check_groups()
         self._check_cells()
         self._check_environments()
+        if self.output.sun_hours and (problems := study_problems(self.light, layers=self.output.layers)):
+            fail(problems)
         if self.samples.halves and self._window_hits < 2:
             fail([(("samples", "halves"), "expected at least two hits for each pixel of an image")])
         job_file = (info.context or {}).get("job_file")

@@ -59,6 +59,8 @@ def job_table(job: Job) -> dict[str, Any]:
         table["indirect"] = {"method": "cells", "exact": True}
     else:
         del table["indirect"]["exact"]
+    if not job.output.sun_hours:  # as in jobs of versions without this key
+        table["output"].pop("sun_hours", None)
     del table["samples"]["most_hits" if job.samples.error is None else "hits"]  # a job has either
     return table
 

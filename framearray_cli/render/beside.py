@@ -73,7 +73,9 @@ _FEW = 4096  # walks that sample the cells of the room
 def tables_for(job: Job) -> dict[str, Any]:
     """The tables of a job that decide which kernels it needs."""
     table = job_table(job)
-    return {name: table[name] for name in _KEPT if name in table}
+    found = {name: table[name] for name in _KEPT if name in table}
+    found["output"].pop("sun_hours", None)  # the room has no sun
+    return found
 
 
 def offer_for(job: Job, more: Mapping[str, Any] = NO_TABLES) -> None:

@@ -95,12 +95,14 @@ def window_memory(
     values = prepared.light_arrays.channels * n_lights
     per_record = 4 * (values + LANES + (LIGHT + values if job.indirect.method != "obscurance" else 0))
     per_record += 4 * EMISSION_COLUMNS * (prepared.light_arrays.emitters.span.size > 0)
-    per_hit = per_record + 16 * job.output.layers + frames * (4 + weighed)
+    days = job.sun_days if job.output.layers else ()
+    per_hit = per_record + 16 * job.output.layers + 4 * len(days) + frames * (4 + weighed)
     # a frame's mirror hits wait for N_r frames; twice while the lists of all batches are joined, and chains add some
     mirrored = mirror_share * job.specular.hits * (n_r + 3) * per_record
     # of the frame being traced: the pixel of each hit in every frame of the window, before hits are sorted by it
     finding = float(per_pixel.max()) * frames * 4
-    layers = 2 * LAYER_CHANNELS * 4 * job.output.layers  # while summed, and while written
+    channels = LAYER_CHANNELS * job.output.layers + len(days) + bool(days)
+    layers = 2 * channels * 4  # while summed, and while written
     differences = (BLOCKS + 1) * 12 * n_lights * job.samples.halves
     per_image_pixel = (
         finding

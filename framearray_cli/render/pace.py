@@ -99,7 +99,9 @@ def pixel_cost(setup: FrameSetup, n_planes: int) -> float:
 
 def hit_cost(setup: FrameSetup, n_lights: int) -> float:
     """Return the approximate nanoseconds of finding a hit, at that many light positions, that no other frame shares."""
-    return EYE_RAY + OBSCURANCE_RAY * setup.obscurance.n_rays + SHADOW_RAY * n_lights / setup.shadow_step
+    suns = setup.sun.lights.n_lights / setup.lights.n_lights if setup.sun else 0.0  # positions with a ray of their own
+    shadow_rays = n_lights * (1 / setup.shadow_step + suns)
+    return EYE_RAY + OBSCURANCE_RAY * setup.obscurance.n_rays + SHADOW_RAY * shadow_rays
 
 
 def eye_work(setup: FrameSetup, c: int) -> float:

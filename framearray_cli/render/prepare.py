@@ -35,6 +35,7 @@ from framearray_cli.scene.paths.planes import Plane
 from framearray_cli.scene.scene import Scene, load_scene
 
 from .shining import with_emission
+from .sun_study import sun_study
 
 # Least native hits per pixel that are sampled in two halves.
 FEWEST_SPLIT = 4
@@ -175,6 +176,7 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
         layers=job.output.layers,
         denoise=job.denoise.obscurance,
         halves=_halves(job, still=prepared.still),
+        sun=sun_study(job, prepared.lights) if job.sun_days else None,
     )
 
 

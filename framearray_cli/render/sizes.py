@@ -6,6 +6,7 @@ from framearray_cli.job.job import Job
 BYTES = {"exr": 6.0, "png": 1.7, "tif": 12.0, "jpg": 0.4}
 COMPRESSED = 0.6  # of an EXR
 LAYER_BYTES = 18.0  # of the layers of a camera position
+SUN_BYTES = 2.0  # of the hours of sun of a day
 
 
 def images_per_camera(job: Job) -> int:
@@ -26,5 +27,6 @@ def rough_bytes(job: Job) -> float:
     each = BYTES[output.format]
     if output.format == "exr":
         each *= (COMPRESSED if output.compression != "none" else 1.0) * (2.0 if output.half == "never" else 1.0)
-    frame = each * images_per_camera(job) + LAYER_BYTES * output.layers
+    days = len(job.sun_days)
+    frame = each * images_per_camera(job) + LAYER_BYTES * output.layers + SUN_BYTES * (days + bool(days))
     return width * height * frame * job.camera.frames

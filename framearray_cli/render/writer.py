@@ -14,7 +14,7 @@ from typing import Self
 import numpy as np
 
 from framearray_cli.array.images.attributes import Attributes, frame_attributes
-from framearray_cli.array.images.images import ImageFormat, write_image, write_layers
+from framearray_cli.array.images.images import SUN_HOURS, ImageFormat, write_image, write_layers
 from framearray_cli.array.images.levels import pixel_shares
 from framearray_cli.base.arrays import Float32, Images
 from framearray_cli.base.errors import OutputError
@@ -245,6 +245,7 @@ class ArrayWriter:
             ("normal", "XYZ", layers.normal),
         ):
             channels |= {f"{name}.{letter}": values[..., i] for i, letter in enumerate(letters)}
+        channels |= {f"{SUN_HOURS}.{day}": hours for day, hours in layers.sun_hours.items()}
         write_layers(path, channels, self._target.attributes(c))
         return path
 

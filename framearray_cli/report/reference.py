@@ -102,6 +102,7 @@ def _render_reference(case: Case, c: int, passes: int) -> Reference:
         area=False,
         shadow_step=1,
         layers=True,
+        sun=None,
     )
     shape = (setup.cams.height, setup.cams.width, 3)
     light: Float64 = np.zeros((2, setup.lights.n_lights, *shape))

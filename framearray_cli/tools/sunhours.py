@@ -1,43 +1,57 @@
-"""Hours of direct sun, from the images of a sun study: positions with direct light times the time between them.
+"""Hours of direct sun of a sun study: a layer of its array, or counted in its images.
 
-The sun must be alone in a group of sources, whose images hold its direct light and nothing else; so light from cells
-will not do, which they hold too. Light that a mirror
-shows counts as well: the pixel shows a place in the sun.
+In images they are the positions with direct light times the time between them. The sun must be alone in a group of
+sources, whose images hold its direct light and nothing else; so light from cells will not do, which they hold too.
+There light that a mirror shows counts: the pixel shows a place in the sun. The layer holds the hours of the mirror.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
 from datetime import datetime
-from itertools import groupby, pairwise
 
 import numpy as np
 
-from framearray_cli.array.manifest import Manifest, ManifestGroup
+from framearray_cli.array.images.images import SUN_HOURS, read_layers
+from framearray_cli.array.manifest import Manifest, ManifestGroup, layers_path
+from framearray_cli.array.moments import axis_moments
 from framearray_cli.array.pictures import Pictures, Positions, Relight
 from framearray_cli.base.arrays import Float32
 from framearray_cli.base.errors import OutputError
+from framearray_cli.base.sundays import SunDay, short_days, sun_days
 from framearray_cli.base.units import counted
 
 NO_LIGHT = (0.0, 0.0, 0.0)
+ReadHours = Callable[[SunDay, int], Float32]  # of a day and a camera, (h, w)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SunDay:
-    """The light positions of one day.
+def open_sun_hours(manifest: Manifest) -> tuple[tuple[SunDay, ...], ReadHours]:
+    """Return the days of a sun study, and what reads the hours of one: the layer where there is one, else the images.
 
-    Attributes:
-        date: "2026-06-21".
-        lights: along the axis of the sun's group.
-        step_h: hours from one to the next.
+    Raises:
+        OutputError: there is no layer, and the images do not hold what hours of sun need, see `find_sun`.
     """
+    if manifest.has_sun_hours:
+        if moments := next(iter(axis_moments(manifest).values()), ()):
+            return sun_days(moments), lambda day, c: read_sun_hours(manifest, day, c)
+        raise OutputError(f"{manifest.directory}: expected the times of a sun beside its hours, found none")
+    group, days = find_sun(manifest)
+    pictures = Pictures(manifest)
+    return days, lambda day, c: sun_hours(pictures, group, day, c)
 
-    date: str
-    lights: range
-    step_h: float
 
-    @property
-    def most_h(self) -> float:
-        """Hours of a place that is in the sun at all positions."""
-        return len(self.lights) * self.step_h
+def read_sun_hours(manifest: Manifest, day: SunDay, c: int) -> Float32:
+    """Read the layer of hours of direct sun of a camera, (h, w).
+
+    Raises:
+        OutputError: the file is missing or damaged, or holds no hours of that day.
+    """
+    path, name = layers_path(manifest, c), f"{SUN_HOURS}.{day.date}"
+    found = read_layers(path).get(name)
+    if found is None:
+        raise OutputError(f"{path}: expected the channel {name}, found none")
+    if found.shape != manifest.resolution[::-1]:
+        size, (width, height) = found.shape, manifest.resolution
+        raise OutputError(f"{path}: expected {width} x {height} pixels, got {size[1]} x {size[0]}")
+    return found
 
 
 def find_sun(manifest: Manifest) -> tuple[ManifestGroup, tuple[SunDay, ...]]:
@@ -51,9 +65,12 @@ def find_sun(manifest: Manifest) -> tuple[ManifestGroup, tuple[SunDay, ...]]:
     if not manifest.uses_ambient:
         raise OutputError(
             f"{folder}: hours of sun need the direct light of a sun apart from all other light, and images with "
-            'indirect.method = "cells" hold its indirect light too; render again with "obscurance"'
+            'indirect.method = "cells" hold its indirect light too; render again with output.sun_hours = true'
         )
-    apart = 'render again with a source of type "sun" that has a group of its own, as in group = "sun"'
+    apart = (
+        'render again with output.sun_hours = true, or with a source of type "sun" that has a group of its own, as in '
+        'group = "sun"'
+    )
     found = [group for group in manifest.groups if any("time" in source for source in group.lights[0].sources)]
     if not found:
         what = "the direct light of a sun apart from all other light"
@@ -63,21 +80,14 @@ def find_sun(manifest: Manifest) -> tuple[ManifestGroup, tuple[SunDay, ...]]:
     if (n := len(group.lights[0].sources)) > 1:
         has = f'"{group.name}" has {counted(n, "source")}'
         raise OutputError(f"{folder}: hours of sun need a sun alone in its group, and {has}; {apart}")
-    times = [datetime.fromisoformat(light.sources[0]["time"]) for light in group.lights]
-    days, first = [], 0
-    for date, each in groupby(times, key=datetime.date):
-        moments = list(each)
-        if len(moments) < 2:
-            raise OutputError(f"{folder}: hours of sun need at least 2 light positions per day, got 1 on {date}")
-        steps = [(b - a).total_seconds() / 3600 for a, b in pairwise(moments)]
-        lights = range(first, first + len(moments))
-        days.append(SunDay(date=date.isoformat(), lights=lights, step_h=float(np.median(steps))))
-        first = lights.stop
-    return group, tuple(days)
+    days = sun_days([datetime.fromisoformat(light.sources[0]["time"]) for light in group.lights])
+    if short := short_days(days):
+        raise OutputError(f"{folder}: hours of sun need {short}")
+    return group, days
 
 
 def sun_hours(pictures: Pictures, group: ManifestGroup, day: SunDay, c: int) -> Float32:
-    """Return the hours of direct sun in each pixel of a camera, (h, w).
+    """Count the hours of direct sun in each pixel of a camera, (h, w).
 
     Raises:
         OutputError: an image is missing or damaged.

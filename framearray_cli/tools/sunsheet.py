@@ -6,7 +6,6 @@ import numpy as np
 
 from framearray_cli.array.images.images import FOR_SCREENS
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.array.pictures import Pictures
 from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.units import counted
 
@@ -14,7 +13,7 @@ from .drawing import draw_scale, draw_sheet
 from .progress import Progress
 from .sheet import MOST_COLUMNS, WIDTH, SheetResult, choose_columns, sheet_format, tile_size, write_drawn, write_linear
 from .shrinking import area_mean
-from .sunhours import find_sun, sun_hours
+from .sunhours import open_sun_hours
 
 # sRGB codes from no sun to most: lightness rises evenly, so that the order is seen without the colours.
 RAMP = np.array([[16, 16, 32], [56, 44, 120], [140, 50, 120], [224, 96, 70], [250, 176, 70], [252, 250, 190]])
@@ -47,7 +46,7 @@ def make_sun_sheet(
         MissingExtraError: no library here draws labels, or writes the format.
     """
     image_format, manifest = sheet_format(target, 0.0), read_manifest(out)
-    group, days = find_sun(manifest)
+    days, read = open_sun_hours(manifest)
     chosen = choose_columns(manifest, cameras, columns)
     labels = [day.date for day in days] if image_format.format in FOR_SCREENS else []
     tile = tile_size(manifest, len(chosen), width, labels)
@@ -55,16 +54,15 @@ def make_sun_sheet(
     if dry_run:
         return SheetResult(target=target, cameras=chosen, lights=lights, size=(0, 0))
     tiles = np.zeros((len(days), len(chosen), tile[1], tile[0], 3), np.float32)
-    pictures = Pictures(manifest)
     for i, c in enumerate(chosen):
         for j, day in enumerate(days):
-            hours = sun_hours(pictures, group, day, c)
+            hours = read(day, c)
             tiles[j, i] = area_mean(np.repeat(hours[..., None], 3, axis=2), *tile)
             if progress:
                 progress(i * len(days) + j + 1, len(days) * len(chosen))
     if labels:
         most = max(day.most_h for day in days)
-        heads = (manifest.name, f"hours of direct sun,  {counted(len(group.lights), 'light position')}")
+        heads = (manifest.name, f"hours of direct sun,  {counted(days[-1].lights.stop, 'light position')}")
         codes = draw_sheet(false_colours(tiles[..., 0], most), chosen, labels, heads, width)
         codes = draw_scale(codes, false_colours(np.linspace(0, most, 256, dtype=np.float32)[None], most), most, "h")
         size = write_drawn(target, codes)

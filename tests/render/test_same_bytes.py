@@ -50,11 +50,22 @@ SOFT = {
 }
 
 
+STUDY = {
+    "frames": 3,
+    "sources": [
+        {
+            "type": "sun", "latitude": 41.9, "longitude": 12.5, "date": "2026-06-21", "timezone": 1.0,
+            "start": "08:00", "stop": "16:00", "irradiance": 3.0,
+        }
+    ],
+}  # fmt: skip
+
+
 def job(scene: Path, out: Path, threads: int, more: dict[str, Any]) -> Job:
     tables: dict[str, Any] = {
         "scene": {"file": str(scene), "background": [0.3, 0.4, 0.5]},
         "camera": WALK,
-        "output": {"directory": str(out)},
+        "output": {"directory": str(out), "sun_hours": more.get("light") is STUDY},
         "reuse": {"n_r": 1, "weights": "area"},
         "render": {"threads": threads},
     }
@@ -65,7 +76,11 @@ def images(folder: Path) -> Bytes:
     return {file.name: file.read_bytes() for file in folder.glob("*.exr")}
 
 
-@pytest.mark.parametrize("more", [{}, {"indirect": tiny.CELLS}, {"light": SOFT}], ids=["area", "cells", "soft"])
+@pytest.mark.parametrize(
+    "more",
+    [{}, {"indirect": tiny.CELLS}, {"light": SOFT}, {"light": STUDY}],
+    ids=["area", "cells", "soft", "hours of sun"],
+)
 def test_any_way_to_render_writes_the_same_bytes(
     more: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from support.movies import CAMERA, plain
 
-from framearray_cli.array.images.images import ImageFormat, read_image, write_image
+from framearray_cli.array.images.images import ImageFormat, read_image, write_image, write_layers
 from framearray_cli.array.images.png import read_codes
-from framearray_cli.array.manifest import Manifest, ManifestGroup, ManifestLight, array_files, image_path
+from framearray_cli.array.manifest import Manifest, ManifestGroup, ManifestLight, array_files, image_path, layers_path
 from framearray_cli.array.manifest_toml import write_manifest
 from framearray_cli.base.errors import OutputError
 from framearray_cli.tools.sunsheet import RAMP, false_colours, make_sun_sheet
+from framearray_cli.tools.view.streams import is_exposed, layer_streams
+from framearray_cli.tools.view.tiles import Tiles
 
 TIMES = [f"2026-{day}T{hour:02d}:{minute:02d}:00+01:00" for day in ("03-20", "06-21") for hour, minute in
          ((8, 0), (8, 30), (9, 0), (9, 30))]  # fmt: skip
@@ -76,6 +78,60 @@ def test_a_sheet_in_false_colour(tmp_path: Path) -> None:
         assert tuple(false_colours(np.float32(hours), 2.0).tolist()) in codes
 
 
+def with_layer(manifest: Manifest, days: Any = ("2026-03-20", "2026-06-21")) -> Manifest:
+    """Write hours as a layer: k + c / 4 in all pixels of camera c on day k."""
+    changed = replace(manifest, layers="study.layers.c{camera:04d}.exr", job={"output": {"sun_hours": True}})
+    for c in range(2):
+        layers = {
+            f"sun_hours.{day}": np.full(SIZE[::-1], k + c / 4, np.float32) for k, day in enumerate((*days, "total"))
+        }
+        write_layers(layers_path(changed, c), layers)
+    write_manifest(manifest.directory, changed)
+    return changed
+
+
+def test_a_layer_takes_the_place_of_images(tmp_path: Path) -> None:
+    """It needs no sun alone in its group, and light from cells does no harm."""
+    manifest = with_layer(study(tmp_path / "out", n_sources=2))
+    made = make_sun_sheet(manifest.directory, tmp_path / "hours.exr", cameras="all")
+    assert (made.cameras, made.lights, made.size) == ((0, 1), (0, 4), (24, 16))
+    hours = read_image(tmp_path / "hours.exr").reshape(2, 8, 2, 12, 3)
+    np.testing.assert_array_equal(hours[:, 0, :, 0, 0], [[0.0, 0.25], [1.0, 1.25]])
+    assert (hours == hours[:, :1, :, :1, :1]).all()
+
+
+def test_a_layer_without_a_day_or_a_file_is_named(tmp_path: Path) -> None:
+    manifest = with_layer(study(tmp_path / "a"), days=("2026-03-20",))
+    with pytest.raises(OutputError, match=r"c0000\.exr: expected the channel sun_hours\.2026-06-21, found none"):
+        make_sun_sheet(manifest.directory, tmp_path / "x.png")
+    layers_path(manifest, 0).unlink()
+    with pytest.raises(OutputError, match=r"study\.layers\.c0000\.exr: no such file"):
+        make_sun_sheet(manifest.directory, tmp_path / "x.png")
+    bare = with_layer(study(tmp_path / "b", with_time=False))
+    with pytest.raises(OutputError, match="expected the times of a sun beside its hours, found none"):
+        make_sun_sheet(bare.directory, tmp_path / "x.png")
+
+
+def test_the_page_lists_days_and_their_sum() -> None:
+    one = np.zeros((2, 3), np.float32)
+    channels = {f"sun_hours.{day}": one for day in ("2026-03-20", "2026-06-21", "total")} | {"samples": one}
+    assert [stream.key for stream in layer_streams(channels)] == [
+        "samples", "sun-2026-03-20", "sun-2026-06-21", "sun-total"
+    ]  # fmt: skip
+    del channels["sun_hours.2026-03-20"]
+    (_, day) = layer_streams(channels)
+    assert (day.key, day.label) == ("sun-2026-06-21", "Hours of sun 2026-06-21"), "of one day the sum is the same"
+
+
+def test_the_page_shows_hours(tmp_path: Path) -> None:
+    manifest = with_layer(study(tmp_path / "out"))
+    tiles = Tiles(manifest, tmp_path / "tiles", 1)
+    (stream,) = (stream for stream in tiles.streams if stream.key == "sun-2026-06-21")
+    assert (stream.coding.scale, stream.coding.high) == (0.0, 1.3), "data, up to the most hours"
+    assert tiles.ensure_tile(stream.key, 1, 0).exists()
+    assert not is_exposed(stream)
+
+
 def test_colours_run_from_dark_to_bright() -> None:
     codes = false_colours(np.linspace(-1, 13, 50, dtype=np.float32), 12.0).astype(float)
     assert (np.diff(codes @ [0.2126, 0.7152, 0.0722]) >= 0).all()
@@ -84,7 +140,10 @@ def test_colours_run_from_dark_to_bright() -> None:
 
 def test_what_is_missing_is_named(tmp_path: Path) -> None:
     cases = [
-        (plain(tmp_path / "a"), "this array stores its light all together; render again with a source of type"),
+        (
+            plain(tmp_path / "a"),
+            "this array stores its light all together; render again with output.sun_hours = true, or with",
+        ),
         (study(tmp_path / "b", with_time=False), "this array has no group with a sun; render again"),
         (study(tmp_path / "c", n_sources=2), 'a sun alone in its group, and "sun" has 2 sources'),
         (lit_by_cells(study(tmp_path / "e")), 'images with indirect.method = "cells" hold its indirect light too'),

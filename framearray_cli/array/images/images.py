@@ -30,7 +30,8 @@ Extension = Literal["exr", "png", "tif", "jpg"]
 
 HALF_MAX = 65504.0  # the largest half; values beyond become infinite
 EXR_COMPRESSIONS = ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
-FLOAT_LAYERS = ("depth", "samples")  # layers that need more than the 11 bits of a half
+SUN_HOURS = "sun_hours"  # layer with a channel per day of a sun study, and one for all days
+FLOAT_LAYERS = ("depth", "samples", SUN_HOURS)  # layers that need more than the 11 bits of a half
 FOR_SCREENS = ("png", "jpg")  # formats of 8-bit sRGB; the others keep the radiance
 _SAME = {"jpeg": "jpg", "tiff": "tif"}
 

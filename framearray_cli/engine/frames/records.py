@@ -45,16 +45,18 @@ class HitRecords:
         emission: (n, EMISSION_COLUMNS) what the hit sends out itself, tinted by mirrors, see `record_emission`; (n, 0)
             where nothing shines.
         indirect: (n, LIGHT + channels n_lights) indirect light read from cells, see `gather_cells`; (n, 0) without.
+        sun_hours: (n, n_days) hours of direct sun, see `find_sun_hours`; not written behind mirrors. (n, 0) without.
     """
 
     row: Float32
     irradiance: Float32
     indirect: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
     emission: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
+    sun_hours: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
 
     @property
     def arrays(self) -> dict[str, Float32]:
-        """The arrays by name; `indirect` and `emission` only if they have columns."""
+        """The arrays by name; those that may have no columns only if they have some."""
         return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name).shape[1]}
 
     @property
@@ -113,6 +115,7 @@ def empty_records(
     n_lights: int,
     columns: int = 0,
     shining: bool = False,
+    days: int = 0,
     take: Callable[[str, tuple[int, ...], Any], Any] = fresh_array,
 ) -> HitRecords:
     """Allocate records of n hits; contents are arbitrary.
@@ -122,11 +125,14 @@ def empty_records(
         n_lights: light positions whose irradiance is stored.
         columns: of `indirect`.
         shining: whether hits may send out light themselves.
+        days: whose hours of sun are counted.
         take: returns an array for a name, shape and dtype; by default a new one.
     """
+    none = np.empty((n, 0), np.float32)
     return HitRecords(
         row=take("row", (n, LANES), np.float32),
         irradiance=take("irradiance", (n, channels, n_lights), np.float32),
-        indirect=take("indirect", (n, columns), np.float32) if columns else np.empty((n, 0), np.float32),
-        emission=take("emission", (n, EMISSION_COLUMNS), np.float32) if shining else np.empty((n, 0), np.float32),
+        indirect=take("indirect", (n, columns), np.float32) if columns else none,
+        emission=take("emission", (n, EMISSION_COLUMNS), np.float32) if shining else none,
+        sun_hours=take("sun_hours", (n, days), np.float32) if days else none,
     )

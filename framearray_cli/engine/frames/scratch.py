@@ -14,6 +14,7 @@ from ..terms.cells.mirrored import room_for_mirrors
 from ..terms.cells.smooth import room_for_smoothing
 from ..terms.direct_steps import room_for_steps
 from ..terms.obscurance import RAYS_TOGETHER
+from ..terms.sun_hours import room_for_sun
 from .setup import FrameSetup
 
 # Rays traced together within a batch.
@@ -39,6 +40,7 @@ class Scratch:
         emission: (batch, EMISSION_COLUMNS) of the hits, see `record_emission`; (0, ...) where nothing shines.
         paths: of indirect light by paths; None without.
         smooth: of the filter of indirect light; None without.
+        sun: of hours of sun; None without.
         rays: number of rays traced by kind; `seconds`: by stage.
     """
 
@@ -46,7 +48,9 @@ class Scratch:
         n_eyes = 4 * setup.n_r + 1  # the windows of all frames that see a hit of eye c
         rays = max(RAYS, batch, setup.obscurance.n_rays)
         self.hit_rays = room_for_hits(rays)
-        self.test_rays = room_for_tests(RAYS, setup.lights.n_lights)
+        suns = setup.sun.lights.n_lights if setup.sun else 0
+        self.test_rays = room_for_tests(RAYS, max(setup.lights.n_lights, suns))
+        self.sun = room_for_sun(setup.sun, batch) if setup.sun else None
         self.hits = empty_hits(batch)
         # kernels write sixteen hits at a time, here from any hit on
         self.reflected = [empty_hits(batch + LANES) for _ in range(2 if setup.depth else 0)]

@@ -16,6 +16,7 @@ from ..inputs.surfaces import Surfaces
 from ..terms.cells.gather import LIGHT
 from ..terms.cells.table import Cells, at_lights
 from ..terms.obscurance import ObscuranceSettings
+from ..terms.sun_hours import SunStudy
 from .blocks import Allotment
 from .passes import Pass, passes, passes_of_counts
 from .records import BY_SAMPLE, HitRecords, empty_records, fresh_array
@@ -46,6 +47,7 @@ class FrameSetup:
         local: whether `cells` hold the ambient light of obscurances, see `terms/cells/local.py`; else all light.
         exact: whether paths take the place of `cells`, which then hold nothing, see `terms/cells/exact.py`.
         smooth: number of passes of the filter of indirect light from cells.
+        sun: whose hours the layers hold; None: of none.
         order: (n_pixels,) every pixel once, in the order of tracing.
     """
 
@@ -74,6 +76,7 @@ class FrameSetup:
     local: bool = False
     exact: bool = False
     smooth: int = 0
+    sun: SunStudy | None = None
     order: Int32 = field(init=False)
 
     def __post_init__(self) -> None:
@@ -132,7 +135,14 @@ class FrameSetup:
         Shadow steps need the whole light path: all positions are computed, and those of the block kept.
         """
         planes = self.planes[block.start : block.stop]
-        setup = replace(self, layers=self.layers and block.start == 0, planes=planes, cells=self.cells_at(block))
+        first = block.start == 0  # layers are written once
+        setup = replace(
+            self,
+            layers=self.layers and first,
+            sun=self.sun if first else None,
+            planes=planes,
+            cells=self.cells_at(block),
+        )
         if self.shadow_step > 1:
             return replace(setup, kept=block)
         return replace(setup, lights=some_lights(self.lights, block), kept=range(len(block)))
@@ -147,7 +157,8 @@ class FrameSetup:
         """Allocate records of n hits; see `empty_records` in `records.py`."""
         channels, n_lights = self.stored_light
         columns = 0 if self.cells is None else LIGHT + channels * n_lights
-        return empty_records(n, channels, n_lights, columns, self.shines, take or fresh_array)
+        days = len(self.sun.days) if self.sun else 0
+        return empty_records(n, channels, n_lights, columns, self.shines, days, take or fresh_array)
 
     def eyes_of(self, j: int) -> range:
         """The window of frame j: the eyes whose hits it shows."""

@@ -19,6 +19,7 @@ from ..terms.direct_steps import direct_by_steps
 from ..terms.environments import has_environments, see_environments
 from ..terms.looks import look_around, looking
 from ..terms.obscurance import obscurance
+from ..terms.sun_hours import find_sun_hours
 from .records import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, HitRecords, lit_bit
 from .scratch import Scratch
 from .setup import FrameSetup
@@ -71,6 +72,8 @@ def estimate_terms(
             out.irradiance[:n] = irradiance[:n, :, setup.kept.start : setup.kept.stop]
     if has_environments(setup.lights):
         see_environments(hits, n, setup.lights, setup.kept.start, scratch.test_rays, out.irradiance)
+    if setup.sun is not None and scratch.sun is not None and neighbours:
+        rays += find_sun_hours(hits, n, setup.sun, setup.tracer, scratch.test_rays, scratch.sun, out.sun_hours)
     scratch.rays[shadow_kind] += rays
     if setup.shines:
         out.emission[:n] = scratch.emission[:n]

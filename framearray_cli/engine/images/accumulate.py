@@ -58,9 +58,9 @@ def accumulate(
             for entry in range(start, end):
                 _fetch(sources, s, entry, ahead, last, channels, n_lights)
                 # 2. The source and the weight w of the hit.
-                source, hit = sources[_row_of(listed, s, entry)], integer_at(listed[ORDER], entry)
+                source, hit = sources[row_of(listed, s, entry)], integer_at(listed[ORDER], entry)
                 row = source[ROW] + ROW_BYTES * hit
-                w = (odd if real_at(row, HALF) > 0.0 else even) * _weight(listed, entry, hit)
+                w = (odd if real_at(row, HALF) > 0.0 else even) * weight_of(listed, entry, hit)
                 # 3. What has no l: w R W, w B, w W and w R at once.
                 total = total + lanes_from(row) * w
                 # 4. Note where the light of a hit is, and its share w R / pi.
@@ -88,13 +88,13 @@ def accumulate(
 
 
 @inlined
-def _row_of(listed: Addresses, s: int, entry: int) -> int:
+def row_of(listed: Addresses, s: int, entry: int) -> int:
     """The row of the source of an entry, for the list in row s: that row itself, or one after it."""
     return s + (integer_at(listed[OF], entry) if listed[OF] != 0 else 0)
 
 
 @inlined
-def _weight(source: Addresses, entry: int, hit: int) -> Real:
+def weight_of(source: Addresses, entry: int, hit: int) -> Real:
     """The weight of a hit: of its entry, else its own, else 1."""
     w = real_at(source[WEIGHTS], hit) if source[WEIGHTS] != 0 else np.float32(1.0)
     if source[SHARES] != 0:
@@ -197,12 +197,12 @@ def _fetch(sources: Addresses, s: int, entry: int, ahead: int, last: int, channe
     """Prefetch row and weight of a hit that comes soon, and irradiance of an earlier one, which its row describes."""
     listed, later, next_one = sources[s], entry + 2 * ahead, entry + ahead
     if later < last:
-        hit, source = integer_at(listed[ORDER], later), sources[_row_of(listed, s, later)]
+        hit, source = integer_at(listed[ORDER], later), sources[row_of(listed, s, later)]
         prefetch(source[ROW] + ROW_BYTES * hit, 1)
         if listed[WEIGHTS] != 0:
             prefetch(listed[WEIGHTS] + 4 * hit, 1)
     if next_one < last:
-        hit, source = integer_at(listed[ORDER], next_one), sources[_row_of(listed, s, next_one)]
+        hit, source = integer_at(listed[ORDER], next_one), sources[row_of(listed, s, next_one)]
         if source[GATHERED] != 0:
             columns = LIGHT + channels * n_lights
             prefetch(source[GATHERED] + 4 * columns * hit, 4 * columns)

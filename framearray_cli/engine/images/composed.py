@@ -1,6 +1,7 @@
 """A composed frame: its images, layers and errors."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,6 +16,7 @@ class Layers:
         obscurance, indirect, reflectivity: W, R W and R, averaged over all hits.
         normal, depth: shading normal and distance along the optical axis, averaged over native hits; 0 if all escape.
         samples: number of hits of the pixel, native and outer.
+        sun_hours: by day and in total, see `sun_layers`; empty unless the job counts them.
     """
 
     obscurance: Float32
@@ -23,6 +25,7 @@ class Layers:
     normal: Float32
     depth: Float32
     samples: Float32
+    sun_hours: Mapping[str, Float32] = field(default_factory=dict)
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -50,13 +53,16 @@ class Composed:
     differences: Float32 | None = None
 
 
-def layers_of(maps: Float32, own: Float32, samples: Int32, shape: tuple[int, ...]) -> Layers:
+def layers_of(
+    maps: Float32, own: Float32, samples: Int32, shape: tuple[int, ...], sun_hours: Mapping[str, Float32]
+) -> Layers:
     """The layers of a frame.
 
     Args:
         maps, samples: see `Pixels`.
         own: (n_pixels, 4) normal and depth, see `average_native`.
         shape: (height, width).
+        sun_hours: see `Layers`.
     """
     return Layers(
         obscurance=maps[:, :3].reshape(*shape, 3),
@@ -65,4 +71,5 @@ def layers_of(maps: Float32, own: Float32, samples: Int32, shape: tuple[int, ...
         normal=own[:, :3].reshape(*shape, 3),
         depth=own[:, 3].reshape(shape),
         samples=samples.astype(np.float32).reshape(shape),
+        sun_hours=sun_hours,
     )

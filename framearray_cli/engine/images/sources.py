@@ -13,9 +13,9 @@ from ..frames.records import HitRecords, HitsByPixel
 # Columns of a list of sources: addresses of arrays, 0 for an empty one; and what the arrays hold. Hits weighed by area
 # are one list over all sources (`area_weights.py`): SHARES is that of a weight per entry of ORDER in place of one per
 # hit, OF that of the source of each entry, as the number of rows from the list to it. These rows have no START.
-START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE, GATHERED, EMISSION, PLACES, SHARES, OF = range(12)
-COLUMNS = 12
-_TYPES = (np.int32, np.int32, *[np.float32] * 7, np.uint8)
+START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE, GATHERED, EMISSION, HOURS, PLACES, SHARES, OF = range(13)
+COLUMNS = 13
+_TYPES = (np.int32, np.int32, *[np.float32] * 8, np.uint8)
 NO_SCALE, _NO_PLACES = np.empty(0, np.float32), np.empty(0, np.uint8)
 NO_SOURCES: Addresses = np.empty((0, COLUMNS), np.int64)
 
@@ -44,7 +44,8 @@ class HitSource(NamedTuple):
         """The arrays in the order of the columns of a list."""
         found, records = self.by_pixel, self.records
         in_order = (found.start, found.order, self.weight, self.scale, self.odd_scale)
-        return (*in_order, records.row, records.irradiance, records.indirect, records.emission, self.place)
+        light = (records.row, records.irradiance, records.indirect, records.emission, records.sun_hours)
+        return (*in_order, *light, self.place)
 
 
 class SourceList:

@@ -28,6 +28,7 @@ from .composed import Composed, layers_of
 from .denoise import denoise_obscurance
 from .sources import NO_SCALE, NO_SOURCES, HitSource, SourceList
 from .standard_error import fill_unknown, half_factors
+from .sun_hours import average_sun_hours, sun_layers
 
 # Pixels of a band, whose sums over all lights fit a core's cache, and pixels of a task.
 BAND_PIXELS, TASK_PIXELS = 256, 2048
@@ -122,7 +123,8 @@ class Window:
         flat = as_stored(images.reshape(len(images), setup.n_pixels, 3))
         layered = setup.n_pixels if setup.layers else 0
         maps, own = np.empty((layered, 9), np.float32), np.empty((layered, 4), np.float32)
-        samples = np.empty(setup.n_pixels, np.int32)
+        samples, days = np.empty(setup.n_pixels, np.int32), setup.sun.days if setup.sun else ()
+        sun_hours = np.empty((setup.n_pixels if days else 0, len(days)), np.float32)
         holes = self._holes[j] if eyes is None else []
         mirror_scale = self._mirror_scale(j, holes)
         hits, mirrored = self._hits(j, holes[:1], eyes), self._mirrored(j, holes[1:], mirror_scale)
@@ -139,6 +141,8 @@ class Window:
                 found: tuple[int, int, int, int] = compose_pixels(band, first, n, summands, self._finish, out)
                 if setup.area:
                     samples[first : first + n] = in_pixels
+                if days:
+                    average_sun_hours(listed, first, n, sun_hours)
             if layered:
                 native = frame.places[j]
                 average_native(native.start, native.order, frame.normal, frame.depth, first, n, own)
@@ -152,7 +156,7 @@ class Window:
         return Composed(
             c=j,
             images=images,
-            layers=layers_of(maps, own, samples, shape) if layered else None,
+            layers=layers_of(maps, own, samples, shape, sun_layers(days, sun_hours, shape)) if layered else None,
             hits=samples,
             beyond=sum(result[3] for result in results),
             bad=bad,

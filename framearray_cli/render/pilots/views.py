@@ -102,6 +102,7 @@ def _shrink(setup: FrameSetup, planes: Sequence[int], pixels: int) -> FrameSetup
         area=False,
         shadow_step=1,
         layers=False,
+        sun=None,
         denoise=False,
         halves=0,
         allotment=None,

@@ -14,7 +14,7 @@ from framearray_cli.array.moments import axis_moments, moment_text
 from framearray_cli.base.arrays import Float32, is_number
 from framearray_cli.base.hashing import line_digest
 
-from .streams import LAYERS, Stream
+from .streams import Stream, is_exposed
 from .turning import STEP_DEG, Turning
 
 INDEX_FORMAT = 2  # of the index and the tiles; a new number discards those that exist
@@ -116,6 +116,6 @@ def _stream(stream: Stream) -> dict[str, Any]:
         "label": stream.label,
         "axis": stream.axis,
         "n": stream.n,
-        "exposed": stream.role != "layer" or LAYERS[stream.key][2],
+        "exposed": is_exposed(stream),
         **asdict(stream.coding),
     }

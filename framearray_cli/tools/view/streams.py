@@ -1,5 +1,6 @@
 """Streams of pictures that the page shows: one kind of picture each, by camera and by light along one axis."""
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from framearray_cli.array.images.images import FOR_SCREENS, format_name, read_image
+from framearray_cli.array.images.images import FOR_SCREENS, SUN_HOURS, format_name, read_image
 from framearray_cli.array.manifest import Manifest, ManifestGroup
 from framearray_cli.array.names import file_name
 from framearray_cli.base.arrays import Float32, Image
@@ -32,6 +33,7 @@ LAYERS = {
     "samples": ("Samples", "", False),
     "normal": ("Normals", "XYZ", False),
 }
+SUN_KEY = "sun-"  # and a day, or the word for all days
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,12 +78,28 @@ def streams_of(manifest: Manifest) -> list[Stream]:
 
 
 def layer_streams(channels: dict[str, Float32]) -> list[Stream]:
-    """List the streams of the layers in a file."""
-    return [
+    """List the streams of the layers in a file; hours of sun by day, and in total where there are several days."""
+    known = [
         Stream(key=name, role="layer", label=label)
         for name, (label, letters, _) in LAYERS.items()
         if all(channel in channels for channel in _channels(name, letters))
     ]
+    suns = [name.partition(".")[2] for name in channels if name.startswith(f"{SUN_HOURS}.")]
+    days = [day for day in suns if re.fullmatch(r"[\w-]+", day)]  # a key is part of an address
+    shown = days if len(days) > 2 else days[:1]  # of one day the total is the same
+    return known + [Stream(key=f"{SUN_KEY}{day}", role="layer", label=f"Hours of sun {day}") for day in shown]
+
+
+def is_exposed(stream: Stream) -> bool:
+    """Return whether the exposure of the page applies."""
+    return stream.role != "layer" or LAYERS.get(stream.key, ("", "", False))[2]
+
+
+def _layer_channels(key: str) -> list[str]:
+    """Return the channels of a layer in its file."""
+    if key.startswith(SUN_KEY):
+        return [f"{SUN_HOURS}.{key.removeprefix(SUN_KEY)}"]
+    return _channels(key, LAYERS[key][1])
 
 
 def source_name(manifest: Manifest, stream: Stream, c: int, l: int) -> str:
@@ -110,7 +128,7 @@ def read_values(manifest: Manifest, stream: Stream, c: int, l: int, read_layers:
     path = source_file(manifest, stream, c, l)
     if stream.role == "layer":
         channels = read_layers(path)
-        names = _channels(stream.key, LAYERS[stream.key][1])
+        names = _layer_channels(stream.key)
         missing = [name for name in names if name not in channels]
         if missing:
             raise OutputError(f"{path}: expected the channels {', '.join(names)}, found no {missing[0]}")
@@ -132,7 +150,7 @@ def choose_coding(manifest: Manifest, stream: Stream, read: ReadPicture) -> Codi
     if _is_clipped(manifest, stream):
         return PLAIN_CODING
     largest = max((float(values.max()) for values in _sample_values(manifest, stream, read)), default=0.0)
-    if stream.role == "layer" and not LAYERS[stream.key][2]:
+    if not is_exposed(stream):
         return data_coding(largest)
     return coding_for(largest)
 

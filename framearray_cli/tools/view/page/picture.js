@@ -155,7 +155,7 @@ export class Picture {
       uniforms += `uniform sampler2D image${i};\nuniform vec4 part${i};\nuniform vec3 factor${i};\nuniform vec2 curve${i};\n`;
       sum += `  sum += factor${i} * radiance(code(image${i}, part${i}), curve${i}.x, curve${i}.y);\n`;
     }
-    const main = stream.scale ? LIGHT_MAIN.replace("#SUM", sum) : `void main() { ${DATA_MAINS[stream.key]} }`;
+    const main = stream.scale ? LIGHT_MAIN.replace("#SUM", sum) : `void main() { ${DATA_MAINS[stream.key] ?? DATA_MAINS.samples} }`;
     const program = link(this.gl, VERTEX, HEAD + uniforms + main);
     this.programs.set(kind, program);
     return program;
