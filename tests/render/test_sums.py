@@ -131,6 +131,33 @@ def test_a_sum_knows_sources_with_a_size_and_those_that_eyes_see(
         np.testing.assert_allclose(groups.picture(0, (mixture,)), whole, rtol=5e-5, atol=5e-6)
 
 
+def dark(n: int) -> list[dict[str, Any]]:
+    """Return sources that never shine."""
+    return [{"type": "directional", "keys": [{"frame": 0, "direction": [0, -1, 0], "irradiance": 0.0}]}] * n
+
+
+@pytest.mark.parametrize("n_dark", [3, 0], ids=["as many sources", "fewer sources"])
+def test_a_sum_knows_maps_with_suns(scene: Path, tmp_path: Path, dome: Pictures, n_dark: int) -> None:
+    """The suns of a map are a source behind all others, whose number says which points of them hits draw.
+
+    With as many sources as in the render of all at once, hits draw the same points, and pictures are equal. With fewer,
+    they differ by the noise of the suns' light, whose mean over all pixels is 0.
+    """
+    sky = write_sky(tmp_path / "sky.exr", top=200.0)
+    mixture, total = mixture_of(WEIGHTS), (WEIGHTS * STRENGTHS).sum(axis=0)
+    sources = [new_source("environment", STRENGTHS, sky) | {"group": "new"}, DOME | {"group": "dome"}]
+    groups = rendered(scene, tmp_path / "groups", sources + [source | {"group": "dark"} for source in dark(n_dark)])
+    check_mixture(groups.manifest, mixture)
+    at = [new_source("environment", [total], sky), *at_once(dome, WEIGHTS)]
+    made, whole = groups.picture(0, (mixture,)), rendered(scene, tmp_path / "whole", at).picture(0, (0,))
+    if n_dark:
+        np.testing.assert_allclose(made, whole, rtol=5e-5, atol=5e-6)
+        return
+    difference = (made - whole).mean(axis=-1).ravel()
+    assert np.abs(difference).max() > 1e-3 * whole.mean(), "else both should be compared as above"
+    assert abs(difference.mean()) < 4 * difference.std() / np.sqrt(difference.size)
+
+
 def test_what_stays_is_found_in_the_manifest(scene: Path, tmp_path: Path, dome: Pictures) -> None:
     mixed = rendered(scene, tmp_path / "out", [DOME, SUN], background=[0.0, 0.1, 0.0]).manifest
     assert constant_parts(mixed) == ["the background", "source 1, which stays"]
