@@ -72,7 +72,7 @@ def _lens(manifest: Manifest, focal: float) -> dict[str, float]:
 
 
 def _frame(manifest: Manifest, frame: ExportedFrame) -> dict[str, Any]:
-    """Return pose and light; `pl_pos` and `pl_intensity` only where the only source is a point."""
+    """Return pose and light: all sources, and `pl_pos` and `pl_intensity` where the only one is a point."""
     table: dict[str, Any] = {
         "transform_matrix": [plain_floats(row) for row in rigid_pose(manifest, frame.c)],
         "camera": frame.c,
@@ -82,7 +82,18 @@ def _frame(manifest: Manifest, frame: ExportedFrame) -> dict[str, Any]:
     if len(sources) == 1 and sources[0]["type"] == "point":
         table["pl_pos"] = plain_floats(sources[0]["position"])
         table["pl_intensity"] = plain_floats(sources[0]["intensity"])
-    return table
+    return table | {"sources": [_source(source) for source in sources]}
+
+
+def _source(source: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a source as the manifest describes it, in values of JSON."""
+
+    def value_of(value: Any) -> Any:
+        if isinstance(value, bool | str):
+            return value
+        return plain_floats(value) if isinstance(value, list | tuple) else float(value)
+
+    return {key: value_of(value) for key, value in source.items()}
 
 
 def _write_depth(file: Path, manifest: Manifest, c: int) -> None:
