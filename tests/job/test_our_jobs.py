@@ -16,6 +16,7 @@ from support import ROOT
 
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.forms.toml import load_toml
+from framearray_cli.base.openimage import read_environment
 from framearray_cli.job.job import Job
 from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.paths import eyes, lights
@@ -24,7 +25,13 @@ from framearray_cli.scene.scene import Scene, load_scene
 JOBS = ROOT / "jobs"
 ROOMS = ("cabin", "kitchen", "stairs")
 SCENES = (*ROOMS, "furnace")
-WALKS = ("smoke", "kitchen-sun", *(f"{room}{size}" for room in ROOMS for size in ("", "-small")))
+WALKS = (
+    "smoke",
+    "kitchen-sun",
+    "kitchen-sky",
+    "kitchen-dome",
+    *(f"{room}{size}" for room in ROOMS for size in ("", "-small")),
+)
 FURNACES = ("furnace-20", "furnace-50", "furnace-80")
 CLEARANCE = 0.15  # metres between an eye and the nearest surface
 LAMP_CLEARANCE = 0.25  # metres; a nearer lamp would burn a white spot into a surface
@@ -116,8 +123,26 @@ def test_one_command_makes_a_scene(tmp_path: Path) -> None:
     assert file.read_bytes()[:4] == b"glTF"
 
 
-def test_the_folder_of_scenes_holds_only_scenes() -> None:
-    assert {file.name for file in (JOBS / "scenes").iterdir() if file.is_file()} == {f"{name}.glb" for name in SCENES}
+def test_the_sky_is_what_its_generator_makes_with_the_sun_in_the_middle(
+    make: Callable[[str, Path], None], tmp_path: Path
+) -> None:
+    made = tmp_path / "sky.exr"
+    make("sky", made)
+    sky = read_environment(JOBS / "scenes" / "sky.exr")
+    np.testing.assert_allclose(read_environment(made), sky, rtol=2**-10)  # one step of half
+    height, width, _ = sky.shape
+    elevation = np.pi * (0.5 - (np.arange(height) + 0.5) / height)
+    solid_angle = np.cos(elevation)[:, None, None] * (np.pi / height) ** 2
+    sun = sky > 100 * sky.mean()
+    np.testing.assert_allclose((sky * sun * solid_angle).sum(axis=(0, 1)), [24.0, 21.5, 18.0], rtol=0.01)
+    rows, columns = np.nonzero(sun.any(axis=-1))
+    assert np.degrees(elevation[rows]).mean() == pytest.approx(35.0, abs=0.1)
+    assert columns.mean() == pytest.approx((width - 1) / 2)
+
+
+def test_the_folder_of_scenes_holds_only_scenes_and_a_sky() -> None:
+    names = {file.name for file in (JOBS / "scenes").iterdir() if file.is_file()}
+    assert names == {"sky.exr", *(f"{name}.glb" for name in SCENES)}
 
 
 @pytest.mark.parametrize("name", ROOMS)

@@ -1,13 +1,15 @@
 """Makes the pictures of README and docs/ with the program itself.
 
-    PYTHONPATH=tests python tests/pictures/make_pictures.py
+    PYTHONPATH=tests python tests/pictures/make_pictures.py                  # all of them
+    PYTHONPATH=tests python tests/pictures/make_pictures.py environment sums  # these
 
 Each picture comes from a job of this project, cut down to the eyes and light positions in the picture. An eye keeps
 the N_r eyes before and after it, so that it has the same samples as in the whole array.
 """
 
+import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +25,7 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table, read_job
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import eyes, lights
+from framearray_cli.tools.mixing.mixer import SumOptions, open_pictures
 from framearray_cli.tools.movie.assemble import assemble_movie
 from framearray_cli.tools.movie.look import Look
 from framearray_cli.tools.sheet import make_sheet
@@ -146,6 +149,42 @@ def visible_lamps(width: int, folder: Path) -> Image.Image:
     return sheet([[picture(read_image(image_path(rendered, shown_eye(0), l)), width) for l in range(3)]])
 
 
+def whole(name: str, folder: Path, **source: str) -> Path:
+    """Render jobs/NAME.toml, whole, as EXR; `source` replaces keys of its first source."""
+    table = job_table(read_job(ROOT / "jobs" / f"{name}.toml"))
+    table["light"]["sources"][0] |= source
+    table["output"] |= {"directory": str(folder), "format": "exr"}
+    render(Job.model_validate(table))
+    return folder
+
+
+def shown(rendered: Path, c: int, l: float, width: int, sums: SumOptions = SumOptions()) -> Image.Image:  # noqa: B008  # frozen
+    """What a sheet shows of one place of an array, as a sum if `sums` says so."""
+    pictures, _ = open_pictures(read_manifest(rendered), sums)
+    return picture(pictures.picture(c, (l,)), width)
+
+
+def environment(width: int, folder: Path) -> Image.Image:
+    """Above four turns of jobs/kitchen-sky.toml, below the same by sums of jobs/kitchen-dome.toml."""
+    c, turns = 2, {0: 15.0, 5: 40.0, 10: 65.0, 15: 90.0}
+    sky, dome = whole("kitchen-sky", folder / "sky"), whole("kitchen-dome", folder / "dome")
+    panorama = ROOT / "jobs" / "scenes" / "sky.exr"
+    turned = [SumOptions(environment=panorama, rotate=(degrees, degrees)) for degrees in turns.values()]
+    return sheet([[shown(sky, c, l, width) for l in turns], [shown(dome, c, 0, width, sums) for sums in turned]])
+
+
+def sums(width: int, folder: Path) -> Image.Image:
+    """Above the mean of 1, 3, 7 and 15 positions of the sun, below three positions of a lamp, and a sum of two."""
+    around = 40
+    suns = array("kitchen", [280], range(around - 7, around + 8), folder / "suns").directory
+    soft = [shown(suns, shown_eye(0), 7, width, SumOptions(soft=n)) for n in (1, 3, 7, 15)]
+    lamps = whole("cabin-small", folder / "lamps", group="lamp")
+    weights = folder / "weights.csv"
+    weights.write_text("light,r,g,b\n4,0.25,0.4,0.8\n7,0.6,0.3,0.1\n")
+    mixed = [shown(lamps, 8, l, width) for l in (2, 4, 7)]
+    return sheet([soft, [*mixed, shown(lamps, 8, 0, width, SumOptions(weights=weights))]])
+
+
 def evening(folder: Path) -> Path:
     """Render jobs/kitchen-evening.toml, whole."""
     job = read_job(ROOT / "jobs" / "kitchen-evening.toml")
@@ -163,22 +202,24 @@ def relit(width: int, rendered: Path, folder: Path) -> Image.Image:
 
 
 def main() -> None:
-    """Make all pictures again."""
+    """Make all pictures again, or those that the command line names."""
     PICTURES.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
-        made = {
-            "kitchen": array_sheet("kitchen", [20, 90, 170, 280], [4, 20, 40], 280, out / "kitchen"),
-            "cabin": array_sheet("cabin", [20, 80, 150], [6, 24, 40], 280, out / "cabin"),
-            "stairs": array_sheet("stairs", [10, 70, 130], [6, 24, 40], 280, out / "stairs"),
-            "terms": terms(280, out / "terms"),
-            "reuse": reuse(420, out / "reuse"),
-            "sheet": contact_sheet(900, out / "sheet"),
-            "visible-lamps": visible_lamps(300, out / "visible"),
-            "relight": relit(280, evening(out / "evening"), out / "relight"),
+        makers: dict[str, Callable[[], Image.Image]] = {
+            "kitchen": lambda: array_sheet("kitchen", [20, 90, 170, 280], [4, 20, 40], 280, out / "kitchen"),
+            "cabin": lambda: array_sheet("cabin", [20, 80, 150], [6, 24, 40], 280, out / "cabin"),
+            "stairs": lambda: array_sheet("stairs", [10, 70, 130], [6, 24, 40], 280, out / "stairs"),
+            "terms": lambda: terms(280, out / "terms"),
+            "reuse": lambda: reuse(420, out / "reuse"),
+            "sheet": lambda: contact_sheet(900, out / "sheet"),
+            "visible-lamps": lambda: visible_lamps(300, out / "visible"),
+            "environment": lambda: environment(280, out / "environment"),
+            "sums": lambda: sums(280, out / "sums"),
+            "relight": lambda: relit(280, evening(out / "evening"), out / "relight"),
         }
-        for name, image in made.items():
-            file = PICTURES / f"{name}.jpg"
+        for name in sys.argv[1:] or makers:
+            image, file = makers[name](), PICTURES / f"{name}.jpg"
             image.save(file, "JPEG", quality=QUALITY, optimize=True)
             print(f"{file}: {image.width} x {image.height}, {file.stat().st_size:,} bytes")
 
