@@ -271,6 +271,11 @@ UNKNOWN = [
     ("camera.keys.0.look_at", 'camera.keys[0].look_at: unknown key; did you mean "target"?'),
     ("light.sources.0.keys.0.irradiance",
      'light.sources[0].keys[0].irradiance: unknown key; did you mean "intensity"?'),
+    ("light.sources.0.latitude",
+     'light.sources[0].latitude: unknown key here; "latitude" belongs in [light.sources[]] of type "sun"'),
+    ("light.sources.0.keys.0.angle",
+     'light.sources[0].keys[0].angle: unknown key here; "angle" belongs in [light.sources[]] of type "directional" or '
+     '"sun" or [light.sources[].keys[]] of type "directional"'),
     ("specular.qqq", "specular.qqq: unknown key; known here: depth, hits"),
     ("specular.a b", 'specular."a b": unknown key; known here: depth, hits'),
 ]  # fmt: skip

@@ -99,14 +99,20 @@ def _unknown_key(root: Schema, place: tuple[int | str, ...]) -> str:
     known = find(root, place[:-1])[1].get("properties", {})
     if meant := _guess_key(key, known):
         return f'unknown key; did you mean "{meant}"?'
-    homes: dict[str, list[str]] = {}
+    homes: dict[str, dict[str, list[str]]] = {}  # of each key the tables that have it, and the types of these
     for section in sections(root):
+        home = f"in [{section.place}]" if section.place else "at the top of the file"
         for name in section.keys:
-            homes.setdefault(name, []).append(f"in [{section.place}]" if section.place else "at the top of the file")
+            homes.setdefault(name, {}).setdefault(home, []).extend([section.kind] if section.kind else [])
     if meant := _guess_key(key, homes):
-        places = " or ".join(dict.fromkeys(homes[meant])).replace(" or in ", " or ")
+        places = " or ".join(_of_type(home, kinds) for home, kinds in homes[meant].items()).replace(" or in ", " or ")
         return f'unknown key here; "{meant}" belongs {places}'
     return f"unknown key; known here: {', '.join(toml_key(name) for name in known)}"
+
+
+def _of_type(home: str, kinds: list[str]) -> str:
+    types = [f'"{kind}"' for kind in dict.fromkeys(kinds)]
+    return f"{home} of type {join_options(types)}" if types else home
 
 
 def _guess_key(key: str, known: Iterable[str]) -> str | None:

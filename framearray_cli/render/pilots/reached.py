@@ -95,6 +95,8 @@ def _reason(setup: FrameSetup, prepared: Prepared, s: int, plane: int) -> str:
     if (emitter := prepared.lights.sources[s].emitter) is not None:
         sides = "" if emitter.two_sided else ", or it shines the other way; try two_sided = true"
         return f'surfaces hide the material "{emitter.material}" from all that is seen{sides}'
+    if prepared.lights.sources[s].environment is not None:
+        return "surfaces hide the sky from all that is seen; open the scene"
     if setup.lights.kind[s] == DIRECTIONAL:
         axis = 2 if prepared.job.scene.up == "z" else 1
         if values[axis] > 0:

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from support import tiny
-from support.ruined import CASES, Case, case
+from support import ROOT, tiny
+from support.ruined import CASES, Case, case, lit
 
 from framearray_cli.job.job import Job
 from framearray_cli.render.pilots.typed import range_warnings
@@ -22,6 +22,13 @@ def test_a_ruined_job_is_warned_of(name):
     found = warnings_of(CASES[name])
     assert any(all(word in text for word in CASES[name].words) for text in found), found
     assert len(found) <= 3
+
+
+@pytest.mark.slow  # compiles kernels with maps
+def test_a_sky_outside_a_closed_room():
+    sky = {"type": "environment", "file": str(ROOT / "jobs" / "scenes" / "sky.exr"), "keys": [{"frame": 0}]}
+    (found,) = warnings_of(case(light=lit(sky)))
+    assert "reaches nothing that is seen: surfaces hide the sky" in found
 
 
 def test_the_job_that_they_are_made_from_is_good():
