@@ -6,6 +6,8 @@ from datetime import datetime
 from itertools import groupby, pairwise
 from statistics import median
 
+TOTAL = "total"  # in place of a date: all days
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SunDay:

@@ -14,7 +14,9 @@ from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.sundays import sun_days
 from framearray_cli.job.read import job_table
 from framearray_cli.render.beside import tables_for
+from framearray_cli.render.memory import window_memory
 from framearray_cli.render.render import render
+from framearray_cli.render.sizes import rough_bytes
 from framearray_cli.scene.files import Material
 from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.scene.scene import Scene
@@ -158,6 +160,14 @@ def test_files_hold_the_hours(tmp_path: Path) -> None:
     assert 0 < found["with"]["sun_hours.total"].max() <= 2 * POSITIONS * STEP_H
     manifests = [read_manifest(tmp_path / name) for name in found]
     assert [manifest.has_sun_hours for manifest in manifests] == [True, False]
+
+
+def test_memory_estimates_know_the_hours() -> None:
+    """Two days per hit, and these and their sum per pixel, twice."""
+    with_hours, without = study(), study(output={"sun_hours": False})
+    more = [window_memory(tiny.prepared(job, yard()), 18) for job in (with_hours, without)]
+    assert more[0] - more[1] == 48 * 36 * (2 * 2 * 4 + 2 * 3 * 4)
+    assert rough_bytes(with_hours) - rough_bytes(without) == 48 * 36 * 3 * 2.0
 
 
 def test_tables_of_other_jobs_do_not_name_the_key() -> None:

@@ -118,6 +118,7 @@ def test_the_page_lists_days_and_their_sum() -> None:
     assert [stream.key for stream in layer_streams(channels)] == [
         "samples", "sun-2026-03-20", "sun-2026-06-21", "sun-total"
     ]  # fmt: skip
+    assert layer_streams(channels)[-1].label == "Hours of sun, all days"
     del channels["sun_hours.2026-03-20"]
     (_, day) = layer_streams(channels)
     assert (day.key, day.label) == ("sun-2026-06-21", "Hours of sun 2026-06-21"), "of one day the sum is the same"

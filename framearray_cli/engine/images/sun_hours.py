@@ -5,13 +5,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from framearray_cli.base.arrays import Addresses, Float32
-from framearray_cli.base.sundays import SunDay
+from framearray_cli.base.sundays import TOTAL, SunDay
 
 from ..kernels.kernel import integer_at, kernel, real_at
 from .accumulate import row_of, weight_of
 from .sources import HOURS, ORDER, START
-
-TOTAL = "total"
 
 
 @kernel

@@ -13,6 +13,7 @@ from framearray_cli.array.manifest import Manifest, ManifestGroup
 from framearray_cli.array.names import file_name
 from framearray_cli.base.arrays import Float32, Image
 from framearray_cli.base.errors import OutputError
+from framearray_cli.base.sundays import TOTAL
 
 from .coding import PLAIN_CODING, Coding, coding_for, data_coding
 
@@ -87,7 +88,8 @@ def layer_streams(channels: dict[str, Float32]) -> list[Stream]:
     suns = [name.partition(".")[2] for name in channels if name.startswith(f"{SUN_HOURS}.")]
     days = [day for day in suns if re.fullmatch(r"[\w-]+", day)]  # a key is part of an address
     shown = days if len(days) > 2 else days[:1]  # of one day the total is the same
-    return known + [Stream(key=f"{SUN_KEY}{day}", role="layer", label=f"Hours of sun {day}") for day in shown]
+    labels = {day: "Hours of sun, all days" if day == TOTAL else f"Hours of sun {day}" for day in shown}
+    return known + [Stream(key=f"{SUN_KEY}{day}", role="layer", label=label) for day, label in labels.items()]
 
 
 def is_exposed(stream: Stream) -> bool:
