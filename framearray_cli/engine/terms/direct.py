@@ -10,29 +10,27 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Real, Triple
 
-from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude, room_in
+from ..embree.packets import Tracer, room_in
 from ..hits.hits import Hits, lift, ray_origin, reflects, reflects_in_lanes, triple
 from ..hits.rays import NO_RAYS, Rays
 from ..inputs.lights import DIRECTIONAL, MESH, LightArrays
 from ..inputs.maps import map_share, map_texel
 from ..inputs.shapes import source_at, source_in_lanes, source_point, vector_and_factor
-from ..kernels.kernel import has_rows, index, inlined, kernel, step
+from ..kernels.kernel import has_rows, inlined, kernel
 from ..kernels.simd import (
     LANES,
     append,
-    bits,
-    ctz,
     gather,
     lane_numbers,
     load,
-    load_row,
     popcount,
     select,
     store,
-    store_row,
     triples_at,
 )
+from .direct_maps import is_map, queue_maps
 from .direct_meshes import FAR_END, FROM, REACH, TO, add_emitters
+from .direct_queue import Sixteen, queue_hits, trace_queue
 
 # With at most this many light positions a step takes sixteen hits, even those that lie apart.
 FEW_LIGHTS = 8
@@ -130,35 +128,9 @@ def _queue(
     return found
 
 
-@step
-def _trace_queue(tracer: Tracer, rays: Rays, n: int, irradiance: Float32) -> None:
-    """Trace the n queued shadow rays and add the irradiance of those that nothing blocks."""
-    room = rays.row.shape[1]
-    # rays into packets
-    for first in range(0, n, LANES):
-        for axis in range(3):
-            store_row(rays.packets, first, ORIGIN + axis, load(rays.row, (FROM + axis) * room + first))
-            store_row(rays.packets, first, DIRECTION + axis, load(rays.row, (TO + axis) * room + first))
-        store_row(rays.packets, first, TFAR, load(rays.row, REACH * room + first))
-    occlude(tracer, rays.packets, n, True)
-    # add to E_direct what rays carry that nothing blocks; idle lanes count as blocked
-    channels, n_lights = irradiance.shape[1], irradiance.shape[2]
-    flat = irradiance.reshape(irradiance.size)
-    for first in range(0, n, LANES):
-        arrived = bits(~(load_row(rays.packets, first, TFAR) < np.float32(0.0)))
-        while arrived != 0:
-            ray = first + ctz(arrived)
-            arrived &= arrived - 1
-            place = rays.place[index(ray)]
-            for channel in range(channels):
-                flat[index(place + channel * n_lights)] += rays.value[channel, index(ray)]
-
-
 @inlined
 def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, irradiance: Float32) -> int:
     """`direct` for hits that lie close together, or few light positions: sixteen hits per step."""
-    channels, n_lights, room, row = irradiance.shape[1], irradiance.shape[2], rays.row.shape[1], rays.row
-    capacity = room_in(rays.packets)
     # Loop state
     waiting = NO_RAYS  # rays in the queue
     total = NO_RAYS  #   rays traced
@@ -169,35 +141,13 @@ def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, ray
         e = load(hits.offset, i)
         up = (e * g[0], e * g[1], e * g[2])
         key = load(hits.key, i)
+        sixteen = Sixteen(at, wanted, p, g, m, up, key)
         for s in range(lights.kind.shape[0]):
-            if lights.kind[s] == MESH:
+            if lights.kind[s] == MESH or is_map(lights, s):
                 continue
-            q = source_point(lights, key, s)
-            texel = map_texel(lights.maps, s, key)
-            for l in range(n_lights):
-                # make room for sixteen rays
-                if waiting > capacity - LANES:
-                    _trace_queue(tracer, rays, waiting, irradiance)
-                    total, waiting = total + waiting, 0
-                # cos(theta) / d^2 of source s at light position l
-                x, y, z, factor = vector_and_factor(lights, s, source_at(lights, s, l), p, g, m, q)
-                # queue the rays of hits that the source may reach
-                traced = wanted & (factor > np.float32(0.0))
-                if bits(traced) == 0:
-                    continue
-                to, from_point = (x, y, z), np.float32(0.0 if lights.kind[s] == DIRECTIONAL else 1.0)
-                for axis in range(3):
-                    append(traced, p[axis] + up[axis], row, (FROM + axis) * room + waiting)
-                    append(traced, to[axis] - from_point * up[axis], row, (TO + axis) * room + waiting)
-                store(row, REACH * room + waiting, np.float32(np.inf) if lights.kind[s] == DIRECTIONAL else FAR_END)
-                # with the irradiance that each carries
-                append(traced, at * np.int32(channels * n_lights) + np.int32(l), rays.place, waiting)
-                for channel in range(channels):
-                    tint = map_share(lights.maps, s, texel, factor, channel)
-                    value = factor * lights.strength[s, channel, l] * tint
-                    append(traced, value, rays.value, channel * rays.value.shape[1] + waiting)
-                waiting += popcount(traced)
-    _trace_queue(tracer, rays, waiting, irradiance)
+            waiting, total = queue_hits(lights, s, sixteen, tracer, rays, irradiance, waiting, total)
+    waiting, total = queue_maps(hits, n, lights, tracer, rays, irradiance, waiting, total)
+    trace_queue(tracer, rays, waiting, irradiance)
     return total + waiting
 
 
@@ -220,12 +170,12 @@ def _direct_by_lights(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, r
             for l in range(0, n_lights, LANES):
                 # make room for sixteen rays
                 if waiting > capacity - LANES:
-                    _trace_queue(tracer, rays, waiting, irradiance)
+                    trace_queue(tracer, rays, waiting, irradiance)
                     total, waiting = total + waiting, 0
                 # cos(theta) / d^2 of positions l to l + 15
                 x, y, z, factor = _geometry_of_lights(hits, i, lights, s, l)
                 waiting = _queue(lights, s, l, (x, y, z), factor, start, rays, waiting)
-    _trace_queue(tracer, rays, waiting, irradiance)
+    trace_queue(tracer, rays, waiting, irradiance)
     return total + waiting
 
 

@@ -9,16 +9,17 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32
 
-from ..embree.packets import Tracer, is_blocked, occlude, room_in, set_ray
+from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, is_blocked, occlude, room_in
 from ..hits.hits import Hits, ray_origin, reflects, triple
-from ..hits.rays import NO_RAYS, Rays
+from ..hits.rays import NO_RAYS, ORDER, RANK, Rays
 from ..inputs.lights import LightArrays
 from ..inputs.maps import HEIGHT, MASK, SEEN_WIDTH, TINT, WIDTH
 from ..inputs.random import AROUND, cosine_direction, r2, random_word
 from ..kernels.kernel import index, inlined, kernel
-from ..kernels.simd import LANES, floor, gather, integers, load, select, store
-from .direct_meshes import REACH, TO
+from ..kernels.simd import LANES, floor, gather, integers, lane_numbers, load, select, store, store_row
+from .direct_meshes import FROM, REACH, TO
 from .environments import place_in_map
+from .obscurance_rays import CELLS, cell_of, sort_rays
 
 LOOKS = 4  # rays per hit
 
@@ -61,8 +62,8 @@ def look_around(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: R
             x, y, z = cosine_direction(mx, my, mz, u, v)
             cosine = x * mx + y * my + z * mz
             if cosine > np.float32(0.0) and x * gx + y * gy + z * gz > np.float32(0.0):
-                set_ray(rays.packets, waiting, ox, oy, oz, x, y, z, np.float32(np.inf))
                 at = index(waiting)
+                row[FROM, at], row[FROM + 1, at], row[FROM + 2, at] = ox, oy, oz
                 row[TO, at], row[TO + 1, at], row[TO + 2, at], row[REACH, at] = x, y, z, cosine
                 rays.place[at] = i
                 waiting += 1
@@ -71,14 +72,38 @@ def look_around(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: R
 
 
 @inlined
+def _sort_looks(rays: Rays, n: int) -> None:
+    """Write the n rays in the queue into packets, sorted by direction as obscurance rays are."""
+    row, room, to = rays.row, np.int32(rays.row.shape[1]), RANK * rays.number.shape[1]
+    for first in range(0, n, LANES):
+        x, y, z = (
+            load(row, TO * room + first),
+            load(row, (TO + 1) * room + first),
+            load(row, (TO + 2) * room + first),
+        )
+        counts = lane_numbers() < np.int32(n - first)
+        store(rays.number, to + first, select(counts, cell_of(x, y, z), np.int32(CELLS)))
+    sort_rays(rays, (n + LANES - 1) // LANES * LANES)
+    stride = ORDER * rays.number.shape[1]
+    for first in range(0, n, LANES):
+        ray = load(rays.number, stride + first)
+        for axis in range(3):
+            store_row(rays.packets, first, ORIGIN + axis, gather(row, ray + np.int32(FROM + axis) * room))
+            store_row(rays.packets, first, DIRECTION + axis, gather(row, ray + np.int32(TO + axis) * room))
+        store_row(rays.packets, first, TFAR, np.float32(np.inf))
+
+
+@inlined
 def _add_seen(lights: LightArrays, tracer: Tracer, rays: Rays, n: int, irradiance: Float32) -> None:
     """Trace the n rays in the queue, and add what those see that leave the scene."""
     channels, n_lights, row, maps = irradiance.shape[1], irradiance.shape[2], rays.row, lights.maps
-    occlude(tracer, rays.packets, n)
+    _sort_looks(rays, n)
+    occlude(tracer, rays.packets, n, True)
     for ray in range(n):
         if is_blocked(rays.packets, ray):
             continue
-        at, i = index(ray), rays.place[index(ray)]
+        at = index(rays.number[ORDER, index(ray)])
+        i = rays.place[at]
         d, cosine = (row[TO, at], row[TO + 1, at], row[TO + 2, at]), row[REACH, at]
         for s in range(lights.kind.shape[0]):
             if maps.looks[s] == np.float32(0.0):

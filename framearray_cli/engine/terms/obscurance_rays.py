@@ -51,7 +51,7 @@ class ObscuranceSettings(NamedTuple):
 
 
 @inlined
-def _cell(x: Real, y: Real, z: Real) -> int:
+def cell_of(x: Real, y: Real, z: Real) -> int:
     """The cell of unit directions, in Z order: cells that follow each other are neighbours."""
     nothing, one = np.float32(0.0), np.float32(1.0)
     # onto the octahedron |x| + |y| + |z| = 1, its lower half folded outwards
@@ -113,7 +113,7 @@ def _write_rays(
             store(rays.row, 3 * room + ray, x)
             store(rays.row, 4 * room + ray, y)
             store(rays.row, 5 * room + ray, z)
-            cell = _cell(x, y, z) if neighbours else integers(lane_numbers()) & np.int32(0)
+            cell = cell_of(x, y, z) if neighbours else integers(lane_numbers()) & np.int32(0)
             store(rays.number, to + ray, select(counts, cell, np.int32(CELLS)))
             # the next point of the lattice
             a, b, ray = a + step_x, b + step_y, ray + LANES
@@ -121,7 +121,7 @@ def _write_rays(
 
 
 @kernel
-def _sort_rays(rays: Rays, n: int) -> None:
+def sort_rays(rays: Rays, n: int) -> None:
     """Sort rays 0 to n - 1 by their cells: ORDER lists them, and RANK, which held the cells, says where each stands.
 
     A counting sort; rays of one cell keep their order.
@@ -156,7 +156,7 @@ def write_obscurance_rays(
         number of rays.
     """
     n_written = _write_rays(hits, rays, n, first_ray, n_rays, settings, neighbours)
-    _sort_rays(rays, n_written)
+    sort_rays(rays, n_written)
     stride, room = ORDER * rays.number.shape[1], np.int32(rays.row.shape[1])
     reach = np.float32(np.inf if settings.sky else settings.d_max)
     for first in range(0, n * n_rays, LANES):

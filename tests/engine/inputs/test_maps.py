@@ -50,6 +50,19 @@ def test_one_colour_lights_like_an_open_sky(normal: Any) -> None:
     agree(lit(hits, lights), np.pi * np.array([0.5, 1.0, 2.0])[:, None] * np.ones(5))
 
 
+def test_hits_sorted_by_direction_get_the_light_that_each_gets_by_itself() -> None:
+    """In several runs of a sort, the last of them not full; hits that reflect nothing get none."""
+    rng = np.random.default_rng(9)
+    lights, hits = arrays(environment(rng.random((6, 12, 3)))), points(5001, P, TILTED)
+    hits.position[:] += rng.normal(0, 0.2, (5001, 3)).astype(np.float32)
+    hits.reflectivity[::7] = 0.0
+    scene = tiny.scene_of(tiny.box((-1.0, 1.0, -1.0), (0.0, 1.5, 0.0)))
+    together, apart = (lit(hits, lights, neighbours, scene) for neighbours in (True, False))
+    assert (together == apart).mean() > 0.9999, "but for rays that touch an edge"
+    assert (together[::7] == 0).all()
+    assert 0.1 < (together[1::7] > 0).mean() < 0.9
+
+
 def test_one_bright_texel_is_a_sun() -> None:
     """E cos of a directional source from its middle within 0.5 %, and exactly the integral over the texel."""
     pixels = np.zeros((64, 128, 3), np.float32)
