@@ -8,7 +8,7 @@ OUT := out/kitchen-small
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
 
 .DEFAULT_GOAL := help
-.PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-packets bench-scaling bench-error bench-bias bench-ambient bench-truth bench-flicker bench-report bench-progress bench-first bench-view fuzz clean
+.PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-packets bench-scaling bench-error bench-bias bench-ambient bench-truth bench-flicker bench-lights bench-report bench-progress bench-first bench-view fuzz clean
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -86,6 +86,9 @@ bench-truth: $(VENV)/installed-bench ## Measure images against path-traced ones,
 
 bench-flicker: $(VENV)/installed-bench ## Measure how errors change along the paths of light and camera, and write docs/measured/flicker.md
 	PYTHONPATH=tests $(BIN)/python -m bench flicker $(BENCH)
+
+bench-lights: $(VENV)/installed-bench ## Measure lights with a size, a cone, a profile or a map, and write docs/measured/lights.md
+	PYTHONPATH=tests $(BIN)/python -m bench lights $(BENCH)
 
 bench-report: $(VENV)/installed-bench ## Measure speed against error of the three jobs, and write docs/measured/report-*.md
 	PYTHONPATH=tests $(BIN)/python -m bench report $(BENCH)

@@ -30,9 +30,15 @@
         reports.py     reports of the three jobs -> docs/measured/report-*.md
     ambient/  the ambient estimate
         scenes.py, levels.py, pictures.py   levels against walks, pictures against path-traced ones
-        pathtraced.py  pictures by Mitsuba's path tracer
+        pathtraced.py, emitters.py   pictures by Mitsuba's path tracer
         run.py, page.py, plots.py   results -> docs/measured/ambient.md
     truth/    images of the jobs against path-traced ones: traced.py, rendered.py, compare.py -> docs/measured/truth.md
+    lights/   lights with a size, a cone, a profile or a map -> docs/measured/lights.md
+        sources.py     jobs that differ in their sources only
+        cost.py        the cost of an image, frame by frame in turns with a light without size
+        noise.py, draws.py   noise and how it changes along the light path; drawing a point per light position
+        against.py     direct light against Mitsuba's in real scenes
+        run.py, page.py      the parts, and their results as a page
     peers/    the cost of images in other programs: mitsuba3.py, cycles.py
     view/     the page of `framearray view` in Chromium
 """

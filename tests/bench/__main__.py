@@ -22,6 +22,8 @@ from bench.core.steady import steady
 from bench.error import bias, error, reported, reports
 from bench.error import bias_page as biaspage
 from bench.error import error_page as errorpage
+from bench.lights import against
+from bench.lights import run as lights
 from bench.peers import cycles, mitsuba3, peers
 from bench.speed import first, packets, processes, scaling, speed
 from bench.speed import page as table
@@ -40,6 +42,8 @@ AVX2 = {"FRAMEARRAY_EMBREE": "isa=avx2", "NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_C
 OTHERS = (
     "truth",
     "flicker",
+    "lights",
+    "lights-against",
     "trace-place",
     "pace",
     "scaling",
@@ -63,7 +67,9 @@ def main() -> None:
         prog="bench", description="Measure the cost of an image, and write docs/measured/speed.md."
     )
     parser.add_argument("what", nargs="?", default="all", choices=("all", *OTHERS, *PROGRAMS, *PARTS))
-    parser.add_argument("jobs", nargs="*", help="some of the jobs, of the scenes of `ambient`, or arrays for `view`")
+    parser.add_argument(
+        "jobs", nargs="*", help="some of the jobs, scenes of `ambient`, parts of `lights`, or arrays for `view`"
+    )
     parser.add_argument("--quick", action="store_true", help="a small picture, once; the page goes to out/bench/quick")
     parser.add_argument("--runs", type=int, default=speed.RUNS, help="how often each thing is measured")
     parser.add_argument("--patience", type=float, default=0.0, help="seconds to wait for a busy machine, each time")
@@ -87,6 +93,12 @@ def main() -> None:
         return
     if args.what == "flicker":
         flicker.run(args.jobs, args.quick)
+        return
+    if args.what == "lights":
+        lights.run(args.jobs, args.quick)
+        return
+    if args.what == "lights-against":
+        print(json.dumps(against.measure_here(args.jobs[0], args.quick, folder(args.quick))))
         return
     if args.what == "trace-place":
         job, c, l = args.jobs

@@ -17,11 +17,10 @@ from bench.core.results import Table
 from bench.speed.processes import asked
 from bench.speed.speed import log
 from framearray_cli.base.arrays import Float32, Float64, Image
-from framearray_cli.engine.inputs.lights import DIRECTIONAL
 from framearray_cli.render.prepare import Prepared
-from framearray_cli.scene.paths.placing import LightPath
 from framearray_cli.scene.scene import Scene
 
+from .emitters import area_light, emitters_of, hidden_sides, past_lamps, radiance_of_materials
 from .scenes import Probe, probe_named, resized
 
 COMPILED, SCALAR = "llvm_ad_rgb", "scalar_rgb"  # variants of Mitsuba: by LLVM, and one path at a time
@@ -152,7 +151,7 @@ def pictures(mi: Any, prepared: Prepared, probe: Probe, samples: int, variant: s
     each = max(samples // PASSES, 1)
     mi.set_variant(COMPILED)
     dark, sensor = scene_of(mi, prepared, probe, sky=False), sensor_of(mi, prepared, probe.c)
-    light = [_light(mi, dark, sensor, prepared, each, 1_000_000 + i) for i in range(PASSES)]
+    light = [direct_light(mi, dark, sensor, prepared, each, 1_000_000 + i) for i in range(PASSES)]
     mi.set_variant(variant)
     lit, sensor = scene_of(mi, prepared, probe, sky=True), sensor_of(mi, prepared, probe.c)
     integrator = mi.load_dict({"type": "path", "max_depth": -1, "rr_depth": ROULETTE})
@@ -166,12 +165,13 @@ def pictures(mi: Any, prepared: Prepared, probe: Probe, samples: int, variant: s
     return Traced(total=np.stack(total), light=np.stack(light), seconds=seconds)
 
 
-def sensor_of(mi: Any, prepared: Prepared, c: int) -> Any:
+def sensor_of(mi: Any, prepared: Prepared, c: int, origin: Float64 | None = None) -> Any:
     """Eye c; a pixel's filter is its box."""
     width, height = prepared.job.camera.resolution
     matrix = prepared.eyes.world_from_camera[c]
+    eye = np.zeros(3) if origin is None else prepared.eyes.position[c] - origin
     look = mi.ScalarTransform4f().look_at(
-        origin=[0.0, 0.0, 0.0], target=(-matrix[:3, 2]).tolist(), up=matrix[:3, 1].tolist()
+        origin=eye.tolist(), target=(eye - matrix[:3, 2]).tolist(), up=matrix[:3, 1].tolist()
     )
     return mi.load_dict(
         {
@@ -192,7 +192,7 @@ def sensor_of(mi: Any, prepared: Prepared, c: int) -> Any:
     )
 
 
-def scene_of(mi: Any, prepared: Prepared, probe: Probe, sky: bool) -> Any:
+def scene_of(mi: Any, prepared: Prepared, probe: Probe, sky: bool, origin: Float64 | None = None) -> Any:
     """The scene under the probe's light position, one mesh per material; the probe's eye is the origin.
 
     Mitsuba starts rays 1500 units in the last place of the largest coordinate above a surface. About the middle of the
@@ -200,63 +200,34 @@ def scene_of(mi: Any, prepared: Prepared, probe: Probe, sky: bool) -> Any:
 
     Args:
         sky: whether the background shines.
+        origin: another origin, for `sensor_of` too.
     """
-    scene, eye = prepared.scene, prepared.eyes.position[probe.c]
+    scene, origin = prepared.scene, prepared.eyes.position[probe.c] if origin is None else origin
     table: dict[str, Any] = {"type": "scene"}
+    radiance = radiance_of_materials(prepared, probe.l)
     for m in np.unique(scene.material):
-        table[f"mesh{m}"] = _mesh(mi, scene, int(m), eye - scene.centre)
+        table[f"mesh{m}"] = _mesh(mi, scene, int(m), origin - scene.centre, radiance.get(scene.material_names[m]))
     for s, source in enumerate(prepared.lights.sources):
-        power = {"type": "rgb", "value": source.intensity[probe.l].tolist()}
-        if prepared.light_arrays.kind[s] == DIRECTIONAL:
-            table[f"light{s}"] = {
-                "type": "directional", "direction": source.vector[probe.l].tolist(), "irradiance": power
-            }  # fmt: skip
-        elif source.panel is not None:
-            table |= _panel(mi, f"light{s}", source, probe.l, eye)
-        else:
-            position = (source.vector[probe.l] - eye).tolist()
-            table[f"light{s}"] = {"type": "point", "position": position, "intensity": power}
+        table |= emitters_of(mi, f"light{s}", source, probe.l, origin)
     background = prepared.job.scene.background
     if sky and max(background) > 0:
         table["sky"] = {"type": "constant", "radiance": {"type": "rgb", "value": list(background)}}
     return mi.load_dict(table)
 
 
-def _panel(mi: Any, name: str, source: LightPath, l: int, eye: Float64) -> dict[str, Any]:
-    """The bright sides of a rectangle or disc, which let the rays of eyes through; see `_past_panels`."""
-    panel = source.panel
-    assert panel is not None
-    (a, b), axis = (axes[l] for axes in panel.half_axes), panel.axis[l]
-    radiance = {"type": "rgb", "value": (source.intensity[l] / panel.area[l]).tolist()}
-    sides = {}
-    for side in (1, -1) if panel.two_sided else (1,):
-        matrix = np.eye(4)
-        matrix[:3] = np.stack([side * a, b, side * axis, source.vector[l] - eye], axis=1)
-        sides[f"{name}{'-front' if side > 0 else '-back'}"] = {
-            "type": "disk" if panel.round else "rectangle",
-            "to_world": mi.ScalarTransform4f(matrix.tolist()),
-            "bsdf": {"type": "null"},
-            "emitter": {"type": "area", "radiance": radiance},
-        }
-    return sides
+def _mesh(mi: Any, scene: Scene, m: int, origin: Float64, radiance: Float64 | None = None) -> Any:
+    """The triangles of a material, from an origin in the scene's coordinates.
 
-
-def _past_panels(scene: Any, ray: Any, active: Any, panels: int) -> Any:
-    """What a ray meets first but for panels."""
-    hit = scene.ray_intersect(ray, active)
-    for _ in range(panels):
-        ray.o[hit.emitter(scene) != None] = hit.spawn_ray(ray.d).o  # noqa: E711  # of arrays
-        hit = scene.ray_intersect(ray, active)
-    return hit
-
-
-def _mesh(mi: Any, scene: Scene, m: int, origin: Float64) -> Any:
-    """The triangles of a material, from an origin in the scene's coordinates."""
+    Args:
+        radiance: of the fronts of its triangles, which Mitsuba takes from interpolated normals where it has them.
+    """
     chosen = scene.material == m
     n = int(chosen.sum())
-    smooth, textured = len(scene.normals) > 0, bool(scene.reflectivity_texture[m] >= 0)
+    smooth, textured = len(scene.normals) > 0 and radiance is None, bool(scene.reflectivity_texture[m] >= 0)
     properties = mi.Properties()
     properties["bsdf"] = mi.load_dict(_bsdf(mi, scene, m))
+    if radiance is not None:
+        properties["emitter"] = mi.load_dict(area_light(radiance))
     mesh = mi.Mesh(
         f"mesh{m}", vertex_count=3 * n, face_count=n, has_vertex_normals=smooth, has_vertex_texcoords=textured,
         props=properties,
@@ -299,24 +270,19 @@ def _reflectance(mi: Any, scene: Scene, m: int, scale: float) -> dict[str, Any]:
     return {"type": "bitmap", "data": data, "raw": True, "filter_type": "bilinear", "wrap_mode": "repeat"}
 
 
-def _light(mi: Any, scene: Any, sensor: Any, prepared: Prepared, samples: int, seed: int) -> Image:
+def direct_light(mi: Any, scene: Any, sensor: Any, prepared: Prepared, samples: int, seed: int) -> Image:
     """Direct light of the sources and the background on the surfaces that the eye sees, directly or by mirrors."""
     import drjit as dr
 
     width, height = prepared.job.camera.resolution
-    sampler = mi.load_dict({"type": "independent"})
-    sampler.seed(seed, width * height * samples)
-    pixel = dr.arange(mi.UInt32, width * height * samples) // samples
-    corner = mi.Point2f(mi.Float(pixel % width), mi.Float(pixel // width))
-    place = (corner + sampler.next_2d()) / mi.Point2f(width, height)
-    ray, _ = sensor.sample_ray(0.0, 0.0, place, mi.Point2f(0.5, 0.5))
+    ray, sampler = eye_rays(mi, sensor, (width, height), samples, seed)
     context, background = mi.BSDFContext(), mi.Color3f(list(prepared.job.scene.background))
     found, through, active = mi.Color3f(0), mi.Color3f(1), mi.Bool(True)
-    panels = sum(1 + source.panel.two_sided for source in prepared.lights.sources if source.panel is not None)
+    hidden = hidden_sides(prepared)
     depth = prepared.job.specular.depth if prepared.scene.has_mirrors else 0
     # no `minimum` and no roulette: older LLVMs cannot compile them
     for bounce in range(depth + 1):
-        hit = _past_panels(scene, ray, active, panels)
+        hit = past_lamps(scene, ray, active, hidden)
         found += dr.select(active & ~hit.is_valid(), through * background, 0)
         active &= hit.is_valid()
         bsdf = hit.bsdf(ray)
@@ -332,3 +298,17 @@ def _light(mi: Any, scene: Any, sensor: Any, prepared: Prepared, samples: int, s
     sums = [dr.block_reduce(dr.ReduceOp.Add, channel, samples) for channel in (found.x, found.y, found.z)]
     dr.eval(*sums)
     return np.stack([np.array(channel, np.float32) for channel in sums], -1).reshape(height, width, 3) / samples
+
+
+def eye_rays(mi: Any, sensor: Any, resolution: tuple[int, int], samples: int, seed: int) -> tuple[Any, Any]:
+    """Rays through all pixels, those of a pixel in a row; and the sampler that chose them."""
+    import drjit as dr
+
+    width, height = resolution
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(seed, width * height * samples)
+    pixel = dr.arange(mi.UInt32, width * height * samples) // samples
+    corner = mi.Point2f(mi.Float(pixel % width), mi.Float(pixel // width))
+    place = (corner + sampler.next_2d()) / mi.Point2f(width, height)
+    ray, _ = sensor.sample_ray(0.0, 0.0, place, mi.Point2f(0.5, 0.5))
+    return ray, sampler
