@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32
+from framearray_cli.engine.frames.array_pool import ArrayPool
 from framearray_cli.engine.frames.frame import FrameHits
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.frames.threads import TracePool
@@ -100,23 +101,25 @@ class TimedWindow(Window):
 
 
 def render_frames(
-    case: Case, settings: Settings, cameras: Sequence[int], lights: Sequence[int], seed: int
+    case: Case, settings: Settings, cameras: Sequence[int], lights: Sequence[int], seed: int, arrays: ArrayPool
 ) -> TimedFrames:
     """Render consecutive frames with some settings and a window, as a render does.
 
     Args:
         cameras: indices of the frames.
         lights: light positions of the returned images.
+        arrays: memory for hits, which the next run takes over.
     """
     changed = with_settings(case, settings)
     changed = with_lights(changed, lights) if settings.one_light else changed
     setup = replace(changed.setup, seed=seed)
     shape = (setup.lights.n_lights, setup.cams.height, setup.cams.width, 3)
-    block = np.empty(shape, np.float16)
+    block = np.full(shape, 0, np.float16)  # the first write to memory costs time per page
     exact = np.empty(shape, np.float32)
     kept = range(len(lights)) if settings.one_light else lights
     images, hits, composing = [], [], []
     with TracePool(setup, changed.threads) as pool:
+        pool.arrays = arrays
         window = TimedWindow(setup, changed.ambient, pool)
         for j in ready_frames(window, setup, range(cameras[0], cameras[-1] + 1), pool):
             started = time.perf_counter()
@@ -139,8 +142,9 @@ def measure(
     """Render the probe images of some settings twice, and compare them with the references, and with true light."""
     found, seconds, hits, example = [], [], [], None
     true_errors: list[TruthError] = []
+    arrays = ArrayPool()
     for frames in cameras:
-        runs = [render_frames(case, named.settings, frames, lights, seed) for seed in SEEDS]
+        runs = [render_frames(case, named.settings, frames, lights, seed, arrays) for seed in SEEDS]
         seconds += [r.seconds for r in runs]
         hits.append(runs[0].hits)
         pictures = (runs[0].images, runs[1].images)
@@ -153,7 +157,7 @@ def measure(
     all_hits = np.concatenate([h.ravel() for h in hits])
     return Measured(
         named=named,
-        ms=1e3 * statistics.median(seconds) / case.setup.lights.n_lights,
+        ms=1e3 * _steady(seconds) / case.setup.lights.n_lights,
         quality=mean_quality(found),
         hits=(float(all_hits.mean()), float(np.percentile(all_hits, 1))),
         example=example,
@@ -169,12 +173,13 @@ def measure_method(
     Args:
         case: of `with_method`.
     """
-    runs = {c: render_frames(case, named.settings, [c], lights, SEEDS[0]) for c in truths}
+    arrays = ArrayPool()
+    runs = {c: render_frames(case, named.settings, [c], lights, SEEDS[0], arrays) for c in truths}
     found = [error for c, run in runs.items() for error in compare_with_truth([run.images[0]], truths[c])]
     truth = mean_truth_error(found)
     if truth is None:
         return None
-    ms = 1e3 * statistics.median(run.seconds for run in runs.values()) / case.setup.lights.n_lights
+    ms = 1e3 * _steady([run.seconds for run in runs.values()]) / case.setup.lights.n_lights
     return MeasuredMethod(named=named, ms=ms, truth=truth)
 
 
@@ -182,5 +187,11 @@ def measure_single_lights(
     case: Case, named: NamedSettings, cameras: Sequence[Sequence[int]], lights: Sequence[int], twin: Measured
 ) -> Measured:
     """Time images rendered for one light position each; take their errors from `twin`, which has the same pixels."""
-    seconds = [render_frames(case, named.settings, frames[:1], lights[:1], SEEDS[0]).seconds for frames in cameras]
-    return replace(twin, named=named, ms=1e3 * statistics.median(seconds))
+    arrays = ArrayPool()
+    runs = [render_frames(case, named.settings, frames[:1], lights[:1], SEEDS[0], arrays) for frames in cameras]
+    return replace(twin, named=named, ms=1e3 * _steady([run.seconds for run in runs]))
+
+
+def _steady(seconds: Sequence[float]) -> float:
+    """The median of runs that share memory, without the first, if there are more: a long render has all its pages."""
+    return statistics.median(seconds[1:] or seconds)
