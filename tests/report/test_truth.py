@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from support import tiny
 
+from framearray_cli.engine.frames.array_pool import ArrayPool
 from framearray_cli.report.case import plan_case, with_method, with_settings
 from framearray_cli.report.measure import render_frames
 from framearray_cli.report.probes import Probes, choose_probes
@@ -145,7 +146,7 @@ def test_cells_are_nearer_to_true_light_than_obscurances(tmp_path: Path) -> None
             assert (of_method.setup.cells is None) == (method == "obscurance")
             same = with_settings(of_method, of_method.settings).setup
             assert same.cells is of_method.setup.cells and same.smooth == of_method.setup.smooth
-            images = render_frames(of_method, of_method.settings, [0], lights, 5).images[0]
+            images = render_frames(of_method, of_method.settings, [0], lights, 5, ArrayPool()).images[0]
             errors[method] = mean_truth_error(compare_with_truth([images], truth))
         again = make_truth(true_case(case), 0, lights, lights, tmp_path)
     assert np.array_equal(again.images, truth.images) and len(list(tmp_path.iterdir())) == 1
