@@ -35,6 +35,7 @@ from .rowsource import FORMS, RowForm
 from .spot import SpotKey
 
 AXES = ("x", "y", "z")
+_AIMS = {"direction", "target"}
 AT = "at"  # where the light is, until its kind is known
 _KEYS: Mapping[str, type[Table]] = {
     "point": PointKey,
@@ -80,6 +81,8 @@ def read_positions(path: Path, kind: str, common: Mapping[str, Any], *, strong: 
     if not strong and not any(name in row for name in form.strengths for row in (common, *(row for _, row in rows))):
         wanted = " or ".join(form.strengths)
         raise RowFileError(f"the file has no {wanted}; give it beside `file`, as in {form.strengths[0]} = 10")
+    if "target" in form.vectors and not any(_AIMS & row.keys() for row in (common, *(row for _, row in rows))):
+        raise RowFileError("the file has no direction or target; give one beside `file`, as in target = [0, 1, 0]")
     if problems := row_problems(rows, _KEYS[kind], form.values, common):
         raise RowFileError(*problems)
     return [{"frame": frame, **common, **row} for frame, (_, row) in enumerate(rows)]
@@ -104,7 +107,8 @@ def _csv_rows(text: str, form: RowForm) -> list[PlacedRow]:
     wanted = [name for columns in found.values() for name in columns] + single
     if sorted(header) != sorted(wanted) or (AT in found) == (form.vector in found):
         strengths = " or ".join(f"{name} or {', '.join(names[name])}" for name in form.strengths)
-        known = f"x, y, z or {', '.join(names[form.vector])}, and {strengths} where wanted"
+        more = ", ".join(["color", *(f"{key}_x, ..." for key in form.vectors), *form.numbers])
+        known = f"x, y, z or {', '.join(names[form.vector])}, and {strengths}, {more} where wanted"
         raise RowFileError(f"row 1: expected the column names {known}, got {columns_text(header)}")
     rows = []
     for place, cells in lines:
@@ -154,8 +158,10 @@ def _dome_rows(text: str, kind: str) -> list[PlacedRow]:
     names = [*_DOME_LISTS[configuration], *(positions if lamp else ("directions", *positions))]
     name = next((name for name in names if table.get(name)), None)
     if name is None or (lamp and name == "directions"):
-        remedy = 'expected positions; use type = "directional" for directions' if lamp else "expected some"
-        raise RowFileError(f"the file has no {'positions' if kind == 'point' else 'directions or positions'}; {remedy}")
+        if lamp:
+            remedy = '; expected positions; use type = "directional" for directions' if table.get("directions") else ""
+            raise RowFileError(f"the file has no positions{remedy}")
+        raise RowFileError("the file has no directions or positions; expected some")
     entries = table[name]
     if not isinstance(entries, list):
         raise RowFileError(f"{name}: expected a list, got {shown(entries)}")

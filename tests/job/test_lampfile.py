@@ -72,7 +72,8 @@ WRONG = [
      [f"row {k}: expected either `power` or `radiance`, got both" for k in (2, 3, 4)]),
     ("spot", LAMPS["spot"] | {"inner": 30},
      [f"row {k}: inner: expected at most 20, the angle `outer`, got 30" for k in (2, 3, 4)]),
-    ("spot", {"intensity": 3}, [f"row {k}: expected either `direction` or `target`, got neither" for k in (2, 3, 4)]),
+    ("spot", {"intensity": 3},
+     ["the file has no direction or target; give one beside `file`, as in target = [0, 1, 0]"]),
 ]  # fmt: skip
 
 
@@ -92,7 +93,8 @@ def test_wrong_columns_of_a_spot(tmp_path: Path) -> None:
     (found,) = problems(tmp_path, "a.csv", "x,y,z,target_x\n1,2,3,4\n", "spot", LAMPS["spot"])
     assert found == (
         'file: "a.csv": row 1: expected the column names x, y, z or position_x, position_y, position_z, and intensity '
-        "or intensity_r, intensity_g, intensity_b where wanted, got x, y, z, target_x"
+        "or intensity_r, intensity_g, intensity_b, color, direction_x, ..., target_x, ..., up_x, ..., "
+        "radius, inner, outer where wanted, got x, y, z, target_x"
     )
 
 

@@ -118,8 +118,8 @@ def test_a_temperature_for_all_positions(tmp_path: Path) -> None:
 
 BROKEN = [
     ("a.csv", "", "row 1: expected the column names x, y, z or position_x, position_y, position_z, and intensity or "
-     "intensity_r, intensity_g, intensity_b where wanted, got none"),
-    ("b.csv", "x,y\n1,2\n", "intensity_b where wanted, got x, y"),
+     "intensity_r, intensity_g, intensity_b, color, up_x, ..., radius where wanted, got none"),
+    ("b.csv", "x,y\n1,2\n", "color, up_x, ..., radius where wanted, got x, y"),
     ("c.csv", "x,y,z,x\n1,2,3,4\n", "got x, y, z, x"),
     ("d.csv", "x,y,z,position_x,position_y,position_z\n1,2,3,4,5,6\n",
      "got x, y, z, position_x, position_y, position_z"),

@@ -141,8 +141,10 @@ def assemble(
     path_file = None if str(path_file) in choices else path_file  # ./walk is a file
     light = None if light == LIGHT_MOVES else light
     named = [option for option, text in (("--cameras", cameras), ("--light", light)) if text is not None]
-    _refuse_conflicts(path_file, kinds, named, at or (), seconds)
+    sums = sum_options(environment, rotate, soft, weights, moves=True)
+    _refuse_conflicts(path_file, kinds, named, at or (), seconds, turns=sums.turns)
     kind = kinds[0] if kinds else None
+    sweep = Sweep(kind=kind, cameras=cameras, light=light, at=tuple(at or ()), seconds=seconds, turns=sums.turns)
     movie = _movie_file(target, force=force) if is_stdout(target) and not dry_run else nullcontext(output_path(target))
     with movie as file, Screen(err, quiet=quiet) as screen:
 
@@ -153,12 +155,11 @@ def assemble(
 
         made = run(
             array,
-            path_file or Sweep(kind=kind, cameras=cameras, light=light, at=tuple(at or ()), seconds=seconds),
-            file,
+            path_file or sweep, file,
             look=Look(exposure=exposure, view=find_view(view), label=label),
             fps=fps,
             positions="blend" if blend else None,
-            sums=sum_options(environment, rotate, soft, weights, moves=True),
+            sums=sums,
             progress=screen.counter("assembling", "frame"),
             warned=warn, force=force, dry_run=dry_run,
         )  # fmt: skip
@@ -189,16 +190,23 @@ def _movie_file(target: str, *, force: bool) -> AbstractContextManager[Path]:
 
 
 def _refuse_conflicts(
-    path_file: Path | None, kinds: Sequence[str], named: Sequence[str], at: Sequence[str], seconds: float | None
+    path_file: Path | None,
+    kinds: Sequence[str],
+    named: Sequence[str],
+    at: Sequence[str],
+    seconds: float | None,
+    *,
+    turns: bool,
 ) -> None:
     """Refuse options that do not go together.
 
     Args:
         named: options that name places.
+        turns: an environment turns.
     """
     ways = ([f"the path file {path_file}"] if path_file else []) + list(kinds)
     axes = any("=" in text for text in at)
-    if len(ways) > 1 or not (ways or named or axes):
+    if len(ways) > 1 or not (ways or named or axes or turns):
         found = " and ".join(ways) or "none of them"
         wanted = "a path file, walk, light or diagonal, or --cameras and --light with places"
         raise typer.BadParameter(f"expected {wanted}; got {found}", param_hint="PATH")

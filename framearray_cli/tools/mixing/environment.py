@@ -46,11 +46,13 @@ def read_map(file: Path) -> Image:
     """Read an environment map, and shrink it to at most ROWS rows.
 
     Raises:
-        OutputError: it is missing or damaged, is no panorama, or holds values that are no radiance.
+        OutputError: it is missing or damaged, is no panorama, is black, or holds values that are no radiance.
     """
     image = read_environment(file)
     if not np.isfinite(image).all() or image.min() < 0:
         raise OutputError(f"{file}: expected radiance of at least 0, got values that are negative or not finite")
+    if not image.any():
+        raise OutputError(f"{file}: expected an environment that shines, got radiance 0 everywhere")
     return area_mean(image, 2 * ROWS, ROWS) if len(image) > ROWS else image
 
 

@@ -45,6 +45,11 @@ class SumOptions:
         return self.environment is not None or self.weights is not None
 
     @property
+    def turns(self) -> bool:
+        """Whether an environment turns during a movie."""
+        return self.rotate[0] != self.rotate[1]
+
+    @property
     def any(self) -> bool:
         """Whether pictures are sums."""
         return self.environment is not None or self.soft is not None or self.weights is not None

@@ -25,6 +25,7 @@ class Sweep:
         cameras, light: places that the camera passes through, and the light along the first axis; None: as `kind` says.
         at: "AXIS=PLACES" for other light axes; a place without an axis is where all that does not move stays.
         seconds: length; None: one frame per image on the way.
+        turns: an environment turns meanwhile, so that nothing else needs to move.
     """
 
     kind: SweepKind | None = None
@@ -32,13 +33,15 @@ class Sweep:
     light: str | None = None
     at: tuple[str, ...] = ()
     seconds: float | None = None
+    turns: bool = False
 
 
 def sweep_path(sweep: Sweep, manifest: Manifest) -> MoviePath:
     """Make the path of a sweep.
 
     Raises:
-        JobError: a place is none, or lies outside the array; or nothing moves, and no `kind` says what should.
+        JobError: a place is none, or lies outside the array; nothing moves, and no `kind` says what should; or only an
+            environment moves, and no `seconds` says how long.
     """
     sizes = {CAMERA_AXIS: manifest.n_cameras, **manifest.axes}
     moves: tuple[IndexPlace, ...] = ("first", "last")
@@ -53,7 +56,10 @@ def sweep_path(sweep: Sweep, manifest: Manifest) -> MoviePath:
         if problems:
             raise JobError(option, [problem.removeprefix(f"{option}: ") for problem in problems])
     n_frames = max(lengths.values())
-    if sweep.kind is None and n_frames == 1:
+    if sweep.kind is None and n_frames == 1 and sweep.turns:
+        if sweep.seconds is None:
+            raise JobError("--seconds", ["missing; expected the length of the movie, as only the environment moves"])
+    elif sweep.kind is None and n_frames == 1:
         option = next(iter(named.values()), ("--cameras", ""))[0]
         raise JobError(option, ["expected several places, such as 0-last or all, as nothing else moves"])
     segment = Segment(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial import SphericalVoronoi
 from support.movies import grouped, plain
+from support.program import run
 
 from framearray_cli.array.images.images import ImageFormat, read_image, read_layers, write_image
 from framearray_cli.array.manifest import Manifest, ManifestLight, image_path
@@ -182,6 +183,7 @@ def test_maps_that_are_none(array: Manifest, tmp_path: Path) -> None:
         (tmp_path / "gone.exr", "gone.exr"),
         (tmp_path / "bad.exr", "bad.exr"),
         (broken_map(tmp_path, "square.exr", np.ones((8, 8, 3), np.float32)), "twice as wide as high, got 8 x 8 pixels"),
+        (broken_map(tmp_path, "black.exr", np.zeros((4, 8, 3), np.float32)), "expected an environment that shines"),
         (broken_map(tmp_path, "dark.exr", np.full((4, 8, 3), -1, np.float32)), "expected radiance of at least 0"),
     ]
     for file, text in cases:
@@ -331,6 +333,17 @@ def test_options_turn_an_environment_during_a_sweep(array: Manifest, tmp_path: P
     sums = SumOptions(environment=sky(tmp_path, 90, 0), rotate=(0.0, 180.0))
     assemble_movie(array.directory, Sweep(kind="walk"), tmp_path / "f.##.exr", sums=sums)
     first, last = (float(read_image(tmp_path / f"f.0{k}.exr")[0, 0, 0]) for k in (0, 1))
+    assert last / first == pytest.approx(4 / 2, rel=2**-9)
+
+
+def test_an_environment_turns_where_nothing_else_moves(array: Manifest, tmp_path: Path, capsys: Any) -> None:
+    panorama, frames = sky(tmp_path, 90, 0), tmp_path / "f.##.exr"
+    options = ("assemble", array.directory, "--environment", panorama, "--rotate", "0-180", "-o", frames)
+    result = run(capsys, *options)
+    assert (result.code, result.out) == (2, "")
+    assert result.err.startswith("--seconds: missing; expected the length of the movie, as only the environment moves")
+    assert run(capsys, *options, "--cameras", "1", "--seconds", "0.25").code == 0
+    first, last = (float(read_image(tmp_path / f"f.{k:02d}.exr")[0, 0, 0]) for k in (0, 5))
     assert last / first == pytest.approx(4 / 2, rel=2**-9)
 
 
