@@ -28,7 +28,7 @@ from ..kernels.simd import (
     store,
     triples_at,
 )
-from .direct_maps import is_map, queue_maps
+from .direct_maps import add_maps, is_map
 from .direct_meshes import FAR_END, FROM, REACH, TO, add_emitters
 from .direct_queue import Sixteen, queue_hits, trace_queue
 
@@ -146,9 +146,9 @@ def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, ray
             if lights.kind[s] == MESH or is_map(lights, s):
                 continue
             waiting, total = queue_hits(lights, s, sixteen, tracer, rays, irradiance, waiting, total)
-    waiting, total = queue_maps(hits, n, lights, tracer, rays, irradiance, waiting, total)
     trace_queue(tracer, rays, waiting, irradiance)
-    return total + waiting
+    of_maps: int = add_maps(hits, n, lights, tracer, rays, irradiance)
+    return total + waiting + of_maps
 
 
 @inlined

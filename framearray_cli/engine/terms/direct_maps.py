@@ -5,18 +5,21 @@ have enough of them to fill packets with rays that start near each other and run
 turns, they do so under every light position. So hits are sorted once by the direction that they draw.
 """
 
+from typing import Any
+
 import numpy as np
 
 from framearray_cli.base.arrays import Float32
 
 from ..embree.packets import Tracer, room_in
 from ..hits.hits import Hits, reflects_in_lanes, triple
-from ..hits.rays import ORDER, RANK, Rays
+from ..hits.rays import NO_RAYS, ORDER, RANK, Rays
 from ..inputs.lights import LightArrays
-from ..inputs.maps import MASK, map_point
-from ..kernels.kernel import has_rows, inlined
+from ..inputs.maps import MASK, Maps, map_point
+from ..kernels.kernel import has_rows, inlined, step
+from ..kernels.optional import chosen_by_type, step_or_zero
 from ..kernels.simd import LANES, gather, lane_numbers, load, select, store
-from .direct_queue import Sixteen, queue_hits
+from .direct_queue import Sixteen, queue_hits, trace_queue
 from .obscurance_rays import CELLS, cell_of, sort_rays
 
 TOGETHER = 2048  # hits; batches hold multiples of it, so that their size does not decide which rays share a packet
@@ -29,14 +32,13 @@ def is_map(lights: LightArrays, s: int) -> bool:
     return found
 
 
-@inlined
-def queue_maps(
-    hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, irradiance: Float32, waiting: int, total: int
-) -> tuple[int, int]:
-    """Queue the shadow rays of hits 0 to n - 1 to all environments; see `queue_hits`."""
-    if not has_rows(lights.maps.tint):
-        return waiting, total
+@step
+def light_of_maps(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays: Rays, irradiance: Float32) -> int:
+    """Add the irradiance of all environments at hits 0 to n - 1, see `direct`; return the number of shadow rays."""
     stride, together = ORDER * rays.number.shape[1], min(TOGETHER, room_in(rays.packets))
+    # Loop state
+    waiting = NO_RAYS  # rays in the queue
+    total = NO_RAYS  #   rays traced
     for s in range(lights.kind.shape[0]):
         if not is_map(lights, s):
             continue
@@ -50,7 +52,8 @@ def queue_maps(
                 up = (e * g[0], e * g[1], e * g[2])
                 sixteen = Sixteen(at, wanted, p, g, m, up, gather(hits.key, at))
                 waiting, total = queue_hits(lights, s, sixteen, tracer, rays, irradiance, waiting, total)
-    return waiting, total
+    trace_queue(tracer, rays, waiting, irradiance)
+    return total + waiting
 
 
 @inlined
@@ -68,3 +71,12 @@ def _sort_hits(hits: Hits, first: int, n: int, lights: LightArrays, s: int, rays
     sort_rays(rays, (n + LANES - 1) // LANES * LANES)
     found: int = rays.start[CELLS - 1]
     return found
+
+
+def _add_maps_of(typingctx: Any, hits: Any, n: Any, lights: Any, tracer: Any, rays: Any, irradiance: Any) -> Any:
+    """`light_of_maps`, or 0 where no source has a map."""
+    tint = lights[LightArrays._fields.index("maps")][Maps._fields.index("tint")]
+    return step_or_zero(typingctx, light_of_maps, (hits, n, lights, tracer, rays, irradiance), tint)
+
+
+add_maps: Any = chosen_by_type(_add_maps_of)
