@@ -136,6 +136,7 @@ def dark(n: int) -> list[dict[str, Any]]:
     return [{"type": "directional", "keys": [{"frame": 0, "direction": [0, -1, 0], "irradiance": 0.0}]}] * n
 
 
+@pytest.mark.slow  # kernels of a map with suns and a direction, which no other test needs
 @pytest.mark.parametrize("n_dark", [3, 0], ids=["as many sources", "fewer sources"])
 def test_a_sum_knows_maps_with_suns(scene: Path, tmp_path: Path, dome: Pictures, n_dark: int) -> None:
     """The suns of a map are a source behind all others, whose number says which points of them hits draw.
