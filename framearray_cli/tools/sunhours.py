@@ -1,7 +1,7 @@
 """Hours of direct sun of a sun study: a layer of its array, or counted in its images.
 
-In images they are the positions with direct light times the time between them. The sun must be alone in a group of
-sources, whose images hold its direct light and nothing else; so light from cells will not do, which they hold too.
+In images they are the positions with direct light times the time between them. The sun must be the only source of a
+group, whose images hold its direct light and nothing else; so light from cells will not do, which they hold too.
 There light that a mirror shows counts: the pixel shows a place in the sun. The layer holds the hours of the mirror.
 """
 

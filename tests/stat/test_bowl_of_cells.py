@@ -67,4 +67,4 @@ def test_a_bowl_has_the_light_of_an_open_sphere(method: str, outside: str) -> No
     most = float(t.ppf(1 - CHANCE / 2, SEEDS - 1))
     assert abs(got.mean - right) < most * got.error + FLAT * right
     assert abs(got.mean - right) < 0.01 * right
-    assert got.error < 0.002 * right  # so that light of the sky alone, 8 % less, would fail
+    assert got.error < 0.002 * right  # so that only the light of the sky, 8 % less, would fail

@@ -91,7 +91,7 @@ def with_layer(manifest: Manifest, days: Any = ("2026-03-20", "2026-06-21")) -> 
 
 
 def test_a_layer_takes_the_place_of_images(tmp_path: Path) -> None:
-    """It needs no sun alone in its group, and light from cells does no harm."""
+    """It needs no group for the sun, and light from cells does no harm."""
     manifest = with_layer(study(tmp_path / "out", n_sources=2))
     made = make_sun_sheet(manifest.directory, tmp_path / "hours.exr", cameras="all")
     assert (made.cameras, made.lights, made.size) == ((0, 1), (0, 4), (24, 16))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Int32
+from framearray_cli.base.arrays import Float32, Int32, Real
 
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude, room_in
 from ..hits.hits import Hits, reflects_in_lanes
@@ -48,15 +48,21 @@ def _shines(kind: Int32, strength: Float32, s: int) -> bool:
     return False
 
 
+@inlined
+def write_packet(rays: Rays, first: int, reach: Real) -> None:
+    """Write queued rays first to first + 15 into packets, with their length or lengths."""
+    room = rays.row.shape[1]
+    for axis in range(3):
+        store_row(rays.packets, first, ORIGIN + axis, load(rays.row, (FROM + axis) * room + first))
+        store_row(rays.packets, first, DIRECTION + axis, load(rays.row, (TO + axis) * room + first))
+    store_row(rays.packets, first, TFAR, reach)
+
+
 @step
 def _trace_meshes(tracer: Tracer, rays: Rays, n: int, strength: Float32, irradiance: Float32) -> None:
     """Trace the n queued shadow rays, and add the light of those that nothing blocks, at all light positions."""
-    room = rays.row.shape[1]
     for first in range(0, n, LANES):
-        for axis in range(3):
-            store_row(rays.packets, first, ORIGIN + axis, load(rays.row, (FROM + axis) * room + first))
-            store_row(rays.packets, first, DIRECTION + axis, load(rays.row, (TO + axis) * room + first))
-        store_row(rays.packets, first, TFAR, FAR_END)
+        write_packet(rays, first, FAR_END)
     occlude(tracer, rays.packets, n, True)
     n_sources, channels, n_lights = strength.shape
     for first in range(0, n, LANES):

@@ -6,14 +6,14 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Triple
 
-from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude, room_in
+from ..embree.packets import TFAR, Tracer, occlude, room_in
 from ..hits.rays import Rays
 from ..inputs.lights import DIRECTIONAL, LightArrays
 from ..inputs.maps import map_share, map_texel
 from ..inputs.shapes import source_at, source_point, vector_and_factor
 from ..kernels.kernel import index, inlined, step
-from ..kernels.simd import LANES, append, bits, ctz, load, load_row, popcount, store, store_row
-from .direct_meshes import FAR_END, FROM, REACH, TO
+from ..kernels.simd import LANES, append, bits, ctz, load, load_row, popcount, store
+from .direct_meshes import FAR_END, FROM, REACH, TO, write_packet
 
 
 class Sixteen(NamedTuple):
@@ -42,10 +42,7 @@ def trace_queue(tracer: Tracer, rays: Rays, n: int, irradiance: Float32) -> None
     room = rays.row.shape[1]
     # rays into packets
     for first in range(0, n, LANES):
-        for axis in range(3):
-            store_row(rays.packets, first, ORIGIN + axis, load(rays.row, (FROM + axis) * room + first))
-            store_row(rays.packets, first, DIRECTION + axis, load(rays.row, (TO + axis) * room + first))
-        store_row(rays.packets, first, TFAR, load(rays.row, REACH * room + first))
+        write_packet(rays, first, load(rays.row, REACH * room + first))
     occlude(tracer, rays.packets, n, True)
     # add to E_direct what rays carry that nothing blocks; idle lanes count as blocked
     channels, n_lights = irradiance.shape[1], irradiance.shape[2]

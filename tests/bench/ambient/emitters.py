@@ -79,7 +79,7 @@ def past_lamps(scene: Any, ray: Any, active: Any, sides: int) -> Any:
     """What a ray meets first but for lamps."""
     hit = scene.ray_intersect(ray, active)
     for _ in range(sides):
-        ray.o[hit.emitter(scene) != None] = hit.spawn_ray(ray.d).o  # noqa: E711  # of arrays
+        ray.o[hit.emitter(scene) != None] = hit.spawn_ray(ray.d).o  # noqa: E711  # drjit compares arrays by !=
         hit = scene.ray_intersect(ray, active)
     return hit
 

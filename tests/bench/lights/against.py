@@ -163,7 +163,7 @@ def surfaces_only(mi: Any, scene: Any, sensor: Any, prepared: Prepared) -> Flags
     width, height = prepared.job.camera.resolution
     ray, _ = pathtraced.eye_rays(mi, sensor, (width, height), SAMPLES, 1_000_001)
     hit = past_lamps(scene, ray, mi.Bool(True), hidden_sides(prepared))
-    plain = hit.is_valid() & (hit.emitter(scene) == None)  # noqa: E711  # of arrays
+    plain = hit.is_valid() & (hit.emitter(scene) == None)  # noqa: E711  # drjit compares arrays by ==
     counts = dr.block_reduce(dr.ReduceOp.Add, dr.select(plain, mi.UInt32(1), mi.UInt32(0)), SAMPLES)
     return np.asarray(np.array(counts).reshape(height, width) == SAMPLES)
 
