@@ -14,6 +14,7 @@ from framearray_cli.render.prepare import Prepared, open_embree, plan_work, prep
 
 JOBS = sorted(file.stem for file in (ROOT / "jobs").glob("*.toml") if not file.stem.endswith("-movie"))
 WALKS = 512  # for the ambient light, which needs no more to tell black from white
+SAMPLES = 2**14  # of cells, likewise
 
 
 def warnings_of(inputs: Prepared) -> tuple[str, ...]:
@@ -28,6 +29,8 @@ def test_jobs_of_the_project(name):
     if not job.scene.file.exists():
         pytest.skip("the scenes of jobs/ have not been made")
     fast = job if job.ambient.intensity else changed(job, ambient=changed(job.ambient, paths=WALKS))
+    if job.indirect.method == "cells":
+        fast = changed(fast, indirect=changed(job.indirect, samples=SAMPLES))
     assert warnings_of(prepare(fast)) == ()
 
 

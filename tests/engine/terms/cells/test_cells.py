@@ -131,7 +131,7 @@ IMAGES: dict[str, dict[str, Any]] = {
     "one ray, one hit": {"samples": {"hits": 1, "obscurance": 1}},
     "more rays than packets hold": {"samples": {"hits": 1, "obscurance": 300}, "camera": {"resolution": [4, 3]}},
     "wide cells": {"indirect": {**CELLS["indirect"], "cell": 0.6}},
-    "reuse": {"camera": WALK, "reuse": {"n_r": 2}, **SKY},
+    "reuse": {"camera": WALK | {"resolution": [8, 6]}, "reuse": {"n_r": 2}, **SKY},
     "one light": {"light": {"frames": 1, "sources": [RED]}, **SKY},
     "more lights than are solved together": {"light": {"frames": 19}, "camera": {"resolution": [4, 3]}},
 }
