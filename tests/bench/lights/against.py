@@ -32,7 +32,7 @@ RESOLUTION, QUICK_RESOLUTION = (160, 120), (32, 24)
 PASSES, QUICK_PASSES = 8, 2  # independent ones of both programs, at least
 HITS, SAMPLES = 16, 64  # of one pass
 # Times as many passes, where light is noisier.
-MORE = {"mesh": 8, "environment": 4, "spot": 2}
+MORE = {"mesh": 32, "environment": 4, "spot": 2}
 KINDS = ("rect", "disc", "sphere", "spot", "mesh", "environment")
 
 
