@@ -1,4 +1,4 @@
-"""The door to OpenImageIO, and images read with it. It raises nothing: every return value is checked here."""
+"""The door to OpenImageIO, which reads and writes images. It raises nothing: every return value is checked here."""
 
 import os
 from functools import cache
@@ -6,10 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .arrays import Float32
 from .errors import OutputError
 from .extras import extra
+from .files import refusal, whole_file
 
 MOST_PIXELS = 16384**2  # of an image; no job may have more
 LINEAR_MAPS = (".exr", ".hdr", ".tif", ".tiff")
@@ -78,6 +80,52 @@ def read_environment(path: Path) -> Float32:
     return pixels
 
 
+def write_environment(path: Path, pixels: Float32) -> None:
+    """Write a panorama of linear radiance, (h, 2 h, 3), as an EXR that `read_environment` reads; equal pixels give
+    equal bytes.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    kind = "half" if float(pixels.max(initial=0.0)) <= float(np.finfo(np.float16).max) else "float"
+    height, width, channels = pixels.shape
+    spec = oiio().ImageSpec(width, height, channels, kind)
+    spec.attribute("compression", "zip")
+    write_pixels(path, "openexr", spec, pixels)
+
+
+def write_pixels(path: Path, format_name: str, spec: Any, pixels: NDArray[Any]) -> None:
+    """Write pixels (h, w, channels) in a named format: a temporary file has no suffix to choose it by."""
+    library = oiio()
+    pixels = np.ascontiguousarray(pixels)  # a strided array can be stored wrongly without an error
+    with whole_file(path) as part:
+        output = library.ImageOutput.create(format_name)
+        if output is None:
+            raise OutputError(f"{path}: OpenImageIO cannot write {format_name}: {library.geterror()}")
+        # All three calls run; the file is good only if none fails and no error was left behind.
+        done = output.open(str(part), spec) and output.write_image(pixels)
+        done = output.close() and done
+        message = output.geterror()
+        if not done or message:
+            why = refusal(part, pixels.nbytes) or first_line(message, part)
+            raise OutputError(f"{path}: cannot be written: {why}")
+        _check_end(path, part, pixels.nbytes)
+
+
+def last_row(path: Path) -> tuple[int, int] | None:
+    """Return width and height of an EXR or TIFF if its last row, which a truncated file lacks, can be read."""
+    library = oiio()
+    source = library.ImageInput.open(str(path)) if os.path.isfile(path) and begins_well(path) else None
+    if source is None:
+        library.geterror()  # clears what the failed opening left behind
+        return None
+    spec = source.spec()
+    row = source.read_scanlines(spec.height - 1, spec.height, 0, 0, spec.nchannels, library.UNKNOWN)
+    message = source.geterror()
+    source.close()
+    return None if row is None or message else (spec.width, spec.height)
+
+
 def check_size(path: Path, width: int, height: int) -> None:
     """Refuse a size beyond any job, which a few bytes can claim, before memory is allocated for it."""
     if width * height > MOST_PIXELS:
@@ -97,3 +145,10 @@ def first_line(message: str, path: Path) -> str:
     """Shorten an OpenImageIO error to one line, without the path that the message around it already names."""
     lines = [line.strip() for line in message.replace(str(path), path.name).splitlines() if line.strip()]
     return lines[0] if lines else "no reason given"
+
+
+def _check_end(path: Path, part: Path, n_bytes: int) -> None:
+    """Read the last row back (0.15 ms): a disk that is full when the last buffer is flushed goes unreported."""
+    if last_row(part) is None:
+        why = refusal(part, n_bytes) or "the file is cut short; is the disk full?"
+        raise OutputError(f"{path}: cannot be written: {why}")

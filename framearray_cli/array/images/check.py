@@ -5,8 +5,8 @@ from pathlib import Path
 
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import require_file
+from framearray_cli.base.openimage import last_row
 
-from .exr import last_row
 from .images import format_name, read_image
 from .png import open_picture
 

@@ -18,12 +18,12 @@ from framearray_cli.base.colour import linear_from_srgb8, srgb8_from_linear
 from framearray_cli.base.errors import MissingExtraError
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.files import write_bytes
-from framearray_cli.base.openimage import oiio, read_pixels, read_rgb
+from framearray_cli.base.openimage import oiio, read_pixels, read_rgb, write_pixels
 from framearray_cli.base.units import counted
 
 from . import plain_exr
 from .attributes import Attributes
-from .exr import OIIO_NAMES, spec_of, write_pixels
+from .exr import OIIO_NAMES, spec_of
 from .png import can_encode, encode_jpeg, encode_png, read_codes
 
 Extension = Literal["exr", "png", "tif", "jpg"]

@@ -8,12 +8,12 @@ import pytest
 from support import movies
 
 from framearray_cli.array.images.check import check_image
-from framearray_cli.array.images.exr import last_row
 from framearray_cli.array.images.images import read_image
 from framearray_cli.array.integrity import find_damage
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.record import Entry, RecordedRun, RecordWriter, read_records, record_file, seal
 from framearray_cli.base.errors import OutputError
+from framearray_cli.base.openimage import last_row
 from framearray_cli.engine.images.standard_error import standard_error
 
 PRINT = "sha256:0"
