@@ -13,6 +13,7 @@ from framearray_cli.base.forms.kinds import mistaken
 from framearray_cli.render.beside import FLOATS
 from framearray_cli.render.beside import offer_beside as offer
 
+from .environment import install_environment, maps_for
 from .model import INDIRECT, WEIGHTS, Start, table_of, validate_job
 from .options import Format, StartOptions, SunOption
 from .plan import plan_start
@@ -27,18 +28,24 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
     """Write a first job for a scene; the job, and the folder of its images, have the name of the file.
 
     Args:
-        job_file: the file; STDOUT: nothing is written, and `to_text` gives the job for the current folder.
+        job_file: the file; STDOUT: nothing is written, and `to_text` gives the job for the current folder. An
+            environment of the file is left out then, as its panorama would have no place.
         force: replace an existing file.
 
     Raises:
         SceneError: the scene cannot be read, or nothing in it can be seen or lit.
         JobError: no camera has the name in the options, or the sun never rises.
-        OutputError: the job file exists already, or cannot be written.
+        OutputError: the job file, or the panorama of an environment beside it, exists already or cannot be written.
     """
     check_files(scene, job_file, force=force)
-    start = plan_start(scene, scene.stem if job_file == STDOUT else job_file.stem, options)
-    validate_job(table_of(start), scene)
-    if job_file != STDOUT:
+    if job_file == STDOUT:
+        start = plan_start(scene, scene.stem, options)
+        validate_job(table_of(start), scene)
+        return start
+    with maps_for(scene, job_file, force=force) as maps:
+        start = plan_start(scene, job_file.stem, options, maps)
+        validate_job(table_of(start), scene)
+        start = install_environment(start, maps)
         write_bytes(job_file, to_text(start, job_file).encode("utf-8"))
     return start
 

@@ -125,5 +125,11 @@ def _spread_indices(n: int) -> list[int]:
 
 def _append_dark(source: LightPath, some: list[int]) -> LightPath:
     """Some positions of a source, followed by one at which it does not shine."""
-    intensity = np.concatenate([source.intensity[some], np.zeros((1, 3))])
-    return replace(source.at([*some, 0]), intensity=intensity, notes=())
+    shown = source.at([*some, 0])
+    around = shown.environment and replace(shown.environment, factor=_with_dark(shown.environment.factor))
+    return replace(shown, intensity=_with_dark(shown.intensity), environment=around, notes=())
+
+
+def _with_dark(strength: Float64) -> Float64:
+    """Strengths (n, 3) of which the last is 0."""
+    return np.concatenate([strength[:-1], np.zeros((1, 3))])

@@ -12,9 +12,21 @@ from framearray_cli.base.errors import JobError, SceneError
 from framearray_cli.scene.files import Stage
 from framearray_cli.scene.paths.sun import NEVER, daylight
 
+from .environment import Maps, environment_light
 from .expose import find_factors
 from .lamps import choose_lamp_path
-from .model import LightKeys, LightSource, MeshLight, Start, SunDay, Vector, round_points, round_vector, without_accents
+from .model import (
+    EnvironmentLight,
+    LightKeys,
+    LightSource,
+    MeshLight,
+    Start,
+    SunDay,
+    Vector,
+    round_points,
+    round_vector,
+    without_accents,
+)
 from .options import StartOptions, SunOption
 from .orbit import SUN_KEYS, key_frames, sun_directions
 from .shining import mesh_lights
@@ -24,19 +36,24 @@ from .staged import convert_lights
 LIGHTS = 12  # positions of the light of a first array; 288 images with its eyes are rendered in a minute
 LAMP: Vector = (1.0, 0.92, 0.8)  # colour of a lamp, and of the sun
 SUN: Vector = (1.0, 0.94, 0.84)
+BLACK: Vector = (0.0, 0.0, 0.0)
 GROUP_LENGTH, TAKEN = 32, ("ambient", "background", "layers", "light", "main")  # names that groups cannot have
 GRAZING = 0.1  # share of the time from the rise to the set of the sun
 HOUR_DEG = 15  # longitude that the sun crosses in an hour
 
 
-def add_lights(site: Site, start: Start, stage: Stage, options: StartOptions, ends: Float64) -> Start:
+def add_lights(
+    site: Site, start: Start, stage: Stage, options: StartOptions, ends: Float64, maps: Maps | None = None
+) -> Start:
     """Add the lights of the file, or a lamp inside, or a sun outside, at the strength that exposes pictures well.
 
     Args:
         ends: (2, 2, 3) first and last eye and target.
+        maps: where an environment of the file is saved; None: it is left out.
 
     Raises:
         JobError: the sun asked for never rises.
+        OutputError: the file of an environment is in the way, or cannot be written.
         SceneError: no light reaches what the camera sees.
     """
     start = replace(start, about=(*start.about, *stage.notes))
@@ -45,11 +62,15 @@ def add_lights(site: Site, start: Start, stage: Stage, options: StartOptions, en
     sources, n = convert_lights(stage, options.lights)
     meshes, faint = mesh_lights(site.probe.scene)
     start = replace(start, about=(*start.about, *faint))
-    if sources:
+    around, left = environment_light(stage, maps)
+    start = replace(start, about=(*start.about, *left))
+    if sources or around:
         brings = "The file brings its own lights."
         if n == 1 and (options.lights or 1) > 1:
             brings = f"{brings} They stand still: one light position; a second key in the job makes a light move."
-        own = replace(start, sources=(*sources, *meshes), light_frames=n, about=(*start.about, brings))
+        sky = BLACK if around else start.background  # the environment is what lies outside
+        own = replace(start, sources=(*around, *sources, *meshes), light_frames=n, background=sky)
+        own = replace(own, about=(*start.about, brings))
         if (factors := find_factors(own, site.probe.scene, site.probe.embree)) is not None:
             return _with_groups(_scale_lights(own, *factors), options)
         dark = "The lights of the file light nothing that its pictures show, so others were chosen."
@@ -162,7 +183,7 @@ def _scale_lights(start: Start, factor: float, sky: float) -> Start:
     def scaled(source: LightSource) -> LightSource:
         if isinstance(source, SunDay):
             return replace(source, power=strong(source.power, factor))
-        if isinstance(source, MeshLight):
+        if isinstance(source, MeshLight | EnvironmentLight):
             return replace(source, intensity=float(f"{source.intensity * factor:.3g}"))
         return replace(source, powers=tuple(strong(power, factor) for power in source.powers))
 

@@ -114,7 +114,22 @@ class MeshLight:
     group: str | None = None
 
 
-LightSource = LightKeys | SunDay | MeshLight
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnvironmentLight:
+    """A panorama around the scene.
+
+    Attributes:
+        file: its EXR; `intensity`: factor of its radiance.
+    """
+
+    file: Path
+    intensity: float
+    about: tuple[str, ...]
+    name: str
+    group: str | None = None
+
+
+LightSource = LightKeys | SunDay | MeshLight | EnvironmentLight
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -230,6 +245,9 @@ def source_table(source: LightSource) -> dict[str, Any]:
     if isinstance(source, LightKeys):
         ies = {"ies": str(source.ies)} if source.ies else {}
         return {"type": source.kind, **group, **ies, "keys": source_keys(source)}
+    if isinstance(source, EnvironmentLight):
+        keys = [{"frame": 0, "intensity": source.intensity}]
+        return {"type": "environment", **group, "file": str(source.file), "keys": keys}
     if isinstance(source, MeshLight):
         own = {"material": source.material, "two_sided": source.two_sided}
         return {"type": "mesh", **group, **own, "keys": [{"frame": 0, "intensity": source.intensity}]}

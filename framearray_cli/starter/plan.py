@@ -11,6 +11,7 @@ from framearray_cli.scene.files import read_stage
 from framearray_cli.scene.scene import Scene, load_scene
 
 from .cameras import choose_shot
+from .environment import Maps
 from .lighting import add_lights
 from .model import MaterialNote, Start, Vector, round_vector, without_accents
 from .options import StartOptions
@@ -22,16 +23,18 @@ SKY: Vector = (0.7, 0.85, 1.05)  # radiance, as in the jobs that come with the p
 ROOM_RANGE, THING_RANGE = 0.5, 0.2  # d_max over the height of a room, and over the largest extent of a thing
 
 
-def plan_start(file: Path, name: str, options: StartOptions) -> Start:
+def plan_start(file: Path, name: str, options: StartOptions, maps: Maps | None = None) -> Start:
     """Choose a first job for a scene.
 
     Args:
         name: of the job, as a person wrote it.
+        maps: where an environment of the file is saved; None: it is left out.
 
     Raises:
         SceneError: a scene that cannot be read, that has no inside where one is asked for, or whose visible surfaces no
             light reaches.
         JobError: no camera of that name, a sun that never rises, or groups in a format that cannot hold them.
+        OutputError: the file of an environment is in the way, or cannot be written.
     """
     if options.groups and options.image_format not in LINEAR:
         problem = f'--groups: expected --format exr or tif, as groups are added up afterwards, got "{options.format}"'
@@ -55,7 +58,7 @@ def plan_start(file: Path, name: str, options: StartOptions) -> Start:
             notes=scene.report.notes,
             format=options.image_format,
         )
-        return add_lights(site, start, stage, options, shot.ends)
+        return add_lights(site, start, stage, options, shot.ends, maps)
 
 
 def _range(site: Site, inside: bool) -> float:

@@ -17,6 +17,7 @@ from .model import (
     SUN_ANGLE,
     WEIGHTS,
     Camera,
+    EnvironmentLight,
     LightSource,
     MaterialNote,
     MeshLight,
@@ -128,6 +129,14 @@ def _source(source: LightSource, job_file: Path) -> list[str]:
     group = [_line("group", quoted(source.group), "stored separately, to change it afterwards")] if source.group else []
     if isinstance(source, SunDay):
         return [_line("type", '"sun"', "by place and time"), *group, *_sun(source)]
+    if isinstance(source, EnvironmentLight):
+        turned = f"[{{ frame = 0, rotation = 0, intensity = {source.intensity!r} }}]"
+        return [
+            _line("type", '"environment"', "light from all around"),
+            *group,
+            _line("file", quoted(scene_name(source.file, job_file)), "its panorama"),
+            _line("keys", turned, "rotation in degrees, clockwise; a second key makes it turn"),
+        ]
     if isinstance(source, MeshLight):
         return [
             _line("type", '"mesh"', "surfaces of the scene that shine"),

@@ -1,5 +1,6 @@
 """Scene files -> triangles, materials, textures, cameras and lights. The only door to trimesh."""
 
+from .gltf.imagelight import StageEnvironment
 from .gltf.stage import Stage, StageCamera, StageLight
 from .model import Material, Meshes, Notes, Part
 from .read import read_meshes, read_stage
@@ -11,6 +12,7 @@ __all__ = [
     "Part",
     "Stage",
     "StageCamera",
+    "StageEnvironment",
     "StageLight",
     "read_meshes",
     "read_stage",

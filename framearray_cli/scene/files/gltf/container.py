@@ -165,6 +165,20 @@ def _buffer(buffer: Tree, index: int, binary: bytes | None, assets: Assets) -> b
     return block[: buffer["byteLength"]]
 
 
+def image_bytes(gltf: Gltf, index: int, assets: Assets) -> bytes:
+    """Read the encoded bytes of an image.
+
+    Raises:
+        AssetError: it is missing, elsewhere, or in a format that cannot be read.
+    """
+    entry = gltf.tree["images"][index]
+    if entry.get("mimeType") == "image/ktx2":
+        raise AssetError(f"images[{index}]: KTX2 cannot be read; export PNG or JPEG")
+    if "bufferView" in entry:
+        return gltf.view_bytes(entry["bufferView"])
+    return uri_bytes(entry["uri"], assets)
+
+
 def uri_bytes(uri: str, assets: Assets) -> bytes:
     """Read the bytes behind a URI: embedded data, or a file beside the scene."""
     if uri.startswith("data:"):

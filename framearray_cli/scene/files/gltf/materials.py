@@ -10,11 +10,11 @@ import numpy as np
 from framearray_cli.base.arrays import Float64
 from framearray_cli.base.colour import linear_from_srgb
 
-from ..assets import AssetError, Assets
+from ..assets import Assets
 from ..materials import CUTOFF, Opacity, Rgb3, blended_opacity, make_material, masked_opacity
 from ..model import Material, Notes
 from ..textures import TextureTable
-from .container import Gltf, uri_bytes
+from .container import Gltf, image_bytes
 from .values import Tree
 
 STRENGTH = "KHR_materials_emissive_strength"
@@ -136,15 +136,7 @@ class ImageFinder:
         return bool(entry.get("wrapS", REPEAT) == REPEAT and entry.get("wrapT", REPEAT) == REPEAT)
 
     def _reader(self, image: int) -> Callable[[], bytes]:
-        def read() -> bytes:
-            entry = self.gltf.tree["images"][image]
-            if entry.get("mimeType") == "image/ktx2":
-                raise AssetError(f"images[{image}]: KTX2 cannot be read; export PNG or JPEG")
-            if "bufferView" in entry:
-                return self.gltf.view_bytes(entry["bufferView"])
-            return uri_bytes(entry["uri"], self.assets)
-
-        return read
+        return lambda: image_bytes(self.gltf, image, self.assets)
 
 
 def _shining(

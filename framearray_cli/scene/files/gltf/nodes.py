@@ -22,6 +22,7 @@ TRIANGLE_BYTES, PLACE_BYTES = 450, 1000
 INSTANCE_KEYS = {"TRANSLATION": "translation", "ROTATION": "rotation", "SCALE": "scale"}
 HANDLED = KNOWN | SILENT | {"KHR_texture_transform", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}
 HANDLED |= {"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_materials_unlit"}
+LIGHTS = ("KHR_lights_punctual", "EXT_lights_ies", "EXT_lights_image_based")  # for first jobs; a job has its own
 
 
 def check_readable(gltf: Gltf) -> None:
@@ -76,9 +77,7 @@ def used_materials(gltf: Gltf) -> set[int]:
 def note_unread(gltf: Gltf, notes: Notes) -> None:
     """Note what the file contains and the renderer does not show."""
     for extension in sorted(set(gltf.tree.get("extensionsUsed") or []) - HANDLED):
-        if extension == "EXT_lights_image_based":
-            notes.add(f'{extension} is left out, as its cube maps are no panorama; give one to a source "environment"')
-        elif extension not in ("KHR_lights_punctual", "EXT_lights_ies") and not extension.startswith("KHR_materials_"):
+        if extension not in LIGHTS and not extension.startswith("KHR_materials_"):
             notes.add(f"{extension} is left out")  # the others are noted elsewhere
     if _moves_meshes(gltf):
         notes.add("animations of meshes are left out; they stand in their rest pose")

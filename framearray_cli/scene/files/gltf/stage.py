@@ -12,6 +12,7 @@ from framearray_cli.job.rowfile import RowFileError
 
 from ..assets import AssetError, Assets
 from .container import Gltf
+from .imagelight import StageEnvironment, read_image_light, scene_light
 from .motion import Motion, read_motion
 from .values import Tree
 
@@ -57,12 +58,14 @@ class Stage:
     """Cameras and lights of a scene file, in the order of its nodes; both may be missing.
 
     Attributes:
+        environment: light from all around.
         motion: None for a format without animations.
         notes: what the file holds that cannot be used.
     """
 
     cameras: tuple[StageCamera, ...] = ()
     lights: tuple[StageLight, ...] = ()
+    environment: StageEnvironment | None = None
     motion: Motion | None = None
     notes: tuple[str, ...] = ()
 
@@ -99,14 +102,18 @@ def read_gltf_stage(gltf: Gltf, assets: Assets) -> Stage:
         if measured is not None:
             light = _measured(index, node, measured, gltf, assets, notes)
             lights += [light] if light else []
-    return Stage(cameras=tuple(cameras), lights=tuple(lights), motion=motion, notes=tuple(notes))
+    environment = read_image_light(gltf, assets, notes)
+    return Stage(
+        cameras=tuple(cameras), lights=tuple(lights), environment=environment, motion=motion, notes=tuple(notes)
+    )
 
 
 def count_lights(gltf: Gltf) -> int:
     """Return the number of lights that the default scene shows; 0 if they are broken, as no render needs them."""
     with suppress(LookupError, TypeError, ValueError, AttributeError):
         nodes = gltf.items("nodes")
-        return sum(PUNCTUAL in (nodes[index].get("extensions") or {}) for index in _shown(gltf))
+        around = scene_light(gltf) is not None
+        return around + sum(PUNCTUAL in (nodes[index].get("extensions") or {}) for index in _shown(gltf))
     return 0
 
 

@@ -1,0 +1,86 @@
+"""The environment of a scene file -> a source of a first job, and its panorama beside the job file."""
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from framearray_cli.base.files import require_new, write_bytes
+from framearray_cli.base.openimage import write_environment
+from framearray_cli.scene.files import Stage
+
+from .model import EnvironmentLight, Start
+
+DIGITS = 4  # significant digits of the intensity
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Maps:
+    """Where a panorama is saved.
+
+    Attributes:
+        draft: where it lies while the job is planned; `final`: beside the job file.
+        force: replace another file there.
+    """
+
+    draft: Path
+    final: Path
+    force: bool
+
+
+@contextmanager
+def maps_for(scene: Path, job_file: Path, *, force: bool) -> Iterator[Maps]:
+    """Yield where the panorama of a scene is saved; the draft goes at the end."""
+    name = f"{scene.stem}-environment.exr"
+    with tempfile.TemporaryDirectory(prefix="framearray-") as folder:
+        yield Maps(draft=Path(folder) / name, final=job_file.parent / name, force=force)
+
+
+def environment_light(stage: Stage, maps: Maps | None) -> tuple[tuple[EnvironmentLight, ...], tuple[str, ...]]:
+    """Save the panorama of the environment of a file, if it has one; also return a note if it is left out.
+
+    Raises:
+        OutputError: another file has its name already, or it cannot be written.
+    """
+    found = stage.environment
+    if found is None:
+        return (), ()
+    if maps is None:
+        left = "is left out: no file can lie beside a job on standard output; give --output a name"
+        return (), (f"the environment of the file {left}",)
+    write_environment(maps.draft, found.pixels)
+    if not _is_there(maps):
+        require_new(maps.final, force=maps.force)
+    height, width, _ = found.pixels.shape
+    about = f'the environment "{found.name}" of the file, as a panorama of {width} x {height} pixels'
+    intensity = float(f"{found.intensity:.{DIGITS}g}")
+    return (EnvironmentLight(file=maps.draft, intensity=intensity, about=(about,), name=found.name),), ()
+
+
+def install_environment(start: Start, maps: Maps) -> Start:
+    """Put the panorama of a job beside its file, and name it there.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    if not any(isinstance(source, EnvironmentLight) for source in start.sources):
+        return start
+    if not _is_there(maps):
+        write_bytes(maps.final, maps.draft.read_bytes())
+    sources = (
+        replace(source, file=maps.final) if isinstance(source, EnvironmentLight) else source for source in start.sources
+    )
+    return replace(
+        start,
+        sources=tuple(sources),
+        about=(*start.about, f"Its environment is saved beside the job, as {maps.final.name}."),
+    )
+
+
+def _is_there(maps: Maps) -> bool:
+    """Whether the very panorama lies there already, from an earlier job of the same scene."""
+    try:
+        return maps.final.is_file() and maps.final.read_bytes() == maps.draft.read_bytes()
+    except OSError:
+        return False
