@@ -123,7 +123,8 @@ class SunSource(ShownSource):
     latitude: float = Field(ge=-90, le=90, description="Of the place, degrees; north is positive.")
     longitude: float = Field(ge=-180, le=180, description="Of the place, degrees; east is positive.")
     date: Dates = Field(
-        description="The day, or a list of days, one behind the other on the light axis: each has the times below."
+        description="The day, or a list of different days, one behind the other on the light axis: each has the times "
+        "below."
     )
     timezone: Zone = Field(description="Whose clocks show the times: a name of the IANA, or the hours ahead of UTC.")
     start: Clock = Field(description="Local time of the first light position.")

@@ -40,9 +40,13 @@ def _dates(value: object) -> str | tuple[str, ...]:
     found, problems = [], []
     for k, each in enumerate(value):
         try:
-            found.append(_date(each))
+            date = _date(each)
         except ValidationError as error:
             problems += [((k,), each["ctx"]["text"]) for each in error.errors()]
+        else:
+            if date in found:
+                problems.append(((k,), f"expected a day that the list does not hold yet, got {date} again"))
+            found.append(date)
     if problems:
         fail(problems)
     return tuple(found)

@@ -78,6 +78,7 @@ def to_text(start: Start, job_file: Path) -> str:
                 '"png" is small; "exr" keeps the linear light, for work after the render',
             ),
             _line("fps", "24", "frames per second of movies"),
+            *_sun_hours(start),
             "",
         ]
     )
@@ -174,8 +175,20 @@ def _sun(source: SunDay) -> list[str]:
         _line("timezone", f"{source.timezone:g}", 'hours ahead of UTC, or a name: "Europe/Berlin"'),
         _line("start", quoted(source.start), "local time of the first position"),
         _line("stop", quoted(source.stop), "local time of the last"),
+        _line("# step", "15", "minutes between positions, in place of `frames` of [light]"),
         _line("irradiance", inline_floats(source.power), "of a surface that faces the sun: red, green, blue, W/m2"),
         _line("angle", repr(SUN_ANGLE), "under which the sun is seen, degrees: shadows get soft edges"),
+    ]
+
+
+def _sun_hours(start: Start) -> list[str]:
+    """The key for hours of sun, commented out: a dozen positions without both ends of the day count too few hours."""
+    if not any(isinstance(source, SunDay) for source in start.sources):
+        return []
+    return [
+        "# For hours of direct sun as a layer, let the sun go from its rise to its set in steps of minutes: remove",
+        "# `frames` of [light], change `start` and `stop`, and remove the # before `step` and here.",
+        _line("# sun_hours", "true", "each position counts for the time to the next"),
     ]
 
 

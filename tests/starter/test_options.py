@@ -1,5 +1,6 @@
 """Options of `framearray init`: the size and format of images, groups, the sun over a place, and equal positions."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -99,6 +100,26 @@ def test_a_sun_over_a_place_shines_in_every_picture(tmp_path: Path) -> None:
     found = lights(job).sources[0]
     assert (found.vector[:, 1] < -0.15).all()  # from above, and not from the horizon
     assert (found.intensity > 0).all()
+
+
+@pytest.mark.usefixtures("obscurances")
+def test_a_sun_study_counts_hours_once_its_comments_are_followed(tmp_path: Path) -> None:
+    """The key is a comment, as a dozen positions that leave out both ends of the day would count too few hours."""
+    pytest.importorskip("pvlib")
+    scene = rooms.street().save(tmp_path / "street.glb")
+    file = tmp_path / "street.toml"
+    init(scene, file, StartOptions(frames=1, resolution=(32, 24), sun=SunOption(48.1, 11.6, "2026-06-21")))
+    text = file.read_text(encoding="utf-8")
+    assert not read_job(file).output.sun_hours
+    before, table, rest = text.partition("\n[light]\n")
+    text = before + table + re.sub("frames = .*\n", "", rest, count=1)
+    for key in ("step", "sun_hours"):
+        assert text.count(f"\n# {key} = ") == 1
+        text = text.replace(f"\n# {key} = ", f"\n{key} = ")
+    file.write_text(text, encoding="utf-8")
+    job = read_job(file)
+    (day,) = job.sun_days
+    assert day.step_h == 0.25 and len(day.lights) == job.light.frames > 40
 
 
 def test_a_sun_that_does_not_rise_is_an_error() -> None:

@@ -265,6 +265,8 @@ def test_days_share_the_light_positions_of_a_job() -> None:
         (5, {"step": 60}, "expected as many light positions as its axis has, 5, got 15; remove the number of the axis"),
         (5, {"step": 0}, "expected a number from 0.0166667 to 1440, got 0"),
         (5, {"date": []}, "expected a date, or a list of at least 1, got an empty list"),
+        (4, {"date": ["2026-06-21", "2026-06-21"]}, "date[1]: expected a day that the list does not hold "
+         "yet, got 2026-06-21 again"),
         (4, {"date": ["2026-03-20", "2026-02-30"]}, 'date[1]: expected a date that the calendar has, got "2026-02-30"'),
         (None, {}, "light.frames: missing; expected the number of positions of the sun, which has no key frames"),
     ],
