@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import tomli_w
 from support import tiny
+from support.guide import GUIDE, blocks, job_file
 from support.iesfiles import ies
 from support.movies import plain
 from typer.testing import CliRunner
@@ -23,10 +24,8 @@ from framearray_cli.job.sources import DomeSource
 from framearray_cli.scene.paths.domes import dome_directions
 from framearray_cli.scene.paths.paths import lights
 
-PAGE = Path(__file__).parents[2] / "docs" / "guide" / "lights.md"
-BLOCKS = re.findall(r"^```(toml|sh)\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
-SOURCES = [block for language, block in BLOCKS if language == "toml" and "[[light.sources]]" in block]
-COMMANDS = [line for language, block in BLOCKS if language == "sh" for line in block.splitlines()]
+SOURCES = [block for block in blocks("lights.md", "toml") if "[[light.sources]]" in block]
+COMMANDS = [line for block in blocks("lights.md", "sh") for line in block.splitlines()]
 STUDY = [line for line in COMMANDS if re.search(r"\d{4}-\d\d-\d\d", line)]
 
 
@@ -40,9 +39,7 @@ def job_with(folder: Path, text: str) -> Job:
     (folder / "floodlight.ies").write_text(ies())
     write_image(folder / "sky.exr", np.ones((4, 8, 3), np.float32), ImageFormat())
     rest = {key: value for key, value in tiny.table().items() if key != "light"} | {"scene": {"file": "a.glb"}}
-    table = tomli_w.dumps(rest)
-    (folder / "job.toml").write_text(f"{table}\n{text}", encoding="utf-8")
-    return read_job(folder / "job.toml")
+    return read_job(job_file(folder, tomli_w.dumps(rest), text))
 
 
 def example(start: str) -> str:
@@ -71,7 +68,7 @@ def test_a_dome_of_96_lamps_is_one_source(tmp_path: Path) -> None:
 
 def test_a_sun_study_has_the_positions_that_the_page_says(tmp_path: Path) -> None:
     job = job_with(tmp_path, example("date ="))
-    assert "three days of 57 positions" in PAGE.read_text(encoding="utf-8")
+    assert "three days of 57 positions" in (GUIDE / "lights.md").read_text(encoding="utf-8")
     assert job.light.frames == 3 * 57
     times = [path["time"] for l in range(171) for path in [lights(job).sources[0].table(l)]][::57]
     assert [time[:16] for time in times] == ["2026-03-20T06:00", "2026-06-21T06:00", "2026-12-21T06:00"]

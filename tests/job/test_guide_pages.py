@@ -1,0 +1,108 @@
+"""The examples, commands and numbers of docs/guide/scenes.md and docs/guide/jobs.md."""
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+import tomli_w
+from support import ROOT, tiny
+from support.guide import GUIDE, blocks, job_file, rows
+from support.scenes import Glb
+
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import read_job
+from framearray_cli.scene.scene import load_scene
+
+JOBS = ROOT / "jobs"
+THREE, SMALL = rows("jobs.md", "The three tests of the paper"), rows("jobs.md", "Small ones")
+COMMANDS = re.findall(r"^    python -m jobs\.generators(.*?)(?:#.*)?$", (GUIDE / "jobs.md").read_text(), re.MULTILINE)
+
+
+def job_with(folder: Path, text: str) -> Job:
+    """Read a job with an example in place of one of its tables."""
+    name = re.findall(r"^\[+(\w+)", text, re.MULTILINE)[0]
+    rest = {"scene": {"file": "a.glb"}} | {
+        key: value for key, value in tiny.table().items() if key not in ("scene", name)
+    }
+    if "\nfile = " in text:
+        del rest["scene"]
+    return read_job(job_file(folder, tomli_w.dumps(rest), text))
+
+
+def sizes(row: list[str]) -> list[tuple[str, str]]:
+    """The jobs of a row of a table, and the sizes that it gives them."""
+    return [(name, row[1]) for name in re.findall(r"`([\w-]+)\.toml`", row[0])]
+
+
+def test_a_material_is_overridden_as_the_page_shows(tmp_path: Path) -> None:
+    (text,) = [block for block in blocks("scenes.md", "toml") if "materials" in block]
+    job = job_with(tmp_path, text)
+    glb = Glb()
+    glb.node(glb.mesh(glb.material("Chrome", {"metallicFactor": 1.0, "roughnessFactor": 0.0})))
+    scene = load_scene(glb.save(tmp_path / "a.glb"), job.scene.materials)
+    assert scene.reflectivity.tolist() == [pytest.approx([0.1] * 3)]
+    assert scene.specular.tolist() == [pytest.approx([0.8] * 3)]
+
+
+def test_a_folder_of_textures_is_relative_to_the_job(tmp_path: Path) -> None:
+    (text,) = [block for block in blocks("scenes.md", "toml") if "folders" in block]
+    scene = job_with(tmp_path, text).scene
+    assert scene.file == tmp_path / "models" / "house.gltf"
+    assert scene.folders == (tmp_path / "textures",)
+
+
+def test_every_example_is_tested() -> None:
+    assert (len(blocks("scenes.md", "toml")), len(blocks("jobs.md", "toml"))) == (2, 1)
+    assert not blocks("scenes.md", "sh") and not blocks("jobs.md", "sh")
+
+
+def test_the_sun_study_is_that_of_its_job(tmp_path: Path) -> None:
+    (text,) = blocks("jobs.md", "toml")
+    assert job_with(tmp_path, text).light == read_job(JOBS / "kitchen-sun.toml").light
+
+
+@pytest.mark.parametrize(("name", "size"), [pair for row in (*THREE, *SMALL) for pair in sizes(row)])
+def test_jobs_have_the_sizes_that_the_page_gives(name: str, size: str) -> None:
+    job = read_job(JOBS / f"{name}.toml")
+    found = re.fullmatch(r"(\d+) x (?:(\d+)|\((\d+) \+ (\d+)\))(?: at (\d+) x (\d+))?", size)
+    assert found is not None, size
+    eyes, lights, first, second, width, height = (int(text) if text else None for text in found.groups())
+    assert job.camera.frames == eyes
+    assert [job.light.frames, *job.light.axes.values()] == ([first, second] if first else [lights])
+    assert job.camera.resolution == (width or 400, height or 300)
+
+
+def test_all_jobs_are_on_the_page() -> None:
+    text = (GUIDE / "jobs.md").read_text(encoding="utf-8")
+    assert [file.name for file in JOBS.glob("*.toml") if f"`{file.name}`" not in text] == []
+
+
+@pytest.mark.parametrize("row", THREE, ids=lambda row: row[0])
+def test_scenes_have_the_triangles_and_textures_that_the_page_gives(row: list[str]) -> None:
+    scene = load_scene(read_job(JOBS / row[0].strip("`")).scene.file)
+    assert f"{scene.report.triangles:,}" == row[3]
+    assert str(scene.report.textures) == row[4]
+
+
+def test_furnaces_follow_from_their_reflectivity() -> None:
+    heads = [0.2, 0.5, 0.8]
+    formulas = {
+        "E, W/m2": lambda r: 1 / (1 - r),
+        "I_A = E / pi": lambda r: 1 / (1 - r) / math.pi,
+        "W": lambda r: r,
+        "indirect radiance R I_A W": lambda r: r * r / (1 - r) / math.pi,
+    }
+    table = rows("jobs.md", "Furnaces")
+    assert [row[0] for row in table] == list(formulas)
+    for row in table:
+        for cell, r in zip(row[1:], heads, strict=True):
+            assert float(cell) == pytest.approx(formulas[row[0]](r), abs=0.6 * 10.0 ** -len(cell.partition(".")[2]))
+
+
+def test_generators_have_the_names_that_commands_use() -> None:
+    text = (JOBS / "generators" / "__main__.py").read_text(encoding="utf-8")
+    names = re.findall(r'"(\w+)"', re.findall(r"^NAMES = \((.*)\)$", text, re.MULTILINE)[0])
+    assert len(COMMANDS) == 3 and "all four scenes and the sky" in (GUIDE / "jobs.md").read_text(encoding="utf-8")
+    assert len(names) == 5
+    assert {words.split()[0] for words in COMMANDS if words.strip()} <= set(names)
