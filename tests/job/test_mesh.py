@@ -5,11 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tomli_w
 from support import tiny
+from support.problems import problems_of_source
 
-from framearray_cli.base.errors import JobError
-from framearray_cli.job.read import read_job
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.placing import place_source
 
@@ -30,12 +28,7 @@ WRONG = [
 
 @pytest.mark.parametrize(("source", "texts"), WRONG)
 def test_wrong_keys_of_meshes(source: dict[str, Any], texts: list[str], tmp_path: Path) -> None:
-    file = tmp_path / "job.toml"
-    table = tiny.table() | {"light": {"sources": [source]}, "scene": {"file": "a.glb"}}
-    file.write_text(tomli_w.dumps(table), encoding="utf-8")
-    with pytest.raises(JobError) as caught:
-        read_job(file)
-    assert [problem.removeprefix("light.sources[0].") for problem in caught.value.problems] == texts
+    assert problems_of_source(source, tmp_path) == texts
 
 
 def path(**source: Any) -> LightPath:

@@ -4,11 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import tomli_w
-from support import tiny
-
-from framearray_cli.base.errors import JobError
-from framearray_cli.job.read import read_job
+from support.problems import problems_of_source
 
 DISC = {"frame": 0, "position": [1, 2, 3], "direction": [0, 0, 1], "radius": 1}
 RECT = {"frame": 0, "position": [1, 2, 3], "width": 1, "height": 2, "power": 3}
@@ -33,9 +29,4 @@ WRONG = [
 
 @pytest.mark.parametrize(("source", "texts"), WRONG)
 def test_wrong_keys_of_panels(source: dict[str, Any], texts: list[str], tmp_path: Path) -> None:
-    file = tmp_path / "job.toml"
-    table = tiny.table() | {"light": {"sources": [source]}, "scene": {"file": "a.glb"}}
-    file.write_text(tomli_w.dumps(table), encoding="utf-8")
-    with pytest.raises(JobError) as caught:
-        read_job(file)
-    assert [problem.removeprefix("light.sources[0].") for problem in caught.value.problems] == texts
+    assert problems_of_source(source, tmp_path) == texts

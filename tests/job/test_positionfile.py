@@ -11,6 +11,7 @@ import pytest
 import tomli_w
 from support import tiny
 from support.phrases import library_phrase
+from support.problems import problems_of_source
 
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import Job
@@ -249,12 +250,7 @@ WRONG = [
 
 @pytest.mark.parametrize(("source", "texts"), WRONG)
 def test_wrong_keys_of_sources(source: dict[str, Any], texts: list[str], tmp_path: Path) -> None:
-    file = tmp_path / "job.toml"
-    table = tiny.table() | {"light": {"sources": [{"type": "point"} | source]}, "scene": {"file": "a.glb"}}
-    file.write_text(tomli_w.dumps(table), encoding="utf-8")
-    with pytest.raises(JobError) as caught:
-        read_job(file)
-    assert [problem.removeprefix("light.sources[0].") for problem in caught.value.problems] == texts
+    assert problems_of_source({"type": "point"} | source, tmp_path) == texts
 
 
 def test_a_dome_with_more_positions_than_its_axis(tmp_path: Path) -> None:
