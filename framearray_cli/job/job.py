@@ -84,6 +84,11 @@ class SceneTable(Table):
         "Without them a scene may only name files in its own folder or below.",
         json_schema_extra={"x-words": "a list of folders"},
     )
+    surfaces: Literal["diffuse", "file"] = Field(
+        default="diffuse",
+        description='What surfaces follow: "diffuse" makes all of them diffuse or mirrors; "file" also uses the normal '
+        "maps of the scene file.",
+    )
     materials: dict[str, MaterialTable] = Field(
         default_factory=dict, description="Materials to override, by their names in the scene file."
     )

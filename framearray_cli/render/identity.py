@@ -82,7 +82,8 @@ def require_same_cells(directory: Path, digest: str, records: ArrayRecords) -> N
 
 def scene_fingerprint(prepared: Prepared) -> str:
     """Hash the scene as it was read: its triangles, materials and textures; its path is ignored."""
-    arrays = (np.ascontiguousarray(array).reshape(-1).view(np.uint8).data for array in prepared.surfaces)
+    tables = (*prepared.surfaces, *prepared.relief[:-1])
+    arrays = (np.ascontiguousarray(array).reshape(-1).view(np.uint8).data for array in tables)
     return fingerprint(prepared.scene.centre.tobytes(), *arrays)
 
 

@@ -17,6 +17,7 @@ from framearray_cli.engine.inputs.cameras import Cameras, cameras
 from framearray_cli.engine.inputs.emitters import emitters
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.random import lattice_steps
+from framearray_cli.engine.inputs.relief import Relief, relief
 from framearray_cli.engine.inputs.surfaces import Surfaces, near_depth, surfaces
 from framearray_cli.engine.kernels.clock import compile_clock
 from framearray_cli.engine.terms.ambient.estimate import MIN_WALKS, Ambient
@@ -25,7 +26,7 @@ from framearray_cli.engine.terms.ambient.from_eyes import EyeWalks, ambient_by_e
 from framearray_cli.engine.terms.ambient.from_lights import LightWalks, ambient_by_light
 from framearray_cli.engine.terms.cells.build import CellWork, build_cells
 from framearray_cli.engine.terms.cells.exact import coloured, no_cells
-from framearray_cli.engine.terms.cells.residual import Accuracy, compare_with_paths
+from framearray_cli.engine.terms.cells.residual import compare_with_paths
 from framearray_cli.engine.terms.cells.samples import SampleWalks
 from framearray_cli.engine.terms.falloff import FALLOFFS
 from framearray_cli.engine.terms.obscurance import ObscuranceSettings
@@ -57,6 +58,7 @@ class Prepared:
     lights: Lights
     light_arrays: LightArrays
     surfaces: Surfaces
+    relief: Relief
     still: bool
 
     @property
@@ -68,6 +70,10 @@ class Prepared:
     def n_lights(self) -> int:
         """N_l."""
         return self.lights.n
+
+    def world(self, embree: EmbreeScene) -> World:
+        """The surfaces, how to trace rays to them, and their normal maps."""
+        return World(self.surfaces, embree.tracer, self.relief)
 
     @property
     def threads(self) -> int:
@@ -86,7 +92,8 @@ def prepare(job: Job) -> Prepared:
         require_denoiser()
     job_eyes, job_lights = eyes(job), lights(job)
     shining, file = {path.emitter.material for path in job_lights.sources if path.emitter}, job.scene
-    scene = load_scene(file.file, file.materials, file.folders, _scene_memory(job), shining)
+    as_file = job.scene.surfaces == "file"
+    scene = load_scene(file.file, file.materials, file.folders, _scene_memory(job), shining, as_file=as_file)
     return prepared_from(job, scene, job_eyes, job_lights)
 
 
@@ -101,6 +108,7 @@ def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepare
         lights=lights,
         light_arrays=coloured(arrays) if job.indirect.exact else arrays,
         surfaces=surfaces(scene),
+        relief=relief(scene),
         still=eyes.at_rest,
     )
 
@@ -147,6 +155,7 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
     return FrameSetup(
         cams=cams,
         surfaces=prepared.surfaces,
+        relief=prepared.relief,
         tracer=embree.tracer,
         lights=prepared.light_arrays,
         kept=range(prepared.n_lights),
@@ -188,7 +197,7 @@ def _with_cells(
     walks = SampleWalks(
         cams=eye_cameras(prepared),
         seed=job.seed,
-        world=World(prepared.surfaces, embree.tracer),
+        world=prepared.world(embree),
         lights=prepared.light_arrays,
         depth=setup.depth,
     )
@@ -208,17 +217,9 @@ def _with_cells(
         if compare and not local:
             accuracy = compare_with_paths(built.cells, eyes, setup.obscurance, setup.depth, prepared.threads)
     shared_s = built.shared_s + time.perf_counter() - started - clock.seconds
-    notes = (accuracy_text(accuracy),) if accuracy else ()
+    notes = (accuracy.note,) if accuracy else ()
     setup = replace(setup, cells=built.cells, smooth=0 if local else job.indirect.filter, local=local)
     return setup, replace(ambient, notes=(*ambient.notes, *notes), shared_s=shared_s)
-
-
-def accuracy_text(accuracy: Accuracy) -> str:
-    """Return the note on the error of light from cells."""
-    level = f"{accuracy.error:.1%} +- {accuracy.error_error:.1%}"
-    return (
-        f"indirect light differs from paths by {level}, its mean by {accuracy.bias:+.1%} +- {accuracy.bias_error:.1%}"
-    )
 
 
 def image_ambient(ambient: Ambient, lights: Lights) -> Ambient:
@@ -262,7 +263,7 @@ def eye_cameras(prepared: Prepared) -> Cameras:
 
 
 def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Ambient:
-    job, seed, world = prepared.job, prepared.job.seed, World(prepared.surfaces, embree.tracer)
+    job, seed, world = prepared.job, prepared.job.seed, prepared.world(embree)
     if job.indirect.method == "cells":
         # Images take none; in layers, the average reflectivity stands for what rays of W miss.
         few = replace(_eye_walks(prepared, embree), paths=MIN_WALKS)
@@ -287,7 +288,7 @@ def _eye_walks(prepared: Prepared, embree: EmbreeScene) -> EyeWalks:
         cams=eye_cameras(prepared),
         seed=job.seed,
         paths=job.ambient.paths,
-        world=World(prepared.surfaces, embree.tracer),
+        world=prepared.world(embree),
         lights=prepared.light_arrays,
         background=np.array(job.scene.background, np.float32),
     )

@@ -67,6 +67,16 @@ def _corner_hashes(corners: Corners) -> Keys:
         return _mix(bits[..., 0] + _mix(bits[..., 1] + _mix(bits[..., 2])))
 
 
+def hash_rows(rows: Float64) -> Keys:
+    """(n,) hash of each row of numbers (n, k); 0.0 and -0.0 are the same number."""
+    bits = np.ascontiguousarray(rows + 0.0).view(np.uint64)
+    found = np.zeros(len(rows), np.uint64)
+    with np.errstate(over="ignore"):
+        for k in range(bits.shape[1]):
+            found = _mix(found + bits[:, k])
+    return found
+
+
 def _mix(keys: Keys) -> Keys:
     """Spread 64-bit keys over all their bits (the finaliser of splitmix64)."""
     with np.errstate(over="ignore"):

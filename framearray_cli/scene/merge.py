@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from framearray_cli.base.arrays import Corners, CornerUvs, Float64
+from framearray_cli.base.arrays import Corners, CornerUvs, Float32, Float64
 from framearray_cli.base.units import agree, counted
 
 from .files.model import Material, Notes, Part
@@ -40,10 +40,12 @@ class Merged:
 
     Attributes:
         corners: (n, 3, 3) in file coordinates.
-        normals: (n, 3, 3); NaN for parts without.
+        normals: (n, 3, 3); NaN for parts without. There are some where there are tangents.
         has_normals: (n,) whether the file gives normals.
         uvs: (n, 3, 2).
         colours: (n, 3, 3); white for parts without.
+        tangents: (n, 3, 4) with unit vectors; 0 for parts without, and where there is none.
+        normal_uvs: (n, 3, 2); 0 for parts without.
         material: (n,).
     """
 
@@ -52,6 +54,8 @@ class Merged:
     has_normals: NDArray[np.bool_]
     uvs: Float64 | None
     colours: Corners | None
+    tangents: Float32 | None
+    normal_uvs: Float64 | None
     material: NDArray[np.int32]
 
 
@@ -60,9 +64,13 @@ def merge(parts: Sequence[Part]) -> Merged:
     counts = [len(part.corners) for part in parts]
     n = sum(counts)
     ends = np.cumsum(counts)
-    normals = np.full((n, 3, 3), np.nan, dtype=np.float32) if any(p.normals is not None for p in parts) else None
+    bumpy = any(p.tangents is not None for p in parts)
+    normal = bumpy or any(p.normals is not None for p in parts)
+    normals = np.full((n, 3, 3), np.nan, dtype=np.float32) if normal else None
     uvs = np.zeros((n, 3, 2)) if any(p.uvs is not None for p in parts) else None
     colours = np.ones((n, 3, 3), dtype=np.float32) if any(p.colours is not None for p in parts) else None
+    tangents = np.zeros((n, 3, 4), dtype=np.float32) if bumpy else None
+    normal_uvs = np.zeros((n, 3, 2)) if bumpy else None
     has_normals = np.zeros(n, dtype=np.bool_)
     for part, end, count in zip(parts, ends, counts, strict=True):
         rows = slice(end - count, end)
@@ -73,12 +81,18 @@ def merge(parts: Sequence[Part]) -> Merged:
             uvs[rows] = part.uvs
         if colours is not None and part.colours is not None:
             colours[rows] = part.colours
+        if tangents is not None and part.tangents is not None:
+            tangents[rows] = _unit_tangents(part.tangents)
+        if normal_uvs is not None and part.normal_uvs is not None:
+            normal_uvs[rows] = part.normal_uvs
     return Merged(
         corners=np.concatenate([part.corners for part in parts]),
         normals=normals,
         has_normals=has_normals,
         uvs=uvs,
         colours=colours,
+        tangents=tangents,
+        normal_uvs=normal_uvs,
         material=np.repeat(np.array([part.material for part in parts], dtype=np.int32), counts),
     )
 
@@ -87,6 +101,15 @@ def _scale_normals(normals: Float64) -> Float64:
     """Scale normals so that their largest component is 1: float32 would round those of a tiny node to 0."""
     with np.errstate(all="ignore"):
         return np.asarray(normals / largest(normals)[..., None])
+
+
+def _unit_tangents(tangents: Float64) -> Float64:
+    """Tangents with vectors of length 1; 0 where there is no direction."""
+    with np.errstate(all="ignore"):
+        scaled = tangents[..., :3] / largest(tangents[..., :3])[..., None]
+        unit = scaled / lengths(scaled)[..., None]
+    known = are_finite(unit)[..., None]
+    return np.concatenate([np.where(known, unit, 0.0), tangents[..., 3:] * known], axis=2)
 
 
 def unit_normals(normals: Corners, has_normals: NDArray[np.bool_], corners: Corners, notes: Notes) -> Corners:

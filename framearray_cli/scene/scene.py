@@ -29,6 +29,7 @@ class SceneReport:
         dropped: reason -> number of triangles left out, e.g. "degenerate", "non-finite", "duplicate", "transmissive".
         notes: what was not understood or was approximated, one sentence each.
         lights: number of light sources in the file; a job has its own.
+        normal_maps: number of normal maps in use.
     """
 
     triangles: int
@@ -37,6 +38,7 @@ class SceneReport:
     dropped: dict[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     lights: int = 0
+    normal_maps: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,6 +69,11 @@ class Scene:
             row 0 on top.
         textures: (n_textures, 3) int32 first texel, width, height.
         n_opaque: number of triangles without alpha mask.
+        tangents: (n, 3, 4) per corner: the unit vector in which u of the normal map grows, or 0, and w, which with
+            normal x tangent gives the bitangent; (0, 3, 4) where no material has a normal map.
+        normal_uvs: (n, 3, 2) texture coordinates of normal maps, v upwards, or (0, 3, 2).
+        normal_texture: (m,) normal map, or -1.
+        normal_scale: (m,) what multiplies red and green of the normal map.
     """
 
     centre: Float64
@@ -89,6 +96,10 @@ class Scene:
     texels: Bytes
     textures: Int32
     n_opaque: int
+    tangents: Float32
+    normal_uvs: CornerUvs
+    normal_texture: Int32
+    normal_scale: Float32
     report: SceneReport
 
     @property
@@ -103,6 +114,8 @@ def load_scene(
     folders: Sequence[Path] = (),
     memory: int | None = None,
     shining: Container[str] = (),
+    *,
+    as_file: bool = False,
 ) -> Scene:
     """Read a scene file, clean it and move it to its own centre.
 
@@ -112,11 +125,12 @@ def load_scene(
         folders: where files that the scene names may lie, beside its own folder.
         memory: bytes that reading may allocate; None: all free memory.
         shining: names of the materials whose emission is read; that of others is 0.
+        as_file: whether surfaces follow the file, with its normal maps; else they are diffuse or mirrors.
 
     Raises:
         SceneError: a file that cannot be read, holds nothing to render, or lacks an overridden material.
     """
-    meshes = read_meshes(file, folders, memory, shining)
+    meshes = read_meshes(file, folders, memory, shining, as_file=as_file)
     try:
         return build_scene(meshes, overrides or {})
     except SceneError as error:
@@ -136,8 +150,10 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
     dropped = dict(meshes.dropped)
     keep, centre, corners = _select_triangles(merged, materials, dropped, meshes.notes)
     material = merged.material[keep]
-    normals, uvs, colours = _empty(3), _empty(2), _empty(3)
-    if merged.normals is not None and merged.has_normals[keep].any():
+    normals, uvs, colours, tangents, normal_uvs = _empty(3), _empty(2), _empty(3), _empty(4), _empty(2)
+    if merged.tangents is not None and merged.normal_uvs is not None:
+        tangents, normal_uvs = rows_of(merged.tangents, keep), wrap_uvs(rows_of(merged.normal_uvs, keep), notes)
+    if merged.normals is not None and (merged.has_normals[keep].any() or len(tangents)):
         normals = unit_normals(rows_of(merged.normals, keep), merged.has_normals[keep], corners, notes)
     textured = any(m.textured for m in materials)
     if merged.uvs is not None and textured:
@@ -169,6 +185,10 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
         texels=np.concatenate(texels) if texels else np.zeros((0, 4), dtype=np.uint8),
         textures=np.column_stack([starts, sizes[:, 1], sizes[:, 0]]).astype(np.int32),
         n_opaque=int((cutoff[material] == 0).sum()),
+        tangents=tangents,
+        normal_uvs=normal_uvs,
+        normal_texture=np.array([m.normal_texture for m in materials], dtype=np.int32),
+        normal_scale=np.array([m.normal_scale for m in materials], dtype=np.float32),
         report=SceneReport(
             triangles=len(corners),
             materials=len(np.unique(material)),
@@ -176,6 +196,7 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
             dropped=dropped,
             notes=meshes.notes + notes.lines(),
             lights=meshes.lights,
+            normal_maps=len({materials[m].normal_texture for m in np.unique(material)} - {-1}),
         ),
     )
 
@@ -253,4 +274,6 @@ def scene_report_lines(report: SceneReport, file: Path | str) -> list[str]:
     left_out = f"; left out: {_dropped_text(report.dropped)}" if report.dropped else ""
     found = (report.triangles, "triangle"), (report.materials, "material"), (report.textures, "texture")
     numbers = ", ".join(counted(n, noun) for n, noun in found)
+    if report.normal_maps:
+        numbers += f", {counted(report.normal_maps, 'normal map')} in use"
     return [f"{file}: {numbers}{left_out}", *(f"note: {note}" for note in report.notes)]

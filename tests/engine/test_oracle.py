@@ -97,6 +97,14 @@ def test_a_scene_without_normals_or_colours() -> None:
     compare(tiny.prepared(tiny.job(), scene))
 
 
+@pytest.mark.parametrize("reuse", [{"n_r": 0}, {"n_r": 2, "weights": "balance"}])
+def test_normal_maps_turn_what_all_terms_see(reuse: dict[str, Any]) -> None:
+    inputs = tiny.prepared(tiny.job(camera=WALK, reuse=reuse, scene=SKY), tiny.bumpy_room())
+    rendered, _ = compare(inputs, frames=[3], lights=[0, 2])
+    flat = tiny.render_frames(tiny.prepared(tiny.job(camera=WALK, reuse=reuse, scene=SKY)))
+    assert differing(rendered.images[3, 0], flat.images[3, 0]) > 100
+
+
 def test_the_twin_sees_mirrors_in_mirrors() -> None:
     """Otherwise the depths above would all test the same picture. Both sides are the twin's, so no pixel flips."""
     jobs = [tiny.job(specular={"depth": depth}) for depth in range(4)]

@@ -52,8 +52,13 @@ def test_a_folder_of_textures_is_relative_to_the_job(tmp_path: Path) -> None:
     assert scene.folders == (tmp_path / "textures",)
 
 
+def test_surfaces_as_the_file_has_them_are_asked_for_as_the_page_shows(tmp_path: Path) -> None:
+    (text,) = [block for block in blocks("scenes.md", "toml") if "surfaces" in block]
+    assert job_with(tmp_path, text).scene.surfaces == "file"
+
+
 def test_every_example_is_tested() -> None:
-    assert (len(blocks("scenes.md", "toml")), len(blocks("jobs.md", "toml"))) == (2, 1)
+    assert (len(blocks("scenes.md", "toml")), len(blocks("jobs.md", "toml"))) == (3, 1)
     assert not blocks("scenes.md", "sh") and not blocks("jobs.md", "sh")
 
 

@@ -114,8 +114,11 @@ class Model:
         return linear[height - 1 - np.floor(uv[:, 1] % 1 * height).astype(int), (uv[:, 0] % 1 * width).astype(int)]
 
     def texture(self, number: int, uv: Any) -> Any:
-        """Bilinear and repeating: linear RGB at texture coordinates (n, 2), v upwards; texels are centred at halves."""
-        linear = self.texels(number)
+        """Bilinear and repeating: linear RGB at texture coordinates (n, 2), v upwards."""
+        return self.blend(self.texels(number), uv)
+
+    def blend(self, linear: Any, uv: Any) -> Any:
+        """Bilinear and repeating: a table (height, width, 3) at texture coordinates; texels are centred at halves."""
         height, width = linear.shape[:2]
         place = np.stack([uv[:, 0] * width, -uv[:, 1] * height], axis=1) - 0.5  # row 0 is on top, where v is 1
         low = np.floor(place).astype(int)
@@ -127,6 +130,24 @@ class Model:
         top = at(0, 0) * (1 - right) + at(1, 0) * right
         bottom = at(0, 1) * (1 - right) + at(1, 1) * right
         return top * (1 - down) + bottom * down
+
+    def mapped(self, triangle: Any, uv: Any, geometric: Any, shading: Any) -> Any:
+        """Shading normals (n, 3), turned by normal maps; where these point below the triangle, up to its plane."""
+        scene, turned = self.scene, shading.copy()
+        numbers = scene.normal_texture[scene.material[triangle]]
+        for number in np.unique(numbers[numbers >= 0]):
+            rows = np.flatnonzero((numbers == number) & scene.tangents[triangle].any(axis=(1, 2)))
+            on, at, up = triangle[rows], uv[rows], geometric[rows]
+            first, width, height = (int(x) for x in scene.textures[number])
+            codes = scene.texels[first : first + width * height, :3].reshape(height, width, 3) / 255 * 2 - 1
+            x, y, z = self.blend(codes, self.mix(scene.normal_uvs, on, at)).T[:, :, None]
+            scale = scene.normal_scale[scene.material[on]].astype(np.float64)[:, None]
+            tangent, normal = self.mix(scene.tangents, on, at), self.mix(scene.normals, on, at)
+            along, across = tangent[:, :3], tangent[:, 3:] * np.cross(normal, tangent[:, :3])
+            found = unit(scale * x * along + scale * y * across + z * normal)
+            found *= np.where(dot(normal, shading[rows]) < 0, -1, 1)[:, None]
+            turned[rows] = unit(found - np.minimum(dot(found, up), 0)[:, None] * up)
+        return turned
 
     def diffuse(self, triangle: Any, uv: Any) -> Any:
         """Diffuse reflectivity (n, 3)."""
@@ -155,6 +176,8 @@ class Model:
         if len(self.scene.normals):
             shading = unit(self.mix(self.scene.normals, triangle, uv))
             shading = shading * np.where(dot(shading, geometric) < 0, -1, 1)[:, None]
+        if len(self.scene.tangents):
+            shading = self.mapped(triangle, uv, geometric, shading)
         return Points(
             surface=surface,
             position=self.mix(self.scene.corners, triangle, uv),

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 from framearray_cli.render.prepare import Prepared, open_embree, plan_work, prepared_from
 from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.files.tangents import compute_tangents
 from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.scene.scene import Scene, build_scene
 from support.scenes import Glb, png
@@ -117,6 +118,42 @@ def room_meshes(*, mirrors: bool = True, textured: bool = True, at: Any = (0.0, 
     textures = (checks(),) if textured else ()
     materials = MATERIALS if mirrors else MATERIALS[:MIRROR]
     return Meshes(parts=moved, materials=materials, textures=textures, dropped={}, notes=())
+
+
+def bumps(size: int = 8, seed: int = 2) -> Any:
+    """(size, size, 4) texels of a normal map that leans up to 60 degrees to all sides."""
+    random = np.random.default_rng(seed)
+    way, lean = random.uniform(0, 2 * np.pi, (size, size)), random.uniform(0, np.pi / 3, (size, size))
+    normal = np.stack([np.sin(lean) * np.cos(way), np.sin(lean) * np.sin(way), np.cos(lean)], axis=-1)
+    return np.dstack([np.rint((normal + 1) * 127.5), np.full((size, size), 255)]).astype(np.uint8)
+
+
+def bumpy_room() -> Scene:
+    """`room_meshes` with normal maps: on the floor mirrored, on the ball doubled, and in the mirror."""
+    meshes = room_meshes()
+    ball = next(part.normals for part in meshes.parts if part.normals is not None)
+    uvs = {
+        FLOOR: next(part.uvs * [-1.3, 2.0] for part in meshes.parts if part.uvs is not None),
+        SMOOTH: ball @ np.array([[2.0, 0.3], [-0.4, 1.5], [0.5, 0.9]]),
+        MIRROR: np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float64),
+    }
+    parts = [
+        replace(
+            part,
+            normal_uvs=uvs[part.material],
+            tangents=compute_tangents(part.corners, part.normals, uvs[part.material]),
+        )
+        if part.material in uvs
+        else part
+        for part in meshes.parts
+    ]
+    scales = {FLOOR: 1.0, SMOOTH: 2.0, MIRROR: 0.1}
+    materials = [
+        replace(m, normal_texture=1, normal_scale=scales[k]) if k in scales else m
+        for k, m in enumerate(meshes.materials)
+    ]
+    textures = (*meshes.textures, bumps())
+    return build_scene(replace(meshes, parts=tuple(parts), materials=tuple(materials), textures=textures), {})
 
 
 def room(**options: Any) -> Scene:

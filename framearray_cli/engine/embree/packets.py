@@ -17,7 +17,7 @@ from framearray_cli.base.arrays import Float32, Real
 
 from ..embree_c import packet_width
 from ..kernels.kernel import inlined, kernel
-from ..kernels.simd import LANES, select, store_row, width_of_packets
+from ..kernels.simd import LANES, load_row, select, store_row, width_of_packets
 
 RAY_ROWS = 12
 HIT_ROWS = 24  # RTCRayHit16 has 20 to 22 rows, depending on how Embree was built; the rest is padding
@@ -185,3 +185,14 @@ def hit_triangle(tracer: Tracer, packets: Float32, i: int) -> int:
     bits = packets.view(np.int32)
     p, lane = i // width_of_packets(), i % width_of_packets()
     return scene_triangle(tracer, bits[p, TRIANGLE, lane], bits[p, GEOMETRY, lane])
+
+
+@inlined
+def decode_hits(tracer: Tracer, packets: Float32, i: int) -> tuple[bool, int, Real, Real]:
+    """Whether rays i to i + 15 missed, and the triangle and the place (u, v) that each met, 0 after a miss."""
+    bits = packets.view(np.int32)
+    triangle = load_row(bits, i, TRIANGLE)
+    missed = triangle < np.int32(0)
+    triangle = select(missed, 0, scene_triangle(tracer, triangle, load_row(bits, i, GEOMETRY)))
+    u, v = load_row(packets, i, U), load_row(packets, i, V)
+    return missed, triangle, select(missed, 0.0, u), select(missed, 0.0, v)

@@ -7,12 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from framearray_cli.base.arrays import Bytes, Directions, Float32, Int32, Keys, Points, Real, Rgb, Triple
+from framearray_cli.base.arrays import Bytes, Directions, Float32, Int32, Keys, Points, Rgb, Triple
 
-from ..embree.packets import DIRECTION, GEOMETRY, TRIANGLE, Tracer, U, V, intersect, scene_triangle
+from ..embree.packets import DIRECTION, Tracer, decode_hits, intersect
+from ..inputs.relief import FLAT, Relief
 from ..inputs.surfaces import Surfaces, geometric_normal, position_at, reflectivity_at, shading_normal, specular_at
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, gather, lane_numbers, load, load_row, put_triples, select, sqrt, store, triples_at
+from .relief import turn_normals
 
 ESCAPED, SURFACE = 0, 1
 
@@ -24,7 +26,8 @@ class Hits(NamedTuple):
         kind: (n,) SURFACE, or ESCAPED for a ray that left the scene.
         position: (n, 3) the point, centred; for an escaped ray its unit direction.
         geometric: (n, 3) unit normal of the triangle, on the viewer's side: offsets, reprojection, sides.
-        shading: (n, 3) unit interpolated normal on that same side: direct light, hemisphere, mirror.
+        shading: (n, 3) unit interpolated normal, turned by a normal map, on that same side: direct light, hemisphere,
+            mirror.
         offset: (n,) height above the triangle at which rays start.
         reflectivity, specular: (n, 3) diffuse and mirror part; specular is not written in scenes without mirrors.
         incoming: (n, 3) direction of the ray that found the hit, not normalised.
@@ -47,10 +50,11 @@ class Hits(NamedTuple):
 
 
 class World(NamedTuple):
-    """The surfaces of a scene, and the tracer that finds them."""
+    """The surfaces of a scene, the tracer that finds them, and their normal maps, if any."""
 
     surfaces: Surfaces
     tracer: Tracer
+    relief: Relief = FLAT
 
 
 def empty_hits(n: int) -> Hits:
@@ -116,17 +120,6 @@ def triple(array: Float32, i: int) -> Triple:
     return gather(array, at), gather(array, at + np.int32(1)), gather(array, at + np.int32(2))
 
 
-@inlined
-def decode_hits(tracer: Tracer, packets: Float32, i: int) -> tuple[bool, int, Real, Real]:
-    """Whether rays i to i + 15 missed, and the triangle and the place (u, v) that each met, 0 after a miss."""
-    bits = packets.view(np.int32)
-    triangle = load_row(bits, i, TRIANGLE)
-    missed = triangle < np.int32(0)
-    triangle = select(missed, 0, scene_triangle(tracer, triangle, load_row(bits, i, GEOMETRY)))
-    u, v = load_row(packets, i, U), load_row(packets, i, V)
-    return missed, triangle, select(missed, 0.0, u), select(missed, 0.0, v)
-
-
 def trace_hits(
     world: World, packets: Float32, n: int, *, coherent: bool, near: float, mirrors: bool, hits: Hits
 ) -> None:
@@ -145,7 +138,7 @@ def record_hits(world: World, packets: Float32, n: int, mirrors: bool, hits: Hit
     Args:
         mirrors: whether to write `specular`.
     """
-    surfaces, tracer = world
+    surfaces, tracer = world.surfaces, world.tracer
     for i in range(0, n, LANES):
         # Read everything before the first write, so that the compiler loads shared values once.
         # direction, triangle and place (u, v)
@@ -175,3 +168,4 @@ def record_hits(world: World, packets: Float32, n: int, mirrors: bool, hits: Hit
             hits.reflectivity, i, select(missed, 0.0, red), select(missed, 0.0, green), select(missed, 0.0, blue)
         )
         store(hits.kind, i, select(missed, np.uint8(ESCAPED), np.uint8(SURFACE)))
+    turn_normals(world.relief, tracer, packets, n, hits.geometric, hits.shading)

@@ -6,13 +6,13 @@ import numpy as np
 
 from framearray_cli.base.arrays import Bytes, Float32, Int32, Real
 
-from ..embree.packets import DIRECTION, ORIGIN, TFAR, intersect
+from ..embree.packets import DIRECTION, ORIGIN, TFAR, decode_hits, intersect
 from ..inputs.cameras import Cameras, corner_of, eye_ray
 from ..inputs.random import OTHER_HALF, PIXEL, PIXEL_SAMPLE, r2, random_word, stream
 from ..inputs.surfaces import specular_at
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, doubles, floor, gather, integers, lane_numbers, put_triples, select, store, store_row
-from .hits import Hits, World, decode_hits, trace_hits
+from .hits import Hits, World, trace_hits
 
 
 class Samples(NamedTuple):
@@ -176,7 +176,7 @@ def pilot_hits(
     """
     for i in range(0, n, LANES):
         _write_eye_rays(cams, c, gather(order, _lane_numbers_below(i, n) + np.int32(first)), 0.5, 0.5, i, packets, hits)
-    surfaces, tracer = world
+    surfaces, tracer = world.surfaces, world.tracer
     intersect(tracer, packets, n, True, cams.near)
     for i in range(0, n, LANES):
         missed, triangle, u, v = decode_hits(tracer, packets, i)

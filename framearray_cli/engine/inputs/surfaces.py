@@ -131,7 +131,7 @@ def nearest_texel_at(s: Surfaces, texture: int, u: Real, v: Real) -> tuple[Real,
 
 
 @inlined
-def _interpolate(corners: Float32, triangle: int, stride: int, axis: int, u: Real, v: Real, w: Real) -> Real:
+def interpolate(corners: Float32, triangle: int, stride: int, axis: int, u: Real, v: Real, w: Real) -> Real:
     """One component of corner values, interpolated at barycentric (u, v), w = 1 - u - v."""
     at = triangle * np.int32(3 * stride) + np.int32(axis)
     a, b, c = gather(corners, at), gather(corners, at + np.int32(stride)), gather(corners, at + np.int32(2 * stride))
@@ -147,7 +147,7 @@ def _multiply_texture(
     w = np.float32(1.0) - u - v
     textured = texture >= np.int32(0)
     if popcount(textured) > 0:
-        tu, tv = _interpolate(s.uvs, triangle, 2, 0, u, v, w), _interpolate(s.uvs, triangle, 2, 1, u, v, w)
+        tu, tv = interpolate(s.uvs, triangle, 2, 0, u, v, w), interpolate(s.uvs, triangle, 2, 1, u, v, w)
         texture = select(textured, texture, np.int32(0))
         r, g, b, _ = texture_at(s, texture, tu, tv) if blended else nearest_texel_at(s, texture, tu, tv)
         red, green, blue = (
@@ -156,9 +156,9 @@ def _multiply_texture(
             select(textured, blue * b, blue),
         )
     if s.colours.shape[0] > 0:
-        red = red * _interpolate(s.colours, triangle, 3, 0, u, v, w)
-        green = green * _interpolate(s.colours, triangle, 3, 1, u, v, w)
-        blue = blue * _interpolate(s.colours, triangle, 3, 2, u, v, w)
+        red = red * interpolate(s.colours, triangle, 3, 0, u, v, w)
+        green = green * interpolate(s.colours, triangle, 3, 1, u, v, w)
+        blue = blue * interpolate(s.colours, triangle, 3, 2, u, v, w)
     return red, green, blue
 
 
@@ -203,7 +203,7 @@ def emission_at(s: Surfaces, texture: int, triangle: int, u: Real, v: Real) -> T
     red = green = blue = u * np.float32(0.0) + one
     if popcount(textured) > 0:
         w = one - u - v
-        tu, tv = _interpolate(s.uvs, triangle, 2, 0, u, v, w), _interpolate(s.uvs, triangle, 2, 1, u, v, w)
+        tu, tv = interpolate(s.uvs, triangle, 2, 0, u, v, w), interpolate(s.uvs, triangle, 2, 1, u, v, w)
         r, g, b, _ = texture_at(s, select(textured, texture, np.int32(0)), tu, tv)
         red, green, blue = select(textured, r, red), select(textured, g, green), select(textured, b, blue)
     return red, green, blue
@@ -216,7 +216,7 @@ def is_cut_out(s: Surfaces, triangle: int, u: Real, v: Real) -> bool:
     alpha = s.alpha[m]
     if s.alpha_texture[m] >= 0:
         w = np.float32(1.0) - u - v
-        tu, tv = _interpolate(s.uvs, triangle, 2, 0, u, v, w), _interpolate(s.uvs, triangle, 2, 1, u, v, w)
+        tu, tv = interpolate(s.uvs, triangle, 2, 0, u, v, w), interpolate(s.uvs, triangle, 2, 1, u, v, w)
         alpha *= texture_at(s, s.alpha_texture[m], tu, tv)[3]
     return bool(alpha < s.alpha_cutoff[m])
 
@@ -266,8 +266,8 @@ def shading_normal(s: Surfaces, triangle: int, u: Real, v: Real, gx: Real, gy: R
     if s.normals.shape[0] == 0:
         return gx, gy, gz
     w, k = np.float32(1.0) - u - v, s.normals
-    x, y = _interpolate(k, triangle, 3, 0, u, v, w), _interpolate(k, triangle, 3, 1, u, v, w)
-    z = _interpolate(k, triangle, 3, 2, u, v, w)
+    x, y = interpolate(k, triangle, 3, 0, u, v, w), interpolate(k, triangle, 3, 1, u, v, w)
+    z = interpolate(k, triangle, 3, 2, u, v, w)
     square = x * x + y * y + z * z
     none = square < np.float32(1e-12)  # corner normals that cancel give no direction
     scale = np.float32(1.0) / sqrt(select(none, np.float32(1.0), square))

@@ -15,12 +15,14 @@ chosen_by_type: Any = intrinsic  # declares a function for kernels that `step_or
 def step_or_zero(typingctx: Any, function: Callable[..., int], given: tuple[Any, ...], array: Any) -> Any:
     """Return what `chosen_by_type` needs to call a `@step` where an array has rows, and else to return 0.
 
+    A job that needs no such step may also give () in place of the array.
+
     Args:
         function: returns an integer.
         given: types of its arguments.
         array: type of the array.
     """
-    if array.ndim == 1:
+    if (isinstance(array, types.BaseTuple) and not len(array)) or getattr(array, "ndim", 2) == 1:
 
         def nothing(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             return context.get_constant(types.int64, 0)

@@ -6,7 +6,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float64, Int32, with_room
 from framearray_cli.engine.embree import EmbreeScene
-from framearray_cli.engine.hits.hits import SURFACE, Hits, World, empty_hits
+from framearray_cli.engine.hits.hits import SURFACE, Hits, empty_hits
 from framearray_cli.engine.hits.native import Samples, native_hits, pixel_order
 from framearray_cli.engine.hits.outer import outer_hits
 from framearray_cli.engine.hits.rays import Rays, room_for_hits, room_for_tests
@@ -70,7 +70,7 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
     order = pixel_order(cams.width, cams.height)
     pixels = order[evenly_spaced(len(order), PROBE_HITS)]
     n, samples = len(pixels), Samples(job.seed, pixels, per_pixel=1, first=0)
-    world = World(prepared.surfaces, embree.tracer)
+    world = prepared.world(embree)
     hits, hit_rays = empty_hits(PROBE_HITS), room_for_hits(PROBE_HITS)
     test_rays = room_for_tests(PROBE_HITS, lights.n_lights)
     irradiance = with_room((PROBE_HITS, lights.channels, lights.n_lights), np.float32)

@@ -25,6 +25,7 @@ class Assets:
 
     Attributes:
         shining: names of the materials whose emission is read; that of others is left out.
+        as_file: whether surfaces follow the file, with its normal maps; else they are diffuse or mirrors.
         refused: names of files that lie elsewhere, in the order in which the scene named them.
     """
 
@@ -32,6 +33,7 @@ class Assets:
     folders: tuple[Path, ...] = ()
     limit: Limit = field(default_factory=Limit)
     shining: Container[str] = ()
+    as_file: bool = False
     refused: list[str] = field(default_factory=list)
 
     def read(self, name: str) -> bytes:

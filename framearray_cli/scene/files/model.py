@@ -25,6 +25,7 @@ class Material:
         one_sided: whether only the front emits, where corners run counter-clockwise.
         alpha: opacity factor, multiplied with the alpha of `alpha_texture`.
         alpha_cutoff: a point is absent where alpha is below it; 0 for an opaque material.
+        normal_texture: normal map, or -1; `normal_scale` multiplies what its red and green say.
         left_out: why its triangles are left out ("transmissive", "cut out"), or "".
     """
 
@@ -39,6 +40,8 @@ class Material:
     alpha: float = 1.0
     alpha_texture: int = -1
     alpha_cutoff: float = 0.0
+    normal_texture: int = -1
+    normal_scale: float = 1.0
     left_out: str = ""
 
     @property
@@ -61,6 +64,9 @@ class Part:
         normals: (n, 3, 3) from the file, of any length, or None.
         uvs: (n, 3, 2) texture coordinates, v upwards, or None.
         colours: (n, 3, 3) linear colours, or None.
+        tangents: (n, 3, 4) direction in which u of the normal map grows, of any length, and w: the bitangent is w times
+            normal x tangent; all 0 where there is none. None without normal map.
+        normal_uvs: (n, 3, 2) texture coordinates of the normal map, v upwards, or None.
     """
 
     material: int
@@ -68,6 +74,8 @@ class Part:
     normals: Float64 | None = None
     uvs: Float64 | None = None
     colours: Float32 | None = None
+    tangents: Float64 | None = None
+    normal_uvs: Float64 | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

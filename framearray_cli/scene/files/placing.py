@@ -33,6 +33,8 @@ def place_mesh(
     uvs: Float64 | None,
     colours: Float32 | None,
     face_colours: Float32 | None = None,
+    tangents: Float64 | None = None,
+    normal_uvs: Float64 | None = None,
 ) -> Part:
     """Put a mesh at all of its places, one after another, in float64, one row per corner of a triangle.
 
@@ -48,6 +50,7 @@ def place_mesh(
         uvs: (v, 2) per vertex.
         colours: (v, 3) per vertex.
         face_colours: (f, 3) per face; used if `colours` is None.
+        tangents, normal_uvs: (f, 3, 4) per corner and (v, 2) per vertex, of a normal map.
     """
     linear = world_from_mesh[:, :3, :3]
     with np.errstate(all="ignore"):  # the scene counts and drops non-finite triangles later
@@ -68,17 +71,26 @@ def place_mesh(
         """Repeat (f, 3, k) at all places."""
         return join_places(np.broadcast_to(rows, (len(linear), *rows.shape)))
 
+    at_corners = None if colours is None else colours[faces]
     if colours is None and face_colours is not None:
-        at_corners: Float32 | None = np.repeat(face_colours[:, None], 3, axis=1)
-    else:
-        at_corners = None if colours is None else colours[faces]
+        at_corners = np.repeat(face_colours[:, None], 3, axis=1)
     return Part(
         material=material,
         corners=join_places(np.take(world, faces, axis=1)),
         normals=None if normals is None else join_places(np.take(normals, faces, axis=1)),
         uvs=None if uvs is None else repeat_at_places(uvs[faces]),
         colours=None if at_corners is None else repeat_at_places(at_corners),
+        tangents=None if tangents is None else join_places(_place_tangents(tangents, linear, mirrored)),
+        normal_uvs=None if normal_uvs is None else repeat_at_places(normal_uvs[faces]),
     )
+
+
+def _place_tangents(tangents: Float64, linear: Float64, mirrored: NDArray[np.bool_]) -> Float64:
+    """(n, f, 3, 4) tangents at all places; where normal x tangent points the other way in a mirror, w does too."""
+    with np.errstate(all="ignore"):
+        along = np.einsum("nij,fkj->nfki", linear, tangents[..., :3])
+    w = np.where(mirrored, -1.0, 1.0)[:, None, None] * tangents[None, ..., 3]
+    return np.concatenate([along, w[..., None]], axis=3)
 
 
 def cofactors(matrices: Float64) -> Float64:

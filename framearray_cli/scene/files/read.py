@@ -34,7 +34,12 @@ MAX_REASON = 200  # characters of a library's own message that an error repeats
 
 
 def read_meshes(
-    file: Path, folders: Sequence[Path] = (), memory: int | None = None, shining: Container[str] = ()
+    file: Path,
+    folders: Sequence[Path] = (),
+    memory: int | None = None,
+    shining: Container[str] = (),
+    *,
+    as_file: bool = False,
 ) -> Meshes:
     """Read a scene file of any format.
 
@@ -42,12 +47,13 @@ def read_meshes(
         folders: where files that the scene names may lie, beside its own folder.
         memory: bytes that reading may take; None: all that are free.
         shining: names of the materials whose emission is read.
+        as_file: see `Assets`.
 
     Raises:
         SceneError: the file is missing, a folder, of an unknown kind, broken, without triangles or too large, or names
             files elsewhere.
     """
-    assets = _assets(file, folders, memory, shining)
+    assets = replace(_assets(file, folders, memory, shining), as_file=as_file)
     extension = file.suffix[1:].lower()
     with _quiet() as messages, np.errstate(all="ignore"), _scene_errors(file, extension):
         meshes = _read(_bytes_of(file, assets.limit), extension, assets)

@@ -153,7 +153,7 @@ def _gather_hits(
     """
     of_w = settings.obscurance
     total = NO_RAYS
-    surfaces, tracer = world
+    surfaces, tracer = world.surfaces, world.tracer
     most = min(room_in(rays.packets), RAYS_TOGETHER) // LANES
     for first_ray in range(0, of_w.n_rays, most):
         # rays first_ray to first_ray + n_rays - 1 of every hit

@@ -10,8 +10,8 @@ import numpy as np
 
 from framearray_cli.base.arrays import Addresses, Float32, Int32, Real, Rgb, with_room
 
-from ...embree.packets import DIRECTION, HIT_ROWS, TFAR, Tracer, hit_triangle, room_in
-from ...hits.hits import Hits, decode_hits, empty_hits
+from ...embree.packets import DIRECTION, HIT_ROWS, TFAR, Tracer, decode_hits, hit_triangle, room_in
+from ...hits.hits import Hits, empty_hits
 from ...hits.rays import NO_RAYS, ORDER, Rays, room_for_hits
 from ...inputs.random import CONTINUED, random_word
 from ...inputs.surfaces import Surfaces, geometric_normal, position_at, total_at

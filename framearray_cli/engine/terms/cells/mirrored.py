@@ -12,8 +12,8 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32, Keys, Rgb
 
-from ...embree.packets import DIRECTION, HIT_ROWS, TFAR, empty_packets, intersect, set_ray
-from ...hits.hits import SURFACE, Hits, World, decode_hits, empty_hits, record_hits
+from ...embree.packets import DIRECTION, HIT_ROWS, TFAR, decode_hits, empty_packets, intersect, set_ray
+from ...hits.hits import SURFACE, Hits, World, empty_hits, record_hits
 from ...hits.rays import NO_RAYS, ORDER, Rays
 from ...inputs.random import MIRRORED, mix, r2, random_word
 from ...kernels.kernel import inlined, kernel
@@ -72,7 +72,7 @@ def find_ends(
     Returns:
         number of rays kept, and of reflected rays.
     """
-    surfaces, tracer = world
+    surfaces, tracer = world.surfaces, world.tracer
     mirrored = reflected = NO_RAYS
     if mirrors.depth > 0:
         mirrored, reflected = follow_mirrors(hits, world, rays, n, first_ray, n_rays, mirrors)
@@ -93,7 +93,7 @@ def follow_mirrors(
     Returns:
         number of rays that met mirrors, and of reflected ones.
     """
-    surfaces, tracer = world
+    surfaces, tracer = world.surfaces, world.tracer
     # Loop state
     found = NO_RAYS  # rays that met mirrors
     total = NO_RAYS  # reflected rays

@@ -51,6 +51,12 @@ class Accuracy:
     error: float
     error_error: float
 
+    @property
+    def note(self) -> str:
+        """What renders and reports print of it."""
+        level = f"{self.error:.1%} +- {self.error_error:.1%}"
+        return f"indirect light differs from paths by {level}, its mean by {self.bias:+.1%} +- {self.bias_error:.1%}"
+
 
 def compare_with_paths(
     cells: Cells, walks: EyeWalks, obscurance: ObscuranceSettings, depth: int, threads: int

@@ -59,9 +59,8 @@ SIZE = number(0, LARGEST, whole=True)
 VIEW, ACCESSOR = number_of("bufferViews"), number_of("accessors")
 COMPONENT = one_of(*COMPONENTS)
 MOVED = table({"offset": numbers(2), "scale": numbers(2), "rotation": number(), "texCoord": SIZE})
-IMAGE_USE = table(
-    {"index": number_of("textures"), "texCoord": SIZE, **extensions(KHR_texture_transform=MOVED)}, ("index",)
-)
+USE = {"index": number_of("textures"), "texCoord": SIZE, **extensions(KHR_texture_transform=MOVED)}
+IMAGE_USE = table(USE, ("index",))
 METAL = {"metallicFactor": number(), "roughnessFactor": number(), "baseColorFactor": numbers(4)}
 METAL |= {"baseColorTexture": IMAGE_USE, "metallicRoughnessTexture": IMAGE_USE}
 GLOSSY = {"diffuseFactor": numbers(4), "specularFactor": numbers(3), "glossinessFactor": number()}
@@ -71,6 +70,7 @@ MATERIAL = {
     "alphaMode": text,
     "alphaCutoff": number(),
     "emissiveFactor": numbers(3),
+    "normalTexture": table({**USE, "scale": number()}, ("index",)),
     **extensions(
         KHR_materials_pbrSpecularGlossiness=table(GLOSSY),
         KHR_materials_transmission=table({"transmissionFactor": number()}),

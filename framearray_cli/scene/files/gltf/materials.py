@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,19 +26,32 @@ REPEAT = 10497
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class GltfMaterial:
-    """A material, and how meshes that use it find their texture coordinates.
+class TexturePlaces:
+    """How the meshes of a material find the texture coordinates of a texture.
 
     Attributes:
         uv_set: index of the TEXCOORD attribute; -1 without texture.
-        uv_matrix: (2, 3) transform of (u, v down, 1), or None.
+        matrix: (2, 3) transform of (u, v down, 1), or None.
         repeats: whether the sampler repeats in both directions.
     """
 
-    material: Material
     uv_set: int = -1
-    uv_matrix: Float64 | None = None
+    matrix: Float64 | None = None
     repeats: bool = True
+
+    @property
+    def attribute(self) -> str:
+        """Name of the attribute; "" without texture."""
+        return f"TEXCOORD_{self.uv_set}" if self.uv_set >= 0 else ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GltfMaterial:
+    """A material, the places of its textures, and those of its normal map."""
+
+    material: Material
+    places: TexturePlaces = field(default_factory=TexturePlaces)
+    normal_places: TexturePlaces = field(default_factory=TexturePlaces)
 
 
 def read_materials(
@@ -70,21 +83,28 @@ def _material(
     else:
         diffuse, specular = _glossy(name, base, gloss, notes)
     opacity = _opacity(name, entry, float(base[3]), texture, source, notes)
-    _note_ignored(name, entry, name in assets.shining, notes)
+    _note_ignored(name, entry, assets, notes)
     mirror_texture = texture if gloss is None else -1
     material = make_material(name, diffuse, specular, opacity, notes, texture=texture, mirror_texture=mirror_texture)
     if name in assets.shining:
         material, own = _shining(material, entry, None if texture < 0 else info, source, notes)
         texture, info = (texture, info) if texture >= 0 else (material.emission_texture, own)
-    if texture < 0 or info is None:
-        return GltfMaterial(material=material)
-    uv_set, transform = _places(info)
+    bumps: Tree | None = entry.get("normalTexture") if assets.as_file else None
+    if bumps is not None:
+        scale = float(bumps.get("scale", 1.0))
+        material = replace(material, normal_texture=source.index(bumps), normal_scale=scale)
     return GltfMaterial(
         material=material,
-        uv_set=uv_set,
-        uv_matrix=uv_matrix(transform),
-        repeats=source.repeats(info),
+        places=_texture_places(texture, info, source),
+        normal_places=_texture_places(material.normal_texture, bumps, source),
     )
+
+
+def _texture_places(texture: int, info: Tree | None, source: "ImageFinder") -> TexturePlaces:
+    if texture < 0 or info is None:
+        return TexturePlaces()
+    uv_set, transform = _places(info)
+    return TexturePlaces(uv_set=uv_set, matrix=uv_matrix(transform), repeats=source.repeats(info))
 
 
 def _places(info: Tree) -> tuple[int, Tree]:
@@ -222,12 +242,12 @@ def uv_matrix(transform: Tree) -> Float64 | None:
     return np.column_stack([turn * scale, offset])
 
 
-def _note_ignored(name: str, entry: Tree, shines: bool, notes: Notes) -> None:
+def _note_ignored(name: str, entry: Tree, assets: Assets, notes: Notes) -> None:
     emissive = entry.get("emissiveFactor")
-    if not shines and emissive is not None and max(emissive) > 0:
+    if name not in assets.shining and emissive is not None and max(emissive) > 0:
         notes.add("emission is left out", name)
-    if entry.get("normalTexture") is not None:
-        notes.add("normal maps are left out", name)
+    if entry.get("normalTexture") is not None and not assets.as_file:
+        notes.add('normal maps are left out; scene.surfaces = "file" uses them', name)
     if entry.get("occlusionTexture") is not None:
         notes.add("occlusion maps are left out (obscurances are computed)", name)
     for extension in sorted(set(entry.get("extensions") or {}) - KNOWN - SILENT):

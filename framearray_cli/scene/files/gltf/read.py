@@ -4,12 +4,14 @@ from ..assets import Assets
 from ..materials import default_material
 from ..model import Material, Meshes, Notes, Part
 from ..placing import place_mesh
+from ..tangents import CORNER_BYTES
 from ..textures import TextureTable
-from .container import open_gltf
-from .materials import read_materials
+from .container import Gltf, open_gltf
+from .materials import GltfMaterial, read_materials
 from .nodes import check_readable, note_unread, placed_meshes, used_materials
 from .stage import count_lights
-from .triangles import Triangles, read_triangles
+from .triangles import Triangles, read_triangles, triangle_count
+from .values import Tree
 
 
 def read_gltf(data: bytes, assets: Assets) -> Meshes:
@@ -30,7 +32,7 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
     shown = {mesh for mesh, _ in placed}
     for number, entry in enumerate(gltf.items("meshes")):
         if number in shown:
-            read = (read_triangles(gltf, primitive, materials, notes) for primitive in entry["primitives"])
+            read = (_read_triangles(gltf, primitive, materials, assets, notes) for primitive in entry["primitives"])
             primitives[number] = [triangles for triangles in read if triangles is not None]
     parts: list[Part] = []
     outside = 0
@@ -45,6 +47,8 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
                     normals=found.normals,
                     uvs=found.uvs,
                     colours=found.colours,
+                    tangents=found.tangents,
+                    normal_uvs=found.normal_uvs,
                 )
             )
             outside += found.outside * len(places)
@@ -57,6 +61,16 @@ def read_gltf(data: bytes, assets: Assets) -> Meshes:
         notes=notes.lines(),
         lights=count_lights(gltf),
     )
+
+
+def _read_triangles(
+    gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], assets: Assets, notes: Notes
+) -> Triangles | None:
+    """`read_triangles`, which may take memory for tangents."""
+    material = primitive.get("material")
+    mapped = material is not None and materials[material].normal_places.attribute
+    with assets.limit.lend("tangents", 3 * CORNER_BYTES * triangle_count(gltf, primitive) if mapped else 0):
+        return read_triangles(gltf, primitive, materials, notes)
 
 
 def _defaults(parts: list[Part], plain: int, coloured: int, notes: Notes) -> list[Material]:

@@ -1,6 +1,6 @@
 """glTF primitives -> triangles: lists, strips and fans, plain, sparse or compressed with Draco."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,9 +11,10 @@ from framearray_cli.base.arrays import Float32, Float64
 
 from ..materials import clean_colours
 from ..model import Notes
+from ..tangents import compute_tangents
 from .check import TRIANGLES
 from .container import Gltf, normalise
-from .materials import GltfMaterial
+from .materials import GltfMaterial, TexturePlaces
 from .values import Tree
 
 LIST, STRIP, FAN = TRIANGLES
@@ -34,6 +35,8 @@ class Triangles:
         normals: (v, 3), or None.
         uvs: (v, 2) with v upwards, or None.
         colours: (v, 3) linear, or None.
+        tangents: (f, 3, 4) of the normal map, see `Part`; None without one.
+        normal_uvs: (v, 2) texture coordinates of the normal map with v upwards, or None.
         outside: the number of triangles left out because a vertex of theirs does not exist.
     """
 
@@ -43,6 +46,8 @@ class Triangles:
     normals: Float64 | None
     uvs: Float64 | None
     colours: Float32 | None
+    tangents: Float64 | None
+    normal_uvs: Float64 | None
     outside: int
 
 
@@ -73,8 +78,12 @@ def read_triangles(gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], n
         return None
     number = primitive.get("material")
     material = None if number is None else materials[number]
-    uv_name = f"TEXCOORD_{material.uv_set}" if material is not None and material.uv_set >= 0 else ""
-    found, indices = _arrays(gltf, primitive, ("POSITION", "NORMAL", "COLOR_0", uv_name))
+    places, bumps = (
+        (TexturePlaces(), TexturePlaces()) if material is None else (material.places, material.normal_places)
+    )
+    names = ["POSITION", "NORMAL", "COLOR_0", places.attribute]
+    names += ["TANGENT", bumps.attribute] if bumps.attribute else []
+    found, indices = _arrays(gltf, primitive, names)
     count = len(found["POSITION"])
     for name in [name for name, values in found.items() if len(values) != count]:
         notes.add(f"{name} of another length than POSITION is left out")
@@ -89,19 +98,37 @@ def read_triangles(gltf: Gltf, primitive: Tree, materials: list[GltfMaterial], n
         kept = np.arange(kept.size, dtype=np.int64).reshape(-1, 3)
     if number is None:
         number = len(materials) + ("COLOR_0" in found)
-    normals, uvs = found.get("NORMAL"), found.get(uv_name)
+    vertices, normals = found["POSITION"].astype(np.float64), found.get("NORMAL")
+    normals = None if normals is None else normals.astype(np.float64)
+    name = "" if material is None else material.material.name
+    uvs, normal_uvs = _uvs(found, places, name, notes), _uvs(found, bumps, name, notes)
+    if bumps.attribute and normal_uvs is None:
+        notes.add("meshes without texture coordinates show no normal map", name)
     return Triangles(
         material=number,
-        vertices=found["POSITION"].astype(np.float64),
+        vertices=vertices,
         faces=kept,
-        normals=None if normals is None else normals.astype(np.float64),
-        uvs=None if uvs is None or material is None else _uvs(uvs, material, notes),
+        normals=normals,
+        uvs=uvs,
         colours=_colours(found["COLOR_0"], notes) if "COLOR_0" in found else None,
+        tangents=None if normal_uvs is None else _tangents(found, vertices, normals, normal_uvs, kept),
+        normal_uvs=normal_uvs,
         outside=int((~inside).sum()),
     )
 
 
-def _arrays(gltf: Gltf, primitive: Tree, names: tuple[str, ...]) -> tuple[Attributes, Faces | None]:
+def _tangents(found: Attributes, vertices: Float64, normals: Float64 | None, uvs: Float64, faces: Faces) -> Float64:
+    """(f, 3, 4) tangents of the file, or computed ones where it has none, or not a direction for every corner."""
+    tangents = found.get("TANGENT")
+    if tangents is not None and normals is not None and tangents.shape[1] == 4:  # they belong to the file's normals
+        given = tangents.astype(np.float64)[faces]
+        if np.isfinite(given).all() and given[..., :3].any(axis=2).all():
+            given[..., 3] = np.where(given[..., 3] < 0, -1.0, 1.0)
+            return given
+    return compute_tangents(vertices[faces], None if normals is None else normals[faces], uvs[faces])
+
+
+def _arrays(gltf: Gltf, primitive: Tree, names: Sequence[str]) -> tuple[Attributes, Faces | None]:
     """Read those of the named attributes that exist, and the indices, if any."""
     attributes: Mapping[str, int] = primitive["attributes"]
     packed: Attributes = {}
@@ -151,14 +178,16 @@ def _faces(indices: Faces, mode: int, notes: Notes) -> Faces | None:
     return indices[: count - count % 3].reshape(-1, 3)
 
 
-def _uvs(values: NDArray[Any], material: GltfMaterial, notes: Notes) -> Float64:
-    """(v, 2) texture coordinates, transformed, v upwards."""
-    uv = values.astype(np.float64)
-    if material.uv_matrix is not None:
+def _uvs(found: Attributes, places: TexturePlaces, name: str, notes: Notes) -> Float64 | None:
+    """(v, 2) texture coordinates, transformed, v upwards; None if there are none."""
+    if places.attribute not in found:
+        return None
+    uv = found[places.attribute].astype(np.float64)
+    if places.matrix is not None:
         with np.errstate(all="ignore"):
-            uv = np.column_stack([uv, np.ones(len(uv))]) @ material.uv_matrix.T
-    if not material.repeats and len(uv) and (uv.min() < 0 or uv.max() > 1):
-        notes.add("textures that clamp or mirror at their edges repeat", material.material.name)
+            uv = np.column_stack([uv, np.ones(len(uv))]) @ places.matrix.T
+    if not places.repeats and len(uv) and (uv.min() < 0 or uv.max() > 1):
+        notes.add("textures that clamp or mirror at their edges repeat", name)
     return np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])
 
 

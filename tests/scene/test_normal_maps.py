@@ -1,0 +1,121 @@
+"""Normal maps of a glTF file, as the scene has them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.scenes import QUAD, QUAD_UVS, Glb, check_shapes, png
+
+from framearray_cli.base.errors import SceneError
+from framearray_cli.scene.scene import Scene, load_scene, scene_report_lines
+
+UP = np.broadcast_to(np.float32([0, 0, 1]), (4, 3))
+IMAGE = [[[128, 128, 255], [255, 128, 128]]]
+
+
+def mapped_quad(folder: Path, info: Any = None, *, uvs: Any = QUAD_UVS, node: Any = None, **attributes: Any) -> Path:
+    """A quad with a normal map and no other texture."""
+    glb = Glb()
+    image = {"index": glb.texture(png(IMAGE)), **(info or {})}
+    found = {name: glb.accessor(np.ascontiguousarray(values)) for name, values in attributes.items()}
+    if uvs is not None:
+        found["TEXCOORD_0"] = glb.accessor(uvs.astype(np.float32))
+    glb.node(glb.mesh(glb.material("Wall", normalTexture=image), **found), **(node or {}))
+    return glb.save(folder / "quad.glb")
+
+
+def read(file: Path) -> Scene:
+    scene = load_scene(file, as_file=True)
+    check_shapes(scene)
+    return scene
+
+
+def tangents_of(scene: Scene) -> Any:
+    """The tangents that occur, as a list."""
+    return np.unique(scene.tangents.reshape(-1, 4).round(6), axis=0).tolist()
+
+
+def test_diffuse_surfaces_read_no_map(tmp_path: Path) -> None:
+    scene = load_scene(mapped_quad(tmp_path))
+    assert (len(scene.textures), len(scene.tangents), len(scene.normal_uvs), len(scene.normals)) == (0, 0, 0, 0)
+    assert scene.normal_texture.tolist() == [-1]
+    assert scene.report.notes == ('normal maps are left out; scene.surfaces = "file" uses them: Wall',)
+
+
+def test_a_map_has_its_tangents_coordinates_and_scale(tmp_path: Path) -> None:
+    scene = read(mapped_quad(tmp_path, {"scale": 0.5}))
+    assert tangents_of(scene) == [[1, 0, 0, 1]]
+    assert scene.normals.reshape(-1, 3).tolist() == [[0, 0, 1]] * 6  # the geometric ones, as the file has none
+    assert scene.normal_uvs[0].tolist() == [[0, 0], [1, 0], [1, 1]]
+    assert (scene.normal_texture.tolist(), scene.normal_scale.tolist()) == ([0], [0.5])
+    assert len(scene.uvs) == 0
+    assert scene_report_lines(scene.report, "a.glb") == [
+        "a.glb: 2 triangles, 1 material, 1 texture, 1 normal map in use"
+    ]
+
+
+def test_tangents_of_the_file_are_kept(tmp_path: Path) -> None:
+    given = np.array([[0, 2, 0, -1]] * 4, np.float32)
+    assert tangents_of(read(mapped_quad(tmp_path, NORMAL=UP, TANGENT=given))) == [[0, 1, 0, -1]]
+
+
+@pytest.mark.parametrize("broken", [[0, 0, 0, 1], [np.nan, 0, 0, 1]])
+def test_tangents_that_are_none_are_computed(tmp_path: Path, broken: Any) -> None:
+    given = np.array([[0, 1, 0, -1]] * 3 + [broken], np.float32)
+    assert tangents_of(read(mapped_quad(tmp_path, NORMAL=UP, TANGENT=given))) == [[1, 0, 0, 1]]
+    # without normals those of the file mean nothing [glTF]
+    assert tangents_of(read(mapped_quad(tmp_path, TANGENT=given[[0, 0, 0, 0]]))) == [[1, 0, 0, 1]]
+
+
+def test_a_map_has_a_set_and_a_transform_of_its_own(tmp_path: Path) -> None:
+    info = {"texCoord": 1, "extensions": {"KHR_texture_transform": {"rotation": np.pi / 2, "scale": [2, 1]}}}
+    scene = read(mapped_quad(tmp_path, info, TEXCOORD_1=QUAD_UVS))
+    # glTF turns the picture clockwise as v points down: (u, v) shows what stands at (v, -2 u) of the image
+    u, v = QUAD_UVS[[0, 1, 2]].T
+    assert scene.normal_uvs[0] == pytest.approx(np.stack([v, 1 + 2 * u], axis=1), abs=1e-6)
+    assert tangents_of(scene) == [[0, -1, 0, 1]]
+
+
+def test_mirrored_and_scaled_nodes(tmp_path: Path) -> None:
+    """In a mirror, normal x tangent points against the bitangent, so w changes its sign."""
+    turned = {"scale": [-3, 1, 1]}
+    assert tangents_of(read(mapped_quad(tmp_path, node=turned))) == [[-1, 0, 0, -1]]
+    assert tangents_of(read(mapped_quad(tmp_path, node={"scale": [1e-6] * 3}))) == [[1, 0, 0, 1]]
+
+
+def test_a_mesh_without_coordinates_shows_no_map(tmp_path: Path) -> None:
+    scene = read(mapped_quad(tmp_path, uvs=None))
+    assert len(scene.tangents) == 0
+    assert scene.report.notes == ("meshes without texture coordinates show no normal map: Wall",)
+
+
+def test_parts_without_a_map_have_no_tangents(tmp_path: Path) -> None:
+    glb = Glb()
+    coordinates = {"TEXCOORD_0": glb.accessor(QUAD_UVS)}
+    bumpy = glb.material("Bumpy", normalTexture={"index": glb.texture(png(IMAGE))})
+    glb.node(glb.mesh(bumpy, **coordinates))
+    glb.node(glb.mesh(glb.material("Flat"), positions=QUAD + np.float32([0, 0, 1]), **coordinates))
+    scene = read(glb.save(tmp_path / "two.glb"))
+    flat = scene.material == scene.material_names.index("Flat")
+    assert not scene.tangents[flat].any() and scene.tangents[~flat].any()
+    assert scene.normal_texture[scene.material[flat]].tolist() == [-1, -1]
+
+
+def test_a_map_that_cannot_be_read_is_left_out(tmp_path: Path) -> None:
+    glb = Glb()
+    gone = glb.add("textures", {"source": glb.add("images", {"uri": "gone.png"})})
+    mesh = glb.mesh(glb.material("Wall", normalTexture={"index": gone}), TEXCOORD_0=glb.accessor(QUAD_UVS))
+    glb.node(mesh)
+    scene = read(glb.save(tmp_path / "a.glb"))
+    assert len(scene.tangents) == 0
+    assert "gone.png" in scene.report.notes[0]
+
+
+@pytest.mark.parametrize("info", [{"index": 7}, {"index": 0, "scale": "much"}, {}])
+def test_what_is_no_normal_map_is_refused_with_its_place(tmp_path: Path, info: Any) -> None:
+    glb = Glb()
+    glb.texture(png(IMAGE))
+    glb.node(glb.mesh(glb.material("Wall", normalTexture=info)))
+    with pytest.raises(SceneError, match=r"materials\[0\].normalTexture"):
+        load_scene(glb.save(tmp_path / "a.glb"), as_file=True)
