@@ -34,6 +34,7 @@ from .study import study_days, study_problems
 from .values import MOST_HITS, Auto, Emission, FileName, MemorySize, Reflectivity, absolute
 
 Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; in every other format y is up
+STEEPEST = 100.0  # a normal map whose slopes are multiplied by more is a map of cliffs
 NAME = "[A-Za-z0-9_][A-Za-z0-9._-]{0,99}"  # what can start a file name on every system
 
 
@@ -51,6 +52,13 @@ class MaterialTable(Table):
         description="Mirror reflectivity, linear. Above 0 the material reflects like a mirror. "
         "Diffuse plus mirror reflectivity is at most 1 in each channel.",
         json_schema_extra=default_text("as in the scene"),
+    )
+    normal_strength: float | None = Field(
+        default=None,
+        ge=0,
+        le=STEEPEST,
+        description='Multiplies the slopes of the material\'s normal map; 0: no map. Only with `surfaces = "file"`.',
+        json_schema_extra=default_text("1"),
     )
 
     @field_validator("specular")
@@ -92,6 +100,14 @@ class SceneTable(Table):
     materials: dict[str, MaterialTable] = Field(
         default_factory=dict, description="Materials to override, by their names in the scene file."
     )
+
+    @model_validator(mode="after")
+    def _check_surfaces(self) -> "SceneTable":
+        given = [name for name, table in self.materials.items() if table.normal_strength is not None]
+        if given and self.surfaces != "file":
+            problem = 'expected none with scene.surfaces = "diffuse", which shows no normal map; ask for "file"'
+            fail([(("materials", name, "normal_strength"), problem) for name in given])
+        return self
 
     @model_validator(mode="after")
     def _fill_up(self) -> "SceneTable":

@@ -24,6 +24,10 @@ class Override(Protocol):
     def specular(self) -> Sequence[float] | None:
         """Mirror reflectivity, linear RGB."""
 
+    @property
+    def normal_strength(self) -> float | None:
+        """What multiplies the slopes of the normal map."""
+
 
 def override_materials(
     materials: Sequence[Material], overrides: Mapping[str, Override], notes: Notes
@@ -46,8 +50,18 @@ def override_materials(
                 material = replace(material, specular=_rgb(override.specular), specular_texture=-1)
             if any(d + s > 1 for d, s in zip(material.reflectivity, material.specular, strict=True)):
                 notes.add("overridden materials reflect more than they receive", material.name)
+        if override is not None and override.normal_strength is not None:
+            material = _with_strength(material, override.normal_strength, notes)
         found.append(material)
     return found
+
+
+def _with_strength(material: Material, strength: float, notes: Notes) -> Material:
+    """Multiply the slopes of a normal map; without slopes there is no map."""
+    if material.normal_texture < 0:
+        notes.add("normal_strength changes nothing where there is no normal map", material.name)
+    texture = material.normal_texture if strength > 0 else -1
+    return replace(material, normal_texture=texture, normal_scale=material.normal_scale * strength)
 
 
 def _rgb(values: Sequence[float]) -> tuple[float, float, float]:

@@ -5,9 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
+from support import tiny
 from support.scenes import QUAD, QUAD_UVS, Glb, check_shapes, png
 
 from framearray_cli.base.errors import SceneError
+from framearray_cli.job.job import MaterialTable
 from framearray_cli.scene.scene import Scene, load_scene, scene_report_lines
 
 UP = np.broadcast_to(np.float32([0, 0, 1]), (4, 3))
@@ -119,3 +122,101 @@ def test_what_is_no_normal_map_is_refused_with_its_place(tmp_path: Path, info: A
     glb.node(glb.mesh(glb.material("Wall", normalTexture=info)))
     with pytest.raises(SceneError, match=r"materials\[0\].normalTexture"):
         load_scene(glb.save(tmp_path / "a.glb"), as_file=True)
+
+
+# --- OBJ and MTL --------------------------------------------------------------------------------------------------
+
+RAMP = np.repeat(np.uint8([[[0], [40], [80], [40]]]), 3, axis=2)  # a roof: up, up, down, down
+SLOPE = 40 / 255  # in heights per texel, at its sides
+
+
+def obj_quad(folder: Path, line: str, *, image: Any = RAMP, vn: bool = True) -> Path:
+    (folder / "map.png").write_bytes(png(image))
+    (folder / "a.mtl").write_text(f"newmtl Wall\nKd 0.5 0.5 0.5\n{line}\n")
+    rows = [f"v {x} {y} {z}" for x, y, z in QUAD.tolist()]
+    rows += [f"vt {u} {1 - v}" for u, v in QUAD_UVS.tolist()] + (["vn 0 0 1"] if vn else [])
+    rows += ["mtllib a.mtl", "usemtl Wall", "f " + " ".join(f"{k}/{k}/{'1' if vn else ''}" for k in range(1, 5))]
+    (folder / "a.obj").write_text("\n".join(rows) + "\n")
+    return folder / "a.obj"
+
+
+def slopes(scene: Scene) -> Any:
+    """(height, width, 2) slopes -x / z and -y / z of the first normal map, times its scale."""
+    first, width, height = scene.textures[scene.normal_texture[0]]
+    codes = scene.texels[first : first + width * height, :3].reshape(height, width, 3) / 127.5 - 1
+    return -codes[..., :2] / codes[..., 2:] * scene.normal_scale[0]
+
+
+@pytest.mark.parametrize("key", ["map_Bump", "bump", "map_bump"])
+def test_heights_become_normals(tmp_path: Path, key: str) -> None:
+    scene = read(obj_quad(tmp_path, f"{key} -bm 2.5 map.png"))
+    # half a code value of a normal is 0.004 of its slope
+    assert slopes(scene)[0, :, 0] == pytest.approx(2.5 * SLOPE * np.array([0, 1, 0, -1]), abs=2.5 * 0.006)
+    assert slopes(scene)[0, :, 1] == pytest.approx(np.zeros(4), abs=2.5 * 0.006)
+    assert tangents_of(scene) == [[1, 0, 0, 1]]
+    assert "height maps are taken as normals, with heights in texels: Wall" in scene.report.notes
+
+
+def test_heights_upwards_in_the_picture_lean_down(tmp_path: Path) -> None:
+    scene = read(obj_quad(tmp_path, "map_Bump map.png", image=np.swapaxes(RAMP, 0, 1)))
+    # row 0 is on top: from row 0 to row 2 the height falls with v
+    assert slopes(scene)[:, 0, 1] == pytest.approx(-SLOPE * np.array([0, 1, 0, -1]), abs=0.006)
+
+
+def test_light_greys_are_heights_though_their_length_is_1(tmp_path: Path) -> None:
+    """(201, 201, 201) is nearly a unit vector."""
+    scene = read(obj_quad(tmp_path, "map_Bump map.png", image=RAMP // 8 + 196))
+    assert any("heights" in note for note in scene.report.notes)
+
+
+@pytest.mark.parametrize("line", ["norm map.png", "map_Bump -bm 0.5 map.png", "map_Bump gone.png\nnorm map.png"])
+def test_an_image_of_normals_is_taken_as_it_is(tmp_path: Path, line: str) -> None:
+    random = np.random.default_rng(4).normal(size=(8, 8, 3))
+    normal = abs(random) * [1, 1, 3] / np.linalg.norm(random * [1, 1, 3], axis=2, keepdims=True)
+    image = np.rint((normal + 1) * 127.5).astype(np.uint8)
+    scene = read(obj_quad(tmp_path, line, image=image))
+    assert scene.texels[:, :3].tolist() == image.reshape(-1, 3).tolist()
+    assert scene.normal_scale.tolist() == [0.5 if "-bm" in line else 1.0]
+    assert not scene.report.notes
+
+
+def test_maps_of_an_obj_file_move_and_need_no_normals(tmp_path: Path) -> None:
+    scene = read(obj_quad(tmp_path, "map_Bump -s -2 3 1 -o 0.5 0 0 map.png", vn=False))
+    assert scene.normal_uvs[0].tolist() == [[0.5, 0], [-1.5, 0], [-1.5, 3]]
+    assert tangents_of(scene) == [[-1, 0, 0, -1]]
+
+
+def test_maps_of_an_obj_file_are_left_out_with_a_note(tmp_path: Path) -> None:
+    scene = load_scene(obj_quad(tmp_path, "map_Bump map.png"))
+    assert scene.report.notes == ('normal maps are left out; scene.surfaces = "file" uses them: Wall',)
+    assert not len(scene.tangents) and not len(scene.textures)
+
+
+# --- overrides ----------------------------------------------------------------------------------------------------
+
+
+def test_a_strength_multiplies_slopes(tmp_path: Path) -> None:
+    file = mapped_quad(tmp_path, {"scale": 0.5})
+    strong = load_scene(file, {"Wall": MaterialTable(normal_strength=3.0)}, as_file=True)
+    assert strong.normal_scale.tolist() == [1.5]
+    none = load_scene(file, {"Wall": MaterialTable(normal_strength=0.0)}, as_file=True)
+    assert (none.normal_texture.tolist(), none.report.normal_maps) == ([-1], 0)
+    kept = load_scene(file, {"Wall": MaterialTable(reflectivity=[0.1, 0.1, 0.1])}, as_file=True)
+    assert kept.normal_texture.tolist() == [0]
+
+
+def test_a_strength_without_a_map_is_noted(tmp_path: Path) -> None:
+    glb = Glb()
+    glb.node(glb.mesh(glb.material("Wall")))
+    scene = load_scene(glb.save(tmp_path / "a.glb"), {"Wall": MaterialTable(normal_strength=3.0)}, as_file=True)
+    assert scene.report.notes == ("normal_strength changes nothing where there is no normal map: Wall",)
+
+
+def test_a_strength_needs_surfaces_as_the_file_has_them() -> None:
+    with pytest.raises(ValidationError) as error:
+        tiny.job(scene={"materials": {"Wall": {"normal_strength": 2.0}}})
+    assert 'expected none with scene.surfaces = "diffuse"' in str(error.value)
+    job = tiny.job(scene={"surfaces": "file", "materials": {"Wall": {"normal_strength": 2.0}}})
+    assert job.scene.materials["Wall"].normal_strength == 2.0
+    with pytest.raises(ValidationError):
+        tiny.job(scene={"surfaces": "file", "materials": {"Wall": {"normal_strength": -1.0}}})

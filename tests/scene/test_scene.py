@@ -18,6 +18,7 @@ from framearray_cli.scene.scene import Scene, build_scene, load_scene, scene_rep
 class Override:
     reflectivity: tuple[float, float, float] | None = None
     specular: tuple[float, float, float] | None = None
+    normal_strength: float | None = None
 
 
 TRIANGLE = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], dtype=np.float64)

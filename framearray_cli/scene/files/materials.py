@@ -17,6 +17,7 @@ from .textures import TextureTable
 TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light counts as glass, which is left out for now
 CUTOFF = 0.5  # alpha where a blended texture turns from hole to surface; also glTF's default for masks
 BRIGHTEST = 1e30  # stands in for infinite reflectivities, before they are scaled to 1
+NO_NORMAL_MAPS = 'normal maps are left out; scene.surfaces = "file" uses them'
 DEFAULT_NAME = "default"
 COLOURED_NAME = "vertex colours"
 

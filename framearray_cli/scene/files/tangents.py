@@ -10,6 +10,8 @@ takes the front of a triangle from the order of its corners; here it is where th
 against that order exist.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,8 @@ from framearray_cli.base.arrays import Float64
 
 from ..cleaning import hash_rows
 from ..vectors import cross, lengths
+from .limit import Limit
+from .model import Part
 
 CORNER_BYTES = 300  # memory per corner while tangents are computed (measured: 290)
 
@@ -26,7 +30,7 @@ def compute_tangents(corners: Float64, normals: Float64 | None, uvs: Float64) ->
 
     Args:
         corners: (f, 3, 3) positions.
-        normals: (f, 3, 3) of any length, or None: those of the triangles.
+        normals: (f, 3, 3) of any length, or None: those of the triangles, which also replace broken ones.
         uvs: (f, 3, 2) texture coordinates, v upwards.
 
     Returns:
@@ -38,8 +42,10 @@ def compute_tangents(corners: Float64, normals: Float64 | None, uvs: Float64) ->
         (du1, dv1), (du2, dv2) = (uvs[:, 1] - uvs[:, 0]).T, (uvs[:, 2] - uvs[:, 0]).T
         area = du1 * dv2 - du2 * dv1  # of the texture, twice
         along_u = (dv2[:, None] * first - dv1[:, None] * second) * np.sign(area)[:, None]
-        front = np.repeat(cross(first, second)[:, None], 3, axis=1)
-        unit = _unit(front if normals is None else normals)
+        front = unit = np.repeat(_unit(cross(first, second))[:, None], 3, axis=1)
+        if normals is not None:
+            unit = _unit(normals)
+            unit = np.where(np.isfinite(unit), unit, front)
         inside_out = (unit * front).sum(axis=(1, 2)) < 0
         flat = _unit(_into_plane(np.broadcast_to(along_u[:, None], corners.shape), unit))
         weighted = flat * _angles(corners, unit)[..., None]
@@ -56,6 +62,14 @@ def compute_tangents(corners: Float64, normals: Float64 | None, uvs: Float64) ->
         tangent = np.nan_to_num(_unit(sums[2 * group + mirrored]))
     w = np.where(mirrored, -1.0, 1.0) * (lengths(tangent) > 0)
     return np.concatenate([tangent, w[..., None]], axis=2)
+
+
+def with_tangents(part: Part, limit: Limit) -> Part:
+    """Give a part that has texture coordinates of a normal map its tangents."""
+    if part.normal_uvs is None:
+        return part
+    with limit.lend("tangents", CORNER_BYTES * 3 * len(part.corners)):
+        return replace(part, tangents=compute_tangents(part.corners, part.normals, part.normal_uvs))
 
 
 def _unit(vectors: Float64) -> Float64:

@@ -12,6 +12,7 @@ from framearray_cli.base.arrays import Bytes, Float64
 from framearray_cli.base.errors import SceneError
 
 from .assets import AssetError
+from .heights import holds_normals, normals_of_heights
 from .limit import Limit
 from .model import Notes
 
@@ -76,6 +77,20 @@ class TextureTable:
                 texels[..., 3] = np.rint(texels[..., :3].mean(axis=2))
                 self.indices[cut_key] = self._append(texels)
         return self.indices[cut_key]
+
+    def relief(self, key: Hashable, label: str, read: Callable[[], bytes]) -> tuple[int, bool]:
+        """As `index`, for an image of normals or of heights, which become normals; also whether it held heights."""
+        own_key = ("relief", key)
+        if own_key not in self.indices:
+            texels = self._decode(label, read)
+            if texels is None:
+                self.indices[own_key] = -1
+            elif holds_normals(texels):
+                self.indices[own_key] = self.index(key, label, read)
+            else:
+                self.indices[own_key] = self._append(normals_of_heights(texels))
+        found = self.indices[own_key]
+        return found, found != self.indices.get(key, -1)
 
     def alpha_range(self, index: int) -> tuple[float, float]:
         """Lowest and highest alpha of a texture in [0, 1]; (1, 1) for no texture."""

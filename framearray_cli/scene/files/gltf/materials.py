@@ -11,7 +11,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.colour import linear_from_srgb
 
 from ..assets import Assets
-from ..materials import CUTOFF, Opacity, Rgb3, blended_opacity, make_material, masked_opacity
+from ..materials import CUTOFF, NO_NORMAL_MAPS, Opacity, Rgb3, blended_opacity, make_material, masked_opacity
 from ..model import Material, Notes
 from ..textures import TextureTable
 from .container import Gltf, image_bytes
@@ -247,7 +247,7 @@ def _note_ignored(name: str, entry: Tree, assets: Assets, notes: Notes) -> None:
     if name not in assets.shining and emissive is not None and max(emissive) > 0:
         notes.add("emission is left out", name)
     if entry.get("normalTexture") is not None and not assets.as_file:
-        notes.add('normal maps are left out; scene.surfaces = "file" uses them', name)
+        notes.add(NO_NORMAL_MAPS, name)
     if entry.get("occlusionTexture") is not None:
         notes.add("occlusion maps are left out (obscurances are computed)", name)
     for extension in sorted(set(entry.get("extensions") or {}) - KNOWN - SILENT):

@@ -1,11 +1,12 @@
 """MTL text -> materials. trimesh is not used: it ignores map options, Windows paths, `d` and `illum`."""
 
+import math
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from ..assets import Assets
-from ..materials import Opacity, Rgb3, blended_opacity, make_material
+from ..materials import NO_NORMAL_MAPS, Opacity, Rgb3, blended_opacity, make_material
 from ..model import GREY, Material, Notes
 from ..textures import TextureTable
 
@@ -15,18 +16,19 @@ GLASS_MODELS = (4, 6, 7, 9)
 MIRROR_NS = 810.0
 MAP_OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-texres": 1, "-clamp": 1, "-bm": 1, "-imfchan": 1}
 MAP_OPTIONS |= {"-type": 1, "-cc": 1, "-o": 3, "-s": 3, "-t": 3}
-IGNORED_MAPS = [f"map_{what}" for what in ("ks", "ns", "ke", "ka", "bump", "refl", "pr", "pm", "ps", "tr")]
-IGNORED_MAPS += ["bump", "norm", "disp", "refl"]
+IGNORED_MAPS = [f"map_{what}" for what in ("ks", "ns", "ke", "ka", "refl", "pr", "pm", "ps", "tr")] + ["disp", "refl"]
+RELIEF = ("norm", "map_bump", "bump")  # normal and height maps; the first that a material has counts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapUse:
-    """A texture of a material: its file, and uv' = scale * uv + offset."""
+    """A texture of a material: its file, and uv' = scale * uv + offset; `strength` multiplies heights (-bm)."""
 
     file: str
     scale: tuple[float, float] = (1.0, 1.0)
     offset: tuple[float, float] = (0.0, 0.0)
     clamp: bool = False
+    strength: float = 1.0
 
 
 @dataclass(slots=True)
@@ -56,11 +58,12 @@ def parse_mtl(text: str) -> dict[str, MtlEntry]:
 
 def to_material(
     entry: MtlEntry, assets: Assets, textures: TextureTable, notes: Notes
-) -> tuple[Material, MapUse | None]:
+) -> tuple[Material, MapUse | None, MapUse | None]:
     """Map an MTL material to a diffuse part, a mirror part and an opacity.
 
     Returns:
-        The material, and the use of its base texture, whose scale and offset the reader applies.
+        The material, and the uses of its base texture and of its normal map, whose scales and offsets the reader
+        applies.
     """
     name, values = entry.name, entry.values
     use = _map_use(values.get("map_kd"))
@@ -78,11 +81,28 @@ def to_material(
             notes.add("rough metals are taken as diffuse", name)
     opacity = _opacity(name, values, texture, assets, textures, notes)
     shines = name in assets.shining
-    _note_ignored(name, values, use, shines, notes)
+    _note_ignored(name, values, use, assets, notes)
     material = make_material(name, kd, specular, opacity, notes, texture=texture)
     if shines and (ke := _rgb(values, "ke")) is not None:
         material = replace(material, emission=(max(ke[0], 0.0), max(ke[1], 0.0), max(ke[2], 0.0)))
-    return material, use if texture >= 0 else None
+    material, relief = _relief(material, values, assets, textures, notes)
+    return material, use if texture >= 0 else None, relief
+
+
+def _relief(
+    material: Material, values: Mapping[str, str], assets: Assets, textures: TextureTable, notes: Notes
+) -> tuple[Material, MapUse | None]:
+    """Give a material its normal map, if surfaces follow the file; also return how the map is used."""
+    use = next((_map_use(values[key]) for key in RELIEF if key in values), None)
+    if use is None or not assets.as_file:
+        return material, None
+    file = use.file
+    texture, heights = textures.relief(("file", file), f"material {material.name}", lambda: assets.read(file))
+    if texture < 0:
+        return material, None
+    if heights:
+        notes.add("height maps are taken as normals, with heights in texels", material.name)
+    return replace(material, normal_texture=texture, normal_scale=use.strength), use
 
 
 def _base_colour(name: str, values: Mapping[str, str], textured: bool, notes: Notes) -> Rgb3:
@@ -115,13 +135,15 @@ def _opacity(
     return opacity
 
 
-def _note_ignored(name: str, values: Mapping[str, str], use: MapUse | None, shines: bool, notes: Notes) -> None:
+def _note_ignored(name: str, values: Mapping[str, str], use: MapUse | None, assets: Assets, notes: Notes) -> None:
     ke = _rgb(values, "ke")
-    if not shines and ke is not None and max(ke) > 0:
+    if name not in assets.shining and ke is not None and max(ke) > 0:
         notes.add("emission is left out", name)
     for key in IGNORED_MAPS:
         if key in values:
             notes.add(f"{key} maps are left out", name)
+    if not assets.as_file and any(key in values for key in RELIEF):
+        notes.add(NO_NORMAL_MAPS, name)
     if "pm" in values or "pr" in values:
         notes.add("Pm and Pr (metalness and roughness) of an MTL file are left out", name)
     if use is not None and use.clamp:
@@ -149,7 +171,14 @@ def _map_use(value: str | None) -> MapUse | None:
         scale[1] = 1.0
     file = value.strip() if at == 0 else " ".join(words[at:])
     clamp = found.get("-clamp", [""])[:1] == ["on"]
-    return MapUse(file=file, scale=(scale[0], scale[1]), offset=(offset[0], offset[1]), clamp=clamp)
+    strength = [float(word) for word in found.get("-bm", []) if _is_number(word) and math.isfinite(float(word))]
+    return MapUse(
+        file=file,
+        scale=(scale[0], scale[1]),
+        offset=(offset[0], offset[1]),
+        clamp=clamp,
+        strength=strength[0] if strength else 1.0,
+    )
 
 
 def _rgb(values: Mapping[str, str], key: str) -> Rgb3 | None:

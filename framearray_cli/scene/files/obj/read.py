@@ -17,6 +17,7 @@ from framearray_cli.base.units import agree, counted
 from ..assets import AssetError, Assets
 from ..materials import clean_colours, default_material
 from ..model import Material, Meshes, Notes, Part
+from ..tangents import with_tangents
 from ..textures import TextureTable
 from .mtl import MapUse, MtlEntry, parse_mtl, to_material
 from .polygons import Ears, triangulate
@@ -68,19 +69,16 @@ def read_obj(data: bytes, assets: Assets) -> Meshes:
     parts: list[Part] = []
     for place in np.unique(material_of):
         rows = corners[material_of == place]
-        material, use = _material(text, int(place), colours is not None, library, assets, textures, notes)
-        part_uvs = _pick(uvs, rows[..., 1]) if use is not None else None
-        if use is not None and part_uvs is not None:
-            part_uvs = part_uvs * np.array(use.scale) + np.array(use.offset)
-        parts.append(
-            Part(
-                material=len(materials),
-                corners=positions[rows[..., 0]],
-                normals=_pick(normals, rows[..., 2]),
-                uvs=part_uvs,
-                colours=None if colours is None else colours[rows[..., 0]],
-            )
+        material, use, relief = _material(text, int(place), colours is not None, library, assets, textures, notes)
+        part = Part(
+            material=len(materials),
+            corners=positions[rows[..., 0]],
+            normals=_pick(normals, rows[..., 2]),
+            uvs=_placed(uvs, rows[..., 1], use),
+            colours=None if colours is None else colours[rows[..., 0]],
+            normal_uvs=_placed(uvs, rows[..., 1], relief),
         )
+        parts.append(with_tangents(part, assets.limit))
         materials.append(material)
     return Meshes(
         parts=tuple(parts),
@@ -221,6 +219,12 @@ def _pick(table: Float64, index: Indices) -> Float64 | None:
     return picked
 
 
+def _placed(table: Float64, index: Indices, use: MapUse | None) -> Float64 | None:
+    """Pick the texture coordinates of a map; None without a map, or if all are missing."""
+    picked = None if use is None else _pick(table, index)
+    return None if picked is None or use is None else picked * np.array(use.scale) + np.array(use.offset)
+
+
 def _libraries(names: Sequence[str], assets: Assets, notes: Notes) -> dict[str, MtlEntry]:
     """Read the materials of all `mtllib` lines; the first of each name counts."""
     entries: dict[str, MtlEntry] = {}
@@ -258,12 +262,12 @@ def _material(
     assets: Assets,
     textures: TextureTable,
     notes: Notes,
-) -> tuple[Material, MapUse | None]:
-    """The material at an index of the `usemtl` names, or a default for faces without."""
+) -> tuple[Material, MapUse | None, MapUse | None]:
+    """The material, with the uses of its maps, at an index of the `usemtl` names, or a default for faces without."""
     name = text.materials[place] if place >= 0 else ""
     entry = library.get(name) or library.get(name.split("#", 1)[0].strip())
     if entry is not None:
         return to_material(entry, assets, textures, notes)
     if name:
         notes.add("materials not found in any material library", name)
-    return default_material(coloured, notes, name), None
+    return default_material(coloured, notes, name), None, None
