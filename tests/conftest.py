@@ -25,10 +25,6 @@ def pytest_configure() -> None:
         from support import instructionset
 
         instructionset.force_embreex()
-    if os.environ.get("PYTEST_XDIST_WORKER"):
-        from support import inturn
-
-        inturn.compile_in_turn()
 
 
 @pytest.hookimpl(optionalhook=True)
