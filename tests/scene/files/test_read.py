@@ -321,6 +321,18 @@ def test_ignored_features_are_noted(tmp_path):
         assert expected in text
 
 
+def test_what_stands_in_for_an_extension_is_noted(tmp_path):
+    glb = Glb()
+    found = {"KHR_materials_clearcoat": {"clearcoatFactor": 1}, "KHR_materials_sheen": {}, "EXT_odd": {}}
+    for name in ("Car", "Boat"):
+        glb.node(glb.mesh(glb.material(name, extensions=found)))
+    assert read_meshes(glb.save(tmp_path / "a.glb")).notes == (
+        "EXT_odd is left out: Car, Boat",
+        "KHR_materials_clearcoat is left out; the surface under the coat shows: Car, Boat",
+        "KHR_materials_sheen is left out; cloth has no bright rim: Car, Boat",
+    )
+
+
 @pytest.mark.parametrize(("uri", "expected"), [("gone.png", "no such file"), ("broken.png", "not an image")])
 def test_missing_texture_is_noted(tmp_path, uri, expected):
     folder = tmp_path / "scene"

@@ -22,6 +22,15 @@ MIRROR_ROUGHNESS = 0.1  # up to it a metal is a mirror
 GLOSSY_SPECULAR = 0.2  # a specular factor (old extension) above it means metal; dielectrics have 0.04
 KNOWN = {"KHR_materials_transmission", "KHR_materials_pbrSpecularGlossiness", STRENGTH}
 SILENT = {"KHR_materials_ior", "KHR_materials_volume"}  # they only matter inside glass, which is left out
+# What a surface is taken for without an extension that is left out.
+INSTEAD = {
+    "KHR_materials_anisotropy": "brushed surfaces look the same from all sides",
+    "KHR_materials_clearcoat": "the surface under the coat shows",
+    "KHR_materials_diffuse_transmission": "no light comes through from the back",
+    "KHR_materials_dispersion": "glass does not part colours",
+    "KHR_materials_iridescence": "the surface under the thin film shows",
+    "KHR_materials_sheen": "cloth has no bright rim",
+}
 REPEAT = 10497
 
 
@@ -254,7 +263,8 @@ def _note_ignored(name: str, entry: Tree, assets: Assets, notes: Notes) -> None:
         if extension == "KHR_materials_unlit":
             notes.add("unlit materials are lit like any other", name)
         else:
-            notes.add(f"{extension} is left out", name)
+            instead = f"; {INSTEAD[extension]}" if extension in INSTEAD else ""
+            notes.add(f"{extension} is left out{instead}", name)
 
 
 def _rgb(values: Any) -> Rgb3:
