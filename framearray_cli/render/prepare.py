@@ -16,6 +16,7 @@ from framearray_cli.engine.images.denoise import require_denoiser
 from framearray_cli.engine.inputs.cameras import Cameras, cameras
 from framearray_cli.engine.inputs.emitters import emitters
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
+from framearray_cli.engine.inputs.mips import mips
 from framearray_cli.engine.inputs.random import lattice_steps
 from framearray_cli.engine.inputs.relief import Relief, relief
 from framearray_cli.engine.inputs.surfaces import Surfaces, near_depth, surfaces
@@ -156,6 +157,7 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
         cams=cams,
         surfaces=prepared.surfaces,
         relief=prepared.relief,
+        mips=mips(scene, 1 / (cams.focal * max(job.hits * (2 * n_r + 1), 1.0) ** 0.5)),
         tracer=embree.tracer,
         lights=prepared.light_arrays,
         kept=range(prepared.n_lights),
@@ -275,7 +277,9 @@ def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Am
         return ambient_by_light(particles, prepared.threads)
     walks = _eye_walks(prepared, embree)
     if job.ambient.method == "fit":
-        return ambient_by_fit(walks, _curve(job), prepared.threads)
+        ways, sky = job.obscurance, job.obscurance.outside == "background"
+        curve = ObscuranceCurve(d_max=ways.range, falloff=FALLOFFS[ways.falloff], tau=ways.tau, sky=sky)
+        return ambient_by_fit(walks, curve, prepared.threads)
     if job.ambient.intensity is not None:
         return fixed_ambient(walks, np.array(job.ambient.intensity, np.float32), prepared.threads)
     return ambient_by_eye(walks, prepared.threads)
@@ -292,9 +296,3 @@ def _eye_walks(prepared: Prepared, embree: EmbreeScene) -> EyeWalks:
         lights=prepared.light_arrays,
         background=np.array(job.scene.background, np.float32),
     )
-
-
-def _curve(job: Job) -> ObscuranceCurve:
-    wanted = job.obscurance
-    sky = wanted.outside == "background"
-    return ObscuranceCurve(d_max=wanted.range, falloff=FALLOFFS[wanted.falloff], tau=wanted.tau, sky=sky)

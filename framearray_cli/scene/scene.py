@@ -14,6 +14,7 @@ from framearray_cli.base.units import counted
 from .cleaning import has_area, is_finite, is_repeated
 from .files import Material, Meshes, Notes, read_meshes
 from .merge import Merged, add_untextured_variants, merge, unit_normals, wrap_uvs
+from .mips import MOST_LEVELS, add_mips
 from .overrides import Override, override_materials
 from .vectors import rows_of
 
@@ -68,6 +69,8 @@ class Scene:
         texels: (n_texels, 4) uint8 RGBA of all textures one after another; colours sRGB encoded, alpha linear;
             row 0 on top.
         textures: (n_textures, 3) int32 first texel, width, height.
+        levels: (n_textures, MOST_LEVELS, 3) first texel, width and height of smaller copies of textures, see `mips.py`,
+            whose texels follow those of the textures; or (0, MOST_LEVELS, 3).
         n_opaque: number of triangles without alpha mask.
         tangents: (n, 3, 4) per corner: the unit vector in which u of the normal map grows, or 0, and w, which with
             normal x tangent gives the bitangent; (0, 3, 4) where no material has a normal map.
@@ -95,6 +98,7 @@ class Scene:
     alpha_cutoff: Float32
     texels: Bytes
     textures: Int32
+    levels: Int32
     n_opaque: int
     tangents: Float32
     normal_uvs: CornerUvs
@@ -125,21 +129,22 @@ def load_scene(
         folders: where files that the scene names may lie, beside its own folder.
         memory: bytes that reading may allocate; None: all free memory.
         shining: names of the materials whose emission is read; that of others is 0.
-        as_file: whether surfaces follow the file, with its normal maps; else they are diffuse or mirrors.
+        as_file: whether surfaces follow the file, with its normal maps and smaller copies of textures; else they are
+            diffuse or mirrors.
 
     Raises:
         SceneError: a file that cannot be read, holds nothing to render, or lacks an overridden material.
     """
     meshes = read_meshes(file, folders, memory, shining, as_file=as_file)
     try:
-        return build_scene(meshes, overrides or {})
+        return build_scene(meshes, overrides or {}, as_file=as_file)
     except SceneError as error:
         raise SceneError(f"{file}: {error}") from error
     except MemoryError as error:
         raise SceneError(f"{file}: does not fit into memory") from error
 
 
-def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
+def build_scene(meshes: Meshes, overrides: Mapping[str, Override], *, as_file: bool = False) -> Scene:
     """Make the arrays that kernels read from the contents of a file."""
     notes = Notes()
     parts, materials = add_untextured_variants(meshes.parts, meshes.materials, notes)
@@ -161,9 +166,7 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
     if merged.colours is not None:
         colours = merged.colours[keep]
     cutoff = np.array([m.alpha_cutoff for m in materials], dtype=np.float32)
-    sizes = np.array([t.shape[:2] for t in meshes.textures], dtype=np.int64).reshape(-1, 2)
-    starts = np.cumsum(sizes.prod(axis=1)) - sizes.prod(axis=1)
-    texels = [t.reshape(-1, 4) for t in meshes.textures]
+    texels, textures, levels = _texture_tables(meshes.textures, materials if as_file else ())
     return Scene(
         centre=centre,
         corners=corners,
@@ -182,8 +185,9 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
         alpha=np.array([m.alpha for m in materials], dtype=np.float32),
         alpha_texture=np.array([m.alpha_texture for m in materials], dtype=np.int32),
         alpha_cutoff=cutoff,
-        texels=np.concatenate(texels) if texels else np.zeros((0, 4), dtype=np.uint8),
-        textures=np.column_stack([starts, sizes[:, 1], sizes[:, 0]]).astype(np.int32),
+        texels=texels,
+        textures=textures,
+        levels=levels,
         n_opaque=int((cutoff[material] == 0).sum()),
         tangents=tangents,
         normal_uvs=normal_uvs,
@@ -199,6 +203,21 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override]) -> Scene:
             normal_maps=len({materials[m].normal_texture for m in np.unique(material)} - {-1}),
         ),
     )
+
+
+def _texture_tables(images: Sequence[Bytes], shown: Sequence[Material]) -> tuple[Bytes, Int32, Int32]:
+    """`Scene.texels`, `Scene.textures` and `Scene.levels`.
+
+    Args:
+        shown: materials whose textures get smaller copies.
+    """
+    sizes = np.array([image.shape[:2] for image in images], dtype=np.int64).reshape(-1, 2)
+    starts = np.cumsum(sizes.prod(axis=1)) - sizes.prod(axis=1)
+    textures = np.column_stack([starts, sizes[:, 1], sizes[:, 0]]).astype(np.int32)
+    wanted = {number for m in shown for number in (m.texture, m.specular_texture)} - {-1}
+    copies, levels = add_mips(images, wanted) if wanted else ([], np.zeros((0, MOST_LEVELS, 3), np.int32))
+    texels = [image.reshape(-1, 4) for image in (*images, *copies)]
+    return np.concatenate(texels) if texels else np.zeros((0, 4), dtype=np.uint8), textures, levels
 
 
 def _empty(width: int) -> Float32:

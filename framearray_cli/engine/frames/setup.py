@@ -12,6 +12,7 @@ from ..hits.hits import World
 from ..hits.native import pixel_order
 from ..inputs.cameras import Cameras
 from ..inputs.lights import LightArrays, some_lights
+from ..inputs.mips import SHARP, Mips
 from ..inputs.relief import FLAT, Relief
 from ..inputs.surfaces import Surfaces
 from ..terms.cells.gather import LIGHT
@@ -48,7 +49,7 @@ class FrameSetup:
         local: whether `cells` hold the ambient light of obscurances, see `terms/cells/local.py`; else all light.
         exact: whether paths take the place of `cells`, which then hold nothing, see `terms/cells/exact.py`.
         smooth: number of passes of the filter of indirect light from cells.
-        relief: normal maps.
+        relief, mips: normal maps, and smaller copies of textures.
         sun: whose hours the layers hold; None: of none.
         order: (n_pixels,) every pixel once, in the order of tracing.
     """
@@ -80,6 +81,7 @@ class FrameSetup:
     smooth: int = 0
     sun: SunStudy | None = None
     relief: Relief = FLAT
+    mips: Mips = SHARP
     order: Int32 = field(init=False)
 
     def __post_init__(self) -> None:
@@ -96,7 +98,7 @@ class FrameSetup:
     @property
     def world(self) -> World:
         """The surfaces, and how to trace rays to them."""
-        return World(self.surfaces, self.tracer, self.relief)
+        return World(self.surfaces, self.tracer, self.relief, self.mips)
 
     def passes(self, c: int) -> tuple[Pass, ...]:
         """The native hits of eye c."""

@@ -10,6 +10,7 @@ import numpy as np
 from framearray_cli.base.arrays import Bytes, Directions, Float32, Int32, Keys, Points, Rgb, Triple
 
 from ..embree.packets import DIRECTION, Tracer, decode_hits, intersect
+from ..inputs.mips import SHARP, Mips
 from ..inputs.relief import FLAT, Relief
 from ..inputs.surfaces import Surfaces, geometric_normal, position_at, reflectivity_at, shading_normal, specular_at
 from ..kernels.kernel import inlined, kernel
@@ -50,11 +51,12 @@ class Hits(NamedTuple):
 
 
 class World(NamedTuple):
-    """The surfaces of a scene, the tracer that finds them, and their normal maps, if any."""
+    """The surfaces of a scene, the tracer that finds them, and if wanted normal maps and smaller copies of textures."""
 
     surfaces: Surfaces
     tracer: Tracer
     relief: Relief = FLAT
+    mips: Mips = SHARP
 
 
 def empty_hits(n: int) -> Hits:
@@ -128,7 +130,7 @@ def trace_hits(
     Kernels that write rays do not call these two themselves: they would be compiled into each of them.
     """
     intersect(world.tracer, packets, n, coherent, near)
-    record_hits(world, packets, n, mirrors, hits)
+    record_hits(world._replace(mips=SHARP), packets, n, mirrors, hits)  # compiled once, whether there are any
 
 
 @kernel

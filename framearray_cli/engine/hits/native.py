@@ -13,6 +13,7 @@ from ..inputs.surfaces import specular_at
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, doubles, floor, gather, integers, lane_numbers, put_triples, select, store, store_row
 from .hits import Hits, World, trace_hits
+from .mips import blur_textures
 
 
 class Samples(NamedTuple):
@@ -121,8 +122,14 @@ def native_hits(
         mirrors: whether the scene has mirrors; otherwise the hits' `specular` is not written.
     """
     _write_native_rays(cams, c, samples, first, n, packets, hits)
-    # trace from the depth at which eyes begin to see
+    _trace_eye_rays(cams, world, packets, n, mirrors=mirrors, hits=hits)
+
+
+def _trace_eye_rays(cams: Cameras, world: World, packets: Float32, n: int, *, mirrors: bool, hits: Hits) -> None:
+    """Trace eye rays from the depth at which eyes begin to see, and turn them into hits."""
     trace_hits(world, packets, n, coherent=True, near=cams.near, mirrors=mirrors, hits=hits)
+    if len(world.mips):
+        blur_textures(world.mips, world.tracer, packets, n, mirrors, hits)
 
 
 @kernel
@@ -151,7 +158,7 @@ def extra_hits(
     Hits are numbered by pixel, within a pixel by sample.
     """
     _write_extra_rays(cams, c, samples, first, n, packets, hits)
-    trace_hits(world, packets, n, coherent=True, near=cams.near, mirrors=True, hits=hits)
+    _trace_eye_rays(cams, world, packets, n, mirrors=True, hits=hits)
 
 
 @kernel

@@ -24,6 +24,7 @@ from .limit import Limit
 from .model import Meshes
 from .obj.read import read_obj
 from .other import read_other, readable_formats
+from .textures import KEPT
 
 LOGGERS = ("trimesh", "PIL")
 # Not reported: the limit counts what images take, and a note names each texture that is left out.
@@ -57,6 +58,8 @@ def read_meshes(
     extension = file.suffix[1:].lower()
     with _quiet() as messages, np.errstate(all="ignore"), _scene_errors(file, extension):
         meshes = _read(_bytes_of(file, assets.limit), extension, assets)
+        if as_file:  # for their smaller copies, see `mips.py`
+            assets.limit.take("textures", KEPT * sum(t.shape[0] * t.shape[1] for t in meshes.textures) // 3)
         assets.require_inside()
     if not any(len(part.corners) for part in meshes.parts):
         found = "; ".join(
