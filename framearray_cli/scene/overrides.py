@@ -41,8 +41,8 @@ def override_materials(
     for material in materials:
         override = overrides.get(material.name)
         if override is not None and (override.reflectivity is not None or override.specular is not None):
-            if material.left_out == "transmissive":
-                material = replace(material, left_out="")
+            if material.left_out == "transmissive" or material.glass is not None:
+                material = replace(material, left_out="", glass=None)
                 notes.add("transmissive materials with an override are shown after all", material.name)
             if override.reflectivity is not None:
                 material = replace(material, reflectivity=_rgb(override.reflectivity), texture=-1)

@@ -5,21 +5,18 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Float64, Int32, Rgb
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.units import counted
 
-from .cleaning import has_area, is_finite, is_repeated
 from .files import Material, Meshes, Notes, read_meshes
-from .merge import Merged, add_untextured_variants, merge, unit_normals, wrap_uvs
+from .merge import add_untextured_variants, merge, unit_normals, wrap_uvs
 from .mips import MOST_LEVELS, add_mips
 from .overrides import Override, override_materials
+from .panes import select_panes
+from .selecting import dropped_text, select_triangles
 from .vectors import rows_of
-
-# Between these sizes tracing was measured to be right. Far below, float32 is denormal; far above, rays hit nothing.
-SMALLEST_SCENE, LARGEST_SCENE = 1e-12, 1e12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,6 +74,8 @@ class Scene:
         normal_uvs: (n, 3, 2) texture coordinates of normal maps, v upwards, or (0, 3, 2).
         normal_texture: (m,) normal map, or -1.
         normal_scale: (m,) what multiplies red and green of the normal map.
+        pane_corners: (p, 3, 3) corner positions of the triangles of thin glass, centred; they are no part of `corners`.
+        pane_optics: (p, PANE_COLUMNS) what each of them lets through; see `panes.py`.
     """
 
     centre: Float64
@@ -104,7 +103,14 @@ class Scene:
     normal_uvs: CornerUvs
     normal_texture: Int32
     normal_scale: Float32
+    pane_corners: Corners
+    pane_optics: Float32
     report: SceneReport
+
+    @property
+    def has_glass(self) -> bool:
+        """Whether any triangle is thin glass."""
+        return len(self.pane_corners) > 0
 
     @property
     def has_mirrors(self) -> bool:
@@ -153,7 +159,10 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override], *, as_file: b
     parts = [replace(p, colours=None) if materials[p.material].name in plain else p for p in parts]
     merged = merge(parts)
     dropped = dict(meshes.dropped)
-    keep, centre, corners = _select_triangles(merged, materials, dropped, meshes.notes)
+    keep, centre, corners = select_triangles(merged, materials, dropped, meshes.notes)
+    panes = select_panes(merged, materials, centre, dropped)
+    if len(panes.corners):
+        notes.add(panes.note)
     material = merged.material[keep]
     normals, uvs, colours, tangents, normal_uvs = _empty(3), _empty(2), _empty(3), _empty(4), _empty(2)
     if merged.tangents is not None and merged.normal_uvs is not None:
@@ -193,6 +202,8 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override], *, as_file: b
         normal_uvs=normal_uvs,
         normal_texture=np.array([m.normal_texture for m in materials], dtype=np.int32),
         normal_scale=np.array([m.normal_scale for m in materials], dtype=np.float32),
+        pane_corners=panes.corners,
+        pane_optics=panes.optics,
         report=SceneReport(
             triangles=len(corners),
             materials=len(np.unique(material)),
@@ -224,73 +235,9 @@ def _empty(width: int) -> Float32:
     return np.zeros((0, 3, width), dtype=np.float32)
 
 
-def _select_triangles(
-    merged: Merged, materials: Sequence[Material], dropped: dict[str, int], notes: Sequence[str]
-) -> tuple[NDArray[np.int64], Float64, Corners]:
-    """Select the triangles that stay, and centre them.
-
-    Args:
-        merged: all triangles of the file.
-        materials: indexed by `merged.material`.
-        dropped: gets the reasons and numbers of triangles left out.
-        notes: repeated in the error when nothing stays.
-
-    Returns:
-        Rows of `merged` that stay, opaque ones first; the centre (3,); their corners (n, 3, 3), centred.
-
-    Raises:
-        SceneError: nothing stays, or a size that cannot be traced.
-    """
-    rows = np.arange(len(merged.corners))
-    rows = _drop(rows, ~is_finite(merged.corners), "non-finite", dropped)
-    for reason in sorted({material.left_out for material in materials} - {""}):
-        absent = np.array([material.left_out == reason for material in materials])
-        rows = _drop(rows, absent[merged.material[rows]], reason, dropped)
-    rows = _drop(rows, ~has_area(rows_of(merged.corners, rows)), "degenerate", dropped)
-    _check_left(rows, dropped, notes)
-    left = rows_of(merged.corners, rows)
-    # axis by axis: numpy takes ten times as long for the bounds of all three at once
-    low, high = (np.array([bound(left[..., axis]) for axis in range(3)]) for bound in (np.min, np.max))
-    centre = low / 2 + high / 2
-    size = float((high / 2 - low / 2).max()) * 2
-    if not SMALLEST_SCENE <= size <= LARGEST_SCENE:
-        raise SceneError(
-            f"the scene is {size:.3g} units wide; expected {SMALLEST_SCENE:g} to {LARGEST_SCENE:g}; scale the model"
-        )
-    corners = (left - centre).astype(np.float32)
-    flat = ~has_area(corners)
-    rows, corners = _drop(rows, flat, "degenerate", dropped), rows_of(corners, np.flatnonzero(~flat))
-    cutoff = np.array([material.alpha_cutoff for material in materials])
-    masked = cutoff[merged.material[rows]] > 0
-    order = np.argsort(masked, kind="stable")
-    rows, corners, masked = rows[order], rows_of(corners, order), masked[order]
-    # of coinciding opaque triangles one hides the others, of any material; a cut-out one lets others show
-    again = is_repeated(corners, np.where(masked, merged.material[rows] + 1, 0))
-    rows, corners = _drop(rows, again, "duplicate", dropped), rows_of(corners, np.flatnonzero(~again))
-    _check_left(rows, dropped, notes)
-    return rows, centre, corners
-
-
-def _drop(rows: NDArray[np.int64], bad: NDArray[np.bool_], reason: str, dropped: dict[str, int]) -> NDArray[np.int64]:
-    count = int(bad.sum())
-    if count:
-        dropped[reason] = dropped.get(reason, 0) + count
-    return rows[~bad] if count else rows
-
-
-def _check_left(rows: NDArray[np.int64], dropped: Mapping[str, int], notes: Sequence[str]) -> None:
-    if len(rows) == 0:
-        found = "; ".join((_dropped_text(dropped), *notes))
-        raise SceneError(f"no triangle is left to render: {found}")
-
-
-def _dropped_text(dropped: Mapping[str, int]) -> str:
-    return ", ".join(f"{count} {reason}" for reason, count in dropped.items())
-
-
 def scene_report_lines(report: SceneReport, file: Path | str) -> list[str]:
     """The report on a scene: one line of numbers, then one line per note."""
-    left_out = f"; left out: {_dropped_text(report.dropped)}" if report.dropped else ""
+    left_out = f"; left out: {dropped_text(report.dropped)}" if report.dropped else ""
     found = (report.triangles, "triangle"), (report.materials, "material"), (report.textures, "texture")
     numbers = ", ".join(counted(n, noun) for n, noun in found)
     if report.normal_maps:

@@ -11,7 +11,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64
 
-from .model import GREY, Material, Notes
+from .model import GREY, Glass, Material, Notes
 from .textures import TextureTable
 
 TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light counts as glass, which is left out for now
@@ -32,6 +32,7 @@ class Opacity:
     alpha_texture: int = -1
     alpha_cutoff: float = 0.0
     left_out: str = ""
+    glass: Glass | None = None
 
 
 def make_material(
@@ -64,6 +65,7 @@ def make_material(
         alpha_texture=opacity.alpha_texture,
         alpha_cutoff=opacity.alpha_cutoff,
         left_out=opacity.left_out,
+        glass=opacity.glass,
     )
 
 
@@ -89,10 +91,19 @@ def masked_opacity(alpha: float, texture: int, cutoff: float, textures: TextureT
     return Opacity(alpha=alpha, alpha_texture=texture, alpha_cutoff=cutoff)
 
 
-def blended_opacity(name: str, alpha: float, texture: int, textures: TextureTable, notes: Notes) -> Opacity:
-    """Opacity of a material that lets light through by alpha: glass, cut out, or taken as opaque."""
+def blended_opacity(
+    name: str, alpha: float, texture: int, textures: TextureTable, notes: Notes, glass: Glass | None = None
+) -> Opacity:
+    """Opacity of a material that lets light through by alpha: glass, cut out, or taken as opaque.
+
+    Args:
+        glass: what a pane of the material lets through; None leaves panes out.
+    """
     lowest, highest = textures.alpha_range(texture)
     if alpha * highest < TRANSMISSIVE_ALPHA:
+        if glass is not None:
+            notes.add("transmissive materials are thin glass, which light passes straight", name)
+            return Opacity(glass=glass)
         notes.add("transmissive materials are left out", name)
         return Opacity(left_out="transmissive")
     if lowest < CUTOFF <= highest:

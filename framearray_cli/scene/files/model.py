@@ -12,6 +12,21 @@ MOST_NOTES = 50  # more would scroll away what matters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Glass:
+    """What a thin pane lets through, see `PANE_COLUMNS`.
+
+    Attributes:
+        colour: share of the light that passes a whole pane, besides what its faces reflect, linear RGB in [0, 1].
+        ior: refractive index, at least 1; 1 reflects nothing head-on.
+        covers: whether the pane is no glass but a surface that covers a part of what is behind it: nothing reflects.
+    """
+
+    colour: tuple[float, float, float]
+    ior: float = 1.5
+    covers: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
     """A material as the renderer sees it; textures are indices into `Meshes.textures`, or -1.
 
@@ -27,6 +42,7 @@ class Material:
         alpha_cutoff: a point is absent where alpha is below it; 0 for an opaque material.
         normal_texture: normal map, or -1; `normal_scale` multiplies what its red and green say.
         left_out: why its triangles are left out ("transmissive", "cut out"), or "".
+        glass: what its triangles let through as thin panes, which nothing else is seen of; None: of no pane.
     """
 
     name: str
@@ -43,6 +59,7 @@ class Material:
     normal_texture: int = -1
     normal_scale: float = 1.0
     left_out: str = ""
+    glass: Glass | None = None
 
     @property
     def textured(self) -> bool:

@@ -74,6 +74,10 @@ MATERIAL = {
     **extensions(
         KHR_materials_pbrSpecularGlossiness=table(GLOSSY),
         KHR_materials_transmission=table({"transmissionFactor": number()}),
+        KHR_materials_ior=table({"ior": number()}),
+        KHR_materials_volume=table(
+            {"thicknessFactor": number(), "attenuationDistance": number(), "attenuationColor": numbers(3)}
+        ),
     ),
 }
 PRIMITIVE = {

@@ -15,6 +15,7 @@ from ..materials import CUTOFF, NO_NORMAL_MAPS, Opacity, Rgb3, blended_opacity, 
 from ..model import Material, Notes
 from ..textures import TextureTable
 from .container import Gltf, image_bytes
+from .glass import cover_of, pane_of
 from .values import Tree
 
 STRENGTH = "KHR_materials_emissive_strength"
@@ -91,7 +92,7 @@ def _material(
         diffuse, specular = _metal(name, base, pbr, source, notes)
     else:
         diffuse, specular = _glossy(name, base, gloss, notes)
-    opacity = _opacity(name, entry, float(base[3]), texture, source, notes)
+    opacity = _opacity(name, entry, base, texture, info, source, notes)
     _note_ignored(name, entry, assets, notes)
     mirror_texture = texture if gloss is None else -1
     material = make_material(name, diffuse, specular, opacity, notes, texture=texture, mirror_texture=mirror_texture)
@@ -220,23 +221,31 @@ def _glossy(name: str, base: Float64, gloss: Tree, notes: Notes) -> tuple[Rgb3, 
     return _rgb(base[:3] + specular), (0.0, 0.0, 0.0)
 
 
-def _opacity(name: str, entry: Tree, alpha: float, texture: int, source: ImageFinder, notes: Notes) -> Opacity:
-    transmission: Tree = (entry.get("extensions") or {}).get("KHR_materials_transmission") or {}
-    passed = float(transmission.get("transmissionFactor", 0.0))
+def _opacity(
+    name: str, entry: Tree, base: Float64, texture: int, info: Tree | None, source: ImageFinder, notes: Notes
+) -> Opacity:
+    """Opacity of a material; with `Assets.as_file`, what nearly clear ones let through."""
+    extensions: Tree = entry.get("extensions") or {}
+    transmission: Tree = extensions.get("KHR_materials_transmission") or {}
+    alpha, passed = float(base[3]), float(transmission.get("transmissionFactor", 0.0))
+    mode, panes = entry.get("alphaMode", "OPAQUE"), source.assets.as_file
+    coloured = panes and (passed > 0 or mode == "BLEND") and texture >= 0
+    texel = source.mean(info) if coloured and info is not None else None
     if transmission.get("transmissionTexture") is not None and passed > 0:
         notes.add("transmission textures are left out, their factor counts", name)
     if passed > 0:
-        through = blended_opacity(name, 1.0 - passed, -1, source.textures, notes)
-        if through.left_out:
+        pane = pane_of(passed, base, texel, extensions) if panes else None
+        through = blended_opacity(name, 1.0 - passed, -1, source.textures, notes, pane)
+        if through.left_out or through.glass:
             return through
-    mode = entry.get("alphaMode", "OPAQUE")
     if mode == "MASK":
         opacity = masked_opacity(alpha, texture, float(entry.get("alphaCutoff", CUTOFF)), source.textures)
         if opacity.left_out:
             notes.add("materials that their alpha mask removes everywhere are left out", name)
         return opacity
     if mode == "BLEND":
-        return blended_opacity(name, alpha, texture, source.textures, notes)
+        cover = cover_of(alpha, texel) if panes else None
+        return blended_opacity(name, alpha, texture, source.textures, notes, cover)
     return Opacity()
 
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field, replace
 
 from ..assets import Assets
 from ..materials import NO_NORMAL_MAPS, Opacity, Rgb3, blended_opacity, make_material
-from ..model import GREY, Material, Notes
+from ..model import GREY, Glass, Material, Notes
 from ..textures import TextureTable
 
 MIRROR_MODELS = (3, 5)  # illum: ray traced reflection, without and with Fresnel
 GLASS_MODELS = (4, 6, 7, 9)
+IOR = 1.5  # of glass without Ni
 # The lowest Ns of a mirror. Exporters write Ns = 1000 (1 - roughness)^2, and a mirror's roughness is at most 0.1.
 MIRROR_NS = 810.0
 MAP_OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-texres": 1, "-clamp": 1, "-bm": 1, "-imfchan": 1}
@@ -129,10 +130,21 @@ def _opacity(
     if use is not None:
         file = use.file
         texture = textures.cutout(("file", file), f"material {name}", lambda: assets.read(file))
-    opacity = blended_opacity(name, alpha, texture, textures, notes)
-    if not opacity.left_out and int(_number(values, "illum", 2)) in GLASS_MODELS:
+    pane = _pane(values, alpha) if assets.as_file else None
+    opacity = blended_opacity(name, alpha, texture, textures, notes, pane)
+    if not opacity.left_out and not opacity.glass and int(_number(values, "illum", 2)) in GLASS_MODELS:
         notes.add("glass that is not nearly clear (d from 0.25) is taken as opaque", name)
     return opacity
+
+
+def _pane(values: Mapping[str, str], alpha: float) -> Glass:
+    """The pane of a nearly clear material: coloured by Tf, and of glass if `illum` or Ni says so."""
+    tf = _rgb(values, "tf") or (1.0, 1.0, 1.0)
+    red, green, blue = (min(max(channel * (1.0 - alpha), 0.0), 1.0) for channel in tf)
+    glass = int(_number(values, "illum", 2)) in GLASS_MODELS or _number(values, "ni", 1.0) > 1.0
+    return Glass(
+        colour=(red, green, blue), ior=max(_number(values, "ni", IOR), 1.0) if glass else 1.0, covers=not glass
+    )
 
 
 def _note_ignored(name: str, values: Mapping[str, str], use: MapUse | None, assets: Assets, notes: Notes) -> None:

@@ -1,0 +1,118 @@
+"""Thin glass: the triangles that light passes straight through, and the share of it that each lets pass.
+
+Of light that meets a face at the angle theta, the share F = f + g (1 - cos(theta))^5 is reflected, with
+f = ((ior - 1) / (ior + 1))^2 and g = 1 - f (Schlick). A sheet without thickness stands for a pane with two faces,
+between which light is reflected to and fro: it passes colour (1 - F) / (1 + F) and reflects 2 F / (1 + F). Of a body
+with a thickness, which is a mesh that closes, each face passes the root of the colour times 1 - F, and reflects F.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from framearray_cli.base.arrays import Corners, Float32, Float64
+from framearray_cli.base.units import counted
+
+from .cleaning import has_area, is_finite, is_repeated
+from .files import Material
+from .merge import Merged, geometric_normals
+from .vectors import largest
+
+# Columns of a triangle: colour, RGB; f and g of its reflectance; 1 of a sheet and 0 of a body; unit normal; the height
+# at which rays leave it, see `Surfaces.offset`.
+COLOUR, F, G, SHEET, NORMAL, OFFSET = 0, 3, 4, 5, 6, 9
+PANE_COLUMNS = 10
+OFFSET_SHARE = 16.0 * 2.0**-23  # of the largest coordinate, as of other triangles
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Panes:
+    """The triangles of thin glass: `Scene.pane_corners` and `pane_optics`."""
+
+    corners: Corners
+    optics: Float32
+
+    @property
+    def note(self) -> str:
+        """What the report on a scene says of them."""
+        sheets = int((self.optics[:, SHEET] > 0).sum())
+        bodies = len(self.optics) - sheets
+        parts = [f"{counted(sheets, 'triangle')} of sheets"] * (sheets > 0)
+        parts += [f"{counted(bodies, 'triangle')} of closed bodies, which do not refract"] * (bodies > 0)
+        return f"glass: {' and '.join(parts)}"
+
+
+def is_glass(merged: Merged, materials: Sequence[Material]) -> NDArray[np.bool_]:
+    """(n,) whether each triangle of all parts is thin glass."""
+    glass = np.array([material.glass is not None for material in materials], np.bool_)
+    return np.asarray(glass[merged.material])
+
+
+def select_panes(merged: Merged, materials: Sequence[Material], centre: Float64, dropped: dict[str, int]) -> Panes:
+    """Select the triangles of thin glass; of coinciding ones the first counts.
+
+    Args:
+        merged: all triangles of the file.
+        materials: indexed by `merged.material`.
+        centre: (3,) of the scene.
+        dropped: gets the reasons and numbers of triangles left out.
+    """
+    rows = np.flatnonzero(is_glass(merged, materials))
+    if not len(rows):
+        return Panes(np.zeros((0, 3, 3), np.float32), np.zeros((0, PANE_COLUMNS), np.float32))
+    bad = ~is_finite(merged.corners[rows])
+    corners = np.where(bad[:, None, None], 0.0, merged.corners[rows] - centre).astype(np.float32)
+    flat = ~bad & ~has_area(corners)
+    again = ~bad & ~flat & is_repeated(corners, np.zeros(len(rows), np.int64))
+    for reason, left_out in (("non-finite", bad), ("degenerate", flat), ("duplicate", again)):
+        if left_out.any():
+            dropped[reason] = dropped.get(reason, 0) + int(left_out.sum())
+    kept = ~(bad | flat | again)
+    corners, material = corners[kept], merged.material[rows[kept]]
+    optics = np.zeros((len(corners), PANE_COLUMNS), np.float32)
+    if not len(corners):
+        return Panes(corners, optics)
+    closed = in_closed_mesh(corners)
+    for number in np.unique(material):
+        glass = materials[number].glass
+        assert glass is not None
+        some = material == number
+        colour = np.array(glass.colour)
+        optics[some, COLOUR : COLOUR + 3] = colour
+        if not glass.covers:
+            optics[some & closed, COLOUR : COLOUR + 3] = np.sqrt(colour)
+            optics[some, F] = ((glass.ior - 1) / (glass.ior + 1)) ** 2
+            optics[some, G] = 1 - optics[some, F]
+    optics[:, SHEET] = ~closed
+    optics[:, NORMAL : NORMAL + 3] = geometric_normals(corners)
+    optics[:, OFFSET] = OFFSET_SHARE * largest(corners.reshape(-1, 9))
+    return Panes(corners, optics)
+
+
+def in_closed_mesh(corners: Corners) -> NDArray[np.bool_]:
+    """(n,) whether a triangle belongs to a mesh of triangles, joined at their corners, each edge of which has two.
+
+    Args:
+        corners: (n, 3, 3) positions; corners at the same place are one vertex.
+    """
+    _, vertex = np.unique(corners.reshape(-1, 3) + np.float32(0.0), axis=0, return_inverse=True)
+    faces = vertex.reshape(-1, 3)
+    n = int(faces.max()) + 1
+    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2)  # (n, 3, 2)
+    _, number, count = np.unique(edges[..., 0] * n + edges[..., 1], return_inverse=True, return_counts=True)
+    whole = (count[number.reshape(-1, 3)] == 2).all(axis=1)
+    # the lowest vertex of the mesh that each vertex belongs to
+    label = np.arange(n)
+    while True:
+        lowest = label[faces].min(axis=1)
+        new = label.copy()
+        np.minimum.at(new, faces.reshape(-1), np.repeat(lowest, 3))
+        new = new[new]
+        if (new == label).all():
+            break
+        label = new
+    open_mesh = np.zeros(n, np.bool_)
+    open_mesh[label[faces[~whole, 0]]] = True
+    return np.asarray(~open_mesh[label[faces[:, 0]]])
