@@ -8,8 +8,7 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Rgb
 from framearray_cli.base.memory import available_cores, resident_memory
 from framearray_cli.engine.embree import EmbreeScene, Engine
-from framearray_cli.engine.frames.passes import frame_hits, frames_per_turn
-from framearray_cli.engine.frames.records import BY_SAMPLE
+from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.images.denoise import require_denoiser
@@ -17,6 +16,7 @@ from framearray_cli.engine.inputs.cameras import Cameras, cameras
 from framearray_cli.engine.inputs.emitters import emitters
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.mips import mips
+from framearray_cli.engine.inputs.panes import pane_arrays
 from framearray_cli.engine.inputs.random import lattice_steps
 from framearray_cli.engine.inputs.relief import Relief, relief
 from framearray_cli.engine.inputs.surfaces import Surfaces, near_depth, surfaces
@@ -36,11 +36,10 @@ from framearray_cli.scene.paths.paths import Eyes, Lights, eyes, lights
 from framearray_cli.scene.paths.planes import Plane
 from framearray_cli.scene.scene import Scene, load_scene
 
+from .halves import halves_of
 from .shining import with_emission
 from .sun_study import sun_study
 
-# Least native hits per pixel that are sampled in two halves.
-FEWEST_SPLIT = 4
 # Least memory granted to the scene; a limit that leaves less is refused later, when the needs of frames are known.
 LEAST_SCENE_MEMORY = 64 * 2**20
 
@@ -76,6 +75,10 @@ class Prepared:
         """The surfaces, how to trace rays to them, and their normal maps."""
         return World(self.surfaces, embree.tracer, self.relief)
 
+    def lights_in(self, embree: EmbreeScene) -> LightArrays:
+        """All lights, with the glass that dims them."""
+        return self.light_arrays._replace(panes=pane_arrays(self.scene, embree.panes))
+
     @property
     def threads(self) -> int:
         """Threads of the render: the job's, else one per core that this process may use."""
@@ -107,7 +110,7 @@ def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepare
         scene=scene,
         eyes=eyes,
         lights=lights,
-        light_arrays=coloured(arrays) if job.indirect.exact else arrays,
+        light_arrays=coloured(arrays) if job.indirect.exact or scene.has_glass else arrays,
         surfaces=surfaces(scene),
         relief=relief(scene),
         still=eyes.at_rest,
@@ -152,14 +155,14 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
     if prepared.still:  # one frame, with the hits that its whole window would have
         cams = cams._replace(**{name: getattr(cams, name)[:1] for name in ("position", "right", "up", "forward")})
     step_x, step_y = lattice_steps(job.samples.obscurance)
-    mirrors = scene.has_mirrors and job.specular.depth > 0
+    mirrors = (scene.has_mirrors or scene.has_glass) and job.specular.depth > 0
     return FrameSetup(
         cams=cams,
         surfaces=prepared.surfaces,
         relief=prepared.relief,
         mips=mips(scene, 1 / (cams.focal * max(job.hits * (2 * n_r + 1), 1.0) ** 0.5)),
         tracer=embree.tracer,
-        lights=prepared.light_arrays,
+        lights=prepared.lights_in(embree),
         kept=range(prepared.n_lights),
         obscurance=ObscuranceSettings(
             d_max=job.obscurance.range,
@@ -176,17 +179,17 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
         seed=job.seed,
         n_r=0 if prepared.still else n_r,
         per_pixel=frame_hits(len(cams.position), n_r, job.hits),
-        mirror_hits=job.specular.hits if mirrors else 0,
+        mirror_hits=job.specular.hits if mirrors and scene.has_mirrors else 0,
         depth=job.specular.depth if mirrors else 0,
         balance=job.reuse.weights != "average" and not prepared.still,
         area=job.reuse.weights == "area",
         background=background,
         planes=prepared.lights.planes,
-        shadow_step=job.samples.shadow_step,
+        shadow_step=1 if scene.has_glass else job.samples.shadow_step,
         shadow_unbiased=job.samples.shadow_unbiased,
         layers=job.output.layers,
         denoise=job.denoise.obscurance,
-        halves=_halves(job, still=prepared.still),
+        halves=halves_of(job, still=prepared.still),
         sun=sun_study(job, prepared.lights) if job.sun_days else None,
     )
 
@@ -200,7 +203,7 @@ def _with_cells(
         cams=eye_cameras(prepared),
         seed=job.seed,
         world=prepared.world(embree),
-        lights=prepared.light_arrays,
+        lights=prepared.lights_in(embree),
         depth=setup.depth,
     )
     work = CellWork(
@@ -246,18 +249,6 @@ def _name_groups(ambient: Ambient, lights: Lights) -> Ambient:
     return replace(ambient, notes=tuple(note.replace(f"at light {l} ", name) for note in ambient.notes))
 
 
-def _halves(job: Job, *, still: bool) -> int:
-    """Return how the job's hits are split into two halves; see `FrameSetup.halves`.
-
-    Frames see a place differently, so halves of frames differ by more than noise, which matters where noise is low.
-    Halves of one or two samples are spread less evenly over a pixel than all these samples.
-    """
-    if not job.samples.halves:
-        return 0
-    by_sample = job.hits >= FEWEST_SPLIT or still or job.n_r == 0
-    return BY_SAMPLE if by_sample else frames_per_turn(job.hits)
-
-
 def eye_cameras(prepared: Prepared) -> Cameras:
     """Return all eyes as kernels take them; an eye sees nothing nearer than the ray offset from surfaces."""
     near = near_depth(prepared.surfaces)
@@ -272,7 +263,7 @@ def _ambient(prepared: Prepared, embree: EmbreeScene, background: Float32) -> Am
         return replace(fixed_ambient(few, np.zeros(3, np.float32), prepared.threads), paths=0)
     if job.ambient.method == "light" and job.ambient.intensity is None:
         particles = LightWalks(
-            seed=seed, paths=job.ambient.paths, world=world, lights=prepared.light_arrays, background=background
+            seed=seed, paths=job.ambient.paths, world=world, lights=prepared.lights_in(embree), background=background
         )
         return ambient_by_light(particles, prepared.threads)
     walks = _eye_walks(prepared, embree)
@@ -293,6 +284,6 @@ def _eye_walks(prepared: Prepared, embree: EmbreeScene) -> EyeWalks:
         seed=job.seed,
         paths=job.ambient.paths,
         world=prepared.world(embree),
-        lights=prepared.light_arrays,
+        lights=prepared.lights_in(embree),
         background=np.array(job.scene.background, np.float32),
     )

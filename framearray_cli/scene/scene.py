@@ -10,7 +10,7 @@ from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Float
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.units import counted
 
-from .files import Material, Meshes, Notes, read_meshes
+from .files import Meshes, Notes, read_meshes
 from .merge import add_untextured_variants, merge, unit_normals, wrap_uvs
 from .mips import MOST_LEVELS, add_mips
 from .overrides import Override, override_materials

@@ -9,6 +9,7 @@ engines serve the same kernels:
   reached, and the twin that tests compare packets with.
 """
 
+from dataclasses import replace
 from types import TracebackType
 from typing import Literal, Self
 
@@ -26,7 +27,13 @@ Engine = Literal["auto", "packets", "embreex"]
 
 
 class EmbreeScene:
-    """A scene to trace rays through; owns Embree's structures and frees them on `close`."""
+    """A scene to trace rays through; owns Embree's structures and frees them on `close`.
+
+    Attributes:
+        engine: how rays are traced.
+        tracer: of all triangles but glass.
+        panes: of the triangles of thin glass; None without.
+    """
 
     def __init__(self, scene: Scene, engine: Engine = "auto") -> None:
         """Build the acceleration structure.
@@ -44,10 +51,15 @@ class EmbreeScene:
         self.engine: Engine = "packets" if library else "embreex"
         self._built = NativeScene(scene, library) if library else EmbreexScene(scene)
         self.tracer: Tracer = self._built.tracer
+        panes = replace(scene, corners=scene.pane_corners, n_opaque=len(scene.pane_corners))
+        self._glass = (NativeScene(panes, library) if library else EmbreexScene(panes)) if scene.has_glass else None
+        self.panes: Tracer | None = self._glass.tracer if self._glass else None
 
     def close(self) -> None:
         """Free Embree's memory; do not trace afterwards."""
         self._built.close()
+        if self._glass:
+            self._glass.close()
 
     def __enter__(self) -> Self:
         return self

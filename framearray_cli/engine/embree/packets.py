@@ -157,6 +157,17 @@ def intersect(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = Fa
 
 
 @kernel
+def intersect_on(tracer: Tracer, packets: Float32, n_rays: int) -> None:
+    """Find the first hits of rays 0 to n_rays - 1 beyond row TNEAR of each; idle rays meet nothing."""
+    n_packets = _idle_from(packets, n_rays)
+    bits = packets.view(np.int32)
+    for first in range(0, n_rays, LANES):
+        store_row(bits, first, TRIANGLE, np.int32(MISS))
+        store_row(bits, first, GEOMETRY, np.int32(MISS))
+    _trace(tracer, tracer.intersect, packets, n_packets, False)
+
+
+@kernel
 def occlude(tracer: Tracer, packets: Float32, n_rays: int, coherent: bool = False) -> None:
     """Test rays 0 to n_rays - 1: row TFAR becomes -inf where something blocks the ray (`is_blocked`).
 

@@ -32,7 +32,8 @@ class Rays(NamedTuple):
     start: Int32
 
 
-# Origin, direction, tfar.
+# Rows of `Rays.row`: origin, direction, and length in units of that.
+FROM, TO, REACH = 0, 3, 6
 ROWS = 7
 # Rows of `Rays.number`.
 ORDER, RANK = 2, 3

@@ -12,7 +12,7 @@ from framearray_cli.base.arrays import Float32, Real, Triple
 
 from ..embree.packets import Tracer, room_in
 from ..hits.hits import Hits, lift, ray_origin, reflects, reflects_in_lanes, triple
-from ..hits.rays import NO_RAYS, Rays
+from ..hits.rays import FROM, NO_RAYS, REACH, TO, Rays
 from ..inputs.lights import DIRECTIONAL, MESH, LightArrays
 from ..inputs.maps import map_share, map_texel
 from ..inputs.shapes import source_at, source_in_lanes, source_point, vector_and_factor
@@ -29,7 +29,7 @@ from ..kernels.simd import (
     triples_at,
 )
 from .direct_maps import add_maps, is_map
-from .direct_meshes import FAR_END, FROM, REACH, TO, add_emitters
+from .direct_meshes import FAR_END, add_emitters
 from .direct_queue import Sixteen, queue_hits, trace_queue
 
 # With at most this many light positions a step takes sixteen hits, even those that lie apart.
@@ -146,7 +146,7 @@ def _direct_by_hits(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, ray
             if lights.kind[s] == MESH or is_map(lights, s):
                 continue
             waiting, total = queue_hits(lights, s, sixteen, tracer, rays, irradiance, waiting, total)
-    trace_queue(tracer, rays, waiting, irradiance)
+    trace_queue(tracer, lights.panes, rays, waiting, irradiance)
     of_maps: int = add_maps(hits, n, lights, tracer, rays, irradiance)
     return total + waiting + of_maps
 
@@ -170,12 +170,12 @@ def _direct_by_lights(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, r
             for l in range(0, n_lights, LANES):
                 # make room for sixteen rays
                 if waiting > capacity - LANES:
-                    trace_queue(tracer, rays, waiting, irradiance)
+                    trace_queue(tracer, lights.panes, rays, waiting, irradiance)
                     total, waiting = total + waiting, 0
                 # cos(theta) / d^2 of positions l to l + 15
                 x, y, z, factor = _geometry_of_lights(hits, i, lights, s, l)
                 waiting = _queue(lights, s, l, (x, y, z), factor, start, rays, waiting)
-    trace_queue(tracer, rays, waiting, irradiance)
+    trace_queue(tracer, lights.panes, rays, waiting, irradiance)
     return total + waiting
 
 
@@ -201,7 +201,9 @@ def direct(
         for channel in range(channels):
             for l in range(n_lights):
                 irradiance[i, channel, l] = 0.0
-    total: int = add_emitters(hits, n, lights.kind, lights.strength, lights.emitters, tracer, rays, irradiance)
+    total: int = add_emitters(
+        hits, n, lights.kind, lights.strength, lights.emitters, tracer, lights.panes, rays, irradiance
+    )
     if neighbours or n_lights <= FEW_LIGHTS:
         return total + _direct_by_hits(hits, n, lights, tracer, rays, irradiance)
     return total + _direct_by_lights(hits, n, lights, tracer, rays, irradiance)

@@ -52,7 +52,7 @@ def light_of_maps(hits: Hits, n: int, lights: LightArrays, tracer: Tracer, rays:
                 up = (e * g[0], e * g[1], e * g[2])
                 sixteen = Sixteen(at, wanted, p, g, m, up, gather(hits.key, at))
                 waiting, total = queue_hits(lights, s, sixteen, tracer, rays, irradiance, waiting, total)
-    trace_queue(tracer, rays, waiting, irradiance)
+    trace_queue(tracer, lights.panes, rays, waiting, irradiance)
     return total + waiting
 
 

@@ -12,9 +12,11 @@ from framearray_cli.base.arrays import Float32, Int32, Real
 
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, occlude, room_in
 from ..hits.hits import Hits, reflects_in_lanes
-from ..hits.rays import NO_RAYS, Rays
+from ..hits.rays import FROM, NO_RAYS, TO, Rays
+from ..hits.through import dim
 from ..inputs.emitters import Emitters, emitted_colour, kept_point
 from ..inputs.lights import MESH
+from ..inputs.panes import Panes
 from ..kernels.kernel import index, inlined, step
 from ..kernels.optional import chosen_by_type, step_or_zero
 from ..kernels.simd import (
@@ -32,8 +34,6 @@ from ..kernels.simd import (
 
 # A shadow ray ends at this fraction of the distance to the light: a surface that the light lies on must not hide it.
 FAR_END = np.float32(1.0 - 1e-4)
-# Rows of queued rays: origin, vector to the light, length in units of that vector.
-FROM, TO, REACH = 0, 3, 6
 
 
 @inlined
@@ -59,11 +59,12 @@ def write_packet(rays: Rays, first: int, reach: Real) -> None:
 
 
 @step
-def _trace_meshes(tracer: Tracer, rays: Rays, n: int, strength: Float32, irradiance: Float32) -> None:
+def _trace_meshes(tracer: Tracer, panes: Panes, rays: Rays, n: int, strength: Float32, irradiance: Float32) -> None:
     """Trace the n queued shadow rays, and add the light of those that nothing blocks, at all light positions."""
     for first in range(0, n, LANES):
         write_packet(rays, first, FAR_END)
     occlude(tracer, rays.packets, n, True)
+    dim(panes, rays, n, FAR_END)
     n_sources, channels, n_lights = strength.shape
     for first in range(0, n, LANES):
         arrived = bits(~(load_row(rays.packets, first, TFAR) < np.float32(0.0)))
@@ -80,7 +81,7 @@ def _trace_meshes(tracer: Tracer, rays: Rays, n: int, strength: Float32, irradia
 
 @step
 def light_of_meshes(
-    hits: Hits, n: int, kind: Int32, strength: Float32, emitters: Emitters, tracer: Tracer, rays: Rays,
+    hits: Hits, n: int, kind: Int32, strength: Float32, emitters: Emitters, tracer: Tracer, panes: Panes, rays: Rays,
     irradiance: Float32,
 ) -> int:  # fmt: skip
     """Add the irradiance of all meshes that shine at hits 0 to n - 1; hits that reflect nothing get none.
@@ -108,7 +109,7 @@ def light_of_meshes(
             if not _shines(kind, strength, s):
                 continue
             if waiting > capacity - LANES:
-                _trace_meshes(tracer, rays, waiting, strength, irradiance)
+                _trace_meshes(tracer, panes, rays, waiting, strength, irradiance)
                 total, waiting = total + waiting, 0
             # the points y that the hits keep
             kept, to, factor = kept_point(emitters, key, s, p, g, m)
@@ -128,15 +129,24 @@ def light_of_meshes(
                 for channel in range(3):
                     append(traced, factor * colour[channel], rays.value, channel * rays.value.shape[1] + waiting)
             waiting += popcount(traced)
-    _trace_meshes(tracer, rays, waiting, strength, irradiance)
+    _trace_meshes(tracer, panes, rays, waiting, strength, irradiance)
     return total + waiting
 
 
 def _add_emitters_of(
-    typingctx: Any, hits: Any, n: Any, kind: Any, strength: Any, emitters: Any, tracer: Any, rays: Any, irradiance: Any
+    typingctx: Any,
+    hits: Any,
+    n: Any,
+    kind: Any,
+    strength: Any,
+    emitters: Any,
+    tracer: Any,
+    panes: Any,
+    rays: Any,
+    irradiance: Any,
 ) -> Any:
     """`light_of_meshes`, or 0 where no mesh shines."""
-    given = (hits, n, kind, strength, emitters, tracer, rays, irradiance)
+    given = (hits, n, kind, strength, emitters, tracer, panes, rays, irradiance)
     return step_or_zero(typingctx, light_of_meshes, given, emitters[0])
 
 

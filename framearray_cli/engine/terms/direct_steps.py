@@ -17,13 +17,13 @@ from framearray_cli.base.arrays import Float32, Int32
 
 from ..embree.packets import Tracer, is_blocked, occlude, room_in, set_ray
 from ..hits.hits import Hits, lift, ray_origin, reflects
-from ..hits.rays import NO_RAYS, Rays
+from ..hits.rays import NO_RAYS, TO, Rays
 from ..inputs.lights import DIRECTIONAL, MESH, LightArrays
 from ..inputs.maps import map_texel, map_tint
 from ..inputs.random import STEPS, mix, random_word
 from ..kernels.kernel import inlined, kernel, step
 from .direct import vector_to_source, write_geometry
-from .direct_meshes import FAR_END, TO, add_emitters
+from .direct_meshes import FAR_END, add_emitters
 
 # Hits per block: enough to fill packets in the later rounds, which have fewer rays.
 BLOCK_HITS = 128
@@ -291,5 +291,7 @@ def direct_by_steps(
                     for l in range(n_lights):
                         seen = tests.factor[b, l] * tests.visible[b, l]
                         irradiance[first + b, channel, l] += seen * (lights.strength[s, channel, l] * tint)
-    meshes: int = add_emitters(hits, n, lights.kind, lights.strength, lights.emitters, tracer, rays, irradiance)
+    meshes: int = add_emitters(
+        hits, n, lights.kind, lights.strength, lights.emitters, tracer, lights.panes, rays, irradiance
+    )
     return total + meshes

@@ -11,13 +11,12 @@ from framearray_cli.base.arrays import Float32
 
 from ..embree.packets import DIRECTION, ORIGIN, TFAR, Tracer, is_blocked, occlude, room_in
 from ..hits.hits import Hits, ray_origin, reflects, triple
-from ..hits.rays import NO_RAYS, ORDER, RANK, Rays
+from ..hits.rays import FROM, NO_RAYS, ORDER, RANK, REACH, TO, Rays
 from ..inputs.lights import LightArrays
 from ..inputs.maps import HEIGHT, MASK, SEEN_WIDTH, TINT, WIDTH
 from ..inputs.random import AROUND, cosine_direction, r2, random_word
 from ..kernels.kernel import index, inlined, kernel
 from ..kernels.simd import LANES, floor, gather, integers, lane_numbers, load, select, store, store_row
-from .direct_meshes import FROM, REACH, TO
 from .environments import place_in_map
 from .obscurance_rays import CELLS, cell_of, sort_rays
 

@@ -66,7 +66,7 @@ def probe(prepared: Prepared, embree: EmbreeScene, reach: int) -> Acceptance:
     """
     job, n_c = prepared.job, 1 if prepared.still else prepared.n_cameras
     cams = eye_cameras(prepared)
-    lights = some_lights(prepared.light_arrays, evenly_spaced(prepared.n_lights, PROBE_LIGHTS))
+    lights = some_lights(prepared.lights_in(embree), evenly_spaced(prepared.n_lights, PROBE_LIGHTS))
     order = pixel_order(cams.width, cams.height)
     pixels = order[evenly_spaced(len(order), PROBE_HITS)]
     n, samples = len(pixels), Samples(job.seed, pixels, per_pixel=1, first=0)

@@ -165,7 +165,7 @@ class _Look:
         place = np.empty(n, np.int64)
         place[hits.pixel[:n]] = np.arange(n)
         reflects = surface & (hits.reflectivity[:n] > 0).any(axis=1)
-        for pixel, reflected in mirror_paths(setup, hits, n, scratch) if setup.depth else []:
+        for pixel, reflected in mirror_paths(setup, c, hits, n, scratch) if setup.depth else []:
             np.add.at(radiance, place[pixel], self._radiance(reflected))
         return {
             "surface": surface,

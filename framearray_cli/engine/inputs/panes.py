@@ -1,0 +1,99 @@
+"""Thin glass for kernels: what a face passes and mirrors of the light that meets it; see `scene/panes.py`."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from framearray_cli.base.arrays import Float32, Real, Triple
+from framearray_cli.scene.panes import COLOUR, NORMAL, OFFSET, SHEET, F, G
+from framearray_cli.scene.scene import Scene
+
+from ..embree.packets import Tracer
+from ..kernels.kernel import inlined
+
+NOWHERE = Tracer(0, 0, 0, 0, 0, 0, 0)
+
+
+class Panes(NamedTuple):
+    """The triangles of thin glass.
+
+    Attributes:
+        tracer: traces rays to them, and to nothing else.
+        optics: (n, PANE_COLUMNS) of `Scene`; (0,) where there are none: kernels are then compiled without them.
+    """
+
+    tracer: Tracer
+    optics: Float32
+
+
+NO_PANES = Panes(NOWHERE, np.empty(0, np.float32))
+
+
+def pane_arrays(scene: Scene, tracer: Tracer | None) -> Panes:
+    """The panes of a scene.
+
+    Args:
+        tracer: of `EmbreeScene.panes`; None where there are none.
+    """
+    return NO_PANES if tracer is None else Panes(tracer, scene.pane_optics)
+
+
+def has_panes(panes: Panes) -> bool:
+    """Whether there is any glass."""
+    return panes.optics.ndim > 1
+
+
+@inlined
+def reflectance(panes: Panes, triangle: int, d: Triple) -> Real:
+    """F of a face under a ray of direction d, of any length."""
+    o = panes.optics
+    x, y, z = np.float64(d[0]), np.float64(d[1]), np.float64(d[2])
+    along = x * o[triangle, NORMAL] + y * o[triangle, NORMAL + 1] + z * o[triangle, NORMAL + 2]
+    c = min(abs(along) / np.sqrt(x * x + y * y + z * z), 1.0)
+    s = (1.0 - c) * (1.0 - c)
+    f: Real = np.float32(o[triangle, F] + o[triangle, G] * s * s * (1.0 - c))
+    return f
+
+
+@inlined
+def passed_by(panes: Panes, triangle: int, f: Real) -> Real:
+    """The share of light that a triangle passes, before its colour, of the reflectance f of a face."""
+    one = np.float32(1.0)
+    share: Real = (one - f) / (one + f) if panes.optics[triangle, SHEET] > 0.0 else one - f
+    return share
+
+
+@inlined
+def mirrored_by(panes: Panes, triangle: int, f: Real) -> Real:
+    """The share of light that a triangle reflects, of the reflectance f of a face."""
+    share: Real = (f + f) / (np.float32(1.0) + f) if panes.optics[triangle, SHEET] > 0.0 else f
+    return share
+
+
+@inlined
+def colour_of(panes: Panes, triangle: int, channel: int) -> Real:
+    """The colour of light behind a triangle."""
+    share: Real = panes.optics[triangle, COLOUR + channel]
+    return share
+
+
+@inlined
+def step_beyond(panes: Panes, triangle: int, d: Triple) -> Real:
+    """How far behind a triangle the next one may be, in lengths of d: a ray does not meet the same one again."""
+    length = np.sqrt(np.float64(d[0]) * d[0] + np.float64(d[1]) * d[1] + np.float64(d[2]) * d[2])
+    step: Real = np.float32(panes.optics[triangle, OFFSET] / length)
+    return step
+
+
+@inlined
+def normal_of(panes: Panes, triangle: int) -> Triple:
+    """The unit normal of a triangle."""
+    o = panes.optics
+    return o[triangle, NORMAL], o[triangle, NORMAL + 1], o[triangle, NORMAL + 2]
+
+
+@inlined
+def lift_of(panes: Panes, triangle: int) -> Real:
+    """The height above a triangle at which rays that it mirrors start."""
+    height: Real = panes.optics[triangle, OFFSET]
+    return height

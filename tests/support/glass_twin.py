@@ -1,0 +1,87 @@
+"""The slow twin of thin glass: a floor in the sun, seen through and in panes, by formulas and without any tricks.
+
+Every ray meets every triangle. Rays are rows: origins and directions (n, 3), shares of light (n, 3).
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+Rows = Any
+
+
+@dataclass(frozen=True)
+class Pane:
+    """Triangles (t, 3, 3) of glass: sheets, or one closed body with its normals."""
+
+    corners: Any
+    colour: Any
+    ior: float = 1.5
+    body: bool = False
+
+    def faces(self, origin: Rows, way: Rows) -> tuple[Rows, Rows, Rows, Rows]:
+        """Where rays meet the triangles, infinite where they do not, (t, n); what passes, (t, n, 3); what is mirrored,
+        (t, n); unit normals (t, 3)."""
+        a, b, c = (self.corners[:, k, None] for k in range(3))
+        normal = np.cross(b - a, c - a)[:, 0]
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        with np.errstate(all="ignore"):
+            t = ((a - origin) * normal[:, None]).sum(axis=2) / (way @ normal.T).T
+            point = origin + t[..., None] * way
+            inside = np.ones(t.shape, bool)
+            for first, second in ((a, b), (b, c), (c, a)):
+                inside &= (np.cross(second - first, point - first) * normal[:, None]).sum(axis=2) >= 0
+        cosine = np.abs(way @ normal.T).T / np.linalg.norm(way, axis=1)
+        f0 = ((self.ior - 1) / (self.ior + 1)) ** 2
+        f = (f0 + (1 - f0) * (1 - cosine) ** 5)[..., None]
+        colour = np.array(self.colour)
+        passed, mirrored = (
+            (np.sqrt(colour) * (1 - f), f) if self.body else (colour * (1 - f) / (1 + f), 2 * f / (1 + f))
+        )
+        return np.where(inside & (t > 1e-6), t, np.inf), passed, mirrored[..., 0], normal
+
+
+@dataclass(frozen=True)
+class Floor:
+    """A floor at y = 0, x and z within `half`, that reflects `reflectivity`, under a sun; and panes."""
+
+    half: float
+    reflectivity: Any
+    sun: Any  # direction of its light
+    irradiance: Any
+    panes: Any
+
+    def passed(self, origin: Rows, way: Rows, end: Rows) -> Rows:
+        """The share of light that passes all panes up to `end`, (n, 3)."""
+        share = np.ones((len(origin), 3))
+        for pane in self.panes:
+            t, passed, _, _ = pane.faces(origin, way)
+            share *= np.where((t < end)[..., None], passed, 1.0).prod(axis=0)
+        return share
+
+    def seen(self, origin: Rows, way: Rows) -> tuple[Rows, Rows]:
+        """What rays see of the floor, through all panes, (n, 3), and where it is; infinite if they miss it."""
+        with np.errstate(all="ignore"):
+            t = -origin[:, 1] / way[:, 1]
+            point = origin + t[:, None] * way
+        met = (t > 0) & (np.abs(point[:, [0, 2]]) < self.half).all(axis=1)
+        t, point = np.where(met, t, np.inf), np.where(met[:, None], point, 0.0)
+        sun = np.array(self.sun) / np.linalg.norm(self.sun)
+        light = self.passed(point, np.broadcast_to(-sun, point.shape), np.full(len(point), np.inf))
+        light = light * np.array(self.irradiance) * -sun[1] * np.array(self.reflectivity) / np.pi
+        return np.where(met[:, None], light * self.passed(origin, way, t), 0.0), t
+
+    def radiance(self, origin: Rows, way: Rows, faces: int) -> Rows:
+        """What rays see: the floor, and what each of the first `faces` faces of glass before it mirrors, (n, 3)."""
+        light, end = self.seen(origin, way)
+        for pane in self.panes:
+            t, _, mirrored, normal = pane.faces(origin, way)
+            t = np.where(t < end, t, np.inf)
+            for k in range(len(t)):
+                rows = np.flatnonzero(np.isfinite(t[k]) & ((t < t[k]).sum(axis=0) < faces))
+                o, d, at = origin[rows], way[rows], t[k, rows]
+                before = self.passed(o, d, at * (1 - 1e-9))
+                back = d - 2 * (d @ normal[k])[:, None] * normal[k]
+                light[rows] += before * mirrored[k, rows, None] * self.seen(o + at[:, None] * d, back)[0]
+        return light
