@@ -20,6 +20,7 @@ from ..hits.places import find_places
 from ..inputs.cameras import Cameras
 from ..inputs.random import HOLE_SAMPLE
 from .array_pool import ArrayPool
+from .glass import find_through, own_view
 from .mirror_paths import extra_mirror_hits, mirror_paths
 from .passes import Pass
 from .records import BY_SAMPLE, HitRecords, HitsByPixel
@@ -37,6 +38,7 @@ class FrameHits:
         records: of the native hits.
         places: frame j -> the hits by the pixel of j that sees them.
         weights: frame j -> (n,) weight w of each hit there, or (0,) where all weigh 1.
+        through: frame j -> (n, 3) the share of the light of each hit that passes the glass before it; (0, 3) without.
         within: frame j -> (n,) where in its pixel each hit lies, see `hits/places.py`; (0,) unless weights are by area.
         mirrored, mirror_places: reflected hits of mirror pixels of frame c; None in a scene without mirrors.
         mirror_hits: (2, n_pixels) the number of native hits of each pixel whose mirrors were followed, with even and
@@ -50,6 +52,7 @@ class FrameHits:
     places: dict[int, HitsByPixel]
     weights: dict[int, Float32]
     within: dict[int, Bytes]
+    through: dict[int, Float32]
     mirrored: HitRecords | None
     mirror_places: HitsByPixel | None
     mirror_hits: Int32
@@ -81,6 +84,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
     order = take("order", (len(frames), n), np.int32)
     weight = take("weight", (len(frames), n if setup.balance else 0), np.float32)
     within = take("within", (len(frames), n if setup.area else 0), np.uint8)
+    through = take("through", (len(frames), n if setup.has_glass else 0, 3), np.float32)
     n_normals = n if setup.layers or setup.denoise else 0
     normal, depth = np.empty((n_normals, 3), np.float32), np.empty(n_normals, np.float32)
 
@@ -93,7 +97,9 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
             normal[span], depth[span] = _normals_and_depths(setup.cams, c, hits, m)
         estimate_terms(setup, hits, m, scratch, records.part(span), "obscurance", "shadow", smooth=True)
         find_outer(setup, c, m, scratch, frames, pixel[:, span], weight[:, span], within[:, span])
-        return mirror_paths(setup, hits, m, scratch) if setup.depth else []
+        find_through(setup, frames, hits, m, scratch, pixel[:, span], through[:, span])
+        own = through[frames.index(c), span]
+        return mirror_paths(setup, c, hits, m, scratch, own) if setup.depth else []
 
     tasks = [(part, first, m) for part in parts for first, m in pool.batches(part.n)]
     mirrored = [path for paths in pool.run(find_batch, tasks) for path in paths]
@@ -109,7 +115,15 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
         places=places,
         weights={j: weight[row] for row, j in enumerate(frames)},
         within={j: within[row] for row, j in enumerate(frames)},
-        pooled={**records.arrays, "order": order, "weight": weight, "within": within, "mirror_hits": mirror_hits},
+        through={j: through[row] for row, j in enumerate(frames)},
+        pooled={
+            **records.arrays,
+            "through": through,
+            "order": order,
+            "weight": weight,
+            "within": within,
+            "mirror_hits": mirror_hits,
+        },
         mirrored=reflected[1] if reflected else None,
         mirror_places=_sort_one(reflected[0], setup.n_pixels, pool) if reflected else None,
         mirror_hits=mirror_hits,
@@ -129,7 +143,9 @@ def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> lis
         find_emission(setup, scratch, 0, m)
         scratch.rays["native"] += m
         estimate_terms(setup, scratch.hits, m, scratch, records.part(slice(first, first + m)), "obscurance", "shadow")
-        return mirror_paths(setup, scratch.hits, m, scratch) if setup.depth else []
+        own = own_view(setup, c, scratch.hits, m, scratch)
+        _dim_records(records.part(slice(first, first + m)), own)
+        return mirror_paths(setup, c, scratch.hits, m, scratch, own) if setup.depth else []
 
     mirrored = [path for paths in pool.run(find_batch, range(0, n, pool.batch)) for path in paths]
     found = [(_sort_one(pixels, setup.n_pixels, pool), records)]
@@ -233,6 +249,12 @@ def find_outer(
             divide_by_own_hits(hits, of_pixel, frames.start, n, pixel, weight)
     _find_within(setup, n, scratch, frames, seen[first_row : first_row + len(frames)], within)
     scratch.seconds["visibility"] += perf_counter() - started
+
+
+def _dim_records(records: HitRecords, shares: Float32) -> None:
+    """Dim hits in place by the glass before them; see `HitRecords.through`."""
+    dimmed = records.through(shares)
+    records.row[:], records.emission[:] = dimmed.row, dimmed.emission
 
 
 def _find_within(setup: FrameSetup, n: int, scratch: Scratch, frames: range, pixel: Int32, within: Bytes) -> None:

@@ -5,12 +5,14 @@ from time import perf_counter
 
 import numpy as np
 
-from framearray_cli.base.arrays import Int32, Rgb
+from framearray_cli.base.arrays import Float32, Int32, Rgb
 
 from ..hits.hits import Hits
 from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
 from ..terms.mirrors import count_mirrors, reflect
 from ..terms.obscurance import HITS_TOGETHER
+from ..terms.panes import FACES, Fronts, reflect_at_panes
+from .glass import NO_GLASS, dim_reflected, own_view
 from .passes import Pass, half_sizes
 from .records import HitRecords
 from .scratch import Scratch
@@ -19,19 +21,26 @@ from .shading import estimate_terms, find_emission
 from .threads import TracePool
 
 
-def mirror_paths(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
-    """Follow hits 0 to n - 1 that are on mirrors; return pixels and records of the reflected hits of each bounce.
+def mirror_paths(
+    setup: FrameSetup, c: int, hits: Hits, n: int, scratch: Scratch, own: Float32 = NO_GLASS
+) -> list[tuple[Int32, HitRecords]]:
+    """Follow hits 0 to n - 1 of eye c that are on mirrors, and find what glass before hits mirrors.
 
-    Rays of HITS_TOGETHER hits are reflected together, and what they meet at all bounces stands together. Batches begin
-    at multiples of these, so neither the order of reflected hits nor which rays share a packet depends on the size of
-    batches.
+    Returns pixels and records of the reflected hits of each face of glass, and of each bounce. Rays of HITS_TOGETHER
+    hits are reflected together, and what they meet at all bounces stands together. Batches begin at multiples of these,
+    so neither the order of reflected hits nor which rays share a packet depends on the size of batches.
+
+    Args:
+        own: (n, 3) what passes the glass before the hits, which mirrors too; (0, 3) without glass.
     """
-    if count_mirrors(hits, n) == 0:
-        return []
-    started = perf_counter()
-    throughput = np.ones((n, 3), np.float32)
     ends = [*range(0, n, HITS_TOGETHER), n]  # of the hits that are reflected together
-    found: list[list[tuple[Int32, HitRecords]]] = [[] for _ in ends[1:]]
+    found: list[list[tuple[Int32, HitRecords]]] = [
+        _glass_images(setup, c, hits, *span, scratch) if setup.has_glass else [] for span in pairwise(ends)
+    ]
+    if count_mirrors(hits, n) == 0:
+        return [path for paths in found for path in paths]
+    started = perf_counter()
+    throughput = own if len(own) else np.ones((n, 3), np.float32)
     for bounce in range(setup.depth):
         reflected, next_throughput = scratch.reflected[bounce % 2], scratch.throughput[bounce % 2]
         ends = _reflect(setup, hits, throughput, ends, scratch, reflected, next_throughput)
@@ -47,6 +56,30 @@ def mirror_paths(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch) -> lis
                 paths.append((pixels[first:last], records.part(slice(first, last))))
     scratch.seconds["mirror"] += perf_counter() - started
     return [path for paths in found for path in paths]
+
+
+def _glass_images(
+    setup: FrameSetup, c: int, hits: Hits, first: int, last: int, scratch: Scratch
+) -> list[tuple[Int32, HitRecords]]:
+    """Find what glass mirrors on the way from eye c to hits first to last - 1, face by face."""
+    started, n, world = perf_counter(), last - first, setup.world
+    found: list[tuple[Int32, HitRecords]] = []
+    reflected, tint = scratch.reflected[0], scratch.throughput[0]
+    some, fronts = Hits._make(array[first:last] for array in hits), Fronts(n)
+    for _ in range(FACES):
+        m = reflect_at_panes(
+            some, n, setup.cams.position[c], fronts, setup.lights.panes, world, scratch.hit_rays, reflected, tint
+        )
+        if m == 0:
+            break
+        find_emission(setup, scratch, 0, m)
+        dim_reflected(setup, scratch, m, tint)
+        scratch.rays["mirror"] += m
+        records, pixels = setup.empty_records(m), reflected.pixel[:m].copy()
+        estimate_terms(setup, reflected, m, scratch, records, "mirror obscurance", "mirror shadow", tint)
+        found.append((pixels, records))
+    scratch.seconds["mirror"] += perf_counter() - started
+    return found
 
 
 def _reflect(
@@ -65,6 +98,7 @@ def _reflect(
             packets = scratch.hit_rays.packets
             m = reflect(some, last - first, throughput[first:last], setup.world, packets, to, tint[at:])
             find_emission(setup, scratch, at, m)
+            dim_reflected(setup, scratch, m, tint[at:])
         found.append(at + m)
     return found
 
@@ -102,7 +136,8 @@ def extra_mirror_hits(
         n = min(pool.batch, len(pixels) * extra - first)
         extra_hits(setup.cams, c, samples, first, n, setup.world, scratch.hit_rays.packets, scratch.hits)
         scratch.rays["mirror"] += n
-        return mirror_paths(setup, scratch.hits, n, scratch)
+        own = own_view(setup, c, scratch.hits, n, scratch)
+        return mirror_paths(setup, c, scratch.hits, n, scratch, own)
 
     pool.run(flag, range(0, setup.n_pixels, pool.batch))
     pixels = setup.order[flags[setup.order] > 0]

@@ -13,6 +13,7 @@ from ..terms.direct import direct
 from ..terms.mirrors import reflect
 from ..terms.obscurance import apply_textures
 from .frame import FrameHits, find_outer
+from .glass import NO_GLASS
 from .records import HitsByPixel
 from .scratch import Scratch
 from .setup import FrameSetup
@@ -71,6 +72,7 @@ def frame_without_hits(setup: FrameSetup, c: int) -> FrameHits:
         places=dict.fromkeys(frames, nowhere),
         weights=dict.fromkeys(frames, nothing),
         within=dict.fromkeys(frames, np.empty(0, np.uint8)),
+        through=dict.fromkeys(frames, NO_GLASS),
         mirrored=None,
         mirror_places=None,
         mirror_hits=np.zeros((2, 0), np.int32),

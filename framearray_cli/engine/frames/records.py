@@ -1,7 +1,7 @@
 """What composing reads of hits: a record per hit, and the hits of each pixel."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -85,6 +85,23 @@ class HitRecords:
         radiance = np.swapaxes(strength, 1, 2)[np.maximum(source, 0)] * colour
         found: Float32 = radiance * self.emission[:, None, TEXTURE:]
         return found
+
+    def through(self, shares: Float32) -> "HitRecords":
+        """What is left of the hits behind glass; shares all memory that it can.
+
+        Args:
+            shares: (n, 3) of light that passes the glass; (0, 3) where there is none.
+        """
+        behind = np.flatnonzero((shares != 1.0).any(axis=1))
+        if not len(behind):
+            return self
+        dimmed, row, emission = shares[behind], self.row.copy(), self.emission
+        for column in (INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY):
+            row[behind, column : column + 3] *= dimmed
+        if emission.shape[1]:
+            emission = emission.copy()
+            emission[behind, TEXTURE:] *= dimmed
+        return replace(self, row=row, emission=emission)
 
     def part(self, span: slice) -> "HitRecords":
         """The records of some of the hits; shares memory."""

@@ -13,6 +13,7 @@ from ..hits.native import pixel_order
 from ..inputs.cameras import Cameras
 from ..inputs.lights import LightArrays, some_lights
 from ..inputs.mips import SHARP, Mips
+from ..inputs.panes import has_panes
 from ..inputs.relief import FLAT, Relief
 from ..inputs.surfaces import Surfaces
 from ..terms.cells.gather import LIGHT
@@ -128,6 +129,11 @@ class FrameSetup:
     def shines(self) -> bool:
         """Whether any surface of the scene shines."""
         return self.lights.emitters.span.size > 0
+
+    @property
+    def has_glass(self) -> bool:
+        """Whether any surface of the scene is thin glass."""
+        return has_panes(self.lights.panes)
 
     @property
     def keeps_all(self) -> bool:

@@ -8,6 +8,7 @@ from framearray_cli.base.arrays import Float32, Rgb
 
 from ..hits.emission import TEXTURE, record_emission
 from ..hits.hits import ESCAPED, Hits
+from ..inputs.panes import has_panes
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, bits, load
 from ..terms.cells.exact import light_of_paths
@@ -58,9 +59,13 @@ def estimate_terms(
     skylight = scratch.skylight if setup.cells is None else scratch.constant
     middle = perf_counter()
     if scratch.steps is None:
-        lights = looking(setup.lights) if has_environments(setup.lights) else setup.lights
+        lights = (
+            looking(setup.lights)
+            if has_environments(setup.lights) and not has_panes(setup.lights.panes)
+            else setup.lights
+        )
         rays = direct(hits, n, lights, setup.tracer, scratch.test_rays, out.irradiance, neighbours)
-        if has_environments(lights):
+        if lights is not setup.lights:
             rays += look_around(hits, n, lights, setup.tracer, scratch.test_rays, out.irradiance)
     else:
         irradiance = out.irradiance if setup.keeps_all else scratch.irradiance

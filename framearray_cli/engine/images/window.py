@@ -246,7 +246,8 @@ class Window:
         """Native and outer hits of frame j, of its whole window or of some eyes, and those that fill holes."""
         window = [self._frames[c] for c in self._setup.eyes_of(j) if eyes is None or c in eyes]
         sources = [
-            HitSource(found.places[j], found.records, found.weights[j], place=found.within[j]) for found in window
+            HitSource(found.places[j], found.records.through(found.through[j]), found.weights[j], place=found.within[j])
+            for found in window
         ]
         return SourceList(sources + [HitSource(by_pixel, records) for by_pixel, records in holes])
 
