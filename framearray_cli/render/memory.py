@@ -96,11 +96,12 @@ def window_memory(
     per_record = 4 * (values + LANES + (LIGHT + values if job.indirect.method != "obscurance" else 0))
     per_record += 4 * EMISSION_COLUMNS * (prepared.light_arrays.emitters.span.size > 0)
     days = job.sun_days if job.output.layers else ()
-    per_hit = (
-        per_record + 16 * job.output.layers + 4 * len(days) + frames * (4 + weighed + 12 * prepared.scene.has_glass)
-    )
+    glass = prepared.scene.has_glass
+    per_hit = per_record + 16 * job.output.layers + 4 * len(days) + frames * (4 + weighed)
+    per_hit += glass * (12 * frames + 4 * LANES)  # what passes it in each frame; the rows that one frame sees
     # a frame's mirror hits wait for N_r frames; twice while the lists of all batches are joined, and chains add some
     mirrored = mirror_share * job.specular.hits * (n_r + 3) * per_record
+    mirrored += glass * float(per_pixel.max()) * (n_r + 3) * per_record  # one face of glass in every pixel
     # of the frame being traced: the pixel of each hit in every frame of the window, before hits are sorted by it
     finding = float(per_pixel.max()) * frames * 4
     channels = LAYER_CHANNELS * job.output.layers + len(days) + bool(days)
