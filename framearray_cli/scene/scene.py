@@ -135,8 +135,8 @@ def load_scene(
         folders: where files that the scene names may lie, beside its own folder.
         memory: bytes that reading may allocate; None: all free memory.
         shining: names of the materials whose emission is read; that of others is 0.
-        as_file: whether surfaces follow the file, with its normal maps and smaller copies of textures; else they are
-            diffuse or mirrors.
+        as_file: whether surfaces follow the file, with its normal maps, glass and smaller copies of textures; else
+            they are diffuse or mirrors.
 
     Raises:
         SceneError: a file that cannot be read, holds nothing to render, or lacks an overridden material.
