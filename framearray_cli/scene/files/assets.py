@@ -25,7 +25,7 @@ class Assets:
 
     Attributes:
         shining: names of the materials whose emission is read; that of others is left out.
-        as_file: whether surfaces follow the file, with its normal maps and thin glass; else they are diffuse or mirrors.
+        as_file: whether surfaces follow the file, with its normal maps and glass; else they are diffuse or mirrors.
         refused: names of files that lie elsewhere, in the order in which the scene named them.
     """
 

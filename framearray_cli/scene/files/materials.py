@@ -104,7 +104,7 @@ def blended_opacity(
         if glass is not None:
             notes.add("transmissive materials are thin glass, which light passes straight", name)
             return Opacity(glass=glass)
-        notes.add("transmissive materials are left out", name)
+        notes.add('transmissive materials are left out; scene.surfaces = "file" takes them as thin glass', name)
         return Opacity(left_out="transmissive")
     if lowest < CUTOFF <= highest:
         notes.add("textures with partial transparency are cut out at half opacity", name)

@@ -166,7 +166,7 @@ def half_holes(alpha: int) -> bytes:
         ({"alphaMode": "MASK", "alphaCutoff": 0.2}, 0.1, 255, 0.0, "cut out", "removes everywhere"),
         ({"alphaMode": "BLEND"}, 1.0, 0, 0.5, "", "cut out at half"),
         ({"alphaMode": "BLEND"}, 0.5, 255, 0.0, "", "taken as opaque"),
-        ({"alphaMode": "BLEND"}, 0.2, 255, 0.0, "transmissive", "left out: Leaf"),
+        ({"alphaMode": "BLEND"}, 0.2, 255, 0.0, "transmissive", "as thin glass: Leaf"),
         ({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}}}, 1.0, 255, 0.0, "transmissive", ""),
     ],
 )
