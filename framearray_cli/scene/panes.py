@@ -16,7 +16,7 @@ from framearray_cli.base.arrays import Corners, Float32, Float64
 from framearray_cli.base.units import counted
 
 from .cleaning import has_area, is_finite, is_repeated
-from .files import Material
+from .files import Material, Notes
 from .merge import Merged, geometric_normals
 from .vectors import largest
 
@@ -34,15 +34,6 @@ class Panes:
     corners: Corners
     optics: Float32
 
-    @property
-    def note(self) -> str:
-        """What the report on a scene says of them."""
-        sheets = int((self.optics[:, SHEET] > 0).sum())
-        bodies = len(self.optics) - sheets
-        parts = [f"{counted(sheets, 'triangle')} of sheets"] * (sheets > 0)
-        parts += [f"{counted(bodies, 'triangle')} of closed bodies, which do not refract"] * (bodies > 0)
-        return f"glass: {' and '.join(parts)}"
-
 
 def is_glass(merged: Merged, materials: Sequence[Material]) -> NDArray[np.bool_]:
     """(n,) whether each triangle of all parts is thin glass."""
@@ -50,7 +41,9 @@ def is_glass(merged: Merged, materials: Sequence[Material]) -> NDArray[np.bool_]
     return np.asarray(glass[merged.material])
 
 
-def select_panes(merged: Merged, materials: Sequence[Material], centre: Float64, dropped: dict[str, int]) -> Panes:
+def select_panes(
+    merged: Merged, materials: Sequence[Material], centre: Float64, dropped: dict[str, int], notes: Notes
+) -> Panes:
     """Select the triangles of thin glass; of coinciding ones the first counts.
 
     Args:
@@ -58,6 +51,7 @@ def select_panes(merged: Merged, materials: Sequence[Material], centre: Float64,
         materials: indexed by `merged.material`.
         centre: (3,) of the scene.
         dropped: gets the reasons and numbers of triangles left out.
+        notes: gets the number of triangles.
     """
     rows = np.flatnonzero(is_glass(merged, materials))
     if not len(rows):
@@ -88,7 +82,17 @@ def select_panes(merged: Merged, materials: Sequence[Material], centre: Float64,
     optics[:, SHEET] = ~closed
     optics[:, NORMAL : NORMAL + 3] = geometric_normals(corners)
     optics[:, OFFSET] = OFFSET_SHARE * largest(corners.reshape(-1, 9))
+    notes.add(_counted(optics))
     return Panes(corners, optics)
+
+
+def _counted(optics: Float32) -> str:
+    """What the report on a scene says of its glass."""
+    sheets = int((optics[:, SHEET] > 0).sum())
+    bodies = len(optics) - sheets
+    parts = [f"{counted(sheets, 'triangle')} of sheets"] * (sheets > 0)
+    parts += [f"{counted(bodies, 'triangle')} of closed bodies, which do not refract"] * (bodies > 0)
+    return f"glass: {' and '.join(parts)}"
 
 
 def in_closed_mesh(corners: Corners) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ from framearray_cli.base.arrays import Bytes, Corners, CornerUvs, Float32, Float
 from framearray_cli.base.errors import SceneError
 from framearray_cli.base.units import counted
 
-from .files import Meshes, Notes, read_meshes
+from .files import Material, Meshes, Notes, read_meshes
 from .merge import add_untextured_variants, merge, unit_normals, wrap_uvs
 from .mips import MOST_LEVELS, add_mips
 from .overrides import Override, override_materials
@@ -157,20 +157,16 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override], *, as_file: b
     materials = override_materials(materials, overrides, notes)
     plain = {name for name, override in overrides.items() if override.reflectivity is not None}
     parts = [replace(p, colours=None) if materials[p.material].name in plain else p for p in parts]
-    merged = merge(parts)
-    dropped = dict(meshes.dropped)
+    merged, dropped = merge(parts), dict(meshes.dropped)
     keep, centre, corners = select_triangles(merged, materials, dropped, meshes.notes)
-    panes = select_panes(merged, materials, centre, dropped)
-    if len(panes.corners):
-        notes.add(panes.note)
+    panes = select_panes(merged, materials, centre, dropped, notes)
     material = merged.material[keep]
     normals, uvs, colours, tangents, normal_uvs = _empty(3), _empty(2), _empty(3), _empty(4), _empty(2)
     if merged.tangents is not None and merged.normal_uvs is not None:
         tangents, normal_uvs = rows_of(merged.tangents, keep), wrap_uvs(rows_of(merged.normal_uvs, keep), notes)
     if merged.normals is not None and (merged.has_normals[keep].any() or len(tangents)):
         normals = unit_normals(rows_of(merged.normals, keep), merged.has_normals[keep], corners, notes)
-    textured = any(m.textured for m in materials)
-    if merged.uvs is not None and textured:
+    if merged.uvs is not None and any(m.textured for m in materials):
         uvs = wrap_uvs(rows_of(merged.uvs, keep), notes)
     if merged.colours is not None:
         colours = merged.colours[keep]
