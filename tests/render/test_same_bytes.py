@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 from support import tiny
+from support.iesfiles import ies
 from support.tiny import WALK
 
 import framearray_cli.render.render as rendering
@@ -46,6 +47,11 @@ SOFT = {
                 }
             ],
         },
+        {
+            "type": "spot",
+            "ies": "lamp.ies",
+            "keys": [{"frame": 0, "position": [0.2, 1.8, -0.5], "target": [0, 0, 0], "intensity": 4.0}],
+        },
     ]
 }
 
@@ -85,6 +91,8 @@ def test_any_way_to_render_writes_the_same_bytes(
     more: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = tiny.save_glb(tiny.room_meshes(), tmp_path / "room.glb")
+    (tmp_path / "lamp.ies").write_text(ies())
+    monkeypatch.chdir(tmp_path)
     render(job(scene, tmp_path / "whole", 1, more))
     whole = images(tmp_path / "whole")
     assert len(set(whole.values())) == 6 * (3 + 1), "images and layers, all different"

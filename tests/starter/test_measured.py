@@ -32,7 +32,7 @@ def test_a_measured_lamp_keeps_its_file_its_way_and_its_strength(tmp_path: Path)
     (tmp_path / "lights").mkdir()
     (tmp_path / "lights" / "a.ies").write_text(IES)
     tinted = {"light": 0, "multiplier": 0.5, "color": [1.0, 0.5, 0.25]}
-    glb = with_lamps(room(), [{"uri": "lights/a.ies"}], {"light": 0}, tinted)
+    glb = with_lamps(room(screen=False), [{"uri": "lights/a.ies"}], {"light": 0}, tinted)
     init(glb.save(tmp_path / "scene.glb"), tmp_path / "job.toml", FEW)
     assert 'ies = "lights/a.ies"' in (tmp_path / "job.toml").read_text()
     job = read_job(tmp_path / "job.toml")

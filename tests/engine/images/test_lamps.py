@@ -4,11 +4,13 @@ A closed form gives the area that a shape covers in the picture. Each of the pix
 rays that hit or miss, a variance of at most 1 / 4 / SAMPLES.
 """
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from support import tiny
+from support.mixed import dark_sources
 
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.lamps import SAMPLES
@@ -27,10 +29,14 @@ def wall(z: float, material: Material | None = None, side: float = 9.0) -> Scene
     return tiny.scene_of(tiny.quad((-side, -side, z), (side, -side, z), (side, side, z), (-side, side, z)), material)
 
 
-def drawn(source: dict[str, Any], scene: Scene, *, dtype: Any = np.float32) -> tuple[Any, int]:
-    """What the eye at the origin sees of a lamp, looking along -z: an image per light position; and what is beyond."""
+def drawn(source: dict[str, Any], scene: Scene, *beside: dict[str, Any], dtype: Any = np.float32) -> tuple[Any, int]:
+    """What the eye at the origin sees of a lamp, looking along -z: an image per light position; and what is beyond.
+
+    Args:
+        beside: sources that eyes do not see.
+    """
     camera = {"resolution": list(SIZE), "fov": 40.0, "keys": [{"frame": 0, "eye": [0, 0, 0], "target": [0, 0, -1]}]}
-    light = {"sources": [source | {"visible": True}]}
+    light = {"sources": [source | {"visible": True}, *beside]}
     job = Job.model_validate(tiny.table(camera=camera) | {"light": light, "ambient": {"intensity": 0.1}})
     inputs = tiny.prepared(job, scene)
     with tiny.planned(inputs) as (setup, _), TracePool(setup, 2) as pool:
@@ -103,12 +109,12 @@ def test_a_mirror_shows_the_lamp_behind_the_eye_in_its_tint() -> None:
         check_area(image[..., channel], tint * radiance, np.pi * radius**2, 2 * np.pi * radius)
 
 
-def test_a_spot_is_as_bright_as_its_cone_towards_the_eye() -> None:
+def test_a_spot_is_as_bright_as_its_cone_towards_the_eye(tmp_path: Path) -> None:
     """Half way between the cones, in cosines, a spot has a quarter of its intensity."""
     angle = np.degrees(np.arccos((np.cos(np.radians(10)) + np.cos(np.radians(30))) / 2))
     way = [np.sin(np.radians(angle)), 0, np.cos(np.radians(angle))]
     spot = lamp("spot", position=[0, 0, -2], direction=way, inner=10, outer=30, radius=0.2, intensity=1)
-    middle = drawn(spot, wall(-3))[0][0, 23:25, 31:33]  # a degree on each side, which cancels
+    middle = drawn(spot, wall(-3), *dark_sources(tmp_path))[0][0, 23:25, 31:33]  # a degree on each side, which cancels
     assert middle.mean() == pytest.approx(0.25 / (np.pi * 0.2**2), rel=0.01)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support import tiny
 from support.irradiance import FAR, N, P, arrays, hits_at, lit
+from support.mixed import mixed_arrays
 from support.panels import lambert
 
 from framearray_cli.engine.embree import EmbreeScene
@@ -164,9 +165,9 @@ def test_panels_beside_other_sources_leave_them_alone() -> None:
     lamp = LightPath(kind="point", vector=P + MIDDLES + 1, intensity=np.ones((6, 3)), size=np.full(6, 0.1))
     sun = LightPath(kind="directional", vector=np.tile((0.6, -0.8, 0.0), (6, 1)), intensity=np.ones((6, 3)))
     together = lit(hits_at(n=500), arrays(sun, lamp))
-    assert (lit(hits_at(n=500), arrays(sun, lamp, rect, disc)) >= together).all()
+    assert (lit(hits_at(n=500), mixed_arrays(sun, lamp, rect, disc)) >= together).all()
     dark = LightPath(kind="point", vector=rect.vector, intensity=rect.intensity * 0, panel=rect.panel)
-    np.testing.assert_allclose(lit(hits_at(n=500), arrays(sun, lamp, dark)), together, rtol=1e-6)
+    np.testing.assert_allclose(lit(hits_at(n=500), mixed_arrays(sun, lamp, dark)), together, rtol=1e-6)
     apart = lit(hits_at(n=500), arrays(dark, disc)) + lit(hits_at(n=500), arrays(rect))
     np.testing.assert_allclose(lit(hits_at(n=500), arrays(rect, disc)), apart, rtol=1e-5)
 
@@ -178,10 +179,11 @@ def test_light_of_panels_is_the_same_to_the_last_bit_for_any_grouping(n_lights: 
     hits.position[:] += RNG.uniform(-1, 1, (203, 3)) * [1, 0, 1]
     middles = np.add(RNG.uniform(-2, 2, (n_lights, 3)), (0, 3, 0))
     normals = np.add(RNG.normal(size=(n_lights, 3)) * 0.4, (0, -1, 0))
-    lights = arrays(
+    panels = (
         panel(1.0, 0.5, middles=middles, normals=normals),
         panel(0, 0.5, middles=-middles, normals=normals, two_sided=True),
     )
+    lights = arrays(*panels)
     together, apart = (lit(hits, lights, box, neighbours=nb) for nb in (True, False))
     np.testing.assert_array_equal(together, apart)
     chosen = [n_lights - 1, 0, 2]
@@ -189,7 +191,7 @@ def test_light_of_panels_is_the_same_to_the_last_bit_for_any_grouping(n_lights: 
     with EmbreeScene(box) as embree:
         out = np.empty((203, 1, n_lights), np.float32)
         tests, steps = room_for_tests(4096, n_lights), room_for_steps(n_lights)
-        direct_by_steps(hits, 203, lights, 1, False, embree.tracer, tests, steps, out)
+        direct_by_steps(hits, 203, mixed_arrays(*panels), 1, False, embree.tracer, tests, steps, out)
     np.testing.assert_allclose(out[:, 0], together, rtol=1e-5, atol=1e-7)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support import tiny
 from support.hits import points
+from support.mixed import mixed_arrays
 
 from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
@@ -143,7 +144,7 @@ def test_a_measured_lamp_may_have_a_size() -> None:
     )
     source = lamp(table, n=16, radius=0.02)
     place = np.zeros((20_000, 3))
-    found = lit(place, arrays(source), True)
+    found = lit(place, mixed_arrays(source), True)
     point = LightPath(kind="point", vector=source.vector, intensity=source.intensity, profile=source.profile)
     wanted = lit(place[:1], arrays(point), True)[0]
     error = found.std(axis=0) / len(place) ** 0.5

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support import tiny
 from support.hits import points
+from support.mixed import mixed_arrays
 
 from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
@@ -88,7 +89,7 @@ def test_a_spot_may_have_a_size() -> None:
     wide = spot(60, 90, radius=0.1)
     bare = LightPath(kind="point", vector=wide.vector, intensity=wide.intensity, size=wide.size)
     places = wide.vector * (1, 0, 1)
-    found, sphere = (np.diag(lit(places, arrays(one), True)) for one in (wide, bare))
+    found, sphere = (np.diag(lit(places, lights, True)) for lights in (mixed_arrays(wide), arrays(bare)))
     straight = -wide.cone.axis[:, 1] > 0.8  # type: ignore[union-attr]  # it has a cone
     np.testing.assert_allclose(found[straight], sphere[straight], rtol=1e-6)
     assert straight.any()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from support import tiny
 from support.irradiance import FAR, N, P, arrays, hits_at, lit
+from support.mixed import mixed_arrays
 
 from framearray_cli.engine.embree import EmbreeScene
 from framearray_cli.engine.hits.rays import room_for_tests
@@ -136,10 +137,11 @@ def test_soft_light_is_the_same_to_the_last_bit_for_any_grouping(n_lights: int) 
     box = tiny.scene_of(np.concatenate([tiny.box((-2, 0.6, -2), (0.3, 0.7, 2)), FAR]))
     rng, hits = np.random.default_rng(3), hits_at(n=203)
     hits.position[:] += rng.uniform(-1, 1, (203, 3)) * [1, 0, 1]
-    lights = arrays(
+    sources = (
         lamps(0.3, np.add(rng.uniform(-2, 2, (n_lights, 3)), (0, 3, 0))),
         suns(5, np.add(rng.normal(size=(n_lights, 3)), (0, -3, 0))),
     )
+    lights = arrays(*sources)
     together, apart = (lit(hits, lights, box, neighbours=nb) for nb in (True, False))
     np.testing.assert_array_equal(together, apart)
     chosen = [n_lights - 1, 0, 2]
@@ -147,5 +149,5 @@ def test_soft_light_is_the_same_to_the_last_bit_for_any_grouping(n_lights: int) 
     with EmbreeScene(box) as embree:
         out = np.empty((203, 1, n_lights), np.float32)
         tests, steps = room_for_tests(4096, n_lights), room_for_steps(n_lights)
-        direct_by_steps(hits, 203, lights, 1, False, embree.tracer, tests, steps, out)
+        direct_by_steps(hits, 203, mixed_arrays(*sources), 1, False, embree.tracer, tests, steps, out)
     np.testing.assert_allclose(out[:, 0], together, rtol=1e-5, atol=1e-7)
