@@ -10,7 +10,7 @@ from framearray_cli.engine.terms.cells import residual
 from framearray_cli.engine.terms.cells.residual import Accuracy, compare_with_paths
 from framearray_cli.render.prepare import _eye_walks, open_embree, plan_work
 
-CELLS = {"method": "cells", "samples": 2**18, "filter": 0, "cell": 1.5}
+CELLS = {"method": "cells", "samples": 2**18, "filter": 0, "cell": 2.0}  # as wide as the rooms, to be wrong there
 N, N_L = 2048, 8
 
 
