@@ -41,6 +41,7 @@ def override_materials(
     for material in materials:
         override = overrides.get(material.name)
         if override is not None and (override.reflectivity is not None or override.specular is not None):
+            material = replace(material, roughness=0.0, gloss_texture=-1)
             if material.left_out == "transmissive" or material.glass is not None:
                 material = replace(material, left_out="", glass=None)
                 notes.add("transmissive materials with an override are shown after all", material.name)

@@ -3,6 +3,7 @@
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -60,6 +61,9 @@ class Scene:
         emission: (m, 3) radiance that surfaces emit, before texture; as the file gives it.
         emission_texture: (m,) texture that multiplies `emission`, or -1.
         one_sided: (m,) whether only the front of surfaces emits, by the file.
+        roughness, metallic: (m,) of glossy materials, whose `reflectivity` is then the base colour, before texture;
+            roughness is 0 of all others. (0,) where none is glossy.
+        gloss_texture: (m,) texture whose green multiplies `roughness` and whose blue `metallic`, or -1; (0,) likewise.
         alpha: (m,) opacity factor, multiplied with the alpha of `alpha_texture`.
         alpha_texture: (m,) texture whose alpha is the mask, or -1.
         alpha_cutoff: (m,) a point of a masked triangle is absent where alpha < cutoff.
@@ -92,6 +96,9 @@ class Scene:
     emission: Rgb
     emission_texture: Int32
     one_sided: Bytes
+    roughness: Float32
+    metallic: Float32
+    gloss_texture: Int32
     alpha: Float32
     alpha_texture: Int32
     alpha_cutoff: Float32
@@ -111,6 +118,11 @@ class Scene:
     def has_glass(self) -> bool:
         """Whether any triangle is thin glass."""
         return len(self.pane_corners) > 0
+
+    @property
+    def is_glossy(self) -> bool:
+        """Whether any triangle is glossy."""
+        return bool(len(self.roughness) and (self.roughness[np.unique(self.material)] > 0).any())
 
     @property
     def has_mirrors(self) -> bool:
@@ -187,6 +199,7 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override], *, as_file: b
         emission=np.array([m.emission for m in materials], dtype=np.float32),
         emission_texture=np.array([m.emission_texture for m in materials], dtype=np.int32),
         one_sided=np.array([m.one_sided for m in materials], dtype=np.uint8),
+        **_gloss_arrays(materials),
         alpha=np.array([m.alpha for m in materials], dtype=np.float32),
         alpha_texture=np.array([m.alpha_texture for m in materials], dtype=np.int32),
         alpha_cutoff=cutoff,
@@ -210,6 +223,16 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override], *, as_file: b
             normal_maps=len({materials[m].normal_texture for m in np.unique(material)} - {-1}),
         ),
     )
+
+
+def _gloss_arrays(materials: Sequence[Material]) -> dict[str, Any]:
+    """Make the arrays of glossy materials, of length 0 where there are none."""
+    glossy = materials if any(m.roughness > 0 for m in materials) else []
+    return {
+        "roughness": np.array([m.roughness for m in glossy], dtype=np.float32),
+        "metallic": np.array([m.metallic for m in glossy], dtype=np.float32),
+        "gloss_texture": np.array([m.gloss_texture for m in glossy], dtype=np.int32),
+    }
 
 
 def _texture_tables(images: Sequence[Bytes], shown: Sequence[Material]) -> tuple[Bytes, Int32, Int32]:

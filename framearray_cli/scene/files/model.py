@@ -41,6 +41,9 @@ class Material:
         alpha: opacity factor, multiplied with the alpha of `alpha_texture`.
         alpha_cutoff: a point is absent where alpha is below it; 0 for an opaque material.
         normal_texture: normal map, or -1; `normal_scale` multiplies what its red and green say.
+        roughness, metallic: of a glossy material, as glTF defines them, with `reflectivity` for the base colour;
+            roughness 0 is that of all others.
+        gloss_texture: its green multiplies `roughness`, its blue `metallic`.
         left_out: why its triangles are left out ("transmissive", "cut out"), or "".
         glass: what its triangles let through as thin panes, which nothing else is seen of; None: of no pane.
     """
@@ -58,17 +61,21 @@ class Material:
     alpha_cutoff: float = 0.0
     normal_texture: int = -1
     normal_scale: float = 1.0
+    roughness: float = 0.0
+    metallic: float = 0.0
+    gloss_texture: int = -1
     left_out: str = ""
     glass: Glass | None = None
 
     @property
     def textured(self) -> bool:
         """Whether it needs texture coordinates."""
-        return max(self.texture, self.specular_texture, self.alpha_texture, self.emission_texture) >= 0
+        used = (self.texture, self.specular_texture, self.alpha_texture, self.emission_texture, self.gloss_texture)
+        return max(used) >= 0
 
     def without_textures(self) -> "Material":
         """Return the material for meshes without texture coordinates."""
-        bare = replace(self, texture=-1, specular_texture=-1, emission_texture=-1)
+        bare = replace(self, texture=-1, specular_texture=-1, emission_texture=-1, gloss_texture=-1)
         return replace(bare, alpha_texture=-1, alpha_cutoff=0.0)
 
 

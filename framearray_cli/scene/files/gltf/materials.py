@@ -11,15 +11,16 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.colour import linear_from_srgb
 
 from ..assets import Assets
+from ..gloss import MIRROR_ROUGHNESS, Gloss, with_gloss
 from ..materials import CUTOFF, NO_NORMAL_MAPS, Opacity, Rgb3, blended_opacity, make_material, masked_opacity
 from ..model import Material, Notes
 from ..textures import TextureTable
 from .container import Gltf, image_bytes
 from .glass import cover_of, pane_of
+from .gloss import metal_gloss, specular_gloss
 from .values import Tree
 
 STRENGTH = "KHR_materials_emissive_strength"
-MIRROR_ROUGHNESS = 0.1  # up to it a metal is a mirror
 GLOSSY_SPECULAR = 0.2  # a specular factor (old extension) above it means metal; dielectrics have 0.04
 KNOWN = {"KHR_materials_transmission", "KHR_materials_pbrSpecularGlossiness", STRENGTH}
 SILENT = {"KHR_materials_ior", "KHR_materials_volume"}  # they only matter inside glass, which is left out
@@ -88,7 +89,10 @@ def _material(
     factor = pbr.get("baseColorFactor") if gloss is None else gloss.get("diffuseFactor")
     base = np.array([1.0, 1.0, 1.0, 1.0] if factor is None else factor, dtype=np.float64)
     texture = source.index(info)
-    if gloss is None:
+    shine = _gloss(name, base, pbr, gloss, source, notes) if assets.as_file else None
+    if shine is not None:
+        diffuse, specular = shine.base, (0.0, 0.0, 0.0)
+    elif gloss is None:
         diffuse, specular = _metal(name, base, pbr, source, notes)
     else:
         diffuse, specular = _glossy(name, base, gloss, notes)
@@ -96,6 +100,9 @@ def _material(
     _note_ignored(name, entry, assets, notes)
     mirror_texture = texture if gloss is None else -1
     material = make_material(name, diffuse, specular, opacity, notes, texture=texture, mirror_texture=mirror_texture)
+    material = with_gloss(material, shine)
+    if texture < 0 and material.gloss_texture >= 0:
+        texture, info = material.gloss_texture, pbr["metallicRoughnessTexture"]
     if name in assets.shining:
         material, own = _shining(material, entry, None if texture < 0 else info, source, notes)
         texture, info = (texture, info) if texture >= 0 else (material.emission_texture, own)
@@ -115,6 +122,16 @@ def _texture_places(texture: int, info: Tree | None, source: "ImageFinder") -> T
         return TexturePlaces()
     uv_set, transform = _places(info)
     return TexturePlaces(uv_set=uv_set, matrix=uv_matrix(transform), repeats=source.repeats(info))
+
+
+def _gloss(
+    name: str, base: Float64, pbr: Tree, gloss: Tree | None, source: "ImageFinder", notes: Notes
+) -> Gloss | None:
+    """How a material shines; None where it is a mirror."""
+    if gloss is not None:
+        return specular_gloss(name, base, gloss, source, notes)
+    infos = [pbr[key] for key in ("baseColorTexture", "metallicRoughnessTexture") if pbr.get(key) is not None]
+    return metal_gloss(name, base, pbr, source, notes, shared=len({str(_places(info)) for info in infos}) <= 1)
 
 
 def _places(info: Tree) -> tuple[int, Tree]:

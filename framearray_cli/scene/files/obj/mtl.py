@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from ..assets import Assets
+from ..gloss import Gloss, is_mirror, with_gloss
 from ..materials import NO_NORMAL_MAPS, Opacity, Rgb3, blended_opacity, make_material
 from ..model import GREY, Glass, Material, Notes
 from ..textures import TextureTable
@@ -14,7 +15,7 @@ MIRROR_MODELS = (3, 5)  # illum: ray traced reflection, without and with Fresnel
 GLASS_MODELS = (4, 6, 7, 9)
 IOR = 1.5  # of glass without Ni
 # The lowest Ns of a mirror. Exporters write Ns = 1000 (1 - roughness)^2, and a mirror's roughness is at most 0.1.
-MIRROR_NS = 810.0
+MIRROR_NS, SHARPEST_NS = 810.0, 1000.0
 MAP_OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-texres": 1, "-clamp": 1, "-bm": 1, "-imfchan": 1}
 MAP_OPTIONS |= {"-type": 1, "-cc": 1, "-o": 3, "-s": 3, "-t": 3}
 IGNORED_MAPS = [f"map_{what}" for what in ("ks", "ns", "ke", "ka", "refl", "pr", "pm", "ps", "tr")] + ["disp", "refl"]
@@ -74,7 +75,13 @@ def to_material(
         texture = textures.index(("file", file), f"material {name}", lambda: assets.read(file))
     kd, ks = _base_colour(name, values, use is not None, notes), _rgb(values, "ks")
     specular: Rgb3 = (0.0, 0.0, 0.0)
-    if int(_number(values, "illum", 2)) in MIRROR_MODELS and ks is not None and max(ks) > 0:
+    shine = _gloss(values, kd, ks) if assets.as_file else None
+    if shine is not None and is_mirror(shine.metallic, shine.roughness):
+        metal, kd, shine = shine.metallic, shine.base, None
+        kd, specular = _scaled(kd, 1.0 - metal), _scaled(kd, metal)
+    elif shine is not None:
+        kd = shine.base
+    elif int(_number(values, "illum", 2)) in MIRROR_MODELS and ks is not None and max(ks) > 0:
         if _number(values, "ns", 1000.0) >= MIRROR_NS:
             specular = ks
         else:
@@ -84,6 +91,7 @@ def to_material(
     shines = name in assets.shining
     _note_ignored(name, values, use, assets, notes)
     material = make_material(name, kd, specular, opacity, notes, texture=texture)
+    material = with_gloss(material, shine)
     if shines and (ke := _rgb(values, "ke")) is not None:
         material = replace(material, emission=(max(ke[0], 0.0), max(ke[1], 0.0), max(ke[2], 0.0)))
     material, relief = _relief(material, values, assets, textures, notes)
@@ -104,6 +112,29 @@ def _relief(
     if heights:
         notes.add("height maps are taken as normals, with heights in texels", material.name)
     return replace(material, normal_texture=texture, normal_scale=use.strength), use
+
+
+def _gloss(values: Mapping[str, str], kd: Rgb3, ks: Rgb3 | None) -> Gloss | None:
+    """How a material shines, by Pr and Pm, or by Ns where it has a Ks; None where it does not.
+
+    Ks says no more than that: exporters write 0.5 for the 4 % of what is no metal.
+    """
+    ns = min(max(_number(values, "ns", 0.0), 0.0), SHARPEST_NS)
+    roughness = _number(values, "pr", 1.0 - (ns / SHARPEST_NS) ** 0.5)
+    if "pr" in values or "pm" in values:
+        return Gloss(base=kd, roughness=roughness, metallic=_number(values, "pm", 0.0))
+    model = int(_number(values, "illum", 2))
+    if ks is None or max(ks) <= 0 or model < 2:
+        return None
+    if model in MIRROR_MODELS:
+        if ns >= MIRROR_NS or "ns" not in values:
+            return None
+        return Gloss(base=(kd[0] + ks[0], kd[1] + ks[1], kd[2] + ks[2]), roughness=roughness, metallic=1.0)
+    return Gloss(base=kd, roughness=roughness, metallic=0.0)
+
+
+def _scaled(colour: Rgb3, factor: float) -> Rgb3:
+    return (factor * colour[0], factor * colour[1], factor * colour[2])
 
 
 def _base_colour(name: str, values: Mapping[str, str], textured: bool, notes: Notes) -> Rgb3:
@@ -156,8 +187,8 @@ def _note_ignored(name: str, values: Mapping[str, str], use: MapUse | None, asse
             notes.add(f"{key} maps are left out", name)
     if not assets.as_file and any(key in values for key in RELIEF):
         notes.add(NO_NORMAL_MAPS, name)
-    if "pm" in values or "pr" in values:
-        notes.add("Pm and Pr (metalness and roughness) of an MTL file are left out", name)
+    if ("pm" in values or "pr" in values) and not assets.as_file:
+        notes.add('Pm and Pr (metalness and roughness) are left out; scene.surfaces = "file" uses them', name)
     if use is not None and use.clamp:
         notes.add("textures that clamp at their edges repeat", name)
 
