@@ -49,7 +49,7 @@ def identity_of(prepared: Prepared, old: Manifest | None = None, scene: str | No
 def unused_keys(prepared: Prepared) -> Iterator[tuple[str, str]]:
     """Yield the keys, with their tables, on which no pixel depends in this scene, with these cameras and lights."""
     job = prepared.job
-    if not (prepared.scene.has_mirrors or prepared.scene.has_glass):
+    if not (prepared.scene.has_mirrors or prepared.scene.has_glass or prepared.scene.is_glossy):
         yield "specular", "depth"
     if not prepared.scene.has_mirrors or job.specular.depth == 0:
         yield "specular", "hits"
@@ -83,7 +83,8 @@ def require_same_cells(directory: Path, digest: str, records: ArrayRecords) -> N
 def scene_fingerprint(prepared: Prepared) -> str:
     """Hash the scene as it was read: its triangles, materials and textures; its path is ignored."""
     glass = (prepared.scene.pane_corners, prepared.scene.pane_optics) if prepared.scene.has_glass else ()
-    tables = (*prepared.surfaces, *prepared.relief[:-1], *glass)
+    gloss = (prepared.glossy.factor, prepared.glossy.texture) if prepared.scene.is_glossy else ()
+    tables = (*prepared.surfaces, *prepared.relief[:-1], *glass, *gloss)
     arrays = (np.ascontiguousarray(array).reshape(-1).view(np.uint8).data for array in tables)
     return fingerprint(prepared.scene.centre.tobytes(), *arrays)
 

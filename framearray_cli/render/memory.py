@@ -11,14 +11,19 @@ from framearray_cli.base.units import gibibytes, in_unit_of
 from framearray_cli.engine.frames.passes import frame_hits
 from framearray_cli.engine.frames.setup import FrameSetup
 from framearray_cli.engine.hits.emission import EMISSION_COLUMNS
+from framearray_cli.engine.hits.gloss import gloss_columns
 from framearray_cli.engine.hits.hits import empty_hits
 from framearray_cli.engine.hits.native import flag_mirrors, pilot_hits
 from framearray_cli.engine.hits.rays import room_for_hits
+from framearray_cli.engine.inputs.gloss import DIELECTRIC
+from framearray_cli.engine.inputs.glossy import WIDE
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.engine.terms.ambient.estimate import BATCH
 from framearray_cli.engine.terms.cells.gather import LIGHT
 from framearray_cli.engine.terms.cells.lookups import MOST_NEAR
+from framearray_cli.engine.terms.lobes import CERTAIN
 from framearray_cli.engine.terms.obscurance import HITS_TOGETHER
+from framearray_cli.scene.scene import Scene
 
 from .prepare import Prepared
 from .writer import BLOCKS, image_format
@@ -30,6 +35,8 @@ GROWTH = 256 * 2**20
 # Number of frames searched for mirrors, and rays per batch.
 PILOT_FRAMES, PILOT_BATCH = 8, 2048
 LAYER_CHANNELS = 14
+# What a dielectric reflects beyond that face on, mean over directions.
+GRAZING_SHARE = 0.05
 
 
 def program_memory() -> int:
@@ -95,13 +102,17 @@ def window_memory(
     values = prepared.light_arrays.channels * n_lights
     per_record = 4 * (values + LANES + (LIGHT + values if job.indirect.method != "obscurance" else 0))
     per_record += 4 * EMISSION_COLUMNS * (prepared.light_arrays.emitters.span.size > 0)
-    days = job.sun_days if job.output.layers else ()
-    glass = prepared.scene.has_glass
+    days, glass = job.sun_days if job.output.layers else (), prepared.scene.has_glass
+    sources, channels = len(prepared.light_arrays.kind), prepared.light_arrays.channels
+    glossy = prepared.scene.is_glossy
+    per_record += 4 * glossy * gloss_columns(sources, channels, n_lights, glass=glass, mirrored=True)
     per_hit = per_record + 16 * job.output.layers + 4 * len(days) + frames * (4 + weighed)
     per_hit += glass * (12 * frames + 4 * LANES)  # what passes it in each frame; the rows that one frame sees
     # a frame's mirror hits wait for N_r frames; twice while the lists of all batches are joined, and chains add some
     mirrored = mirror_share * job.specular.hits * (n_r + 3) * per_record
     mirrored += glass * float(per_pixel.max()) * (n_r + 3) * per_record  # one face of glass in every pixel
+    if job.specular.depth and glossy:
+        mirrored += followed_share(prepared.scene) * float(per_pixel.max()) * (n_r + 3) * per_record
     # of the frame being traced: the pixel of each hit in every frame of the window, before hits are sorted by it
     finding = float(per_pixel.max()) * frames * 4
     channels = LAYER_CHANNELS * job.output.layers + len(days) + bool(days)
@@ -116,6 +127,16 @@ def window_memory(
     )
     pixels = width * height * (held * per_hit + mirrored + per_image_pixel)
     return int(pixels) + prepared.threads * _gathering_memory(prepared, n_lights)
+
+
+def followed_share(scene: Scene) -> float:
+    """Return the share of hits that rays of lobes follow, by the area of materials; at most twice what eyes may see."""
+    corners = scene.corners.astype(np.float64)
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    certain = DIELECTRIC + scene.metallic * scene.reflectivity.mean(axis=1)
+    narrow = (scene.roughness > 0) & (scene.roughness**2 < WIDE)
+    chance = np.where(narrow, np.minimum((certain + GRAZING_SHARE) / CERTAIN, 1.0), 0.0)
+    return min(2 * float((area * chance[scene.material]).sum() / area.sum()), 1.0)
 
 
 def _gathering_memory(prepared: Prepared, n_lights: int) -> int:

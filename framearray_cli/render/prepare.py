@@ -14,6 +14,7 @@ from framearray_cli.engine.hits.hits import World
 from framearray_cli.engine.images.denoise import require_denoiser
 from framearray_cli.engine.inputs.cameras import Cameras, cameras
 from framearray_cli.engine.inputs.emitters import emitters
+from framearray_cli.engine.inputs.glossy import Glossy, glossy
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.mips import mips
 from framearray_cli.engine.inputs.panes import pane_arrays
@@ -36,6 +37,7 @@ from framearray_cli.scene.paths.paths import Eyes, Lights, eyes, lights
 from framearray_cli.scene.paths.planes import Plane
 from framearray_cli.scene.scene import Scene, load_scene
 
+from .gloss import require_plain_shadows
 from .halves import halves_of
 from .shining import with_emission
 from .sun_study import sun_study
@@ -59,6 +61,7 @@ class Prepared:
     light_arrays: LightArrays
     surfaces: Surfaces
     relief: Relief
+    glossy: Glossy
     still: bool
 
     @property
@@ -104,6 +107,7 @@ def prepare(job: Job) -> Prepared:
 def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepared:
     """Put together a job, its scene, and the eyes and lights to render, or raise a JobError as `with_emission`."""
     lights = with_emission(job, lights, scene)
+    require_plain_shadows(job, scene)
     arrays = light_arrays(lights, scene.centre, emitters(lights, scene))
     return Prepared(
         job=job,
@@ -113,6 +117,7 @@ def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepare
         light_arrays=coloured(arrays) if job.indirect.exact or scene.has_glass else arrays,
         surfaces=surfaces(scene),
         relief=relief(scene),
+        glossy=glossy(scene),
         still=eyes.at_rest,
     )
 
@@ -190,6 +195,8 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
         layers=job.output.layers,
         denoise=job.denoise.obscurance,
         halves=halves_of(job, still=prepared.still),
+        glossy=prepared.glossy,
+        lobes=scene.is_glossy and job.specular.depth > 0,
         sun=sun_study(job, prepared.lights) if job.sun_days else None,
     )
 

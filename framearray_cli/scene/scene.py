@@ -173,15 +173,14 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override], *, as_file: b
     keep, centre, corners = select_triangles(merged, materials, dropped, meshes.notes)
     panes = select_panes(merged, materials, centre, dropped, notes)
     material = merged.material[keep]
-    normals, uvs, colours, tangents, normal_uvs = _empty(3), _empty(2), _empty(3), _empty(4), _empty(2)
+    normals, uvs, tangents, normal_uvs = _empty(3), _empty(2), _empty(4), _empty(2)
     if merged.tangents is not None and merged.normal_uvs is not None:
         tangents, normal_uvs = rows_of(merged.tangents, keep), wrap_uvs(rows_of(merged.normal_uvs, keep), notes)
     if merged.normals is not None and (merged.has_normals[keep].any() or len(tangents)):
         normals = unit_normals(rows_of(merged.normals, keep), merged.has_normals[keep], corners, notes)
     if merged.uvs is not None and any(m.textured for m in materials):
         uvs = wrap_uvs(rows_of(merged.uvs, keep), notes)
-    if merged.colours is not None:
-        colours = merged.colours[keep]
+    colours = _empty(3) if merged.colours is None else merged.colours[keep]
     cutoff = np.array([m.alpha_cutoff for m in materials], dtype=np.float32)
     texels, textures, levels = _texture_tables(meshes.textures, materials if as_file else ())
     return Scene(

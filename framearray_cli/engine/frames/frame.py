@@ -26,7 +26,7 @@ from .passes import Pass
 from .records import BY_SAMPLE, HitRecords, HitsByPixel
 from .scratch import Scratch
 from .setup import FrameSetup
-from .shading import estimate_terms, find_emission
+from .shading import estimate_terms, find_shine
 from .threads import TracePool
 
 
@@ -99,16 +99,16 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
         find_outer(setup, c, m, scratch, frames, pixel[:, span], weight[:, span], within[:, span])
         find_through(setup, frames, hits, m, scratch, pixel[:, span], through[:, span])
         own = through[frames.index(c), span]
-        return mirror_paths(setup, c, hits, m, scratch, own) if setup.depth else []
+        return mirror_paths(setup, c, hits, m, scratch, own) if setup.follows else []
 
     tasks = [(part, first, m) for part in parts for first, m in pool.batches(part.n)]
     mirrored = [path for paths in pool.run(find_batch, tasks) for path in paths]
-    mirror_hits = take("mirror_hits", (2, setup.n_pixels if setup.depth else 0), np.int32)
-    if setup.depth:
+    mirror_hits = take("mirror_hits", (2, setup.n_pixels if setup.follows else 0), np.int32)
+    if setup.follows:
         mirrored += extra_mirror_hits(setup, c, parts, pool, mirror_hits)
     places = dict(zip(frames, _sort_each(pixel, setup.n_pixels, order, pool), strict=True))
     pool.arrays.give("pixel", pixel)
-    reflected = _join(setup, mirrored, pool) if setup.depth else None
+    reflected = _join(setup, mirrored, pool) if setup.follows else None
     return FrameHits(
         c=c,
         records=records,
@@ -140,12 +140,12 @@ def fill_holes(setup: FrameSetup, c: int, pixels: Int32, pool: TracePool) -> lis
     def find_batch(first: int, scratch: Scratch) -> list[tuple[Int32, HitRecords]]:
         m = min(pool.batch, n - first)
         extra_hits(setup.cams, c, samples, first, m, setup.world, scratch.hit_rays.packets, scratch.hits)
-        find_emission(setup, scratch, 0, m)
+        find_shine(setup, scratch.hits, scratch, 0, m)
         scratch.rays["native"] += m
         estimate_terms(setup, scratch.hits, m, scratch, records.part(slice(first, first + m)), "obscurance", "shadow")
         own = own_view(setup, c, scratch.hits, m, scratch)
         _dim_records(records.part(slice(first, first + m)), own)
-        return mirror_paths(setup, c, scratch.hits, m, scratch, own) if setup.depth else []
+        return mirror_paths(setup, c, scratch.hits, m, scratch, own) if setup.follows else []
 
     mirrored = [path for paths in pool.run(find_batch, range(0, n, pool.batch)) for path in paths]
     found = [(_sort_one(pixels, setup.n_pixels, pool), records)]
@@ -163,7 +163,7 @@ def _join(setup: FrameSetup, parts: list[tuple[Int32, HitRecords]], pool: TraceP
     def take(name: str, *shape_and_type: Any) -> Any:
         return pool.arrays.take(f"mirrored {name}", *shape_and_type)
 
-    pixel, whole = np.empty(n, np.int32), setup.empty_records(n, take)
+    pixel, whole = np.empty(n, np.int32), setup.empty_records(n, take, mirrored=True)
 
     def copy(first: int, _scratch: Scratch) -> None:
         for part in range(first, len(parts), pool.threads):
@@ -201,7 +201,7 @@ def _find_native(setup: FrameSetup, c: int, part: Pass, first: int, n: int, scra
     samples = Samples(setup.seed, part.pixels, part.per_pixel, part.first_sample, setup.halves == BY_SAMPLE)
     packets = scratch.hit_rays.packets
     native_hits(setup.cams, c, samples, first, n, setup.world, setup.depth > 0, packets, scratch.hits)
-    find_emission(setup, scratch, 0, n)
+    find_shine(setup, scratch.hits, scratch, 0, n)
     scratch.rays["native"] += n
     scratch.seconds["native"] += perf_counter() - started
 

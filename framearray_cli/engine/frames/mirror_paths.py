@@ -1,30 +1,39 @@
-"""What mirrors show: native hits followed from mirror to mirror. A reflected hit is a hit seen through a tint."""
+"""What mirrors show: native hits followed from mirror to mirror. A reflected hit is a hit seen through a tint.
+
+Glossy surfaces are followed likewise, by one ray of their lobe, for some of their hits.
+"""
 
 from itertools import pairwise
 from time import perf_counter
+from typing import TypeAlias
 
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Int32, Rgb
 
-from ..hits.hits import Hits
+from ..hits.emission import SOURCE
+from ..hits.hits import ESCAPED, Hits
 from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
+from ..inputs.glossy import WIDE
+from ..terms.lobes import follow_lobes
 from ..terms.mirrors import count_mirrors, reflect
 from ..terms.obscurance import HITS_TOGETHER
 from ..terms.panes import FACES, Fronts, reflect_at_panes
 from .glass import NO_GLASS, dim_reflected, own_view
 from .passes import Pass, half_sizes
-from .records import HitRecords
+from .records import LIT, HitRecords
 from .scratch import Scratch
 from .setup import FrameSetup
-from .shading import estimate_terms, find_emission
+from .shading import estimate_terms, find_shine
 from .threads import TracePool
+
+Gloss: TypeAlias = tuple[Float32, Float32]  # alpha and metal of hits
 
 
 def mirror_paths(
     setup: FrameSetup, c: int, hits: Hits, n: int, scratch: Scratch, own: Float32 = NO_GLASS
 ) -> list[tuple[Int32, HitRecords]]:
-    """Follow hits 0 to n - 1 of eye c that are on mirrors, and find what glass before hits mirrors.
+    """Follow hits 0 to n - 1 of eye c that are on mirrors or glossy, and find what glass before hits mirrors.
 
     Returns pixels and records of the reflected hits of each face of glass, and of each bounce. Rays of HITS_TOGETHER
     hits are reflected together, and what they meet at all bounces stands together. Batches begin at multiples of these,
@@ -33,36 +42,74 @@ def mirror_paths(
     Args:
         own: (n, 3) what passes the glass before the hits, which mirrors too; (0, 3) without glass.
     """
+    started = perf_counter()
     ends = [*range(0, n, HITS_TOGETHER), n]  # of the hits that are reflected together
+    # reflected hits write their own gloss there
+    gloss = (scratch.alpha[:n].copy(), scratch.metal[:n].copy()) if setup.lobes else None
     found: list[list[tuple[Int32, HitRecords]]] = [
         _glass_images(setup, c, hits, *span, scratch) if setup.has_glass else [] for span in pairwise(ends)
     ]
-    if count_mirrors(hits, n) == 0:
-        return [path for paths in found for path in paths]
-    started = perf_counter()
     throughput = own if len(own) else np.ones((n, 3), np.float32)
-    for bounce in range(setup.depth):
+    if gloss is not None:
+        _follow(setup, hits, throughput, ends, scratch, found, gloss)
+    if setup.depth and count_mirrors(hits, n):
+        _follow(setup, hits, throughput, ends, scratch, found, None)
+    scratch.seconds["mirror"] += perf_counter() - started
+    return [path for paths in found for path in paths]
+
+
+def _follow(
+    setup: FrameSetup,
+    hits: Hits,
+    throughput: Rgb,
+    ends: list[int],
+    scratch: Scratch,
+    found: list[list[tuple[Int32, HitRecords]]],
+    gloss: Gloss | None,
+) -> None:
+    """Follow hits, and add pixels and records of the reflected hits of each bounce to those of their ends.
+
+    Args:
+        throughput: (n, 3) what passes on the way to the hits.
+        gloss: alpha and metal, to follow glossy hits by their lobes first; None to follow mirrors only.
+    """
+    for bounce in range(setup.depth or 1):
         reflected, next_throughput = scratch.reflected[bounce % 2], scratch.throughput[bounce % 2]
-        ends = _reflect(setup, hits, throughput, ends, scratch, reflected, next_throughput)
+        lobes = gloss if bounce == 0 else None
+        ends = _reflect(setup, hits, throughput, ends, scratch, reflected, next_throughput, lobes)
         m = ends[-1]
         if m == 0:
             break
         scratch.rays["mirror"] += m
         hits, throughput = reflected, next_throughput
-        records, pixels = setup.empty_records(m), reflected.pixel[:m].copy()
+        if gloss is not None:
+            _widen(scratch.alpha[:m])
+        records, pixels = setup.empty_records(m, mirrored=True), reflected.pixel[:m].copy()
         estimate_terms(setup, hits, m, scratch, records, "mirror obscurance", "mirror shadow", throughput)
+        if gloss is not None:
+            _hide_sources(setup, hits, m, records)
         for paths, (first, last) in zip(found, pairwise(ends), strict=True):
             if first < last:
                 paths.append((pixels[first:last], records.part(slice(first, last))))
-    scratch.seconds["mirror"] += perf_counter() - started
-    return [path for paths in found for path in paths]
+
+
+def _widen(alpha: Float32) -> None:
+    """Widen narrow lobes of hits that lobes found [Kaplanyan13]: few rays meet their highlights, as bright dots."""
+    np.maximum(alpha, WIDE, out=alpha, where=alpha > 0)
+
+
+def _hide_sources(setup: FrameSetup, hits: Hits, n: int, records: HitRecords) -> None:
+    """Leave out environments and surfaces that shine: composing finds what a lobe reflects of sources by themselves."""
+    records.row[:n, LIT][hits.kind[:n] == ESCAPED] = 0.0
+    if setup.shines:
+        records.emission[:n, SOURCE] = -1.0
 
 
 def _glass_images(
     setup: FrameSetup, c: int, hits: Hits, first: int, last: int, scratch: Scratch
 ) -> list[tuple[Int32, HitRecords]]:
     """Find what glass mirrors on the way from eye c to hits first to last - 1, face by face."""
-    started, n, world = perf_counter(), last - first, setup.world
+    n, world = last - first, setup.world
     found: list[tuple[Int32, HitRecords]] = []
     reflected, tint = scratch.reflected[0], scratch.throughput[0]
     some, fronts = Hits._make(array[first:last] for array in hits), Fronts(n)
@@ -72,23 +119,30 @@ def _glass_images(
         )
         if m == 0:
             break
-        find_emission(setup, scratch, 0, m)
+        find_shine(setup, reflected, scratch, 0, m)
         dim_reflected(setup, scratch, m, tint)
         scratch.rays["mirror"] += m
-        records, pixels = setup.empty_records(m), reflected.pixel[:m].copy()
+        records, pixels = setup.empty_records(m, mirrored=True), reflected.pixel[:m].copy()
         estimate_terms(setup, reflected, m, scratch, records, "mirror obscurance", "mirror shadow", tint)
         found.append((pixels, records))
-    scratch.seconds["mirror"] += perf_counter() - started
     return found
 
 
 def _reflect(
-    setup: FrameSetup, hits: Hits, throughput: Rgb, ends: list[int], scratch: Scratch, reflected: Hits, tint: Rgb
+    setup: FrameSetup,
+    hits: Hits,
+    throughput: Rgb,
+    ends: list[int],
+    scratch: Scratch,
+    reflected: Hits,
+    tint: Rgb,
+    gloss: Gloss | None,
 ) -> list[int]:
     """Follow hits through one bounce, those between two `ends` together; return the ends of what they meet.
 
     Args:
         reflected, tint: overwritten, see `reflect`.
+        gloss: see `_follow`.
     """
     found = [0]
     for first, last in pairwise(ends):
@@ -96,8 +150,12 @@ def _reflect(
         if first < last:
             some, to = Hits._make(array[first:last] for array in hits), Hits._make(array[at:] for array in reflected)
             packets = scratch.hit_rays.packets
-            m = reflect(some, last - first, throughput[first:last], setup.world, packets, to, tint[at:])
-            find_emission(setup, scratch, at, m)
+            if gloss is None:
+                m = reflect(some, last - first, throughput[first:last], setup.world, packets, to, tint[at:])
+            else:
+                coat = gloss[0][first:last], gloss[1][first:last], setup.glossy.albedo
+                m = follow_lobes(some, last - first, throughput[first:last], *coat, setup.world, packets, to, tint[at:])
+            find_shine(setup, to, scratch, at, m)
             dim_reflected(setup, scratch, m, tint[at:])
         found.append(at + m)
     return found
@@ -136,6 +194,8 @@ def extra_mirror_hits(
         n = min(pool.batch, len(pixels) * extra - first)
         extra_hits(setup.cams, c, samples, first, n, setup.world, scratch.hit_rays.packets, scratch.hits)
         scratch.rays["mirror"] += n
+        if setup.lobes:
+            find_shine(setup, scratch.hits, scratch, 0, n)
         own = own_view(setup, c, scratch.hits, n, scratch)
         return mirror_paths(setup, c, scratch.hits, n, scratch, own)
 

@@ -45,6 +45,7 @@ class HitRecords:
         emission: (n, EMISSION_COLUMNS) what the hit sends out itself, tinted by mirrors, see `record_emission`; (n, 0)
             where nothing shines.
         indirect: (n, LIGHT + channels n_lights) indirect light read from cells, see `gather_cells`; (n, 0) without.
+        gloss: (n, columns) what composing needs of hits on glossy surfaces, see `keep_gloss`; (n, 0) without.
         sun_hours: (n, n_days) hours of direct sun, see `find_sun_hours`; not written behind mirrors. (n, 0) without.
     """
 
@@ -52,6 +53,7 @@ class HitRecords:
     irradiance: Float32
     indirect: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
     emission: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
+    gloss: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
     sun_hours: Float32 = field(default_factory=lambda: np.empty((0, 0), np.float32))
 
     @property
@@ -133,6 +135,7 @@ def empty_records(
     columns: int = 0,
     shining: bool = False,
     days: int = 0,
+    gloss: int = 0,
     take: Callable[[str, tuple[int, ...], Any], Any] = fresh_array,
 ) -> HitRecords:
     """Allocate records of n hits; contents are arbitrary.
@@ -143,6 +146,7 @@ def empty_records(
         columns: of `indirect`.
         shining: whether hits may send out light themselves.
         days: whose hours of sun are counted.
+        gloss: columns of `gloss`.
         take: returns an array for a name, shape and dtype; by default a new one.
     """
     none = np.empty((n, 0), np.float32)
@@ -151,5 +155,6 @@ def empty_records(
         irradiance=take("irradiance", (n, channels, n_lights), np.float32),
         indirect=take("indirect", (n, columns), np.float32) if columns else none,
         emission=take("emission", (n, EMISSION_COLUMNS), np.float32) if shining else none,
+        gloss=take("gloss", (n, gloss), np.float32) if gloss else none,
         sun_hours=take("sun_hours", (n, days), np.float32) if days else none,
     )

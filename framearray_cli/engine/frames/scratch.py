@@ -4,9 +4,12 @@ from collections import Counter, defaultdict
 
 import numpy as np
 
+from framearray_cli.base.arrays import with_room
+
 from ..hits.emission import EMISSION_COLUMNS
 from ..hits.hits import empty_hits
 from ..hits.rays import room_for_hits, room_for_tests
+from ..inputs.lights import one_source
 from ..kernels.simd import LANES
 from ..terms.cells.exact import PathScratch
 from ..terms.cells.lookups import room_for_gathering, room_for_near
@@ -37,6 +40,8 @@ class Scratch:
         gather, near: of gather rays, and of those too short for cells; and `constant`: (batch, 3) the light that cells
             have at every light position, `closeness`: (batch,) of their rays; None and empty without cells.
         mirrors: of gather rays that meet mirrors; empty without.
+        alpha, metal: (batch + LANES,) gloss of the hits, see `record_gloss`; empty where nothing is glossy.
+        by_source: the lights with one source at a time, where gloss needs the light of each; else empty.
         emission: (batch, EMISSION_COLUMNS) of the hits, see `record_emission`; (0, ...) where nothing shines.
         paths: of indirect light by paths; None without.
         smooth: of the filter of indirect light; None without.
@@ -53,7 +58,7 @@ class Scratch:
         self.sun = room_for_sun(setup.sun, batch) if setup.sun else None
         self.hits = empty_hits(batch)
         # kernels write sixteen hits at a time, here from any hit on
-        self.reflected = [empty_hits(batch + LANES) for _ in range(2 if setup.depth else 0)]
+        self.reflected = [empty_hits(batch + LANES) for _ in range(2 if setup.follows else 0)]
         self.throughput = [np.empty((batch, 3), np.float32) for _ in self.reflected]
         self.steps = room_for_steps(setup.lights.n_lights) if setup.shadow_step > 1 else None
         full = (0 if setup.keeps_all else batch, setup.lights.channels, setup.lights.n_lights)
@@ -72,6 +77,10 @@ class Scratch:
         self.closeness = np.empty(batch if near else 0, np.float32)
         self.constant = np.empty((batch if setup.cells is not None else 0, 3), np.float32)
         self.emission = np.empty((batch if setup.shines else 0, EMISSION_COLUMNS), np.float32)
+        self.alpha, self.metal = (np.empty(batch + LANES if setup.shiny else 0, np.float32) for _ in range(2))
+        n_sources = len(setup.lights.kind)
+        self.by_source = [one_source(setup.lights, s) for s in range(n_sources if setup.shiny and n_sources > 1 else 0)]
+        self.of_source = with_room((batch if self.by_source else 0, channels, len(setup.kept)), np.float32)
         self.paths = PathScratch(setup.lights) if setup.exact else None
         self.smooth = room_for_smoothing(setup.lights.channels * len(setup.kept)) if setup.smooth else None
         self.rays: Counter[str] = Counter()

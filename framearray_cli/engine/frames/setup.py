@@ -8,9 +8,12 @@ from framearray_cli.base.arrays import Float64, Int32, Rgb
 from framearray_cli.scene.paths.planes import Plane, first_with_background
 
 from ..embree.packets import Tracer
+from ..hits.gloss import gloss_columns
 from ..hits.hits import World
 from ..hits.native import pixel_order
 from ..inputs.cameras import Cameras
+from ..inputs.glossy import NONE as NO_GLOSS
+from ..inputs.glossy import Glossy
 from ..inputs.lights import LightArrays, some_lights
 from ..inputs.mips import SHARP, Mips
 from ..inputs.panes import has_panes
@@ -37,6 +40,7 @@ class FrameSetup:
         per_pixel: (n_c,) number n_c of native hits per pixel of every eye.
         mirror_hits: number of native hits of a pixel that sees a mirror, if more; 0 in a scene without mirrors.
         depth: number of mirror bounces to follow; 0 in a scene without mirrors.
+        lobes: whether rays follow what glossy surfaces reflect, too.
         balance: whether hits are weighed by the balance heuristic; else all weigh 1.
         area: whether hits are weighed by the part of the pixel that they stand for, see `engine/images/area.py`.
         background: (3,) radiance outside the scene.
@@ -52,6 +56,7 @@ class FrameSetup:
         smooth: number of passes of the filter of indirect light from cells.
         relief, mips: normal maps, and smaller copies of textures.
         sun: whose hours the layers hold; None: of none.
+        glossy: the gloss of all materials.
         order: (n_pixels,) every pixel once, in the order of tracing.
     """
 
@@ -83,6 +88,8 @@ class FrameSetup:
     sun: SunStudy | None = None
     relief: Relief = FLAT
     mips: Mips = SHARP
+    glossy: Glossy = NO_GLOSS
+    lobes: bool = False
     order: Int32 = field(init=False)
 
     def __post_init__(self) -> None:
@@ -136,6 +143,16 @@ class FrameSetup:
         return has_panes(self.lights.panes)
 
     @property
+    def shiny(self) -> bool:
+        """Whether any surface of the scene is glossy."""
+        return self.glossy.factor.ndim > 1
+
+    @property
+    def follows(self) -> bool:
+        """Whether native hits may have reflected hits."""
+        return self.depth > 0 or self.lobes
+
+    @property
     def keeps_all(self) -> bool:
         """Whether the light of all positions is stored."""
         return len(self.kept) == self.lights.n_lights
@@ -164,12 +181,16 @@ class FrameSetup:
             return self.cells
         return at_lights(self.cells, list(positions))
 
-    def empty_records(self, n: int, take: Any = None) -> HitRecords:
-        """Allocate records of n hits; see `empty_records` in `records.py`."""
+    def empty_records(self, n: int, take: Any = None, *, mirrored: bool = False) -> HitRecords:
+        """Allocate records of n hits, seen in mirrors or not; see `empty_records` in `records.py`."""
         channels, n_lights = self.stored_light
         columns = 0 if self.cells is None else LIGHT + channels * n_lights
         days = len(self.sun.days) if self.sun else 0
-        return empty_records(n, channels, n_lights, columns, self.shines, days, take or fresh_array)
+        gloss = 0
+        if self.shiny:
+            n_sources = len(self.lights.kind)
+            gloss = gloss_columns(n_sources, channels, n_lights, glass=self.has_glass, mirrored=mirrored)
+        return empty_records(n, channels, n_lights, columns, self.shines, days, gloss, take or fresh_array)
 
     def eyes_of(self, j: int) -> range:
         """The window of frame j: the eyes whose hits it shows."""

@@ -7,20 +7,17 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Rgb
 
 from ..hits.emission import TEXTURE, record_emission
+from ..hits.gloss import record_gloss
 from ..hits.hits import ESCAPED, Hits
-from ..inputs.panes import has_panes
 from ..kernels.kernel import inlined, kernel
 from ..kernels.simd import LANES, bits, load
 from ..terms.cells.exact import light_of_paths
 from ..terms.cells.gather import Gathered, gather_cells, gather_settings
 from ..terms.cells.local import read_cells
 from ..terms.cells.smooth import smooth_light
-from ..terms.direct import direct
-from ..terms.direct_steps import direct_by_steps
-from ..terms.environments import has_environments, see_environments
-from ..terms.looks import look_around, looking
 from ..terms.obscurance import obscurance
 from ..terms.sun_hours import find_sun_hours
+from .direct_light import estimate_direct
 from .records import HALF, INDIRECT, LIGHT_INDEPENDENT, LIT, OBSCURANCE, REFLECTIVITY, WEIGHT, HitRecords, lit_bit
 from .scratch import Scratch
 from .setup import FrameSetup
@@ -43,7 +40,7 @@ def estimate_terms(
     """Estimate W, the light-independent radiance and E[l] of hits 0 to n - 1.
 
     Args:
-        out: overwritten; of `scratch.emission`, see `find_emission`, what the hits send out.
+        out: overwritten; `scratch` has what the hits send out, and their gloss, see `find_shine`.
         obscurance_kind, shadow_kind: kinds of rays and stages to count the cost under.
         throughput: (>= n, 3) the tint t of the mirrors on the way to each hit, or (0, 3) without mirrors.
         smooth: whether hits in a row are neighbours in the image, and their indirect light is filtered.
@@ -58,25 +55,7 @@ def estimate_terms(
         )  # fmt: skip
     skylight = scratch.skylight if setup.cells is None else scratch.constant
     middle = perf_counter()
-    if scratch.steps is None:
-        lights = (
-            looking(setup.lights)
-            if has_environments(setup.lights) and not has_panes(setup.lights.panes)
-            else setup.lights
-        )
-        rays = direct(hits, n, lights, setup.tracer, scratch.test_rays, out.irradiance, neighbours)
-        if lights is not setup.lights:
-            rays += look_around(hits, n, lights, setup.tracer, scratch.test_rays, out.irradiance)
-    else:
-        irradiance = out.irradiance if setup.keeps_all else scratch.irradiance
-        rays = direct_by_steps(
-            hits, n, setup.lights, setup.shadow_step, setup.shadow_unbiased, setup.tracer, scratch.test_rays,
-            scratch.steps, irradiance,
-        )  # fmt: skip
-        if not setup.keeps_all:
-            out.irradiance[:n] = irradiance[:n, :, setup.kept.start : setup.kept.stop]
-    if has_environments(setup.lights):
-        see_environments(hits, n, setup.lights, setup.kept.start, scratch.test_rays, out.irradiance)
+    rays = estimate_direct(setup, hits, n, scratch, out, throughput)
     if setup.sun is not None and scratch.sun is not None and neighbours:
         rays += find_sun_hours(hits, n, setup.sun, setup.tracer, scratch.test_rays, scratch.sun, out.sun_hours)
     scratch.rays[shadow_kind] += rays
@@ -89,11 +68,18 @@ def estimate_terms(
     scratch.seconds[shadow_kind] += perf_counter() - middle
 
 
-def find_emission(setup: FrameSetup, scratch: Scratch, first: int, n: int) -> None:
-    """Find what the n hits whose rays are still in `scratch.hit_rays` send out; they are hits `first` and following."""
+def find_shine(setup: FrameSetup, hits: Hits, scratch: Scratch, first: int, n: int) -> None:
+    """Find what n hits whose rays are still in `scratch.hit_rays` send out, and their gloss.
+
+    Args:
+        hits: these; their base colours change where they are glossy.
+        first: number of the first of them in the arrays of `scratch`.
+    """
+    packets = scratch.hit_rays.packets
     if setup.shines:
-        packets, found = scratch.hit_rays.packets, scratch.emission[first:]
-        record_emission(setup.lights.emitters, setup.tracer, packets, n, found)
+        record_emission(setup.lights.emitters, setup.tracer, packets, n, scratch.emission[first:])
+    if setup.shiny:
+        record_gloss(setup.glossy, setup.tracer, packets, n, hits, scratch.alpha[first:], scratch.metal[first:])
 
 
 def _estimate_indirect(

@@ -54,6 +54,7 @@ class Band(NamedTuple):
         lit: (HITS_AT_ONCE + 2,) LIT of a hit.
         strength: (n_sources,) addresses of the strengths of all sources, (channels, n_lights) each, for hits that send
             out light themselves; (0,) where nothing shines.
+        room: (10, LANES) scratch of `light_of_gloss`.
     """
 
     direct: Float32
@@ -63,6 +64,7 @@ class Band(NamedTuple):
     shares: Float32
     lit: Addresses
     strength: Addresses
+    room: Float32
 
 
 class Finish(NamedTuple):
@@ -96,6 +98,7 @@ def empty_band(n_pixels: int, n_lights: int, strength: Addresses = NOTHING_SHINE
         shares=np.empty((HITS_AT_ONCE + 2, 3), np.float32),
         lit=np.empty(HITS_AT_ONCE + 2, np.int64),
         strength=strength,
+        room=np.empty((10, LANES), np.float32),
     )
 
 

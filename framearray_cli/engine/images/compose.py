@@ -10,6 +10,8 @@ from ..frames.records import BY_SAMPLE, HALF, INDIRECT, OBSCURANCE, REFLECTIVITY
 from ..kernels.kernel import integer_at, kernel, real_at
 from .accumulate import ROW_BYTES, accumulate
 from .band import Band, Finish, Stored, finish
+from .gloss import add_gloss
+from .gloss_view import GlossView
 from .sources import ORDER, ROW, START, WEIGHTS
 
 
@@ -21,12 +23,14 @@ class Summands(NamedTuple):
         mirrored: addresses of a `SourceList`: reflected hits, summed and added to the average.
         channels: of irradiance, 1 or 3.
         smooth: (n_pixels, 3) R W that replaces the average, or (0, 3).
+        view: of glossy hits.
     """
 
     hits: Addresses
     mirrored: Addresses
     channels: int
     smooth: Float32
+    view: GlossView
 
 
 class Pixels(NamedTuple):
@@ -57,7 +61,7 @@ def compose_pixels(
         as `finish`, for all bands together.
     """
     # --- loop state ---
-    hits, mirrored, channels, smooth = summands
+    hits, mirrored, channels, smooth, view = summands
     images, samples, maps = out
     n_lights = images.shape[0]
     bad, bad_light, bad_pixel = 0, -1, -1  # values that are no radiance; light position and pixel of the first
@@ -79,11 +83,15 @@ def compose_pixels(
                     maps[first + i, 3 + channel] = band.sums[i, INDIRECT + channel]
                     maps[first + i, 6 + channel] = band.sums[i, REFLECTIVITY + channel]
 
-        # 3. Add reflected hits: sum(t (R / pi E[l], R W, B)) / n_native.
+        # 3. What glossy hits send to this eye beyond that.
+        add_gloss(band, first, m, hits, view, channels, n_lights, True, True)
+
+        # 4. Add reflected hits: sum(t (R / pi E[l], R W, B)) / n_native.
         if mirrored.shape[0] > 0:
             accumulate(band, first, m, mirrored, channels, n_lights, False)
+            add_gloss(band, first, m, mirrored, view, channels, n_lights, False, True)
 
-        # 4. Multiply by the colour of the lights and by I_A[l], and write the images.
+        # 5. Multiply by the colour of the lights and by I_A[l], and write the images.
         found, l, pixel, large = finish(band, first, m, how, images)
         if bad == 0 and found > 0:
             bad_light, bad_pixel = l, pixel
@@ -113,7 +121,14 @@ def weigh_halves(sources: Addresses, halves: Int32, first_pixel: int, n: int, we
 
 @kernel
 def compose_differences(
-    band: Band, first_pixel: int, n: int, sources: Addresses, channels: int, how: Finish, images: Float32
+    band: Band,
+    first_pixel: int,
+    n: int,
+    sources: Addresses,
+    channels: int,
+    how: Finish,
+    images: Float32,
+    view: GlossView,
 ) -> None:
     """Compose the differences D of the halves of the hits, a band at a time; see `standard_error.py`.
 
@@ -123,6 +138,7 @@ def compose_differences(
         channels: of irradiance, 1 or 3.
         how: `lowest` is minus infinity, as differences have both signs.
         images: (n_lights, n_pixels, 3) overwritten in pixels first_pixel to first_pixel + n - 1.
+        view: of glossy hits.
     """
     for first in range(first_pixel, first_pixel + n, band.hits.shape[0]):
         # 1. Sums are added to the band, so clear it.
@@ -136,6 +152,7 @@ def compose_differences(
 
         # 2. Sum hits times factors, and write the sums as images.
         accumulate(band, first, m, sources, channels, images.shape[0], False)
+        add_gloss(band, first, m, sources, view, channels, images.shape[0], False, False)
         finish(band, first, m, how, images)
 
 

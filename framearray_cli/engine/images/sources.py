@@ -13,9 +13,11 @@ from ..frames.records import HitRecords, HitsByPixel
 # Columns of a list of sources: addresses of arrays, 0 for an empty one; and what the arrays hold. Hits weighed by area
 # are one list over all sources (`area_weights.py`): SHARES is that of a weight per entry of ORDER in place of one per
 # hit, OF that of the source of each entry, as the number of rows from the list to it. These rows have no START.
-START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE, GATHERED, EMISSION, HOURS, PLACES, SHARES, OF = range(13)
-COLUMNS = 13
-_TYPES = (np.int32, np.int32, *[np.float32] * 8, np.uint8)
+# GLOSS_COLUMNS is no address, but the number of columns of GLOSS.
+START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE, GATHERED, EMISSION, HOURS, GLOSS, PLACES = range(12)
+GLOSS_COLUMNS, SHARES, OF = range(12, 15)
+COLUMNS = 15
+_TYPES = (np.int32, np.int32, *[np.float32] * 9, np.uint8)
 NO_SCALE, _NO_PLACES = np.empty(0, np.float32), np.empty(0, np.uint8)
 NO_SOURCES: Addresses = np.empty((0, COLUMNS), np.int64)
 
@@ -44,7 +46,7 @@ class HitSource(NamedTuple):
         """The arrays in the order of the columns of a list."""
         found, records = self.by_pixel, self.records
         in_order = (found.start, found.order, self.weight, self.scale, self.odd_scale)
-        light = (records.row, records.irradiance, records.indirect, records.emission, records.sun_hours)
+        light = (records.row, records.irradiance, records.indirect, records.emission, records.sun_hours, records.gloss)
         return (*in_order, *light, self.place)
 
 
@@ -64,7 +66,10 @@ class SourceList:
         """
         self.sources = list(sources)  # keeps the arrays
         rows = [
-            [*(_address(array, dtype) for array, dtype in zip(source.arrays, _TYPES, strict=True)), 0, 0]
+            [
+                *(_address(array, dtype) for array, dtype in zip(source.arrays, _TYPES, strict=True)),
+                *(source.records.gloss.shape[1], 0, 0),
+            ]
             for source in self.sources
         ]
         self.addresses: Addresses = np.array(rows, np.int64).reshape(-1, COLUMNS)

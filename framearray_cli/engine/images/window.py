@@ -26,6 +26,7 @@ from .band import NOTHING_SHINES, Band, Finish, as_stored, empty_band
 from .compose import Pixels, Summands, average_native, compose_differences, compose_pixels, weigh_halves
 from .composed import Composed, layers_of
 from .denoise import denoise_obscurance
+from .gloss_view import GlossView, gloss_view
 from .sources import NO_SCALE, NO_SOURCES, HitSource, SourceList
 from .standard_error import fill_unknown, half_factors
 from .sun_hours import average_sun_hours, sun_layers
@@ -57,7 +58,12 @@ class Window:
         self._holes: dict[int, list[tuple[HitsByPixel, HitRecords]]] = {}
         self._area = AreaWeights((setup.cams.width, setup.cams.height))
         self._strength, strength = _strengths(setup)
+        self._gloss = gloss_view(setup)
         self._bands = [empty_band(BAND_PIXELS, len(setup.kept), strength) for _ in range(pool.threads)]
+
+    def _view(self, j: int) -> GlossView:
+        """How eye j sees glossy hits."""
+        return self._gloss._replace(eye=self._setup.cams.position[j : j + 1]) if self._setup.shiny else self._gloss
 
     def add(self, frame: FrameHits) -> None:
         """Add the hits of the next eye of the path."""
@@ -131,13 +137,13 @@ class Window:
         smooth = (
             self._smooth_indirect(j, holes[:1], images.shape[1:3]) if setup.denoise else np.empty((0, 3), np.float32)
         )
-        frame, out = self._frames[j], Pixels(flat, samples, maps)
+        frame, out, view = self._frames[j], Pixels(flat, samples, maps), self._view(j)
 
         def compose_task(first: int, scratch: Scratch) -> tuple[int, int, int, int]:
             started = perf_counter()
             n = min(TASK_PIXELS, setup.n_pixels - first)
             with self._weighed(hits, first, n) as (listed, in_pixels), self._band() as band:
-                summands = Summands(listed, mirrored.addresses, setup.lights.channels, smooth)
+                summands = Summands(listed, mirrored.addresses, setup.lights.channels, smooth, view)
                 found: tuple[int, int, int, int] = compose_pixels(band, first, n, summands, self._finish, out)
                 if setup.area:
                     samples[first : first + n] = in_pixels
@@ -175,12 +181,13 @@ class Window:
             even, odd = half_factors(frame.mirror_hits)
             sources.append(HitSource(frame.mirror_places, frame.mirrored, scale=even, odd_scale=odd))
         listed, how = SourceList(sources), self._finish._replace(lowest=np.float32(-np.inf))
+        view = self._view(j)
 
         def compose_task(task: tuple[int, int], _scratch: Scratch) -> None:
             by_area = self._area.halved(hits, halves, *task, known) if setup.area else nullcontext(NO_SOURCES)
             with by_area as addresses, self._band() as band:
                 addresses = np.concatenate([addresses, listed.addresses])
-                compose_differences(band, *task, addresses, setup.lights.channels, how, images)
+                compose_differences(band, *task, addresses, setup.lights.channels, how, images, view)
 
         self._pool.run(compose_task, tasks)
         differences = images.reshape(shape)

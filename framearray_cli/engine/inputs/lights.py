@@ -184,3 +184,10 @@ def some_lights(lights: LightArrays, at: Sequence[int]) -> LightArrays:
         profiles=lights.profiles._replace(frame=frame[:, :, some] if frame.ndim > 1 else frame),
     )
     return pad_lights(found)
+
+
+def one_source(lights: LightArrays, s: int) -> LightArrays:
+    """The lights with all sources but one dark."""
+    lit, strength = np.zeros_like(lights.lit), np.zeros_like(lights.strength)
+    lit[s], strength[s] = lights.lit[s], lights.strength[s]
+    return pad_lights(lights._replace(lit=lit, strength=strength))

@@ -12,7 +12,7 @@ from framearray_cli.engine.frames.mirror_paths import mirror_paths
 from framearray_cli.engine.frames.records import INDIRECT, LIGHT_INDEPENDENT, REFLECTIVITY, HitRecords
 from framearray_cli.engine.frames.scratch import Scratch
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.shading import estimate_terms, find_emission
+from framearray_cli.engine.frames.shading import estimate_terms, find_shine
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.hits import SURFACE, Hits
 from framearray_cli.engine.hits.native import Samples, native_hits
@@ -153,7 +153,7 @@ class _Look:
         n = setup.n_pixels
         samples = Samples(setup.seed, setup.order, 1, 0, False)
         native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, hits)
-        find_emission(setup, scratch, 0, n)
+        find_shine(setup, scratch.hits, scratch, 0, n)
         surface = hits.kind[:n] == SURFACE
         back = surface & from_behind(self._scene, met_triangles(setup.tracer, packets, n), hits.incoming[:n])
         distance = np.linalg.norm(hits.position[:n] - setup.cams.position[c], axis=1)
@@ -165,7 +165,7 @@ class _Look:
         place = np.empty(n, np.int64)
         place[hits.pixel[:n]] = np.arange(n)
         reflects = surface & (hits.reflectivity[:n] > 0).any(axis=1)
-        for pixel, reflected in mirror_paths(setup, c, hits, n, scratch) if setup.depth else []:
+        for pixel, reflected in mirror_paths(setup, c, hits, n, scratch) if setup.follows else []:
             np.add.at(radiance, place[pixel], self._radiance(reflected))
         return {
             "surface": surface,

@@ -20,7 +20,7 @@ from framearray_cli.engine.frames.records import (
 )
 from framearray_cli.engine.frames.scratch import Scratch
 from framearray_cli.engine.frames.setup import FrameSetup
-from framearray_cli.engine.frames.shading import estimate_terms, find_emission
+from framearray_cli.engine.frames.shading import estimate_terms, find_shine
 from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.hits.native import Samples, native_hits
 from framearray_cli.engine.hits.outer import outer_hits
@@ -132,7 +132,7 @@ def share_after_filter(setup: FrameSetup, pool: TracePool) -> float:
                 samples = Samples(setup.seed + half, pixels, per_pixel=1, first=0, halves=False)
                 packets, hits = scratch.hit_rays.packets, scratch.hits
                 native_hits(setup.cams, c, samples, 0, len(pixels), setup.world, setup.depth > 0, packets, hits)
-                find_emission(setup, scratch, 0, len(pixels))
+                find_shine(setup, scratch.hits, scratch, 0, len(pixels))
                 records = setup.empty_records(len(pixels))
                 estimate_terms(setup, hits, len(pixels), scratch, records, "pilot", "pilot", smooth=smooth)
                 reflectivity = records.row[:, None, REFLECTIVITY : REFLECTIVITY + 3]
@@ -206,7 +206,7 @@ class _Pilot:
         setup, n = self.setup, 2 * len(pixels)
         samples, packets = Samples(setup.seed, pixels, per_pixel=2, first=0, halves=True), scratch.hit_rays.packets
         native_hits(setup.cams, c, samples, 0, n, setup.world, setup.depth > 0, packets, scratch.hits)
-        find_emission(setup, scratch, 0, n)
+        find_shine(setup, scratch.hits, scratch, 0, n)
         scratch.rays["pilot"] += n
         records = setup.empty_records(n)
         estimate_terms(setup, scratch.hits, n, scratch, records, "pilot", "pilot")

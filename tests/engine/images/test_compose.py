@@ -26,6 +26,7 @@ from framearray_cli.engine.hits.outer import sort_by_pixel
 from framearray_cli.engine.images.accumulate import accumulate
 from framearray_cli.engine.images.band import HITS_AT_ONCE, Band, Finish, as_stored, empty_band, finish
 from framearray_cli.engine.images.compose import compose_differences, weigh_halves
+from framearray_cli.engine.images.gloss_view import NO_GLOSS
 from framearray_cli.engine.images.sources import COLUMNS, HitSource, SourceList
 from framearray_cli.engine.kernels.simd import LANES
 
@@ -179,7 +180,7 @@ def test_differences_are_sums_with_a_factor_for_each_half(channels: int, weighed
     colour, ambient = lights()
     listed = SourceList([case.source(records, even, odd)])
     how = Finish(colour, ambient, 0, np.float32(-np.inf))
-    compose_differences(empty_band(16, N_LIGHTS), 0, N_PIXELS, listed.addresses, channels, how, images)
+    compose_differences(empty_band(16, N_LIGHTS), 0, N_PIXELS, listed.addresses, channels, how, images, NO_GLOSS)
     factor = np.where(case.half == 1, odd[case.pixel], even[case.pixel]).astype(np.float64)
     value = (
         colour * case.sums(case.direct() * factor[:, None, None])

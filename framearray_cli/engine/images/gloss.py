@@ -1,0 +1,264 @@
+"""What glossy hits send to the eye of an image beyond a diffuse surface: f for that eye, with the weights of all hits.
+
+    sum of w t ((f(v, d_s[l]) - R / pi) E_s[l] + (A(v) - R) / pi E_indirect[l])
+
+`accumulate` sums w R / pi E[l] of every hit; this is what is missing. d_s[l] is the direction in which the hit found
+source s, by its key, E_s[l] the irradiance from there, and A(v) the albedo of the surface towards the eye: indirect
+light counts as if it came evenly from all sides.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from framearray_cli.base.arrays import Addresses, Float32, Real, Triple
+
+from ..frames.records import HALF, INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY
+from ..hits.gloss import ALPHA, GEOMETRIC, KEY, METAL, OF_MIRRORS, POINT, SHADING
+from ..hits.gloss import LIT as LIT_WORDS
+from ..inputs.gloss import DIELECTRIC, evaluate_lobe, facing
+from ..inputs.glossy import albedo_at, followed_share
+from ..inputs.lights import MESH
+from ..inputs.maps import map_texel, map_tint
+from ..inputs.shapes import source_in_lanes, source_point, vector_and_factor
+from ..kernels.kernel import inlined, integer_at, prefetch, real_at, step
+from ..kernels.optional import chosen_by_type, step_or_zero
+from ..kernels.simd import LANES, lane_numbers, load, select, sqrt, store, words
+from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
+from .accumulate import ROW_BYTES, row_of, weight_of
+from .band import INVERSE_PI, Band
+from .gloss_view import Coat, GlossView, find_mesh
+from .sources import GATHERED, GLOSS, GLOSS_COLUMNS, ODD_SCALE, ORDER, ROW, SCALE, START
+
+# Rows of `Band.room` with light that was kept, of each channel.
+TAKEN = 7
+# Prefetch the gloss of the hit that comes this many hits later.
+AHEAD = 12
+
+
+@inlined
+def _triple_at(address: int, column: int) -> Triple:
+    return real_at(address, column), real_at(address, column + 1), real_at(address, column + 2)
+
+
+@step
+def light_of_gloss(
+    band: Band,
+    first_pixel: int,
+    n: int,
+    sources: Addresses,
+    view: GlossView,
+    channels: int,
+    n_lights: int,
+    mean: bool,
+    positive: bool,
+) -> int:
+    """Add what glossy hits send beyond diffuse light to the sums of pixels first_pixel to first_pixel + n - 1.
+
+    Args:
+        sources, channels, n_lights, mean: as `accumulate` took them.
+        positive: whether sums below 0 are rounding errors, as of metals, whose diffuse light is taken away again.
+    """
+    for i in range(n):
+        pixel, inverse = first_pixel + i, np.float32(1.0)
+        if mean:
+            total = np.float32(0.0)
+            for s in range(sources.shape[0]):
+                listed = sources[s]
+                if listed[START] == 0:
+                    continue
+                for entry in range(integer_at(listed[START], pixel), integer_at(listed[START], pixel + 1)):
+                    total += _weight(sources, s, pixel, entry)
+            inverse = np.float32(1.0) / total if total > 0.0 else np.float32(0.0)
+        for s in range(sources.shape[0]):
+            listed = sources[s]
+            if listed[START] == 0:
+                continue
+            last = integer_at(listed[START], first_pixel + n)
+            for entry in range(integer_at(listed[START], pixel), integer_at(listed[START], pixel + 1)):
+                source, hit = sources[row_of(listed, s, entry)], integer_at(listed[ORDER], entry)
+                if entry + AHEAD < last:
+                    later = sources[row_of(listed, s, entry + AHEAD)]
+                    columns = 4 * later[GLOSS_COLUMNS]
+                    prefetch(later[GLOSS] + columns * integer_at(listed[ORDER], entry + AHEAD), columns)
+                at = source[GLOSS] + 4 * source[GLOSS_COLUMNS] * hit
+                if source[GLOSS] == 0 or not real_at(at, ALPHA) > 0.0:
+                    continue
+                w = inverse * _weight(sources, s, pixel, entry)
+                if w != 0.0:
+                    _add_hit(band, i, source, hit, at, w, view, channels, n_lights)
+        if positive:
+            _cut_at_zero(band, i)
+    return 0
+
+
+@inlined
+def _cut_at_zero(band: Band, i: int) -> None:
+    """Set negative sums of pixel i of the band to 0."""
+    nothing = np.float32(0.0)
+    for channel in range(3):
+        for column in (INDIRECT + channel, LIGHT_INDEPENDENT + channel):
+            band.sums[i, column] = max(band.sums[i, column], nothing)
+        for l in range(0, band.direct.shape[2], LANES):
+            at = (3 * i + channel) * band.direct.shape[2] + l
+            value = load(band.direct, at)
+            store(band.direct, at, select(value < nothing, nothing, value))
+
+
+@inlined
+def _weight(sources: Addresses, s: int, pixel: int, entry: int) -> Real:
+    """The weight of an entry of the list in row s, with the factor of its pixel."""
+    listed = sources[s]
+    hit = integer_at(listed[ORDER], entry)
+    row = sources[row_of(listed, s, entry)][ROW] + ROW_BYTES * hit
+    even = real_at(listed[SCALE], pixel) if listed[SCALE] != 0 else np.float32(1.0)
+    odd = real_at(listed[ODD_SCALE], pixel) if listed[ODD_SCALE] != 0 else even
+    found: Real = (odd if real_at(row, HALF) > 0.0 else even) * weight_of(listed, entry, hit)
+    return found
+
+
+@step
+def _add_hit(
+    band: Band, i: int, source: Addresses, hit: int, at: int, w: Real, view: GlossView, channels: int, n_lights: int
+) -> None:
+    """Add what one glossy hit sends beyond diffuse light to pixel i of the band; `at` is the address of its gloss."""
+    lights, one, nothing = view.lights, np.float32(1.0), np.float32(0.0)
+    row, n_sources = source[ROW] + ROW_BYTES * hit, lights.kind.shape[0]
+    # 1. The direction to the viewer, the tint of mirrors, and the colours of the surface.
+    p, m = _triple_at(at, POINT), _triple_at(at, SHADING)
+    packets = (n_lights + LANES - 1) // LANES
+    last = LIT_WORDS + (n_sources * channels * n_lights if view.glass else (n_sources * packets + 1) // 2)
+    mirrored = source[GLOSS_COLUMNS] >= last + OF_MIRRORS
+    x, y, z = view.eye[0, 0] - p[0], view.eye[0, 1] - p[1], view.eye[0, 2] - p[2]
+    tint: Triple = (one, one, one)
+    if mirrored:
+        x, y, z = _triple_at(at, last)
+        tint = _triple_at(at, last + 3)
+    scale = one / sqrt(x * x + y * y + z * z)
+    v = (scale * x, scale * y, scale * z)
+    alpha, metal = real_at(at, ALPHA), real_at(at, METAL)
+    seen = _triple_at(row, REFLECTIVITY)  # t R
+    if view.glass and not mirrored:
+        base = _triple_at(at, last)
+        tint = (seen[0] / base[0], seen[1] / base[1], seen[2] / base[2])
+    else:
+        base = (
+            seen[0] / tint[0] if tint[0] > nothing else nothing,
+            seen[1] / tint[1] if tint[1] > nothing else nothing,
+            seen[2] / tint[2] if tint[2] > nothing else nothing,
+        )
+    of_coat = DIELECTRIC * (one - metal)
+    f0 = (of_coat + metal * base[0], of_coat + metal * base[1], of_coat + metal * base[2])
+    diffuse = ((one - metal) * base[0], (one - metal) * base[1], (one - metal) * base[2])
+    share = (w * tint[0], w * tint[1], w * tint[2])
+    low = words(lane_numbers() * np.int32(0)) + np.uint64(np.uint32(integer_at(at, KEY)))
+    key = low + (np.uint64(np.uint32(integer_at(at, KEY + 1))) << np.uint64(32))
+    even = one if mirrored or not view.lobes else one - followed_share(alpha)
+    coat = Coat(at, alpha, v, m, p, _triple_at(at, GEOMETRIC), key, even, share, base, f0, diffuse)
+    # 2. Indirect light.
+    _add_indirect(band, i, source, hit, row, coat, view, channels, n_lights)
+    # 3. Direct light of all sources.
+    for s in range(n_sources):
+        for packet in range(packets):
+            number = s * packets + packet
+            if view.glass:
+                lit = _take_light(band.room, at, s, LANES * packet, channels, n_lights)
+            else:
+                lit = (integer_at(at, LIT_WORDS + number // 2) >> (LANES * (number % 2))) & 0xFFFF
+            if lit != 0:
+                _add_direct(band, i, coat, view, s, LANES * packet, lit, channels)
+
+
+@inlined
+def _take_light(room: Float32, at: int, s: int, l: int, channels: int, n_lights: int) -> int:
+    """Copy what is kept of the irradiance of source s at light positions l to l + 15; return whether there is any."""
+    found = 0
+    for channel in range(channels):
+        light = at + 4 * (LIT_WORDS + (s * channels + channel) * n_lights)
+        for lane in range(LANES):
+            value = real_at(light, l + lane) if l + lane < n_lights else np.float32(0.0)
+            room[TAKEN + channel, lane] = value
+            if value != 0.0:
+                found = 1
+    return found
+
+
+@inlined
+def _add_indirect(
+    band: Band, i: int, source: Addresses, hit: int, row: int, coat: Coat, view: GlossView, channels: int,
+    n_lights: int,
+) -> None:  # fmt: skip
+    """Add (A - R) W and (A - R) S, and (A - R) / pi E of cells."""
+    one = np.float32(1.0)
+    face_on, edge, through = albedo_at(view.albedo, coat.alpha, facing(coat.m, coat.v))
+    cells = source[GATHERED] + 4 * (LIGHT + channels * n_lights) * hit if source[GATHERED] != 0 else 0
+    for channel in range(3):
+        base, f0 = coat.base[channel], coat.f0[channel]
+        albedo = coat.diffuse[channel] * (one - f0 - (one - f0) * through)
+        albedo += coat.even * (f0 * face_on + edge)
+        more = coat.share[channel] * (albedo - base)
+        band.sums[i, INDIRECT + channel] += more * real_at(row, OBSCURANCE + channel)
+        seen = real_at(row, REFLECTIVITY + channel)
+        if seen > 0.0:
+            band.sums[i, LIGHT_INDEPENDENT + channel] += more / seen * real_at(row, LIGHT_INDEPENDENT + channel)
+        if cells != 0 and real_at(cells, LEVEL) > 0.0:
+            factor = more * INVERSE_PI * real_at(cells, COLOUR + channel)
+            light = cells + 4 * (LIGHT + (channel * n_lights if channels == 3 else 0))
+            for l in range(n_lights):
+                band.direct[i, channel, l] += factor * real_at(light, l)
+
+
+@inlined
+def _add_direct(band: Band, i: int, coat: Coat, view: GlossView, s: int, l: int, lit: int, channels: int) -> None:
+    """Add (f - R / pi) E_s at light positions l to l + 15, of which the bits of `lit` have light of source s."""
+    lights, one, nothing = view.lights, np.float32(1.0), np.float32(0.0)
+    n_lights, stride = lights.lit.shape[1], band.direct.shape[2]
+    # 1. The vector to the source, and the geometry factor of its irradiance.
+    if lights.kind[s] == MESH:
+        find_mesh(lights.emitters, coat.key, s, coat.p, coat.g, coat.m, band.room)
+        x, y, z, factor = (
+            load(band.room, 0),
+            load(band.room, LANES),
+            load(band.room, 2 * LANES),
+            load(band.room, 3 * LANES),
+        )
+    else:
+        q = source_point(lights, coat.key, s)
+        x, y, z, factor = vector_and_factor(lights, s, source_in_lanes(lights, s, l), coat.p, coat.g, coat.m, q)
+    square = x * x + y * y + z * z
+    scale = one / sqrt(select(square > nothing, square, one))
+    lobe, fresnel = evaluate_lobe(coat.alpha, coat.m, coat.v, (scale * x, scale * y, scale * z))
+    if not view.glass:
+        none = (load(view.bits, 0) & np.int32(lit)) == np.int32(0)
+        factor = select(none, nothing, factor)
+    texel = map_texel(lights.maps, s, coat.key)
+    # 2. F D V + (1 - F) diffuse / pi - R / pi of each channel.
+    for channel in range(3):
+        f0 = coat.f0[channel]
+        reflected = fresnel * (one - f0) + f0
+        more = reflected * lobe + ((one - reflected) * coat.diffuse[channel] - coat.base[channel]) * INVERSE_PI
+        of = channel if channels == 3 else 0
+        strength = load(lights.strength, (s * channels + of) * n_lights + l)
+        light = factor * strength
+        if view.glass:
+            light = load(band.room, (TAKEN + of) * LANES)
+        elif channels == 3:
+            light = light * (
+                load(band.room, (4 + channel) * LANES)
+                if lights.kind[s] == MESH
+                else map_tint(lights.maps, s, texel, channel)
+            )
+        at = (3 * i + channel) * stride + l
+        store(band.direct, at, load(band.direct, at) + light * more * coat.share[channel])
+
+
+def _add_gloss_of(
+    typingctx: Any, band: Any, first: Any, n: Any, sources: Any, view: Any, channels: Any, n_lights: Any, mean: Any,
+    positive: Any,
+) -> Any:  # fmt: skip
+    """`light_of_gloss`, or 0 where nothing is glossy."""
+    given = (band, first, n, sources, view, channels, n_lights, mean, positive)
+    return step_or_zero(typingctx, light_of_gloss, given, view[0])
+
+
+add_gloss: Any = chosen_by_type(_add_gloss_of)

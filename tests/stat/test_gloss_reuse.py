@@ -1,0 +1,89 @@
+"""Reuse of glossy hits keeps the mean: balls under a moving camera and a moving light, with `balance` and without."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+from support.tiny import ball, quad
+from support.ztests import differing
+
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.loop import window_of
+from framearray_cli.job.job import Job
+from framearray_cli.render.prepare import open_embree, plan_work
+from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.scene import Scene, build_scene
+
+pytestmark = pytest.mark.slow  # 80 windows for a mean, with kernels of their own
+
+ALPHAS = (0.05, 0.1, 0.25, 0.5)
+N_R, MIDDLE, SEEDS = 2, 2, 40
+
+
+def balls() -> Scene:
+    """Metal balls of four lobes in a row, and dielectric ones behind them, on a glossy floor."""
+    parts = [Part(material=0, corners=quad((-3, 0, 3), (3, 0, 3), (3, 0, -3), (-3, 0, -3)))]
+    materials = [Material(name="Floor", reflectivity=(0.5, 0.5, 0.5), roughness=0.5)]
+    for metal in (1.0, 0.0):
+        for k, alpha in enumerate(ALPHAS):
+            corners, normals = ball((k - 1.5, 0.4, metal), 0.4, 12)
+            parts.append(Part(material=len(materials), corners=corners, normals=normals))
+            colour = (0.9, 0.5, 0.2) if metal else (0.1, 0.3, 0.7)
+            name = f"{alpha} {metal}"
+            materials.append(Material(name=name, reflectivity=colour, roughness=alpha**0.5, metallic=metal))
+    return build_scene(Meshes(parts=tuple(parts), materials=tuple(materials), textures=(), dropped={}, notes=()), {})
+
+
+def job_of(n_r: int, hits: int, weights: str) -> Job:
+    return tiny.job(
+        camera={"frames": 5, "resolution": [32, 12], "fov": 22.0, "keys": [
+            {"frame": 0, "eye": [-1.2, 1.5, 5.0], "target": [0, 0.3, 0.5]},
+            {"frame": 4, "eye": [1.2, 1.7, 5.0], "target": [0, 0.3, 0.5]}]},
+        light={"frames": 3, "sources": [{"type": "point", "keys": [
+            {"frame": 0, "position": [-2, 3, 3], "intensity": [20, 20, 20], "radius": 0.4},
+            {"frame": 2, "position": [1, 3, 3], "intensity": [20, 20, 20], "radius": 0.4}]}]},
+        scene={"background": [0.3, 0.4, 0.5]}, obscurance={"range": 1.0, "outside": "background"},
+        samples={"hits": hits, "obscurance": 2},
+        reuse={"n_r": n_r, "weights": weights},
+    )  # fmt: skip
+
+
+def middle_frames(job: Job, seeds: range) -> Any:
+    """The middle frame under all lights for each seed, (seeds, values)."""
+    images, inputs = [], tiny.prepared(job, balls())
+    width, height = job.camera.resolution
+    with open_embree(inputs) as embree:
+        planned, ambient = plan_work(inputs, embree)
+        for seed in seeds:
+            setup = replace(planned, seed=seed)
+            with TracePool(setup, 1) as pool:
+                block = np.empty((setup.lights.n_lights, height, width, 3), np.float32)
+                images.append(
+                    window_of(MIDDLE, setup, ambient, pool).compose(MIDDLE, block).images.ravel().astype(float)
+                )
+    return np.array(images)
+
+
+@pytest.fixture(scope="module")
+def alone() -> Any:
+    return middle_frames(job_of(0, 20, "balance"), range(1000, 1000 + SEEDS))
+
+
+def test_balance_keeps_the_mean_of_gloss(alone: Any):
+    shared = middle_frames(job_of(N_R, 4, "balance"), range(SEEDS))
+    assert differing(shared, alone).max() < 1
+    # the mean over all pixels and lights as well, within three standard errors
+    means, others = shared.mean(axis=1), alone.mean(axis=1)
+    error = np.hypot(means.std(ddof=1), others.std(ddof=1)) / np.sqrt(SEEDS)
+    assert abs(means.mean() - others.mean()) < 3 * error
+
+
+def test_gloss_towards_another_eye_is_off(alone: Any, monkeypatch: pytest.MonkeyPatch):
+    """The comparison can fail: it finds highlights where another eye sees them."""
+    view = Window._view
+    monkeypatch.setattr(Window, "_view", lambda self, j: view(self, 0))
+    shared = middle_frames(job_of(N_R, 4, "balance"), range(SEEDS))
+    assert differing(shared, alone).max() > 1.5
