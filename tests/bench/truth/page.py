@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image as Pillow
 
+from bench.core.cases import JOBS
 from bench.core.markdown import grid, number, percent
 from bench.core.results import Site, Table, folder, load, site_for
 from framearray_cli.base.arrays import Float32, Image
@@ -25,6 +26,10 @@ samples; only the keys of indirect light differ.
 *All light*: RMSE of means over {BLOCK} x {BLOCK} pixels, over their root mean square. *Indirect*: RMSE per pixel,
 noise of ours included, over the mean indirect light. *Mean*: over that of the truth. Noise of the path-traced images is
 no part of any figure: errors against two independent halves of them are multiplied.
+
+Images after those of the kitchen, the stairs and the cabin are of
+[scenes by other people](real-scenes.md), 200 x 150, with few positions of camera and light
+(`tests/support/real_jobs.py`), so that an image takes longer and one of Mitsuba's less.
 """
 TIMES = """
 *ms per image*: of interior frames of the job, all light positions, with writing; of Mitsuba rendering only. *Error*:
@@ -93,13 +98,13 @@ def _times(compared: Mapping[Place, Table], results: Path) -> list[str]:
 
 
 def _pictures(compared: Mapping[Place, Table], results: Path, site: Site) -> list[str]:
-    """A strip per job: truth, each method, and the difference of the last from the truth."""
+    """A strip per job of the project: truth, each method, and the difference of the last from the truth."""
     parts = [
         "## Pictures",
         f"Truth, `{'`, `'.join(SHOWN)}`, and `{SHOWN[-1]}` minus truth: grey is none, white as much as the mean of the"
         " image.",
     ]
-    for place in {place.job: place for place in compared}.values():  # the last of each job
+    for place in {place.job: place for place in compared if place.job in JOBS}.values():  # the last of each job
         shown = results / f"truth-shown-{place.name}.npz"
         if not shown.is_file():
             continue

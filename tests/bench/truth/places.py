@@ -14,7 +14,7 @@ from framearray_cli.job.read import read_job
 # Camera and light positions of the images, as shares of their paths.
 PLACES = ((0.4, 0.5), (0.75, 0.2))
 # Jobs of scenes by other people, see `tests/support/real_jobs.py`.
-SCENES = ("cornell_box-lamp", "country_kitchen-sun", "grey_white_room-sun", "modern_hall-lamp")
+SCENES = ("cornell_box-lamp", "country_kitchen-sun", "modern_hall-lamp", "vr_gallery-lamp")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
