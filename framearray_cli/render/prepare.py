@@ -108,16 +108,16 @@ def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepare
     """Put together a job, its scene, and the eyes and lights to render, or raise a JobError as `with_emission`."""
     lights = with_emission(job, lights, scene)
     require_plain_shadows(job, scene)
-    arrays = light_arrays(lights, scene.centre, emitters(lights, scene))
+    arrays, of_scene = light_arrays(lights, scene.centre, emitters(lights, scene)), surfaces(scene)
     return Prepared(
         job=job,
         scene=scene,
         eyes=eyes,
         lights=lights,
         light_arrays=coloured(arrays) if job.indirect.exact or scene.has_glass else arrays,
-        surfaces=surfaces(scene),
-        relief=relief(scene),
-        glossy=glossy(scene),
+        surfaces=of_scene,
+        relief=relief(scene, of_scene),
+        glossy=glossy(scene, of_scene),
         still=eyes.at_rest,
     )
 
@@ -165,7 +165,7 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
         cams=cams,
         surfaces=prepared.surfaces,
         relief=prepared.relief,
-        mips=mips(scene, 1 / (cams.focal * max(job.hits * (2 * n_r + 1), 1.0) ** 0.5)),
+        mips=mips(scene, prepared.surfaces, 1 / (cams.focal * max(job.hits * (2 * n_r + 1), 1.0) ** 0.5)),
         tracer=embree.tracer,
         lights=prepared.lights_in(embree),
         kept=range(prepared.n_lights),

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import tiny
-from support.glass_twin import Floor, Pane
+from support.glass_twin import Floor, Pane, picture
 
 from framearray_cli.job.job import Job
 from framearray_cli.scene.files import Material, Meshes, Part
@@ -18,7 +18,6 @@ COLOUR = (0.9, 0.6, 0.3)
 SHEET = tiny.quad((-1.5, 0.2, 0), (1.5, 0.2, 0), (1.5, 1.8, 0), (-1.5, 1.8, 0))
 BODY = tiny.box((-1.5, 0.2, -0.2), (1.5, 1.8, 0.0))
 OPEN = BODY[:-2]
-SPREAD = 6  # squared: rays per pixel of the twin
 FACES = 4  # that mirror
 PANES = {
     "sheet": Pane(SHEET, COLOUR),
@@ -61,20 +60,8 @@ def job_for(n_r: int, weights: str = "balance") -> Any:
 
 def expected(inputs: Any, pane: Pane, j: int) -> tuple[Any, Any]:
     """The image of eye j by the twin, (height, width, 3), and the pixels all of whose rays see nearly the same."""
-    width, height = inputs.job.camera.resolution
     floor = Floor(HALF, REFLECTIVITY, SUN, IRRADIANCE, [pane])
-    matrix = inputs.eyes.world_from_camera[j]
-    focal = 0.5 * height / np.tan(np.radians(inputs.eyes.fov_deg) / 2)
-    place = (np.arange(SPREAD) + 0.5) / SPREAD
-    x = (np.arange(width)[:, None] + place).reshape(-1)
-    y = (np.arange(height)[:, None] + place).reshape(-1)
-    way = (matrix[:3, :3] @ np.stack(np.broadcast_arrays(
-        (x[None] - width / 2) / focal, (height / 2 - y[:, None]) / focal, -1.0
-    )).reshape(3, -1)).T  # fmt: skip
-    origin = np.broadcast_to(matrix[:3, 3], way.shape)
-    light = floor.radiance(origin, way, FACES).reshape(height, SPREAD, width, SPREAD, 3)
-    mean = light.mean(axis=(1, 3))
-    spread = light.max(axis=(1, 3)) - light.min(axis=(1, 3))
+    mean, spread = picture(inputs, j, lambda origin, way: floor.radiance(origin, way, FACES))
     return mean, (spread <= 0.03 * mean).all(axis=2) & (mean > 0).all(axis=2)
 
 

@@ -7,14 +7,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support import closed_forms as forms
+from support.irradiance import seen
 from support.stages import Part, look, make_job, point, quad, result_of, sun, write_scene
 
-from framearray_cli.engine.frames.scratch import Scratch
-from framearray_cli.engine.hits.hits import SURFACE
-from framearray_cli.engine.hits.native import Samples, native_hits
-from framearray_cli.engine.terms.direct import direct
 from framearray_cli.job.job import Job
-from framearray_cli.render.prepare import open_embree, plan_work, prepare
 
 Array = NDArray[np.float64]
 
@@ -56,21 +52,8 @@ class Lit:
 
 def hits_of(job: Job) -> Lit:
     """Find the eye's hits and their direct irradiance by the program's kernels, as its frame loop does."""
-    prepared = prepare(job)
-    with open_embree(prepared) as embree:
-        setup, _ = plan_work(prepared, embree)
-        scratch, n = Scratch(setup, 1024), 1024
-        samples = Samples(setup.seed, setup.order, per_pixel=1, first=0)
-        native_hits(setup.cams, 0, samples, 0, n, setup.world, False, scratch.hit_rays.packets, scratch.hits)
-        irradiance = np.empty((n, setup.lights.channels, setup.lights.n_lights), np.float32)
-        direct(scratch.hits, n, setup.lights, setup.tracer, scratch.test_rays, irradiance, True)
-    hits = scratch.hits
-    met = hits.kind[:n] == SURFACE
-    return Lit(
-        position=hits.position[:n][met].astype(float) + prepared.scene.centre,
-        normal=hits.geometric[:n][met].astype(float),
-        irradiance=irradiance[met, 0].astype(float),
-    )
+    position, hits, irradiance = seen(job)
+    return Lit(position=position, normal=hits.geometric.astype(float), irradiance=irradiance[:, 0])
 
 
 def shadow(points: Array, way: Array, length: float) -> tuple[Array, Array]:

@@ -68,22 +68,22 @@ def middle_frames(job: Job, seeds: range) -> Any:
 
 
 @pytest.fixture(scope="module")
-def alone() -> Any:
+def unshared() -> Any:
     return middle_frames(job_of(0, 20, "balance"), range(1000, 1000 + SEEDS))
 
 
-def test_balance_keeps_the_mean_of_gloss(alone: Any):
+def test_balance_keeps_the_mean_of_gloss(unshared: Any):
     shared = middle_frames(job_of(N_R, 4, "balance"), range(SEEDS))
-    assert differing(shared, alone).max() < 1
+    assert differing(shared, unshared).max() < 1
     # the mean over all pixels and lights as well, within three standard errors
-    means, others = shared.mean(axis=1), alone.mean(axis=1)
+    means, others = shared.mean(axis=1), unshared.mean(axis=1)
     error = np.hypot(means.std(ddof=1), others.std(ddof=1)) / np.sqrt(SEEDS)
     assert abs(means.mean() - others.mean()) < 3 * error
 
 
-def test_gloss_towards_another_eye_is_off(alone: Any, monkeypatch: pytest.MonkeyPatch):
+def test_gloss_towards_another_eye_is_off(unshared: Any, monkeypatch: pytest.MonkeyPatch):
     """The comparison can fail: it finds highlights where another eye sees them."""
     view = Window._view
     monkeypatch.setattr(Window, "_view", lambda self, j: view(self, 0))
     shared = middle_frames(job_of(N_R, 4, "balance"), range(SEEDS))
-    assert differing(shared, alone).max() > 1.5
+    assert differing(shared, unshared).max() > 1.5

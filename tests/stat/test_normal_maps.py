@@ -12,15 +12,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support import tiny
+from support.irradiance import seen
 from support.scenes import Glb, png
 from support.stages import look, point, sun
 
-from framearray_cli.engine.frames.scratch import Scratch
-from framearray_cli.engine.hits.hits import SURFACE
-from framearray_cli.engine.hits.native import Samples, native_hits
-from framearray_cli.engine.terms.direct import direct
 from framearray_cli.job.job import Job
-from framearray_cli.render.prepare import open_embree, plan_work, prepare
 
 Array = NDArray[np.float64]
 
@@ -89,21 +85,12 @@ class Found:
 
 
 def found_in(job: Job) -> Found:
-    prepared = prepare(job)
-    with open_embree(prepared) as embree:
-        setup, _ = plan_work(prepared, embree)
-        scratch, n = Scratch(setup, 1024), 1024
-        samples = Samples(setup.seed, setup.order, per_pixel=1, first=0)
-        native_hits(setup.cams, 0, samples, 0, n, setup.world, False, scratch.hit_rays.packets, scratch.hits)
-        light = np.empty((n, setup.lights.channels, setup.lights.n_lights), np.float32)
-        direct(scratch.hits, n, setup.lights, setup.tracer, scratch.test_rays, light, True)
-    hits = scratch.hits
-    met = hits.kind[:n] == SURFACE
+    position, hits, light = seen(job)
     return Found(
-        position=hits.position[:n][met].astype(float) + prepared.scene.centre,
-        geometric=hits.geometric[:n][met].astype(float),
-        shading=hits.shading[:n][met].astype(float),
-        irradiance=light[met, 0, 0].astype(float),
+        position=position,
+        geometric=hits.geometric.astype(float),
+        shading=hits.shading.astype(float),
+        irradiance=light[:, 0, 0],
     )
 
 

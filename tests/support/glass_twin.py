@@ -3,12 +3,14 @@
 Every ray meets every triangle. Rays are rows: origins and directions (n, 3), shares of light (n, 3).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 Rows = Any
+SPREAD = 6  # squared: rays per pixel of a picture
 
 
 @dataclass(frozen=True)
@@ -85,3 +87,23 @@ class Floor:
                 back = d - 2 * (d @ normal[k])[:, None] * normal[k]
                 light[rows] += before * mirrored[k, rows, None] * self.seen(o + at[:, None] * d, back)[0]
         return light
+
+
+def picture(inputs: Any, j: int, radiance: Callable[[Rows, Rows], Rows]) -> tuple[Any, Any]:
+    """The image of eye j, and by how much the rays of each pixel differ, (height, width, 3) each.
+
+    Args:
+        radiance: of rays, origins and directions.
+    """
+    width, height = inputs.job.camera.resolution
+    matrix = inputs.eyes.world_from_camera[j]
+    focal = 0.5 * height / np.tan(np.radians(inputs.eyes.fov_deg) / 2)
+    place = (np.arange(SPREAD) + 0.5) / SPREAD
+    x = (np.arange(width)[:, None] + place).reshape(-1)
+    y = (np.arange(height)[:, None] + place).reshape(-1)
+    way = (matrix[:3, :3] @ np.stack(np.broadcast_arrays(
+        (x[None] - width / 2) / focal, (height / 2 - y[:, None]) / focal, -1.0
+    )).reshape(3, -1)).T  # fmt: skip
+    origin = np.broadcast_to(matrix[:3, 3], way.shape)
+    light = radiance(origin, way).reshape(height, SPREAD, width, SPREAD, 3)
+    return light.mean(axis=(1, 3)), light.max(axis=(1, 3)) - light.min(axis=(1, 3))

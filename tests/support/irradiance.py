@@ -5,16 +5,18 @@ from typing import Any
 import numpy as np
 
 from framearray_cli.engine.embree import EmbreeScene
-from framearray_cli.engine.hits.hits import Hits
+from framearray_cli.engine.hits.hits import SURFACE, Hits
 from framearray_cli.engine.hits.rays import room_for_tests
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.terms.direct import direct
+from framearray_cli.job.job import Job
+from framearray_cli.render.prepare import open_embree, plan_work, prepare
 from framearray_cli.scene.paths.lightpath import LightPath
 from framearray_cli.scene.paths.paths import lights_without_groups
 from framearray_cli.scene.scene import Scene
 
 from . import tiny
-from .hits import points
+from .hits import native, points
 
 P, UP = np.array([0.3, 0.1, -0.2]), (0.0, 1.0, 0.0)
 N = 40_000
@@ -38,3 +40,20 @@ def lit(hits: Hits, lights: LightArrays, scene: Scene | None = None, neighbours:
     with EmbreeScene(scene or tiny.scene_of(FAR)) as embree:
         direct(hits, n, lights, embree.tracer, room_for_tests(4096, lights.n_lights), out, neighbours)
     return out[:, 0].astype(np.float64)
+
+
+def seen(job: Job) -> tuple[Any, Hits, Any]:
+    """What the first eye of a job sees of surfaces, by the program's kernels, one hit per pixel.
+
+    Returns:
+        positions (n, 3) in the coordinates of the file; the hits; irradiance (n, channels, n_lights) in float64.
+    """
+    prepared = prepare(job)
+    with open_embree(prepared) as embree:
+        setup, _ = plan_work(prepared, embree)
+        hits, tests = native(setup, 0, 1), room_for_tests(1024, setup.lights.n_lights)
+        light = np.empty((len(hits.kind), setup.lights.channels, setup.lights.n_lights), np.float32)
+        direct(hits, len(hits.kind), setup.lights, setup.tracer, tests, light, True)
+    met = hits.kind == SURFACE
+    hits = Hits(*(array[met] for array in hits))
+    return hits.position.astype(float) + prepared.scene.centre, hits, light[met].astype(float)

@@ -11,7 +11,7 @@ from framearray_cli.scene.scene import Scene
 from ..kernels.kernel import inlined
 from ..kernels.simd import gather, integers, reals, select, sqrt
 from .gloss import MIRROR_ROUGHNESS
-from .surfaces import Surfaces, emission_at, surfaces
+from .surfaces import Surfaces, emission_at
 
 # Columns of `Glossy.factor`.
 ROUGHNESS, METALLIC = 0, 1
@@ -47,11 +47,11 @@ NONE = Glossy(
 )
 
 
-def glossy(scene: Scene) -> Glossy:
+def glossy(scene: Scene, surfaces: Surfaces) -> Glossy:
     """Gather the gloss of a scene."""
     if not scene.is_glossy:
         return NONE
-    numbers = surfaces(scene)._replace(linear=np.arange(256, dtype=np.float32) / np.float32(255))
+    numbers = surfaces._replace(linear=np.arange(256, dtype=np.float32) / np.float32(255))
     factor = np.stack([scene.roughness, scene.metallic], axis=1)
     return Glossy(np.ascontiguousarray(factor, np.float32), scene.gloss_texture, numbers, albedo_table())
 

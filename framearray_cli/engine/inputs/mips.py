@@ -16,7 +16,7 @@ from framearray_cli.scene.scene import Scene
 
 from ..kernels.kernel import inlined
 from ..kernels.simd import gather, integers, popcount, reals, select, sqrt
-from .surfaces import Surfaces, interpolate, surfaces, texture_at
+from .surfaces import Surfaces, interpolate, texture_at
 
 MOST_TAPS = 8  # places of a texture that a hit reads, at most; longer rectangles get a smaller copy
 LEAST_COSINE = np.float32(1e-3)  # of a surface seen from its edge
@@ -39,12 +39,12 @@ class Mips(NamedTuple):
 SHARP = cast(Mips, ())
 
 
-def mips(scene: Scene, spread: float) -> Mips:
-    """Gather the copies of textures as kernels take them."""
+def mips(scene: Scene, surfaces: Surfaces, spread: float) -> Mips:
+    """Gather the copies of textures of a scene, whose surfaces are gathered already, as kernels take them."""
     if not len(scene.levels):
         return SHARP
     levels = np.ascontiguousarray(scene.levels.reshape(-1, 3))
-    return Mips(levels=levels, surfaces=surfaces(scene)._replace(textures=levels), spread=spread)
+    return Mips(levels=levels, surfaces=surfaces._replace(textures=levels), spread=spread)
 
 
 class Footprint(NamedTuple):

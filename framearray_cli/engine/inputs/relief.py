@@ -14,7 +14,7 @@ from framearray_cli.scene.scene import Scene
 
 from ..kernels.kernel import inlined
 from ..kernels.simd import gather, select, sqrt
-from .surfaces import Surfaces, interpolate, surfaces, texture_at
+from .surfaces import Surfaces, interpolate, texture_at
 
 # Below this length, squared, a sum of unit vectors gives no direction.
 NOTHING = np.float32(1e-12)
@@ -41,8 +41,8 @@ class Relief(NamedTuple):
 FLAT = cast(Relief, ())
 
 
-def relief(scene: Scene) -> Relief:
-    """Gather the normal maps of a scene as kernels take them."""
+def relief(scene: Scene, surfaces: Surfaces) -> Relief:
+    """Gather the normal maps of a scene, whose surfaces are gathered already, as kernels take them."""
     if not len(scene.tangents):
         return FLAT
     codes = np.linspace(-1.0, 1.0, 256, dtype=np.float32)
@@ -51,7 +51,7 @@ def relief(scene: Scene) -> Relief:
         uvs=np.ascontiguousarray(scene.normal_uvs),
         texture=scene.normal_texture,
         scale=scene.normal_scale,
-        surfaces=surfaces(scene)._replace(linear=codes),
+        surfaces=surfaces._replace(linear=codes),
     )
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import gloss_twin, tiny
-from support.glass_twin import Floor, Pane
+from support.glass_twin import Floor, Pane, picture
 
 from framearray_cli.job.job import Job
 from framearray_cli.scene.files import Material, Meshes, Part
@@ -20,7 +20,6 @@ SUNS = [
     [((0.25, -1.0, 0.55), (3.0, 2.5, 2.0)), ((-0.35, -1.0, 0.45), (2.0, 2.5, 1.0))],
     [((-0.1, -0.8, 0.7), (1.0, 0.5, 2.0)), ((0.1, -1.0, -0.3), (1.0, 2.0, 3.0))],
 ]
-SPREAD = 6  # squared: rays per pixel of the twin
 PANES = {
     "sheet": Pane(tiny.quad((-1.5, 0.2, 0), (1.5, 0.2, 0), (1.5, 1.8, 0), (-1.5, 1.8, 0)), COLOUR),
     "body": Pane(tiny.box((-1.5, 0.2, -0.2), (1.5, 1.8, 0.0)), COLOUR, body=True),
@@ -78,19 +77,8 @@ def job_for(n_r: int, weights: str) -> Any:
 
 def expected(inputs: Any, pane: Pane, j: int, l: int) -> tuple[Any, Any]:
     """The image of eye j by the twin, (height, width, 3), and the pixels all of whose rays see nearly the same."""
-    width, height = inputs.job.camera.resolution
-    matrix = inputs.eyes.world_from_camera[j]
-    focal = 0.5 * height / np.tan(np.radians(inputs.eyes.fov_deg) / 2)
-    place = (np.arange(SPREAD) + 0.5) / SPREAD
-    x = (np.arange(width)[:, None] + place).reshape(-1)
-    y = (np.arange(height)[:, None] + place).reshape(-1)
-    way = (matrix[:3, :3] @ np.stack(np.broadcast_arrays(
-        (x[None] - width / 2) / focal, (height / 2 - y[:, None]) / focal, -1.0
-    )).reshape(3, -1)).T  # fmt: skip
-    origin = np.broadcast_to(matrix[:3, 3], way.shape)
     floors = [GlossyFloor(HALF, BASE, *sun[l], [pane]) for sun in SUNS]
-    light = sum(floor.radiance(origin, way, 4) for floor in floors).reshape(height, SPREAD, width, SPREAD, 3)
-    mean, spread = light.mean(axis=(1, 3)), light.max(axis=(1, 3)) - light.min(axis=(1, 3))
+    mean, spread = picture(inputs, j, lambda origin, way: sum(floor.radiance(origin, way, 4) for floor in floors))
     return mean, (spread <= 0.04 * mean).all(axis=2) & (mean > 0).all(axis=2)
 
 
