@@ -13,13 +13,13 @@ from framearray_cli.base.forms.kinds import mistaken
 from framearray_cli.render.beside import FLOATS
 from framearray_cli.render.beside import offer_beside as offer
 
-from .environment import install_environment, maps_for
+from .environment import install_environment, maps_for, planned_panorama
 from .model import INDIRECT, WEIGHTS, Start, table_of, validate_job
 from .options import Format, StartOptions, SunOption
 from .plan import plan_start
 from .text import to_text
 
-__all__ = ["STDOUT", "Format", "Start", "StartOptions", "SunOption", "check_files", "init", "offer_beside", "to_text"]
+__all__ = ["STDOUT", "Format", "Start", "StartOptions", "SunOption", "init", "offer_beside", "planned_files", "to_text"]
 
 STDOUT = Path("-")
 
@@ -37,7 +37,7 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
         JobError: no camera has the name in the options, or the sun never rises.
         OutputError: the job file, or the panorama of an environment beside it, exists already or cannot be written.
     """
-    check_files(scene, job_file, force=force)
+    _check_files(scene, job_file, force=force)
     if job_file == STDOUT:
         start = plan_start(scene, scene.stem, options)
         validate_job(table_of(start), scene)
@@ -55,7 +55,21 @@ def offer_beside() -> None:
     offer({"indirect": {"method": INDIRECT}, "reuse": {"weights": WEIGHTS}} | FLOATS)
 
 
-def check_files(scene: Path, job_file: Path, *, force: bool) -> None:
+def planned_files(scene: Path, job_file: Path, *, force: bool = False) -> list[Path]:
+    """Name the files that `init` would write, which may be there; none on standard output.
+
+    Raises:
+        SceneError: the scene cannot be read.
+        OutputError: the job file, or the panorama of an environment beside it, exists already.
+    """
+    _check_files(scene, job_file, force=force)
+    if job_file == STDOUT:
+        return []
+    panorama = planned_panorama(scene, job_file, force=force)
+    return [job_file, *([] if panorama is None else [panorama])]
+
+
+def _check_files(scene: Path, job_file: Path, *, force: bool) -> None:
     """Refuse a scene that is none, and a job file that is there.
 
     Raises:

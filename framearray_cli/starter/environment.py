@@ -8,7 +8,7 @@ from pathlib import Path
 
 from framearray_cli.base.files import require_new, write_bytes
 from framearray_cli.base.openimage import write_environment
-from framearray_cli.scene.files import Stage
+from framearray_cli.scene.files import Stage, read_stage
 
 from .model import EnvironmentLight, Start
 
@@ -56,6 +56,18 @@ def environment_light(stage: Stage, maps: Maps | None) -> tuple[tuple[Environmen
     about = f'the environment "{found.name}" of the file, as a panorama of {width} x {height} pixels'
     intensity = float(f"{found.intensity:.{DIGITS}g}")
     return (EnvironmentLight(file=maps.draft, intensity=intensity, about=(about,), name=found.name),), ()
+
+
+def planned_panorama(scene: Path, job_file: Path, *, force: bool) -> Path | None:
+    """Where the panorama of a scene would be written; None without one, or where that very file lies already.
+
+    Raises:
+        SceneError: the scene cannot be read.
+        OutputError: another file has its name already.
+    """
+    with maps_for(scene, job_file, force=force) as maps:
+        environment_light(read_stage(scene), maps)
+        return maps.final if maps.draft.exists() and not _is_there(maps) else None
 
 
 def install_environment(start: Start, maps: Maps) -> Start:

@@ -15,7 +15,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.job.read import read_job
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import lights
-from framearray_cli.starter import STDOUT, StartOptions, init, to_text
+from framearray_cli.starter import STDOUT, StartOptions, init, planned_files, to_text
 
 FEW = StartOptions(frames=1, resolution=(48, 36), format="exr")
 MAP = "scene-environment.exr"
@@ -130,3 +130,17 @@ def test_a_job_without_a_place_has_no_environment(tmp_path: Path) -> None:
     assert "environment.exr" not in to_text(found, STDOUT)
     assert any("the environment of the file is left out" in line for line in found.about)
     assert [file.name for file in tmp_path.iterdir()] == ["scene.glb"]
+
+
+@pytest.mark.usefixtures("exposed")
+def test_the_panorama_is_among_the_planned_files(tmp_path: Path) -> None:
+    scene, job = lit(lectern(), (WHITE,) * 6).save(tmp_path / "scene.glb"), tmp_path / "scene.toml"
+    assert planned_files(scene, job) == [job, tmp_path / MAP]
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["scene.glb"]
+    init(scene, job, FEW)
+    assert planned_files(scene, tmp_path / "other.toml") == [tmp_path / "other.toml"], "the very panorama is there"
+    assert planned_files(scene, STDOUT) == []
+    (tmp_path / MAP).write_bytes(b"mine")
+    with pytest.raises(OutputError, match=f"{MAP}: is there already"):
+        planned_files(scene, tmp_path / "other.toml")
+    assert planned_files(scene, job, force=True) == [job, tmp_path / MAP]

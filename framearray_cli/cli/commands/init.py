@@ -128,8 +128,9 @@ def init(
 
 
 def _print_planned(scene: Path, job_file: Path, *, force: bool) -> None:
-    """Print whether the job file would be written or replaced."""
-    from framearray_cli.starter import check_files
+    """Print which files would be written or replaced."""
+    from framearray_cli.starter import planned_files
 
-    check_files(scene, job_file, force=force)
-    print_would([f"would {'replace' if job_file.exists() else 'write'} {job_file}"])
+    files = planned_files(scene, job_file, force=force)
+    lines = [f"would {'replace' if file.exists() else 'write'} {file}" for file in files]
+    print_would(lines or ["would print the job"])
