@@ -1,11 +1,14 @@
 """The parts of tests/bench that compute or write without measuring: metrics, tables, resampled lights, pieces."""
 
 import os
+import pkgutil
+from importlib import import_module
 
 import numpy as np
 import pytest
 from support import ROOT
 
+import bench
 from bench.core.cases import BY_AREA, FRAME_ARRAY, REDUCED, SCRATCH, VARIANTS
 from bench.core.markdown import grid, number, percent
 from bench.core.results import DOCS, load, median, save, site_for, site_in
@@ -29,6 +32,17 @@ SETTINGS = [
     {"name": "from scratch, 14 hits", "one_light": True, "ms": 300.0, "rmse": 0.1, "bias": 0.0, "noise": 0.1,
      "flip": 0.05, "accepted_hits": 14.0, "times_faster_than_scratch": 1.0, "on_the_front": False},
 ]  # fmt: skip
+
+
+def test_all_parts_can_be_imported():
+    """No test runs them all; a name that moved must not wait for the next measurement."""
+    for module in pkgutil.walk_packages(bench.__path__, "bench."):
+        if "test_" in module.name:
+            continue
+        try:
+            import_module(module.name)
+        except ModuleNotFoundError as error:  # a package that only measurements need
+            assert (error.name or "").split(".")[0] not in ("bench", "framearray_cli", "support"), module.name
 
 
 def test_a_report_as_a_page():
