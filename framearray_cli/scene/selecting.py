@@ -57,7 +57,7 @@ def select_triangles(
     flat = ~has_area(corners)
     rows, corners = _drop(rows, flat, "degenerate", dropped), rows_of(corners, np.flatnonzero(~flat))
     cutoff = np.array([material.alpha_cutoff for material in materials])
-    masked = cutoff[merged.material[rows]] > 0
+    masked = cutoff[merged.material[rows]] != 0
     order = np.argsort(masked, kind="stable")
     rows, corners, masked = rows[order], rows_of(corners, order), masked[order]
     # of coinciding opaque triangles one hides the others, of any material; a cut-out one lets others show

@@ -16,11 +16,15 @@ from framearray_cli.scene.vectors import largest
 
 from ..kernels.kernel import inlined
 from ..kernels.simd import doubles, floor, gather, integers, popcount, reals, select, sqrt
+from .random import UNIT_24, mix
 
 # Ray offsets: 16 units in the last place of the largest coordinate of the triangle. Of the rules tried, this is the
 # only one without self-hits and leaks at every scale (docs/decisions/ray-offsets.md).
 OFFSET_ULPS = 16.0
 ULP = 2.0**-23
+# Places per side of a triangle that are solid or a hole, where a surface covers a part of what is behind it.
+SCREEN_BITS = 16
+SCREEN = 1 << SCREEN_BITS
 
 
 class Surfaces(NamedTuple):
@@ -218,7 +222,23 @@ def is_cut_out(s: Surfaces, triangle: int, u: Real, v: Real) -> bool:
         w = np.float32(1.0) - u - v
         tu, tv = interpolate(s.uvs, triangle, 2, 0, u, v, w), interpolate(s.uvs, triangle, 2, 1, u, v, w)
         alpha *= texture_at(s, s.alpha_texture[m], tu, tv)[3]
-    return bool(alpha < s.alpha_cutoff[m])
+    cutoff = s.alpha_cutoff[m]
+    if cutoff < 0.0:
+        cutoff = _screen(triangle, u, v)
+    return bool(alpha < cutoff)
+
+
+@inlined
+def _screen(triangle: int, u: Real, v: Real) -> Real:
+    """A number in [0, 1) of the place (u, v) of a triangle: the share alpha of its places is solid, the rest is holes.
+
+    It belongs to the place and not to the ray, so that all rays find the same surface, and with it all eyes.
+    """
+    places = np.float32(SCREEN)
+    at = np.uint64(np.uint32(u * places)) + (np.uint64(np.uint32(v * places)) << np.uint64(SCREEN_BITS))
+    at += np.uint64(np.uint32(triangle)) << np.uint64(2 * SCREEN_BITS)
+    found: Real = np.float32(mix(mix(at)) >> np.uint64(40)) * UNIT_24
+    return found
 
 
 @inlined

@@ -1,8 +1,8 @@
 """Materials: the same rules for the readers of all formats.
 
 A reader maps what its file says of a surface to a diffuse part, a mirror part and an opacity; `make_material` puts them
-together. No surface reflects more than it receives. Glass is left out, blended textures are cut out. There are defaults
-for missing materials, and for colours that are not colours.
+together. No surface reflects more than it receives. Unless surfaces follow the file, glass is left out and blended
+textures are cut out. There are defaults for missing materials, and for colours that are not colours.
 """
 
 from dataclasses import dataclass
@@ -11,13 +11,15 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64
 
-from .model import GREY, Glass, Material, Notes
+from .model import GREY, SCREENED, Glass, Material, Notes
 from .textures import TextureTable
 
 TRANSMISSIVE_ALPHA = 0.25  # a surface that stops less light counts as glass, which is left out for now
+OPAQUE = 0.999  # a surface that covers this share covers everything
 CUTOFF = 0.5  # alpha where a blended texture turns from hole to surface; also glTF's default for masks
 BRIGHTEST = 1e30  # stands in for infinite reflectivities, before they are scaled to 1
 NO_NORMAL_MAPS = 'normal maps are left out; scene.surfaces = "file" uses them'
+ONLY_SEEN = 'emission is seen and lights nothing; a source of type "mesh" lets it light'
 DEFAULT_NAME = "default"
 COLOURED_NAME = "vertex colours"
 
@@ -94,10 +96,10 @@ def masked_opacity(alpha: float, texture: int, cutoff: float, textures: TextureT
 def blended_opacity(
     name: str, alpha: float, texture: int, textures: TextureTable, notes: Notes, glass: Glass | None = None
 ) -> Opacity:
-    """Opacity of a material that lets light through by alpha: glass, cut out, or taken as opaque.
+    """Opacity of a material that lets light through by alpha: glass, screened, cut out, or taken as opaque.
 
     Args:
-        glass: what a pane of the material lets through; None leaves panes out.
+        glass: what a pane of the material lets through, where surfaces follow the file; None leaves panes out.
     """
     lowest, highest = textures.alpha_range(texture)
     if alpha * highest < TRANSMISSIVE_ALPHA:
@@ -106,6 +108,11 @@ def blended_opacity(
             return Opacity(glass=glass)
         notes.add('transmissive materials are left out; scene.surfaces = "file" takes them as thin glass', name)
         return Opacity(left_out="transmissive")
+    if glass is not None:
+        if alpha * lowest >= OPAQUE:
+            return Opacity()
+        notes.add("partly transparent materials cover a part of what is behind them, by chance", name)
+        return Opacity(alpha=alpha, alpha_texture=texture, alpha_cutoff=SCREENED)
     if lowest < CUTOFF <= highest:
         notes.add("textures with partial transparency are cut out at half opacity", name)
         return Opacity(alpha_texture=texture, alpha_cutoff=CUTOFF)

@@ -8,6 +8,7 @@ from framearray_cli.base.units import counted
 
 GREY = 0.5  # reflectivity of surfaces without material: neither black, nor a white that hides all shading
 NAMES_IN_A_NOTE = 6  # names that one note lists before it says "and n more"
+SCREENED = -1.0  # alpha cutoff of a surface that is solid at the share alpha of its places, and has holes at the others
 MOST_NOTES = 50  # more would scroll away what matters
 
 
@@ -39,7 +40,7 @@ class Material:
         emission_texture: multiplies `emission`.
         one_sided: whether only the front emits, where corners run counter-clockwise.
         alpha: opacity factor, multiplied with the alpha of `alpha_texture`.
-        alpha_cutoff: a point is absent where alpha is below it; 0 for an opaque material.
+        alpha_cutoff: a point is absent where alpha is below it; 0 for an opaque material, or SCREENED.
         normal_texture: normal map, or -1; `normal_scale` multiplies what its red and green say.
         roughness, metallic: of a glossy material, as glTF defines them, with `reflectivity` for the base colour;
             roughness 0 is that of all others.
@@ -76,7 +77,7 @@ class Material:
     def without_textures(self) -> "Material":
         """Return the material for meshes without texture coordinates."""
         bare = replace(self, texture=-1, specular_texture=-1, emission_texture=-1, gloss_texture=-1)
-        return replace(bare, alpha_texture=-1, alpha_cutoff=0.0)
+        return replace(bare, alpha_texture=-1, alpha_cutoff=min(self.alpha_cutoff, 0.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

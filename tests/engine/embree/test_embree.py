@@ -34,6 +34,7 @@ from framearray_cli.engine.embree.packets import (
 )
 from framearray_cli.engine.kernels.simd import LANES
 from framearray_cli.scene.files import Material
+from framearray_cli.scene.files.model import SCREENED
 from framearray_cli.scene.scene import Scene, load_scene
 
 CHUNK = 1 << 16
@@ -215,6 +216,20 @@ def test_opaque_and_masked_triangles_of_one_scene() -> None:
             assert (hits[:, 0] >= 2).tolist() == [True, False, False]  # fence, wall through the hole, wall
             assert hits[:, 1] == pytest.approx([5, 6, 6], rel=1e-6)
             assert blocked(opened, origins, dirs, 5.5).tolist() == [True, False, False]
+
+
+@pytest.mark.parametrize("engine", ["packets", "embreex"])
+def test_a_screen_stops_the_share_alpha_of_rays(engine: Any) -> None:
+    """Rays that find hits and rays that are only tested agree, ray by ray."""
+    alpha, n = 0.4, 10_000
+    curtain = tiny.quad((-4, -4, 0), (4, -4, 0), (4, 4, 0), (-4, 4, 0))
+    scene = tiny.scene_of(curtain, Material(name="A", alpha=alpha, alpha_cutoff=SCREENED))
+    origins = np.column_stack([*np.random.default_rng(1).uniform(-1, 1, (2, n)), np.full(n, 3.0)]).astype(np.float32)
+    dirs = np.tile(np.float32([0.1, 0.2, -1.0]), (n, 1))
+    with EmbreeScene(scene, engine) as opened:
+        stopped = blocked(opened, origins, dirs, np.inf)
+        assert abs(stopped.mean() - alpha) < 4 * np.sqrt(alpha * (1 - alpha) / n)
+        np.testing.assert_array_equal(first_hits(opened, origins, dirs)[:, 0] >= 0, stopped)
 
 
 @pytest.mark.parametrize("engine", ["packets", "embreex"])

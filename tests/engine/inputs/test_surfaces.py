@@ -20,6 +20,7 @@ from framearray_cli.engine.inputs.surfaces import (
 )
 from framearray_cli.engine.kernels.kernel import kernel
 from framearray_cli.scene.files import Material
+from framearray_cli.scene.files.model import SCREENED
 
 QUAD = tiny.quad((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0))
 UVS = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], np.float64)
@@ -193,6 +194,19 @@ def test_the_alpha_mask_cuts_below_the_cutoff() -> None:
         )
         cut_out(surfaces(big), 0, uv.astype(np.float32), result)
         assert result.tolist() == expected
+
+
+def test_a_screen_is_solid_at_the_share_alpha_of_its_places() -> None:
+    n = 20_000
+    uv = np.random.default_rng(6).dirichlet((1, 1, 1), n)[:, :2].astype(np.float32)
+    holes = np.empty((2, n), np.uint8)
+    for alpha in (0.0, 0.3, 0.75, 1.0):
+        s = surfaces(tiny.scene_of(QUAD, Material(name="A", alpha=alpha, alpha_cutoff=SCREENED)))
+        for triangle in (0, 1):
+            cut_out(s, triangle, uv, holes[triangle])
+        assert abs(holes.mean() - (1 - alpha)) <= 4 * np.sqrt(alpha * (1 - alpha) / holes.size)
+        # both triangles have holes of their own
+        assert abs(holes.all(axis=0).mean() - (1 - alpha) ** 2) <= 4 * np.sqrt(0.25 / n) * (0 < alpha < 1)
 
 
 def test_normals_are_on_the_viewers_side() -> None:

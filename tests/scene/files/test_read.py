@@ -13,6 +13,7 @@ from support.staged import animate
 from framearray_cli.base.errors import SceneError
 from framearray_cli.scene.files import Meshes, read_meshes
 from framearray_cli.scene.files.limit import Limit
+from framearray_cli.scene.files.model import SCREENED
 from framearray_cli.scene.files.obj.polygons import Ears, triangulate
 from framearray_cli.scene.files.textures import decode_image, rgba
 
@@ -180,6 +181,27 @@ def test_opacity(tmp_path, more, factor, alpha, cutoff, left_out, note):
     assert (material.alpha_cutoff, material.left_out) == (cutoff, left_out)
     assert (material.alpha_texture >= 0) == (cutoff > 0)
     assert note in notes_of(meshes)
+
+
+@pytest.mark.parametrize(
+    ("more", "factor", "lowest", "alpha"),
+    [
+        ({"alphaMode": "BLEND"}, 1.0, 0, 1.0),
+        ({"alphaMode": "BLEND"}, 0.5, 255, 0.5),
+        ({"alphaMode": "BLEND"}, 1.0, 255, None),
+        ({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 0.6}}}, 1.0, 255, 0.4),
+    ],
+)
+def test_blends_are_screens_where_surfaces_follow_the_file(tmp_path, more, factor, lowest, alpha):
+    glb = Glb()
+    pbr = {"baseColorFactor": [1, 1, 1, factor], "baseColorTexture": {"index": glb.texture(half_holes(lowest))}}
+    glb.node(glb.mesh(glb.material("Leaf", pbr, **more), TEXCOORD_0=glb.accessor(QUAD_UVS)))
+    meshes = read_meshes(glb.save(tmp_path / "a.glb"), as_file=True)
+    material = meshes.materials[0]
+    assert (material.left_out, material.glass) == ("", None)
+    assert material.alpha_cutoff == (0.0 if alpha is None else SCREENED)
+    assert material.alpha == pytest.approx(alpha or 1.0)
+    assert ("by chance" in notes_of(meshes)) == (alpha is not None)
 
 
 def test_vertex_colours_beside_a_material_stay_linear(tmp_path):

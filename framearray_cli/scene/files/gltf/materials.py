@@ -12,7 +12,7 @@ from framearray_cli.base.colour import linear_from_srgb
 
 from ..assets import Assets
 from ..gloss import MIRROR_ROUGHNESS, Gloss, with_gloss
-from ..materials import CUTOFF, NO_NORMAL_MAPS, Opacity, Rgb3, blended_opacity, make_material, masked_opacity
+from ..materials import CUTOFF, NO_NORMAL_MAPS, ONLY_SEEN, Opacity, Rgb3, blended_opacity, make_material, masked_opacity
 from ..model import Material, Notes
 from ..textures import TextureTable
 from .container import Gltf, image_bytes
@@ -103,7 +103,7 @@ def _material(
     material = with_gloss(material, shine)
     if texture < 0 and material.gloss_texture >= 0:
         texture, info = material.gloss_texture, pbr["metallicRoughnessTexture"]
-    if name in assets.shining:
+    if name in assets.shining or assets.as_file:
         material, own = _shining(material, entry, None if texture < 0 else info, source, notes)
         texture, info = (texture, info) if texture >= 0 else (material.emission_texture, own)
     bumps: Tree | None = entry.get("normalTexture") if assets.as_file else None
@@ -253,7 +253,7 @@ def _opacity(
     if passed > 0:
         pane = pane_of(passed, base, texel, extensions) if panes else None
         through = blended_opacity(name, 1.0 - passed, -1, source.textures, notes, pane)
-        if through.left_out or through.glass:
+        if through.left_out or through.glass or through.alpha_cutoff:
             return through
     if mode == "MASK":
         opacity = masked_opacity(alpha, texture, float(entry.get("alphaCutoff", CUTOFF)), source.textures)
@@ -280,7 +280,7 @@ def uv_matrix(transform: Tree) -> Float64 | None:
 def _note_ignored(name: str, entry: Tree, assets: Assets, notes: Notes) -> None:
     emissive = entry.get("emissiveFactor")
     if name not in assets.shining and emissive is not None and max(emissive) > 0:
-        notes.add("emission is left out", name)
+        notes.add(ONLY_SEEN if assets.as_file else "emission is left out", name)
     if entry.get("normalTexture") is not None and not assets.as_file:
         notes.add(NO_NORMAL_MAPS, name)
     if entry.get("occlusionTexture") is not None:

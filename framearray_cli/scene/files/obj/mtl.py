@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from ..assets import Assets
 from ..gloss import Gloss, is_mirror, with_gloss
-from ..materials import NO_NORMAL_MAPS, Opacity, Rgb3, blended_opacity, make_material
+from ..materials import NO_NORMAL_MAPS, ONLY_SEEN, Opacity, Rgb3, blended_opacity, make_material
 from ..model import GREY, Glass, Material, Notes
 from ..textures import TextureTable
 
@@ -88,7 +88,7 @@ def to_material(
             kd = (kd[0] + ks[0], kd[1] + ks[1], kd[2] + ks[2])
             notes.add("rough metals are taken as diffuse", name)
     opacity = _opacity(name, values, texture, assets, textures, notes)
-    shines = name in assets.shining
+    shines = name in assets.shining or assets.as_file
     _note_ignored(name, values, use, assets, notes)
     material = make_material(name, kd, specular, opacity, notes, texture=texture)
     material = with_gloss(material, shine)
@@ -163,7 +163,8 @@ def _opacity(
         texture = textures.cutout(("file", file), f"material {name}", lambda: assets.read(file))
     pane = _pane(values, alpha) if assets.as_file else None
     opacity = blended_opacity(name, alpha, texture, textures, notes, pane)
-    if not opacity.left_out and not opacity.glass and int(_number(values, "illum", 2)) in GLASS_MODELS:
+    clear = opacity.left_out or opacity.glass or opacity.alpha_cutoff < 0
+    if not clear and int(_number(values, "illum", 2)) in GLASS_MODELS:
         notes.add("glass that is not nearly clear (d from 0.25) is taken as opaque", name)
     return opacity
 
@@ -181,7 +182,7 @@ def _pane(values: Mapping[str, str], alpha: float) -> Glass:
 def _note_ignored(name: str, values: Mapping[str, str], use: MapUse | None, assets: Assets, notes: Notes) -> None:
     ke = _rgb(values, "ke")
     if name not in assets.shining and ke is not None and max(ke) > 0:
-        notes.add("emission is left out", name)
+        notes.add(ONLY_SEEN if assets.as_file else "emission is left out", name)
     for key in IGNORED_MAPS:
         if key in values:
             notes.add(f"{key} maps are left out", name)
