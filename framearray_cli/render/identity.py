@@ -16,6 +16,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.forms.table import Table
 from framearray_cli.base.hashing import fingerprint
 from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.inputs.glow import glows
 from framearray_cli.job.method import ObscuranceTable, SamplesTable
 from framearray_cli.job.read import job_table
 from framearray_cli.scene.paths.lightpath import LightPath
@@ -82,11 +83,14 @@ def require_same_cells(directory: Path, digest: str, records: ArrayRecords) -> N
 
 def scene_fingerprint(prepared: Prepared) -> str:
     """Hash the scene as it was read: its triangles, materials and textures; its path is ignored."""
-    glass = (prepared.scene.pane_corners, prepared.scene.pane_optics) if prepared.scene.has_glass else ()
-    gloss = (prepared.glossy.factor, prepared.glossy.texture) if prepared.scene.is_glossy else ()
-    tables = (*prepared.surfaces, *prepared.relief[:-1], *glass, *gloss)
+    scene = prepared.scene
+    glass = (scene.pane_corners, scene.pane_optics) if scene.has_glass else ()
+    gloss = (prepared.glossy.factor, prepared.glossy.texture) if scene.is_glossy else ()
+    shining = prepared.light_arrays.emitters.span.size > 0 or glows(prepared.glow)
+    emission = (scene.emission, scene.emission_texture, scene.one_sided) if shining else ()
+    tables = (*prepared.surfaces, *prepared.relief[:-1], *glass, *gloss, *emission)
     arrays = (np.ascontiguousarray(array).reshape(-1).view(np.uint8).data for array in tables)
-    return fingerprint(prepared.scene.centre.tobytes(), *arrays)
+    return fingerprint(scene.centre.tobytes(), *arrays)
 
 
 def job_fingerprint(prepared: Prepared, scene: str | None = None, table: dict[str, Any] | None = None) -> str:

@@ -15,6 +15,7 @@ from framearray_cli.engine.images.denoise import require_denoiser
 from framearray_cli.engine.inputs.cameras import Cameras, cameras
 from framearray_cli.engine.inputs.emitters import emitters
 from framearray_cli.engine.inputs.glossy import Glossy, glossy
+from framearray_cli.engine.inputs.glow import Glow, glow, glowing
 from framearray_cli.engine.inputs.lights import LightArrays, light_arrays
 from framearray_cli.engine.inputs.mips import mips
 from framearray_cli.engine.inputs.panes import pane_arrays
@@ -34,9 +35,9 @@ from framearray_cli.engine.terms.falloff import FALLOFFS
 from framearray_cli.engine.terms.obscurance import ObscuranceSettings
 from framearray_cli.job.job import Job
 from framearray_cli.scene.paths.paths import Eyes, Lights, eyes, lights
-from framearray_cli.scene.paths.planes import Plane
 from framearray_cli.scene.scene import Scene, load_scene
 
+from .ambient_groups import name_groups
 from .gloss import require_plain_shadows
 from .halves import halves_of
 from .shining import with_emission
@@ -62,6 +63,7 @@ class Prepared:
     surfaces: Surfaces
     relief: Relief
     glossy: Glossy
+    glow: Glow
     still: bool
 
     @property
@@ -99,8 +101,8 @@ def prepare(job: Job) -> Prepared:
         require_denoiser()
     job_eyes, job_lights = eyes(job), lights(job)
     shining, file = {path.emitter.material for path in job_lights.sources if path.emitter}, job.scene
-    as_file = job.scene.surfaces == "file"
-    scene = load_scene(file.file, file.materials, file.folders, _scene_memory(job), shining, as_file=as_file)
+    as_file, memory = file.surfaces == "file", _scene_memory(job)
+    scene = load_scene(file.file, file.materials, file.folders, memory, shining, as_file=as_file)
     return prepared_from(job, scene, job_eyes, job_lights)
 
 
@@ -109,6 +111,7 @@ def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepare
     lights = with_emission(job, lights, scene)
     require_plain_shadows(job, scene)
     arrays, of_scene = light_arrays(lights, scene.centre, emitters(lights, scene)), surfaces(scene)
+    seen = glow(scene, lights, as_file=job.scene.surfaces == "file")
     return Prepared(
         job=job,
         scene=scene,
@@ -117,7 +120,8 @@ def prepared_from(job: Job, scene: Scene, eyes: Eyes, lights: Lights) -> Prepare
         light_arrays=coloured(arrays) if job.indirect.exact or scene.has_glass else arrays,
         surfaces=of_scene,
         relief=relief(scene, of_scene),
-        glossy=glossy(scene, of_scene),
+        glossy=glossy(scene, of_scene, glowing(seen)),
+        glow=seen,
         still=eyes.at_rest,
     )
 
@@ -140,7 +144,7 @@ def plan_work(prepared: Prepared, embree: EmbreeScene, *, compare: bool = True) 
         compare: whether to note how far light from cells is from that of paths.
     """
     job, background = prepared.job, np.array(prepared.job.scene.background, np.float32)
-    ambient = _name_groups(_ambient(prepared, embree, background), prepared.lights)
+    ambient = name_groups(_ambient(prepared, embree, background), prepared.lights)
     setup = frame_setup(prepared, embree, ambient.reflectivity)
     if job.indirect.exact:
         return replace(setup, cells=no_cells(setup.lights, background), exact=True), ambient
@@ -196,6 +200,7 @@ def frame_setup(prepared: Prepared, embree: EmbreeScene, reflectivity: Rgb) -> F
         denoise=job.denoise.obscurance,
         halves=halves_of(job, still=prepared.still),
         glossy=prepared.glossy,
+        glow=prepared.glow,
         lobes=scene.is_glossy and job.specular.depth > 0,
         sun=sun_study(job, prepared.lights) if job.sun_days else None,
     )
@@ -232,28 +237,6 @@ def _with_cells(
     notes = (accuracy.note,) if accuracy else ()
     setup = replace(setup, cells=built.cells, smooth=0 if local else job.indirect.filter, local=local)
     return setup, replace(ambient, notes=(*ambient.notes, *notes), shared_s=shared_s)
-
-
-def image_ambient(ambient: Ambient, lights: Lights) -> Ambient:
-    """Return the I_A that images are composed with; with groups, 0 for all planes but that of R W, and 1 there.
-
-    An array with groups has the I_A of each group in its manifest, and adds it when a picture is made.
-    """
-    if not lights.groups:
-        return ambient
-    intensity = np.zeros_like(ambient.intensity)
-    intensity[lights.planes.index(Plane.INDIRECT)] = 1.0
-    return replace(ambient, intensity=intensity)
-
-
-def _name_groups(ambient: Ambient, lights: Lights) -> Ambient:
-    """Return the same estimate with the group of the light position in its notes."""
-    l = int(ambient.standard_error.argmax())
-    group = next((group for group in lights.groups if l in group.positions), None)
-    if group is None:
-        return ambient
-    name = f"at light {l - group.positions.start} of {group.name} "
-    return replace(ambient, notes=tuple(note.replace(f"at light {l} ", name) for note in ambient.notes))
 
 
 def eye_cameras(prepared: Prepared) -> Cameras:

@@ -28,6 +28,7 @@ from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 
+from .ambient_groups import image_ambient
 from .group_sums import group_sums
 from .identity import cells_digest, require_same_cells
 from .lamps import draw_visible
@@ -35,7 +36,7 @@ from .manifest import initial_manifest
 from .memory import light_blocks, mirror_share, require_memory
 from .pace import Expected, Pace, block_work, eye_work, plane_cost, total_work
 from .pilots.warn import find_warnings
-from .prepare import Prepared, image_ambient, plan_work
+from .prepare import Prepared, plan_work
 from .progress import RenderEvents
 from .session import RenderSession, complete_manifest, open_session
 from .summary import Summary, summarize, with_summary

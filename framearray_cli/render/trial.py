@@ -21,9 +21,10 @@ from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 
+from .ambient_groups import image_ambient
 from .few_lights import with_few_lights
 from .pace import Cost, Pace, block_work, eye_work
-from .prepare import Prepared, image_ambient
+from .prepare import Prepared
 from .writer import ArrayWriter, array_target, image_format
 
 AnyImage: TypeAlias = Image | NDArray[np.float16]

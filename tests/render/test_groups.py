@@ -211,7 +211,7 @@ def test_notes_name_groups(scene: Path) -> None:
     from dataclasses import replace
 
     from framearray_cli.engine.terms.ambient.estimate import Ambient
-    from framearray_cli.render.prepare import _name_groups
+    from framearray_cli.render.ambient_groups import name_groups
     from framearray_cli.scene.paths.paths import lights
 
     job = tiny.Job.model_validate({**tiny.table(), "light": {"sources": SOURCES}})
@@ -227,5 +227,5 @@ def test_notes_name_groups(scene: Path) -> None:
         rays=1,
         notes=("ambient: standard error 50 % at light 4 after 1 walks",),
     )
-    assert _name_groups(ambient, found).notes == ("ambient: standard error 50 % at light 1 of sun after 1 walks",)
-    assert _name_groups(ambient, replace(found, groups=())).notes == ambient.notes
+    assert name_groups(ambient, found).notes == ("ambient: standard error 50 % at light 1 of sun after 1 walks",)
+    assert name_groups(ambient, replace(found, groups=())).notes == ambient.notes

@@ -43,6 +43,7 @@ class Scratch:
         alpha, metal: (batch + LANES,) gloss of the hits, see `record_gloss`; empty where nothing is glossy.
         by_source: the lights with one source at a time, where gloss needs the light of each; else empty.
         emission: (batch, EMISSION_COLUMNS) of the hits, see `record_emission`; (0, ...) where nothing shines.
+        glow: (batch, 3) radiance that the hits send out without being sources; (0, 3) where none does.
         paths: of indirect light by paths; None without.
         smooth: of the filter of indirect light; None without.
         sun: of hours of sun; None without.
@@ -77,6 +78,7 @@ class Scratch:
         self.closeness = np.empty(batch if near else 0, np.float32)
         self.constant = np.empty((batch if setup.cells is not None else 0, 3), np.float32)
         self.emission = np.empty((batch if setup.shines else 0, EMISSION_COLUMNS), np.float32)
+        self.glow = np.empty((batch if setup.glows else 0, 3), np.float32)
         self.alpha, self.metal = (np.empty(batch + LANES if setup.shiny else 0, np.float32) for _ in range(2))
         n_sources = len(setup.lights.kind)
         self.by_source = [one_source(setup.lights, s) for s in range(n_sources if setup.shiny and n_sources > 1 else 0)]

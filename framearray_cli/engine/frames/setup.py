@@ -14,6 +14,7 @@ from ..hits.native import pixel_order
 from ..inputs.cameras import Cameras
 from ..inputs.glossy import NONE as NO_GLOSS
 from ..inputs.glossy import Glossy
+from ..inputs.glow import NO_GLOW, Glow, glows
 from ..inputs.lights import LightArrays, some_lights
 from ..inputs.mips import SHARP, Mips
 from ..inputs.panes import has_panes
@@ -56,7 +57,7 @@ class FrameSetup:
         smooth: number of passes of the filter of indirect light from cells.
         relief, mips: normal maps, and smaller copies of textures.
         sun: whose hours the layers hold; None: of none.
-        glossy: the gloss of all materials.
+        glossy: the gloss of all materials; `glow`: what they send out without being sources.
         order: (n_pixels,) every pixel once, in the order of tracing.
     """
 
@@ -89,6 +90,7 @@ class FrameSetup:
     relief: Relief = FLAT
     mips: Mips = SHARP
     glossy: Glossy = NO_GLOSS
+    glow: Glow = NO_GLOW
     lobes: bool = False
     order: Int32 = field(init=False)
 
@@ -136,6 +138,11 @@ class FrameSetup:
     def shines(self) -> bool:
         """Whether any surface of the scene shines."""
         return self.lights.emitters.span.size > 0
+
+    @property
+    def glows(self) -> bool:
+        """Whether any surface that is no source is seen shining."""
+        return glows(self.glow)
 
     @property
     def has_glass(self) -> bool:

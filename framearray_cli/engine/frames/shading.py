@@ -6,7 +6,7 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Rgb
 
-from ..hits.emission import TEXTURE, record_emission
+from ..hits.emission import EMISSION_COLUMNS, SOURCE, TEXTURE, record_emission
 from ..hits.gloss import record_gloss
 from ..hits.hits import ESCAPED, Hits
 from ..kernels.kernel import inlined, kernel
@@ -64,6 +64,9 @@ def estimate_terms(
         if len(throughput):
             out.emission[:n, TEXTURE:] *= throughput[:n]
     write_rows(hits, n, setup.background, scratch.obscurance, skylight, throughput, out.irradiance, out.row)
+    if setup.glows:
+        seen = scratch.glow[:n] * throughput[:n] if len(throughput) else scratch.glow[:n]
+        out.row[:n, LIGHT_INDEPENDENT : LIGHT_INDEPENDENT + 3] += seen
     scratch.seconds[obscurance_kind] += middle - started
     scratch.seconds[shadow_kind] += perf_counter() - middle
 
@@ -78,6 +81,11 @@ def find_shine(setup: FrameSetup, hits: Hits, scratch: Scratch, first: int, n: i
     packets = scratch.hit_rays.packets
     if setup.shines:
         record_emission(setup.lights.emitters, setup.tracer, packets, n, scratch.emission[first:])
+    if setup.glows:
+        found = np.empty((n, EMISSION_COLUMNS), np.float32)
+        record_emission(setup.glow.emitters, setup.tracer, packets, n, found)
+        radiance = setup.glow.radiance[found[:, SOURCE].astype(np.int64)]  # of any where the texture is 0
+        np.multiply(radiance, found[:, TEXTURE:], out=scratch.glow[first : first + n])
     if setup.shiny:
         record_gloss(setup.glossy, setup.tracer, packets, n, hits, scratch.alpha[first:], scratch.metal[first:])
 

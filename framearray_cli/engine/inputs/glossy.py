@@ -47,12 +47,17 @@ NONE = Glossy(
 )
 
 
-def glossy(scene: Scene, surfaces: Surfaces) -> Glossy:
-    """Gather the gloss of a scene."""
+def glossy(scene: Scene, surfaces: Surfaces, glowing: Int32) -> Glossy:
+    """Gather the gloss of a scene.
+
+    Args:
+        glowing: materials that are seen shining without being sources, whose gloss is left out.
+    """
     if not scene.is_glossy:
         return NONE
     numbers = surfaces._replace(linear=np.arange(256, dtype=np.float32) / np.float32(255))
     factor = np.stack([scene.roughness, scene.metallic], axis=1)
+    factor[glowing, ROUGHNESS] = 0.0
     return Glossy(np.ascontiguousarray(factor, np.float32), scene.gloss_texture, numbers, albedo_table())
 
 

@@ -18,7 +18,8 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.window import Window
 from framearray_cli.engine.loop import ready_frames
 from framearray_cli.job.job import Job
-from framearray_cli.render.prepare import image_ambient, open_embree, plan_work, prepare
+from framearray_cli.render.ambient_groups import image_ambient
+from framearray_cli.render.prepare import open_embree, plan_work, prepare
 
 RESOLUTION, QUICK_RESOLUTION = (80, 60), (40, 30)
 CAMERAS, FIRST = 3, 0.4  # consecutive positions, from this share of the path on

@@ -9,10 +9,10 @@ from support import tiny
 
 from framearray_cli.array.manifest import array_files
 from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.render.ambient_groups import image_ambient
 from framearray_cli.render.identity import identity_of
 from framearray_cli.render.manifest import initial_manifest
 from framearray_cli.render.names import array_names
-from framearray_cli.render.prepare import image_ambient
 from framearray_cli.render.writer import array_target
 from framearray_cli.scene.paths.paths import lights
 from framearray_cli.scene.paths.planes import Plane, first_with_background, group_planes, picture_planes

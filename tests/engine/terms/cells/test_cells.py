@@ -23,7 +23,8 @@ from framearray_cli.engine.terms.cells.places import Places, PlaceWork, find_pla
 from framearray_cli.engine.terms.cells.samples import Samples, SampleWalks, draw_samples
 from framearray_cli.engine.terms.cells.sweeps import sweeps_for
 from framearray_cli.engine.terms.cells.table import Cells, at_lights
-from framearray_cli.render.prepare import Prepared, eye_cameras, image_ambient, open_embree, plan_work
+from framearray_cli.render.ambient_groups import image_ambient
+from framearray_cli.render.prepare import Prepared, eye_cameras, open_embree, plan_work
 from framearray_cli.render.target.pilot import _radiance
 
 CELLS = {"indirect": {"method": "cells", "samples": 4096, "cell": 0.1, "filter": 0}}
