@@ -9,15 +9,16 @@ import re
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
-from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, model_validator
 
-from framearray_cli.base.forms.table import Float3, Place, Table, default_text, fail, fill
+from framearray_cli.base.forms.table import Place, Table, default_text, fail, fill
 from framearray_cli.base.forms.words import shown
 from framearray_cli.base.sundays import SunDay
 from framearray_cli.base.units import MOST_THREADS
 
 from .camera import CameraTable
 from .light import LightTable
+from .material import KEYS_BY_FILE, MaterialTable
 from .method import (
     DEFAULT_HITS,
     DEFAULT_N_R,
@@ -31,44 +32,10 @@ from .method import (
 )
 from .output import OutputTable
 from .study import study_days, study_problems
-from .values import MOST_HITS, Auto, Emission, FileName, MemorySize, Reflectivity, absolute
+from .values import MOST_HITS, Auto, Emission, FileName, MemorySize, absolute
 
 Z_UP_FORMATS = (".stl", ".ply", ".3mf")  # print and scan formats; in every other format y is up
-STEEPEST = 100.0  # a normal map whose slopes are multiplied by more is a map of cliffs
 NAME = "[A-Za-z0-9_][A-Za-z0-9._-]{0,99}"  # what can start a file name on every system
-
-
-class MaterialTable(Table):
-    """Replaces parts of one material of the scene, by its name."""
-
-    reflectivity: Reflectivity | None = Field(
-        default=None,
-        description="Diffuse reflectivity, linear, Rec. 709. Replaces the material's colour, "
-        "texture and vertex colours.",
-        json_schema_extra=default_text("as in the scene"),
-    )
-    specular: Reflectivity | None = Field(
-        default=None,
-        description="Mirror reflectivity, linear. Above 0 the material reflects like a mirror. "
-        "Diffuse plus mirror reflectivity is at most 1 in each channel.",
-        json_schema_extra=default_text("as in the scene"),
-    )
-    normal_strength: float | None = Field(
-        default=None,
-        ge=0,
-        le=STEEPEST,
-        description='Multiplies the slopes of the material\'s normal map; 0: no map. Only with `surfaces = "file"`.',
-        json_schema_extra=default_text("1"),
-    )
-
-    @field_validator("specular")
-    @classmethod
-    def _conserves_energy(cls, specular: Float3 | None, info: ValidationInfo) -> Float3 | None:
-        diffuse = info.data.get("reflectivity")
-        for channel, a, b in zip(("red", "green", "blue"), diffuse or (), specular or (), strict=False):
-            if a + b > 1 + 1e-9:  # 0.1 + 0.9 may round to just above 1
-                fail([((), f"expected reflectivity + specular of at most 1, got {a + b:g} in {channel}")])
-        return specular
 
 
 class SceneTable(Table):
@@ -103,10 +70,15 @@ class SceneTable(Table):
 
     @model_validator(mode="after")
     def _check_surfaces(self) -> "SceneTable":
-        given = [name for name, table in self.materials.items() if table.normal_strength is not None]
+        given = [
+            ("materials", name, key)
+            for name, table in self.materials.items()
+            for key in KEYS_BY_FILE
+            if getattr(table, key) is not None
+        ]
         if given and self.surfaces != "file":
-            problem = 'expected none with scene.surfaces = "diffuse", which shows no normal map; ask for "file"'
-            fail([(("materials", name, "normal_strength"), problem) for name in given])
+            problem = 'expected none with scene.surfaces = "diffuse"; it acts with "file"'
+            fail([(place, problem) for place in given])
         return self
 
     @model_validator(mode="after")

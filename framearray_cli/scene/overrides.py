@@ -5,64 +5,65 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
+from framearray_cli.base.arrays import Bytes
 from framearray_cli.base.errors import SceneError
 
 from .files.model import Material, Notes, join_names
+from .surface_overrides import SurfaceOverride, override_surface
 
 LONGEST_NAME = 100  # characters of a name in a message
 NAMES_IN_AN_ERROR = 12
 
 
-class Override(Protocol):
+class Override(SurfaceOverride, Protocol):
     """What a job may say about a material; None keeps the value of the file."""
 
     @property
     def reflectivity(self) -> Sequence[float] | None:
-        """Diffuse reflectivity, linear RGB."""
+        """Diffuse reflectivity, linear RGB; with roughness or metal the base colour."""
 
     @property
     def specular(self) -> Sequence[float] | None:
         """Mirror reflectivity, linear RGB."""
 
-    @property
-    def normal_strength(self) -> float | None:
-        """What multiplies the slopes of the normal map."""
-
 
 def override_materials(
-    materials: Sequence[Material], overrides: Mapping[str, Override], notes: Notes
+    materials: Sequence[Material], overrides: Mapping[str, Override], textures: Sequence[Bytes], notes: Notes
 ) -> list[Material]:
-    """Apply the values of the job. Glass with an override is shown, since its colour was set on purpose."""
+    """Apply the values of the job.
+
+    Args:
+        textures: (height, width, 4) RGBA each.
+    """
     names = sorted({material.name for material in materials})
     unknown = [name for name in overrides if name not in names]
     if unknown:
         raise SceneError("; ".join(_unknown_material(name, names) for name in unknown))
     found = []
     for material in materials:
-        override = overrides.get(material.name)
-        if override is not None and (override.reflectivity is not None or override.specular is not None):
-            material = replace(material, roughness=0.0, gloss_texture=-1)
-            if material.left_out == "transmissive" or material.glass is not None:
-                material = replace(material, left_out="", glass=None)
-                notes.add("transmissive materials with an override are shown after all", material.name)
-            if override.reflectivity is not None:
-                material = replace(material, reflectivity=_rgb(override.reflectivity), texture=-1)
-            if override.specular is not None:
-                material = replace(material, specular=_rgb(override.specular), specular_texture=-1)
-            if any(d + s > 1 for d, s in zip(material.reflectivity, material.specular, strict=True)):
-                notes.add("overridden materials reflect more than they receive", material.name)
-        if override is not None and override.normal_strength is not None:
-            material = _with_strength(material, override.normal_strength, notes)
+        if (override := overrides.get(material.name)) is not None:
+            if override.reflectivity is not None or override.specular is not None:
+                material = _with_colours(material, override, notes)
+            material = override_surface(material, override, textures, notes)
         found.append(material)
     return found
 
 
-def _with_strength(material: Material, strength: float, notes: Notes) -> Material:
-    """Multiply the slopes of a normal map; without slopes there is no map."""
-    if material.normal_texture < 0:
-        notes.add("normal_strength changes nothing where there is no normal map", material.name)
-    texture = material.normal_texture if strength > 0 else -1
-    return replace(material, normal_texture=texture, normal_scale=material.normal_scale * strength)
+def _with_colours(material: Material, override: Override, notes: Notes) -> Material:
+    """Replace colours. Glass is shown then, since its colour was set on purpose."""
+    if override.roughness is None and override.metallic is None:
+        material = replace(material, roughness=0.0, gloss_texture=-1)
+    if material.left_out == "transmissive" or material.glass is not None:
+        material = replace(material, left_out="", glass=None)
+        if not override.transmission:
+            notes.add("transmissive materials with an override are shown after all", material.name)
+    if override.reflectivity is not None:
+        material = replace(material, reflectivity=_rgb(override.reflectivity), texture=-1)
+    if override.specular is not None:
+        material = replace(material, specular=_rgb(override.specular), specular_texture=-1)
+    if any(d + s > 1 for d, s in zip(material.reflectivity, material.specular, strict=True)):
+        notes.add("overridden materials reflect more than they receive", material.name)
+    return material
 
 
 def _rgb(values: Sequence[float]) -> tuple[float, float, float]:

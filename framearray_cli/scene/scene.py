@@ -66,7 +66,7 @@ class Scene:
         gloss_texture: (m,) texture whose green multiplies `roughness` and whose blue `metallic`, or -1; (0,) likewise.
         alpha: (m,) opacity factor, multiplied with the alpha of `alpha_texture`.
         alpha_texture: (m,) texture whose alpha is the mask, or -1.
-        alpha_cutoff: (m,) a point of a masked triangle is absent where alpha < cutoff.
+        alpha_cutoff: (m,) a point of a masked triangle is absent where alpha < cutoff; below 0, see `SCREENED`.
         texels: (n_texels, 4) uint8 RGBA of all textures one after another; colours sRGB encoded, alpha linear;
             row 0 on top.
         textures: (n_textures, 3) int32 first texel, width, height.
@@ -166,7 +166,7 @@ def build_scene(meshes: Meshes, overrides: Mapping[str, Override], *, as_file: b
     """Make the arrays that kernels read from the contents of a file."""
     notes = Notes()
     parts, materials = add_untextured_variants(meshes.parts, meshes.materials, notes)
-    materials = override_materials(materials, overrides, notes)
+    materials = override_materials(materials, overrides, meshes.textures, notes)
     plain = {name for name, override in overrides.items() if override.reflectivity is not None}
     parts = [replace(p, colours=None) if materials[p.material].name in plain else p for p in parts]
     merged, dropped = merge(parts), dict(meshes.dropped)

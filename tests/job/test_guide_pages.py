@@ -4,6 +4,7 @@ import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 import tomli_w
 from support import ROOT, tiny
@@ -36,13 +37,25 @@ def sizes(row: list[str]) -> list[tuple[str, str]]:
 
 
 def test_a_material_is_overridden_as_the_page_shows(tmp_path: Path) -> None:
-    (text,) = [block for block in blocks("scenes.md", "toml") if "materials" in block]
+    (text,) = [block for block in blocks("scenes.md", "toml") if "Chrome" in block]
     job = job_with(tmp_path, text)
     glb = Glb()
     glb.node(glb.mesh(glb.material("Chrome", {"metallicFactor": 1.0, "roughnessFactor": 0.0})))
     scene = load_scene(glb.save(tmp_path / "a.glb"), job.scene.materials)
     assert scene.reflectivity.tolist() == [pytest.approx([0.1] * 3)]
     assert scene.specular.tolist() == [pytest.approx([0.8] * 3)]
+
+
+def test_surfaces_are_overridden_as_the_page_shows(tmp_path: Path) -> None:
+    (text,) = [block for block in blocks("scenes.md", "toml") if "Window" in block]
+    job, glb = job_with(tmp_path, text), Glb()
+    for name in ("Floor", "Window", "Sign"):
+        glb.node(glb.mesh(glb.material(name)), translation=[0.0, 0.0, float(len(name))])
+    scene = load_scene(glb.save(tmp_path / "a.glb"), job.scene.materials, as_file=True)
+    floor, sign = scene.material_names.index("Floor"), scene.material_names.index("Sign")
+    assert (scene.roughness[floor], scene.metallic[floor]) == (np.float32(0.2), 0)
+    assert len(scene.pane_corners) > 0
+    assert scene.emission[sign].tolist() == [8, 2, 1]
 
 
 def test_a_folder_of_textures_is_relative_to_the_job(tmp_path: Path) -> None:
@@ -53,12 +66,12 @@ def test_a_folder_of_textures_is_relative_to_the_job(tmp_path: Path) -> None:
 
 
 def test_surfaces_as_the_file_has_them_are_asked_for_as_the_page_shows(tmp_path: Path) -> None:
-    (text,) = [block for block in blocks("scenes.md", "toml") if "surfaces" in block]
+    (text,) = [block for block in blocks("scenes.md", "toml") if "surfaces" in block and "materials" not in block]
     assert job_with(tmp_path, text).scene.surfaces == "file"
 
 
 def test_every_example_is_tested() -> None:
-    assert (len(blocks("scenes.md", "toml")), len(blocks("jobs.md", "toml"))) == (3, 1)
+    assert (len(blocks("scenes.md", "toml")), len(blocks("jobs.md", "toml"))) == (4, 1)
     assert not blocks("scenes.md", "sh") and not blocks("jobs.md", "sh")
 
 

@@ -1,7 +1,7 @@
 """Scene arrays: cleaned, centred, ordered, overridden; and the real scenes."""
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,17 +9,10 @@ import pytest
 from support.scenes import QUAD, QUAD_FACES, QUAD_UVS, Glb, check_shapes, png, shared_scene
 
 from framearray_cli.base.errors import SceneError
+from framearray_cli.job.material import MaterialTable
 from framearray_cli.scene.cleaning import has_area, is_repeated
 from framearray_cli.scene.files import Material, Meshes, Part
 from framearray_cli.scene.scene import Scene, build_scene, load_scene, scene_report_lines
-
-
-@dataclass(frozen=True)
-class Override:
-    reflectivity: tuple[float, float, float] | None = None
-    specular: tuple[float, float, float] | None = None
-    normal_strength: float | None = None
-
 
 TRIANGLE = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], dtype=np.float64)
 
@@ -211,7 +204,7 @@ def test_report_lines(tmp_path):
 
 def test_overrides_replace_factor_and_texture(tmp_path):
     file = leaf_and_wall(tmp_path)
-    overrides = {"Leaf": Override(reflectivity=(0.1, 0.2, 0.3)), "Wall": Override(specular=(0.5, 0.5, 0.5))}
+    overrides = {"Leaf": MaterialTable(reflectivity=(0.1, 0.2, 0.3)), "Wall": MaterialTable(specular=(0.5, 0.5, 0.5))}
     scene = load_scene(file, overrides)
     leaf, wall = scene.material_names.index("Leaf"), scene.material_names.index("Wall")
     assert scene.reflectivity[leaf] == pytest.approx([0.1, 0.2, 0.3])
@@ -222,7 +215,7 @@ def test_overrides_replace_factor_and_texture(tmp_path):
 
 
 def test_an_overridden_glass_is_shown(tmp_path):
-    scene = load_scene(leaf_and_wall(tmp_path), {"Glass": Override(reflectivity=(0.5, 0.5, 0.5))})
+    scene = load_scene(leaf_and_wall(tmp_path), {"Glass": MaterialTable(reflectivity=(0.5, 0.5, 0.5))})
     assert "Glass" in [scene.material_names[m] for m in scene.material]
     assert "transmissive" not in scene.report.dropped
 
@@ -230,14 +223,14 @@ def test_an_overridden_glass_is_shown(tmp_path):
 def test_override_clears_corner_colours():
     coloured = part_of(TRIANGLE[0], colours=np.full((1, 3, 3), 0.25, dtype=np.float32))
     meshes = Meshes(parts=(coloured,), materials=(Material(name="M"),), textures=(), dropped={}, notes=())
-    assert len(build_scene(meshes, {"M": Override(reflectivity=(0.5, 0.5, 0.5))}).colours) == 0
-    assert len(build_scene(meshes, {"M": Override(specular=(0.5, 0.5, 0.5))}).colours) == 1
+    assert len(build_scene(meshes, {"M": MaterialTable(reflectivity=(0.5, 0.5, 0.5))}).colours) == 0
+    assert len(build_scene(meshes, {"M": MaterialTable(specular=(0.5, 0.5, 0.5))}).colours) == 1
 
 
 def test_unknown_override_names_the_nearest(tmp_path):
     file = leaf_and_wall(tmp_path)
     with pytest.raises(SceneError, match=r'"Laef".*it has Leaf, .*"Sky"') as caught:
-        load_scene(file, {"Laef": Override(), "Wall": Override(), "Sky": Override()})
+        load_scene(file, {"Laef": MaterialTable(), "Wall": MaterialTable(), "Sky": MaterialTable()})
     assert str(file) in str(caught.value)
 
 

@@ -1,6 +1,5 @@
 """Gloss of scene files: what materials become with surfaces as the file says; without, they stay as they were."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -8,18 +7,12 @@ import numpy as np
 import pytest
 from support.scenes import QUAD_UVS, Glb, png
 
+from framearray_cli.job.material import MaterialTable
 from framearray_cli.scene.files.gloss import from_specular
 from framearray_cli.scene.scene import Scene, load_scene
 
 # roughness in green, metal in blue
 RAW = np.array([[[0, 51, 255], [0, 102, 0]]], np.uint8)
-
-
-@dataclass(frozen=True)
-class Override:
-    reflectivity: tuple[float, float, float] | None = None
-    specular: tuple[float, float, float] | None = None
-    normal_strength: float | None = None
 
 
 def load(glb: Glb, folder: Path, **more: Any) -> Scene:
@@ -112,7 +105,7 @@ def test_colours_survive_the_way_to_metal_and_back():
 
 def test_a_reflectivity_of_the_job_is_diffuse(tmp_path: Path):
     glb = painted({"roughnessFactor": 0.3})
-    scene = load(glb, tmp_path, overrides={"Paint": Override(reflectivity=(0.2, 0.2, 0.2))})
+    scene = load(glb, tmp_path, overrides={"Paint": MaterialTable(reflectivity=(0.2, 0.2, 0.2))})
     assert not scene.is_glossy
 
 
