@@ -9,17 +9,29 @@ import pytest
 from support import ROOT
 
 import bench
-from bench.core.cases import BY_AREA, FRAME_ARRAY, REDUCED, SCRATCH, VARIANTS
+from bench.core.cases import BY_AREA, FRAME_ARRAY, REDUCED, SCRATCH, VARIANTS, open_case
 from bench.core.markdown import grid, number, percent
 from bench.core.results import DOCS, load, median, save, site_for, site_in
 from bench.core.steady import mean
 from bench.error import reports
 from bench.error.bias_page import at_most, at_time
 from bench.speed.processes import environment
-from bench.speed.recording import COHERENT, KEPT_ROWS, OCCLUDED, PIECE, Recording, cut, regroup
+from bench.speed.recording import (
+    COHERENT,
+    KEPT_ROWS,
+    OCCLUDED,
+    PIECE,
+    WALKS,
+    Recording,
+    cut,
+    record,
+    record_ambient,
+    regroup,
+)
 from bench.speed.scaling import resampled
 from bench.speed.speed import FORMATS, WRITTEN
 from framearray_cli.engine.inputs.lights import DIRECTIONAL, POINT, LightArrays
+from framearray_cli.job.read import read_job
 from framearray_cli.report.metrics import block_mean, errors, relmse, rmse, shadow_edges, squared_bias
 
 WITH_WRITING = [variant for variant in VARIANTS if variant.writes]
@@ -221,3 +233,11 @@ def test_pages_find_their_plots(tmp_path):
         assert (site.pages / link).resolve() == site.plots / "bias.svg"
     assert f"]({DOCS.link(DOCS.plots / 'bias.svg')})" in (DOCS.pages / "bias.md").read_text(encoding="utf-8")
     assert site_for(False) == DOCS and site_for(True).pages.name == "quick"
+
+
+def test_rays_of_a_frame_and_of_ambient_light_can_be_recorded():
+    """The recorder counts what the program counts, or fails."""
+    with open_case(read_job(ROOT / "jobs" / "smoke.toml")) as case:
+        frame, ambient = record(case, 0, 4 * case.setup.n_pixels * case.setup.lights.n_lights), record_ambient(case)
+    assert frame.n_rays["native"] == case.setup.n_pixels * case.setup.per_pixel[0]
+    assert ambient.n_rays["ambient walk"] > WALKS

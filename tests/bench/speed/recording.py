@@ -137,7 +137,7 @@ def record_ambient(case: Case) -> Recording:
         render=changed(job.render, threads=1),
     )
     tape = _Tape(case.setup.tracer, 8 * WALKS * case.setup.lights.n_lights)
-    plan_work(replace(case.prepared, job=job), cast(EmbreeScene, SimpleNamespace(tracer=tape.tracer)))
+    plan_work(replace(case.prepared, job=job), cast(EmbreeScene, SimpleNamespace(tracer=tape.tracer, panes=None)))
     rays, flags = tape.end()
     kinds, tests = ("ambient walk", "ambient shadow"), (flags & OCCLUDED) != 0
     changes = [*(np.flatnonzero(np.diff(tests)) + 1).tolist(), len(flags)]
