@@ -62,7 +62,8 @@ class SceneTable(Table):
     surfaces: Literal["diffuse", "file"] = Field(
         default="diffuse",
         description='What surfaces follow: "diffuse" makes all of them diffuse or mirrors; "file" also uses the metal, '
-        "roughness, normal maps and glass of the scene file, and blurs textures by what an eye ray stands for.",
+        "roughness, normal maps, glass and emission of the scene file, and blurs textures by what an eye ray stands "
+        "for.",
     )
     materials: dict[str, MaterialTable] = Field(
         default_factory=dict, description="Materials to override, by their names in the scene file."

@@ -10,11 +10,10 @@ from framearray_cli.base.arrays import Bytes, Float64
 from framearray_cli.base.colour import linear_from_srgb
 
 from .files.gloss import SMOOTHEST, is_mirror
-from .files.materials import TRANSMISSIVE_ALPHA
+from .files.materials import COVERS, TRANSMISSIVE_ALPHA
 from .files.model import SCREENED, Glass, Material, Notes
 
 ROUGH = 1.0  # glTF's default
-IOR = 1.5  # likewise
 
 
 class SurfaceOverride(Protocol):
@@ -108,13 +107,13 @@ def _with_transmission(material: Material, passed: float, textures: Sequence[Byt
     if passed == 0:
         return solid
     if 1 - passed >= TRANSMISSIVE_ALPHA:
-        notes.add("partly transparent materials cover a part of what is behind them, by chance", material.name)
+        notes.add(COVERS, material.name)
         return replace(solid, alpha=1 - passed, alpha_texture=-1, alpha_cutoff=SCREENED)
     colour = np.array(material.reflectivity) + np.array(material.specular)
     if material.texture >= 0:
         colour = colour * linear_from_srgb(_mean(textures[material.texture])[:3])
-    ior = IOR if material.glass is None else material.glass.ior
-    return replace(solid, glass=Glass(colour=_rgb(passed * np.clip(colour, 0.0, 1.0)), ior=ior))
+    glass = Glass(colour=_rgb(passed * np.clip(colour, 0.0, 1.0)))
+    return replace(solid, glass=glass if material.glass is None else replace(glass, ior=material.glass.ior))
 
 
 def _with_strength(material: Material, strength: float, notes: Notes) -> Material:

@@ -60,7 +60,9 @@ def test_a_dielectric_is_never_smoother_than_a_highlight_allows() -> None:
 def test_reflectivity_is_the_base_colour_of_gloss() -> None:
     found, _ = changed(GLOSSY, reflectivity=0.5, roughness=0.2)
     assert (found.reflectivity, found.texture, found.roughness) == ((0.5,) * 3, -1, 0.2)
-    assert changed(GLOSSY, reflectivity=0.5)[0].roughness == 0, "alone it makes the surface diffuse"
+    assert changed(GLOSSY, reflectivity=0.5)[0].roughness == 0, (
+        "without roughness or metal beside it the surface is diffuse"
+    )
 
 
 def test_transmission_makes_glass_of_the_materials_colour() -> None:

@@ -52,5 +52,5 @@ def glowing(glow: Glow) -> Int32:
 
 
 def glows(glow: Glow) -> bool:
-    """Whether anything is seen that only eyes find shining."""
+    """Whether anything is seen shining that is no source."""
     return len(glow.radiance) > 0

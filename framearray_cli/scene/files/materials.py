@@ -19,6 +19,7 @@ OPAQUE = 0.999  # a surface that covers this share covers everything
 CUTOFF = 0.5  # alpha where a blended texture turns from hole to surface; also glTF's default for masks
 BRIGHTEST = 1e30  # stands in for infinite reflectivities, before they are scaled to 1
 NO_NORMAL_MAPS = 'normal maps are left out; scene.surfaces = "file" uses them'
+COVERS = "partly transparent materials cover a part of what is behind them, by chance"
 ONLY_SEEN = 'emission is seen and lights nothing; a source of type "mesh" lets it light'
 DEFAULT_NAME = "default"
 COLOURED_NAME = "vertex colours"
@@ -111,7 +112,7 @@ def blended_opacity(
     if glass is not None:
         if alpha * lowest >= OPAQUE:
             return Opacity()
-        notes.add("partly transparent materials cover a part of what is behind them, by chance", name)
+        notes.add(COVERS, name)
         return Opacity(alpha=alpha, alpha_texture=texture, alpha_cutoff=SCREENED)
     if lowest < CUTOFF <= highest:
         notes.add("textures with partial transparency are cut out at half opacity", name)
