@@ -75,7 +75,8 @@ class ReuseTable(Table):
     )
     weights: Literal["average", "balance", "area"] = Field(
         default="balance",
-        description='"average": all hits of a pixel have the same weight. "balance": the weight of a hit follows from '
+        description='"average": all hits of a pixel have the same weight, and gloss looks as the eye that found a hit '
+        'saw it, for comparison. "balance": the weight of a hit follows from '
         "how densely its eye samples the place, which removes the error at silhouettes and texture edges and costs "
         'more rays. "area": the weight is the part of the pixel that a hit stands for, which removes a third of the '
         'noise at edges; where a surface has just come into view, as with "balance".',

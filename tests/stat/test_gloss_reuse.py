@@ -81,6 +81,12 @@ def test_balance_keeps_the_mean_of_gloss(unshared: Any):
     assert abs(means.mean() - others.mean()) < 3 * error
 
 
+def test_average_shows_what_other_eyes_saw(unshared: Any):
+    """The bias of the literature [Havran03], of narrow lobes most."""
+    shared = middle_frames(job_of(N_R, 4, "average"), range(SEEDS))
+    assert differing(shared, unshared).max() > 1.5
+
+
 def test_gloss_towards_another_eye_is_off(unshared: Any, monkeypatch: pytest.MonkeyPatch):
     """The comparison can fail: it finds highlights where another eye sees them."""
     view = Window._view

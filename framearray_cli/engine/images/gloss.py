@@ -28,7 +28,7 @@ from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
 from .accumulate import ROW_BYTES, row_of, weight_of
 from .band import INVERSE_PI, Band
 from .gloss_view import Coat, GlossView, find_mesh
-from .sources import GATHERED, GLOSS, GLOSS_COLUMNS, ODD_SCALE, ORDER, ROW, SCALE, START
+from .sources import EYE, GATHERED, GLOSS, GLOSS_COLUMNS, ODD_SCALE, ORDER, ROW, SCALE, START
 
 # Rows of `Band.room` with light that was kept, of each channel.
 TAKEN = 7
@@ -129,7 +129,10 @@ def _add_hit(
     packets = (n_lights + LANES - 1) // LANES
     last = LIT_WORDS + (n_sources * channels * n_lights if view.glass else (n_sources * packets + 1) // 2)
     mirrored = source[GLOSS_COLUMNS] >= last + OF_MIRRORS
-    x, y, z = view.eye[0, 0] - p[0], view.eye[0, 1] - p[1], view.eye[0, 2] - p[2]
+    eye = (view.eye[0, 0], view.eye[0, 1], view.eye[0, 2])
+    if source[EYE] != 0:
+        eye = _triple_at(source[EYE], 0)
+    x, y, z = eye[0] - p[0], eye[1] - p[1], eye[2] - p[2]
     tint: Triple = (one, one, one)
     if mirrored:
         x, y, z = _triple_at(at, last)

@@ -13,10 +13,10 @@ from ..frames.records import HitRecords, HitsByPixel
 # Columns of a list of sources: addresses of arrays, 0 for an empty one; and what the arrays hold. Hits weighed by area
 # are one list over all sources (`area_weights.py`): SHARES is that of a weight per entry of ORDER in place of one per
 # hit, OF that of the source of each entry, as the number of rows from the list to it. These rows have no START.
-# GLOSS_COLUMNS is no address, but the number of columns of GLOSS.
+# GLOSS_COLUMNS is no address, but the number of columns of GLOSS; EYE is that of a position.
 START, ORDER, WEIGHTS, SCALE, ODD_SCALE, ROW, IRRADIANCE, GATHERED, EMISSION, HOURS, GLOSS, PLACES = range(12)
-GLOSS_COLUMNS, SHARES, OF = range(12, 15)
-COLUMNS = 15
+GLOSS_COLUMNS, SHARES, OF, EYE = range(12, 16)
+COLUMNS = 16
 _TYPES = (np.int32, np.int32, *[np.float32] * 9, np.uint8)
 NO_SCALE, _NO_PLACES = np.empty(0, np.float32), np.empty(0, np.uint8)
 NO_SOURCES: Addresses = np.empty((0, COLUMNS), np.int64)
@@ -31,6 +31,7 @@ class HitSource(NamedTuple):
         weight: (n_hits,) w of each hit, or (0,) where all weigh 1.
         scale: (n_pixels,) a factor for all hits of a pixel, or (0,) where it is 1.
         odd_scale: (n_pixels,) the factor for odd samples, or (0,) where it is the same.
+        eye: (3,) where gloss of the hits is seen from; (0,) where it is seen from the eye of the image.
         place: (n_hits,) where each hit lies in its pixel, see `hits/places.py`; (0,) where nobody asks.
     """
 
@@ -40,6 +41,7 @@ class HitSource(NamedTuple):
     scale: Float32 = NO_SCALE
     odd_scale: Float32 = NO_SCALE
     place: Bytes = _NO_PLACES
+    eye: Float32 = NO_SCALE
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
@@ -68,7 +70,7 @@ class SourceList:
         rows = [
             [
                 *(_address(array, dtype) for array, dtype in zip(source.arrays, _TYPES, strict=True)),
-                *(source.records.gloss.shape[1], 0, 0),
+                *(source.records.gloss.shape[1], 0, 0, _address(source.eye, np.float32)),
             ]
             for source in self.sources
         ]

@@ -251,9 +251,16 @@ class Window:
         self, j: int, holes: list[tuple[HitsByPixel, HitRecords]], eyes: Sequence[int] | None = None
     ) -> SourceList:
         """Native and outer hits of frame j, of its whole window or of some eyes, and those that fill holes."""
-        window = [self._frames[c] for c in self._setup.eyes_of(j) if eyes is None or c in eyes]
+        setup = self._setup
+        window = [self._frames[c] for c in setup.eyes_of(j) if eyes is None or c in eyes]
         sources = [
-            HitSource(found.places[j], found.records.through(found.through[j]), found.weights[j], place=found.within[j])
+            HitSource(
+                found.places[j],
+                found.records.through(found.through[j]),
+                found.weights[j],
+                place=found.within[j],
+                eye=NO_SCALE if setup.balance else setup.cams.position[found.c],
+            )
             for found in window
         ]
         return SourceList(sources + [HitSource(by_pixel, records) for by_pixel, records in holes])
