@@ -99,7 +99,7 @@ def find_frame(setup: FrameSetup, c: int, pool: TracePool) -> FrameHits:
         find_outer(setup, c, m, scratch, frames, pixel[:, span], weight[:, span], within[:, span])
         find_through(setup, frames, hits, m, scratch, pixel[:, span], through[:, span])
         own = through[frames.index(c), span]
-        return mirror_paths(setup, c, hits, m, scratch, own) if setup.follows else []
+        return mirror_paths(setup, c, hits, m, scratch, own, smooth=True) if setup.follows else []
 
     tasks = [(part, first, m) for part in parts for first, m in pool.batches(part.n)]
     mirrored = [path for paths in pool.run(find_batch, tasks) for path in paths]

@@ -15,11 +15,13 @@ from ..hits.emission import SOURCE
 from ..hits.hits import ESCAPED, Hits
 from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
 from ..inputs.glossy import WIDE
+from ..terms.lobe_cells import SHARPEST
 from ..terms.lobes import follow_lobes
 from ..terms.mirrors import count_mirrors, reflect
 from ..terms.obscurance import HITS_TOGETHER
 from ..terms.panes import FACES, Fronts, reflect_at_panes
 from .glass import NO_GLASS, dim_reflected, own_view
+from .lobes import wide_lobes
 from .passes import Pass, half_sizes
 from .records import LIT, HitRecords
 from .scratch import Scratch
@@ -31,7 +33,7 @@ Gloss: TypeAlias = tuple[Float32, Float32]  # alpha and metal of hits
 
 
 def mirror_paths(
-    setup: FrameSetup, c: int, hits: Hits, n: int, scratch: Scratch, own: Float32 = NO_GLASS
+    setup: FrameSetup, c: int, hits: Hits, n: int, scratch: Scratch, own: Float32 = NO_GLASS, *, smooth: bool = False
 ) -> list[tuple[Int32, HitRecords]]:
     """Follow hits 0 to n - 1 of eye c that are on mirrors or glossy, and find what glass before hits mirrors.
 
@@ -41,6 +43,7 @@ def mirror_paths(
 
     Args:
         own: (n, 3) what passes the glass before the hits, which mirrors too; (0, 3) without glass.
+        smooth: whether hits in a row are neighbours in the image.
     """
     started = perf_counter()
     ends = [*range(0, n, HITS_TOGETHER), n]  # of the hits that are reflected together
@@ -51,6 +54,12 @@ def mirror_paths(
     ]
     throughput = own if len(own) else np.ones((n, 3), np.float32)
     if gloss is not None:
+        if setup.reads_lobes:
+            wide = wide_lobes(setup, hits, throughput, ends, *gloss, scratch, smooth=smooth)
+            for paths, path in zip(found, wide, strict=True):
+                if len(path[0]):
+                    paths.append(path)
+            gloss[0][gloss[0] >= SHARPEST] = 0.0
         _follow(setup, hits, throughput, ends, scratch, found, gloss)
     if setup.depth and count_mirrors(hits, n):
         _follow(setup, hits, throughput, ends, scratch, found, None)

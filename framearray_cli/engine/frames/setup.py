@@ -160,6 +160,11 @@ class FrameSetup:
         return self.depth > 0 or self.lobes
 
     @property
+    def reads_lobes(self) -> bool:
+        """Whether what wide lobes reflect is read from cells."""
+        return self.lobes and self.cells is not None and not self.local and not self.exact
+
+    @property
     def keeps_all(self) -> bool:
         """Whether the light of all positions is stored."""
         return len(self.kept) == self.lights.n_lights

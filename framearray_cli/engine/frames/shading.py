@@ -81,13 +81,22 @@ def find_shine(setup: FrameSetup, hits: Hits, scratch: Scratch, first: int, n: i
     packets = scratch.hit_rays.packets
     if setup.shines:
         record_emission(setup.lights.emitters, setup.tracer, packets, n, scratch.emission[first:])
+    find_glow(setup, packets, n, scratch.glow[first:])
+    if setup.shiny:
+        record_gloss(setup.glossy, setup.tracer, packets, n, hits, scratch.alpha[first:], scratch.metal[first:])
+
+
+def find_glow(setup: FrameSetup, packets: Float32, n: int, glow: Rgb) -> None:
+    """Find the radiance that what traced rays 0 to n - 1 meet sends out without being a source.
+
+    Args:
+        glow: (>= n, 3) overwritten; (0, 3) where nothing does.
+    """
     if setup.glows:
         found = np.empty((n, EMISSION_COLUMNS), np.float32)
         record_emission(setup.glow.emitters, setup.tracer, packets, n, found)
         radiance = setup.glow.radiance[found[:, SOURCE].astype(np.int64)]  # of any where the texture is 0
-        np.multiply(radiance, found[:, TEXTURE:], out=scratch.glow[first : first + n])
-    if setup.shiny:
-        record_gloss(setup.glossy, setup.tracer, packets, n, hits, scratch.alpha[first:], scratch.metal[first:])
+        np.multiply(radiance, found[:, TEXTURE:], out=glow[:n])
 
 
 def _estimate_indirect(

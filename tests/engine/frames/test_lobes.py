@@ -1,0 +1,83 @@
+"""Wide lobes read from cells, against the same lobes followed to hits that are lit like any other."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from support import tiny
+from support.tiny import ball, box, quad
+
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.loop import window_of
+from framearray_cli.job.job import Job
+from framearray_cli.render.prepare import open_embree, plan_work
+from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.scene import Scene, build_scene
+
+SEEDS = 8
+
+
+def room(roughness: float, metallic: float) -> Scene:
+    """A glossy floor and a glossy ball in a coloured room."""
+    corners, normals = ball((0.3, 0.5, 0.0), 0.5, 12)
+    shine = {"roughness": roughness, "metallic": metallic}
+    materials = (
+        Material(name="Walls", reflectivity=(0.7, 0.5, 0.3)),
+        Material(name="Floor", reflectivity=(0.8, 0.8, 0.8), **shine),
+        Material(name="Ball", reflectivity=(0.3, 0.5, 0.8), **shine),
+    )
+    parts = (
+        Part(material=0, corners=box((-2, 0, -2), (2, 2.5, 2))),
+        Part(material=1, corners=quad((-2, 0.01, 2), (2, 0.01, 2), (2, 0.01, -2), (-2, 0.01, -2))),
+        Part(material=2, corners=corners, normals=normals),
+    )
+    return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
+
+
+def job() -> Job:
+    eye = {"frame": 0, "eye": [-1.5, 1.6, 1.7], "target": [0.2, 0.4, 0.0]}
+    lamp = {"type": "point", "keys": [{"frame": 0, "position": [0.8, 2.2, 0.8], "intensity": [3.0, 2.5, 2.0]}]}
+    return tiny.job(
+        camera={"frames": 1, "resolution": [32, 24], "fov": 60.0, "keys": [eye]},
+        light={"frames": 1, "sources": [lamp]},
+        samples={"hits": 4, "obscurance": 4},
+        reuse={"n_r": 0},
+        indirect=tiny.CELLS,
+    )
+
+
+def pictures(scene: Scene, seeds: range, threads: int = 1) -> Any:
+    """(seeds, height, width, 3) of the only image."""
+    inputs, images = tiny.prepared(job(), scene), []
+    with open_embree(inputs) as embree:
+        planned, ambient = plan_work(inputs, embree, compare=False)
+        for seed in seeds:
+            setup = replace(planned, seed=seed)
+            with TracePool(setup, threads) as pool:
+                block = np.empty((1, 24, 32, 3), np.float32)
+                images.append(window_of(0, setup, ambient, pool).compose(0, block).images[0].astype(float))
+    return np.array(images)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("roughness", "metallic"), [(0.25, 1.0), (0.4, 1.0), (0.3, 0.0)])
+def test_cells_hold_what_lobes_find(monkeypatch: pytest.MonkeyPatch, roughness: float, metallic: float) -> None:
+    """Means of the picture agree within 2 % of it: cells are means themselves. The noise of pixels is lower."""
+    scene = room(roughness, metallic)
+    read = pictures(scene, range(SEEDS))
+    monkeypatch.setattr(FrameSetup, "reads_lobes", False)
+    followed = pictures(scene, range(100, 100 + SEEDS))
+    a, b = read.mean(axis=(1, 2)), followed.mean(axis=(1, 2))  # (seeds, 3)
+    error = np.hypot(a.std(axis=0, ddof=1), b.std(axis=0, ddof=1)) / np.sqrt(SEEDS)
+    assert (error < 0.02 * b.mean(axis=0)).all()
+    assert (np.abs(a.mean(axis=0) - b.mean(axis=0)) < 3 * error + 0.02 * b.mean(axis=0)).all()
+    if metallic:
+        assert read.var(axis=0, ddof=1).mean() < 0.7 * followed.var(axis=0, ddof=1).mean()
+
+
+@pytest.mark.slow
+def test_they_are_the_same_for_any_number_of_threads() -> None:
+    scene = room(0.3, 1.0)
+    np.testing.assert_array_equal(pictures(scene, range(1)), pictures(scene, range(1), threads=3))
