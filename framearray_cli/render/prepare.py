@@ -82,7 +82,8 @@ class Prepared:
 
     def lights_in(self, embree: EmbreeScene) -> LightArrays:
         """All lights, with the glass that dims them."""
-        return self.light_arrays._replace(panes=pane_arrays(self.scene, embree.panes))
+        bends = self.job.specular.depth > 0
+        return self.light_arrays._replace(panes=pane_arrays(self.scene, embree.panes, bends=bends))
 
     @property
     def threads(self) -> int:

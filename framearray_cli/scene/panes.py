@@ -3,7 +3,8 @@
 Of light that meets a face at the angle theta, the share F = f + g (1 - cos(theta))^5 is reflected, with
 f = ((ior - 1) / (ior + 1))^2 and g = 1 - f (Schlick). A sheet without thickness stands for a pane with two faces,
 between which light is reflected to and fro: it passes colour (1 - F) / (1 + F) and reflects 2 F / (1 + F). Of a body
-with a thickness, which is a mesh that closes, each face passes the root of the colour times 1 - F, and reflects F.
+with a thickness, which is a mesh that closes, each face passes the root of the colour times 1 - F, and reflects F. A
+solid body also bends the rays of eyes; all other light passes it straight.
 """
 
 from collections.abc import Sequence
@@ -21,9 +22,9 @@ from .merge import Merged, geometric_normals
 from .vectors import largest
 
 # Columns of a triangle: colour, RGB; f and g of its reflectance; 1 of a sheet and 0 of a body; unit normal; the height
-# at which rays leave it, see `Surfaces.offset`.
-COLOUR, F, G, SHEET, NORMAL, OFFSET = 0, 3, 4, 5, 6, 9
-PANE_COLUMNS = 10
+# at which rays leave it, see `Surfaces.offset`; the refractive index of a solid body, 0 of all others.
+COLOUR, F, G, SHEET, NORMAL, OFFSET, BENDS = 0, 3, 4, 5, 6, 9, 10
+PANE_COLUMNS = 11
 OFFSET_SHARE = 16.0 * 2.0**-23  # of the largest coordinate, as of other triangles
 
 
@@ -77,6 +78,7 @@ def select_panes(
         optics[some, COLOUR : COLOUR + 3] = colour
         if not glass.covers:
             optics[some & closed, COLOUR : COLOUR + 3] = np.sqrt(colour)
+            optics[some & closed, BENDS] = glass.ior if glass.solid and glass.ior > 1 else 0
             optics[some, F] = ((glass.ior - 1) / (glass.ior + 1)) ** 2
             optics[some, G] = 1 - optics[some, F]
     optics[:, SHEET] = ~closed
@@ -89,9 +91,11 @@ def select_panes(
 def _counted(optics: Float32) -> str:
     """What the report on a scene says of its glass."""
     sheets = int((optics[:, SHEET] > 0).sum())
-    bodies = len(optics) - sheets
+    solid = int((optics[:, BENDS] > 0).sum())
+    hollow = len(optics) - sheets - solid
     parts = [f"{counted(sheets, 'triangle')} of sheets"] * (sheets > 0)
-    parts += [f"{counted(bodies, 'triangle')} of closed bodies, which do not refract"] * (bodies > 0)
+    parts += [f"{counted(hollow, 'triangle')} of closed bodies, which do not refract"] * (hollow > 0)
+    parts += [f"{counted(solid, 'triangle')} of solid bodies, whose shadows are straight"] * (solid > 0)
     return f"glass: {' and '.join(parts)}"
 
 

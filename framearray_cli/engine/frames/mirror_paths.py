@@ -12,14 +12,16 @@ import numpy as np
 from framearray_cli.base.arrays import Float32, Int32, Rgb
 
 from ..hits.emission import SOURCE
-from ..hits.hits import ESCAPED, Hits
+from ..hits.hits import ESCAPED, Hits, trace_hits
 from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
 from ..inputs.glossy import WIDE
+from ..inputs.panes import bends_rays
 from ..terms.lobe_cells import SHARPEST
 from ..terms.lobes import follow_lobes
 from ..terms.mirrors import count_mirrors, reflect
 from ..terms.obscurance import HITS_TOGETHER
 from ..terms.panes import FACES, Fronts, reflect_at_panes
+from ..terms.refraction import bend, write_bent
 from .glass import NO_GLASS, dim_reflected, own_view
 from .lobes import wide_lobes
 from .passes import Pass, half_sizes
@@ -52,6 +54,9 @@ def mirror_paths(
     found: list[list[tuple[Int32, HitRecords]]] = [
         _glass_images(setup, c, hits, *span, scratch) if setup.has_glass else [] for span in pairwise(ends)
     ]
+    if bends_rays(setup.lights.panes):
+        for paths, span in zip(found, pairwise(ends), strict=True):
+            paths += _refracted(setup, c, hits, *span, scratch)
     throughput = own if len(own) else np.ones((n, 3), np.float32)
     if gloss is not None:
         if setup.reads_lobes:
@@ -135,6 +140,26 @@ def _glass_images(
         estimate_terms(setup, reflected, m, scratch, records, "mirror obscurance", "mirror shadow", tint)
         found.append((pixels, records))
     return found
+
+
+def _refracted(
+    setup: FrameSetup, c: int, hits: Hits, first: int, last: int, scratch: Scratch
+) -> list[tuple[Int32, HitRecords]]:
+    """Find what eye c sees through solid glass in the place of hits first to last - 1."""
+    reflected, packets = scratch.reflected[0], scratch.hit_rays.packets
+    some = Hits._make(array[first:last] for array in hits)
+    bent = bend(some, last - first, setup.cams.position[c], setup.lights.panes, setup.tracer, packets)
+    scratch.rays["glass"] += bent.rays
+    m = len(bent.hit)
+    if m == 0:
+        return []
+    write_bent(bent, some, packets, reflected)
+    trace_hits(setup.world, packets, m, coherent=False, near=0.0, mirrors=True, hits=reflected)
+    find_shine(setup, reflected, scratch, 0, m)
+    scratch.rays["mirror"] += m
+    records, pixels = setup.empty_records(m, mirrored=True), reflected.pixel[:m].copy()
+    estimate_terms(setup, reflected, m, scratch, records, "mirror obscurance", "mirror shadow", bent.passed)
+    return [(pixels, records)]
 
 
 def _reflect(

@@ -23,7 +23,7 @@ from ..embree.packets import (
     occlude,
     set_ray,
 )
-from ..inputs.panes import Panes, colour_of, passed_by, reflectance, step_beyond
+from ..inputs.panes import Panes, bent_by, colour_of, passed_by, reflectance, step_beyond
 from ..kernels.kernel import index, inlined, step
 from ..kernels.optional import chosen_by_type, step_or_zero
 from ..kernels.simd import LANES, store_row, width_of_packets
@@ -36,12 +36,13 @@ IDLE = np.float32(-1.0)
 
 
 @inlined
-def pass_panes(panes: Panes, packets: Float32, n: int, first: int, rays: Rays) -> int:
+def pass_panes(panes: Panes, packets: Float32, n: int, first: int, rays: Rays, straight: bool) -> int:
     """Trace rays 0 to n - 1 of packets through all panes up to their ends, and dim what they carry.
 
     Args:
         packets: with rows for hits; overwritten.
         first: ray k is number j = BEHIND[first + k]: it ends at row REACH of j, and carries `rays.value` of j.
+        straight: whether solid bodies let rays pass; nothing is seen straight through them.
 
     Returns:
         number of rays traced.
@@ -60,6 +61,8 @@ def pass_panes(panes: Panes, packets: Float32, n: int, first: int, rays: Rays) -
             j = index(rays.number[BEHIND, first + k])
             d = packets[p, DIRECTION, lane], packets[p, DIRECTION + 1, lane], packets[p, DIRECTION + 2, lane]
             share = passed_by(panes, triangle, reflectance(panes, triangle, d))
+            if not straight and bent_by(panes, triangle):
+                share = np.float32(0.0)
             for channel in range(3):
                 rays.value[channel, j] *= share * colour_of(panes, triangle, channel)
             packets[p, TNEAR, lane] = packets[p, TFAR, lane] + step_beyond(panes, triangle, d)
@@ -104,7 +107,7 @@ def dim_rays(panes: Panes, rays: Rays, n: int, reach: Real) -> int:
             ray = index(rays.number[BEHIND, first + k])
             x, y, z = row[FROM, ray], row[FROM + 1, ray], row[FROM + 2, ray]
             set_ray(packets, k, x, y, z, row[TO, ray], row[TO + 1, ray], row[TO + 2, ray], row[REACH, ray])
-        total += pass_panes(panes, packets, count, first, rays)
+        total += pass_panes(panes, packets, count, first, rays, True)
     # 3. Packets as they were, but for the rays themselves.
     _clear(rays.packets, min(2 * behind + 2 * LANES, rays.packets.shape[0] * width))
     for ray in range(n, (n + LANES - 1) // LANES * LANES):

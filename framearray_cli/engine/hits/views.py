@@ -53,9 +53,9 @@ def views_through(
             rays.place[waiting] = row * through.shape[1] + i
             waiting += 1
             if waiting == capacity:
-                total += _dim(panes, rays, waiting, through)
+                total += _dim(panes, rays, waiting, False, through)
                 waiting = NO_RAYS
-    return total + _dim(panes, rays, waiting, through)
+    return total + _dim(panes, rays, waiting, False, through)
 
 
 @kernel
@@ -73,12 +73,12 @@ def dim_traced(panes: Panes, rays: Rays, n: int, through: Float32) -> int:
     for k in range(n):
         rays.packets[k // width, TFAR, k % width] *= BEFORE
         rays.place[k] = k
-    return _dim(panes, rays, n, through)
+    return _dim(panes, rays, n, True, through)
 
 
 @inlined
-def _dim(panes: Panes, rays: Rays, n: int, through: Float32) -> int:
-    """Dim the n rays in packets; ray k belongs to row place[k] of `through`."""
+def _dim(panes: Panes, rays: Rays, n: int, straight: bool, through: Float32) -> int:
+    """Dim the n rays in packets; ray k belongs to row place[k] of `through`. `straight`: see `pass_panes`."""
     packets, width = rays.packets, width_of_packets()
     for k in range(n):
         rays.row[REACH, k] = packets[k // width, TFAR, k % width]
@@ -97,7 +97,7 @@ def _dim(panes: Panes, rays: Rays, n: int, through: Float32) -> int:
         set_ray(packets, behind, x, y, z, dx, dy, dz, rays.row[REACH, j])
         packets[behind // width, TNEAR, behind % width] = 0.0
         behind += 1
-    total: int = n + pass_panes(panes, packets, behind, 0, rays)
+    total: int = n + pass_panes(panes, packets, behind, 0, rays, straight)
     flat = through.reshape(through.size)
     for k in range(behind):
         for channel in range(3):

@@ -20,6 +20,8 @@ from ..frames.setup import FrameSetup
 from ..frames.threads import TracePool
 from ..hits.hits import ESCAPED, SURFACE, Hits
 from ..hits.native import Samples, extra_hits, flag_mirrors, pilot_hits
+from ..hits.ways import shares_of_ways
+from ..inputs.panes import Panes, has_panes
 from ..terms.mirrors import reflect
 from .band import HALF_MAX
 from .shapes import Bound, bound_of, radiance_along
@@ -83,7 +85,7 @@ def draw_lamps(
             for bounce, part in enumerate(parts):
                 rows = np.flatnonzero(np.repeat(inside[i, at], SAMPLES)) if bounce == 0 else np.arange(len(part.number))
                 if len(rows):
-                    _add(seen, part, rows, source, planes[k], centre)
+                    _add(seen, part, rows, source, planes[k], centre, setup.lights.panes)
             if seen.any():
                 beyond += _put(flat[k], pixels[at], seen.reshape(-1, SAMPLES, 3).mean(axis=1))
         return beyond
@@ -91,11 +93,24 @@ def draw_lamps(
     return sum(pool.run(draw, range(0, len(pixels) * SAMPLES, pool.batch)))
 
 
-def _add(seen: Float32, part: Paths, rows: NDArray[Any], source: LightPath, l: int, centre: Float64) -> None:
-    """Add what some rays of a part see of a source to the light of their eye rays."""
+def _add(
+    seen: Float32, part: Paths, rows: NDArray[Any], source: LightPath, l: int, centre: Float64, panes: Panes
+) -> None:
+    """Add what some rays of a part see of a source, through glass, to the light of their eye rays."""
     origin = part.origin if part.origin.ndim == 1 else part.origin[rows]
     found = radiance_along(source, l, centre, origin, part.direction[rows], part.reach[rows])
+    lit = np.flatnonzero(found.any(axis=1))
+    if has_panes(panes) and len(lit):
+        start = np.broadcast_to(origin, (len(rows), 3))[lit]
+        far = np.full(len(lit), np.inf) if source.kind == "directional" else _away(source, l, centre, start)
+        reach = np.minimum(far, part.reach[rows][lit])
+        found[lit] *= shares_of_ways(start, part.direction[rows][lit], reach, panes)[0]
     seen[part.number[rows]] += found * part.tint[rows]  # a part has at most one ray of each eye ray
+
+
+def _away(source: LightPath, l: int, centre: Float64, start: Float64) -> Float64:
+    """How far the middle of a lamp is from some points."""
+    return np.asarray(np.linalg.norm(source.vector[l] - centre - start, axis=1))
 
 
 def _put(image: Float32, pixels: Int32, light: Float32) -> int:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from framearray_cli.base.arrays import Float32, Real, Triple
-from framearray_cli.scene.panes import COLOUR, NORMAL, OFFSET, SHEET, F, G
+from framearray_cli.scene.panes import BENDS, COLOUR, NORMAL, OFFSET, SHEET, F, G
 from framearray_cli.scene.scene import Scene
 
 from ..embree.packets import Tracer
@@ -29,18 +29,36 @@ class Panes(NamedTuple):
 NO_PANES = Panes(NOWHERE, np.empty(0, np.float32))
 
 
-def pane_arrays(scene: Scene, tracer: Tracer | None) -> Panes:
+def pane_arrays(scene: Scene, tracer: Tracer | None, *, bends: bool = True) -> Panes:
     """The panes of a scene.
 
     Args:
         tracer: of `EmbreeScene.panes`; None where there are none.
+        bends: whether solid bodies bend the rays of eyes; else these pass straight.
     """
-    return NO_PANES if tracer is None else Panes(tracer, scene.pane_optics)
+    if tracer is None:
+        return NO_PANES
+    optics = scene.pane_optics
+    if not bends and (optics[:, BENDS] > 0).any():
+        optics = optics.copy()
+        optics[:, BENDS] = 0.0
+    return Panes(tracer, optics)
 
 
 def has_panes(panes: Panes) -> bool:
     """Whether there is any glass."""
     return panes.optics.ndim > 1
+
+
+def bends_rays(panes: Panes) -> bool:
+    """Whether any glass is a solid body."""
+    return has_panes(panes) and bool((panes.optics[:, BENDS] > 0).any())
+
+
+@inlined
+def bent_by(panes: Panes, triangle: int) -> bool:
+    """Whether a triangle bends the rays of eyes."""
+    return bool(panes.optics[triangle, BENDS] > 0.0)
 
 
 @inlined

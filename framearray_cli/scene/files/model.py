@@ -19,12 +19,14 @@ class Glass:
     Attributes:
         colour: share of the light that passes a whole pane, besides what its faces reflect, linear RGB in [0, 1].
         ior: refractive index, at least 1; 1 reflects nothing head-on.
+        solid: whether a closed mesh of it is a solid body, which refracts what eyes see.
         covers: whether the pane is no glass but a surface that covers a part of what is behind it: nothing reflects.
     """
 
     colour: tuple[float, float, float]
     ior: float = 1.5
     covers: bool = False
+    solid: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,8 +16,9 @@ from framearray_cli.engine.frames.threads import TracePool
 from framearray_cli.engine.images.lamps import SAMPLES
 from framearray_cli.job.job import Job
 from framearray_cli.render.lamps import draw_visible
-from framearray_cli.scene.files import Material
-from framearray_cli.scene.scene import Scene
+from framearray_cli.scene.files import Material, Meshes, Part
+from framearray_cli.scene.files.model import Glass
+from framearray_cli.scene.scene import Scene, build_scene
 
 SIZE = (64, 48)
 FOCAL = 24 / np.tan(np.radians(20))
@@ -100,6 +101,20 @@ def test_a_wall_hides_a_lamp_and_a_lamp_stays_where_it_is() -> None:
     columns = [(image[..., 0].sum(axis=0) @ np.arange(64)) / image[..., 0].sum() for image in images[:2]]
     np.testing.assert_allclose(columns, [31.5, 31.5 + FOCAL * 0.3 / 2], atol=0.2)
     assert images[0].sum() == pytest.approx(2 * images[1].sum(), rel=0.03) and images[2].max() == 0
+
+
+@pytest.mark.parametrize(("z", "passes"), [(-1.0, True), (-2.5, False)])
+def test_glass_before_a_lamp_dims_it(z: float, passes: bool) -> None:
+    """A pane behind the lamp does not."""
+    colour, side = (0.5, 0.25, 0.8), 4.0
+    pane = tiny.quad((-side, -side, z), (side, -side, z), (side, side, z), (-side, side, z))
+    back = tiny.quad((-9, -9, -3), (9, -9, -3), (9, 9, -3), (-9, 9, -3))
+    materials = (Material(name="Back"), Material(name="Pane", glass=Glass(colour=colour, ior=1.0, covers=True)))
+    parts = (Part(material=0, corners=back), Part(material=1, corners=pane))
+    scene = build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
+    source = lamp("point", position=[0, 0, -2], radius=0.4, intensity=[1, 1, 1])
+    behind, bare = drawn(source, scene)[0][0], drawn(source, wall(-3))[0][0]
+    np.testing.assert_allclose(behind, bare * (colour if passes else 1.0), rtol=1e-5)
 
 
 def test_a_mirror_shows_the_lamp_behind_the_eye_in_its_tint() -> None:

@@ -15,10 +15,12 @@ from framearray_cli.base.arrays import Float32, Float64, Int32, Rgb, with_room
 from ...hits.hits import SURFACE, Hits, World, empty_hits
 from ...hits.rays import Rays, room_for_tests
 from ...inputs.lights import LightArrays, some_lights
+from ...inputs.panes import has_panes
 from ...kernels.clock import compile_clock
 from ..ambient.estimate import BATCH
 from ..direct import direct
 from ..obscurance_rays import ObscuranceSettings
+from .glass import dim_links
 from .local import obscurance_of_cells, per_obscurance
 from .places import Places, PlaceWork, find_places
 from .samples import Samples, SampleWalks, draw_samples
@@ -93,6 +95,8 @@ def build_cells(work: CellWork) -> Built:
         started = time.perf_counter()
         with compile_clock() as clock:
             samples, rays = draw_samples(work.walks, work.count, work.threads)
+            if has_panes(work.walks.lights.panes):
+                rays += dim_links(samples, work.walks.lights.panes)
             grid = _grid(samples, work)
             samples = samples.rows(_sorted(grid, samples))
             world = work.walks.world

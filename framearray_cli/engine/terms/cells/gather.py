@@ -23,6 +23,7 @@ from ...kernels.kernel import inlined, kernel, prefetch
 from ...kernels.simd import LANES, compress, lane_numbers, load, popcount, reals
 from ..obscurance import HITS_TOGETHER, RAYS_TOGETHER, add_to_hits, apply_textures, evaluate_rays
 from ..obscurance_rays import ObscuranceSettings, write_obscurance_rays
+from .glass import dim_gather_rays
 from .lookups import GatherScratch, NearHits, near_cell, weight_of
 from .mirrored import MirrorScratch, find_ends
 from .near import light_near
@@ -165,6 +166,7 @@ def _gather_hits(
             hits, world, cells, rays, n_traced, first_ray, n_rays, room, tests, near[0], reach, mirrors
         )  # fmt: skip
         total += n_traced + reflected
+        total += dim_gather_rays(lights.panes, rays, n_traced, tests, room.reflectivity)
         total += light_near(world, lights, cells, kept, settings.once, reach, room, tests, near[0], near[1], mirrors)
         _sum_cells(cells, rays, n, first_ray, n_rays, of_w.n_rays, room, near[0], out)
         # W, which has its own R(Q), rho and range

@@ -1,7 +1,7 @@
-"""glTF materials that let light through, as thin panes [KHR_materials_transmission, _ior, _volume].
+"""glTF materials that let light through [KHR_materials_transmission, _ior, _volume].
 
 KHR_materials_transmission describes a sheet without thickness: light passes straight through, coloured by the base
-colour. What a volume absorbs along its thickness counts as part of that colour.
+colour. With a volume, a closed mesh is a solid body; what it absorbs along its thickness counts as part of the colour.
 """
 
 import numpy as np
@@ -23,9 +23,10 @@ def pane_of(passed: float, base: Float64, texel: Float64 | None, extensions: Tre
         base: (>= 3,) linear base colour.
         texel: (4,) mean of its texture, sRGB encoded; None without texture.
     """
-    colour = _coloured(base, texel) * passed * _absorbed(extensions.get("KHR_materials_volume") or {})
+    volume: Tree = extensions.get("KHR_materials_volume") or {}
+    colour = _coloured(base, texel) * passed * _absorbed(volume)
     ior = float((extensions.get("KHR_materials_ior") or {}).get("ior", IOR))
-    return Glass(colour=_rgb(colour), ior=max(ior, 1.0))
+    return Glass(colour=_rgb(colour), ior=max(ior, 1.0), solid=float(volume.get("thicknessFactor", 0.0)) > 0)
 
 
 def cover_of(alpha: float, texel: Float64 | None) -> Glass:
