@@ -234,8 +234,9 @@ def _screen(triangle: int, u: Real, v: Real) -> Real:
 
     It belongs to the place and not to the ray, so that all rays find the same surface, and with it all eyes.
     """
-    places = np.float32(SCREEN)
-    at = np.uint64(np.uint32(u * places)) + (np.uint64(np.uint32(v * places)) << np.uint64(SCREEN_BITS))
+    places, nothing = np.float32(SCREEN), np.float32(0.0)
+    row, column = np.uint32(max(u, nothing) * places), np.uint32(max(v, nothing) * places)
+    at = np.uint64(row) + (np.uint64(column) << np.uint64(SCREEN_BITS))
     at += np.uint64(np.uint32(triangle)) << np.uint64(2 * SCREEN_BITS)
     found: Real = np.float32(mix(mix(at)) >> np.uint64(40)) * UNIT_24
     return found
