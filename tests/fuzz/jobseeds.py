@@ -168,6 +168,16 @@ def tables(scene: str) -> dict[str, dict[str, Any]]:
             ambient={"method": "light", "paths": 16},
             output=EXR | {"half": "always"},
         ),
+        "surfaces": tiny.table(
+            camera=small,
+            scene={
+                "surfaces": "file",
+                "materials": {
+                    "Mirror": {"roughness": 0.3, "metallic": 1.0, "emission": [1.0, 0.5, 0.0]},
+                    "Plain": {"transmission": 0.9, "ior": 1.4, "normal_strength": 2.0},
+                },
+            },
+        ),
         "fixed": tiny.table(
             camera=small,
             scene={"up": "z"},

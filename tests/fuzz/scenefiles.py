@@ -90,8 +90,10 @@ def case_of(rng: Random, mutation: str, own: Path, files: dict[str, bytes]) -> C
         (own / name).write_bytes(data)
     scene = next(iter(files))
     job = own / "job.toml"
-    job.write_text(tomli_w.dumps({**JOB, "scene": {"file": scene, **JOB["scene"]}}))
-    command = rng.choices(("render", "check", "init"), (8, 1, 3))[0]
+    command = rng.choices(("render", "check", "init"), (8, 3, 3))[0]
+    # `check` reads all that surfaces follow, and compiles none of their kernels
+    kind = {"surfaces": "file"} if command == "check" else {}
+    job.write_text(tomli_w.dumps({**JOB, "scene": {"file": scene, **JOB["scene"], **kind}}))
     wrong = finite(own / "out") if command == "render" else Case.wrong
     if mutation.endswith("files elsewhere"):
         wrong = refused

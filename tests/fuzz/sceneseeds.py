@@ -150,13 +150,19 @@ def rich_glb(folder: Path) -> bytes:
         {"baseColorTexture": {"index": texture, "extensions": moved}, "metallicRoughnessTexture": {"index": texture}},
         alphaMode="MASK",
         alphaCutoff=0.3,
+        normalTexture={"index": texture, "scale": 0.7, "extensions": moved},
     )
     mirror = glb.material(
         "Mirror", {"metallicFactor": 1.0, "roughnessFactor": 0.0, "baseColorFactor": [1, 0.8, 0.7, 1]}
     )
-    glass = glb.material(
-        "Pane", alphaMode="BLEND", extensions={"KHR_materials_transmission": {"transmissionFactor": 0.5}}
-    )
+    clear = {
+        "KHR_materials_transmission": {"transmissionFactor": 0.9},
+        "KHR_materials_ior": {"ior": 1.4},
+        "KHR_materials_volume": {
+            "thicknessFactor": 0.1, "attenuationDistance": 0.5, "attenuationColor": [0.9, 0.5, 0.2],
+        },
+    }  # fmt: skip
+    glass = glb.material("Pane", alphaMode="BLEND", extensions=clear)
     old = {"diffuseFactor": [0.5, 0.5, 0.5, 1], "specularFactor": [0.9, 0.9, 0.9], "glossinessFactor": 1.0}
     gloss = glb.material("Old", extensions={"KHR_materials_pbrSpecularGlossiness": old}, emissiveFactor=[1, 1, 1])
     up = np.tile(np.array([[0, 0, 1]], np.float32), (4, 1))
