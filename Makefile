@@ -90,6 +90,9 @@ bench-flicker: $(VENV)/installed-bench ## Measure how errors change along the pa
 bench-lights: $(VENV)/installed-bench ## Measure lights with a size, a cone, a profile or a map, and write docs/measured/lights.md
 	PYTHONPATH=tests $(BIN)/python -m bench lights $(BENCH)
 
+bench-gloss: $(VENV)/installed-bench ## Measure glossy scenes against path-traced ones, and write docs/measured/gloss.md
+	PYTHONPATH=tests $(BIN)/python -m bench gloss $(BENCH)
+
 bench-report: $(VENV)/installed-bench ## Measure speed against error of the three jobs, and write docs/measured/report-*.md
 	PYTHONPATH=tests $(BIN)/python -m bench report $(BENCH)
 

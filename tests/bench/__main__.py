@@ -22,6 +22,8 @@ from bench.core.steady import steady
 from bench.error import bias, error, reported, reports
 from bench.error import bias_page as biaspage
 from bench.error import error_page as errorpage
+from bench.gloss import against as glossy
+from bench.gloss import run as gloss
 from bench.lights import against
 from bench.lights import run as lights
 from bench.peers import cycles, mitsuba3, peers
@@ -44,6 +46,8 @@ OTHERS = (
     "flicker",
     "lights",
     "lights-against",
+    "gloss",
+    "gloss-against",
     "trace-place",
     "pace",
     "scaling",
@@ -99,6 +103,12 @@ def main() -> None:
         return
     if args.what == "lights-against":
         print(json.dumps(against.measure_here(args.jobs[0], args.quick, folder(args.quick))))
+        return
+    if args.what == "gloss":
+        gloss.run(args.jobs, args.quick)
+        return
+    if args.what == "gloss-against":
+        print(json.dumps(glossy.measure_here(args.jobs[0], args.quick, folder(args.quick))))
         return
     if args.what == "trace-place":
         job, c, l = args.jobs

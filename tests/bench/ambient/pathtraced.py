@@ -20,6 +20,7 @@ from framearray_cli.base.arrays import Float32, Float64, Image
 from framearray_cli.render.prepare import Prepared
 from framearray_cli.scene.scene import Scene
 
+from . import gloss
 from .emitters import area_light, emitters_of, hidden_sides, past_lamps, radiance_of_materials
 from .scenes import Probe, probe_named, resized
 
@@ -143,6 +144,8 @@ def unknown(scene: Scene) -> str:
         return "alpha masks are not carried over"
     if (scene.specular_texture >= 0).any():
         return "textured mirrors are not carried over"
+    if scene.has_glass or len(scene.tangents):
+        return "neither glass nor normal maps are carried over"
     return ""
 
 
@@ -223,7 +226,9 @@ def _mesh(mi: Any, scene: Scene, m: int, origin: Float64, radiance: Float64 | No
     """
     chosen = scene.material == m
     n = int(chosen.sum())
-    smooth, textured = len(scene.normals) > 0 and radiance is None, bool(scene.reflectivity_texture[m] >= 0)
+    smooth = len(scene.normals) > 0 and radiance is None
+    glossy = gloss.is_glossy(scene, m) and scene.gloss_texture[m] >= 0
+    textured = bool(scene.reflectivity_texture[m] >= 0 or glossy)
     properties = mi.Properties()
     properties["bsdf"] = mi.load_dict(_bsdf(mi, scene, m))
     if radiance is not None:
@@ -245,7 +250,12 @@ def _mesh(mi: Any, scene: Scene, m: int, origin: Float64, radiance: Float64 | No
 
 
 def _bsdf(mi: Any, scene: Scene, m: int) -> dict[str, Any]:
-    """Diffuse and mirror part of a material, on both sides."""
+    """Diffuse and mirror part of a material, or its gloss, on both sides."""
+    if gloss.is_glossy(scene, m):
+        base = _reflectance(mi, scene, m, 1.0)
+        if base["type"] == "rgb":
+            base = gloss.bitmap(mi, np.array(base["value"])[None, None])
+        return {"type": gloss.register(mi, mi.variant()), "base": base, "gloss": gloss.gloss_texture(mi, scene, m)}
     diffuse, mirror = float(scene.reflectivity[m].max()), float(scene.specular[m].max())
     share = mirror / (diffuse + mirror) if mirror else 0.0
     parts: list[dict[str, Any]] = []
@@ -266,8 +276,7 @@ def _reflectance(mi: Any, scene: Scene, m: int, scale: float) -> dict[str, Any]:
     first, width, height = scene.textures[texture]
     code = scene.texels[first : first + width * height, :3].reshape(height, width, 3) / 255.0
     linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
-    data = mi.TensorXf(np.ascontiguousarray(linear * factor, np.float32))
-    return {"type": "bitmap", "data": data, "raw": True, "filter_type": "bilinear", "wrap_mode": "repeat"}
+    return gloss.bitmap(mi, linear * factor)
 
 
 def direct_light(mi: Any, scene: Any, sensor: Any, prepared: Prepared, samples: int, seed: int) -> Image:
