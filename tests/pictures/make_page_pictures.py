@@ -21,7 +21,7 @@ from framearray_cli.tools.view.run import open_server, open_tiles, prepare_all
 
 PICTURES = ROOT / "docs" / "pictures"
 ARRAYS = ROOT / "out" / "page-pictures"
-QUALITY = 82  # of JPEG
+QUALITY = 70  # of JPEG
 TALL = (1280, 860)  # pixels; room for the controls of groups
 THREADS = 2
 

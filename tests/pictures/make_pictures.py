@@ -12,6 +12,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import materials
 import numpy as np
 from PIL import Image
 from support import ROOT
@@ -201,6 +202,14 @@ def relit(width: int, rendered: Path, folder: Path) -> Image.Image:
     return sheet([small[:4], small[4:]])
 
 
+def surfaces(width: int, folder: Path) -> Image.Image:
+    """What keys of a material do: roughness, metal; transmission, index; strength of the normal map, emission."""
+    folder.mkdir()
+    shown = {key: [picture(image, width) for image in row] for key, row in materials.images(folder).items()}
+    rows = list(shown.values())
+    return sheet([[*rows[i], *rows[i + 1]] for i in range(0, len(rows), 2)])
+
+
 def main() -> None:
     """Make all pictures again, or those that the command line names."""
     PICTURES.mkdir(exist_ok=True)
@@ -214,6 +223,7 @@ def main() -> None:
             "reuse": lambda: reuse(420, out / "reuse"),
             "sheet": lambda: contact_sheet(900, out / "sheet"),
             "visible-lamps": lambda: visible_lamps(300, out / "visible"),
+            "surfaces": lambda: surfaces(120, out / "surfaces"),
             "environment": lambda: environment(280, out / "environment"),
             "sums": lambda: sums(280, out / "sums"),
             "relight": lambda: relit(280, evening(out / "evening"), out / "relight"),
