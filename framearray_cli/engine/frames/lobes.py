@@ -1,4 +1,7 @@
-"""What wide lobes of native hits reflect, from cells, filtered as indirect light is; see `terms/lobe_cells.py`."""
+"""What wide lobes of native hits reflect: read from cells and filtered as indirect light is, or the ambient light.
+
+See `terms/lobe_cells.py` and `terms/lobe_ambient.py`.
+"""
 
 from itertools import pairwise
 
@@ -9,10 +12,12 @@ from framearray_cli.base.arrays import Float32, Int32, Rgb
 from ..hits.emission import SOURCE
 from ..hits.gloss import ALPHA
 from ..hits.hits import ESCAPED, Hits, trace_hits
+from ..terms.cells.gather import COLOUR
 from ..terms.cells.smooth import smooth_light
-from ..terms.lobe_cells import RAYS_OF_LOBE, complete_lobes, read_lobe, write_lobe
+from ..terms.lobe_ambient import complete_ambient, read_ambient
+from ..terms.lobe_cells import RAYS_OF_LOBE, LobeLight, complete_lobes, read_lobe, write_lobe
 from .glass import dim_reflected
-from .records import HALF, LIGHT_INDEPENDENT, REFLECTIVITY, WEIGHT, HitRecords
+from .records import HALF, INDIRECT, LIGHT_INDEPENDENT, OBSCURANCE, REFLECTIVITY, WEIGHT, HitRecords
 from .scratch import Scratch
 from .setup import FrameSetup
 from .shading import find_glow
@@ -36,28 +41,20 @@ def wide_lobes(
         alpha, metal: (n,) gloss of the hits.
         smooth: whether hits in a row are neighbours in the image, and the light is filtered.
     """
-    lobes, cells, gather = scratch.lobes, setup.cells, scratch.gather
-    assert lobes is not None and cells is not None and gather is not None
+    lobes = scratch.lobes
+    assert lobes is not None
     reflected, packets, n = scratch.reflected[0], scratch.hit_rays.packets, ends[-1]
     for first, last in pairwise(ends):
         for ray in range(RAYS_OF_LOBE):
             m = write_lobe(hits, first, last, ray, alpha, metal, packets, reflected, lobes)
             if m == 0:
                 continue
-            trace_hits(setup.world, packets, m, coherent=True, near=0.0, mirrors=True, hits=reflected)
+            trace_hits(setup.world, packets, m, coherent=False, near=0.0, mirrors=True, hits=reflected)
             find_glow(setup, packets, m, scratch.glow)
             dim_reflected(setup, scratch, m, lobes.passed)
             scratch.rays["mirror"] += m
-            scratch.rays["mirror obscurance"] += read_lobe(
-                hits, reflected, m, alpha, scratch.glow, cells, setup.tracer, gather, scratch.test_rays, lobes
-            )
-    complete_lobes(n, cells, lobes)
-    if smooth and scratch.smooth is not None:
-        cams = setup.cams
-        only = hits._replace(kind=np.where(lobes.share[: len(hits.kind)] > 0, hits.kind, np.uint8(ESCAPED)))
-        smooth_light(
-            only, n, cams.width, cams.height, setup.smooth, lobes.closeness, scratch.smooth, lobes.light, lobes.constant
-        )  # fmt: skip
+            _read(setup, hits, reflected, m, alpha, scratch, lobes)
+    _complete(setup, hits, n, scratch, lobes, smooth)
     followed = np.flatnonzero(lobes.share[:n] > 0)
     records = setup.empty_records(len(followed), mirrored=True)
     tint = throughput[followed] * lobes.tint[followed]
@@ -67,10 +64,41 @@ def wide_lobes(
     records.row[:, LIGHT_INDEPENDENT : LIGHT_INDEPENDENT + 3] = tint * lobes.constant[followed]
     records.row[:, HALF] = hits.half[followed]
     records.irradiance[:] = 0.0
-    records.indirect[:] = lobes.light[followed]
+    if setup.cells is None:
+        records.row[:, OBSCURANCE : OBSCURANCE + 3] = lobes.light[followed, COLOUR : COLOUR + 3]
+        records.row[:, INDIRECT : INDIRECT + 3] = tint * lobes.light[followed, COLOUR : COLOUR + 3]
+    else:
+        records.indirect[:] = lobes.light[followed]
     records.gloss[:, ALPHA] = 0.0
     if setup.shines:
         records.emission[:, SOURCE] = -1.0
     pixels = hits.pixel[followed]
     spans = pairwise(np.searchsorted(followed, ends).tolist())
     return [(pixels[first:last], records.part(slice(first, last))) for first, last in spans]
+
+
+def _read(
+    setup: FrameSetup, hits: Hits, reflected: Hits, m: int, alpha: Float32, scratch: Scratch, lobes: LobeLight
+) -> None:
+    """Add what m rays of lobes find to the sums of their hits."""
+    if setup.cells is None:
+        read_ambient(hits, reflected, m, scratch.glow, setup.background, setup.obscurance, lobes)
+        return
+    assert scratch.gather is not None
+    scratch.rays["mirror obscurance"] += read_lobe(
+        hits, reflected, m, alpha, scratch.glow, setup.cells, setup.tracer, scratch.gather, scratch.test_rays, lobes
+    )
+
+
+def _complete(setup: FrameSetup, hits: Hits, n: int, scratch: Scratch, lobes: LobeLight, smooth: bool) -> None:
+    """Turn sums into means, and filter them where they are the light of cells."""
+    if setup.cells is None:
+        complete_ambient(n, lobes)
+        return
+    complete_lobes(n, setup.cells, lobes)
+    if smooth and scratch.smooth is not None:
+        cams = setup.cams
+        only = hits._replace(kind=np.where(lobes.share[: len(hits.kind)] > 0, hits.kind, np.uint8(ESCAPED)))
+        smooth_light(
+            only, n, cams.width, cams.height, setup.smooth, lobes.closeness, scratch.smooth, lobes.light, lobes.constant
+        )  # fmt: skip

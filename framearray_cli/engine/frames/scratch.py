@@ -45,7 +45,7 @@ class Scratch:
         by_source: the lights with one source at a time, where gloss needs the light of each; else empty.
         emission: (batch, EMISSION_COLUMNS) of the hits, see `record_emission`; (0, ...) where nothing shines.
         glow: (batch, 3) radiance that the hits send out without being sources; (0, 3) where none does.
-        lobes: of what wide lobes reflect; None where no cells are read for them.
+        lobes: of what wide lobes reflect; None where their rays are followed.
         paths: of indirect light by paths; None without.
         smooth: of the filter of indirect light; None without.
         sun: of hours of sun; None without.
@@ -86,7 +86,7 @@ class Scratch:
         self.by_source = [one_source(setup.lights, s) for s in range(n_sources if setup.shiny and n_sources > 1 else 0)]
         self.of_source = with_room((batch if self.by_source else 0, channels, len(setup.kept)), np.float32)
         values = setup.lights.channels * len(setup.kept)
-        self.lobes = room_for_lobes(batch, values) if setup.reads_lobes else None
+        self.lobes = room_for_lobes(batch, 0 if setup.cells is None else values) if setup.reads_lobes else None
         self.paths = PathScratch(setup.lights) if setup.exact else None
         self.smooth = room_for_smoothing(values) if setup.smooth else None
         self.rays: Counter[str] = Counter()

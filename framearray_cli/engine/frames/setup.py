@@ -161,8 +161,8 @@ class FrameSetup:
 
     @property
     def reads_lobes(self) -> bool:
-        """Whether what wide lobes reflect is read from cells."""
-        return self.lobes and self.cells is not None and not self.local and not self.exact
+        """Whether what wide lobes reflect is read where their rays end: from cells, or as ambient light without any."""
+        return self.lobes and not self.local and not self.exact
 
     @property
     def keeps_all(self) -> bool:

@@ -23,7 +23,7 @@ from ..inputs.maps import map_texel, map_tint
 from ..inputs.shapes import source_in_lanes, source_point, vector_and_factor
 from ..kernels.kernel import inlined, integer_at, prefetch, real_at, step
 from ..kernels.optional import chosen_by_type, step_or_zero
-from ..kernels.simd import LANES, lane_numbers, load, select, sqrt, store, words
+from ..kernels.simd import LANES, lane_numbers, lanes_from, load, select, sqrt, store, words
 from ..terms.cells.gather import COLOUR, LEVEL, LIGHT
 from .accumulate import ROW_BYTES, row_of, weight_of
 from .band import INVERSE_PI, Band
@@ -117,7 +117,7 @@ def _weight(sources: Addresses, s: int, pixel: int, entry: int) -> Real:
     return found
 
 
-@step
+@inlined
 def _add_hit(
     band: Band, i: int, source: Addresses, hit: int, at: int, w: Real, view: GlossView, channels: int, n_lights: int
 ) -> None:
@@ -207,8 +207,9 @@ def _add_indirect(
         if cells != 0 and real_at(cells, LEVEL) > 0.0:
             factor = more * INVERSE_PI * real_at(cells, COLOUR + channel)
             light = cells + 4 * (LIGHT + (channel * n_lights if channels == 3 else 0))
-            for l in range(n_lights):
-                band.direct[i, channel, l] += factor * real_at(light, l)
+            for l in range(0, n_lights, LANES):
+                here = (3 * i + channel) * band.direct.shape[2] + l
+                store(band.direct, here, load(band.direct, here) + lanes_from(light + 4 * l) * factor)
 
 
 @inlined

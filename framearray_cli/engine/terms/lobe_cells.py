@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from framearray_cli.base.arrays import Float32, Int32, Rgb, with_room
+from framearray_cli.base.arrays import Float32, Int32, Real, Rgb, Triple, with_room
 
 from ..embree.packets import Tracer, room_in, set_ray
 from ..hits.hits import SURFACE, Hits
 from ..hits.rays import NO_RAYS, Rays
-from ..inputs.gloss import DIELECTRIC, sample_lobe
+from ..inputs.gloss import DIELECTRIC, facing, sample_lobe, schlick
 from ..inputs.glossy import followed_share
 from ..inputs.random import CELLS, LOBE, mix, r2, random_word
 from ..kernels.kernel import inlined, kernel
@@ -26,8 +26,9 @@ from .cells.table import CONSTANT, EDGE_OF_LENGTH, MEAN, NOWHERE, TINT, Cells, f
 
 # alpha of the widest lobes that are followed as mirrors are.
 SHARPEST = np.float32(0.04)
-# Rays of a lobe.
+# Rays of a lobe; one where the coat reflects less than this share of what comes in the mirrored direction.
 RAYS_OF_LOBE = 2
+MUCH = np.float32(0.0625)
 
 
 class LobeLight(NamedTuple):
@@ -68,6 +69,13 @@ def room_for_lobes(batch: int, values: int) -> LobeLight:
     )
 
 
+@inlined
+def rays_of_lobe(f0: Real, m: Triple, v: Triple) -> int:
+    """The number of rays of a hit: it follows from the hit alone, so that means stay right."""
+    one = np.float32(1.0)
+    return RAYS_OF_LOBE if f0 + (one - f0) * schlick(facing(m, v)) >= MUCH else 1
+
+
 @kernel
 def write_lobe(
     hits: Hits, first: int, last: int, ray: int, alpha: Float32, metal: Float32, packets: Float32, reflected: Hits,
@@ -98,6 +106,10 @@ def write_lobe(
         d, g, s, p, base = hits.incoming[i], hits.geometric[i], hits.shading[i], hits.position[i], hits.reflectivity[i]
         scale = -one / np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
         v, normal = (scale * d[0], scale * d[1], scale * d[2]), (s[0], s[1], s[2])
+        of_coat = DIELECTRIC * (one - metal[i])
+        n_rays = rays_of_lobe(of_coat + metal[i] * (base[0] + base[1] + base[2]) * np.float32(1 / 3), normal, v)
+        if ray >= n_rays:
+            continue
         a, b = r2(random_word(hits.key[i], LOBE), ray)
         to, weight, x = sample_lobe(alpha[i], normal, v, a, b)
         # light from below the triangle does not count
@@ -108,10 +120,9 @@ def write_lobe(
         set_ray(packets, m, ox, oy, oz, to[0], to[1], to[2], np.float32(np.inf))
         out.place[m], out.weight[m] = i, weight
         out.share[i] += weight
-        of_coat = DIELECTRIC * (one - metal[i])
         for channel in range(3):
             f0 = of_coat + metal[i] * base[channel]
-            out.tint[i, channel] += (f0 + (one - f0) * x) * weight * followed * np.float32(1.0 / RAYS_OF_LOBE)
+            out.tint[i, channel] += (f0 + (one - f0) * x) * weight * followed / np.float32(n_rays)
         reflected.key[m] = mix(hits.key[i] + np.uint64(ray))
         reflected.pixel[m], reflected.half[m] = hits.pixel[i], hits.half[i]
         for channel in range(3):

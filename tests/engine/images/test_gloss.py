@@ -72,10 +72,12 @@ def radiance(setup: FrameSetup, ambient: Ambient, records: HitRecords, eye: Any,
     """What hits send to an eye, (n, n_lights, 3): each source has a channel of its own."""
     with np.errstate(invalid="ignore"):  # keys and bits are no numbers
         row, gloss = records.row.astype(np.float64), records.gloss.astype(np.float64)
-    tint = gloss[:, -3:] if mirrored else np.ones((len(row), 3))
+    known = gloss[:, ALPHA, None] > 0  # of what does not shine nothing is kept
+    tint = np.where(known, gloss[:, -3:], 1.0) if mirrored else np.ones((len(row), 3))
     base = np.divide(row[:, REFLECTIVITY : REFLECTIVITY + 3], tint, out=np.zeros_like(tint), where=tint > 0)
-    p, m = gloss[:, POINT : POINT + 3], gloss[:, SHADING : SHADING + 3]
+    p, m = gloss[:, POINT : POINT + 3], np.where(known, gloss[:, SHADING : SHADING + 3], (0.0, 0.0, 1.0))
     v = gloss[:, -OF_MIRRORS:-3] if mirrored else eye - p
+    v = np.where(known, v, (0.0, 0.0, 1.0))
     v = v / np.linalg.norm(v, axis=1, keepdims=True)
     alpha, metal = gloss[:, ALPHA], gloss[:, METAL]
     shines = alpha > 0
