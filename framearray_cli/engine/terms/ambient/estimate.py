@@ -15,10 +15,13 @@ import numpy as np
 
 from framearray_cli.base.arrays import Float32, Float64, Rgb
 
-from ...embree.packets import Tracer
+from ...embree.packets import DIRECTION, ORIGIN, TFAR, Tracer
 from ...hits.hits import ESCAPED, Hits, World, empty_hits
 from ...hits.rays import room_for_hits, room_for_tests
+from ...hits.views import BEFORE
+from ...hits.ways import shares_of_ways
 from ...inputs.lights import LightArrays
+from ...inputs.panes import NO_PANES, Panes, has_panes
 from ...kernels.kernel import kernel
 from ..direct import direct
 from .walks import DIFFUSE, Walkers, advance, choose_step, deposit, empty_walkers
@@ -73,13 +76,23 @@ class Workspace:
         self.sums = np.empty((BATCH, 3, lights.n_lights), np.float32)
         self.rays = 0
 
-    def advance(self, n: int, world: World) -> int:
-        """Move all walks on; `hits[0]` and `walkers[0]` are the current ones before and after."""
+    def advance(self, n: int, world: World, panes: Panes = NO_PANES) -> int:
+        """Move all walks on, dimmed by glass; `hits[0]` and `walkers[0]` are the current ones before and after."""
         n = advance(self.hits[0], self.walkers[0], n, world, self.hit_packets, self.hits[1], self.walkers[1])
         self.hits.reverse()
         self.walkers.reverse()
         self.rays += n
+        if has_panes(panes) and n:
+            self._pass_glass(n, panes)
         return n
+
+    def _pass_glass(self, n: int, panes: Panes) -> None:
+        """Dim the n current walks by the glass that the rays to them went through."""
+        rows = self.hit_packets[:, : TFAR + 1].swapaxes(1, 2).reshape(-1, TFAR + 1)[:n]
+        start, way = rows[:, ORIGIN : ORIGIN + 3], rows[:, DIRECTION : DIRECTION + 3]
+        share, rays = shares_of_ways(start, way, rows[:, TFAR] * BEFORE, panes)
+        self.walkers[0].throughput[:n] *= share
+        self.rays += rays
 
     def diffuse_direct(self, n: int, lights: LightArrays, tracer: Tracer) -> Float32:
         """Direct irradiance at the n current hits, (n, channels, n_lights); 0 where no walk leaves diffusely."""

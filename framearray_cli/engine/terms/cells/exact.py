@@ -105,7 +105,7 @@ def _follow(
     walkers.throughput[:n], walkers.step[:n] = 1.0, DIFFUSE
     work.sums[: len(rows)] = constant[: len(rows)] = 0.0
     for _ in range(MAX_BOUNCES):
-        n = work.advance(n, world)
+        n = work.advance(n, world, lights.panes)
         if n == 0:
             break
         if background.any():

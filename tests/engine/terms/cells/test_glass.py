@@ -42,7 +42,7 @@ def room(colour: Any) -> Scene:
     return build_scene(Meshes(parts=parts, materials=materials, textures=(), dropped={}, notes=()), {})
 
 
-def picture(colour: Any, background: float, intensity: float) -> Any:
+def picture(colour: Any, background: float, intensity: float, indirect: dict[str, Any]) -> Any:
     eye = {"frame": 0, "eye": [1.2, 1.4, 1.7], "target": [-0.6, 0.6, -1.0]}
     lamp = {"type": "point", "keys": [{"frame": 0, "position": [0.0, 1.3, -2.6], "intensity": intensity}]}
     job = tiny.job(
@@ -51,18 +51,22 @@ def picture(colour: Any, background: float, intensity: float) -> Any:
         light={"frames": 1, "sources": [lamp]},
         samples={"hits": 4, "obscurance": 4},
         reuse={"n_r": 0},
-        indirect=tiny.CELLS,
+        indirect=indirect,
     )
     assert isinstance(job, Job)
     return tiny.render_frames(tiny.prepared(job, room(colour)), threads=2).images[0, 0].astype(np.float64)
 
 
+@pytest.mark.parametrize("indirect", [tiny.CELLS, {"method": "cells", "exact": True}, {"method": "obscurance"}])
 @pytest.mark.parametrize(("background", "intensity"), [(1.0, 1e-9), (0.0, 3.0)])
-def test_all_light_behind_a_window_has_its_colour(background: float, intensity: float) -> None:
+def test_all_light_behind_a_window_has_its_colour(
+    background: float, intensity: float, indirect: dict[str, Any]
+) -> None:
     """Pixel by pixel, as all rays are the same: light that leaves the room does not come back."""
-    clear, tinted = picture((1.0, 1.0, 1.0), background, intensity), picture(TINT, background, intensity)
+    clear = picture((1.0, 1.0, 1.0), background, intensity, indirect)
+    tinted = picture(TINT, background, intensity, indirect)
     lit = clear.min(axis=2) > 1e-3 * clear.max()
-    assert lit.mean() > 0.9
+    assert lit.mean() > (0.6 if "exact" in indirect else 0.9)  # few paths of a pixel leave by the window
     ratio = tinted[lit] / clear[lit]
     np.testing.assert_allclose(np.median(ratio, axis=0), TINT, rtol=1e-4)
     assert (np.abs(ratio / TINT - 1) < 0.01).mean() > 0.98
