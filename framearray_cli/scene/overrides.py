@@ -42,9 +42,10 @@ def override_materials(
     found = []
     for material in materials:
         if (override := overrides.get(material.name)) is not None:
+            was = material.glass
             if override.reflectivity is not None or override.specular is not None:
                 material = _with_colours(material, override, notes)
-            material = override_surface(material, override, textures, notes)
+            material = override_surface(material, override, textures, notes, was)
         found.append(material)
     return found
 

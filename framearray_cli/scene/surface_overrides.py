@@ -45,17 +45,18 @@ class SurfaceOverride(Protocol):
 
 
 def override_surface(
-    material: Material, override: SurfaceOverride, textures: Sequence[Bytes], notes: Notes
+    material: Material, override: SurfaceOverride, textures: Sequence[Bytes], notes: Notes, was: Glass | None
 ) -> Material:
     """Apply the values of the job to a material.
 
     Args:
+        was: the glass that it was in the file, if any.
         textures: (height, width, 4) RGBA each.
     """
     if override.roughness is not None or override.metallic is not None:
         material = _with_gloss(material, override.roughness, override.metallic, textures, notes)
     if override.transmission is not None:
-        material = _with_transmission(material, override.transmission, textures, notes)
+        material = _with_transmission(material, override.transmission, textures, notes, was)
     if override.ior is not None:
         if material.glass is None:
             notes.add("ior changes nothing where there is no glass", material.name)
@@ -99,8 +100,10 @@ def _with_gloss(
     )
 
 
-def _with_transmission(material: Material, passed: float, textures: Sequence[Bytes], notes: Notes) -> Material:
-    """Make a material thin glass, a screen, or neither."""
+def _with_transmission(
+    material: Material, passed: float, textures: Sequence[Bytes], notes: Notes, was: Glass | None
+) -> Material:
+    """Make a material glass, with the refractive index and the body that it `was`, a screen, or neither."""
     solid = replace(material, left_out="", glass=None)
     if material.alpha_cutoff == SCREENED:
         solid = replace(solid, alpha=1.0, alpha_texture=-1, alpha_cutoff=0.0)
@@ -113,7 +116,7 @@ def _with_transmission(material: Material, passed: float, textures: Sequence[Byt
     if material.texture >= 0:
         colour = colour * linear_from_srgb(_mean(textures[material.texture])[:3])
     glass = Glass(colour=_rgb(passed * np.clip(colour, 0.0, 1.0)))
-    return replace(solid, glass=glass if material.glass is None else replace(glass, ior=material.glass.ior))
+    return replace(solid, glass=glass if was is None else replace(glass, ior=was.ior, solid=was.solid))
 
 
 def _with_strength(material: Material, strength: float, notes: Notes) -> Material:

@@ -75,6 +75,13 @@ def test_transmission_makes_glass_of_the_materials_colour() -> None:
     assert "by chance" in notes
 
 
+@pytest.mark.parametrize("more", [{}, {"reflectivity": 0.6}])
+def test_another_transmission_or_colour_leaves_the_rest_of_glass_as_it_is(more: dict[str, float]) -> None:
+    pane = replace(DIFFUSE, glass=Glass(colour=(1.0, 1.0, 1.0), ior=1.7, solid=True))
+    glass = changed(pane, transmission=0.9, **more)[0].glass
+    assert glass is not None and (glass.ior, glass.solid) == (1.7, True)
+
+
 def test_no_transmission_makes_glass_and_screens_solid() -> None:
     pane = replace(DIFFUSE, glass=Glass(colour=(1.0, 1.0, 1.0)))
     assert changed(pane, transmission=0)[0] == DIFFUSE
