@@ -53,6 +53,7 @@ usemtl wall
 f 2 6 8 4
 """
 _MATERIALS = {"mirror": {"reflectivity": 0.1, "specular": 0.8}}
+_GLOSS = {"wall": {"reflectivity": 0.5, "roughness": 0.4, "metallic": 0.0}}  # where surfaces follow the file
 _JOB: dict[str, Any] = {
     "name": "room",
     "camera": {
@@ -74,6 +75,7 @@ def tables_for(job: Job) -> dict[str, Any]:
     """The tables of a job that decide which kernels it needs."""
     table = job_table(job)
     found = {name: table[name] for name in _KEPT if name in table}
+    found["scene"] = {"surfaces": job.scene.surfaces}
     found["output"].pop("sun_hours", None)  # the room has no sun
     return found
 
@@ -118,7 +120,10 @@ def compile_for(tables: dict[str, Any]) -> None:
 def room_job(tables: dict[str, Any], folder: Path) -> Job:
     """Write a room into a folder; return a job for it with these tables."""
     (folder / "room.obj").write_text(_ROOM)
-    table = _JOB | tables | {"scene": {"file": str(folder / "room.obj"), "materials": _MATERIALS}}
+    surfaces = tables.get("scene", {}).get("surfaces", "diffuse")
+    materials = _MATERIALS | (_GLOSS if surfaces == "file" else {})
+    scene = {"file": str(folder / "room.obj"), "surfaces": surfaces, "materials": materials}
+    table = _JOB | tables | {"scene": scene}
     if "samples" in table.get("indirect", {}):
         table["indirect"] |= {"samples": _FEW}
     return job_of_table(table, folder / "room.toml", folder / "out")

@@ -52,7 +52,7 @@ def init(scene: Path, job_file: Path, options: StartOptions, *, force: bool = Fa
 
 def offer_beside() -> None:
     """Have a second process compile kernels that a first job needs, should any be missing."""
-    offer({"indirect": {"method": INDIRECT}, "reuse": {"weights": WEIGHTS}} | FLOATS)
+    offer({"scene": {"surfaces": "file"}, "indirect": {"method": INDIRECT}, "reuse": {"weights": WEIGHTS}} | FLOATS)
 
 
 def planned_files(scene: Path, job_file: Path, *, force: bool = False) -> list[Path]:

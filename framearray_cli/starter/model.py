@@ -134,12 +134,18 @@ LightSource = LightKeys | SunDay | MeshLight | EnvironmentLight
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MaterialNote:
-    """A material as read; `more` says what its reflectivity is multiplied with, or is empty."""
+    """A material as read.
+
+    Attributes:
+        more: what its reflectivity is multiplied with, or empty.
+        gloss: roughness and metal; None of what is not glossy.
+    """
 
     name: str
     reflectivity: Vector
     specular: Vector
     more: str
+    gloss: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,6 +156,7 @@ class Start:
         inside: whether the scene counts as a room.
         unit: of length, as it seems: "m", "cm", "mm", "in" or "ft"; "" where nothing tells.
         format: of the images.
+        as_file: whether surfaces follow the file; else they are diffuse or mirrors.
         about: comment lines at the top.
         notes: what of the scene was not understood or was approximated, one sentence each.
     """
@@ -167,6 +174,7 @@ class Start:
     materials: tuple[MaterialNote, ...]
     unit: str = ""
     format: str = "png"
+    as_file: bool = False
     notes: tuple[str, ...] = ()
 
     @property
@@ -199,10 +207,10 @@ def _floor_log10(value: float) -> int:
 
 def table_of(start: Start) -> dict[str, Any]:
     """The tables of the job file of this job."""
-    camera = start.camera
+    camera, surfaces = start.camera, {"surfaces": "file"} if start.as_file else {}
     return {
         "name": start.name,
-        "scene": {"file": str(start.file), "up": start.up, "background": list(start.background)},
+        "scene": {"file": str(start.file), "up": start.up, "background": list(start.background), **surfaces},
         "camera": {
             "resolution": list(camera.resolution),
             "fov": camera.fov_deg,

@@ -8,6 +8,7 @@ import numpy as np
 from framearray_cli.base.errors import JobError
 from framearray_cli.job.job import NAME
 from framearray_cli.scene.files import read_stage
+from framearray_cli.scene.files.model import SCREENED
 from framearray_cli.scene.scene import Scene, load_scene
 
 from .cameras import choose_shot
@@ -39,7 +40,7 @@ def plan_start(file: Path, name: str, options: StartOptions, maps: Maps | None =
     if options.groups and options.image_format not in LINEAR:
         problem = f'--groups: expected --format exr or tif, as groups are added up afterwards, got "{options.format}"'
         raise JobError(str(file), [problem])
-    scene, stage = load_scene(file, shining=AllNames()), read_stage(file)
+    scene, stage = load_scene(file, shining=AllNames(), as_file=True), read_stage(file)
     with explored(scene, file, options.inside) as site:
         shot = choose_shot(site, stage, options, file)
         start = Start(
@@ -57,8 +58,16 @@ def plan_start(file: Path, name: str, options: StartOptions, maps: Maps | None =
             unit="" if site.unit is None else site.unit.name,
             notes=scene.report.notes,
             format=options.image_format,
+            as_file=_says_more(scene),
         )
         return add_lights(site, start, stage, options, shot.ends, maps)
+
+
+def _says_more(scene: Scene) -> bool:
+    """Whether a scene, read as its file says, has more than diffuse surfaces and mirrors."""
+    shines = bool((scene.emission > 0).any())
+    screens = bool((scene.alpha_cutoff == SCREENED).any())
+    return scene.is_glossy or scene.has_glass or shines or screens or len(scene.tangents) > 0 or len(scene.levels) > 0
 
 
 def _range(site: Site, inside: bool) -> float:
@@ -85,6 +94,14 @@ def _materials(scene: Scene) -> tuple[MaterialNote, ...]:
             reflectivity=round_vector(np.round(scene.reflectivity[k], 3)),
             specular=round_vector(np.round(scene.specular[k], 3)),
             more=more,
+            gloss=_gloss(scene, k),
         )
         found.setdefault(name, note)
     return tuple(found.values())
+
+
+def _gloss(scene: Scene, material: int) -> tuple[float, float] | None:
+    """Roughness and metal of a material, rounded; None of what is not glossy."""
+    if not len(scene.roughness) or not scene.roughness[material] > 0:
+        return None
+    return round(float(scene.roughness[material]), 3), round(float(scene.metallic[material]), 3)

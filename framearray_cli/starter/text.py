@@ -49,6 +49,7 @@ def to_text(start: Start, job_file: Path) -> str:
             _line("file", quoted(scene_name(start.file, job_file)), "relative to this file"),
             _line("up", quoted(start.up), "the axis that points up"),
             _line("background", inline_floats(start.background), "radiance of what lies outside: the sky"),
+            *_surfaces(start),
             *_materials(start.materials),
             "",
             *_camera(start.camera),
@@ -98,6 +99,12 @@ def _outside(start: Start) -> str:
     if start.inside:
         return 'what rays bring that meet nothing so near; "background" where the sky matters'
     return "rays that leave the scene bring the sky's light"
+
+
+def _surfaces(start: Start) -> list[str]:
+    if not start.as_file:
+        return []
+    return [_line("surfaces", '"file"', 'gloss, glass and bumps as in the file; "diffuse": without them, in less time')]
 
 
 def _camera(camera: Camera) -> list[str]:
@@ -201,12 +208,18 @@ def _materials(materials: Sequence[MaterialNote]) -> list[str]:
     lines.append(
         "# reflectivity: diffuse, 0 is black and 1 white; specular: above 0 it is a mirror; their sum is at most 1."
     )
+    if any(material.gloss for material in materials):
+        lines.append(
+            "# roughness: 0.1 is polished and 1 matt; metallic: 1 of metals, which have the reflectivity as colour."
+        )
     for material in materials:
         lines.append(f"# [scene.materials.{quoted(material.name)}]")
         more = f"  # {material.more}, which these numbers replace" if material.more else ""
         lines.append(f"# reflectivity = {inline_floats(material.reflectivity)}{more}")
         if max(material.specular) > 0:
             lines.append(f"# specular = {inline_floats(material.specular)}")
+        if material.gloss:
+            lines += [f"# roughness = {material.gloss[0]}", f"# metallic = {material.gloss[1]}"]
     return lines
 
 

@@ -98,13 +98,19 @@ def test_every_key_has_a_comment_and_every_material_is_listed(tmp_path: Path) ->
     assert bare == []
     # uncommented, the materials are what was read: the job stays valid, and the same picture
     begin = lines.index('# [scene.materials."Wall"]')
-    for i in range(begin, begin + 8):
+    for i in range(begin, lines.index("", begin)):
         lines[i] = lines[i].removeprefix("# ")
     (tmp_path / "job.toml").write_text("\n".join(lines))
     found = read_job(tmp_path / "job.toml").scene.materials
     assert list(found) == ["Wall", "Cupboard", 'Table "top"', "Stool"]
     assert found["Stool"].reflectivity == pytest.approx((0.2, 0.3, 0.6), abs=5e-4)
-    load_scene(tmp_path / "scene.glb", found)
+    same, read = (
+        load_scene(tmp_path / "scene.glb", found, as_file=True),
+        load_scene(tmp_path / "scene.glb", as_file=True),
+    )
+    for name in ("reflectivity", "specular", "roughness", "metallic"):
+        np.testing.assert_allclose(getattr(same, name), getattr(read, name), atol=5e-4)
+    assert read.is_glossy and read_job(tmp_path / "job.toml").scene.surfaces == "file"
 
 
 def test_a_room_is_walked_through_by_an_eye_that_is_in_no_furniture(tmp_path: Path) -> None:
@@ -317,7 +323,13 @@ def test_the_command_reports_what_it_did(
 
 
 def test_a_black_scene_is_an_error(tmp_path: Path) -> None:
+    """A black one that is glossy shines."""
     glb = Glb()
     add(glb, box([-1, 0, -1], [1, 1, 1]), "Coal", [0.0, 0.0, 0.0])
+    init_job(glb, tmp_path)
+    corners = "".join(f"v {x} {y} {z}\n" for x in (-1, 1) for y in (0, 1) for z in (-1, 1))
+    faces = "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
+    (tmp_path / "soot.mtl").write_text("newmtl soot\nKd 0 0 0\n")
+    (tmp_path / "soot.obj").write_text(f"mtllib soot.mtl\n{corners}usemtl soot\n{faces}")
     with pytest.raises(SceneError, match="no light reaches what the camera sees"):
-        init_job(glb, tmp_path)
+        init(tmp_path / "soot.obj", tmp_path / "soot.toml", StartOptions())
