@@ -30,6 +30,7 @@ WALKS = (
     "kitchen-sun",
     "kitchen-sky",
     "kitchen-dome",
+    "kitchen-gloss",
     *(f"{room}{size}" for room in ROOMS for size in ("", "-small")),
 )
 FURNACES = ("furnace-20", "furnace-50", "furnace-80")
