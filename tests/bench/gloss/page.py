@@ -3,21 +3,32 @@
 from bench.core.markdown import grid, number, percent
 from bench.core.results import Table, folder, load, site_for
 
+from . import cost
 from .against import PLACES
 
 HEAD = """
-# Gloss against Mitsuba
+# Gloss
+
+`make bench-gloss` measures and writes this page; [gloss](../decisions/gloss.md) and [glass](../decisions/glass.md) say
+how surfaces work.
+
+## Against Mitsuba
 
 Scenes of other people whose surfaces follow the file (`scene.surfaces = "file"`; glass is opaque, nothing shines),
 under a lamp, against Mitsuba 3 with the surface of glTF 2.0, appendix B, written for it in
-`tests/bench/ambient/gloss.py`. `make bench-gloss` measures and writes this page; [gloss](../decisions/gloss.md) says
-how the surfaces work.
+`tests/bench/ambient/gloss.py`.
 
 *Direct light*: native hits of one eye, without mirrors, against Mitsuba's samples of the same lamp; means of pixels
 that show surfaces, ours minus Mitsuba's, with the standard error of both. *Blocks*: RMS difference of means over 4 x
 4 pixels over what the spread of independent passes of each program explains; 1 where noise is all. *All light*: with
 reuse and `indirect.method = "cells"`, RMSE of means over 4 x 4 pixels over their root mean square, the noise of the
 path-traced picture taken out; and the mean of the picture over the path-traced one.
+"""
+COST = """
+## Cost
+
+`jobs/kitchen-gloss.toml` with diffuse surfaces, as it is, and with a pane in each window, frame by frame in turns: hits
+and composing, without writing. Ratios are medians over frames, to diffuse surfaces with the same indirect light.
 """
 
 
@@ -29,9 +40,12 @@ def write(quick: bool) -> None:
         table = load(out, f"gloss-{scene}")
         if table is not None:
             rows.append(_row(scene, table))
+    costs = [row for part, method in cost.PARTS.items() for row in _costs(method, load(out, f"gloss-{part}"))]
     heads = ("scene", "glossy triangles", "direct light", "blocks", "all light", "its mean")
     page.parent.mkdir(parents=True, exist_ok=True)
-    page.write_text(f"{HEAD.strip()}\n\n{grid(heads, rows)}\n", encoding="utf-8")
+    of_cost = ("indirect light", "surfaces", "ms per image", "ratio", "rays per pixel and image")
+    text = f"{HEAD.strip()}\n\n{grid(heads, rows)}\n\n{COST.strip()}\n\n{grid(of_cost, costs)}\n"
+    page.write_text(text, encoding="utf-8")
     print(page)
 
 
@@ -44,3 +58,12 @@ def _row(scene: str, table: Table) -> list[str]:
         scene, percent(table["glossy"], 2), mean, number(direct["chi"]), percent(whole["all"], 2),
         number(whole["mean"]),
     ]  # fmt: skip
+
+
+def _costs(method: str, table: Table | None) -> list[list[str]]:
+    if table is None:
+        return []
+    return [
+        [method, name, number(found["ms"]), f"{found['ratio']:.2f}", number(sum(found["rays"].values()))]
+        for name, found in table["surfaces"].items()
+    ]
