@@ -14,6 +14,7 @@ from pathlib import Path
 
 import materials
 import numpy as np
+import tiles
 from PIL import Image
 from support import ROOT
 
@@ -210,6 +211,19 @@ def surfaces(width: int, folder: Path) -> Image.Image:
     return sheet([[*rows[i], *rows[i + 1]] for i in range(0, len(rows), 2)])
 
 
+def far_tiles(width: int, folder: Path) -> Image.Image:
+    """A floor to the horizon with 2 hits per pixel, with sharp textures and with blurred ones."""
+    folder.mkdir()
+    return sheet([[picture(image, width) for image in tiles.images(folder).values()]])
+
+
+def gloss(width: int, folder: Path) -> Image.Image:
+    """Two eyes of jobs/kitchen-gloss.toml under two positions of the sun."""
+    manifest = read_manifest(whole("kitchen-gloss", folder))
+    shown = [(c, l) for c in (2, 21) for l in (2, 8)]
+    return sheet([[picture(read_image(image_path(manifest, c, l)), width) for c, l in shown]])
+
+
 def main() -> None:
     """Make all pictures again, or those that the command line names."""
     PICTURES.mkdir(exist_ok=True)
@@ -223,6 +237,8 @@ def main() -> None:
             "reuse": lambda: reuse(420, out / "reuse"),
             "sheet": lambda: contact_sheet(900, out / "sheet"),
             "visible-lamps": lambda: visible_lamps(300, out / "visible"),
+            "far-tiles": lambda: far_tiles(300, out / "far"),
+            "gloss": lambda: gloss(230, out / "gloss"),
             "surfaces": lambda: surfaces(120, out / "surfaces"),
             "environment": lambda: environment(280, out / "environment"),
             "sums": lambda: sums(280, out / "sums"),

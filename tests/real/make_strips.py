@@ -1,6 +1,6 @@
 """Strips of pictures of the real scenes, as docs/measured/real-scenes.md shows them.
 
-    python tests/real/make_strips.py FOLDER STRIPS
+    PYTHONPATH=tests python tests/real/make_strips.py FOLDER STRIPS
 
 reads the arrays that the jobs of `support.real_jobs` left in FOLDER/out, and writes STRIPS/NAME.jpg for every scene.
 """
@@ -10,14 +10,15 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
+from support.real_jobs import AS_FILE
 
 from framearray_cli.array.images.images import read_image
 from framearray_cli.array.manifest import image_path
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.colour import srgb8_from_linear
 
-# kind, camera, light; the last one of a scene with fewer
-CHOSEN = (("sun", 0, 0), ("sun", 3, 2), ("lamp", 2, 0), ("lamp", 5, 3))
+# job, camera, light; the last one of a scene with fewer
+CHOSEN = (("sun", 3, 2), (f"sun{AS_FILE}", 3, 2), ("lamp", 2, 0), (f"lamp{AS_FILE}", 2, 0))
 
 
 def strip(arrays: Path, name: str) -> Image.Image:
@@ -33,7 +34,7 @@ def strip(arrays: Path, name: str) -> Image.Image:
 def main(arrays: Path, strips: Path) -> None:
     strips.mkdir(parents=True, exist_ok=True)
     for name in sorted(folder.name.removesuffix("-sun") for folder in arrays.glob("*-sun")):
-        strip(arrays, name).save(strips / f"{name}.jpg", quality=88, subsampling=0)
+        strip(arrays, name).save(strips / f"{name}.jpg", quality=80)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,8 @@
 
     PYTHONPATH=tests python -m support.real_jobs SCENES FOLDER
 
-writes FOLDER/NAME-sun.toml and FOLDER/NAME-lamp.toml for every scene in SCENES.
+writes FOLDER/NAME-sun.toml and FOLDER/NAME-lamp.toml for every scene in SCENES, and with surfaces and indirect light
+as `framearray init` writes them FOLDER/NAME-sun-file.toml and FOLDER/NAME-lamp-file.toml.
 """
 
 import json
@@ -14,6 +15,7 @@ from typing import Any
 import tomli_w
 
 KINDS = ("sun", "lamp")
+AS_FILE = "-file"  # behind the names of jobs whose surfaces follow the file
 EYES, LIGHTS = 6, 4
 RESOLUTION = (200, 150)
 
@@ -112,9 +114,13 @@ def write_jobs(scenes: Path, folder: Path) -> list[Path]:
     for name in scene_names(scenes):
         for kind in KINDS:
             table = job_table(scenes, name, kind)
-            table["output"]["directory"] = f"out/{name}-{kind}"
-            files.append(folder / f"{name}-{kind}.toml")
-            files[-1].write_text(tomli_w.dumps(table))
+            for more in ("", AS_FILE):
+                if more:
+                    table["scene"]["surfaces"] = "file"
+                    table |= {"name": f"{name}-{kind}{more}", "indirect": {"method": "cells"}}
+                table["output"]["directory"] = f"out/{name}-{kind}{more}"
+                files.append(folder / f"{name}-{kind}{more}.toml")
+                files[-1].write_text(tomli_w.dumps(table))
     return files
 
 
