@@ -21,18 +21,19 @@ RESOLUTION = (40, 30)
 AS_A_COMMAND = ("trimesh/fuze.obj", "assimp/invalid/OutOfMemory.off")
 
 
-def scene_of(file: Path) -> Scene | None:
+def scene_of(file: Path, *, as_file: bool) -> Scene | None:
     try:
-        return load_scene(file)
+        return load_scene(file, as_file=as_file)
     except SceneError:
         return None
 
 
-def write_job(name: str, folder: Path) -> tuple[Path, Scene | None]:
+def write_job(name: str, folder: Path, surfaces: str) -> tuple[Path, Scene | None]:
     file = scenes_folder() / "nasty" / name
-    scene = scene_of(file)
-    job = folder / "job.toml"
-    job.write_text(tomli_w.dumps(job_table(file, scene, RESOLUTION, folder / "out")))
+    scene = scene_of(file, as_file=surfaces == "file")
+    job, table = folder / "job.toml", job_table(file, scene, RESOLUTION, folder / "out")
+    table["scene"]["surfaces"] = surfaces
+    job.write_text(tomli_w.dumps(table))
     return job, scene
 
 
@@ -41,9 +42,10 @@ def test_the_set_is_there():
     assert set(AS_A_COMMAND) <= set(FILES)
 
 
+@pytest.mark.parametrize("surfaces", ["diffuse", "file"])
 @pytest.mark.parametrize("name", FILES)
-def test_pictures_or_a_clear_error(name, tmp_path, capfd):
-    job, scene = write_job(name, tmp_path)
+def test_pictures_or_a_clear_error(name, surfaces, tmp_path, capfd):
+    job, scene = write_job(name, tmp_path, surfaces)
     code = 0
     try:
         main(["render", "-q", str(job)])
@@ -67,7 +69,7 @@ def test_pictures_or_a_clear_error(name, tmp_path, capfd):
 
 @pytest.mark.parametrize("name", [name for name in AS_A_COMMAND if name in FILES])
 def test_as_a_command(name, tmp_path):
-    job, scene = write_job(name, tmp_path)
+    job, scene = write_job(name, tmp_path, "file")
     command = [sys.executable, "-m", "framearray_cli", "render", str(job)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=ROOT)
     assert "Traceback" not in done.stderr

@@ -1,10 +1,20 @@
 """Results -> docs/measured/gloss.md. Nothing is measured here."""
 
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
 from bench.core.markdown import grid, number, percent
 from bench.core.results import Table, folder, load, site_for
+from framearray_cli.base.colour import srgb8_from_linear
 
 from . import cost
 from .against import PLACES
+
+SHOWN = (cost.FILE, cost.CLEAR_PANES, cost.GREEN_PANES)
+PANES = "The kitchen without panes, with clear ones and with green ones"
+WIDTH, QUALITY = 240, 78  # of each picture; of JPEG
 
 HEAD = """
 # Gloss
@@ -45,8 +55,26 @@ def write(quick: bool) -> None:
     page.parent.mkdir(parents=True, exist_ok=True)
     of_cost = ("indirect light", "surfaces", "ms per image", "ratio", "rays per pixel and image")
     text = f"{HEAD.strip()}\n\n{grid(heads, rows)}\n\n{COST.strip()}\n\n{grid(of_cost, costs)}\n"
+    site = site_for(quick)
+    if (picture := _picture(out / "gloss-cost-cells.npz", site.pictures / "panes.jpg")) is not None:
+        text += f"\n![{PANES}]({site.link(picture)})\n\n*{PANES}.*\n"
     page.write_text(text, encoding="utf-8")
     print(page)
+
+
+def _picture(images: Path, picture: Path) -> Path | None:
+    """Show the kitchen by its panes, from the images of the measurement of cost; None without."""
+    if not images.is_file():
+        return None
+    with np.load(images) as found:
+        shown = [Image.fromarray(srgb8_from_linear(found[name])) for name in SHOWN]
+    width, height = WIDTH, round(shown[0].height * WIDTH / shown[0].width)
+    strip = Image.new("RGB", (width * len(shown), height))
+    for k, image in enumerate(shown):
+        strip.paste(image.resize((width, height), Image.Resampling.LANCZOS), (k * width, 0))
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    strip.save(picture, quality=QUALITY, optimize=True)
+    return picture
 
 
 def _row(scene: str, table: Table) -> list[str]:
