@@ -23,7 +23,7 @@ from .values import Tree
 STRENGTH = "KHR_materials_emissive_strength"
 GLOSSY_SPECULAR = 0.2  # a specular factor (old extension) above it means metal; dielectrics have 0.04
 KNOWN = {"KHR_materials_transmission", "KHR_materials_pbrSpecularGlossiness", STRENGTH}
-SILENT = {"KHR_materials_ior", "KHR_materials_volume"}  # they only matter inside glass, which is left out
+SILENT = {"KHR_materials_ior", "KHR_materials_volume"}  # they only matter for glass
 # What a surface is taken for without an extension that is left out.
 INSTEAD = {
     "KHR_materials_anisotropy": "brushed surfaces look the same from all sides",
@@ -32,6 +32,7 @@ INSTEAD = {
     "KHR_materials_dispersion": "glass does not part colours",
     "KHR_materials_iridescence": "the surface under the thin film shows",
     "KHR_materials_sheen": "cloth has no bright rim",
+    "KHR_materials_specular": "dielectrics mirror as much as those without it",
 }
 REPEAT = 10497
 
