@@ -3,22 +3,18 @@
 Direct light of both programs comes from native hits of one eye, without mirrors and without rays of lobes.
 """
 
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from support.scenes import scenes_folder
 
 from bench.ambient import pathtraced
 from bench.ambient.scenes import Probe
 from bench.core.cases import with_resolution
 from bench.core.frames import frames
 from bench.core.results import Table
-from bench.lights.against import compare, surfaces_only
+from bench.lights.against import compare, measured_apart, surfaces_only
 from bench.lights.sources import DIRECT
-from bench.speed.processes import asked
-from bench.speed.speed import log
 from bench.truth.compare import distance
 from bench.truth.places import job_of
 from bench.truth.traced import Truth
@@ -55,14 +51,7 @@ def job_for(scene: str, quick: bool, tables: dict[str, dict[str, Any]]) -> Job:
 
 def measure(scene: str, quick: bool) -> Table:
     """Compare a scene in a process of its own; {"skipped": why} where that is impossible."""
-    if not (scenes_folder() / scene / "camera.json").is_file():
-        return {"skipped": "no such scene; set FRAMEARRAY_SCENES to the folder of scenes"}
-    try:
-        table = asked("gloss-against", scene, *(["--quick"] if quick else []))
-    except subprocess.CalledProcessError as error:
-        table = {"skipped": f"Mitsuba ended with status {error.returncode}"}
-    log(f"{scene}: {table}")
-    return table
+    return measured_apart("gloss-against", scene, scene, quick)
 
 
 def measure_here(scene: str, quick: bool, folder: Path) -> Table:

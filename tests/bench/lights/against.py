@@ -115,10 +115,15 @@ def job_for(part: str, quick: bool, folder: Path) -> Job:
 
 def measure(part: str, quick: bool, folder: Path) -> Table:
     """Compare a part in a process of its own; {"skipped": why} where that is impossible."""
-    if not (scenes_folder() / PARTS[part][0] / "camera.json").is_file():
+    return measured_apart("lights-against", part, PARTS[part][0], quick)
+
+
+def measured_apart(command: str, part: str, scene: str, quick: bool) -> Table:
+    """What a command of the bench finds of a part in a process of its own, in which Mitsuba may end badly."""
+    if not (scenes_folder() / scene / "camera.json").is_file():
         return {"skipped": "no such scene; set FRAMEARRAY_SCENES to the folder of scenes"}
     try:
-        table = asked("lights-against", part, *(["--quick"] if quick else []))
+        table = asked(command, part, *(["--quick"] if quick else []))
     except subprocess.CalledProcessError as error:
         table = {"skipped": f"Mitsuba ended with status {error.returncode}"}
     log(f"{part}: {table}")
