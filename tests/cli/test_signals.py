@@ -189,8 +189,8 @@ def test_a_lock_is_never_left_locked():
         previous = signal.signal(number, interrupts.stop)
         timer = threading.Timer(0.001 + 0.0002 * k, os.kill, [os.getpid(), number])
         try:
-            timer.start()
             with pytest.raises(interrupts.Stopped):
+                timer.start()  # which the signal may meet, too
                 while True:
                     with lock:
                         pass
