@@ -71,7 +71,7 @@ def room_for_lobes(batch: int, values: int) -> LobeLight:
 
 @inlined
 def rays_of_lobe(f0: Real, m: Triple, v: Triple) -> int:
-    """The number of rays of a hit: it follows from the hit alone, so that means stay right."""
+    """How many rays a hit has. It depends on the hit alone: if it depended on what rays find, means would be biased."""
     one = np.float32(1.0)
     return RAYS_OF_LOBE if f0 + (one - f0) * schlick(facing(m, v)) >= MUCH else 1
 
