@@ -6,6 +6,8 @@ JOB := jobs/kitchen-small.toml
 OUT := out/kitchen-small
 # One process per core; neighbours share a process and its fixtures
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
+# Formats and checks the page's JavaScript, as deno.json says
+DENO := DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 .DEFAULT_GOAL := help
 .PHONY: help install render test test-avx2 test-all smoke format check docs bench bench-packets bench-scaling bench-error bench-bias bench-ambient bench-truth bench-flicker bench-lights bench-report bench-progress bench-first bench-view fuzz clean
@@ -53,11 +55,14 @@ smoke: $(VENV)/installed ## Render the smallest job
 format: $(VENV)/installed-dev ## Format the code
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+	@if [ -x $(BIN)/deno ]; then $(DENO) fmt; fi
 
 check: $(VENV)/installed-dev ## Check format, style and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	@if [ -x $(BIN)/deno ]; then $(DENO) fmt --check && $(DENO) lint; \
+	else echo "the page's JavaScript is not checked: there is no deno for this platform"; fi
 
 docs: $(VENV)/installed-dev ## Write the generated pages of docs/
 	$(BIN)/python -m framearray_cli.job.docs docs/guide/

@@ -67,8 +67,9 @@ export class Controls {
     const box = document.getElementById("groups");
     box.append(element("h2", {}, "Light"));
     for (const name of tinted) this.tint(box, name, `group-${name}`, changed, (view) => view.tints[name]);
-    if (this.array.streams.some((stream) => stream.role === "ambient"))
+    if (this.array.streams.some((stream) => stream.role === "ambient")) {
       this.tint(box, "Ambient", "ambient", changed, (view) => view.ambient);
+    }
   }
 
   tint(box, name, id, changed, of) {

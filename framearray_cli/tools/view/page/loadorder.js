@@ -45,9 +45,9 @@ export function loadOrder(array, view, velocity, calm) {
     }
   }
   for (let k = 1; k <= 3; k++) for (const c of [view.c - k, view.c + k]) sheet(c);
-  if (calm) for (let k = 1; k <= 2; k++) ring(k, full);
+  for (let k = 1; calm && k <= 2; k++) ring(k, full);
   for (let k = 4; k < array.nCameras; k++) for (const c of [view.c - k, view.c + k]) sheet(c);
-  if (calm) for (let k = 3; k <= RING; k++) ring(k, full);
+  for (let k = 3; calm && k <= RING; k++) ring(k, full);
   return list;
 }
 

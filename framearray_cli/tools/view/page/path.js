@@ -41,8 +41,12 @@ export class Path {
   // Go straight to a place, from where the path ends.
   addPlace(place, places) {
     const from = this.end;
-    if (from === null) this.start = place;
-    else this.segments.push({ seconds: STRAIGHT, camera: [from.c, place.c], light: [from.l, place.l], places: { ...places } });
+    if (from === null) {
+      this.start = place;
+      return;
+    }
+    const camera = [from.c, place.c], light = [from.l, place.l];
+    this.segments.push({ seconds: STRAIGHT, camera, light, places: { ...places } });
   }
 
   // Add a stroke drawn by hand. samples: [{ s, c, l }], s in seconds.
@@ -84,9 +88,10 @@ export class Path {
 
   // Return the path file, see docs/guide/movies.md.
   toToml(array, view) {
+    const exposure = view.exposure ? ` --exposure ${round(view.exposure)}` : "";
     const lines = [
       "# Drawn on the pad of `framearray view`. Make a movie of it:",
-      `#     framearray assemble OUT THIS_FILE -o movie.mp4${view.exposure ? ` --exposure ${round(view.exposure)}` : ""}`,
+      `#     framearray assemble OUT THIS_FILE -o movie.mp4${exposure}`,
       `fps = ${number(array.fps)}`,
       'positions = "nearest"',
     ];
@@ -116,7 +121,8 @@ export class Path {
       });
       start += seconds;
     }
-    return ["", "[environment]", `file = ${JSON.stringify(file)} # relative to this file`, `rotate = [${keys.join(", ")}]`];
+    const name = `file = ${JSON.stringify(file)} # relative to this file`;
+    return ["", "[environment]", name, `rotate = [${keys.join(", ")}]`];
   }
 }
 

@@ -79,7 +79,9 @@ export class Picture {
   // parts: [{ stream, factor, url, bitmap, part: [left, top, width, height] }]
   draw(parts, exposure) {
     const { gl } = this;
-    if (parts.length > this.most) throw new Error(`This device adds at most ${this.most} pictures, not ${parts.length}.`);
+    if (parts.length > this.most) {
+      throw new Error(`This device adds at most ${this.most} pictures, not ${parts.length}.`);
+    }
     const program = this.program(parts);
     gl.useProgram(program);
     parts.forEach((one, i) => {
@@ -112,7 +114,9 @@ export class Picture {
     const flipped = new Uint8Array(4 * width * rows);
     gl.readPixels(0, height - rows, width, rows, gl.RGBA, gl.UNSIGNED_BYTE, flipped);
     const data = new Uint8Array(flipped.length);
-    for (let y = 0; y < rows; y++) data.set(flipped.subarray(4 * width * (rows - 1 - y), 4 * width * (rows - y)), 4 * width * y);
+    for (let y = 0; y < rows; y++) {
+      data.set(flipped.subarray(4 * width * (rows - 1 - y), 4 * width * (rows - y)), 4 * width * y);
+    }
     return data;
   }
 
@@ -129,8 +133,8 @@ export class Picture {
     gl.bindTexture(gl.TEXTURE_2D, texture.name);
     gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
-    for (const [key, value] of [["MIN_FILTER", "LINEAR"], ["MAG_FILTER", "LINEAR"], ["WRAP_S", "CLAMP_TO_EDGE"], ["WRAP_T", "CLAMP_TO_EDGE"]])
-      gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_${key}`], gl[value]);
+    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.LINEAR);
+    for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
     this.textures.set(url, texture);
     this.bytes += texture.bytes;
   }
@@ -152,10 +156,13 @@ export class Picture {
     const count = stream.scale ? parts.length : 1;
     let uniforms = "", sum = "";
     for (let i = 0; i < count; i++) {
-      uniforms += `uniform sampler2D image${i};\nuniform vec4 part${i};\nuniform vec3 factor${i};\nuniform vec2 curve${i};\n`;
+      uniforms +=
+        `uniform sampler2D image${i};\nuniform vec4 part${i};\nuniform vec3 factor${i};\nuniform vec2 curve${i};\n`;
       sum += `  sum += factor${i} * radiance(code(image${i}, part${i}), curve${i}.x, curve${i}.y);\n`;
     }
-    const main = stream.scale ? LIGHT_MAIN.replace("#SUM", sum) : `void main() { ${DATA_MAINS[stream.key] ?? DATA_MAINS.samples} }`;
+    const main = stream.scale
+      ? LIGHT_MAIN.replace("#SUM", sum)
+      : `void main() { ${DATA_MAINS[stream.key] ?? DATA_MAINS.samples} }`;
     const program = link(this.gl, VERTEX, HEAD + uniforms + main);
     this.programs.set(kind, program);
     return program;
