@@ -43,7 +43,8 @@ class Accuracy:
 
     Attributes:
         bias: signed mean over points and light positions; `bias_error`: its standard error.
-        error: root mean square over points and light positions; `error_error`: its standard error.
+        error: root mean square over points and light positions, 0 where noise makes the square negative; `error_error`: its
+            standard error, upwards where the square is within its own.
     """
 
     bias: float
@@ -108,7 +109,8 @@ def _accuracy(paths: Float64, read: Float64) -> Accuracy | None:
         bias=float(bias),
         bias_error=float(bias_error),
         error=error,
-        error_error=float(spread / (2 * error) if error**2 > spread else spread**0.5 / 2),
+        # of a square within its own error the root is not known better than the root of that error
+        error_error=float(spread / (2 * error) if error**2 > spread else np.hypot(error, spread**0.5) - error),
     )
 
 
