@@ -43,8 +43,8 @@ class Accuracy:
 
     Attributes:
         bias: signed mean over points and light positions; `bias_error`: its standard error.
-        error: root mean square over points and light positions, 0 where noise makes the square negative; `error_error`: its
-            standard error, upwards where the square is within its own.
+        error: root mean square over points and light positions, 0 where noise makes the square negative;
+            `error_error`: its standard error, upwards where the square is within its own.
     """
 
     bias: float
