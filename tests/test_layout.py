@@ -26,7 +26,8 @@ DOORS = {
     "llvmlite": ("engine/embree/", "engine/kernels/"),
     "numba": ("engine/embree/", "engine/kernels/", "engine/hits/native"),  # native: one function that allocates
     "trimesh": ("scene/files/",),
-    "OpenImageIO": ("base/openimage", "tools/movie/display"),
+    "OpenImageIO": ("base/openimage",),
+    "PyOpenColorIO": ("tools/display", "tools/view/shaders"),
     "PIL": ("scene/files/", "array/images/png", "tools/movie/label", "tools/movie/animation", "tools/drawing"),
     "tomllib": ("base/forms/toml", "array/manifest_toml"),
     "tomli_w": ("base/forms/text", "array/manifest_toml", "report/tables"),
@@ -51,6 +52,7 @@ HEAVY = (
     "embreex",
     "trimesh",
     "OpenImageIO",
+    "PyOpenColorIO",
     "PIL",
     "scipy",
     "av",

@@ -131,8 +131,8 @@ def assemble(
     json: Json = False,
 ) -> None:
     """Cut a movie or an image sequence out of a frame array."""
+    from framearray_cli.tools.display import find_view
     from framearray_cli.tools.movie.assemble import assemble_movie as run
-    from framearray_cli.tools.movie.display import find_view
     from framearray_cli.tools.movie.look import Look
     from framearray_cli.tools.movie.sweep import Sweep, SweepKind
 

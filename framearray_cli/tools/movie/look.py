@@ -13,7 +13,7 @@ from framearray_cli.array.places import nearest_index
 from framearray_cli.base.arrays import Image
 from framearray_cli.base.colour import srgb8_from_linear
 
-from .display import SRGB, View
+from ..display import SRGB, View
 from .label import burn
 from .timeline import Shot
 
@@ -53,8 +53,8 @@ def screen_codes(image: Image, look: Look, text: str, bits: Literal[8, 16] = 8) 
     if bits == 8 and look.view.is_srgb:
         codes: NDArray[Any] = srgb8_from_linear(exposed)
     else:
-        encode, most, dtype = (look.view.quick, 255, np.uint8) if bits == 8 else (look.view.encode, 65535, np.uint16)
-        codes = np.rint(encode(exposed).astype(np.float64) * most).astype(dtype)
+        most, dtype = (255, np.uint8) if bits == 8 else (65535, np.uint16)
+        codes = np.rint(look.view.encode(exposed).astype(np.float64) * most).astype(dtype)
     return burn(codes, text) if look.label else codes
 
 

@@ -1,12 +1,10 @@
-"""How linear radiance looks on a screen: the sRGB curve, ACES, or a view of an OpenColorIO configuration.
-
-The only module that uses OpenColorIO, which comes with OpenImageIO.
-"""
+"""How linear radiance looks on a screen: the sRGB curve, ACES, or a view of an OpenColorIO configuration."""
 
 import os
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cache, partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -15,7 +13,7 @@ from framearray_cli.base.colour import srgb_from_linear
 from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.words import shown
 
-from .cube import Encode, tabulate
+Encode: TypeAlias = Callable[[Image], Float32]
 
 BUILT_IN = "ocio://default"  # the configuration inside OpenColorIO: ACES 2.0
 ACES = ("sRGB - Display", "ACES 2.0 - SDR 100 nits (Rec.709)")
@@ -38,12 +36,12 @@ class View:
     Attributes:
         name: as the user gave it.
         encode: linear radiance (h, w, 3) -> values of the screen, 0 to 1, of the same shape.
-        quick: the same, accurate enough for 8 bits.
+        processor: OpenColorIO's, which also writes shaders; None for the sRGB curve.
     """
 
     name: str
     encode: Encode
-    quick: Encode
+    processor: Any = field(default=None, repr=False)
 
     @property
     def is_srgb(self) -> bool:
@@ -51,7 +49,7 @@ class View:
         return self.name == "srgb"
 
 
-SRGB = View("srgb", srgb_from_linear, srgb_from_linear)
+SRGB = View("srgb", srgb_from_linear)
 
 
 def find_view(name: str) -> View:
@@ -68,11 +66,12 @@ def find_view(name: str) -> View:
         return _ocio_view(name, BUILT_IN, *ACES)
     place = os.environ.get("OCIO") or BUILT_IN
     config = _config(place)
-    for display in (config.getDefaultDisplayName(), *config.getDisplayNames()):
-        for view in config.getViewNames(display):
+    displays = {display: list(config.getViews(display)) for display in config.getDisplays()}
+    for display in (config.getDefaultDisplay(), *displays):
+        for view in displays.get(display, ()):
             if name in (view, f"{display}/{view}"):
                 return _ocio_view(name, place, display, view)
-    known = [f"{display}/{view}" for display in config.getDisplayNames() for view in config.getViewNames(display)]
+    known = [f"{display}/{view}" for display, views in displays.items() for view in views]
     more = f" and {len(known) - MOST_NAMES} more" if len(known) > MOST_NAMES else ""
     names = "; ".join(known[:MOST_NAMES]) + more
     raise JobError("--view", [f"expected srgb, aces or a view of {place} ({names}), got {shown(name)}"])
@@ -80,34 +79,37 @@ def find_view(name: str) -> View:
 
 def _config(place: str) -> Any:
     """Open a configuration."""
-    import OpenImageIO as oiio
+    import PyOpenColorIO as ocio
 
-    config = oiio.ColorConfig(place)
-    if message := config.geterror():
-        raise JobError("--view", [f"$OCIO: {place}: cannot be read: {message.strip().splitlines()[0]}"])
-    return config
+    try:
+        return ocio.Config.CreateFromFile(place)
+    except (ocio.Exception, ocio.ExceptionMissingFile) as error:
+        raise JobError("--view", [f"$OCIO: {place}: cannot be read: {_first_line(error)}"]) from error
 
 
-@cache  # its table takes long to fill
+@cache  # OpenColorIO keeps what it reads and computes with its processor
 def _ocio_view(name: str, place: str, display: str, view: str) -> View:
-    """Make a view, and try it once, as a transform may name files that are missing."""
+    """Make a view; its transform may name files that are missing."""
+    import PyOpenColorIO as ocio
+
     config = _config(place)
-    spaces = set(config.getColorSpaceNames())
-    found = [space for space in (config.resolve(known) for known in LINEAR_REC709) if space in spaces]
+    found = [space.getName() for space in map(config.getColorSpace, LINEAR_REC709) if space]
     if not found:
         raise JobError("--view", [f'{place}: no colour space "{LINEAR_REC709[0]}"; expected one, as images have that'])
-    encode = partial(_through_ocio, place=place, display=display, view=view, space=found[0])
-    encode(np.zeros((1, 1, 3), np.float32))
-    return View(name, encode, tabulate(encode))
+    try:
+        processor = config.getProcessor(ocio.DisplayViewTransform(found[0], display, view))
+        through = processor.getDefaultCPUProcessor()
+    except (ocio.Exception, ocio.ExceptionMissingFile) as error:
+        raise JobError("--view", [f"{place}: {display}/{view}: {_first_line(error)}"]) from error
+    return View(name, partial(_encode, through), processor)
 
 
-def _through_ocio(image: Image, *, place: str, display: str, view: str, space: str) -> Float32:
-    """Apply a display transform; the result has the shape of the image, and is clipped to 0 to 1."""
-    import OpenImageIO as oiio
+def _encode(through: Any, image: Image) -> Float32:
+    """Apply a transform; the result has the shape of the image, and is clipped to 0 to 1."""
+    values = np.array(image, np.float32, order="C")
+    through.applyRGB(values)
+    return np.clip(values, 0, 1, out=values)
 
-    buffer = oiio.ImageBuf(np.ascontiguousarray(image, np.float32))
-    result = oiio.ImageBufAlgo.ociodisplay(buffer, display, view, space, colorconfig=place)
-    if result.has_error:
-        raise JobError("--view", [f"{place}: {display}/{view}: {result.geterror().strip().splitlines()[0]}"])
-    values: Float32 = np.clip(np.asarray(result.get_pixels(oiio.FLOAT), np.float32), 0, 1)
-    return values
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().splitlines()[0]
