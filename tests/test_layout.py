@@ -41,6 +41,7 @@ DOORS = {
     "psutil": ("base/memory",),
     "xxhash": ("base/hashing",),
     "filelock": ("array/lock", "engine/kernels/claims"),
+    "ephem": ("scene/paths/sun",),
     "pvlib": ("scene/paths/sun",),
     "distributed": ("render/parts/",),
 }
@@ -58,6 +59,7 @@ HEAVY = (
     "av",
     "matplotlib",
     "jinja2",
+    "ephem",
     "pvlib",
     "distributed",
     "psutil",

@@ -23,6 +23,7 @@ from .record import FOLDER, record_files
 
 # Number of differences that a message lists, and the longest text of two values.
 MOST_REPORTED, LONGEST_SHOWN = 4, 60
+FORMERLY = {"almanac": "pvlib"}  # what a job meant that lacks a key, as those of versions without it do
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,13 +128,27 @@ def _changes(old: Mapping[str, Any], new: Mapping[str, Any], place: str = "") ->
     """List the keys whose values differ between two tables, with both values where these are short."""
     found = []
     for key in dict.fromkeys((*old, *new)):
-        a, b = old.get(key), new.get(key)
+        a, b = (table.get(key, FORMERLY.get(key)) for table in (old, new))
         if isinstance(a, Mapping) and isinstance(b, Mapping):
             found += _changes(a, b, f"{place}{toml_key(key)}.")
+        elif _are_alike(a, b):
+            for k, (one, other) in enumerate(zip(a, b, strict=True)):
+                found += _changes(one, other, f"{place}{toml_key(key)}[{k}].")
         elif a != b:
             both = f": {_short(a)} there, {_short(b)} now"
             found.append(f"{place}{toml_key(key)}{both if len(both) < LONGEST_SHOWN else ''}")
     return found
+
+
+def _are_alike(a: Any, b: Any) -> bool:
+    """Whether two values are lists of as many tables, of the same types: sources, or keys."""
+    if not (isinstance(a, list) and isinstance(b, list) and len(a) == len(b)):
+        return False
+    both = [
+        isinstance(x, Mapping) and isinstance(y, Mapping) and x.get("type") == y.get("type")
+        for x, y in zip(a, b, strict=True)
+    ]
+    return all(both)
 
 
 def _short(value: Any) -> str:

@@ -25,6 +25,7 @@ REQUIRED = {
     "OpenImageIO": "OpenImageIO",
     "Pillow": "PIL.Image",
     "scipy": "scipy",
+    "ephem": "ephem",
     "trimesh": "trimesh",
     "pydantic": "pydantic",
     "typer": "typer",
@@ -34,7 +35,7 @@ REQUIRED = {
 EXTRAS = {
     "movie": ("movies", ("av",)),
     "denoise": ("denoise.obscurance", ("pyoidn",)),
-    "sun": ('sources of type "sun"', ("pvlib",)),
+    "sun": ('almanac = "pvlib"', ("pvlib",)),
     "report": ("framearray report", ("matplotlib", "jinja2", "flip_evaluator")),
     "dask": ("render --workers and --dask", ("distributed",)),
 }

@@ -15,7 +15,7 @@ from .panel import DiscSource, RectSource
 from .placed import Angle, DirectionalKey, DirectionalSource, PointSource
 from .sourcetable import ShownSource, SourceTable
 from .spot import SpotSource
-from .times import Clock, Dates, Zone, clock_minutes, even_moments
+from .times import Almanac, Clock, Dates, Zone, clock_minutes, even_moments
 from .units import LAMP_UNITS, SKY_UNITS, UNITS_OF_DOMES, DomeUnits, LampUnits, SkyUnits
 from .values import Colour, Direction, Emission, GridSize, Point
 
@@ -117,7 +117,7 @@ class GridSource(SourceTable):
 
 
 class SunSource(ShownSource):
-    """The sun over a place on Earth on one day; below the horizon it shines 0. It needs the extra `sun`."""
+    """The sun over a place on Earth on one day; below the horizon it shines 0."""
 
     type: Literal["sun"] = Field(description="Kind of source.")
     latitude: float = Field(ge=-90, le=90, description="Of the place, degrees; north is positive.")
@@ -143,6 +143,11 @@ class SunSource(ShownSource):
         default=None,
         description="Direction in the scene that points north; its component along the up axis does not count.",
         json_schema_extra=default_text("-z in a scene with y up, y in one with z up, so that east is x"),
+    )
+    almanac: Almanac = Field(
+        default="ephem",
+        description='Library that computes where the sun is. "pvlib", which needs the extra `sun`, differs by up to '
+        "0.006 degrees; arrays that were begun before there was a choice have it.",
     )
     units: SkyUnits | None = Field(default=None, description=SKY_UNITS, json_schema_extra=default_text('"W/m2"'))
     irradiance: Emission = Field(

@@ -94,7 +94,7 @@ def make_sun_day(sun: SunOption, file: Path) -> SunDay:
 
     Raises:
         JobError: it never rises on that day.
-        MissingExtraError: pvlib is not installed.
+        MissingExtraError: ephem is not installed.
     """
     zone = float(round(sun.longitude / HOUR_DEG))
     hours = daylight(sun.date, zone, (sun.latitude, sun.longitude))

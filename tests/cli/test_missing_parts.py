@@ -26,7 +26,7 @@ class Hide:
 found = util.find_spec
 util.find_spec = lambda name, package=None: None if name in hidden else found(name, package)
 sys.meta_path.insert(0, Hide())
-from framearray_cli.cli import main
+from framearray_cli.cli.main import main
 main(sys.argv[2:])
 """
 
@@ -50,7 +50,7 @@ def test_libraries_that_are_not_installed(array, tmp_path):
     """Every extra where a command needs it, and the library that images need."""
     sun = {"type": "sun", "date": "2026-06-21", "start": "06:00", "stop": "20:00", "irradiance": 3.0}
     place = {"latitude": 52.52, "longitude": 13.405, "timezone": "Europe/Berlin"}
-    sunny = write_job(tmp_path, "sun.toml", light={"frames": 2, "sources": [sun | place]})
+    sunny = write_job(tmp_path, "sun.toml", light={"frames": 2, "sources": [sun | place | {"almanac": "pvlib"}]})
     smooth = write_job(tmp_path, "smooth.toml", denoise={"obscurance": True}, output={"directory": "other"})
     plain = write_job(tmp_path, "plain.toml", output={"directory": "other"})
     cases = [

@@ -21,8 +21,6 @@ from framearray_cli.scene.files import Material
 from framearray_cli.scene.paths.paths import eyes, lights
 from framearray_cli.scene.scene import Scene
 
-pytest.importorskip("pvlib", reason="the extra `sun` is not installed")
-
 SUN: dict[str, Any] = {
     "type": "sun",
     "latitude": 41.9,

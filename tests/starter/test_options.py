@@ -92,7 +92,6 @@ def test_equal_positions_of_lights_are_one(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("obscurances")
 def test_a_sun_over_a_place_shines_in_every_picture(tmp_path: Path) -> None:
-    pytest.importorskip("pvlib")
     scene = rooms.street().save(tmp_path / "street.glb")
     job = read_first_job(scene, sun=SunOption(48.1, 11.6, "2026-06-21"), lights=3)
     (source,) = job.light.sources
@@ -105,7 +104,6 @@ def test_a_sun_over_a_place_shines_in_every_picture(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("obscurances")
 def test_a_sun_study_counts_hours_once_its_comments_are_followed(tmp_path: Path) -> None:
     """The key is a comment, as a dozen positions that leave out both ends of the day would count too few hours."""
-    pytest.importorskip("pvlib")
     scene = rooms.street().save(tmp_path / "street.glb")
     file = tmp_path / "street.toml"
     init(scene, file, StartOptions(frames=1, resolution=(32, 24), sun=SunOption(48.1, 11.6, "2026-06-21")))
@@ -123,7 +121,6 @@ def test_a_sun_study_counts_hours_once_its_comments_are_followed(tmp_path: Path)
 
 
 def test_a_sun_that_does_not_rise_is_an_error() -> None:
-    pytest.importorskip("pvlib")
     with pytest.raises(JobError, match="--sun: expected a day on which the sun rises, got 2026-12-21 at latitude 80"):
         make_sun_day(SunOption(80.0, 0.0, "2026-12-21"), Path("scene.glb"))
 

@@ -1,9 +1,8 @@
 """The sun: against published angles, in scenes, and the errors of a sun that never shines."""
 
-import builtins
 import math
-from collections.abc import Iterator
-from datetime import datetime, timedelta
+import sys
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +13,20 @@ from support import tiny
 
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.pictures import Pictures
+from framearray_cli.base.arrays import Float64
 from framearray_cli.base.blackbody import black_body
-from framearray_cli.base.errors import JobError, MissingExtraError
+from framearray_cli.base.errors import JobError, MissingExtraError, OutputError
 from framearray_cli.engine.inputs.lights import light_arrays
 from framearray_cli.job.job import Job
-from framearray_cli.job.read import job_table, read_job
+from framearray_cli.job.read import job_of_table, job_table, read_job
+from framearray_cli.job.times import Almanac
 from framearray_cli.render.render import render
 from framearray_cli.scene.paths.paths import lights
-from framearray_cli.scene.paths.sun import daylight, sun_at, sun_path
+from framearray_cli.scene.paths.sun import SunPath, daylight, directions_to_sun, sun_at, sun_path
 
-pytest.importorskip("pvlib", reason="the extra `sun` is not installed")
-
+ALMANACS = ("ephem", "pvlib")
 WANTED = 0.1  # degrees
+AGREED = 0.02  # degrees: both are good to 0.005 against the published values
 # UTC, latitude, longitude, azimuth and zenith angle as published, degrees.
 NREL_REPORT = [("2003-10-17T19:30:30", 39.742476, -105.1786, 194.34024, 50.11162)]  # [Reda04], its worked example
 # Made by NREL's own program spa.c, with refraction; published as test data of the library solarpositioning.
@@ -66,13 +67,33 @@ def angle(azimuth: float, other: float) -> float:
     return abs((azimuth - other + 180) % 360 - 180)
 
 
+@pytest.fixture(params=ALMANACS)
+def almanac(request: pytest.FixtureRequest) -> Almanac:
+    if request.param == "pvlib":
+        pytest.importorskip("pvlib", reason="the extra `sun` is not installed")
+    return request.param
+
+
 @pytest.mark.parametrize("case", NREL_REPORT + NREL_PROGRAM + NAVAL_OBSERVATORY)
-def test_the_sun_stands_where_it_was_published(case: tuple[str, float, float, float, float]) -> None:
+def test_the_sun_stands_where_it_was_published(case: tuple[str, float, float, float, float], almanac: Almanac) -> None:
     when, latitude, longitude, azimuth, zenith = case
-    sun = sun_at([datetime.fromisoformat(f"{when}+00:00")], latitude, longitude)
+    sun = sun_at([datetime.fromisoformat(f"{when}+00:00")], latitude, longitude, almanac)
     assert abs(90 - float(sun.elevation_deg[0]) - zenith) < WANTED
     # near the zenith an azimuth says little: what counts is the angle on the sky
     assert angle(float(sun.azimuth_deg[0]), azimuth) * math.sin(math.radians(zenith)) < WANTED
+
+
+@pytest.mark.parametrize("year", [1000, 1581, 1900, 2026, 2999])
+def test_both_almanacs_agree(year: int) -> None:
+    """At all hours of a day, whether the sun is up, and whichever calendar a library takes a date for."""
+    pytest.importorskip("pvlib", reason="the extra `sun` is not installed")
+    times = [datetime(year, 10, 9, tzinfo=UTC) + timedelta(hours=k) for k in range(24)]
+    one, other = (_directions(sun_at(times, -33.9, 151.2, almanac)) for almanac in ALMANACS)
+    assert np.degrees(np.linalg.norm(one - other, axis=1)).max() < AGREED
+
+
+def _directions(sun: SunPath) -> Float64:
+    return directions_to_sun(sun, np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]))
 
 
 def test_true_elevations_would_fail() -> None:
@@ -145,15 +166,15 @@ def test_a_sun_has_a_colour() -> None:
     np.testing.assert_allclose(warm.intensity, plain.intensity * black_body(3200.0))
 
 
-def test_a_day_has_its_published_length() -> None:
+def test_a_day_has_its_published_length(almanac: Almanac) -> None:
     """Almanacs say 04:43 to 21:33 for Berlin, from and to the upper rim of the disc.
 
     Here it is the centre that shines, 0.267 degrees lower. The sun climbs 15 cos(latitude) sin(azimuth) = 6.9 degrees
     per hour, so that is 2.3 minutes; whole minutes within that are 04:46 to 21:30.
     """
-    assert daylight("2026-06-21", "Europe/Berlin", (52.52, 13.405)) == "04:46 to 21:30"
-    assert daylight("2026-12-21", 1, (78.22, 15.65)) == "never"
-    assert daylight("2026-06-21", 2, (78.22, 15.65)) == "00:00 to 23:59"
+    assert daylight("2026-06-21", "Europe/Berlin", (52.52, 13.405), almanac) == "04:46 to 21:30"
+    assert daylight("2026-12-21", 1, (78.22, 15.65), almanac) == "never"
+    assert daylight("2026-06-21", 2, (78.22, 15.65), almanac) == "00:00 to 23:59"
 
 
 def test_a_sun_that_is_down_all_the_time_is_refused_with_the_hours_of_the_day() -> None:
@@ -204,23 +225,19 @@ def test_toml_dates_and_times_mean_the_same_as_text(tmp_path: Path) -> None:
     assert Job.model_validate(job_table(read)).light == read.light  # a round trip
 
 
-@pytest.fixture
-def no_pvlib(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    original = builtins.__import__
-
-    def missing(name: str, *more: Any, **also: Any) -> Any:
-        if name.partition(".")[0] == "pvlib":
-            raise ImportError(name)
-        return original(name, *more, **also)
-
-    monkeypatch.setattr(builtins, "__import__", missing)
-    yield
+@pytest.mark.parametrize(("almanac", "install"), [("pvlib", r".*\[sun\]\""), ("ephem", "ephem")])
+def test_without_its_library_the_almanac_is_named(almanac: str, install: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, almanac, None)
+    with pytest.raises(MissingExtraError, match=rf"needs {almanac}, which is not installed; .*pip install {install}$"):
+        lights(job(almanac=almanac))
 
 
-@pytest.mark.usefixtures("no_pvlib")
-def test_without_the_library_it_is_named() -> None:
-    with pytest.raises(MissingExtraError, match=r'pip install .*\[sun\]"'):
-        lights(job())
+def test_an_array_without_the_key_has_pvlibs_sun() -> None:
+    """The tables of jobs, and so the fingerprints, that arrays from before there was a choice have."""
+    old, new = job(almanac="pvlib"), job()
+    assert [job_table(each)["light"]["sources"][0].get("almanac") for each in (old, new)] == [None, "ephem"]
+    for each in (old, new):
+        assert job_of_table(job_table(each), Path("job"), each.output.directory).light == each.light
 
 
 @pytest.mark.parametrize("group", [None, "sun"])
@@ -229,8 +246,11 @@ def test_an_array_records_the_sun_and_is_dark_before_it_rises(group: str | None,
     wanted = job(
         3, scene={"file": str(tmp_path / "tiny.glb")}, start="02:00", stop="12:00", group=group, irradiance=6.0
     )
-    output = wanted.output.model_copy(update={"directory": tmp_path / "out"})
-    render(wanted.model_copy(update={"output": output}))
+    wanted = wanted.model_copy(update={"output": wanted.output.model_copy(update={"directory": tmp_path / "out"})})
+    render(wanted)
+    other = wanted.light.sources[0].model_copy(update={"almanac": "pvlib"})
+    with pytest.raises(OutputError, match=r'light\.sources\[0\]\.almanac: "ephem" there, "pvlib" now'):
+        render(wanted.model_copy(update={"light": wanted.light.model_copy(update={"sources": (other,)})}))
     manifest = read_manifest(tmp_path / "out")
     noted = manifest.groups[0].lights if group else manifest.lights
     sources = [light.sources[0] for light in noted]
