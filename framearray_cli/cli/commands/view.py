@@ -19,32 +19,40 @@ if TYPE_CHECKING:
 
 MOST_PROBLEMS = 5  # named one by one
 
+Target = Annotated[
+    str | None, typer.Option("--export", help="Write the page as files for any web server.", metavar="FOLDER")
+]
+Cache = Annotated[
+    str | None, typer.Option("--cache", help="Folder for prepared pictures; default: OUT/.view.", metavar="FOLDER")
+]
+Looks = Annotated[
+    list[str] | None,
+    typer.Option("--view", help="Look that the page offers: aces, or a view of $OCIO; repeatable.", metavar="VIEW"),
+]
+
 
 def view(
     array: ArrayFolder,
-    target: Annotated[
-        str | None,
-        typer.Option("--export", help="Write the page as files for any web server.", metavar="FOLDER"),
-    ] = None,
+    target: Target = None,
     port: Annotated[int, typer.Option("--port", parser=whole(0, 65535), help="Port; 0: a free one.", metavar="N")] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
-    cache: Annotated[
-        str | None,
-        typer.Option("--cache", help="Folder for prepared pictures; default: OUT/.view.", metavar="FOLDER"),
-    ] = None,
+    cache: Cache = None,
     environment: Environment = None,
+    looks: Looks = None,
     threads: ThreadsOfNoJob = None,
     force: Force = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Walk through a frame array in the browser."""
+    from framearray_cli.tools.display import find_view
     from framearray_cli.tools.view.run import open_tiles, show_page, write_page
 
     from ..array_results import PageResult, ServerResult
 
     workers = threads or available_cores()
-    tiles = open_tiles(array, output_path(cache, "--cache") if cache is not None else None, workers, environment)
+    folder = output_path(cache, "--cache") if cache is not None else None
+    tiles = open_tiles(array, folder, workers, environment, [find_view(name) for name in looks or ()])
     with Screen(err, quiet=quiet) as screen:
         screen.say(f"warning: {text}" for text in (tiles.turning.warnings if tiles.turning else ()))
         screen.say(_lacking_lines(tiles, "the page marks them" if target else "the page shows them as they come"))

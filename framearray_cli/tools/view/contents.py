@@ -6,6 +6,7 @@ stamp     digest of all below
 lacking   number of cameras that lack images, and their ranges as text
 streams   by key: "stamps", one text per camera that changes with its sources, "" where none is there; "missing",
 by camera, for those of which some sources are there: first and last light position of each gap
+views     only where the page offers some: see `shaders`
 """
 
 import json

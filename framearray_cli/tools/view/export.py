@@ -10,6 +10,7 @@ from framearray_cli.base.files import reason, whole_folder
 
 from .contents import CONTENTS_FILE
 from .page import page_files
+from .shaders import VIEWS_FOLDER
 from .tiles import INDEX_FILE, TILES_FOLDER, Tiles
 
 
@@ -22,7 +23,7 @@ def check_target(target: Path, *, force: bool = True) -> None:
     Raises:
         OutputError: the folder holds other files, or cannot be read.
     """
-    ours = {INDEX_FILE, CONTENTS_FILE, TILES_FOLDER, *page_files()}
+    ours = {INDEX_FILE, CONTENTS_FILE, TILES_FOLDER, VIEWS_FOLDER, *page_files()}
     try:
         found = sorted(entry.name for entry in target.iterdir()) if os.path.exists(target) else []
     except OSError as error:
@@ -49,7 +50,9 @@ def export_page(tiles: Tiles, target: Path) -> int:
     """
     check_target(target)
     with whole_folder(target, replace=True) as part:
-        for name, data in page_files().items():
+        if tiles.views.files:
+            (part / VIEWS_FOLDER).mkdir()
+        for name, data in (page_files() | tiles.views.files).items():
             (part / name).write_bytes(data)
         shutil.copyfile(tiles.folder / INDEX_FILE, part / INDEX_FILE)
         (part / CONTENTS_FILE).write_text(json.dumps(tiles.contents(live=False)))

@@ -3,25 +3,30 @@
 import os
 import threading
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from pathlib import Path
 
-from framearray_cli.array.images.images import require_writer
+from framearray_cli.array.images.images import format_name, require_writer
 from framearray_cli.array.manifest_toml import read_manifest
-from framearray_cli.base.errors import OutputError
+from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import make_folder
 
+from ..display import View
 from .export import check_target, export_page
 from .server import PageServer
+from .shaders import page_views
+from .streams import is_clipped, streams_of
 from .tiles import Tiles
 from .turning import KEY, make_turning
 
 CACHE_FOLDER = ".view"  # of the tiles, beside the images
 
 
-def open_tiles(out: Path, cache: Path | None, threads: int, environment: Path | None = None) -> Tiles:
+def open_tiles(
+    out: Path, cache: Path | None, threads: int, environment: Path | None = None, views: Sequence[View] = ()
+) -> Tiles:
     """Read an array's manifest and open its tiles.
 
     Args:
@@ -29,19 +34,27 @@ def open_tiles(out: Path, cache: Path | None, threads: int, environment: Path | 
         cache: folder of the tiles; None: beside the images.
         threads: that read images at once.
         environment: map that lights the pictures, and turns, in place of light positions.
+        views: that the page offers, the one that it starts with first.
 
     Raises:
+        JobError: the array's images are clipped for screens already, or a view has no shader.
         OutputError: the manifest or the map cannot be read, the array cannot be lit by a map, or the folder cannot be
             written to.
     """
     manifest = read_manifest(out)
     turning = make_turning(manifest, environment) if environment is not None else None
     require_writer("jpg")
+    if views and turning is None and is_clipped(manifest, streams_of(manifest)[0]):
+        kind = format_name(manifest.images).upper()
+        raise JobError(
+            "--view", [f"{manifest.directory}: its images are {kind}, clipped at 1 already; render EXR for views"]
+        )
+    shaders = page_views(views)
     folder = manifest.directory / CACHE_FOLDER if cache is None else cache
     folder = folder / KEY if turning else folder
     try:
         make_folder(folder)
-        return Tiles(manifest, folder, threads, turning=turning)
+        return Tiles(manifest, folder, threads, turning=turning, views=shaders)
     except OutputError as error:
         if cache is None:
             error.add_note("--cache FOLDER keeps what the page needs elsewhere")

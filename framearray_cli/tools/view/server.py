@@ -106,6 +106,8 @@ class _Handler(BaseHTTPRequestHandler):
         if path == f"/{CONTENTS_FILE}":
             return self.server.contents(), "application/json"
         name = path.removeprefix("/") or "index.html"
+        if name in tiles.views.files:
+            return tiles.views.files[name], content_type(name)
         if name not in self.server.page:
             raise OutputError(f"{path}: no such file")
         return self.server.page[name], content_type(name)

@@ -149,7 +149,7 @@ def choose_coding(manifest: Manifest, stream: Stream, read: ReadPicture) -> Codi
     """Choose the coding of a stream from a sample of those of its pictures that exist."""
     if stream.key == "normal" and stream.role == "layer":
         return Coding(scale=0.0, low=-1.0, high=1.0)
-    if _is_clipped(manifest, stream):
+    if is_clipped(manifest, stream):
         return PLAIN_CODING
     largest = max((float(values.max()) for values in _sample_values(manifest, stream, read)), default=0.0)
     if not is_exposed(stream):
@@ -170,7 +170,7 @@ def _sample_values(manifest: Manifest, stream: Stream, read: ReadPicture) -> Ite
             continue
 
 
-def _is_clipped(manifest: Manifest, stream: Stream) -> bool:
+def is_clipped(manifest: Manifest, stream: Stream) -> bool:
     """Return whether the array's images clip radiance at 1."""
     return (
         stream.role not in ("layer", "environment") and format_name(source_file(manifest, stream, 0, 0)) in FOR_SCREENS

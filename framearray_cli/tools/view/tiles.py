@@ -32,6 +32,7 @@ from framearray_cli.base.files import reason, write_bytes
 from .coding import Coding, encode
 from .contents import contents_table, scan_sources
 from .index import index_table, sheet_layout
+from .shaders import PageViews
 from .stamps import Source, is_fresh, source_of, stamp_of, write_tile
 from .streams import Stream, choose_coding, layer_streams, read_values, source_name, streams_of
 from .turning import Turning, make_turning
@@ -60,18 +61,20 @@ class Tiles:
         *,
         discard: bool = True,
         turning: Turning | None = None,
+        views: PageViews = PageViews(),  # noqa: B008  # frozen
     ) -> None:
         """Choose the codings, and write the index.
 
         Args:
             discard: delete tiles of other codings, which nobody may be making meanwhile.
             turning: environment that lights the pictures in place of light positions.
+            views: that the page offers.
 
         Raises:
             OutputError: the folder cannot be written to.
         """
         self.manifest, self.folder, self._threads = manifest, folder, threads
-        self.turning = turning
+        self.turning, self.views = turning, views
         self._read_turned = self.turning.reader() if self.turning else None
         self._read_layers = lru_cache(KEPT_LAYER_FILES)(read_layers)
         self._manifest_source = source_of(manifest.directory / FILE_NAME)
@@ -99,7 +102,8 @@ class Tiles:
                 return [self.turning.source(c, found.get)] * stream.n
             return [found.get(source_name(self.manifest, stream, c, l)) for l in range(stream.n)]
 
-        return contents_table(self.manifest.n_cameras, self.streams, sources_of, self._digest, live=live)
+        table = contents_table(self.manifest.n_cameras, self.streams, sources_of, self._digest, live=live)
+        return table | ({"views": self.views.table} if self.views.table else {})
 
     @property
     def _layers(self) -> list[Stream]:
@@ -121,7 +125,7 @@ class Tiles:
         if same and (found <= before or found < 2 * before):
             return self
         turning = make_turning(manifest, self.turning.file) if self.turning else None
-        return Tiles(manifest, self.folder, self._threads, discard=False, turning=turning)
+        return Tiles(manifest, self.folder, self._threads, discard=False, turning=turning, views=self.views)
 
     def _with_codings(self) -> list[Stream]:
         manifest = self.manifest

@@ -7,6 +7,7 @@ export class Controls {
     this.array = array;
     this.update = []; // functions that set a control to a view
     this.layers(changed);
+    this.views(changed);
     this.exposure(changed);
     this.axes(changed);
     this.groups(changed);
@@ -29,6 +30,16 @@ export class Controls {
       this.update.push((view) => (input.checked = view.show === key));
       box.append(holder);
     }
+  }
+
+  views(changed) {
+    const { views } = this.array.contents;
+    if (!views) return;
+    const select = document.getElementById("view");
+    select.closest("label").hidden = false;
+    for (const { name, label } of views) select.append(element("option", { value: name }, label));
+    select.addEventListener("change", () => changed((view) => (view.look = select.value)));
+    this.update.push((view) => (select.value = view.look));
   }
 
   exposure(changed) {

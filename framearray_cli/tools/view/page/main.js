@@ -23,13 +23,16 @@ const RETRY_AFTER = 5000; // ms, if there is no picture
 const byId = (id) => document.getElementById(id);
 
 class Page {
-  constructor(array) {
+  // modules: those that only some pages need, loaded.
+  constructor(array, { Views }) {
     this.array = array;
     this.view = fromHash(array, location.hash);
+    const { views } = array.contents;
+    this.views = views && new Views(views, () => this.viewLoaded());
     this.store = new Store(memoryBudget(), (url) => this.arrived(url));
     this.store.want(loadOrder(array, this.view, [0, 0], false));
     this.picture = new Picture(byId("picture"), array.resolution); // takes 0.2 s without a graphics card, while tiles load
-    this.map = new ColourMap(array);
+    this.map = new ColourMap(array, (...colours) => this.encode(...colours));
     this.listSheets();
     this.path = new Path();
     this.isDrawing = false;
@@ -137,6 +140,21 @@ class Page {
     byId("memory").value = `${Math.round((this.store.bytes + this.picture.bytes) / 2 ** 20)} MiB`;
   }
 
+  // The shader of the view: null for sRGB, undefined while it is loaded.
+  get shader() {
+    return this.views ? this.views.get(this.view.look) : null;
+  }
+
+  // Return the codes of radiance, (height, width, 3) -> (height, width, 4), by a view; null: by the sRGB curve.
+  encode(radiance, width, height) {
+    return this.shader ? this.picture.encode(radiance, width, height, this.shader) : null;
+  }
+
+  viewLoaded() {
+    this.map.changed = true;
+    this.dirty();
+  }
+
   // Draw the view from full tiles, or else small ones; without either the last drawing stays. What is not there yet is
   // drawn as a blank.
   drawPicture() {
@@ -158,8 +176,9 @@ class Page {
       return { ...part, url: sheet, bitmap: small, part: array.smallPart(part.stream, part.l) };
     });
     this.showProblem(parts);
-    if (!level) return;
-    this.picture.draw(parts, view.exposure + array.exposure);
+    const { shader } = this;
+    if (!level || shader === undefined) return;
+    this.picture.draw(parts, view.exposure + array.exposure, shader);
     if (this.measures) this.picture.pixels(1); // waits for the drawing
     this.level = level;
     const step = this.steps.at(-1);
@@ -173,7 +192,7 @@ class Page {
   showProblem(parts) {
     const full = parts.map((part) => this.array.fullUrl(part.stream, this.view.c, part.l));
     const wrong = full.map((url) => this.store.missing.get(url)).find((text) => text);
-    this.showNote(wrong ? `No picture here. ${wrong}` : "");
+    this.showNote(wrong ? `No picture here. ${wrong}` : this.views?.problems.get(this.view.look) ?? "");
     if (wrong) this.retry ??= setTimeout(() => this.retryMissing(), RETRY_AFTER);
   }
 
@@ -277,7 +296,7 @@ class Page {
 // All that the pad's background depends on: the view without the place on the pad.
 function groundLook(array, view) {
   const others = array.others.map((axis) => view.places[axis.name]);
-  return JSON.stringify([view.show, view.exposure, view.tints, view.ambient, others]);
+  return JSON.stringify([view.show, view.look, view.exposure, view.tints, view.ambient, others]);
 }
 
 function figure(value) {
@@ -285,7 +304,8 @@ function figure(value) {
 }
 
 try {
-  const page = new Page(await loadArray());
+  const array = await loadArray();
+  const page = new Page(array, array.contents.views ? await import("./views.js") : {});
   globalThis.framearray = page; // for the console, and for tests
 } catch (error) {
   byId("note").hidden = false;

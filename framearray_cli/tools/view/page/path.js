@@ -89,9 +89,10 @@ export class Path {
   // Return the path file, see docs/guide/movies.md.
   toToml(array, view) {
     const exposure = view.exposure ? ` --exposure ${round(view.exposure)}` : "";
+    const look = view.look === "srgb" ? "" : ` --view ${JSON.stringify(view.look)}`;
     const lines = [
       "# Drawn on the pad of `framearray view`. Make a movie of it:",
-      `#     framearray assemble OUT THIS_FILE -o movie.mp4${exposure}`,
+      `#     framearray assemble OUT THIS_FILE -o movie.mp4${exposure}${look}`,
       `fps = ${number(array.fps)}`,
       'positions = "nearest"',
     ];

@@ -8,9 +8,15 @@ export function firstView(array) {
     places: Object.fromEntries(array.axes.map((axis) => [axis.name, 0])),
     show: "picture",
     exposure: 0,
+    look: firstLook(array),
     tints: Object.fromEntries(array.tinted.map((name) => [name, { ...PLAIN }])),
     ambient: { ...PLAIN },
   };
+}
+
+// The view that the page starts with.
+function firstLook(array) {
+  return array.contents.views?.[0].name ?? "srgb";
 }
 
 export function toHash(array, view) {
@@ -18,6 +24,7 @@ export function toHash(array, view) {
   words.set("camera", view.c);
   for (const { name } of array.axes) words.set(name === array.main.name ? "light" : `axis.${name}`, view.places[name]);
   if (view.show !== "picture") words.set("show", view.show);
+  if (view.look !== firstLook(array)) words.set("view", view.look);
   if (view.exposure) words.set("exposure", round(view.exposure));
   for (const [name, tint] of Object.entries(view.tints)) if (isTinted(tint)) words.set(`group.${name}`, tintText(tint));
   if (isTinted(view.ambient)) words.set("ambient", tintText(view.ambient));
@@ -33,6 +40,7 @@ export function fromHash(array, hash) {
     view.places[name] = index(words.get(name === array.main.name ? "light" : `axis.${name}`), n);
   }
   if (array.layers.some((layer) => layer.key === words.get("show"))) view.show = words.get("show");
+  if (array.contents.views?.some(({ name }) => name === words.get("view"))) view.look = words.get("view");
   const exposure = Number(words.get("exposure"));
   if (Math.abs(exposure) <= 16) view.exposure = exposure;
   for (const name of Object.keys(view.tints)) view.tints[name] = tintOf(words.get(`group.${name}`));

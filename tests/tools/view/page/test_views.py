@@ -1,0 +1,122 @@
+"""Views of OpenColorIO on the page: its shaders against its own processor."""
+
+import json
+from base64 import b64decode, b64encode
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from support import handmade
+from support.chromium import Shown, shown
+from support.studio import write_studio
+
+from framearray_cli.array.images.png import read_codes
+from framearray_cli.base.arrays import Bytes, Image
+from framearray_cli.tools.display import View, find_view
+from framearray_cli.tools.view.coding import decode
+from framearray_cli.tools.view.run import open_server, open_tiles
+from framearray_cli.tools.view.server import PageServer
+
+NAMES = ("aces", "Film", "Screen/Sharp")  # by formulas and tables of one dimension; of three, linear and in tetrahedra
+SIZE = (128, 96)
+
+
+@pytest.fixture(scope="module")
+def views(tmp_path_factory) -> list[View]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("OCIO", str(write_studio(tmp_path_factory.mktemp("studio"))))
+        return [find_view(name) for name in NAMES]
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory, views) -> Iterator[PageServer]:
+    manifest = handmade.plain(tmp_path_factory.mktemp("views"), n_c=2, n_l=2, layers=False)
+    with open_server(open_tiles(manifest.directory, None, 1, None, views)) as server:
+        yield server
+
+
+def colours() -> Image:
+    """Radiance as in pictures and beyond: dark, bright, pure, black, too bright."""
+    rng = np.random.default_rng(2)
+    width, height = SIZE
+    image = np.exp(rng.normal(-1.5, 2.0, (height, width, 1))) * rng.uniform(0, 1, (height, width, 3))
+    image[0, :6] = [[0, 0, 0], [1, 0, 0], [0, 1e-6, 0], [1e4, 1e4, 1e4], [0, 0, 5], [64, 0, 64]]
+    image[1] = np.linspace(0, 4, width)[:, None]
+    return np.asarray(image, np.float32)
+
+
+def encoded(page: Shown, image: Image) -> Bytes:
+    """Return the codes of radiance by the shader of the page's view."""
+    height, width, _ = image.shape
+    page.wait("framearray.shader")
+    text = page.get(
+        f"""(() => {{
+        const bytes = Uint8Array.from(atob('{b64encode(image.tobytes()).decode()}'), (one) => one.charCodeAt(0));
+        const codes = framearray.encode(new Float32Array(bytes.buffer), {width}, {height});
+        return btoa(codes.reduce((all, x) => all + String.fromCharCode(x), '')); }})()"""
+    )
+    return np.frombuffer(b64decode(text), np.uint8).reshape(height, width, 4)[..., :3]
+
+
+def codes_of(view: View, image: Image) -> Image:
+    return np.rint(255 * view.encode(image))
+
+
+def test_the_page_shows_views_as_opencolorio_does(browser, served, views):
+    """At most one code different, for any radiance; and the picture on the screen is that of its tile."""
+    with shown(browser, f"{served.url}#camera=1&light=1&exposure=-1") as page:
+        assert page.get("framearray.view.look") == "aces", "the first that was asked for"
+        tile = read_codes(served.tiles.ensure_tile("light", 1, 1))
+        radiance = decode(tile, served.tiles.streams[0].coding) / np.float32(2)
+        image, seen = colours(), {}
+        for view in views:
+            page.page.locator("#view").select_option(view.name)
+            page.settle()
+            error = np.abs(encoded(page, image) - codes_of(view, image))
+            assert error.max() <= 1, view.name
+            assert np.abs(encoded(page, image * np.float32(1.05)) - codes_of(view, image)).max() > 1, "can fail"
+            page.wait("framearray.level === 2 && !framearray.isDirty")
+            seen[view.name] = page.pixels().astype(float)
+            # decoders of JPEG may differ by a code, of which a view makes up to a few
+            apart = np.abs(seen[view.name] - codes_of(view, radiance))
+            assert np.percentile(apart, 99) <= 2 and apart.mean() < 0.5
+            other = next(one for one in views if one is not view)
+            assert np.abs(seen[view.name] - codes_of(other, radiance)).mean() > 1
+        page.page.locator("#view").select_option("srgb")
+        assert not np.array_equal(page.pixels(), seen["aces"])
+        page.page.locator("#pad").focus()
+        page.page.keyboard.press("v")  # from the last to the first
+        assert np.array_equal(page.pixels(), seen["aces"])
+        page.page.keyboard.press("v")
+        page.settle()
+        page.page.wait_for_timeout(400)  # until the address follows
+        assert "view=Film" in page.get("location.hash")
+        page.check(served.url)
+
+
+def test_the_pad_has_the_colours_of_the_view(browser, served, views):
+    with shown(browser, served.url) as page:
+        page.all_loaded()
+        page.wait("framearray.shader && !framearray.isDirty && !framearray.map.changed")
+        image = np.full((2, 2, 3), 0.3, np.float32)
+        page.get("framearray.map.means.get('light').fill(0.3), framearray.map.changed = true, framearray.dirty()")
+        page.wait("!framearray.map.changed")
+        pad = page.get("[...framearray.map.canvas.getContext('2d').getImageData(0, 0, 2, 2).data]")
+        assert np.abs(np.reshape(pad, (2, 2, 4))[..., :3] - codes_of(views[0], image)).max() <= 1
+
+
+def test_a_page_without_views_loads_nothing_of_them(browser, plain):
+    with shown(browser, f"{plain.url}#view=aces") as page:
+        assert page.get("framearray.view.look") == "srgb"
+        assert not page.page.locator("#view").is_visible()
+        assert [url for url in page.requests if "views" in url] == []
+
+
+def test_a_link_names_the_view_and_a_broken_file_is_reported(browser, served):
+    with shown(browser, f"{served.url}#view=Screen%2FSharp") as page:
+        assert page.get("framearray.view.look") == "Screen/Sharp"
+        table = page.get("framearray.array.contents.views")
+        assert [row["name"] for row in table] == [*NAMES, "srgb"], json.dumps(table)
+        page.page.route("**/views/*.bin", lambda route: route.abort())
+        page.page.locator("#view").select_option("Film")
+        page.wait("document.getElementById('note').textContent.startsWith('View Film: cannot be loaded')")
