@@ -124,7 +124,7 @@ class Decoded:
 
 def decoded(movie: Path) -> Decoded:
     """Read a movie with a program that is not ours: FFmpeg or Pillow."""
-    return _animation(movie) if movie.suffix in (".gif", ".webp") else _video(movie)
+    return _animation(movie) if movie.suffix in (".gif", ".webp", ".avif") else _video(movie)
 
 
 def _video(movie: Path) -> Decoded:

@@ -39,7 +39,7 @@ Target = Annotated[
     typer.Option(
         "--output",
         "-o",
-        help="Movie: .mp4, .webm, .mkv, .mov, .gif, .webp; or a sequence: frame.####.png.",
+        help="Movie: .mp4, .webm, .mkv, .mov, .gif, .webp, .avif; or a sequence: frame.####.png.",
         metavar="FILE",
         show_default=False,
     ),

@@ -1,13 +1,13 @@
-"""Write GIF and WebP animations: Pillow encodes each picture, this module joins them.
+"""Write GIF, WebP and AVIF animations: Pillow encodes each picture, this module joins them; `avif` hands it all.
 
-Pillow's own animations merge equal neighbours and keep all pictures in memory; here every frame is written as one.
+Pillow's own GIF and WebP merge equal neighbours and keep all pictures in memory; here every frame is written as one.
 Formats: GIF89a, and Google's "WebP Container Specification".
 """
 
 import io
 import struct
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -20,13 +20,15 @@ from framearray_cli.base.errors import MissingExtraError, OutputError
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.files import whole_file
 
+from .avif import open_avif, require_avif
+
 GIF_UNITS, WEBP_UNITS = 100, 1000  # of time, per second
 GIF_FASTEST = 50  # frames per second; browsers play faster animations at a tenth of their rate
 WEBP_LARGEST = 16383  # pixels
 WEBP_LONGEST = 2**24 - 1  # ms of one frame
 WEBP_OPTIONS = {"quality": 90, "method": 4}  # method: 0 fast to 6 small
 WEBP_FILE_MOST = 2**32 - 10  # bytes
-ANIMATIONS = (".gif", ".webp")
+ANIMATIONS = (".gif", ".webp", ".avif")
 
 
 def delays(n: int, fps: Fraction, units: int) -> list[int]:
@@ -42,10 +44,12 @@ def require_animation(suffix: str) -> None:
         suffix: one of ANIMATIONS.
 
     Raises:
-        MissingExtraError: Pillow is built without WebP.
+        MissingExtraError: Pillow is built without it.
     """
     import PIL.features
 
+    if suffix == ".avif":
+        require_avif()
     if suffix == ".webp" and not PIL.features.check("webp"):
         raise MissingExtraError(
             "Pillow is built without WebP here; choose another kind, or install a build that has it with: "
@@ -89,23 +93,29 @@ def open_animation(target: Path, width: int, height: int, fps: Fraction, n_frame
     Raises:
         OutputError: the system refuses to write, or the format cannot hold the animation.
     """
-    gif = target.suffix.lower() == ".gif"
-    form: _Format = _Gif() if gif else _WebP()
+    suffix = target.suffix.lower()
+    gif = suffix == ".gif"
     lengths = delays(n_frames, fps, GIF_UNITS if gif else WEBP_UNITS)
     if gif and fps > GIF_FASTEST:
         raise OutputError(
             f"{target}: expected at most {GIF_FASTEST} frames per second, got {float(fps):g}: viewers play faster GIFs "
             "too slowly; choose another rate or .webp"
         )
-    if not gif and (max(width, height) > WEBP_LARGEST or max(lengths) > WEBP_LONGEST):
+    if suffix == ".webp" and (max(width, height) > WEBP_LARGEST or max(lengths) > WEBP_LONGEST):
         raise OutputError(
             f"{target}: WebP holds up to {WEBP_LARGEST} pixels per side, and {WEBP_LONGEST} ms per frame; choose "
             "another format"
         )
-    with whole_file(target) as part, part.open("wb") as file:
+    with whole_file(target) as part, part.open("wb") as file, _open_format(suffix) as form:
         form.begin(file, width, height)
         yield AnimationWriter(file, form, iter(lengths))
         form.end(file)
+
+
+def _open_format(suffix: str) -> AbstractContextManager[_Format]:
+    if suffix == ".avif":
+        return open_avif()
+    return nullcontext(_Gif() if suffix == ".gif" else _WebP())
 
 
 class _Gif:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import PIL.features
 import pytest
 from support.movies import Decoded, barred, decoded, path_file, plain, rms
 
@@ -17,7 +18,9 @@ from framearray_cli.tools.movie.yuv import planes_422_10
 
 pytest.importorskip("av")
 
-CONTAINERS = (".mp4", ".mkv", ".webm", ".mov", ".gif", ".webp")
+AVIF = (".avif",) if "avif" in PIL.features.modules and PIL.features.check("avif") else ()  # since Pillow 11.3
+CONTAINERS = (".mp4", ".mkv", ".webm", ".mov", ".gif", ".webp", *AVIF)
+UNITS = {".gif": Fraction(1, 100), ".webp": Fraction(1, 1000), ".avif": Fraction(1, 1000)}
 PATH = """
 [[segments]]
 frames = 4
@@ -104,11 +107,10 @@ def test_rates_of_videos_are_exact(array: Path, tmp_path: Path, suffix: str, fps
         assert [k / rate for k in range(13)] == list(movie.times)
 
 
-@pytest.mark.parametrize(("suffix", "unit"), [(".gif", Fraction(1, 100)), (".webp", Fraction(1, 1000))])
+@pytest.mark.parametrize("suffix", [".gif", ".webp", *AVIF])
 @pytest.mark.parametrize("fps", [23.976, 24, 30, 48])
-def test_animations_are_as_long_as_they_should_be(
-    array: Path, tmp_path: Path, suffix: str, unit: Fraction, fps: float
-) -> None:
+def test_animations_are_as_long_as_they_should_be(array: Path, tmp_path: Path, suffix: str, fps: float) -> None:
+    unit = UNITS[suffix]
     path = path_file(tmp_path, f"fps = {fps}\n[[segments]]\nframes = 25\ncamera = [0, 4]\nhold = 0.5\n")
     result = assemble_movie(array, path, tmp_path / f"m{suffix}")
     movie = decoded(tmp_path / f"m{suffix}")
@@ -130,6 +132,27 @@ def test_animations_and_sequences_need_no_pyav(array: Path, tmp_path: Path, monk
         assert assemble_movie(array, path, tmp_path / name).n_frames == 2
     with pytest.raises(MissingExtraError, match=r"pip install .*\[movie\]"):
         assemble_movie(array, path, tmp_path / "m.mov")
+
+
+@pytest.mark.skipif(not AVIF, reason="needs Pillow 11.3 or newer, with AVIF")
+def test_ffmpeg_reads_our_avif(array: Path, tmp_path: Path) -> None:
+    """Every frame, equal ones too, at its time."""
+    import av
+
+    assemble_movie(array, path_file(tmp_path, PATH), tmp_path / "m.avif")
+    with av.open(str(tmp_path / "m.avif")) as container:
+        frames = list(container.decode(video=len(container.streams.video) - 1))  # the first is the still picture
+    assert len(frames) == len(SHOWN)
+    assert [round(24 * frame.time) for frame in frames] == list(range(len(SHOWN)))
+    for frame, place in zip(frames, SHOWN, strict=True):
+        found = errors(frame.to_ndarray(format="rgb24"))
+        assert min(found, key=lambda other: found[other]) == place
+
+
+def test_an_old_pillow_says_what_avif_needs(array: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(PIL.features.modules, "avif", raising=False)
+    with pytest.raises(MissingExtraError, match=r"AVIF needs Pillow 11\.3 or newer.*pip install --upgrade 'Pillow>=11"):
+        assemble_movie(array, path_file(tmp_path, PATH), tmp_path / "m.avif")
 
 
 def test_ffmpeg_reads_our_gif_as_pillow_does(movies: dict[str, Decoded], array: Path, tmp_path: Path) -> None:
@@ -157,7 +180,7 @@ def test_odd_sizes(tmp_path: Path, suffix: str) -> None:
         tmp_path / "out", path_file(tmp_path, "[[segments]]\nframes = 2\ncamera = [0, 1]\n"), tmp_path / f"m{suffix}"
     )
     for c, frame in enumerate(decoded(tmp_path / f"m{suffix}").frames):
-        grows = {".gif": (21, 33), ".webp": (21, 33), ".mov": (21, 34)}.get(suffix, (22, 34))
+        grows = (dict.fromkeys(UNITS, (21, 33)) | {".mov": (21, 34)}).get(suffix, (22, 34))
         assert frame.shape == (*grows, 3)
         assert rms(frame[:21, :33], srgb8_from_linear(barred(c, 0, 33, 21))) < 20
 
