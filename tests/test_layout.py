@@ -43,6 +43,7 @@ DOORS = {
     "flip_evaluator": ("report/flip",),
     "typer": ("cli/",),
     "rich": ("cli/screen",),
+    "opentimelineio": ("tools/movie/otio",),
     "av": ("tools/movie/video",),
     "scipy": ("scene/paths/curves", "engine/images/standard_error", "engine/frames/blocks", "tools/mixing/environment"),
     "psutil": ("base/memory",),

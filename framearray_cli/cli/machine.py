@@ -23,6 +23,7 @@ REQUIRED = {
     "llvmlite": "llvmlite.binding",
     "embreex": "embreex.rtcore_scene",
     "OpenImageIO": "OpenImageIO",
+    "opencolorio": "PyOpenColorIO",
     "Pillow": "PIL.Image",
     "scipy": "scipy",
     "ephem": "ephem",
@@ -37,6 +38,7 @@ EXTRAS = {
     "denoise": ("denoise.obscurance", ("pyoidn",)),
     "sun": ('almanac = "pvlib"', ("pvlib",)),
     "report": ("framearray report", ("matplotlib", "jinja2", "flip_evaluator")),
+    "otio": ("assemble --otio", ("opentimelineio",)),
     "dask": ("render --workers and --dask", ("distributed",)),
 }
 

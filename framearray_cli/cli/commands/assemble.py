@@ -101,6 +101,7 @@ Stops = Annotated[
 View = Annotated[
     str, typer.Option("--view", help="Look: srgb, aces, or a view of the configuration in $OCIO.", metavar="VIEW")
 ]
+Otio = Annotated[bool, typer.Option("--otio", help="Describe a sequence for editing programs, in a file beside it.")]
 Label = Annotated[bool, typer.Option("--label", help="Write camera and light index into each picture.")]
 
 
@@ -124,6 +125,7 @@ def assemble(
     exposure: Stops = 0.0,
     view: View = "srgb",
     label: Label = False,
+    otio: Otio = False,
     strict: Strict = False,
     force: Force = False,
     dry_run: DryRun = False,
@@ -161,7 +163,7 @@ def assemble(
             positions="blend" if blend else None,
             sums=sums,
             progress=screen.counter("assembling", "frame"),
-            warned=warn, force=force, dry_run=dry_run,
+            warned=warn, force=force, dry_run=dry_run, otio=otio,
         )  # fmt: skip
     _print_made(made, target, dry_run=dry_run, quiet=quiet)
 

@@ -29,6 +29,7 @@ from .animation import ANIMATIONS, open_animation, require_animation
 from .label import SMALLEST, typeface
 from .look import Look, screen_codes, shot_label
 from .mixed import mix_timeline
+from .otio import check_otio, write_otio
 from .pathfile import Mode, MoviePath, load_movie_path
 from .sequence import check_earlier, check_look, sequence_pattern, write_sequence
 from .sweep import Sweep, sweep_path
@@ -74,6 +75,7 @@ def assemble_movie(
     warned: Callable[[Sequence[str]], None] = lambda warnings: None,
     force: bool = True,
     dry_run: bool = False,
+    otio: bool = False,
 ) -> AssembleResult:
     """Assemble a movie or an image sequence from a frame array; it appears whole or not at all.
 
@@ -89,11 +91,13 @@ def assemble_movie(
         warned: called once, before the first frame, with what would make the movie useless; may raise an error.
         force: replace an earlier movie, or an earlier sequence that is no longer.
         dry_run: check everything, and write nothing.
+        otio: describe the sequence for editing programs, in a file beside it.
 
     Raises:
         JobError: the path is broken, or asks for places that the array lacks.
         OutputError: an image is missing or damaged, or the target cannot be written.
-        MissingExtraError: a movie needs PyAV, which is not installed, or an encoder or typeface is missing.
+        MissingExtraError: a movie needs PyAV, or a description OpenTimelineIO, which is not installed, or an encoder or
+            typeface is missing.
     """
     manifest = read_manifest(out)
     left_out: list[str] = []
@@ -108,12 +112,16 @@ def assemble_movie(
             raise OutputError(f"{target.parent}: holds the frame array itself; choose another folder")
         check_look(target, look)
     _check_target(target, len(line.shots), force=force)
+    if otio:
+        check_otio(target, is_movie=is_movie, force=force)
     _check_images(pictures, line)
     levels = picture_warnings(pictures, line, look) if is_movie or format_name(target) in FOR_SCREENS else ()
     warned([*left_out, *path_warnings(movie, line), *levels])
     write = _write_movie if is_movie else write_sequence
     if not dry_run:
         write(pictures, line, target, look, progress or (lambda done, total: None))
+    if otio and not dry_run:
+        write_otio(target, line, manifest)
     return AssembleResult(
         target=target if is_movie else target.parent,
         n_frames=len(line.shots),

@@ -17,7 +17,7 @@ from framearray_cli.array.images.images import ImageFormat, read_image, write_im
 from framearray_cli.array.images.png import read_codes
 from framearray_cli.array.manifest import Manifest, image_path
 from framearray_cli.array.pictures import Pictures
-from framearray_cli.base.errors import OutputError
+from framearray_cli.base.errors import MissingExtraError, OutputError
 from framearray_cli.tools.movie import sequence
 from framearray_cli.tools.movie.assemble import assemble_movie
 from framearray_cli.tools.movie.look import Look
@@ -222,3 +222,38 @@ def test_ctrl_c_in_a_process_of_its_own(tmp_path: Path) -> None:
     assert (process.returncode, said) == (130, b"interrupted\n")
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["m.mp4", "out", "path.toml"]
     assert (tmp_path / "m.mp4").read_bytes() == b"an earlier movie"
+
+
+# OpenTimelineIO
+
+
+def test_opentimelineio_reads_what_stands_beside_a_sequence(tmp_path: Path) -> None:
+    otio = pytest.importorskip("opentimelineio", reason="needs OpenTimelineIO: the extra otio")
+    array = plain(tmp_path / "out", 5, 2)
+    path = path_file(tmp_path, "fps = 23.976\n[[segments]]\nframes = 5\ncamera = [0, 4]\nlight = 1\n")
+    for target, name in (("a/walk.####.exr", "a/walk.otio"), ("b/####.png", "b/b.otio"), ("c", "c/frame.otio")):
+        assemble_movie(array.directory, path, tmp_path / target, otio=True)
+        timeline = otio.adapters.read_from_file(str(tmp_path / name))
+        (clip,) = timeline.find_clips()
+        images = clip.media_reference
+        rate = 24000 / 1001
+        assert (images.rate, images.number_of_images_in_sequence(), images.start_frame) == (rate, 5, 0)
+        assert clip.duration() == otio.opentime.RationalTime(5, rate)
+        urls = [images.target_url_for_image_number(k) for k in range(5)]
+        files = {file.name for file in (tmp_path / name).parent.iterdir()}
+        assert files == {*urls, Path(name).name}, "every image, by its name beside the file"
+        assert list(clip.metadata["framearray"]["places"]) == [f"c {c}  l 1" for c in range(5)]
+    with pytest.raises(OutputError, match=r"walk\.otio: .*--force"):
+        assemble_movie(array.directory, path, tmp_path / "a" / "walk.##.png", otio=True, force=False)
+    assert not list((tmp_path / "a").glob("*.png")), "before the first frame"
+    with pytest.raises(OutputError, match=r"m\.gif: --otio describes numbered images"):
+        assemble_movie(array.directory, path, tmp_path / "m.gif", otio=True)
+
+
+def test_otio_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "opentimelineio", None)
+    array = plain(tmp_path / "out", 1, 1)
+    path = path_file(tmp_path, "[[segments]]\nframes = 1\n")
+    with pytest.raises(MissingExtraError, match=r"--otio needs OpenTimelineIO, .*\[otio\]"):
+        assemble_movie(array.directory, path, tmp_path / "f.#.png", otio=True)
+    assert not (tmp_path / "f.0.png").exists()
