@@ -21,7 +21,7 @@ export function addKeys(page) {
     PageUp: () => light(() => 0),
     PageDown: () => light(() => array.main.n - 1),
   };
-  const others = {
+  const others = page.isEmbedded ? {} : {
     " ": () => page.play("camera"),
     l: () => page.play("light"),
     p: () => page.play("path"),

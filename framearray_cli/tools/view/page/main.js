@@ -12,7 +12,7 @@ import { Path } from "./path.js";
 import { Picture } from "./picture.js";
 import { Player } from "./player.js";
 import { memoryBudget, Store } from "./store.js";
-import { firstView, fromHash, toHash } from "./view.js";
+import { firstView, fromHash, isEmbedded, toHash } from "./view.js";
 
 const HASH_DELAY = 300; // ms after the last change; browsers refuse more than some hundred addresses per minute
 const STILL_AFTER = 250; // ms without a change: the movement is over
@@ -29,14 +29,16 @@ class Page {
     this.view = fromHash(array, location.hash);
     const { views } = array.contents;
     this.views = views && new Views(views, () => this.viewLoaded());
+    this.velocity = [0, 0];
     this.store = new Store(memoryBudget(), (url) => this.arrived(url));
-    this.store.want(loadOrder(array, this.view, [0, 0], false));
+    this.isEmbedded = isEmbedded();
+    this.isAsleep = this.isEmbedded; // loads only the picture on the screen
+    this.loadTiles(false);
     this.picture = new Picture(byId("picture"), array.resolution); // takes 0.2 s without a graphics card, while tiles load
     this.map = new ColourMap(array, (...colours) => this.encode(...colours));
     this.listSheets();
     this.path = new Path();
     this.isDrawing = false;
-    this.velocity = [0, 0];
     this.steps = []; // the last places: { c, l, first, full }, ms until drawn at all, and in full size
     this.player = new Player(array, () => this.level > 0, (change) => this.change(change), (what) => this.ended(what));
     this.controls = new Controls(array, this.view, (change) => this.change(change));
@@ -95,6 +97,8 @@ class Page {
     this.velocity = time - this.changedAt < STILL_AFTER ? [this.view.c - c, this.l - l] : [0, 0];
     this.viewChanged(time);
     this.showNumbers();
+    this.wake();
+    if (this.isEmbedded) return; // the address is the other page's
     clearTimeout(this.hashTimer);
     this.hashTimer = setTimeout(() => history.replaceState(null, "", toHash(this.array, this.view)), HASH_DELAY);
   }
@@ -114,7 +118,15 @@ class Page {
   }
 
   loadTiles(calm) {
-    this.store.want(loadOrder(this.array, this.view, this.velocity, calm));
+    const list = loadOrder(this.array, this.view, this.velocity, calm);
+    this.store.want(this.isAsleep ? list.filter((item) => item.needed) : list);
+  }
+
+  // Load what is around the picture, too.
+  wake() {
+    if (!this.isAsleep) return;
+    this.isAsleep = false;
+    this.loadTiles(true);
   }
 
   dirty() {
@@ -133,6 +145,7 @@ class Page {
     if (!this.isDirty) return;
     this.isDirty = false;
     this.drawPicture();
+    if (this.isEmbedded) return;
     const ground = this.map.changed && (now - (this.groundAt ?? -1e9) > 100 || !this.store.inFlight.size);
     if (ground) this.groundAt = now;
     if (this.map.changed && !ground) this.dirty();
@@ -303,9 +316,11 @@ function figure(value) {
   return Number(value.toPrecision(3)).toString();
 }
 
+document.documentElement.classList.toggle("embed", isEmbedded());
 try {
   const array = await loadArray();
   const page = new Page(array, array.contents.views ? await import("./views.js") : {});
+  if (page.isEmbedded) (await import("./embed.js")).embed(page);
   globalThis.framearray = page; // for the console, and for tests
 } catch (error) {
   byId("note").hidden = false;

@@ -48,6 +48,11 @@ export function fromHash(array, hash) {
   return view;
 }
 
+// Whether the page is shown inside another one: "embed" is a word of the address.
+export function isEmbedded() {
+  return new URLSearchParams(location.hash.slice(1)).has("embed");
+}
+
 export function isTinted({ intensity, color }) {
   return intensity !== PLAIN.intensity || color !== PLAIN.color;
 }
