@@ -90,14 +90,12 @@ def assemble_movie(
         progress: called after each frame.
         warned: called once, before the first frame, with what would make the movie useless; may raise an error.
         force: replace an earlier movie, or an earlier sequence that is no longer.
-        dry_run: check everything, and write nothing.
-        otio: describe the sequence for editing programs, in a file beside it.
+        dry_run, otio: only check everything; describe the sequence for editing programs, in a file beside it.
 
     Raises:
         JobError: the path is broken, or asks for places that the array lacks.
         OutputError: an image is missing or damaged, or the target cannot be written.
-        MissingExtraError: a movie needs PyAV, or a description OpenTimelineIO, which is not installed, or an encoder or
-            typeface is missing.
+        MissingExtraError: PyAV or OpenTimelineIO, which this needs, is not installed, or an encoder or typeface is missing.
     """
     manifest = read_manifest(out)
     left_out: list[str] = []
@@ -107,21 +105,17 @@ def assemble_movie(
         typeface(SMALLEST)
     is_movie = target.suffix.lower() in MOVIES
     if not is_movie:
-        target = sequence_pattern(target, _own_suffix(manifest), MOVIES)
-        if target.parent.resolve() == manifest.directory.resolve():
-            raise OutputError(f"{target.parent}: holds the frame array itself; choose another folder")
+        target = _sequence_target(target, manifest)
         check_look(target, look)
-    _check_target(target, len(line.shots), force=force)
-    if otio:
-        check_otio(target, is_movie=is_movie, force=force)
+    _check_target(target, len(line.shots), force=force, otio=otio)
     _check_images(pictures, line)
     levels = picture_warnings(pictures, line, look) if is_movie or format_name(target) in FOR_SCREENS else ()
     warned([*left_out, *path_warnings(movie, line), *levels])
-    write = _write_movie if is_movie else write_sequence
     if not dry_run:
+        write = _write_movie if is_movie else write_sequence
         write(pictures, line, target, look, progress or (lambda done, total: None))
-    if otio and not dry_run:
-        write_otio(target, line, manifest)
+        if otio:
+            write_otio(target, line, manifest)
     return AssembleResult(
         target=target if is_movie else target.parent,
         n_frames=len(line.shots),
@@ -143,9 +137,11 @@ def _plan(
     return movie, mix(manifest, movie, line, file=None if isinstance(path, Sweep) else path)
 
 
-def _check_target(target: Path, n_frames: int, *, force: bool) -> None:
+def _check_target(target: Path, n_frames: int, *, force: bool, otio: bool) -> None:
     """Refuse what is there already, and formats that cannot be written here."""
     suffix = target.suffix.lower()
+    if otio:
+        check_otio(target, is_movie=suffix in MOVIES, force=force)
     if suffix not in MOVIES:
         check_earlier(target, n_frames, force=force)
         require_writer(cast(Extension, format_name(target)))  # `sequence_pattern` has checked it
@@ -163,8 +159,13 @@ def _override(movie: MoviePath, fps: float | None, positions: Mode | None) -> Mo
     return changed(movie, **{key: value for key, value in updates.items() if value is not None})
 
 
-def _own_suffix(manifest: Manifest) -> str:
-    return Path(manifest.groups[0].images if manifest.groups else manifest.images).suffix
+def _sequence_target(target: Path, manifest: Manifest) -> Path:
+    """Return the pattern of a sequence, by default in the array's own format; refuse the folder of the array."""
+    own = Path(manifest.groups[0].images if manifest.groups else manifest.images).suffix
+    target = sequence_pattern(target, own, MOVIES)
+    if target.parent.resolve() == manifest.directory.resolve():
+        raise OutputError(f"{target.parent}: holds the frame array itself; choose another folder")
+    return target
 
 
 def _check_images(pictures: Pictures, line: Timeline) -> None:
