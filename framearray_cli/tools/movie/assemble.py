@@ -95,7 +95,7 @@ def assemble_movie(
     Raises:
         JobError: the path is broken, or asks for places that the array lacks.
         OutputError: an image is missing or damaged, or the target cannot be written.
-        MissingExtraError: PyAV or OpenTimelineIO, which this needs, is not installed, or an encoder or typeface is missing.
+        MissingExtraError: PyAV or OpenTimelineIO is needed and not installed, or an encoder or typeface is missing.
     """
     manifest = read_manifest(out)
     left_out: list[str] = []
