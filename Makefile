@@ -64,7 +64,8 @@ check: $(VENV)/installed-dev ## Check format, style and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	@if [ -x $(BIN)/deno ]; then $(DENO) fmt --check && $(DENO) lint; \
+	@if [ -x $(BIN)/deno ]; then $(DENO) fmt --check && $(DENO) lint && \
+		$(DENO) check framearray_cli/tools/view/page/*.js; \
 	else echo "the page's JavaScript is not checked: there is no deno for this platform"; fi
 
 docs: $(VENV)/installed-dev ## Write the generated pages of docs/

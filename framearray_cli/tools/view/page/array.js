@@ -1,5 +1,8 @@
 // A frame array as index.json describes it: its axes, the URLs of its tiles, and the terms of a picture.
 
+/** @import { Contents } from "./contents.js" */
+/** @import { Index, Part, Stream, Tint, View } from "./types.d.ts" */
+
 import { loadContents } from "./contents.js";
 
 export const WHITE = [1, 1, 1];
@@ -11,8 +14,23 @@ export async function loadArray() {
 }
 
 export class FrameArray {
+  /**
+   * @param {import("./types.d.ts").Index} index
+   * @param {import("./contents.js").Contents} contents
+   */
   constructor(index, contents) {
-    Object.assign(this, index); // name, resolution, fps, axes, streams, small, exposure, digest, ...
+    const { name, digest, fps, resolution, axes, exposure, small, streams, environment } = index;
+    this.name = name;
+    this.digest = digest;
+    this.fps = fps;
+    this.resolution = resolution;
+    this.axes = axes;
+    this.exposure = exposure;
+    this.small = small;
+    this.streams = streams;
+    this.environment = environment;
+    this.ambient = index.ambient;
+    this.backgroundAmbient = index.background_ambient;
     this.contents = contents;
     this.nCameras = index.n_cameras;
     this.main = index.axes[0]; // along the pad's second side
@@ -24,15 +42,20 @@ export class FrameArray {
     if (index.streams.some((stream) => stream.role === "background")) this.tinted.push("background");
   }
 
+  /** @type {(stream: import("./types.d.ts").Stream, c: number, l: number) => string} */
   fullUrl(stream, c, l) {
     return `tiles/${stream.key}/c${pad(c, 4)}.l${pad(l, 3)}.jpg?${this.contents.tag(stream, c)}`;
   }
 
+  /** @type {(stream: import("./types.d.ts").Stream, c: number) => string} */
   sheetUrl(stream, c) {
     return `tiles/${stream.key}/c${pad(c, 4)}.jpg?${this.contents.tag(stream, c)}`;
   }
 
-  // Bytes of a decoded tile or sheet.
+  /**
+   * Bytes of a decoded tile or sheet.
+   * @type {(stream: import("./types.d.ts").Stream, sheet: boolean) => number}
+   */
   bytes(stream, sheet) {
     const [width, height] = this.resolution;
     if (!sheet) return 4 * width * height;
@@ -42,6 +65,7 @@ export class FrameArray {
 
   // Where the small picture of light l lies in its sheet: left, top, width, height as shares of the sheet.
   // Its last column and row may cover less than `factor` pixels, so the picture may end before they do.
+  /** @type {(stream: Stream, l: number) => number[]} */
   smallPart(stream, l) {
     const columns = Math.min(stream.n, this.small.columns);
     const rows = Math.ceil(stream.n / columns);
@@ -52,6 +76,7 @@ export class FrameArray {
 
   // The streams whose sum is the picture of a view, each with its light index and RGB factor, as in pictures.py:
   //     picture = sum of factor_g (direct_g + a I_A,g R W) over groups g, the background among them.
+  /** @type {(view: View) => Part[]} */
   parts(view) {
     if (view.show !== "picture") {
       const layer = this.layers.find((stream) => stream.key === view.show);
@@ -64,12 +89,13 @@ export class FrameArray {
     }));
   }
 
+  /** @type {(stream: Stream, view: View) => number[]} */
   factor(stream, view) {
     if (stream.role === "group") return tint(view.tints[stream.label]);
     if (stream.role === "background") return tint(view.tints.background);
     if (stream.role !== "ambient") return WHITE;
     const sky = view.tints.background ? tint(view.tints.background) : WHITE;
-    const weight = this.background_ambient.map((value, i) => value * sky[i]);
+    const weight = this.backgroundAmbient.map((value, i) => value * sky[i]);
     for (const group of this.groups) {
       const light = this.ambient[group.label][view.places[group.axis]];
       const by = tint(view.tints[group.label]);
@@ -81,29 +107,35 @@ export class FrameArray {
 }
 
 // RGB factor of an intensity and an sRGB colour such as "#ffcc88".
+/** @type {(tint: Tint) => number[]} */
 export function tint({ intensity, color }) {
   return linearColor(color).map((value) => intensity * value);
 }
 
+/** @type {(color: string) => number[]} */
 export function linearColor(color) {
   return [1, 3, 5].map((start) => linear(parseInt(color.slice(start, start + 2), 16) / 255));
 }
 
+/** @type {(encoded: number) => number} */
 export function linear(encoded) {
   return encoded <= 0.04045 ? encoded / 12.92 : ((encoded + 0.055) / 1.055) ** 2.4;
 }
 
+/** @type {(value: number) => number} */
 export function srgb(value) {
   const x = Math.min(1, Math.max(0, value));
   return x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055;
 }
 
 // Radiance of a code, which is 0 to 1; coding.py explains the curve.
+/** @type {(code: number, coding: { scale: number, white: number }) => number} */
 export function decode(code, { scale, white }) {
   const y = linear(code);
   return (scale * 2 * y) / (1 - y + Math.sqrt((1 - y) ** 2 + (4 * y) / white ** 2));
 }
 
+/** @type {(number: number, digits: number) => string} */
 function pad(number, digits) {
   return String(number).padStart(digits, "0");
 }

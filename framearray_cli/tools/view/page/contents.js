@@ -1,5 +1,7 @@
 // What of an array is there, as contents.json says: it may still be rendered.
 
+/** @import { Stream } from "./types.d.ts" */
+
 export async function loadContents() {
   const answer = await fetch("contents.json", { cache: "no-cache" });
   if (!answer.ok) throw new Error(`contents.json: ${answer.status} ${answer.statusText}`);
@@ -7,8 +9,14 @@ export async function loadContents() {
 }
 
 export class Contents {
+  /** @param {import("./types.d.ts").Contents} table */
   constructor(table) {
-    Object.assign(this, table); // live, index, stamp, lacking, streams
+    this.live = table.live;
+    this.index = table.index;
+    this.stamp = table.stamp;
+    this.lacking = table.lacking;
+    this.streams = table.streams;
+    this.views = table.views;
   }
 
   get isComplete() {
@@ -16,10 +24,12 @@ export class Contents {
   }
 
   // Changes with the sources of a stream and camera; "" if none of them is there.
+  /** @type {(stream: Stream, c: number) => string} */
   tag(stream, c) {
     return this.streams[stream.key].stamps[c];
   }
 
+  /** @type {(stream: Stream, c: number, l: number) => boolean} */
   has(stream, c, l) {
     const gaps = this.streams[stream.key].missing[c] ?? [];
     return Boolean(this.tag(stream, c)) && !gaps.some(([first, last]) => first <= l && l <= last);

@@ -1,10 +1,23 @@
 // Sliders and buttons for what the array has. They change the view and call `changed`.
 
+/** @import { FrameArray } from "./array.js" */
+/** @import { Change, Tint, View } from "./types.d.ts" */
+
+import { byId } from "./dom.js";
+
+/** @typedef {(change: Change) => void} Changed */
+
 const MOST_INTENSITY = 4;
 
 export class Controls {
+  /**
+   * @param {FrameArray} array
+   * @param {View} view
+   * @param {Changed} changed
+   */
   constructor(array, view, changed) {
     this.array = array;
+    /** @type {Change[]} */
     this.update = []; // functions that set a control to a view
     this.layers(changed);
     this.views(changed);
@@ -15,12 +28,14 @@ export class Controls {
   }
 
   // Set all controls to a view.
+  /** @type {(view: View) => void} */
   show(view) {
     for (const update of this.update) update(view);
   }
 
+  /** @type {(changed: Changed) => void} */
   layers(changed) {
-    const box = document.getElementById("layers");
+    const box = byId("layers");
     const all = [{ key: "picture", label: "Picture" }, ...this.array.layers];
     box.parentElement.querySelector("h2").hidden = box.hidden = all.length === 1;
     for (const { key, label } of all) {
@@ -32,19 +47,21 @@ export class Controls {
     }
   }
 
+  /** @type {(changed: Changed) => void} */
   views(changed) {
     const { views } = this.array.contents;
     if (!views) return;
-    const select = document.getElementById("view");
+    const select = byId("view");
     select.closest("label").hidden = false;
     for (const { name, label } of views) select.append(element("option", { value: name }, label));
     select.addEventListener("change", () => changed((view) => (view.look = select.value)));
     this.update.push((view) => (select.value = view.look));
   }
 
+  /** @type {(changed: Changed) => void} */
   exposure(changed) {
-    const input = document.getElementById("exposure");
-    const output = document.getElementById("exposure-value");
+    const input = byId("exposure");
+    const output = byId("exposure-value");
     input.addEventListener("input", () => changed((view) => (view.exposure = Number(input.value))));
     this.update.push((view) => {
       input.value = view.exposure;
@@ -53,8 +70,9 @@ export class Controls {
     });
   }
 
+  /** @type {(changed: Changed) => void} */
   axes(changed) {
-    const box = document.getElementById("axes");
+    const box = byId("axes");
     const { environment, main, others } = this.array;
     const axes = environment ? [main] : others;
     if (axes.length) box.append(element("h2", {}, environment ? `Environment: ${environment.file}` : "More lights"));
@@ -72,10 +90,11 @@ export class Controls {
     }
   }
 
+  /** @type {(changed: Changed) => void} */
   groups(changed) {
     const { tinted } = this.array;
     if (!tinted.length) return;
-    const box = document.getElementById("groups");
+    const box = byId("groups");
     box.append(element("h2", {}, "Light"));
     for (const name of tinted) this.tint(box, name, `group-${name}`, changed, (view) => view.tints[name]);
     if (this.array.streams.some((stream) => stream.role === "ambient")) {
@@ -83,6 +102,7 @@ export class Controls {
     }
   }
 
+  /** @type {(box: HTMLElement, name: string, id: string, changed: Changed, of: (view: View) => Tint) => void} */
   tint(box, name, id, changed, of) {
     const { input, output, holder } = slider(name, { min: 0, max: MOST_INTENSITY, step: 0.05, id });
     const color = element("input", { type: "color", id: `${id}-color`, "aria-label": `${name}, colour` });
@@ -101,6 +121,7 @@ export class Controls {
   }
 }
 
+/** @type {(name: string, attributes: Record<string, string | number>) => { input: any, output: any, holder: any }} */
 function slider(name, attributes) {
   const input = element("input", { type: "range", ...attributes });
   const output = element("output", {});
@@ -108,9 +129,10 @@ function slider(name, attributes) {
   return { input, output, holder };
 }
 
+/** @type {(tag: string, attributes: Record<string, string | number>, ...children: (Node | string)[]) => any} */
 export function element(tag, attributes, ...children) {
   const node = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
+  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, String(value));
   node.append(...children);
   return node;
 }

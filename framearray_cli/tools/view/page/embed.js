@@ -1,10 +1,15 @@
 // The page inside another page: only the picture. A drag to the side moves the camera, one up or down the light.
 
+/** @import { Page } from "./main.js" */
+
+import { byId } from "./dom.js";
+
 const TAP = 4; // pixels that a pointer may move before it drags
 
+/** @type {(page: Page) => void} */
 export function embed(page) {
   const { array } = page;
-  const canvas = document.getElementById("picture");
+  const canvas = byId("picture");
   canvas.tabIndex = 0;
   canvas.setAttribute("role", "application");
   canvas.setAttribute("aria-roledescription", "Picture to turn: left and right arrows, up and down arrows");
@@ -12,7 +17,8 @@ export function embed(page) {
   const wake = () => page.wake();
   for (const name of ["pointerenter", "pointerdown", "focus"]) canvas.addEventListener(name, wake, { once: true });
 
-  let drag = null; // { id, x, y, c, l, moves }
+  /** @type {{ id: number, x: number, y: number, c: number, l: number, moves: boolean } | null} */
+  let drag = null;
   canvas.addEventListener("pointerdown", (event) => {
     if (drag || event.button > 0) return;
     page.player.stop();
@@ -21,7 +27,7 @@ export function embed(page) {
     canvas.focus({ preventScroll: true });
   });
   canvas.addEventListener("pointermove", (event) => {
-    if (event.pointerId !== drag?.id) return;
+    if (!drag || event.pointerId !== drag.id) return;
     const [dx, dy] = [event.clientX - drag.x, event.clientY - drag.y];
     drag.moves ||= Math.hypot(dx, dy) > TAP;
     if (!drag.moves) return;
@@ -43,6 +49,7 @@ export function embed(page) {
 }
 
 // The index that a share of the axis of n leads to.
+/** @type {(from: number, share: number, n: number) => number} */
 function moved(from, share, n) {
   return Math.min(n - 1, Math.max(0, Math.round(from + share * (n - 1))));
 }

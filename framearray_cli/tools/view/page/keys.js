@@ -1,8 +1,13 @@
 // Keyboard control, except for keys that the focused element needs itself.
 
+/** @import { Page } from "./main.js" */
+
+import { byId } from "./dom.js";
+
 const FAST = 10; // steps per key with Shift
 const STOPS = 0.5; // of exposure per key
 
+/** @type {(page: Page) => void} */
 export function addKeys(page) {
   const { array } = page;
   const name = array.main.name;
@@ -31,7 +36,7 @@ export function addKeys(page) {
     "-": () => expose((stops) => stops - STOPS),
     0: () => expose(() => 0),
     v: () => nextView(page),
-    "?": () => document.getElementById("help").click(),
+    "?": () => byId("help").click(),
     Escape: () => {
       page.player.stop();
       page.setDrawing(false);
@@ -40,7 +45,7 @@ export function addKeys(page) {
 
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
-    const at = event.target;
+    const at = /** @type {Element} */ (event.target);
     const isPad = at.id === "pad" || at === document.body;
     const typing = at.matches("input[type=number], select");
     const sliding = at.matches("input");
@@ -58,6 +63,7 @@ export function addKeys(page) {
 }
 
 // Show the next of the page's views.
+/** @type {(page: Page) => void} */
 function nextView(page) {
   const names = page.array.contents.views?.map((row) => row.name);
   if (names) page.change((view) => (view.look = names[(names.indexOf(view.look) + 1) % names.length]));

@@ -1,15 +1,20 @@
 // The order in which to load tiles: those on the screen, those that come next, then sheets and pictures around them.
 
+/** @import { FrameArray } from "./array.js" */
+/** @import { Item, Stream, View } from "./types.d.ts" */
+
 const AHEAD = 8; // steps that a movement is extrapolated
 const RING = 6; // full pictures around the place, in each direction
 
 // view: gives the place; velocity: [cameras, lights] per step; calm: whether the view has stayed for a moment. Pictures
 // around the place wait until then, as decoding them would delay the picture on the screen.
 // What is not there yet is left out. Returns [{ url, bytes, needed }]; a needed tile is loaded even if it exceeds the budget.
+/** @type {(array: FrameArray, view: View, velocity: number[], calm: boolean) => Item[]} */
 export function loadOrder(array, view, velocity, calm) {
   const [dc, dl] = velocity;
   const moving = dc !== 0 || dl !== 0;
   const streams = array.parts(view).map((part) => part.stream);
+  /** @type {Item[]} */
   const list = [];
 
   const position = (stream, dlight) => {
@@ -51,6 +56,7 @@ export function loadOrder(array, view, velocity, calm) {
   return list;
 }
 
+/** @type {(k: number, full: (dc: number, dl: number) => void) => void} */
 function ring(k, full) {
   for (let i = -k; i <= k; i++) {
     full(i, -k);

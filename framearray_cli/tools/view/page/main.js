@@ -1,18 +1,25 @@
 // The page: connects array, store, picture, pad, path and controls; one loop redraws what changed.
 
+/** @import { FrameArray } from "./array.js" */
+/** @import { Change, DrawnPart, Part, Place, View } from "./types.d.ts" */
+/** @import { Views } from "./views.js" */
+
 import { loadArray } from "./array.js";
+import { addButtons } from "./buttons.js";
 import { loadContents } from "./contents.js";
 import { Controls } from "./controls.js";
+import { byId } from "./dom.js";
 import { addKeys } from "./keys.js";
 import { loadOrder } from "./loadorder.js";
 import { ColourMap } from "./map.js";
+import { showNumbers } from "./numbers.js";
 import { Pad } from "./pad.js";
 import { addPathButtons } from "./pathbuttons.js";
 import { Path } from "./path.js";
 import { Picture } from "./picture.js";
 import { Player } from "./player.js";
 import { memoryBudget, Store } from "./store.js";
-import { firstView, fromHash, isEmbedded, toHash } from "./view.js";
+import { fromHash, isEmbedded, toHash } from "./view.js";
 
 const HASH_DELAY = 300; // ms after the last change; browsers refuse more than some hundred addresses per minute
 const STILL_AFTER = 250; // ms without a change: the movement is over
@@ -20,25 +27,33 @@ const CALM_AFTER = 60; // ms without a change: load pictures around the place as
 const REFRESH = 3000, REFRESH_COMPLETE = 15000; // ms between two looks at what is there
 const RETRY_AFTER = 5000; // ms, if there is no picture
 
-const byId = (id) => document.getElementById(id);
-
-class Page {
-  // modules: those that only some pages need, loaded.
-  constructor(array, { Views }) {
+export class Page {
+  /**
+   * @param {FrameArray} array
+   * @param {typeof Views | null} ofViews what only some pages need, loaded
+   */
+  constructor(array, ofViews) {
     this.array = array;
     this.view = fromHash(array, location.hash);
     const { views } = array.contents;
-    this.views = views && new Views(views, () => this.viewLoaded());
+    this.views = views && ofViews ? new ofViews(views, () => this.viewLoaded()) : null;
     this.velocity = [0, 0];
+    this.changedAt = -Infinity; // ms
     this.store = new Store(memoryBudget(), (url) => this.arrived(url));
     this.isEmbedded = isEmbedded();
     this.isAsleep = this.isEmbedded; // loads only the picture on the screen
     this.loadTiles(false);
     this.picture = new Picture(byId("picture"), array.resolution); // takes 0.2 s without a graphics card, while tiles load
-    this.map = new ColourMap(array, (...colours) => this.encode(...colours));
+    this.map = new ColourMap(array, (radiance, width, height) => this.encode(radiance, width, height));
     this.listSheets();
     this.path = new Path();
     this.isDrawing = false;
+    this.measures = false; // whether each drawing is waited for, to be timed
+    /** @type {(drawing: boolean) => void} */
+    this.setDrawing = () => {}; // these three are of the path's buttons
+    /** @type {(place: Place, phase: string, event: PointerEvent) => void} */
+    this.drawPath = () => {};
+    this.addHere = () => {};
     this.steps = []; // the last places: { c, l, first, full }, ms until drawn at all, and in full size
     this.player = new Player(array, () => this.level > 0, (change) => this.change(change), (what) => this.ended(what));
     this.controls = new Controls(array, this.view, (change) => this.change(change));
@@ -47,8 +62,8 @@ class Page {
     this.level = 0; // what the screen shows: 0 another view, 1 this view in small, 2 this view in full size
     addPathButtons(this);
     addKeys(this);
-    this.addButtons();
-    this.showNumbers();
+    addButtons(this);
+    showNumbers(this);
     this.viewChanged(performance.now());
     requestAnimationFrame((now) => this.frame(now));
     if (array.contents.live) setTimeout(() => this.refreshAlways(), REFRESH);
@@ -73,7 +88,7 @@ class Page {
     this.level = 0;
     this.store.forgetMissing();
     this.loadTiles(true);
-    this.showNumbers();
+    showNumbers(this);
     this.dirty();
   }
 
@@ -91,18 +106,20 @@ class Page {
   }
 
   // Change the view; the next frame of the screen shows it.
+  /** @type {(change: Change, time?: number) => void} */
   change(change, time = performance.now()) {
     const { c } = this.view, { l } = this;
     change(this.view);
     this.velocity = time - this.changedAt < STILL_AFTER ? [this.view.c - c, this.l - l] : [0, 0];
     this.viewChanged(time);
-    this.showNumbers();
+    showNumbers(this);
     this.wake();
     if (this.isEmbedded) return; // the address is the other page's
     clearTimeout(this.hashTimer);
     this.hashTimer = setTimeout(() => history.replaceState(null, "", toHash(this.array, this.view)), HASH_DELAY);
   }
 
+  /** @type {(time: number) => void} */
   viewChanged(time) {
     this.changedAt = time;
     this.level = 0;
@@ -117,6 +134,7 @@ class Page {
     this.dirty();
   }
 
+  /** @type {(calm: boolean) => void} */
   loadTiles(calm) {
     const list = loadOrder(this.array, this.view, this.velocity, calm);
     this.store.want(this.isAsleep ? list.filter((item) => item.needed) : list);
@@ -133,12 +151,15 @@ class Page {
     this.isDirty = true;
   }
 
+  /** @type {(url: string) => void} */
   arrived(url) {
-    const sheet = this.sheets.get(url);
-    if (sheet && this.store.has(url)) this.map.add(...sheet, this.store.get(url));
+    const sheet = this.sheets?.get(url);
+    const bitmap = sheet && this.store.get(url);
+    if (bitmap) this.map.add(sheet[0], sheet[1], bitmap);
     this.dirty();
   }
 
+  /** @type {(now: number) => void} */
   frame(now) {
     requestAnimationFrame((later) => this.frame(later));
     this.player.tick(now);
@@ -159,6 +180,7 @@ class Page {
   }
 
   // Return the codes of radiance, (height, width, 3) -> (height, width, 4), by a view; null: by the sRGB curve.
+  /** @type {(radiance: Float32Array, width: number, height: number) => Uint8Array | null} */
   encode(radiance, width, height) {
     return this.shader ? this.picture.encode(radiance, width, height, this.shader) : null;
   }
@@ -191,7 +213,8 @@ class Page {
     this.showProblem(parts);
     const { shader } = this;
     if (!level || shader === undefined) return;
-    this.picture.draw(parts, view.exposure + array.exposure, shader);
+    const drawn = /** @type {DrawnPart[]} */ (parts); // all are there, as `level` says
+    this.picture.draw(drawn, view.exposure + array.exposure, shader);
     if (this.measures) this.picture.pixels(1); // waits for the drawing
     this.level = level;
     const step = this.steps.at(-1);
@@ -202,6 +225,7 @@ class Page {
   }
 
   // Show why there is no picture, if there is none.
+  /** @type {(parts: Part[]) => void} */
   showProblem(parts) {
     const full = parts.map((part) => this.array.fullUrl(part.stream, this.view.c, part.l));
     const wrong = full.map((url) => this.store.missing.get(url)).find((text) => text);
@@ -209,6 +233,7 @@ class Page {
     if (wrong) this.retry ??= setTimeout(() => this.retryMissing(), RETRY_AFTER);
   }
 
+  /** @type {(text: string) => void} */
   showNote(text) {
     byId("note").hidden = !text;
     if (byId("note").textContent !== text) byId("note").textContent = text;
@@ -228,26 +253,7 @@ class Page {
     this.dirty();
   }
 
-  // Show the numbers of the view, and set the controls to it.
-  showNumbers() {
-    const { array, view } = this;
-    const { nCameras, main } = array;
-    const time = main.times ? `, ${main.times[this.l].replace(" ", "\u00a0")}` : ""; // on one line
-    const text = `camera ${view.c} of 0-${nCameras - 1}, ${main.name} ${this.l} of 0-${main.n - 1}${time}`;
-    const [lacking, ranges] = array.contents.lacking;
-    byId("lacking").hidden = !lacking;
-    byId("lacking").textContent = `${lacking} of ${nCameras} camera positions lack images: ${ranges}`;
-    byId("where").textContent = text;
-    byId("pad").setAttribute("aria-label", `Pad: ${text}`);
-    byId("picture").setAttribute("aria-label", `Picture of ${array.name}: ${text}`);
-    const shown = array.layers.find((layer) => layer.key === view.show);
-    const range = shown && !shown.scale && shown.key !== "normal";
-    byId("legend").hidden = !range;
-    if (range) byId("legend").textContent = `${shown.label}: ${figure(shown.low)} to ${figure(shown.high)}`;
-    byId("exposure").disabled = Boolean(shown && !shown.exposed);
-    this.controls.show(view);
-  }
-
+  /** @type {(place: Place, phase: string, event: PointerEvent) => void} */
   pointer(place, phase, event) {
     this.player.stop();
     if (this.isDrawing) this.drawPath(place, phase, event);
@@ -258,6 +264,7 @@ class Page {
     }, event.timeStamp);
   }
 
+  /** @type {(what: string) => void} */
   play(what) {
     if (this.player.what === what) this.player.stop();
     else {
@@ -266,64 +273,27 @@ class Page {
     }
   }
 
+  /** @type {(what: string) => void} */
   ended(what) {
     byId(`play-${what}`).setAttribute("aria-pressed", "false");
-  }
-
-  addButtons() {
-    for (const what of ["camera", "light"]) {
-      byId(`play-${what}`).addEventListener("click", () => this.play(what));
-      byId(`play-${what}`).disabled = this.player.length(what) < 2;
-    }
-    byId("speed").addEventListener("change", (event) => (this.player.speed = Number(event.target.value)));
-    byId("reset").addEventListener("click", () => {
-      const { c, places } = this.view;
-      this.change((view) => Object.assign(view, firstView(this.array), { c, places }));
-    });
-    byId("link").addEventListener("click", () => this.copyLink());
-    byId("help").addEventListener("click", () => {
-      byId("keys").hidden = !byId("keys").hidden;
-      byId("help").setAttribute("aria-expanded", String(!byId("keys").hidden));
-    });
-    addEventListener("hashchange", () => {
-      this.change((view) => Object.assign(view, fromHash(this.array, location.hash)));
-    });
-    byId("name").textContent = document.title = this.array.name;
-    byId("pad-light").textContent = this.array.main.name;
-  }
-
-  async copyLink() {
-    const link = new URL(toHash(this.array, this.view), location.href).href;
-    history.replaceState(null, "", link);
-    let outcome = "Copied";
-    try {
-      await navigator.clipboard.writeText(link);
-    } catch {
-      outcome = "In the address bar"; // no clipboard without https, or without permission
-    }
-    byId("link").textContent = outcome;
-    setTimeout(() => (byId("link").textContent = "Copy link"), 1500);
   }
 }
 
 // All that the pad's background depends on: the view without the place on the pad.
+/** @type {(array: FrameArray, view: View) => string} */
 function groundLook(array, view) {
   const others = array.others.map((axis) => view.places[axis.name]);
   return JSON.stringify([view.show, view.look, view.exposure, view.tints, view.ambient, others]);
 }
 
-function figure(value) {
-  return Number(value.toPrecision(3)).toString();
-}
-
 document.documentElement.classList.toggle("embed", isEmbedded());
 try {
   const array = await loadArray();
-  const page = new Page(array, array.contents.views ? await import("./views.js") : {});
+  const page = new Page(array, array.contents.views ? (await import("./views.js")).Views : null);
   if (page.isEmbedded) (await import("./embed.js")).embed(page);
-  globalThis.framearray = page; // for the console, and for tests
+  Object.assign(globalThis, { framearray: page }); // for the console, and for tests
 } catch (error) {
   byId("note").hidden = false;
-  byId("note").textContent = `The page cannot start. ${error.message}`;
+  byId("note").textContent = `The page cannot start. ${/** @type {Error} */ (error).message}`;
   console.error(error);
 }

@@ -1,11 +1,18 @@
 // Mean colour of every picture, from the sheets as they arrive: the pad's background.
 
+/** @import { FrameArray } from "./array.js" */
+/** @import { Stream, View } from "./types.d.ts" */
+
 import { decode, srgb } from "./array.js";
 
 const MISSING = [[32, 36, 46], [46, 52, 66]]; // sRGB codes, alternating: no picture has such a pattern
 
 export class ColourMap {
   // encode(radiance, width, height): codes by the view of the page; null: by the sRGB curve.
+  /**
+   * @param {FrameArray} array
+   * @param {(radiance: Float32Array, width: number, height: number) => Uint8Array | null} encode
+   */
   constructor(array, encode) {
     this.array = array;
     this.encode = encode;
@@ -21,6 +28,7 @@ export class ColourMap {
   }
 
   // Add the means of a sheet, drawn with one pixel per picture.
+  /** @type {(stream: Stream, c: number, sheet: ImageBitmap) => void} */
   add(stream, c, sheet) {
     const means = this.means.get(stream.key);
     const tags = this.tags.get(stream.key), { contents } = this.array;
@@ -28,7 +36,7 @@ export class ColourMap {
     tags[c] = contents.tag(stream, c);
     const columns = Math.min(stream.n, this.array.small.columns);
     const rows = Math.ceil(stream.n / columns);
-    const { small } = this;
+    const small = /** @type {OffscreenCanvasRenderingContext2D} */ (this.small); // never lost: it has no screen
     small.canvas.width = columns;
     small.canvas.height = rows;
     small.imageSmoothingQuality = "high";
@@ -45,6 +53,7 @@ export class ColourMap {
   }
 
   // Draw the colours of a view, one pixel per camera and light, transparent where not loaded yet; return the canvas.
+  /** @type {(view: View) => OffscreenCanvas} */
   draw(view) {
     const { array } = this;
     const { width, height } = this.canvas;
@@ -72,12 +81,13 @@ export class ColourMap {
       }
     }
     this.showByView(shown.data, radiance);
-    this.canvas.getContext("2d").putImageData(shown, 0, 0);
+    this.canvas.getContext("2d")?.putImageData(shown, 0, 0);
     this.changed = false;
     return this.canvas;
   }
 
   // Replace codes by those of the page's view, where radiance is known.
+  /** @type {(shown: Uint8ClampedArray, radiance: Float32Array) => void} */
   showByView(shown, radiance) {
     const { width, height } = this.canvas;
     if (radiance.every(Number.isNaN)) return;

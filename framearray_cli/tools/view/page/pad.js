@@ -1,10 +1,23 @@
 // The pad: cameras from left to right, lights from top to bottom. The pointer moves the place, or draws a path.
 
+/** @import { FrameArray } from "./array.js" */
+/** @import { ColourMap } from "./map.js" */
+/** @import { Place, Segment, View } from "./types.d.ts" */
+
 export class Pad {
   // moved(place, phase, event): place is { c, l }, which need not be whole; phase is "down", "move" or "up".
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {FrameArray} array
+   * @param {ColourMap} map
+   * @param {(place: Place, phase: "down" | "move" | "up", event: PointerEvent) => void} moved
+   */
   constructor(canvas, array, map, moved) {
     this.canvas = canvas;
-    this.context = canvas.getContext("2d");
+    this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d")); // first asked for here
+    this.ratio = 1;
+    /** @type {(() => void) | undefined} */
+    this.onresize = undefined;
     this.array = array;
     this.map = map;
     this.ground = new OffscreenCanvas(1, 1);
@@ -27,7 +40,7 @@ export class Pad {
     canvas.addEventListener("pointermove", (event) => {
       if (event.pointerId === pressed) moved(place(event), "move", event);
     });
-    for (const name of ["pointerup", "pointercancel"]) {
+    for (const name of /** @type {const} */ (["pointerup", "pointercancel"])) {
       canvas.addEventListener(name, (event) => {
         if (event.pointerId !== pressed) return;
         pressed = null;
@@ -45,6 +58,7 @@ export class Pad {
   }
 
   // strokes: [{ camera: [...], light: [...] }] of a path; groundChanged: whether the colours may have changed.
+  /** @type {(view: View, strokes: Pick<Segment, "camera" | "light">[], groundChanged: boolean) => void} */
   draw(view, strokes, groundChanged) {
     const { context, canvas, array } = this;
     if (groundChanged) this.ground = this.map.draw(view);
@@ -63,7 +77,7 @@ export class Pad {
     context.moveTo(0, at[1]);
     context.lineTo(canvas.width, at[1]);
     context.stroke();
-    for (const [radius, width, style] of [[7, 4, "#000a"], [7, 2, "#fff"]]) {
+    for (const [radius, width, style] of /** @type {const} */ ([[7, 4, "#000a"], [7, 2, "#fff"]])) {
       context.lineWidth = width * this.ratio;
       context.strokeStyle = style;
       context.beginPath();
@@ -72,10 +86,11 @@ export class Pad {
     }
   }
 
+  /** @type {(xs: number[], ys: number[]) => void} */
   line(xs, ys) {
     const { context } = this;
     context.lineJoin = context.lineCap = "round";
-    for (const [width, style] of [[5, "#000b"], [2.5, "#f0b45a"]]) {
+    for (const [width, style] of /** @type {const} */ ([[5, "#000b"], [2.5, "#f0b45a"]])) {
       context.lineWidth = width * this.ratio;
       context.strokeStyle = style;
       context.beginPath();
@@ -87,6 +102,7 @@ export class Pad {
 }
 
 // A share of the pad's side -> a place on an axis of n; the outer halves of the end cells belong to the ends.
+/** @type {(share: number, n: number) => number} */
 function along(share, n) {
   return Math.min(n - 1, Math.max(0, share * n - 0.5));
 }

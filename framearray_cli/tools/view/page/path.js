@@ -1,5 +1,8 @@
 // A path over the pad: segments with places at even times; it is drawn, played, and saved for `framearray assemble`.
 
+/** @import { FrameArray } from "./array.js" */
+/** @import { Place, Segment, Tint, View } from "./types.d.ts" */
+
 import { isTinted, round } from "./view.js";
 import { linearColor } from "./array.js";
 
@@ -10,7 +13,9 @@ const SHORTEST = 0.1; // seconds
 
 export class Path {
   constructor() {
-    this.segments = []; // { seconds, camera: [...], light: [...], places: { axis: index } }
+    /** @type {Segment[]} */
+    this.segments = [];
+    /** @type {Place | null} */
     this.start = null; // the first place of a path that has no segment yet
   }
 
@@ -20,7 +25,7 @@ export class Path {
 
   get end() {
     const last = this.segments.at(-1);
-    return last ? { c: last.camera.at(-1), l: last.light.at(-1) } : this.start;
+    return last ? { c: last.camera[last.camera.length - 1], l: last.light[last.light.length - 1] } : this.start;
   }
 
   get isEmpty() {
@@ -39,6 +44,7 @@ export class Path {
   }
 
   // Go straight to a place, from where the path ends.
+  /** @type {(place: Place, places: Record<string, number>) => void} */
   addPlace(place, places) {
     const from = this.end;
     if (from === null) {
@@ -50,13 +56,15 @@ export class Path {
   }
 
   // Add a stroke drawn by hand. samples: [{ s, c, l }], s in seconds.
+  /** @type {(samples: (Place & { s: number })[], places: Record<string, number>) => void} */
   addStroke(samples, places) {
-    const seconds = Math.max(SHORTEST, samples.at(-1).s - samples[0].s);
+    const length = samples[samples.length - 1].s - samples[0].s;
+    const seconds = Math.max(SHORTEST, length);
     // at least one place per sample: a quick stroke keeps its corners
     const count = Math.min(MOST_PLACES, Math.max(2, samples.length, Math.round(seconds * PLACES_PER_SECOND) + 1));
     const camera = [], light = [];
     for (let k = 0, i = 0; k < count; k++) {
-      const s = samples[0].s + ((samples.at(-1).s - samples[0].s) * k) / (count - 1);
+      const s = samples[0].s + (length * k) / (count - 1);
       while (i < samples.length - 2 && samples[i + 1].s < s) i++;
       const [a, b] = [samples[i], samples[Math.min(i + 1, samples.length - 1)]];
       const share = b.s > a.s ? Math.min(1, (s - a.s) / (b.s - a.s)) : 1;
@@ -67,12 +75,14 @@ export class Path {
   }
 
   // Give the whole path a length in seconds; its segments keep their shares.
+  /** @type {(seconds: number) => void} */
   stretch(seconds) {
     const by = seconds / this.seconds;
     for (const segment of this.segments) segment.seconds *= by;
   }
 
   // The place at a time, seconds: { c, l, places }.
+  /** @type {(time: number) => (Place & { places: Record<string, number> }) | null} */
   at(time) {
     let left = time;
     for (const [k, segment] of this.segments.entries()) {
@@ -87,6 +97,7 @@ export class Path {
   }
 
   // Return the path file, see docs/guide/movies.md.
+  /** @type {(array: FrameArray, view: View) => string} */
   toToml(array, view) {
     const exposure = view.exposure ? ` --exposure ${round(view.exposure)}` : "";
     const look = view.look === "srgb" ? "" : ` --view ${JSON.stringify(view.look)}`;
@@ -112,6 +123,7 @@ export class Path {
   }
 
   // The map, and how it turns: the places of each segment at even times.
+  /** @type {(environment: { file: string, step: number }) => string[]} */
   environmentLines({ file, step }) {
     const keys = [];
     let start = 0;
@@ -127,27 +139,32 @@ export class Path {
   }
 }
 
+/** @type {(table: string, tint: Tint) => string[]} */
 function tintLines(table, tint) {
   if (!isTinted(tint)) return [];
   const color = linearColor(tint.color).map((value) => number(Math.round(value * 1e4) / 1e4));
   return ["", `[${table}]`, `intensity = ${number(round(tint.intensity))}`, `color = [${color.join(", ")}]`];
 }
 
+/** @type {(places: number[], share: number) => number} */
 function between(places, share) {
   const at = share * (places.length - 1);
   const k = Math.min(Math.floor(at), places.length - 2);
   return places[k] + (places[k + 1] - places[k]) * (at - k);
 }
 
+/** @type {(places: number[]) => string} */
 function span(places) {
   const same = places.every((place) => place === places[0]);
   return same ? String(places[0]) : `[${places.join(", ")}]`;
 }
 
+/** @type {(value: number) => string} */
 function number(value) {
   return Number.isInteger(value) ? `${value}.0` : String(value);
 }
 
+/** @type {(name: string) => string} */
 function key(name) {
   return /^[\w-]+$/.test(name) ? name : JSON.stringify(name);
 }

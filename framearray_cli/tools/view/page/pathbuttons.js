@@ -1,9 +1,14 @@
 // Buttons of the path: draw, play, clear, save; and the strokes of a pointer on the pad.
 
+/** @import { Page } from "./main.js" */
+/** @import { Place } from "./types.d.ts" */
+
+import { byId } from "./dom.js";
+
 const CLICK = 4; // pixels that the pointer may move during a click
 
+/** @type {(page: Page) => void} */
 export function addPathButtons(page) {
-  const byId = (id) => document.getElementById(id);
   let samples = [];
   let from = [0, 0];
 

@@ -1,5 +1,8 @@
 // Draws a picture in one pass of WebGL 2: the sum of decoded tiles times factors, with exposure, in sRGB or by a view.
 
+/** @import { DrawnPart, Part } from "./types.d.ts" */
+/** @import { Shader } from "./views.js" */
+
 const KEPT_TEXTURES = 24; // beside the decoded tiles, so that a few steps back and forth upload nothing
 
 const VERTEX = `#version 300 es
@@ -58,12 +61,17 @@ const DATA_MAINS = {
 };
 
 export class Picture {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {[number, number]} resolution
+   */
   constructor(canvas, [width, height]) {
     canvas.width = width;
     canvas.height = height;
     const options = { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true };
-    this.gl = canvas.getContext("webgl2", options);
-    if (!this.gl) throw new Error("This page needs WebGL 2, and this browser has none, or it is switched off.");
+    const gl = /** @type {WebGL2RenderingContext | null} */ (canvas.getContext("webgl2", options));
+    if (!gl) throw new Error("This page needs WebGL 2, and this browser has none, or it is switched off.");
+    this.gl = gl;
     this.programs = new Map();
     this.textures = new Map(); // url -> texture, the least recently used first
     this.bytes = 0;
@@ -75,11 +83,12 @@ export class Picture {
       this.tables.clear();
       this.bytes = 0;
     });
-    this.most = this.gl.getParameter(this.gl.MAX_TEXTURE_IMAGE_UNITS);
+    this.most = gl.getParameter(gl.MAX_TEXTURE_IMAGE_UNITS);
   }
 
   // parts: [{ stream, factor, url, bitmap, part: [left, top, width, height] }]
   // shader: of a view, for radiance; null: sRGB.
+  /** @type {(parts: DrawnPart[], exposure: number, shader?: Shader | null) => void} */
   draw(parts, exposure, shader = null) {
     const { gl } = this;
     const most = this.most - (shader?.tables.length ?? 0);
@@ -111,6 +120,7 @@ export class Picture {
   }
 
   // Return the drawn picture: RGBA, row 0 at the top. Waits for the drawing.
+  /** @type {(rows?: number) => Uint8Array} */
   pixels(rows = this.gl.drawingBufferHeight) {
     const { gl } = this;
     const width = gl.drawingBufferWidth, height = gl.drawingBufferHeight;
@@ -123,6 +133,7 @@ export class Picture {
     return data;
   }
 
+  /** @type {(url: string, bitmap: ImageBitmap) => void} */
   bind(url, bitmap) {
     const { gl } = this;
     let texture = this.textures.get(url);
@@ -142,6 +153,7 @@ export class Picture {
     this.bytes += texture.bytes;
   }
 
+  /** @type {(needed: number) => void} */
   forget(needed) {
     for (const [url, texture] of this.textures) {
       if (this.textures.size <= Math.max(KEPT_TEXTURES, needed)) return;
@@ -152,6 +164,7 @@ export class Picture {
   }
 
   // Return the codes of radiance under a view: (height, width, 3) -> (height, width, 4).
+  /** @type {(radiance: Float32Array, width: number, height: number, shader: Shader) => Uint8Array} */
   encode(radiance, width, height, shader) {
     const kind = `radiance ${shader.name}`;
     if (!this.programs.has(kind)) this.programs.set(kind, link(this.gl, VERTEX, shader.fragment));
@@ -159,6 +172,7 @@ export class Picture {
   }
 
   // Return the program: there is one per number of parts and view, and one per kind of data.
+  /** @type {(parts: Part[], shader: Shader | null) => WebGLProgram} */
   program(parts, shader) {
     const { stream } = parts[0];
     const kind = stream.scale ? `${parts.length} ${shader?.name ?? ""}` : stream.key;
@@ -179,17 +193,18 @@ export class Picture {
   }
 }
 
+/** @type {(gl: WebGL2RenderingContext, vertex: string, fragment: string) => WebGLProgram} */
 function link(gl, vertex, fragment) {
   const program = gl.createProgram();
-  for (const [type, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
-    const shader = gl.createShader(type);
+  for (const [type, text] of /** @type {const} */ ([[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]])) {
+    const shader = /** @type {WebGLShader} */ (gl.createShader(type)); // null only where the context is lost
     gl.shaderSource(shader, text);
     gl.compileShader(shader);
     gl.attachShader(program, shader);
   }
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
-    const logs = gl.getAttachedShaders(program).map((shader) => gl.getShaderInfoLog(shader));
+    const logs = (gl.getAttachedShaders(program) ?? []).map((shader) => gl.getShaderInfoLog(shader));
     throw new Error(`shader: ${gl.getProgramInfoLog(program)} ${logs.join(" ")}`);
   }
   return program;

@@ -1,14 +1,34 @@
 // Plays along an axis, back and forth, or along the path. It waits for pictures that are still loading.
 
+/** @import { FrameArray } from "./array.js" */
+/** @import { Path } from "./path.js" */
+/** @import { Change } from "./types.d.ts" */
+
 export class Player {
   // isReady(): whether the screen shows the view; go(change): changes the view; stopped(what): reports the end.
+  /**
+   * @param {FrameArray} array
+   * @param {() => boolean} isReady
+   * @param {(change: Change) => void} go
+   * @param {(what: string) => void} stopped
+   */
   constructor(array, isReady, go, stopped) {
-    Object.assign(this, { array, isReady, go, stopped });
+    this.array = array;
+    this.isReady = isReady;
+    this.go = go;
+    this.stopped = stopped;
+    /** @type {Path | null} */
+    this.path = null;
+    this.time = 0; // seconds since the last step, or of the path
+    /** @type {number | null} */
+    this.last = null; // ms
+    /** @type {string | null} */
     this.what = null; // "camera", "light", "path" or null
     this.speed = 1;
     this.direction = { camera: 1, light: 1 };
   }
 
+  /** @type {(what: string, path?: Path | null) => void} */
   start(what, path = null) {
     this.stop();
     if (what === "path" ? !path?.segments.length : this.length(what) < 2) return;
@@ -21,11 +41,13 @@ export class Player {
     if (was) this.stopped(was);
   }
 
+  /** @type {(axis: string) => number} */
   length(axis) {
     return axis === "camera" ? this.array.nCameras : this.array.main.n;
   }
 
   // Called before each frame of the screen; now: milliseconds.
+  /** @type {(now: number) => void} */
   tick(now) {
     if (!this.what) return;
     const passed = this.last === null ? 0 : Math.min(0.25, (now - this.last) / 1000) * this.speed;
@@ -43,7 +65,7 @@ export class Player {
     const steps = Math.floor(this.time * this.array.fps);
     if (!steps) return;
     this.time -= steps / this.array.fps;
-    const axis = this.what;
+    const axis = this.what === "camera" ? "camera" : "light";
     const n = this.length(axis);
     this.go((view) => {
       const name = this.array.main.name;
@@ -56,7 +78,8 @@ export class Player {
   }
 
   followPath() {
-    const at = this.path.at(this.time);
+    const at = this.path?.at(this.time);
+    if (!this.path || !at) return this.stop();
     this.go((view) => {
       view.c = Math.round(at.c);
       Object.assign(view.places, at.places, { [this.array.main.name]: Math.round(at.l) });
@@ -66,6 +89,7 @@ export class Player {
 }
 
 // Walk a signed number of steps over 0 to n - 1, turning at the ends.
+/** @type {(from: number, steps: number, n: number) => { to: number, direction: number }} */
 export function bounce(from, steps, n) {
   const period = 2 * (n - 1);
   const phase = steps < 0 ? period - from : from; // on the way back the phase counts down from the end

@@ -1,5 +1,7 @@
 // Loads tiles in order of priority, and keeps decoded ones within a budget of bytes.
 
+/** @import { Item } from "./types.d.ts" */
+
 const PARALLEL = 6; // connections that browsers open to one server
 const PARALLEL_LATER = 4; // of them for tiles that are not urgent, so that a drag never waits for all six
 const URGENT = 6; // items at the head of the list
@@ -7,6 +9,10 @@ const URGENT = 6; // items at the head of the list
 const SHARE = 0.8;
 
 export class Store {
+  /**
+   * @param {number} budget bytes
+   * @param {(url: string) => void} loaded
+   */
   constructor(budget, loaded) {
     this.budget = budget;
     this.loaded = loaded; // called with a url once it is loaded, or known to be missing
@@ -15,9 +21,12 @@ export class Store {
     this.entries = new Map(); // url -> { bitmap, bytes }; the least recently used first
     this.missing = new Map(); // url -> answer of the server
     this.inFlight = new Map(); // url -> AbortController
+    /** @type {Item[]} */
     this.wanted = [];
+    this.next = 0; // of the wanted ones
   }
 
+  /** @type {(url: string) => ImageBitmap | null} */
   get(url) {
     const entry = this.entries.get(url);
     if (!entry) return null;
@@ -26,11 +35,13 @@ export class Store {
     return entry.bitmap;
   }
 
+  /** @type {(url: string) => boolean} */
   has(url) {
     return this.entries.has(url);
   }
 
   // Load these in this order; cancel all other loads.
+  /** @type {(list: Item[]) => void} */
   want(list) {
     let bytes = 0;
     const seen = new Set();
@@ -58,6 +69,7 @@ export class Store {
     }
   }
 
+  /** @type {(url: string) => Promise<void>} */
   async load(url) {
     const controller = new AbortController();
     this.inFlight.set(url, controller);
@@ -67,10 +79,12 @@ export class Store {
         this.missing.set(url, (await answer.text()).trim() || answer.statusText);
       } else {
         // Keep the codes of the file; the shader decodes them.
+        /** @type {ImageBitmapOptions} */
         const options = { premultiplyAlpha: "none", colorSpaceConversion: "none" };
         this.add(url, await createImageBitmap(await answer.blob(), options));
       }
-    } catch (error) {
+    } catch (thrown) {
+      const error = /** @type {Error} */ (thrown);
       if (error.name !== "AbortError") this.missing.set(url, `cannot be loaded: ${error.message}`);
     }
     if (this.inFlight.get(url) === controller) this.inFlight.delete(url);
@@ -78,6 +92,7 @@ export class Store {
     this.pump();
   }
 
+  /** @type {(url: string, bitmap: ImageBitmap) => void} */
   add(url, bitmap) {
     if (this.entries.has(url)) {
       bitmap.close();
@@ -105,6 +120,7 @@ export class Store {
 export function memoryBudget() {
   const asked = Number(new URLSearchParams(location.search).get("memory"));
   if (asked > 0) return asked * 2 ** 20;
-  const small = matchMedia("(max-width: 760px), (pointer: coarse)").matches || navigator.deviceMemory < 4;
+  const small = matchMedia("(max-width: 760px), (pointer: coarse)").matches ||
+    "deviceMemory" in navigator && Number(navigator.deviceMemory) < 4;
   return (small ? 96 : 384) * 2 ** 20;
 }

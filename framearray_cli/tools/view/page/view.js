@@ -1,7 +1,11 @@
 // The state of the page: place, layer, exposure, colours. It is written to the address and read from it.
 
+/** @import { FrameArray } from "./array.js" */
+/** @import { Tint, View } from "./types.d.ts" */
+
 const PLAIN = { intensity: 1, color: "#ffffff" };
 
+/** @type {(array: FrameArray) => View} */
 export function firstView(array) {
   return {
     c: 0,
@@ -15,32 +19,42 @@ export function firstView(array) {
 }
 
 // The view that the page starts with.
+/** @type {(array: FrameArray) => string} */
 function firstLook(array) {
   return array.contents.views?.[0].name ?? "srgb";
 }
 
+/** @type {(array: FrameArray, view: View) => string} */
 export function toHash(array, view) {
   const words = new URLSearchParams();
-  words.set("camera", view.c);
-  for (const { name } of array.axes) words.set(name === array.main.name ? "light" : `axis.${name}`, view.places[name]);
+  words.set("camera", String(view.c));
+  for (const { name } of array.axes) words.set(axisWord(array, name), String(view.places[name]));
   if (view.show !== "picture") words.set("show", view.show);
   if (view.look !== firstLook(array)) words.set("view", view.look);
-  if (view.exposure) words.set("exposure", round(view.exposure));
+  if (view.exposure) words.set("exposure", String(round(view.exposure)));
   for (const [name, tint] of Object.entries(view.tints)) if (isTinted(tint)) words.set(`group.${name}`, tintText(tint));
   if (isTinted(view.ambient)) words.set("ambient", tintText(view.ambient));
   return `#${words}`;
 }
 
+/** @type {(array: FrameArray, name: string) => string} */
+function axisWord(array, name) {
+  return name === array.main.name ? "light" : `axis.${name}`;
+}
+
 // Values that do not fit the array stay as in a first view.
+/** @type {(array: FrameArray, hash: string) => View} */
 export function fromHash(array, hash) {
   const view = firstView(array);
   const words = new URLSearchParams(hash.replace(/^#/, ""));
   view.c = index(words.get("camera"), array.nCameras);
   for (const { name, n } of array.axes) {
-    view.places[name] = index(words.get(name === array.main.name ? "light" : `axis.${name}`), n);
+    view.places[name] = index(words.get(axisWord(array, name)), n);
   }
-  if (array.layers.some((layer) => layer.key === words.get("show"))) view.show = words.get("show");
-  if (array.contents.views?.some(({ name }) => name === words.get("view"))) view.look = words.get("view");
+  const layer = array.layers.find((one) => one.key === words.get("show"));
+  const look = array.contents.views?.find((one) => one.name === words.get("view"));
+  if (layer) view.show = layer.key;
+  if (look) view.look = look.name;
   const exposure = Number(words.get("exposure"));
   if (Math.abs(exposure) <= 16) view.exposure = exposure;
   for (const name of Object.keys(view.tints)) view.tints[name] = tintOf(words.get(`group.${name}`));
@@ -53,23 +67,28 @@ export function isEmbedded() {
   return new URLSearchParams(location.hash.slice(1)).has("embed");
 }
 
+/** @type {(tint: Tint) => boolean} */
 export function isTinted({ intensity, color }) {
   return intensity !== PLAIN.intensity || color !== PLAIN.color;
 }
 
+/** @type {(value: number) => number} */
 export function round(value) {
   return Math.round(value * 100) / 100;
 }
 
+/** @type {(text: string | null, n: number) => number} */
 function index(text, n) {
   const value = Math.round(Number(text));
   return value > 0 ? Math.min(n - 1, value) : 0;
 }
 
+/** @type {(tint: Tint) => string} */
 function tintText({ intensity, color }) {
   return `${round(intensity)},${color.slice(1)}`;
 }
 
+/** @type {(text: string | null) => Tint} */
 function tintOf(text) {
   const found = /^(\d+(?:\.\d+)?),([0-9a-f]{6})$/.exec(text ?? "");
   return found ? { intensity: Math.min(16, Number(found[1])), color: `#${found[2]}` } : { ...PLAIN };

@@ -1,0 +1,71 @@
+// What the page reads and passes around: index.json of index.py, contents.json of contents.py, the state of the page.
+
+export type Axis = { name: string; n: number; times?: string[] };
+
+export type Stream = {
+  key: string;
+  role: "image" | "group" | "ambient" | "background" | "layer" | "environment";
+  label: string;
+  axis: string; // "" if the light changes nothing
+  n: number;
+  exposed: boolean;
+  scale: number; // 0: data, from low to high
+  white: number;
+  low: number;
+  high: number;
+};
+
+export type Index = {
+  name: string;
+  digest: string;
+  fps: number;
+  resolution: [number, number];
+  n_cameras: number;
+  axes: Axis[];
+  exposure: number;
+  small: { factor: number; width: number; height: number; columns: number };
+  streams: Stream[];
+  background_ambient: number[];
+  ambient: Record<string, number[][]>; // by group and position: RGB
+  environment?: { file: string; step: number };
+};
+
+export type ViewRow = { name: string; label: string; file?: string };
+
+export type Contents = {
+  live: boolean;
+  index: string;
+  stamp: string;
+  lacking: [number, string];
+  streams: Record<string, { stamps: string[]; missing: Record<string, [number, number][]> }>;
+  views?: ViewRow[];
+};
+
+export type Tint = { intensity: number; color: string };
+
+// The state of the page.
+export type View = {
+  c: number;
+  places: Record<string, number>; // by axis
+  show: string;
+  exposure: number;
+  look: string;
+  tints: Record<string, Tint>;
+  ambient: Tint;
+};
+
+export type Change = (view: View) => unknown;
+
+export type Place = { c: number; l: number };
+
+// A stream of a picture, and the part of its tile or sheet that is drawn: left, top, width, height.
+export type Part = { stream: Stream; l: number; factor: number[] };
+export type DrawnPart = Part & { url: string; bitmap: ImageBitmap; part: number[] };
+
+// A tile to load.
+export type Item = { url: string; bytes: number; needed?: boolean };
+
+export type Segment = { seconds: number; camera: number[]; light: number[]; places: Record<string, number> };
+
+// A table of a view's shader.
+export type Table = { sampler: string; size: number[]; channels: number; smooth: boolean };
