@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import TypeAlias
 
@@ -39,15 +40,16 @@ def _imported(package: str, name: str, files: Mapping[str, Path]) -> Iterator[st
             yield next(place for place in places if place in files)
 
 
-def libraries(file: Path) -> set[str]:
+@cache
+def libraries(file: Path) -> frozenset[str]:
     """Find the libraries that a file imports, also inside functions."""
-    found = set()
+    found: set[str] = set()
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             found |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
             found.add(node.module.split(".")[0])
-    return found
+    return frozenset(found)
 
 
 def room(module: str) -> str:
