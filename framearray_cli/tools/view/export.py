@@ -9,6 +9,7 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, whole_folder
 
 from .contents import CONTENTS_FILE
+from .offline import DATA, LOADER, offline_page, script, tile_scripts
 from .page import page_files
 from .shaders import VIEWS_FOLDER
 from .tiles import INDEX_FILE, TILES_FOLDER, Tiles
@@ -23,7 +24,7 @@ def check_target(target: Path, *, force: bool = True) -> None:
     Raises:
         OutputError: the folder holds other files, or cannot be read.
     """
-    ours = {INDEX_FILE, CONTENTS_FILE, TILES_FOLDER, VIEWS_FOLDER, *page_files()}
+    ours = {INDEX_FILE, CONTENTS_FILE, TILES_FOLDER, VIEWS_FOLDER, DATA, *page_files()}
     try:
         found = sorted(entry.name for entry in target.iterdir()) if os.path.exists(target) else []
     except OSError as error:
@@ -36,11 +37,12 @@ def check_target(target: Path, *, force: bool = True) -> None:
         raise OutputError(f"{target}: an earlier export is there; choose another folder, or give --force to replace it")
 
 
-def export_page(tiles: Tiles, target: Path) -> int:
+def export_page(tiles: Tiles, target: Path, *, offline: bool = False) -> int:
     """Write the page with all tiles; the folder appears whole or not at all, in place of an earlier export.
 
     Args:
         tiles: all prepared.
+        offline: write a page that can be opened as a file, too.
 
     Returns:
         The number of bytes written.
@@ -50,13 +52,22 @@ def export_page(tiles: Tiles, target: Path) -> int:
     """
     check_target(target)
     with whole_folder(target, replace=True) as part:
-        if tiles.views.files:
-            (part / VIEWS_FOLDER).mkdir()
-        for name, data in (page_files() | tiles.views.files).items():
-            (part / name).write_bytes(data)
-        shutil.copyfile(tiles.folder / INDEX_FILE, part / INDEX_FILE)
-        (part / CONTENTS_FILE).write_text(json.dumps(tiles.contents(live=False)))
-        _copy_tiles(tiles.folder / TILES_FOLDER, part / TILES_FOLDER)
+        page, index = page_files(), (tiles.folder / INDEX_FILE).read_bytes()
+        contents = json.dumps(tiles.contents(live=False)).encode()
+        data = {INDEX_FILE: index, CONTENTS_FILE: contents, **tiles.views.files}
+        if offline:
+            files = offline_page(page) | {INDEX_FILE: index, DATA: script(DATA, data)}
+        else:
+            files = {name: content for name, content in page.items() if name != LOADER} | data
+        for name, content in files.items():
+            (part / name).parent.mkdir(exist_ok=True)
+            (part / name).write_bytes(content)
+        if offline:
+            (part / TILES_FOLDER).mkdir()
+            for name, content in tile_scripts(tiles):
+                (part / name).write_bytes(content)
+        else:
+            _copy_tiles(tiles.folder / TILES_FOLDER, part / TILES_FOLDER)
     return sum(file.stat().st_size for file in target.rglob("*") if file.is_file())
 
 

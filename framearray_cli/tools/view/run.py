@@ -100,12 +100,19 @@ def show_page(
 
 
 def write_page(
-    tiles: Tiles, target: Path, *, threads: int, progress: Callable[[int], None], force: bool = True
+    tiles: Tiles,
+    target: Path,
+    *,
+    threads: int,
+    progress: Callable[[int], None],
+    force: bool = True,
+    offline: bool = False,
 ) -> tuple[int, list[OutputError]]:
     """Prepare all tiles, and export the page.
 
     Args:
         force: replace an earlier export.
+        offline: write a page that can be opened as a file, too.
 
     Returns:
         The number of bytes written, and the errors of damaged images.
@@ -116,7 +123,7 @@ def write_page(
     target = Path(os.path.realpath(target))  # "." has no name for a folder beside it
     check_target(target, force=force)
     problems = prepare_all(tiles, threads, progress)
-    return export_page(tiles, target), problems
+    return export_page(tiles, target, offline=offline), problems
 
 
 def prepare_all(tiles: Tiles, threads: int, progress: Callable[[int], None]) -> list[OutputError]:

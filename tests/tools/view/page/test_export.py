@@ -5,6 +5,7 @@ import time
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from support.chromium import PATIENCE_S, PHONE, shown
 from support.expected import bounds, nearest_place, outside
 
 from framearray_cli.base.errors import OutputError
+from framearray_cli.tools.display import find_view
 from framearray_cli.tools.view.run import open_tiles, write_page
 
 
@@ -47,7 +49,36 @@ def test_an_export_works_from_a_sub_folder(browser, served, tmp_path):
         page.settle()
         assert page.place == (1, 1)
         page.all_loaded()
+        assert page.get("framearray.view.look") == "srgb" and not page.page.locator("#view").is_visible()
+        assert [one for one in page.requests if "views" in one or "offline" in one] == [], "nothing that it does not use"
         page.check(url)
+
+
+@pytest.mark.parametrize("kind", ["file", pytest.param("http", marks=pytest.mark.slow)])
+def test_an_offline_export_opens_as_a_file_too(browser, served, tmp_path, kind):
+    """With a view of OpenColorIO, whose shader and tables come from a script as well."""
+    manifest = handmade.plain(tmp_path / "array", n_c=3, n_l=2)
+    tiles = open_tiles(manifest.directory, None, 2, None, [find_view("aces")])
+    page = tmp_path / "some where" / "page"
+    for _ in range(2):  # the second in place of the first
+        assert write_page(tiles, page, threads=2, progress=lambda n: None, offline=True)[1] == []
+    assert not list(page.rglob("*.jpg"))
+    base = f"file://{quote(str(page))}/" if kind == "file" else f"{served}some%20where/page/"
+    with shown(browser, f"{base}index.html#camera=2&light=1&view=srgb") as screen:
+        low, high = bounds(tiles, 2, [("light", 1, (1.0, 1.0, 1.0))])
+        assert outside(screen.pixels(), low, high) == 0.0
+        plain = screen.pixels()
+        screen.page.locator("#view").select_option("aces")
+        assert np.abs(screen.pixels().astype(int) - plain).max() > 10
+        screen.page.keyboard.press("Escape")
+        screen.drag([(2, 1), (1, 0)])
+        screen.settle()
+        assert screen.place == (1, 0)
+        screen.all_loaded()
+        assert {url.rpartition("/")[2] for url in screen.requests} >= {"data.js", "c0001.js", "c0000.sheets.js"}
+        assert not screen.get("framearray.store.missing.size")
+        assert screen.errors == []
+        assert all(url.startswith((base, "blob:", "data:")) for url in screen.requests)
 
 
 def bounds_of_copy(tiles, folder):
@@ -85,7 +116,7 @@ def blog(served, tmp_path) -> str:
     return f"{served}blog.html"
 
 
-@pytest.mark.parametrize("size", [(900, 700), PHONE], ids=["desktop", "phone"])
+@pytest.mark.parametrize("size", [pytest.param((900, 700), marks=pytest.mark.slow), PHONE], ids=["desktop", "phone"])
 def test_an_embedded_page_is_only_a_picture_that_turns(browser, blog, size):
     phone = {"has_touch": True, "is_mobile": True} if size == PHONE else {}
     with browser.new_context(viewport={"width": size[0], "height": size[1]}, **phone) as context:
