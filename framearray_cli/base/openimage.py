@@ -62,6 +62,8 @@ def read_rgb(path: Path) -> Float32:
     names, pixels = read_pixels(path)
     if not {"R", "G", "B"} <= set(names):
         raise OutputError(f"{path}: expected channels R, G, B, found {', '.join(names)}")
+    if names == ["R", "G", "B"]:  # without layers: no copy, which takes as long as reading a file
+        return pixels
     return np.ascontiguousarray(pixels[..., [names.index(name) for name in "RGB"]])
 
 
