@@ -22,20 +22,17 @@ from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.array.moments import position_name
 from framearray_cli.array.pictures import Pictures
 from framearray_cli.array.places import MIDDLE_PLACE, read_indices
-from framearray_cli.array.present import REMEDY, list_present
-from framearray_cli.array.ranges import brief_frames_text
 from framearray_cli.base.arrays import Bytes, Float32
 from framearray_cli.base.colour import srgb8_from_linear
 from framearray_cli.base.errors import JobError, OutputError
-from framearray_cli.base.forms.words import shown
 from framearray_cli.base.units import agree, counted
 
-from .axes import LightIndices, evenly_spaced, given_places
+from .axes import LightIndices, evenly_spaced
 from .drawing import GAP, MARGIN, SHEET_GREY, blank_tile, draw_sheet, gutter
 from .mixing.mixer import SumOptions, open_pictures
 from .progress import Progress
 from .sheetlines import SheetLines, lay_out
-from .shrinking import area_mean
+from .sheettiles import SheetPlaces, find_images, read_lights, read_tiles
 
 MOST_COLUMNS, MOST_ROWS = 12, 8  # for an array of 192 x 48: 200 pixels per tile, on a sheet that fits a screen
 WIDTH = 2400  # pixels
@@ -103,31 +100,91 @@ def make_sheet(
         MissingExtraError: no library here draws labels, or writes the format.
     """
     image_format, manifest = sheet_format(target, exposure), read_manifest(out)
-    axis = side if side is not None else next(iter(manifest.axes))
     pictures, left_out = open_pictures(manifest, sums)
-    lights, fixed = _read_lights(manifest, axis, light, at, columns * rows if wrap else rows)
-    lights, names = _name_rows(manifest, axis, lights, sums)
+    sheet = plan_sheet(
+        pictures, cameras=cameras, light=light, columns=columns, rows=rows, width=width, side=side, at=at, wrap=wrap,
+        summed=sums.collapses, labels=image_format.format in FOR_SCREENS,
+    )  # fmt: skip
+    warnings = (*left_out, *sheet.warnings)
+    size = (0, 0)
+    if not dry_run:
+        tiles = read_tiles(pictures, sheet.places, sheet.there, sheet.tile, progress)
+        if sheet.lines.labels:
+            size = write_drawn(target, drawn_sheet(sheet, tiles, exposure))
+        else:
+            size = write_linear(target, sheet.lines.arrange(tiles, 0), image_format)
+    cameras_of, lights_of = sheet.places.cameras, sheet.places.lights
+    return SheetResult(target=target, cameras=tuple(cameras_of), lights=tuple(lights_of), size=size, warnings=warnings)
+
+
+class SheetPlan(NamedTuple):
+    """A sheet before any image is read.
+
+    Attributes:
+        heads: texts of the head line.
+        tile: width and height of each image, pixels; `width`: of the sheet, at most.
+        there: which images are there, (rows, columns).
+        warnings: about the others.
+    """
+
+    places: SheetPlaces
+    lines: SheetLines
+    heads: Sequence[str]
+    tile: tuple[int, int]
+    width: int
+    there: NDArray[np.bool_]
+    warnings: tuple[str, ...]
+
+
+def plan_sheet(
+    pictures: Pictures,
+    *,
+    cameras: str | None,
+    light: str | None,
+    columns: int,
+    rows: int,
+    width: int,
+    side: str | None,
+    at: Sequence[str],
+    wrap: bool = False,
+    summed: bool = False,
+    labels: bool = True,
+) -> SheetPlan:
+    """Choose the images of a sheet, and find out which are there.
+
+    Args:
+        summed: whether all positions along the first axis are one picture.
+        labels: whether the sheet has labels.
+        cameras, light, columns, rows, width, side, at, wrap: as in `make_sheet`.
+
+    Raises:
+        JobError, OutputError, MissingExtraError: as `make_sheet`.
+    """
+    manifest = pictures.manifest
+    axis = side if side is not None else next(iter(manifest.axes))
+    lights, fixed = read_lights(manifest, axis, light, at, columns * rows if wrap else rows)
+    lights, names = _name_rows(manifest, axis, lights, summed=summed)
     chosen = choose_columns(manifest, MIDDLE_PLACE if wrap and cameras is None else cameras, columns)
-    lines = lay_out(chosen, lights, names if image_format.format in FOR_SCREENS else [], columns if wrap else None)
+    lines = lay_out(chosen, lights, names if labels else [], columns if wrap else None)
     tile = tile_size(manifest, lines.n_columns, width, lines.labels)
-    places = _Places(chosen, lights, list(manifest.axes).index(axis), fixed)
-    there, warnings = _find_images(pictures, places, left_out)
-    if dry_run:
-        return SheetResult(target=target, cameras=chosen, lights=lights, size=(0, 0), warnings=warnings)
-    tiles = _read_tiles(pictures, places, there, tile, progress)
-    if lines.labels:
-        shown = _screen_tiles(tiles, there, exposure)
-        size = _draw(target, shown, lines, _heads(manifest, axis, fixed, chosen[0] if wrap else None), width)
-    else:
-        size = write_linear(target, lines.arrange(tiles, 0), image_format)
-    return SheetResult(target=target, cameras=chosen, lights=lights, size=size, warnings=warnings)
+    places = SheetPlaces(chosen, lights, list(manifest.axes).index(axis), fixed)
+    there, warnings = find_images(pictures, places)
+    heads = _heads(manifest, axis, fixed, chosen[0] if wrap else None)
+    return SheetPlan(places, lines, heads, tile, width, there, warnings)
+
+
+def drawn_sheet(sheet: SheetPlan, tiles: Float32, exposure: float) -> Bytes:
+    """Draw a sheet of tiles, (rows, columns, h, w, 3), with labels; return its sRGB codes."""
+    lines = sheet.lines
+    shown = lines.arrange(_screen_tiles(tiles, sheet.there, exposure), SHEET_GREY)
+    return draw_sheet(shown, lines.columns, lines.labels, sheet.heads, sheet.width, lines.noun)
 
 
 def _name_rows(
-    manifest: Manifest, axis: str, lights: tuple[int, ...], sums: SumOptions
+    manifest: Manifest, axis: str, lights: tuple[int, ...], *, summed: bool
 ) -> tuple[tuple[int, ...], list[str]]:
     """Return the light positions of the rows, one where they are summed, and their names."""
-    if sums.collapses and axis == next(iter(manifest.axes)):
+    if summed and axis == next(iter(manifest.axes)):
         return lights[:1], ["sum"]
     return lights, [position_name(manifest, axis, l) for l in lights]
 
@@ -137,12 +194,6 @@ def _screen_tiles(tiles: Float32, there: NDArray[np.bool_], exposure: float) -> 
     shown = srgb8_from_linear(tiles * np.float32(2.0**exposure))
     shown[~there] = blank_tile(tiles.shape[3], tiles.shape[2])
     return shown
-
-
-def _draw(target: Path, tiles: Bytes, lines: SheetLines, heads: Sequence[str], width: int) -> tuple[int, int]:
-    """Write a sheet of tiles, (rows, columns, h, w, 3), with labels; return its width and height."""
-    shown = lines.arrange(tiles, SHEET_GREY)
-    return write_drawn(target, draw_sheet(shown, lines.columns, lines.labels, heads, width, lines.noun))
 
 
 def write_drawn(target: Path, codes: Bytes) -> tuple[int, int]:
@@ -165,19 +216,6 @@ def write_linear(target: Path, tiles: Float32, image_format: ImageFormat) -> tup
     return size
 
 
-class _Places(NamedTuple):
-    """The images of a sheet: cameras by column, lights along the axis number `side` by row, fixed along the others."""
-
-    cameras: Sequence[int]
-    lights: Sequence[int]
-    side: int
-    fixed: LightIndices
-
-    def at(self, l: int) -> LightIndices:
-        """Return the index along each axis for a row."""
-        return (*self.fixed[: self.side], l, *self.fixed[self.side + 1 :])
-
-
 def sheet_format(target: Path, exposure: float = 0.0) -> ImageFormat:
     """Return the format of a sheet by the suffix of its file."""
     name = format_name(target)
@@ -190,28 +228,6 @@ def sheet_format(target: Path, exposure: float = 0.0) -> ImageFormat:
     return image_format
 
 
-def _read_lights(
-    manifest: Manifest, axis: str, light: str | None, at: Sequence[str], rows: int
-) -> tuple[tuple[int, ...], LightIndices]:
-    """Read the rows of the sheet, and the index along each axis that is not shown; that along the shown one is void.
-
-    Args:
-        rows: at most, where neither `light` nor `at` names them.
-    """
-    if axis not in manifest.axes:
-        raise JobError("--side", [f"expected one of the axes {', '.join(manifest.axes)}, got {shown(axis)}"])
-    given = given_places(manifest, light, at)
-    found = {
-        name: read_indices(*given.get(name, (f"--at {name}", MIDDLE_PLACE)), n, name)
-        for name, n in manifest.axes.items()
-    }
-    shown_rows = found[axis] if axis in given else evenly_spaced(manifest.axes[axis], rows)
-    for name, places in found.items():
-        if name != axis and len(places) > 1:
-            raise JobError(given[name][0], [f"expected one place, as the rows are those of {axis}, got {len(places)}"])
-    return shown_rows, tuple(places[0] for places in found.values())
-
-
 def tile_size(manifest: Manifest, n_columns: int, width: int, labels: Sequence[str]) -> tuple[int, int]:
     """Return width and height of each image on a sheet with these labels at its side."""
     full_width, full_height = manifest.resolution
@@ -221,48 +237,6 @@ def tile_size(manifest: Manifest, n_columns: int, width: int, labels: Sequence[s
         raise JobError("--width", [f"{few} for {counted(n_columns, 'column')}; try fewer --columns"])
     tile_width = min(room, full_width)
     return tile_width, max(1, round(tile_width * full_height / full_width))
-
-
-def _find_images(
-    pictures: Pictures, places: _Places, left_out: tuple[str, ...]
-) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
-    """Return which images are there, (rows, columns), and warnings: those before, and about the others.
-
-    Raises:
-        OutputError: none is there.
-    """
-    manifest, present = pictures.manifest, list_present(pictures.manifest)
-    rows = [[present.has(pictures.files(c, places.at(l))) for c in places.cameras] for l in places.lights]
-    there: NDArray[np.bool_] = np.array(rows)
-    if there.all():
-        return there, left_out
-    gone = int(np.count_nonzero(~there))
-    lacking = [c for i, c in enumerate(places.cameras) if not there[:, i].all()]
-    text = (
-        f"{gone:,} of {counted(there.size, 'image')} of the sheet {agree(gone, 'is', 'are')} missing, "
-        f"of {agree(len(lacking), 'camera', 'cameras')} {brief_frames_text(lacking)}; {REMEDY}"
-    )
-    if not there.any():
-        raise OutputError(f"{manifest.directory}: {text}")
-    return there, (*left_out, text)
-
-
-def _read_tiles(
-    pictures: Pictures,
-    places: _Places,
-    there: NDArray[np.bool_],
-    tile: tuple[int, int],
-    progress: Progress | None,
-) -> Float32:
-    """Read the images that are there, and shrink them: (rows, columns, height, width, 3); the others are black."""
-    total = int(np.count_nonzero(there))
-    tiles = np.zeros((*there.shape, tile[1], tile[0], 3), np.float32)
-    for done, (i, j) in enumerate(np.argwhere(there.T).tolist(), start=1):
-        picture = pictures.picture(places.cameras[i], places.at(places.lights[j]))
-        tiles[j, i] = area_mean(picture, *tile)
-        if progress:
-            progress(done, total)
-    return tiles
 
 
 def _heads(manifest: Manifest, axis: str, fixed: LightIndices, c: int | None) -> Sequence[str]:

@@ -48,11 +48,24 @@ def read_map(file: Path) -> Image:
     Raises:
         OutputError: it is missing or damaged, is no panorama, is black, or holds values that are no radiance.
     """
-    image = read_environment(file)
+    return prepare_map(read_environment(file), file)
+
+
+def prepare_map(image: Image, name: Path | str) -> Image:
+    """Check an environment map, and shrink it to at most ROWS rows.
+
+    Args:
+        name: of the map, for messages.
+
+    Raises:
+        OutputError: it is no panorama, is black, or holds values that are no radiance.
+    """
+    if image.ndim != 3 or image.shape[1:] != (2 * image.shape[0], 3):
+        raise OutputError(f"{name}: expected a panorama of shape (h, 2 h, 3), got {image.shape}")
     if not np.isfinite(image).all() or image.min() < 0:
-        raise OutputError(f"{file}: expected radiance of at least 0, got values that are negative or not finite")
+        raise OutputError(f"{name}: expected radiance of at least 0, got values that are negative or not finite")
     if not image.any():
-        raise OutputError(f"{file}: expected an environment that shines, got radiance 0 everywhere")
+        raise OutputError(f"{name}: expected an environment that shines, got radiance 0 everywhere")
     return area_mean(image, 2 * ROWS, ROWS) if len(image) > ROWS else image
 
 

@@ -11,10 +11,10 @@ import numpy as np
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.mixtures import Mixture, Position, check_linear, check_mixture
 from framearray_cli.array.pictures import Pictures, Positions
-from framearray_cli.base.arrays import Float64
+from framearray_cli.base.arrays import Float64, Image
 from framearray_cli.base.errors import JobError
 
-from .environment import environment_weights, light_field, read_map
+from .environment import LightField, environment_weights, light_field, read_map
 from .weightfile import read_weights
 
 # Below this share of a map's light pictures miss some of it that people would see.
@@ -98,17 +98,32 @@ def _environment_mixer(
 ) -> Mixer:
     field, panorama = light_field(manifest), read_map(file)
     first, last = rotate
-    weights, covered = environment_weights(field, panorama, first)
-    check_mixture(manifest, mixture_of(weights))
+    _, covered = environment_mixture(manifest, field, panorama, first)
     if covered < MOST_LIGHT:
         warn(f"{file}: {1 - covered:.0%} of its light comes from where the array has no light position")
 
     def mix(positions: Positions, share: float) -> Positions:
-        turned = mixture_of(environment_weights(field, panorama, first + (last - first) * share)[0])
-        check_mixture(manifest, turned)
+        turned, _ = environment_mixture(manifest, field, panorama, first + (last - first) * share)
         return (turned, *positions[1:])
 
     return mix
+
+
+def environment_mixture(
+    manifest: Manifest, field: LightField, panorama: Image, rotate_deg: float
+) -> tuple[Mixture, float]:
+    """Return the sum of light positions that an environment is, and the share of its light that they stand for.
+
+    Args:
+        field, panorama, rotate_deg: as in `environment_weights`.
+
+    Raises:
+        OutputError: the sum would be wrong, as in `check_mixture`.
+    """
+    weights, covered = environment_weights(field, panorama, rotate_deg)
+    mixture = mixture_of(weights)
+    check_mixture(manifest, mixture)
+    return mixture, covered
 
 
 def scaled(positions: tuple[Position, ...], factor: float) -> tuple[Position, ...]:
