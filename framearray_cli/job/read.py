@@ -15,7 +15,7 @@ from framearray_cli.base.forms.words import shown
 from .eyefile import read_eyes
 from .ies import read_photometry
 from .job import Job
-from .override import name_settings, put_settings, read_settings
+from .override import Setting, name_settings, put_settings, read_settings
 from .positionfile import read_positions
 from .rowfile import RowFileError
 from .rowsource import FORMS
@@ -34,8 +34,31 @@ def read_job(path: Path, sets: Sequence[str] = ()) -> Job:
     """
     settings = read_settings(sets)
     table = load_kind(path, "job")
-    put_settings(table, settings)
     job_file = shown_file(path) if path == STDIN else path.absolute()
+    return _checked_job(table, settings, job_file, shown_file(path))
+
+
+def job_from_table(table: dict[str, Any], sets: Sequence[str] = ()) -> Job:
+    """Check a job that is given as the tables of a job file; file names in it are relative to the current folder.
+
+    Args:
+        table: plain tables, lists and values, which are changed.
+        sets: as in `read_job`.
+
+    Raises:
+        JobError: as `read_job`, with "job" in place of a file.
+    """
+    return _checked_job(table, read_settings(sets), None, Path("job"))
+
+
+def _checked_job(table: dict[str, Any], settings: Sequence[Setting], job_file: Path | None, name: Path) -> Job:
+    """Read a job from its tables.
+
+    Args:
+        job_file: file names are relative to its folder; None: to the current one.
+        name: of the job in messages.
+    """
+    put_settings(table, settings)
     table, problems = _with_eyes(table, job_file)
     table, more = _with_positions(table, job_file)
     problems += more + _profile_problems(table, job_file)
@@ -44,7 +67,7 @@ def read_job(path: Path, sets: Sequence[str] = ()) -> Job:
     except ValidationError as error:
         problems = problems_of(error, Job) + problems
     if problems:
-        raise JobError(shown_file(path), name_settings(problems, settings))
+        raise JobError(name, name_settings(problems, settings))
     return job
 
 
@@ -100,7 +123,7 @@ def _toml_value(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
-def _with_eyes(table: dict[str, Any], job_file: Path) -> tuple[dict[str, Any], list[str]]:
+def _with_eyes(table: dict[str, Any], job_file: Path | None) -> tuple[dict[str, Any], list[str]]:
     """Replace `camera.file` by its keys, so that the job is complete without the file."""
     camera = table.get("camera")
     if not isinstance(camera, dict) or not isinstance(camera.get("file"), str) or "keys" in camera:
@@ -122,7 +145,7 @@ def _with_eyes(table: dict[str, Any], job_file: Path) -> tuple[dict[str, Any], l
     return {**table, "camera": {**rest, "keys": keys}}, problems
 
 
-def _with_positions(table: dict[str, Any], job_file: Path) -> tuple[dict[str, Any], list[str]]:
+def _with_positions(table: dict[str, Any], job_file: Path | None) -> tuple[dict[str, Any], list[str]]:
     """Replace `file` of light sources by keys, so that the job is complete without the files."""
     light = table.get("light")
     sources = light.get("sources") if isinstance(light, dict) else None
@@ -133,7 +156,7 @@ def _with_positions(table: dict[str, Any], job_file: Path) -> tuple[dict[str, An
     return {**table, "light": {**light, "sources": found}}, problems
 
 
-def _profile_problems(table: dict[str, Any], job_file: Path) -> list[str]:
+def _profile_problems(table: dict[str, Any], job_file: Path | None) -> list[str]:
     """Check the files of measured lamps, of sources that have them."""
     light = table.get("light")
     sources = light.get("sources") if isinstance(light, dict) else None
@@ -149,7 +172,7 @@ def _profile_problems(table: dict[str, Any], job_file: Path) -> list[str]:
     return problems
 
 
-def _with_rows(source: Any, place: str, job_file: Path, problems: list[str]) -> Any:
+def _with_rows(source: Any, place: str, job_file: Path | None, problems: list[str]) -> Any:
     """Replace `file` of one source, with the strength and colour beside it, if it is as it should be."""
     if not isinstance(source, dict) or "keys" in source or str(source.get("type")) not in FORMS:
         return source  # nothing to replace, or a problem that the validation of the job reports

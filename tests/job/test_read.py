@@ -14,7 +14,7 @@ from framearray_cli.base.errors import JobError
 from framearray_cli.base.forms.toml import load_toml
 from framearray_cli.base.forms.words import shown
 from framearray_cli.job.job import Job
-from framearray_cli.job.read import job_table, read_job
+from framearray_cli.job.read import job_from_table, job_table, read_job
 
 JOB = """
 name = "room"
@@ -179,6 +179,15 @@ def test_file_names_are_relative_to_the_job_file(tmp_path, monkeypatch):
     assert job.scene.file == tmp_path / "jobs/scenes/room.glb"
     assert job.output.directory == tmp_path / "out/room"
     assert job.file == tmp_path / "jobs/job.toml"
+
+
+def test_tables_give_the_job_of_their_file_with_names_relative_to_the_current_folder(tmp_path, monkeypatch):
+    path = write(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    sets = ["camera.resolution=[64, 48]"]
+    assert job_from_table(load_toml(path), sets).model_dump() == read_job(path, sets).model_dump()
+    with pytest.raises(JobError, match=r"^job: camera\.fov: expected a number"):
+        job_from_table({**load_toml(path), "camera": {"fov": "wide"}})
 
 
 def test_a_linked_scene_keeps_its_name(tmp_path):
