@@ -57,6 +57,9 @@ class RenderEvents:
     def written(self, images: int) -> None:
         """That many more images are on disk."""
 
+    def frame_written(self, c: int, images: int) -> None:
+        """All files of a camera position are on disk and recorded; of that many images if it is rendered in blocks."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AmbientFigures:

@@ -242,6 +242,7 @@ class _Run:
         with self._lock:
             self._done.add(done.c)
             self._images += len(done.planes)
+        self._events.frame_written(done.c, len(done.planes))
 
     def summary(self, on_disk: OnDisk, ambient: Ambient) -> Summary:
         """Summarize this and all other runs; files found damaged count once they are rendered again."""
