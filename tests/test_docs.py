@@ -97,7 +97,7 @@ def test_every_page_and_picture_is_reachable_from_the_index():
             todo += [(page.parent / link.partition("#")[0]).resolve() for link in links(page) if link[0] != "#"]
     files = {file for file in DOCS.rglob("*") if file.is_file()}
     assert files - reached == set()
-    assert {file.suffix for file in files} == {".md", ".json", ".jpg", ".svg"}, "no scripts in docs/"
+    assert {file.suffix for file in files} == {".md", ".json", ".jpg", ".svg", ".ipynb"}, "no scripts in docs/"
 
 
 def test_pictures_are_small():
@@ -126,9 +126,9 @@ def test_commands_exist():
 
 def test_named_files_exist():
     """Jobs, files of the package and tests that a page names, and pages that code names."""
-    place = re.compile(r"\b((?:jobs|framearray_cli|tests|docs)/[\w./-]*[\w/])")
+    place = re.compile(r"\b((?:jobs|framearray|framearray_cli|tests|docs)/[\w./-]*[\w/])")
     missing = []
-    for page in (*PAGES, *PACKAGE.rglob("*.py"), *ROOT.glob("jobs/*.toml")):
+    for page in (*PAGES, *PACKAGE.rglob("*.py"), *ROOT.glob("framearray/*.py"), *ROOT.glob("jobs/*.toml")):
         for name in place.findall(text(page)):
             if not (ROOT / name).exists():
                 missing.append(f"{page.relative_to(ROOT)}: {name}")
@@ -203,7 +203,7 @@ def test_python_files_that_pages_name_exist():
     """A bare name, or the end of a path, belongs to some file of the tree."""
     files = [
         f"/{file.relative_to(ROOT).as_posix()}"
-        for top in (PACKAGE, ROOT / "tests", ROOT / "jobs")
+        for top in (PACKAGE, ROOT / "framearray", ROOT / "tests", ROOT / "jobs")
         for file in top.rglob("*.py")
     ]
     named = {(page.name, name) for page in PAGES for name in re.findall(r"[\w/]*\w\.py\b", text(page))}

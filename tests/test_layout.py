@@ -10,10 +10,12 @@ import pytest
 from support import ROOT
 from support.imports import against_the_table, circle, import_graph, libraries, modules, room
 
-PACKAGE = ROOT / "framearray_cli"
+PACKAGE, PUBLIC = ROOT / "framearray_cli", ROOT / "framearray"
 PAGE = ROOT / "docs" / "develop" / "contributing.md"
 FILES = modules(PACKAGE)
 TREES = {name: ast.parse(file.read_text(encoding="utf-8")) for name, file in FILES.items()}
+PUBLIC_FILES = {f"{PUBLIC.name}/{name}": file for name, file in modules(PUBLIC).items()}
+PUBLIC_TREES = {name: ast.parse(file.read_text(encoding="utf-8")) for name, file in PUBLIC_FILES.items()}
 GRAPH = import_graph(PACKAGE)
 
 MOST_ENTRIES = 12  # at the top of the package
@@ -52,6 +54,8 @@ DOORS = {
     "ephem": ("scene/paths/sun",),
     "pvlib": ("scene/paths/sun",),
     "distributed": ("render/parts/",),
+    "xarray": ("framearray/array", "framearray/labelled"),  # array: for types only
+    "zarr": ("framearray/zarrstore",),
 }
 # Libraries that load slowly or may be absent: `framearray --help` does without.
 HEAVY = (
@@ -71,6 +75,8 @@ HEAVY = (
     "pvlib",
     "distributed",
     "psutil",
+    "xarray",
+    "zarr",
 )
 
 
@@ -79,19 +85,20 @@ def rooms_table() -> dict[str, tuple[str, set[str]]]:
     rows = re.findall(r"^\| `(\w+)/` \| (.+?) \| (.+?) \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
     every = {name for name, _, _ in rows}
     return {
-        name: (purpose, every - {name} if may == "all" else every & set(re.findall(r"\w+", may)) & every)
+        name: (purpose, every - {name, PUBLIC.name} if may == "all" else every & set(re.findall(r"\w+", may)) & every)
         for name, purpose, may in rows
     }
 
 
 ROOMS = rooms_table()
+PURPOSE, MAY = ROOMS.pop(PUBLIC.name)  # of the public package, which stands beside the rooms
 ALLOWED = {name: may for name, (_, may) in ROOMS.items()}
 
 
 def test_every_file_stands_in_a_room_of_the_table() -> None:
     assert {room(module) for module in FILES} == {"", *ROOMS}
     assert {module for module in FILES if not room(module)} == {"__init__", "__main__"}
-    entries = [entry for entry in PACKAGE.iterdir() if entry.name != "__pycache__"]
+    entries = [entry for entry in PACKAGE.iterdir() if entry.name not in ("__pycache__", "py.typed")]
     assert len(entries) <= MOST_ENTRIES
 
 
@@ -115,6 +122,22 @@ def test_rooms_import_what_the_table_allows() -> None:
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
     assert circle(GRAPH) == []
+
+
+def test_the_public_package_uses_the_rooms_and_no_room_uses_it() -> None:
+    """What it states as its purpose is that of the table; inside it imports are relative."""
+    assert (ast.get_docstring(PUBLIC_TREES["framearray/__init__"]) or "").splitlines()[0] == f"{PURPOSE}."
+    assert [module for module, file in FILES.items() if PUBLIC.name in libraries(file)] == []
+    assert [module for module, file in PUBLIC_FILES.items() if PUBLIC.name in libraries(file)] == []
+    assert circle(import_graph(PUBLIC)) == []
+    used = {
+        node.module.split(".")[1]
+        for tree in PUBLIC_TREES.values()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("framearray_cli.")
+    }
+    assert used <= MAY
+    assert {file.name for file in (PUBLIC, PACKAGE) if (file / "py.typed").is_file()} == {PUBLIC.name, PACKAGE.name}
 
 
 def test_an_import_against_the_table_is_seen(tmp_path: Path) -> None:
@@ -168,10 +191,11 @@ def test_inside_a_room_imports_are_relative_and_between_rooms_absolute() -> None
 
 
 def test_files_and_functions_stay_small() -> None:
-    long = {module: n for module, file in FILES.items() if (n := len(file.read_text().splitlines())) > MOST_LINES}
+    files, trees = FILES | PUBLIC_FILES, TREES | PUBLIC_TREES
+    long = {module: n for module, file in files.items() if (n := len(file.read_text().splitlines())) > MOST_LINES}
     assert not long
     functions = {}
-    for module, tree in TREES.items():
+    for module, tree in trees.items():
         for node in ast.walk(tree):
             if isinstance(node, ast.FunctionDef) and node.end_lineno:
                 functions[f"{module}.{node.name}"] = node.end_lineno - node.lineno + 1
@@ -180,7 +204,8 @@ def test_files_and_functions_stay_small() -> None:
 
 @pytest.mark.parametrize("library", DOORS)
 def test_each_library_has_one_door(library: str) -> None:
-    users = [module for module, file in FILES.items() if library in libraries(file)]
+    files = FILES | PUBLIC_FILES
+    users = [module for module, file in files.items() if library in libraries(file)]
     assert users
     assert [module for module in users if not module.startswith(DOORS[library])] == []
 
@@ -210,7 +235,8 @@ def test_kernels_say_what_they_do(name: str) -> None:
                 assert ast.get_docstring(node) or short, f"{module}.{node.name}"
 
 
-def test_help_imports_nothing_heavy() -> None:
-    code = f"import sys, framearray_cli.cli.main; print([name for name in {HEAVY!r} if name in sys.modules])"
+@pytest.mark.parametrize("module", ["framearray_cli.cli.main", "framearray"])
+def test_help_and_the_public_package_import_nothing_heavy(module: str) -> None:
+    code = f"import sys, {module}; print([name for name in {HEAVY!r} if name in sys.modules])"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"

@@ -1,0 +1,134 @@
+"""The public Python package: frame arrays as numpy, xarray and zarr, and renders with events.
+
+    >>> import framearray
+    >>> array = framearray.open("array")
+    >>> array
+    <FrameArray 'room': 4 camera positions x 3 of light x 2 of lamps, 24 x 18 pixels>
+    >>> array.picture(1, 2).shape
+    (18, 24, 3)
+
+docs/guide/python.md describes it. Everything else is in `framearray_cli`, whose modules may change from version to
+version. Importing this package loads nothing more: each name is loaded when it is first used.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from framearray_cli import __version__
+
+if TYPE_CHECKING:  # for type checkers and editors: what `__getattr__` loads
+    from framearray_cli.base.errors import (
+        BusyError,
+        FrameArrayError,
+        JobError,
+        LimitError,
+        MissingExtraError,
+        OutputError,
+        SceneError,
+    )
+
+    from .array import FrameArray
+    from .array import open_array as open
+    from .cameras import Camera, Cameras
+    from .events import (
+        Compiling,
+        Event,
+        Finished,
+        FrameWritten,
+        Noted,
+        Progress,
+        RenderCancelled,
+        Scanned,
+        Started,
+        Warned,
+    )
+    from .jobs import Checked, check
+    from .lights import Light, Lights
+    from .run import Rendering, render, rendering
+    from .sheets import Sheet
+
+__all__ = [
+    "BusyError",
+    "Camera",
+    "Cameras",
+    "Checked",
+    "Compiling",
+    "Event",
+    "Finished",
+    "FrameArray",
+    "FrameArrayError",
+    "FrameWritten",
+    "JobError",
+    "Light",
+    "Lights",
+    "LimitError",
+    "MissingExtraError",
+    "Noted",
+    "OutputError",
+    "Progress",
+    "RenderCancelled",
+    "Rendering",
+    "Scanned",
+    "SceneError",
+    "Sheet",
+    "Started",
+    "Warned",
+    "__version__",
+    "check",
+    "open",
+    "render",
+    "rendering",
+]
+
+_ERRORS = "framearray_cli.base.errors"
+# Where each public name is; "module:name" where it has another name there.
+_PLACES = {
+    **dict.fromkeys(
+        (
+            "BusyError",
+            "FrameArrayError",
+            "JobError",
+            "LimitError",
+            "MissingExtraError",
+            "OutputError",
+            "SceneError",
+        ),
+        _ERRORS,
+    ),
+    **dict.fromkeys(
+        (
+            "Compiling",
+            "Event",
+            "Finished",
+            "FrameWritten",
+            "Noted",
+            "Progress",
+            "RenderCancelled",
+            "Scanned",
+            "Started",
+            "Warned",
+        ),
+        ".events",
+    ),
+    **dict.fromkeys(("Camera", "Cameras"), ".cameras"),
+    **dict.fromkeys(("Light", "Lights"), ".lights"),
+    **dict.fromkeys(("Checked", "check"), ".jobs"),
+    **dict.fromkeys(("Rendering", "render", "rendering"), ".run"),
+    "FrameArray": ".array",
+    "Sheet": ".sheets",
+    "open": ".array:open_array",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name when it is first used."""
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, _, original = _PLACES[name].partition(":")
+    found = getattr(import_module(module, __name__), original or name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

@@ -1,0 +1,83 @@
+"""Jobs from files, tables or objects, and what they would cost."""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from framearray_cli.array.manifest_toml import plain
+from framearray_cli.base.forms.table import changed
+from framearray_cli.base.memory import RENDER_NEEDS, require_address_space
+from framearray_cli.cli.describe import check_result
+from framearray_cli.cli.results import CheckResult
+from framearray_cli.job.job import Job
+from framearray_cli.job.read import job_from_table, read_job
+
+JobSource: TypeAlias = str | os.PathLike[str] | Mapping[str, Any] | Job
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Checked(CheckResult):
+    """What a job holds and costs, as `framearray check --json` prints it.
+
+    Attributes:
+        warnings: pictures that would be black, clipped or empty; memory or disk that may not be enough.
+    """
+
+    warnings: tuple[str, ...]
+
+
+def load_job(
+    job: JobSource,
+    *,
+    output: str | os.PathLike[str] | None = None,
+    threads: int | None = None,
+    sets: Sequence[str] = (),
+) -> Job:
+    """Return a checked job.
+
+    Args:
+        job: a job file; the tables of one, with file names relative to the current folder; or a `Job`.
+        output: folder for the images, instead of the job's.
+        threads: instead of the job's.
+        sets: "KEY=VALUE" texts that replace keys, as `framearray render --set` takes them.
+
+    Raises:
+        JobError: it cannot be read or has problems; the error lists all of them.
+        ValueError: `sets` come with a `Job`.
+    """
+    if isinstance(job, Job):
+        if sets:
+            raise ValueError("sets: expected none beside a Job, whose keys were checked")
+        found = job
+    elif isinstance(job, Mapping):
+        found = job_from_table(plain(job), sets)
+    else:
+        found = read_job(Path(job), sets)
+    if threads is not None:
+        found = changed(found, render=changed(found.render, threads=threads))
+    if output is not None:
+        found = changed(found, output=found.output.model_copy(update={"directory": Path(output).absolute()}))
+    return found
+
+
+def check(job: JobSource, *, threads: int | None = None, sets: Sequence[str] = ()) -> Checked:
+    """Validate a job and its scene, and estimate its size, memory, disk space and time; no image is written.
+
+    Args:
+        job, threads, sets: as in `render`.
+
+    Raises:
+        JobError, SceneError: the job cannot be rendered.
+        OutputError: its folder holds a manifest that cannot be read.
+    """
+    require_address_space(RENDER_NEEDS)
+    checked = load_job(job, threads=threads, sets=sets)
+    from framearray_cli.render.beside import offer_for
+    from framearray_cli.render.estimate import check as estimate_job
+
+    offer_for(checked)
+    estimate = estimate_job(checked)
+    result = check_result(estimate)
+    return Checked(**{key: getattr(result, key) for key in result.__slots__}, warnings=estimate.warnings)

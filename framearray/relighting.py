@@ -1,0 +1,106 @@
+"""From the arguments of `FrameArray.relight` to factors and sums."""
+
+import os
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from framearray_cli.array.manifest import Manifest, Vector
+from framearray_cli.array.mixtures import Mixture, check_linear, check_mixture
+from framearray_cli.array.pictures import Relight
+from framearray_cli.base.arrays import Float64
+from framearray_cli.base.errors import OutputError
+from framearray_cli.tools.mixing.environment import light_field, prepare_map, read_map
+from framearray_cli.tools.mixing.mixer import MOST_LIGHT, environment_mixture, mixture_of
+from framearray_cli.tools.mixing.weightfile import read_weights
+
+from .lighting import Environment, Factor, Lighting, Weights
+
+
+def changed_lighting(
+    manifest: Manifest,
+    lighting: Lighting,
+    *,
+    groups: Mapping[str, Factor] | None,
+    ambient: Factor | None,
+    weights: Weights | None,
+    environment: Environment | None,
+    rotate: float,
+    soft: float | None,
+) -> Lighting:
+    """Return the lighting with some of it changed; see `FrameArray.relight`."""
+    if sum(value is not None for value in (weights, environment, soft)) > 1:
+        raise ValueError("expected only one of weights, environment and soft")
+    unknown = [name for name in groups or () if name not in manifest.group_names]
+    if unknown or (ambient is not None and not manifest.groups):
+        raise _no_group(manifest, unknown)
+    factors = {**lighting.relight.groups, **{name: _vector(name, f) for name, f in (groups or {}).items()}}
+    level = lighting.relight.ambient if ambient is None else _vector("ambient", ambient)
+    changed = replace(lighting, relight=Relight(groups=factors, ambient=level))
+    if weights is None and environment is None and soft is None:
+        return changed
+    check_linear(manifest)
+    if soft is not None:
+        if not (np.isfinite(soft) and soft >= 1):
+            raise ValueError(f"soft: expected a number of light positions of at least 1, got {soft!r}")
+        return replace(changed, soft=float(soft), mixture=None)
+    if environment is not None:
+        return replace(changed, mixture=_environment(manifest, environment, rotate), soft=None)
+    mixture = mixture_of(_weights(weights, lighting.n))
+    check_mixture(manifest, mixture)
+    return replace(changed, mixture=mixture, soft=None)
+
+
+def _no_group(manifest: Manifest, unknown: Sequence[str]) -> Exception:
+    known = manifest.group_names
+    if known:
+        return KeyError(f"no group {unknown[0]!r}; the array has {', '.join(known)}")
+    return OutputError(
+        f"{manifest.directory}: the light cannot be changed, as this array stores it all together; render "
+        'again with group = "..." in [[light.sources]]'
+    )
+
+
+def _environment(manifest: Manifest, environment: Environment, rotate: float) -> Mixture:
+    field = light_field(manifest)
+    if isinstance(environment, str | os.PathLike):
+        name, panorama = os.fspath(environment), read_map(Path(environment))
+    else:
+        name, panorama = "environment", prepare_map(np.asarray(environment, np.float32), "environment")
+    mixture, covered = environment_mixture(manifest, field, panorama, float(rotate))
+    if covered < MOST_LIGHT:
+        text = f"{name}: {1 - covered:.0%} of its light comes from where the array has no light position"
+        warnings.warn(text, stacklevel=4)  # the caller of `relight`
+    return mixture
+
+
+def _weights(weights: Any, n: int) -> Float64:
+    """Return the weights of n light positions, (n, 3)."""
+    if isinstance(weights, str | os.PathLike):
+        return read_weights(Path(weights), n)
+    if isinstance(weights, Mapping):
+        found = np.zeros((n, 3))
+        for l, weight in weights.items():
+            if not (isinstance(l, int | np.integer) and -n <= l < n):
+                raise IndexError(f"weights: expected light positions from 0 to {n - 1}, got {l!r}")
+            found[l] = _vector(f"weights[{l}]", weight)
+        return found
+    found = np.asarray(weights, np.float64)
+    if found.shape not in ((n,), (n, 3)):
+        raise ValueError(f"weights: expected the shape ({n},) or ({n}, 3), got {found.shape}")
+    if not np.isfinite(found).all():
+        raise ValueError("weights: expected finite numbers")
+    return np.array(np.broadcast_to(found[:, None] if found.ndim == 1 else found, (n, 3)))
+
+
+def _vector(name: str, factor: Factor) -> Vector:
+    """Return a factor per channel."""
+    found = np.asarray(factor, np.float64)
+    if found.shape not in ((), (3,)) or not np.isfinite(found).all():
+        raise ValueError(f"{name}: expected a finite number or 3 of them, got {factor!r}")
+    red, green, blue = np.broadcast_to(found, 3).tolist()
+    return red, green, blue

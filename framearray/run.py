@@ -1,0 +1,253 @@
+"""Render a job from Python: in a thread of its own, with events."""
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from queue import SimpleQueue
+from typing import TYPE_CHECKING
+
+from framearray_cli.array.places import read_indices
+from framearray_cli.base.memory import RENDER_NEEDS, require_address_space
+from framearray_cli.cli.describe import render_result
+from framearray_cli.job.job import Job
+from framearray_cli.render.messages import ambient_lines, scene_lines, settings_lines, target_lines
+from framearray_cli.render.progress import RenderEvents, ambient_figures
+
+from .array import FrameArray, open_array
+from .events import (
+    Compiling,
+    Event,
+    Finished,
+    FrameWritten,
+    Noted,
+    Progress,
+    RenderCancelled,
+    Scanned,
+    Started,
+    Warned,
+)
+from .jobs import JobSource, load_job
+
+if TYPE_CHECKING:
+    from framearray_cli.array.integrity import OnDisk
+    from framearray_cli.engine.terms.ambient.estimate import Ambient
+    from framearray_cli.render.automatic.choose import AutoSettings
+    from framearray_cli.render.prepare import Prepared
+    from framearray_cli.render.target.pilot import Target
+
+EVERY = 0.1  # seconds between two events of progress
+
+
+def render(
+    job: JobSource,
+    *,
+    on_event: Callable[[Event], object] | None = None,
+    output: str | os.PathLike[str] | None = None,
+    cameras: str | Sequence[int] | None = None,
+    restart: bool = False,
+    threads: int | None = None,
+    sets: Sequence[str] = (),
+) -> FrameArray:
+    """Render a frame array, or what is missing of it, and return it.
+
+    Ctrl-C, and an error in `on_event`, end the render after the frame in progress; finished images stay, and the next
+    call renders the rest.
+
+    Args:
+        job: a job file; the tables of one, with file names relative to the current folder; or a `Job`.
+        on_event: called with each event, in the thread that called `render`.
+        output: folder for the images, instead of the job's.
+        cameras: camera positions to render, as places ("0-47", "0-47x3") or indices; None: all.
+        restart: first remove the array in the folder; otherwise another array there is an error.
+        threads: instead of the job's.
+        sets: "KEY=VALUE" texts that replace keys of the job, as `framearray render --set` takes them.
+
+    Raises:
+        JobError, SceneError: the job cannot be rendered.
+        OutputError: a file could not be written, or another array is in the folder.
+        BusyError: another run renders these camera positions.
+        LimitError: the system gives this process less than it needs.
+    """
+    run = rendering(job, output=output, cameras=cameras, restart=restart, threads=threads, sets=sets)
+    for event in run:
+        if on_event is not None:
+            on_event(event)
+    return run.result()
+
+
+def rendering(
+    job: JobSource,
+    *,
+    output: str | os.PathLike[str] | None = None,
+    cameras: str | Sequence[int] | None = None,
+    restart: bool = False,
+    threads: int | None = None,
+    sets: Sequence[str] = (),
+) -> "Rendering":
+    """Prepare a render whose events are iterated over; the arguments are those of `render`.
+
+    Raises:
+        JobError: the job has problems.
+        LimitError: the system gives this process less than it needs.
+    """
+    require_address_space(RENDER_NEEDS)
+    checked = load_job(job, output=output, threads=threads, sets=sets)
+    n = checked.camera.frames
+    chosen = cameras if cameras is None or isinstance(cameras, str) else ",".join(str(int(c)) for c in cameras)
+    return Rendering(checked, None if chosen is None else sorted(read_indices("cameras", chosen, n)), restart=restart)
+
+
+class Rendering:
+    """A render in a thread of its own, which begins when its events are asked for.
+
+    The loop over events owns the render: leaving it early (`break`, an error) cancels it, and waits until the frame in
+    progress is done. An error of the render is raised in the loop.
+
+        run = framearray.rendering("room.toml")
+        for event in run:
+            ...
+        array = run.result()
+    """
+
+    def __init__(self, job: Job, cameras: Sequence[int] | None, *, restart: bool) -> None:
+        """Begin nothing yet; `job` is checked."""
+        self._job, self._cameras, self._restart = job, cameras, restart
+        self._events = SimpleQueue[Event | None]()  # None: the end
+        self._thread = threading.Thread(target=self._run, name="framearray-render")
+        self._cancelled, self._error = threading.Event(), list[BaseException]()
+
+    def __iter__(self) -> Iterator[Event]:
+        if self._thread.ident is not None:
+            raise RuntimeError("events of a render can be read once")
+        self._thread.start()
+        try:
+            while (event := self._events.get()) is not None:
+                yield event
+        finally:
+            self.cancel()
+            self._thread.join()
+        if self._error and not isinstance(self._error[0], RenderCancelled):
+            raise self._error[0]
+
+    def cancel(self) -> None:
+        """End the render after the frame in progress; from any thread. Without effect when it is done."""
+        self._cancelled.set()
+
+    def result(self) -> FrameArray:
+        """Wait for the end, and return the array.
+
+        Raises:
+            RenderCancelled: the render was cancelled.
+            FrameArrayError: what ended it, as of `render`.
+        """
+        if self._thread.ident is None:
+            for _ in self:
+                pass
+        self._thread.join()
+        if self._error:
+            raise self._error[0]
+        return open_array(self._job.output.directory)
+
+    def _run(self) -> None:
+        """Render, in the thread."""
+        try:
+            self._render(_Reporter(self._events.put, self._job, self._cancelled))
+        except BaseException as error:  # whatever it is, it is raised where the events are read
+            self._error.append(error)
+        finally:
+            self._events.put(None)
+
+    def _render(self, reporter: "_Reporter") -> None:
+        reporter.stop_if_cancelled()
+        from framearray_cli.engine.kernels.clock import compile_clock
+        from framearray_cli.render.beside import offer_for
+        from framearray_cli.render.render import render as render_job
+
+        offer_for(self._job)
+        with compile_clock(reporter.compiling) as clock:
+            summary = render_job(self._job, reporter, restart=self._restart, cameras=self._cameras)
+        result = render_result(summary, self._job, clock.seconds)
+        self._events.put(Finished(summary=result, notes=summary.notes))
+
+
+class _Reporter(RenderEvents):
+    """Turns the program's events into public ones; raises `RenderCancelled` between two steps of a cancelled render."""
+
+    def __init__(self, put: Callable[[Event], None], job: Job, cancelled: threading.Event) -> None:
+        self._put, self._job, self._cancelled = put, job, cancelled
+        self._thread, self._lock = threading.get_ident(), threading.Lock()
+        self._written, self._wanted, self._reported = 0, 0, 0.0
+        self._done = False
+        self._left: float | None = None
+
+    def stop_if_cancelled(self) -> None:
+        if self._cancelled.is_set() and threading.get_ident() == self._thread:
+            raise RenderCancelled(f"{self._job.name}: the render was cancelled; the next run renders the rest")
+
+    def _note(self, lines: Sequence[str]) -> None:
+        for line in lines:
+            self._put(Noted(text=line.removeprefix("note: ").strip()))
+        self.stop_if_cancelled()
+
+    def prepared(self, prepared: "Prepared") -> None:
+        self._put(
+            Started(
+                name=self._job.name,
+                folder=self._job.output.directory,
+                cameras=prepared.n_cameras,
+                images=prepared.n_cameras * prepared.n_lights,
+                resolution=self._job.camera.resolution,
+                triangles=prepared.scene.report.triangles,
+            )
+        )
+        self._note(scene_lines(prepared))
+
+    def resolved(self, settings: "AutoSettings") -> None:
+        self._note(settings_lines(settings))
+
+    def scanned(self, on_disk: "OnDisk", wanted: int) -> None:
+        self._wanted = wanted
+        damaged = tuple(name for name, _ in on_disk.damaged)
+        self._put(Scanned(kept=on_disk.images, wanted=wanted, damaged=damaged))
+        self.stop_if_cancelled()
+
+    def planned(self, ambient: "Ambient") -> None:
+        self._note(ambient_lines(ambient_figures(ambient)))
+
+    def compiling(self) -> None:
+        self._put(Compiling())
+
+    def loaded(self) -> None:
+        self.stop_if_cancelled()
+
+    def warned(self, warnings: tuple[str, ...]) -> None:
+        for text in warnings:
+            self._put(Warned(text=text))
+        self.stop_if_cancelled()
+
+    def allotted(self, target: "Target") -> None:
+        self._note(target_lines(target))
+
+    def expected(self, seconds: float | None) -> None:
+        with self._lock:
+            self._left = seconds
+        self._report()
+        self.stop_if_cancelled()
+
+    def written(self, images: int) -> None:
+        with self._lock:
+            self._written += images
+        self._report()
+
+    def frame_written(self, c: int, images: int) -> None:
+        self._put(FrameWritten(camera=c, images=images))
+
+    def _report(self) -> None:
+        """Report progress, unless that was done just now; the last image always."""
+        with self._lock:
+            now, done = time.monotonic(), self._written == self._wanted
+            if now - self._reported < EVERY and not (done and not self._done):
+                return
+            self._reported, self._done = now, done
+            self._put(Progress(written=self._written, wanted=self._wanted, seconds_left=self._left))

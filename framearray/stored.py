@@ -1,0 +1,222 @@
+"""What a frame array on disk holds: names, sizes, cameras, lights, pictures and layers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import isfinite
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from framearray_cli.array.images.images import FOR_SCREENS, format_name, read_image
+from framearray_cli.array.images.png import read_codes
+from framearray_cli.array.manifest import Manifest, image_path
+from framearray_cli.array.pictures import Pictures
+from framearray_cli.array.places import CAMERA_AXIS, outside_problem
+from framearray_cli.array.present import list_present
+from framearray_cli.base.colour import srgb8_from_linear
+from framearray_cli.base.errors import OutputError
+
+from .cameras import Cameras
+from .layers import read_stacked
+from .lighting import Lighting
+from .lights import Lights, lights_along
+
+Place: TypeAlias = float | Mapping[str, float]  # along the first light axis, or by axis
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class StoredArray:
+    """A frame array on disk, under the light that it was rendered with or another one.
+
+    Attributes:
+        manifest: all that is known of the array, in the terms of the program; its fields may change from version to
+            version, those of this class do not.
+        lighting: what `relight` changed.
+    """
+
+    manifest: Manifest
+    lighting: Lighting
+    _pictures: Pictures = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_pictures", Pictures(self.manifest, mix=self.lighting.mix))
+
+    @property
+    def name(self) -> str:
+        """Name of the job."""
+        return self.manifest.name
+
+    @property
+    def folder(self) -> Path:
+        """Where the array is."""
+        return self.manifest.directory
+
+    @property
+    def resolution(self) -> tuple[int, int]:
+        """Width and height, pixels."""
+        return self.manifest.resolution
+
+    @property
+    def fps(self) -> float:
+        """Frames per second of the camera path."""
+        return self.manifest.fps
+
+    @property
+    def axes(self) -> Mapping[str, int]:
+        """Number of light positions along each light axis, by name; one where they are summed.
+
+        All arrays have one axis, "light", but those with groups of sources that move on their own.
+        """
+        axes = self.manifest.axes
+        first = next(iter(axes))
+        return MappingProxyType(axes | {first: 1} if self.lighting.mixture is not None else axes)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """N_c, the number of light positions along each axis, height, width, 3."""
+        width, height = self.resolution
+        return (self.manifest.n_cameras, *self.axes.values(), height, width, 3)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Names of what `relight` can change: groups of sources, and "background"; empty where light is stored
+        all together.
+        """
+        return self.manifest.group_names
+
+    @property
+    def is_radiance(self) -> bool:
+        """Whether files hold linear radiance (EXR, TIFF), and not 8-bit sRGB, clipped to [0, 1] (PNG, JPEG)."""
+        return format_name(self._pattern) not in FOR_SCREENS
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every file of the array is there; looks on disk at each call."""
+        return not list_present(self.manifest).incomplete()
+
+    @property
+    def job(self) -> dict[str, Any]:
+        """The job as it was rendered, with every default filled in: tables as in a job file."""
+        return self.manifest.job
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Result and cost of the runs that rendered the array, as in `manifest.toml`."""
+        return self.manifest.summary
+
+    @property
+    def cameras(self) -> Cameras:
+        """The camera positions: poses, intrinsics, rays."""
+        return Cameras.of(self.manifest)
+
+    @property
+    def lights(self) -> Lights:
+        """The light positions along the first axis, before they are summed."""
+        return self.lights_along(next(iter(self.manifest.axes)))
+
+    def lights_along(self, axis: str) -> Lights:
+        """Return the light positions along an axis.
+
+        Raises:
+            KeyError: the array has no such axis.
+        """
+        return lights_along(self.manifest, axis)
+
+    def file(self, c: int, l: int = 0, *, group: str | None = None) -> Path:
+        """Return the file of an image; in an array with groups that of one group.
+
+        Raises:
+            IndexError: the array has no such image.
+            KeyError: it has no such group.
+            OutputError: it has groups, and none was named.
+        """
+        found = next((one for one in self.manifest.groups if one.name == group), None)
+        if group is not None and found is None:
+            raise KeyError(f"no group {group!r}; the array has {[one.name for one in self.manifest.groups]}")
+        n = len(found.lights) if found else self.manifest.n_lights
+        return image_path(self.manifest, self._camera(c), int(check_index(l, n, "light")), found)
+
+    def picture(self, c: int, l: Place = 0) -> NDArray[np.float32]:
+        """Return the picture of a camera position under a light position.
+
+        Args:
+            c: camera position; -1 is the last.
+            l: light position; between two of them their pictures are blended. With several light axes that along the
+                first, or a mapping from axes to positions; those that are not named are in the middle of their axis.
+
+        Returns:
+            (height, width, 3), linear light with Rec. 709 primaries, your own to change. Radiance where
+            `is_radiance`; else 8-bit sRGB decoded, so clipped to [0, 1], with the job's `output.exposure` in it.
+
+        Raises:
+            IndexError: the array has no such position.
+            OutputError: the image is not there (yet), or damaged.
+        """
+        c, positions = self._camera(c), self._positions(l)
+        whole = self._pictures.whole_file(c, positions, self.lighting.relight)
+        if whole is None:
+            return np.array(self._pictures.picture(c, positions, self.lighting.relight))
+        image, (width, height) = read_image(whole), self.resolution
+        if image.shape != (height, width, 3):
+            raise OutputError(f"{whole}: expected {width} x {height} pixels, got {image.shape[1]} x {image.shape[0]}")
+        return image
+
+    def srgb(self, c: int, l: Place = 0, *, exposure: float = 0.0) -> NDArray[np.uint8]:
+        """Return a picture as 8-bit sRGB codes, (height, width, 3), as screens show it.
+
+        Args:
+            c, l: as in `picture`.
+            exposure: stops, added before clipping.
+
+        Raises:
+            IndexError, OutputError: as `picture`.
+        """
+        c, positions = self._camera(c), self._positions(l)
+        whole = self._pictures.whole_file(c, positions, self.lighting.relight)
+        if whole is not None and not exposure and not self.is_radiance:
+            return np.array(read_codes(whole))
+        return srgb8_from_linear(self.picture(c, l) * np.float32(2.0**exposure))
+
+    def layers(self, c: int) -> dict[str, NDArray[np.float32]]:
+        """Return what a camera position sees under any light, by name; docs/guide/manifest.md describes the layers.
+
+        Returns:
+            "reflectivity", "obscurance", "indirect" and "normal" (height, width, 3); "depth" and "samples"
+            (height, width); others where the job asked for them.
+
+        Raises:
+            IndexError: the array has no such camera position.
+            OutputError: it was rendered without layers, or the file is not there or damaged.
+        """
+        return read_stacked(self.manifest, self._camera(c))
+
+    @property
+    def _pattern(self) -> str:
+        """Pattern of the files of images."""
+        return self.manifest.groups[0].images if self.manifest.groups else self.manifest.images
+
+    def _camera(self, c: int) -> int:
+        return int(check_index(c, self.manifest.n_cameras, CAMERA_AXIS, whole=True))
+
+    def _positions(self, place: Place) -> tuple[float, ...]:
+        """Return the position along each light axis."""
+        axes = self.axes
+        if not isinstance(place, Mapping):
+            place = {next(iter(axes)): place}
+        if unknown := [axis for axis in place if axis not in axes]:
+            raise KeyError(f"no light axis {unknown[0]!r}; the array has {', '.join(axes)}")
+        return tuple(check_index(place[axis], n, axis) if axis in place else float(n // 2) for axis, n in axes.items())
+
+
+def check_index(value: float, n: int, axis: str, *, whole: bool = False) -> float:
+    """Check a position along an axis of n, where negative ones count from the end."""
+    number = isinstance(value, int | np.integer if whole else int | float | np.number) and not isinstance(value, bool)
+    if not number or not isfinite(value):
+        raise TypeError(f"{axis}: expected {'a whole number' if whole else 'a number'}, got {value!r}")
+    found = value + n if value < 0 else value
+    if not 0 <= found <= n - 1:
+        raise IndexError(f"{axis}: {outside_problem(value, n, axis)}")
+    return float(found)
