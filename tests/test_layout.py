@@ -50,7 +50,7 @@ DOORS = {
     "scipy": ("scene/paths/curves", "engine/images/standard_error", "engine/frames/blocks", "tools/mixing/environment"),
     "psutil": ("base/memory",),
     "xxhash": ("base/hashing",),
-    "filelock": ("array/lock", "engine/kernels/claims"),
+    "filelock": ("array/lock", "array/coarse", "engine/kernels/claims"),
     "ephem": ("scene/paths/sun",),
     "pvlib": ("scene/paths/sun",),
     "distributed": ("render/parts/",),

@@ -83,8 +83,8 @@ def _below(folder: Path) -> str:
     """Name the arrays one or two levels below a folder that is none itself, or beside one that does not exist."""
     folder = folder if os.path.exists(folder) else folder.parent
     try:
-        near = sorted(path.parent for path in folder.glob(f"*/{FILE_NAME}"))
-        found = near or sorted(path.parent for path in folder.glob(f"*/*/{FILE_NAME}"))
+        near = sorted(path.parent for path in folder.glob(f"[!.]*/{FILE_NAME}"))
+        found = near or sorted(path.parent for path in folder.glob(f"[!.]*/[!.]*/{FILE_NAME}"))
     except OSError:
         return ""
     names = ", ".join(str(path) for path in found[:MOST_NAMES])

@@ -62,7 +62,7 @@ def render_preview(job: Job, c: int, places: Mapping[str, int]) -> Preview:
         JobError, SceneError: the job cannot be rendered.
     """
     all_eyes, all_lights = eyes(job), lights(job)
-    prepared = prepare(_small(job))
+    prepared = prepare(small_job(job, LEAST_SIDE, HITS))
     prepared = prepared_from(prepared.job, prepared.scene, all_eyes.at([c]), lights_of_preview(all_lights, places))
     require_least_memory(prepared)
     with open_embree(prepared) as embree:
@@ -76,18 +76,23 @@ def render_preview(job: Job, c: int, places: Mapping[str, int]) -> Preview:
     return Preview(image=image[0], c=c, places=places, prepared=prepared)
 
 
-def _small(job: Job) -> Job:
-    """Return the job with small pictures and few hits; its settings of noise and reuse are for whole arrays."""
+def small_job(job: Job, least: int, hits: int) -> Job:
+    """Return the job with small pictures and few hits; its settings of noise and reuse are for whole arrays.
+
+    Args:
+        least: pixels of the longer side at least, unless the job has fewer.
+        hits: per pixel.
+    """
     width, height = job.camera.resolution
-    shrink = min(max(1 / SHRINK, LEAST_SIDE / max(width, height)), 1.0)
+    shrink = min(max(1 / SHRINK, least / max(width, height)), 1.0)
     resolution = (max(1, round(shrink * width)), max(1, round(shrink * height)))
     paths = WALKS if job.ambient.paths is None else min(job.ambient.paths, WALKS)
     return changed(
         job,
         camera=changed(job.camera, resolution=resolution),
-        samples=SamplesTable(hits=HITS, obscurance=job.samples.obscurance),
+        samples=SamplesTable(hits=hits, obscurance=job.samples.obscurance),
         reuse=changed(job.reuse, n_r=0),
-        specular=changed(job.specular, hits=min(job.specular.hits, HITS)),
+        specular=changed(job.specular, hits=min(job.specular.hits, hits)),
         indirect=changed(job.indirect, samples=min(job.indirect.samples, CELL_SAMPLES)),
         ambient=changed(job.ambient, paths=paths),
     )

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from framearray_cli.array.integrity import OnDisk
+    from framearray_cli.array.manifest import Manifest
     from framearray_cli.engine.terms.ambient.estimate import Ambient
 
     from .automatic.choose import AutoSettings
@@ -36,6 +37,12 @@ class RenderEvents:
     def scanned(self, on_disk: "OnDisk", wanted: int) -> None:
         """The files on disk were compared; `wanted` images are to be rendered."""
 
+    def coarse_begins(self, array: "Manifest") -> None:
+        """Coarse pictures begin to appear; `array` describes the array to come, with a rough ambient light."""
+
+    def coarse_ends(self, coarse: "CoarseFigures") -> None:
+        """All coarse pictures are on disk."""
+
     def planned(self, ambient: "Ambient") -> None:
         """The ambient light was estimated."""
 
@@ -59,6 +66,24 @@ class RenderEvents:
 
     def frame_written(self, c: int, images: int) -> None:
         """All files of a camera position are on disk and recorded; of that many images if it is rendered in blocks."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CoarseFigures:
+    """The size of a coarse array, and of the array beside it.
+
+    Attributes:
+        cameras, lights: number of positions that it has of so many; lights along all axes together.
+        resolution: width, height, pixels.
+        step: the largest number of camera positions from one to the next.
+        seconds: that it took.
+    """
+
+    cameras: tuple[int, int]
+    lights: tuple[int, int]
+    resolution: tuple[int, int]
+    step: int
+    seconds: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

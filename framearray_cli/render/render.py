@@ -3,7 +3,7 @@
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import replace
 from threading import Lock
 
@@ -29,6 +29,7 @@ from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.job.job import Job
 
 from .ambient_groups import image_ambient
+from .coarse import coarse_beside
 from .group_sums import group_sums
 from .identity import cells_digest, require_same_cells
 from .lamps import draw_visible
@@ -53,6 +54,7 @@ def render(
     restart: bool = False,
     cameras: Sequence[int] | None = None,
     pilots: bool = True,
+    coarse: bool = False,
 ) -> Summary:
     """Render a frame array, or some of its cameras; images that lie in the job's folder already are kept.
 
@@ -62,6 +64,7 @@ def render(
         restart: first remove the array in the job's folder; otherwise another array there is an error.
         cameras: those to render, in rising order; None: all.
         pilots: whether to look for what would make the array useless; False for parts of a render that did.
+        coarse: whether small pictures come first, beside the array, until it is there; see `coarse.py`.
 
     Raises:
         JobError, SceneError: the job cannot be rendered.
@@ -69,30 +72,36 @@ def render(
     """
     events, started = events or RenderEvents(), time.perf_counter()
     with open_session(job, events, engine, restart=restart, cameras=cameras) as session:
-        prepared, on_disk, directory = session.prepared, session.on_disk, job.output.directory
         if not session.wanted:
             return complete_manifest(session, time.perf_counter() - started)
-        setup, ambient, manifest, rays, sample = _plan(session, events, pilots=pilots)
-        cells = cells_digest(setup)
-        require_same_cells(directory, cells, on_disk.records)
-        with session.folder.exclusive():
-            write_manifest(directory, manifest)
-        record_path = record_file(directory, session.run.cameras)
-        with RecordWriter(record_path, session.identity.fingerprint, replace(session.run, cells=cells)) as record:
-            run = _Run(prepared, record, events, rays, started)
-            try:
-                blocks = light_blocks(prepared, mirror_share(setup), per_pixel=setup.per_pixel, setup=setup)
-                parts = [(block, wanted) for block in blocks if (wanted := on_disk.missing(session.chosen, block))]
-                run.begin(setup, sample, parts)
-                for block, wanted in parts:
-                    _render_block(run, setup.for_lights(block), ambient, block, wanted)
-            except BaseException:
-                with suppress(OutputError), session.folder.exclusive():  # report the first error, not one from here
-                    write_manifest(directory, with_summary(manifest, run.summary(on_disk, ambient)))
-                raise
-        with session.folder.exclusive():
-            summary = run.summary(on_disk, ambient)
-            write_manifest(directory, with_summary(manifest, summary))
+        with coarse_beside(session, events) if coarse else nullcontext():
+            return _render(session, events, started, pilots=pilots)
+
+
+def _render(session: RenderSession, events: RenderEvents, started: float, *, pilots: bool) -> Summary:
+    """Render what is missing; `started` is when the run began, by `time.perf_counter`."""
+    prepared, on_disk, directory = session.prepared, session.on_disk, session.prepared.job.output.directory
+    setup, ambient, manifest, rays, sample = _plan(session, events, pilots=pilots)
+    cells = cells_digest(setup)
+    require_same_cells(directory, cells, on_disk.records)
+    with session.folder.exclusive():
+        write_manifest(directory, manifest)
+    record_path = record_file(directory, session.run.cameras)
+    with RecordWriter(record_path, session.identity.fingerprint, replace(session.run, cells=cells)) as record:
+        run = _Run(prepared, record, events, rays, started)
+        try:
+            blocks = light_blocks(prepared, mirror_share(setup), per_pixel=setup.per_pixel, setup=setup)
+            parts = [(block, wanted) for block in blocks if (wanted := on_disk.missing(session.chosen, block))]
+            run.begin(setup, sample, parts)
+            for block, wanted in parts:
+                _render_block(run, setup.for_lights(block), ambient, block, wanted)
+        except BaseException:
+            with suppress(OutputError), session.folder.exclusive():  # report the first error, not one from here
+                write_manifest(directory, with_summary(manifest, run.summary(on_disk, ambient)))
+            raise
+    with session.folder.exclusive():
+        summary = run.summary(on_disk, ambient)
+        write_manifest(directory, with_summary(manifest, summary))
     return summary
 
 

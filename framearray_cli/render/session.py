@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
+from framearray_cli.array.coarse import remove_left_coarse
 from framearray_cli.array.folder import Identity, check_folder, claim_folder, read_array
 from framearray_cli.array.integrity import OnDisk, scan_output
 from framearray_cli.array.lock import ArrayFolder
@@ -80,6 +81,7 @@ def open_session(
                 folder.require_no_other_run()
             events.removed(claim_folder(directory, identity, restart=restart))
             _take_over_metadata(folder, prepared, identity, events)
+            remove_left_coarse(directory)
             held.enter_context(folder.reserve(chosen, run.cameras))
         if settings:
             events.resolved(settings)

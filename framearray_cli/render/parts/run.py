@@ -21,6 +21,7 @@ from framearray_cli.job.job import Job
 from framearray_cli.job.read import job_table
 
 from ..automatic.choose import require_least_memory
+from ..coarse import coarse_beside
 from ..messages import workers_text
 from ..pilots.warn import find_warnings
 from ..prepare import Prepared, plan_work
@@ -58,6 +59,7 @@ def render_in_parts(
     *,
     restart: bool = False,
     cameras: Sequence[int] | None = None,
+    coarse: bool = False,
 ) -> Summary:
     """Render as `render.render` does, with the same bytes; each chunk of the camera path is rendered by one worker.
 
@@ -77,6 +79,8 @@ def render_in_parts(
                 return complete_manifest(session, time.perf_counter() - started)
             warnings = find_warnings(session.prepared, *plan_work(session.prepared, session.embree))
             events.warned(warnings)
+            if coarse:
+                stack.enter_context(coarse_beside(session, events))
             memory = None if options.address else _memory(session.prepared, options.workers)
         if client is None:
             events.starting_workers()

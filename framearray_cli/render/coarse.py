@@ -1,0 +1,149 @@
+"""A coarse array before the fine one: small pictures of some camera and light positions, for a page to show now.
+
+Camera positions come from coarse to fine: both ends of the path, its middle, the middles of the halves, and so on until
+the time is over. Each is rendered independently, at all chosen light positions; the ends of each axis are among them.
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from framearray_cli.array.coarse import coarse_folder, write_coarse
+from framearray_cli.array.manifest import MAIN_AXIS, Manifest
+from framearray_cli.base.forms.table import changed
+from framearray_cli.engine.frames.setup import FrameSetup
+from framearray_cli.engine.frames.threads import TracePool
+from framearray_cli.engine.images.window import Window
+from framearray_cli.engine.loop import ready_frames
+from framearray_cli.engine.terms.ambient.estimate import Ambient
+from framearray_cli.job.job import Job
+from framearray_cli.scene.paths.few import few_planes
+from framearray_cli.scene.paths.paths import Lights
+
+from .ambient_groups import image_ambient
+from .few_lights import few_prepared
+from .lamps import draw_visible
+from .manifest import initial_manifest
+from .prepare import Prepared, plan_work
+from .preview import small_job
+from .progress import CoarseFigures, RenderEvents
+from .session import RenderSession
+from .writer import ArrayWriter, array_target
+
+SECONDS = 3.0  # of rendering; camera positions that it leaves out have neighbours that are there
+MOST_LIGHTS = 13  # positions of all axes together, about: every fourth of 48
+HITS = 4  # per pixel; no window adds those of neighbours
+LEAST_SIDE = 1  # a quarter of the size, however small
+
+
+@contextmanager
+def coarse_beside(session: RenderSession, events: RenderEvents) -> Iterator[None]:
+    """Render a coarse array into a folder beside the array, and keep it there for the block.
+
+    Raises:
+        OutputError: a file cannot be written.
+    """
+    with coarse_folder(session.prepared.job.output.directory) as folder:
+        if folder is not None:
+            _render_coarse(session, folder, events)
+        yield
+
+
+def _render_coarse(session: RenderSession, folder: Path, events: RenderEvents) -> None:
+    started = time.perf_counter()
+    whole = session.prepared
+    planes = few_planes(whole.lights, MOST_LIGHTS)
+    prepared = few_prepared(replace(whole, job=_coarse_job(whole.job, folder)), MOST_LIGHTS)
+    setup, ambient = plan_work(prepared, session.embree, compare=False)
+    manifest = initial_manifest(prepared, ambient, session.identity, None, None)
+    write_coarse(folder, manifest, places_of(whole.lights, planes))
+
+    def begin() -> None:
+        events.coarse_begins(_array_to_come(session, ambient, planes))
+
+    cameras = sorted(_write_pictures(prepared, setup, ambient, session.wanted, begin))
+    lit = [sum(plane.lit for plane in lights.planes) for lights in (prepared.lights, whole.lights)]
+    events.coarse_ends(
+        CoarseFigures(
+            cameras=(len(cameras), len(session.wanted)),
+            lights=(lit[0], lit[1]),
+            resolution=prepared.job.camera.resolution,
+            step=max((b - a for a, b in pairwise(cameras)), default=1),
+            seconds=time.perf_counter() - started,
+        )
+    )
+
+
+def _coarse_job(job: Job, folder: Path) -> Job:
+    """Return the job with small pictures and few hits, in another folder."""
+    output = changed(job.output, directory=folder, layers=False, sun_hours=None, compression="none")
+    job = changed(job, output=output, denoise=changed(job.denoise, obscurance=False))
+    return small_job(job, LEAST_SIDE, HITS)
+
+
+def _write_pictures(
+    prepared: Prepared, setup: FrameSetup, ambient: Ambient, wanted: Sequence[int], begin: Callable[[], None]
+) -> list[int]:
+    """Render and write camera positions from coarse to fine while there is time; return those that were.
+
+    Args:
+        begin: called once both ends are on disk.
+    """
+    planes, target, done = range(prepared.n_lights), array_target(prepared), list[int]()
+    chosen = wanted[:1] if prepared.still else list(coarse_to_fine(wanted))
+    with TracePool(setup, prepared.threads) as pool, ArrayWriter(target, planes, prepared.threads) as writer:
+        window, end = Window(setup, image_ambient(ambient, prepared.lights), pool), np.inf
+        for c in chosen:
+            for j in ready_frames(window, setup, [0 if prepared.still else c], pool):
+                images = writer.block()
+                composed = window.compose(j, images)
+                composed.beyond += draw_visible(prepared, setup, j, planes, composed.images, pool)
+                if composed.beyond and target.format.half == "auto":
+                    composed = window.compose(j, np.empty(images.shape, np.float32))
+                    draw_visible(prepared, setup, j, planes, composed.images, pool)
+                writer.write(composed, [c], images)
+            done.append(c)
+            if len(done) == min(2, len(chosen)):
+                writer.finish()
+                begin()
+                end = time.perf_counter() + SECONDS  # from now on: kernels may have been compiled so far
+            if time.perf_counter() > end:
+                break
+        writer.finish()
+    return done
+
+
+def coarse_to_fine(places: Sequence[int]) -> Iterator[int]:
+    """Yield both ends of some places, then the middle one, then the middles of both halves, and so on to all."""
+    yield from dict.fromkeys((places[0], places[-1]))
+    gaps = deque([(0, len(places) - 1)])
+    while gaps:
+        low, high = gaps.popleft()
+        if high - low > 1:
+            middle = (low + high) // 2
+            yield places[middle]
+            gaps += ((low, middle), (middle, high))
+
+
+def places_of(lights: Lights, planes: Sequence[int]) -> dict[str, list[int]]:
+    """Return the positions along each light axis that some image planes are."""
+    if not lights.groups:
+        return {MAIN_AXIS: list(planes)}
+    return {
+        group.axis: [p - group.positions.start for p in planes if p in group.positions]
+        for group in reversed(lights.groups)
+    }
+
+
+def _array_to_come(session: RenderSession, ambient: Ambient, planes: Sequence[int]) -> Manifest:
+    """Return the manifest of the array without what is not known yet; I_A is that of the nearest coarse position."""
+    prepared = session.prepared
+    nearest = np.abs(np.arange(prepared.n_lights)[:, None] - np.array(planes)).argmin(axis=1)
+    rough = replace(ambient, intensity=ambient.intensity[nearest], standard_error=ambient.standard_error[nearest])
+    return initial_manifest(prepared, rough, session.identity, session.settings, None)
