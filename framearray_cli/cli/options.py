@@ -71,6 +71,18 @@ Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Say what would be written, replaced and removed; touch nothing.")
 ]
+Port = Annotated[
+    int | None, typer.Option("--port", parser=whole(0, 65535), help="Port of the page; 0: a free one.", metavar="N")
+]
+Host = Annotated[
+    str | None,
+    typer.Option(
+        "--host",
+        help="Serve the page at this address of the machine, 0.0.0.0: all; the printed address has a token.",
+        metavar="ADDRESS",
+    ),
+]
+Browser = Annotated[bool | None, typer.Option("--browser/--no-browser", help="Open the page in the browser.")]
 Exposure = Annotated[
     float,
     typer.Option(

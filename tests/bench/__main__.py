@@ -34,6 +34,7 @@ from bench.truth import run as truth
 from bench.truth.places import Place
 from bench.truth.rendered import METHODS, pace
 from bench.truth.traced import trace_here
+from bench.view import attack, live
 from bench.view import page as viewpage
 
 PROGRAMS = {"mitsuba": mitsuba3.measure, "cycles": cycles.measure}
@@ -59,6 +60,8 @@ OTHERS = (
     "page",
     "peak",
     "view",
+    "live",
+    "attack",
     "first",
     *TRACES,
     *ambient.PARTS,
@@ -119,6 +122,12 @@ def main() -> None:
         return
     if args.what == "view":
         viewpage.run(args.jobs, args.patience, args.quick)
+        return
+    if args.what == "live":
+        live.run(args.jobs)
+        return
+    if args.what == "attack":
+        attack.run()
         return
     if args.what == "first":
         print(json.dumps(first.run(args.jobs), indent=2))

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-import framearray_cli.cli.commands.render as command
 import framearray_cli.render.parts.worker as worker
+from framearray_cli.cli import rendering
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.render.messages import ambient_lines, target_lines
 from framearray_cli.render.parts.chunks import Chunks
@@ -100,7 +100,7 @@ def test_lines_of_a_target_that_is_not_reached() -> None:
 
 
 @pytest.mark.parametrize(
-    ("module", "name", "base"), [(command, "RenderingEvents", PartEvents), (worker, "_Reporter", RenderEvents)]
+    ("module", "name", "base"), [(rendering, "RenderingEvents", PartEvents), (worker, "_Reporter", RenderEvents)]
 )
 def test_listeners_override_existing_events(module: Any, name: str, base: type) -> None:
     """A method with a wrong name would never be called, and nothing would report it."""

@@ -6,18 +6,16 @@ import typer
 
 from framearray_cli.base.memory import available_cores
 from framearray_cli.base.signals import Stopped, cancel_alarm
-from framearray_cli.base.units import agree, counted, size
+from framearray_cli.base.units import size
 
-from ..options import ArrayFolder, Force, Json, Quiet, ThreadsOfNoJob, output_path
+from ..live import LOOPBACK, Growth, warning_lines
+from ..options import ArrayFolder, Browser, Force, Host, Json, Port, Quiet, ThreadsOfNoJob, output_path
 from ..screen import Screen, err, print_document, print_result
 from ..summing import Environment
-from ..values import whole
 
 if TYPE_CHECKING:
     from framearray_cli.base.errors import OutputError
     from framearray_cli.tools.view.tiles import Tiles
-
-MOST_PROBLEMS = 5  # named one by one
 
 Target = Annotated[
     str | None, typer.Option("--export", help="Write the page as files for any web server.", metavar="FOLDER")
@@ -38,8 +36,9 @@ def view(
     array: ArrayFolder,
     target: Target = None,
     offline: Offline = False,
-    port: Annotated[int, typer.Option("--port", parser=whole(0, 65535), help="Port; 0: a free one.", metavar="N")] = 0,
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+    port: Port = None,
+    host: Host = None,
+    browser: Browser = None,
     cache: Cache = None,
     environment: Environment = None,
     looks: Looks = None,
@@ -73,17 +72,19 @@ def view(
 
         def prepared(problems: list["OutputError"]) -> None:
             screen.end()
-            screen.say([*_warning_lines(problems), f"all pictures that are there are prepared, in {tiles.folder}"])
+            screen.say([*warning_lines(problems), f"all pictures that are there are prepared, in {tiles.folder}"])
 
         try:
             show_page(
                 tiles,
-                port=port,
-                browser=browser,
+                port=port or 0,
+                host=host or LOOPBACK,
+                browser=browser is not False,
                 threads=workers,
                 opened=opened,
                 progress=screen.advance,
                 prepared=prepared,
+                grown=Growth(screen).show,
             )
         except Stopped:  # how a user ends it
             cancel_alarm()
@@ -102,7 +103,7 @@ def _export(
     n_bytes, problems = write_page(
         tiles, folder, threads=threads, progress=screen.advance, force=force, offline=offline
     )
-    screen.say(_warning_lines(problems))
+    screen.say(warning_lines(problems))
     screen.end()
     page = PageResult(directory=target, size_bytes=n_bytes, pictures=tiles.n_pictures, damaged=len(problems))
     how = "open its index.html" if offline else "any web server can show it"
@@ -115,9 +116,3 @@ def _lacking_lines(tiles: "Tiles", then: str) -> list[str]:
 
     lacking = list_present(tiles.manifest).incomplete()
     return [f"warning: {missing_text(lacking, tiles.manifest.n_cameras)}; {then}"] if lacking else []
-
-
-def _warning_lines(problems: list["OutputError"]) -> list[str]:
-    rest = len(problems) - MOST_PROBLEMS
-    more = [f"warning: {counted(rest, 'more image')} {agree(rest, 'is', 'are')} damaged"] if rest > 0 else []
-    return [*(f"warning: {problem}" for problem in problems[:MOST_PROBLEMS]), *more]

@@ -3,6 +3,7 @@
 live      whether the answer may change: true from the server, false in an export
 index     digest of the index that the tiles are made by; another one: load the page again
 stamp     digest of all below
+images    number of images that are there, and in the array; layers and sums of light positions do not count
 lacking   number of cameras that lack images, and their ranges as text
 streams   by key: "stamps", one text per camera that changes with its sources, "" where none is there; "missing",
 by camera, for those of which some sources are there: first and last light position of each gap
@@ -53,17 +54,20 @@ def contents_table(
     """
     table: dict[str, Any] = {}
     lacking: set[int] = set()
+    images = [0, 0]
     for stream in streams:
         stamps, missing = [], {}
         for c in range(n_cameras):
             found = sources_of(stream, c)
             stamps.append(stamp_of("", found)[:8])
+            if stream.role not in ("layer", "environment"):
+                images = [images[0] + sum(map(bool, found)), images[1] + len(found)]
             if not all(found):
                 lacking.add(c)
                 if any(found):
                     missing[str(c)] = _gaps(found)
         table[stream.key] = {"stamps": stamps, "missing": missing}
-    rest = {"lacking": [len(lacking), brief_frames_text(lacking)], "streams": table}
+    rest = {"images": images, "lacking": [len(lacking), brief_frames_text(lacking)], "streams": table}
     stamp = line_digest(json.dumps(rest).encode()).decode()
     return {"live": live, "index": index, "stamp": stamp, **rest}
 

@@ -2,18 +2,21 @@
 
 import os
 import threading
+import time
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from framearray_cli.array.images.images import format_name, require_writer
+from framearray_cli.array.manifest import Manifest
 from framearray_cli.array.manifest_toml import read_manifest
 from framearray_cli.base.errors import JobError, OutputError
 from framearray_cli.base.files import make_folder
 
 from ..display import View
+from .access import LOOPBACK
 from .export import check_target, export_page
 from .server import PageServer
 from .shaders import page_views
@@ -21,6 +24,7 @@ from .streams import is_clipped, streams_of
 from .tiles import Tiles
 from .turning import KEY, make_turning
 
+LOOK_S = 3.0  # between two looks at an array that is being rendered
 CACHE_FOLDER = ".view"  # of the tiles, beside the images
 
 
@@ -41,7 +45,13 @@ def open_tiles(
         OutputError: the manifest or the map cannot be read, the array cannot be lit by a map, or the folder cannot be
             written to.
     """
-    manifest = read_manifest(out)
+    return tiles_of(read_manifest(out), cache, threads, environment, views)
+
+
+def tiles_of(
+    manifest: Manifest, cache: Path | None, threads: int, environment: Path | None = None, views: Sequence[View] = ()
+) -> Tiles:
+    """Open the tiles of an array; see `open_tiles`."""
     turning = make_turning(manifest, environment) if environment is not None else None
     require_writer("jpg")
     if views and turning is None and is_clipped(manifest, streams_of(manifest)[0]):
@@ -62,9 +72,9 @@ def open_tiles(
 
 
 @contextmanager
-def open_server(tiles: Tiles, port: int = 0) -> Iterator[PageServer]:
-    """Serve the page while the context lasts."""
-    with PageServer(tiles, port) as server:
+def open_server(tiles: Tiles, port: int = 0, host: str = LOOPBACK, threads: int = 1) -> Iterator[PageServer]:
+    """Serve the page while the context lasts; see `PageServer`."""
+    with PageServer(tiles, port, host, threads) as server:
         thread = threading.Thread(target=server.serve_forever, args=(0.1,), daemon=True)
         thread.start()
         try:
@@ -78,25 +88,50 @@ def show_page(
     tiles: Tiles,
     *,
     port: int,
+    host: str,
     browser: bool,
     threads: int,
     opened: Callable[[str], None],
     progress: Callable[[int], None],
     prepared: Callable[[list[OutputError]], None],
+    grown: Callable[[int, int], None],
 ) -> None:
     """Serve the page until the process is asked to end; prepare the tiles meanwhile.
 
     Args:
         opened: called with the address.
         progress: called with the number of pictures just prepared.
-        prepared: called once all that are there are, with the errors of damaged images.
+        prepared: called once all that are there are, with the errors of damaged images; again when the array is whole.
+        grown: called with the number of images that are there, and in the array, while it lacks some, and once it is
+            whole.
     """
-    with open_server(tiles, port) as server:
+    with open_server(tiles, port, host, threads) as server:
         opened(server.url)
         if browser:
-            webbrowser.open(server.url)
+            open_browser(server.url)
         prepared(prepare_all(tiles, threads, progress))
+        while _follow(server, grown):
+            prepared(prepare_all(server.look_again(), threads, progress))
         threading.Event().wait()
+
+
+def open_browser(url: str) -> None:
+    """Open a page in the browser, without waiting for it."""
+    threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
+
+
+def _follow(server: PageServer, grown: Callable[[int, int], None]) -> bool:
+    """Watch an array that lacks images until it has all; return whether it lacked some."""
+    there, images = server.look()["images"]
+    if there == images:
+        return False
+    while there < images:
+        grown(there, images)
+        time.sleep(LOOK_S)
+        with suppress(OutputError):  # it is just being removed, or rendered again
+            there, images = server.look()["images"]
+    grown(there, images)
+    return True
 
 
 def write_page(

@@ -1,13 +1,16 @@
-"""Serve the page and the tiles of one array to browsers on this machine, and nothing else.
+"""Serve the page and the tiles of one array to browsers, and nothing else.
 
 A request never becomes a file name: it names one of the page's files, or is parsed as key, camera and light.
 """
 
 import json
 import re
+import socket
 import threading
+from collections.abc import Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from socketserver import TCPServer
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -15,51 +18,94 @@ from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason
 from framearray_cli.base.hashing import line_digest
 
+from .access import LOOPBACK, TOKEN, WRONG_HOST, Access, access_to, find_place, shown_address
+from .coarse import COARSE_URL, CoarseTiles
+from .connections import ANSWER_S, HEAD_S, IDLE_S, Connections
 from .contents import CONTENTS_FILE
 from .page import content_type, page_files
 from .tiles import INDEX_FILE, Tiles
 
-HOST = "127.0.0.1"
-TILE = re.compile(r"/tiles/([\w-]+)/c(\d{4,9})(?:\.l(\d{3,9}))?\.jpg", re.ASCII)
-# Names of this machine. Under another name a page from elsewhere may be asking, whose domain points here.
-HOSTS = ("127.0.0.1", "localhost")
+TILE = re.compile(rf"/({COARSE_URL})?tiles/([\w-]+)/c(\d{{4,9}})(?:\.l(\d{{3,9}}))?\.jpg", re.ASCII)
+NO_COOKIE: Mapping[str, str] = {}
 
 
 class PageServer(ThreadingHTTPServer):
-    """Answer requests, each connection in its own thread, until shut down."""
+    """Answer requests, each connection in its own thread, until shut down.
+
+    Attributes:
+        access: who may ask.
+        coarse: small pictures of an array that is being rendered.
+    """
 
     daemon_threads = True
-    request_queue_size = 64  # browsers open several connections at once
+    request_queue_size = 256  # browsers open several connections at once
 
-    def __init__(self, tiles: Tiles, port: int) -> None:
+    def __init__(self, tiles: Tiles, port: int, host: str = LOOPBACK, threads: int = 1) -> None:
         """Listen.
 
         Args:
             port: 0 takes a free one.
+            host: an address of this machine, or a name of it; others than this machine need a token.
+            threads: that read coarse pictures at once.
 
         Raises:
-            OutputError: the port cannot be used.
+            OutputError: host or port cannot be used.
         """
         self.tiles, self.page, self._lock = tiles, page_files(), threading.Lock()
+        self.coarse, self.connections = CoarseTiles(threads), Connections()
+        self._place = find_place(host)
+        self.access, self.address_family = access_to(self._place), self._place.family
         try:
-            super().__init__((HOST, port), _Handler)
+            super().__init__((self._place.address, port), _Handler)
         except (OSError, OverflowError) as error:
             why = reason(error) if isinstance(error, OSError) else str(error)
-            raise OutputError(f"port {port}: cannot be used: {why}; --port 0 takes one that is free") from error
+            at = "" if host == LOOPBACK else f"--host {host}, "
+            raise OutputError(f"{at}port {port}: cannot be used: {why}; --port 0 takes one that is free") from error
+        self.coarse.look(tiles.manifest)
+
+    def server_bind(self) -> None:
+        """Take the address, without asking the network for its name, which may take seconds."""
+        TCPServer.server_bind(self)
+        self.server_name, self.server_port = self._place.address, self.server_address[1]
 
     @property
     def url(self) -> str:
-        return f"http://{HOST}:{self.server_port}/"
+        """The address of the page, with the token if it needs one."""
+        query = f"?{TOKEN}={self.access.token}" if self.access.token else ""
+        return f"http://{shown_address(self._place)}:{self.server_port}/{query}"
 
-    def contents(self) -> bytes:
-        """Return `contents.json` as of now; renew the tiles if the array has changed too much for them.
+    def look_again(self) -> Tiles:
+        """Return the tiles of the array as it is now: others if it has changed too much for those before.
 
         Raises:
             OutputError: the array cannot be read any more.
         """
         with self._lock:
-            self.tiles = self.tiles.renewed()
-            return json.dumps(self.tiles.contents(live=True)).encode()
+            self.coarse.look(self.tiles.manifest)
+            self.tiles = self.tiles.renewed(self.coarse.largest())
+            return self.tiles
+
+    def look(self) -> dict[str, Any]:
+        """Return the table of `contents.json` as of now.
+
+        Raises:
+            OutputError: the array cannot be read any more.
+        """
+        table = self.look_again().contents(live=True)
+        with self._lock:
+            return table | {"coarse": None if self.tiles.turning else self.coarse.table()}
+
+    def service_actions(self) -> None:
+        """Look after the connections; called several times per second."""
+        self.connections.close_late()
+
+    def shutdown_request(self, request: Any) -> None:
+        self.connections.end(request)
+        super().shutdown_request(request)
+
+    def server_close(self) -> None:
+        super().server_close()
+        self.coarse.close()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Report nothing: a browser that leaves closes its connections in the middle of answers."""
@@ -67,9 +113,22 @@ class PageServer(ThreadingHTTPServer):
 
 class _Handler(BaseHTTPRequestHandler):
     server: PageServer
+    connection: socket.socket
+    default_request_version = "HTTP/1.0"  # of what cannot be read: so that its answer has a status
     protocol_version = "HTTP/1.1"  # keeps connections open: a drag requests hundreds of files
+    server_version, sys_version = "framearray", ""
     disable_nagle_algorithm = True  # or else the end of an answer waits 40 ms for an acknowledgement
     wbufsize = -1  # sends head and body together
+
+    def handle_one_request(self) -> None:
+        self.server.connections.begin(self.connection, IDLE_S, waits=True)
+        super().handle_one_request()
+
+    def parse_request(self) -> bool:
+        self.server.connections.begin(self.connection, HEAD_S, waits=True)
+        good = super().parse_request()
+        self.server.connections.begin(self.connection, ANSWER_S, waits=False)
+        return good
 
     def do_GET(self) -> None:
         self._answer(body=True)
@@ -78,33 +137,43 @@ class _Handler(BaseHTTPRequestHandler):
         self._answer(body=False)
 
     def _answer(self, body: bool) -> None:
-        host = self.headers.get("Host", "").rpartition(":")[0] or self.headers.get("Host", "")
-        if host not in HOSTS:
-            self._send(HTTPStatus.MISDIRECTED_REQUEST, b"not this host\n", "text/plain", body=body)
+        if self.headers.get("Content-Length", "0") != "0" or "Transfer-Encoding" in self.headers:
+            self.close_connection = True  # its body would be read as the next request
+            self._send(HTTPStatus.BAD_REQUEST, b"expected a request without a body\n", "text/plain", body=body)
             return
-        path = urlsplit(self.path).path
+        cookie = f"framearray-{self.server.server_port}"
+        host, cookies = self.headers.get("Host", ""), self.headers.get("Cookie", "")
+        if refusal := self.server.access.refusal(host, self.path, cookies, cookie):
+            status = HTTPStatus.MISDIRECTED_REQUEST if refusal == WRONG_HOST else HTTPStatus.FORBIDDEN
+            self._send(status, refusal.encode(), "text/plain", body=body)
+            return
+        more = _set_cookie(self.server.access, cookie) if self.server.access.knows(self.path) else NO_COOKIE
         try:
-            data, kind = self._find(path)
-        except (OutputError, OSError) as error:
+            data, kind = self._find(urlsplit(self.path).path)
+        except (OutputError, OSError, ValueError) as error:  # ValueError: a path that is no part of a URL
             self._send(HTTPStatus.NOT_FOUND, f"{error}\n".encode(errors="replace"), "text/plain", body=body)
             return
-        tag = f'"{line_digest(data).decode()}"'
-        if self.headers.get("If-None-Match") == tag:
-            self._send(HTTPStatus.NOT_MODIFIED, b"", kind, tag, body=False)
+        more = {"ETag": f'"{line_digest(data).decode()}"', **more}
+        if self.headers.get("If-None-Match") == more["ETag"]:
+            self._send(HTTPStatus.NOT_MODIFIED, b"", kind, more, body=False)
         else:
-            self._send(HTTPStatus.OK, data, kind, tag, body=body)
+            self._send(HTTPStatus.OK, data, kind, more, body=body)
 
     def _find(self, path: str) -> tuple[bytes, str]:
         """Return content and its type."""
         tiles = self.server.tiles
         if match := TILE.fullmatch(path):
-            key, c, l = match.groups()
+            coarse, key, c, l = match.groups()
+            if coarse:
+                if self.server.coarse.tiles is None:
+                    raise OutputError(f"{path}: there is no coarse array any more")
+                tiles = self.server.coarse.tiles
             file = tiles.ensure_tile(key, int(c), None if l is None else int(l))
             return file.read_bytes(), "image/jpeg"
         if path == f"/{INDEX_FILE}":
             return (tiles.folder / INDEX_FILE).read_bytes(), "application/json"
         if path == f"/{CONTENTS_FILE}":
-            return self.server.contents(), "application/json"
+            return json.dumps(self.server.look()).encode(), "application/json"
         name = path.removeprefix("/") or "index.html"
         if name in tiles.views.files:
             return tiles.views.files[name], content_type(name)
@@ -112,13 +181,16 @@ class _Handler(BaseHTTPRequestHandler):
             raise OutputError(f"{path}: no such file")
         return self.server.page[name], content_type(name)
 
-    def _send(self, status: HTTPStatus, data: bytes, kind: str, tag: str = "", *, body: bool = True) -> None:
+    def _send(
+        self, status: HTTPStatus, data: bytes, kind: str, more: Mapping[str, str] = NO_COOKIE, *, body: bool = True
+    ) -> None:
         self.send_response(status)
         self.send_header("Content-Type", kind)
         self.send_header("Cache-Control", "no-cache")  # ask each time: the array may have been rendered again
         self.send_header("X-Content-Type-Options", "nosniff")
-        if tag:
-            self.send_header("ETag", tag)
+        self.send_header("Referrer-Policy", "no-referrer")  # the address may hold the token
+        for name, value in more.items():
+            self.send_header(name, value)
         if status != HTTPStatus.NOT_MODIFIED:
             self.send_header("Content-Length", str(len(data)))
         self.end_headers()
@@ -127,3 +199,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: Any) -> None:
         """Report nothing: the terminal shows the progress of the tiles."""
+
+
+def _set_cookie(access: Access, name: str) -> Mapping[str, str]:
+    return {"Set-Cookie": f"{name}={access.token}; Path=/; HttpOnly; SameSite=Strict"}

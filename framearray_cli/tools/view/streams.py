@@ -145,16 +145,22 @@ def read_values(manifest: Manifest, stream: Stream, c: int, l: int, read_layers:
     return values
 
 
-def choose_coding(manifest: Manifest, stream: Stream, read: ReadPicture) -> Coding:
-    """Choose the coding of a stream from a sample of those of its pictures that exist."""
-    if stream.key == "normal" and stream.role == "layer":
+def largest_value(manifest: Manifest, stream: Stream, read: ReadPicture) -> float:
+    """Return the largest value in a sample of those pictures of a stream that exist; 0 if none does or none counts."""
+    if _is_normal(stream) or is_clipped(manifest, stream):
+        return 0.0
+    return max((float(values.max()) for values in _sample_values(manifest, stream, read)), default=0.0)
+
+
+def choose_coding(stream: Stream, largest: float) -> Coding:
+    """Choose the coding of a stream; images that clip radiance at 1 have a largest value of 0."""
+    if _is_normal(stream):
         return Coding(scale=0.0, low=-1.0, high=1.0)
-    if is_clipped(manifest, stream):
-        return PLAIN_CODING
-    largest = max((float(values.max()) for values in _sample_values(manifest, stream, read)), default=0.0)
-    if not is_exposed(stream):
-        return data_coding(largest)
-    return coding_for(largest)
+    return coding_for(largest) if is_exposed(stream) else data_coding(largest)
+
+
+def _is_normal(stream: Stream) -> bool:
+    return stream.key == "normal" and stream.role == "layer"
 
 
 def _sample_values(manifest: Manifest, stream: Stream, read: ReadPicture) -> Iterator[Image]:

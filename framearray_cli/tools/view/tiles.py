@@ -11,7 +11,7 @@ missing, and appear at any time and in any order.
 import json
 import shutil
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
@@ -29,18 +29,19 @@ from framearray_cli.base.arrays import Float32
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import reason, write_bytes
 
-from .coding import Coding, encode
+from .coding import encode
 from .contents import contents_table, scan_sources
 from .index import index_table, sheet_layout
 from .shaders import PageViews
 from .stamps import Source, is_fresh, source_of, stamp_of, write_tile
-from .streams import Stream, choose_coding, layer_streams, read_values, source_name, streams_of
+from .streams import Stream, choose_coding, largest_value, layer_streams, read_values, source_name, streams_of
 from .turning import Turning, make_turning
 
 ReadTurned: TypeAlias = Callable[[int, int], Float32]
 INDEX_FILE = "index.json"
 TILES_FOLDER = "tiles"
 TILES_DEPEND_ON = ("format", "fingerprint", "resolution", "n_cameras", "axes", "small", "streams")  # keys of the index
+NO_BOUNDS: Mapping[str, float] = {}
 KEPT_LAYER_FILES = 6  # a file holds all layers of a camera; codings are chosen from the same number of files
 
 
@@ -51,6 +52,8 @@ class Tiles:
         manifest: of the array.
         folder: of index and tiles.
         streams: of the array, with their codings.
+        largest: value of each stream in a sample of its pictures.
+        index: table of `index.json`.
     """
 
     def __init__(
@@ -62,6 +65,7 @@ class Tiles:
         discard: bool = True,
         turning: Turning | None = None,
         views: PageViews = PageViews(),  # noqa: B008  # frozen
+        bounds: Mapping[str, float] = NO_BOUNDS,
     ) -> None:
         """Choose the codings, and write the index.
 
@@ -69,24 +73,26 @@ class Tiles:
             discard: delete tiles of other codings, which nobody may be making meanwhile.
             turning: environment that lights the pictures in place of light positions.
             views: that the page offers.
+            bounds: by stream, a value that its pictures will reach; few of them may be there.
 
         Raises:
             OutputError: the folder cannot be written to.
         """
         self.manifest, self.folder, self._threads = manifest, folder, threads
-        self.turning, self.views = turning, views
+        self.turning, self.views, self._bounds = turning, views, bounds
         self._read_turned = self.turning.reader() if self.turning else None
         self._read_layers = lru_cache(KEPT_LAYER_FILES)(read_layers)
         self._manifest_source = source_of(manifest.directory / FILE_NAME)
-        self.streams = self._with_codings()
+        self.streams, self.largest = self._with_codings()
         self.layout = sheet_layout(manifest.resolution, max(stream.n for stream in self.streams))
         self._by_key = {stream.key: stream for stream in self.streams}
         self._locks = {(stream.key, c): threading.Lock() for stream in self.streams for c in range(manifest.n_cameras)}
-        self._slots = threading.BoundedSemaphore(threads)
+        self._slots = threading.BoundedSemaphore(threads)  # of sheets
+        self._pictures = threading.BoundedSemaphore(2 * threads)  # a drag must not wait for a sheet; memory is limited
         self.stopping = threading.Event()
         self._n_sources = list_present(manifest).count()
         table = index_table(manifest, self.streams, self.layout, self.turning)
-        self._digest: str = table["digest"]
+        self.index = table
         old = _read_index(folder / INDEX_FILE)
         if discard and _tile_keys(old) != _tile_keys(table):
             _remove(folder / TILES_FOLDER)
@@ -102,17 +108,20 @@ class Tiles:
                 return [self.turning.source(c, found.get)] * stream.n
             return [found.get(source_name(self.manifest, stream, c, l)) for l in range(stream.n)]
 
-        table = contents_table(self.manifest.n_cameras, self.streams, sources_of, self._digest, live=live)
+        table = contents_table(self.manifest.n_cameras, self.streams, sources_of, self.index["digest"], live=live)
         return table | ({"views": self.views.table} if self.views.table else {})
 
     @property
     def _layers(self) -> list[Stream]:
         return [stream for stream in self.streams if stream.role == "layer"]
 
-    def renewed(self) -> "Tiles":
+    def renewed(self, bounds: Mapping[str, float] = NO_BOUNDS) -> "Tiles":
         """Return these tiles, or new ones if the array has changed so much that index and codings must be chosen anew.
 
         That is so if it was rendered again, or if twice as many files are there as when the codings were chosen.
+
+        Args:
+            bounds: by stream, a value that its pictures will reach; those known before if empty.
 
         Raises:
             OutputError: the manifest cannot be read, or the folder cannot be written to.
@@ -125,9 +134,11 @@ class Tiles:
         if same and (found <= before or found < 2 * before):
             return self
         turning = make_turning(manifest, self.turning.file) if self.turning else None
-        return Tiles(manifest, self.folder, self._threads, discard=False, turning=turning, views=self.views)
+        bounds = bounds or self._bounds
+        folder, threads, views = self.folder, self._threads, self.views
+        return Tiles(manifest, folder, threads, discard=False, turning=turning, views=views, bounds=bounds)
 
-    def _with_codings(self) -> list[Stream]:
+    def _with_codings(self) -> tuple[list[Stream], dict[str, float]]:
         manifest = self.manifest
         found = [self.turning.stream] if self.turning else streams_of(manifest)
         for c in range(manifest.n_cameras if manifest.layers else 0):
@@ -138,12 +149,18 @@ class Tiles:
         pictures = [stream for stream in found if stream.role != "layer"]
         layers = [stream for stream in found if stream.role == "layer"]
         with ThreadPoolExecutor(self._threads) as pool:
-            tasks = [pool.submit(self._codings, some) for some in (layers, *([stream] for stream in pictures))]
-            codings = {key: coding for task in tasks for key, coding in task.result().items()}
-        return [replace(stream, coding=codings[stream.key]) for stream in found]
+            tasks = [pool.submit(self._largest, some) for some in (layers, *([stream] for stream in pictures))]
+            largest = {key: value for task in tasks for key, value in task.result().items()}
+        return [replace(stream, coding=choose_coding(stream, largest[stream.key])) for stream in found], largest
 
-    def _codings(self, streams: Sequence[Stream]) -> dict[str, Coding]:
-        return {stream.key: choose_coding(self.manifest, stream, partial(self._read, stream)) for stream in streams}
+    def _largest(self, streams: Sequence[Stream]) -> dict[str, float]:
+        """Return the largest value of some streams in a sample of their pictures, or its bound if that is larger."""
+        return {
+            stream.key: max(
+                largest_value(self.manifest, stream, partial(self._read, stream)), self._bounds.get(stream.key, 0.0)
+            )
+            for stream in streams
+        }
 
     def _read(self, stream: Stream, c: int, l: int, turned: ReadTurned | None = None) -> Float32:
         """Read a picture of the array, or one under the environment."""
@@ -175,7 +192,8 @@ class Tiles:
         if l is not None:
             stamp = self._stamp(stream, [self._source(stream, c, l)])
             if not is_fresh(path, stamp):
-                write_tile(path, encode(self._read(stream, c, l), stream.coding), stamp)
+                with self._pictures:
+                    write_tile(path, encode(self._read(stream, c, l), stream.coding), stamp)
             return path
         stamp = self._stamp(stream, self._sources(stream, c))
         if not stamp:

@@ -33,7 +33,7 @@ THREADS = psutil.cpu_count() or 1
 PACE_S = 0.016  # between two moves of the pointer, as a screen of 60 Hz gives them
 
 
-def synthesised(folder: Path) -> Path:
+def synthesised(folder: Path, n_c: int = N_C, n_l: int = N_L) -> Path:
     """Write an array whose images have noise as rendered ones do; nothing if it is there already."""
     light = ManifestLight(ambient=(0.1,) * 3, ambient_error=(0.0,) * 3, sources=({"type": "point"},))
     manifest = Manifest(
@@ -43,18 +43,18 @@ def synthesised(folder: Path) -> Path:
         images="noise.c{camera:04d}.l{light:03d}.jpg",
         resolution=SIZE,
         fps=24.0,
-        cameras=(ManifestCamera(world_from_camera=matrix_rows(np.eye(4)), fov=60.0),) * N_C,
-        lights=(light,) * N_L,
+        cameras=(ManifestCamera(world_from_camera=matrix_rows(np.eye(4)), fov=60.0),) * n_c,
+        lights=(light,) * n_l,
         directory=folder,
     )
-    if not image_path(manifest, N_C - 1, N_L - 1).is_file():
+    if not image_path(manifest, n_c - 1, n_l - 1).is_file():
         rng = np.random.default_rng(7)
         width, height = SIZE
         y, x = np.mgrid[0:height, 0:width].astype(np.float32)
-        for c in range(N_C):
+        for c in range(n_c):
             detail = rng.normal(1.0, 0.06, (height, width, 3)).astype(np.float32)  # about that of 14 hits per pixel
             stripes = 0.35 + 0.25 * np.sin((x + 5 * c) / 9) * np.cos(y / 13)
-            for l in range(N_L):
+            for l in range(n_l):
                 lamp = 1 / (1 + ((x - 8 * l) ** 2 + (y - 150) ** 2) / 8000)
                 write_image(image_path(manifest, c, l), (stripes * lamp)[..., None] * detail, ImageFormat(format="jpg"))
         write_manifest(folder, manifest)

@@ -17,8 +17,9 @@ export class FrameArray {
   /**
    * @param {import("./types.d.ts").Index} index
    * @param {import("./contents.js").Contents} contents
+   * @param {string} base of its addresses: "", or that of the coarse array
    */
-  constructor(index, contents) {
+  constructor(index, contents, base = "") {
     const { name, digest, fps, resolution, axes, exposure, small, streams, environment } = index;
     this.name = name;
     this.digest = digest;
@@ -32,6 +33,9 @@ export class FrameArray {
     this.ambient = index.ambient;
     this.backgroundAmbient = index.background_ambient;
     this.contents = contents;
+    this.base = base;
+    /** @type {import("./coarse.js").Coarse | null} */
+    this.coarse = null; // small pictures of an array that is being rendered
     this.nCameras = index.n_cameras;
     this.main = index.axes[0]; // along the pad's second side
     this.others = index.axes.slice(1);
@@ -44,12 +48,16 @@ export class FrameArray {
 
   /** @type {(stream: import("./types.d.ts").Stream, c: number, l: number) => string} */
   fullUrl(stream, c, l) {
-    return `tiles/${stream.key}/c${pad(c, 4)}.l${pad(l, 3)}.jpg?${this.contents.tag(stream, c)}`;
+    return `${this.base}tiles/${stream.key}/c${pad(c, 4)}.l${pad(l, 3)}.jpg?${this.contents.tag(stream, c)}`;
   }
 
   /** @type {(stream: import("./types.d.ts").Stream, c: number) => string} */
   sheetUrl(stream, c) {
-    return `tiles/${stream.key}/c${pad(c, 4)}.jpg?${this.contents.tag(stream, c)}`;
+    return `${this.base}tiles/${stream.key}/c${pad(c, 4)}.jpg?${this.contents.tag(stream, c)}`;
+  }
+
+  get isCoarse() {
+    return this.base !== "";
   }
 
   /**

@@ -14,7 +14,9 @@ export class Contents {
     this.live = table.live;
     this.index = table.index;
     this.stamp = table.stamp;
+    this.images = table.images;
     this.lacking = table.lacking;
+    this.coarse = table.coarse;
     this.streams = table.streams;
     this.views = table.views;
   }

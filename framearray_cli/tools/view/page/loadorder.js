@@ -13,7 +13,8 @@ const RING = 6; // full pictures around the place, in each direction
 export function loadOrder(array, view, velocity, calm) {
   const [dc, dl] = velocity;
   const moving = dc !== 0 || dl !== 0;
-  const streams = array.parts(view).map((part) => part.stream);
+  const parts = array.parts(view);
+  const streams = parts.map((part) => part.stream);
   /** @type {Item[]} */
   const list = [];
 
@@ -42,6 +43,7 @@ export function loadOrder(array, view, velocity, calm) {
   if (moving) sheet(view.c);
   full(0, 0);
   sheet(view.c);
+  list.push(...(array.coarse?.here(parts, view.c) ?? []));
   if (moving) {
     const near = Math.abs(dc) <= 2 && Math.abs(dl) <= 2; // faster movements skip the full pictures
     for (let k = 1; k <= AHEAD; k++) {
@@ -51,7 +53,9 @@ export function loadOrder(array, view, velocity, calm) {
   }
   for (let k = 1; k <= 3; k++) for (const c of [view.c - k, view.c + k]) sheet(c);
   for (let k = 1; calm && k <= 2; k++) ring(k, full);
-  for (let k = 4; k < array.nCameras; k++) for (const c of [view.c - k, view.c + k]) sheet(c);
+  // While the array is rendered, coarse sheets take the place of sheets far away: these would be made again and again.
+  list.push(...(array.coarse?.all(parts, view.c) ?? []));
+  for (let k = 4; k < (array.coarse ? 0 : array.nCameras); k++) for (const c of [view.c - k, view.c + k]) sheet(c);
   for (let k = 3; calm && k <= RING; k++) ring(k, full);
   return list;
 }

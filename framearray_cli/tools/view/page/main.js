@@ -1,11 +1,12 @@
 // The page: connects array, store, picture, pad, path and controls; one loop redraws what changed.
 
 /** @import { FrameArray } from "./array.js" */
-/** @import { Change, DrawnPart, Part, Place, View } from "./types.d.ts" */
+/** @import { Change, CoarsePart, DrawnPart, Place, View } from "./types.d.ts" */
 /** @import { Views } from "./views.js" */
 
 import { loadArray } from "./array.js";
 import { addButtons } from "./buttons.js";
+import { updateCoarse } from "./coarse.js";
 import { loadContents } from "./contents.js";
 import { Controls } from "./controls.js";
 import { byId } from "./dom.js";
@@ -19,12 +20,14 @@ import { Path } from "./path.js";
 import { Picture } from "./picture.js";
 import { Player } from "./player.js";
 import { memoryBudget, Store } from "./store.js";
+import { loadedTiles } from "./tiles.js";
 import { fromHash, isEmbedded, toHash } from "./view.js";
 
 const HASH_DELAY = 300; // ms after the last change; browsers refuse more than some hundred addresses per minute
 const STILL_AFTER = 250; // ms without a change: the movement is over
 const CALM_AFTER = 60; // ms without a change: load pictures around the place as well
 const REFRESH = 3000, REFRESH_COMPLETE = 15000; // ms between two looks at what is there
+const REFRESH_COARSE = 700; // ms, while coarse pictures come
 const RETRY_AFTER = 5000; // ms, if there is no picture
 
 export class Page {
@@ -34,11 +37,13 @@ export class Page {
    */
   constructor(array, ofViews) {
     this.array = array;
+    updateCoarse(array);
     this.view = fromHash(array, location.hash);
     const { views } = array.contents;
     this.views = views && ofViews ? new ofViews(views, () => this.viewLoaded()) : null;
     this.velocity = [0, 0];
     this.changedAt = -Infinity; // ms
+    this.refreshIn = REFRESH; // ms
     this.store = new Store(memoryBudget(), (url) => this.arrived(url));
     this.isEmbedded = isEmbedded();
     this.isAsleep = this.isEmbedded; // loads only the picture on the screen
@@ -66,14 +71,16 @@ export class Page {
     showNumbers(this);
     this.viewChanged(performance.now());
     requestAnimationFrame((now) => this.frame(now));
-    if (array.contents.live) setTimeout(() => this.refreshAlways(), REFRESH);
+    if (array.contents.live) setTimeout(() => this.refreshAlways(), array.coarse ? REFRESH_COARSE : REFRESH);
   }
 
   listSheets() {
     const { array } = this;
-    this.sheets = new Map(); // url of a sheet -> [stream, c]
-    for (const stream of array.streams) {
-      for (let c = 0; c < array.nCameras; c++) this.sheets.set(array.sheetUrl(stream, c), [stream, c]);
+    this.sheets = new Map(); // url of a sheet -> [map, stream, c]
+    for (const map of array.coarse ? [this.map, array.coarse.map] : [this.map]) {
+      for (const stream of map.array.streams) {
+        for (let c = 0; c < array.nCameras; c++) this.sheets.set(map.array.sheetUrl(stream, c), [map, stream, c]);
+      }
     }
   }
 
@@ -81,8 +88,11 @@ export class Page {
   async refresh() {
     const contents = await loadContents();
     if (contents.index !== this.array.digest) location.reload();
-    if (contents.stamp === this.array.contents.stamp) return;
+    const coarse = contents.coarse?.contents.stamp !== this.array.contents.coarse?.contents.stamp;
+    this.refreshIn = contents.isComplete ? REFRESH_COMPLETE : coarse ? REFRESH_COARSE : REFRESH;
+    if (contents.stamp === this.array.contents.stamp && !coarse) return;
     this.array.contents = contents;
+    updateCoarse(this.array);
     this.listSheets();
     this.map.changed = true;
     this.level = 0;
@@ -98,7 +108,7 @@ export class Page {
     } catch {
       // the server may be back later
     }
-    setTimeout(() => this.refreshAlways(), this.array.contents.isComplete ? REFRESH_COMPLETE : REFRESH);
+    setTimeout(() => this.refreshAlways(), this.refreshIn);
   }
 
   get l() {
@@ -155,7 +165,11 @@ export class Page {
   arrived(url) {
     const sheet = this.sheets?.get(url);
     const bitmap = sheet && this.store.get(url);
-    if (bitmap) this.map.add(sheet[0], sheet[1], bitmap);
+    if (bitmap) {
+      const [map, ...place] = sheet;
+      map.add(...place, bitmap);
+      this.map.changed = true;
+    }
     this.dirty();
   }
 
@@ -190,27 +204,18 @@ export class Page {
     this.dirty();
   }
 
-  // Draw the view from full tiles, or else small ones; without either the last drawing stays. What is not there yet is
-  // drawn as a blank.
+  // Draw the view from the best tiles that are loaded; if a part lacks one, the last drawing stays. What is not there yet
+  // is drawn from the coarse array, or else as a blank.
   drawPicture() {
     const { array, store, view } = this;
-    if (this.missing().length) {
+    const { parts, level, rough, missing } = loadedTiles(array, store, view);
+    if (missing) {
       this.picture.blank();
       this.showNote(`Camera ${view.c}, ${array.main.name} ${this.l}: not rendered yet.`);
       this.level = 2;
       return;
     }
-    let level = 2;
-    const parts = array.parts(view).map((part) => {
-      const url = array.fullUrl(part.stream, view.c, part.l);
-      const full = store.get(url);
-      if (full) return { ...part, url, bitmap: full, part: [0, 0, 1, 1] };
-      const sheet = array.sheetUrl(part.stream, view.c);
-      const small = store.get(sheet);
-      level = Math.min(level, small ? 1 : 0);
-      return { ...part, url: sheet, bitmap: small, part: array.smallPart(part.stream, part.l) };
-    });
-    this.showProblem(parts);
+    this.showProblem(rough);
     const { shader } = this;
     if (!level || shader === undefined) return;
     const drawn = /** @type {DrawnPart[]} */ (parts); // all are there, as `level` says
@@ -224,12 +229,14 @@ export class Page {
     if (level === 2) step.full ??= ms;
   }
 
-  // Show why there is no picture, if there is none.
-  /** @type {(parts: Part[]) => void} */
-  showProblem(parts) {
-    const full = parts.map((part) => this.array.fullUrl(part.stream, this.view.c, part.l));
+  // Show why there is no picture, if there is none; or which coarse one stands for it.
+  /** @type {(rough: CoarsePart | null) => void} */
+  showProblem(rough) {
+    const { array, view } = this;
+    const full = array.parts(view).map((part) => array.fullUrl(part.stream, view.c, part.l));
     const wrong = full.map((url) => this.store.missing.get(url)).find((text) => text);
-    this.showNote(wrong ? `No picture here. ${wrong}` : this.views?.problems.get(this.view.look) ?? "");
+    const stands = rough ? `Not rendered yet. Coarse picture of ${array.coarse?.place(rough)}.` : "";
+    this.showNote(wrong ? `No picture here. ${wrong}` : this.views?.problems.get(view.look) ?? stands);
     if (wrong) this.retry ??= setTimeout(() => this.retryMissing(), RETRY_AFTER);
   }
 
@@ -237,12 +244,6 @@ export class Page {
   showNote(text) {
     byId("note").hidden = !text;
     if (byId("note").textContent !== text) byId("note").textContent = text;
-  }
-
-  // The parts of the view that are not there yet.
-  missing() {
-    const { array, view } = this;
-    return array.parts(view).filter((part) => !array.contents.has(part.stream, view.c, part.l));
   }
 
   // A damaged image may have been rendered again, or the server may be back.

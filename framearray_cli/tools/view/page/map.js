@@ -72,7 +72,10 @@ export class ColourMap {
         }
         const start = 4 * (l * width + c);
         if (!parts.every(({ stream, l: at }) => array.contents.has(stream, c, at))) {
-          shown.data.set([...MISSING[(c + l) % 2], 255], start);
+          const rough = array.coarse?.mean(parts, c);
+          const codes = rough ? rough.map((value) => 255 * srgb(value * gain)) : MISSING[(c + l) % 2];
+          shown.data.set([...codes, 255], start);
+          if (rough && linear) radiance.set(rough.map((value) => value * gain), 3 * (l * width + c));
           continue;
         }
         for (let i = 0; i < 3; i++) shown.data[start + i] = 255 * (linear ? srgb(sum[i] * gain) : sum[i]);

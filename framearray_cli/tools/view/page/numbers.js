@@ -3,6 +3,7 @@
 /** @import { Page } from "./main.js" */
 
 import { byId } from "./dom.js";
+import { showProgress } from "./progress.js";
 
 // Show the numbers of the view, and set the controls to it.
 /** @type {(page: Page) => void} */
@@ -13,6 +14,7 @@ export function showNumbers({ array, view, l, controls }) {
   const [lacking, ranges] = array.contents.lacking;
   byId("lacking").hidden = !lacking;
   byId("lacking").textContent = `${lacking} of ${nCameras} camera positions lack images: ${ranges}`;
+  showProgress(array);
   byId("where").textContent = text;
   byId("pad").setAttribute("aria-label", `Pad: ${text}`);
   byId("picture").setAttribute("aria-label", `Picture of ${array.name}: ${text}`);

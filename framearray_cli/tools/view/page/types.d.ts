@@ -36,10 +36,15 @@ export type Contents = {
   live: boolean;
   index: string;
   stamp: string;
+  images: [number, number]; // there, and in the array
   lacking: [number, string];
   streams: Record<string, { stamps: string[]; missing: Record<string, [number, number][]> }>;
   views?: ViewRow[];
+  coarse?: CoarseTable | null; // from the server, while the array is rendered
 };
+
+// `places`: by axis, the positions of the array that the coarse one has.
+export type CoarseTable = { index: Index; contents: Contents; places: Record<string, number[]> };
 
 export type Tint = { intensity: number; color: string };
 
@@ -61,6 +66,9 @@ export type Place = { c: number; l: number };
 // A stream of a picture, and the part of its tile or sheet that is drawn: left, top, width, height.
 export type Part = { stream: Stream; l: number; factor: number[] };
 export type DrawnPart = Part & { url: string; bitmap: ImageBitmap; part: number[] };
+
+// A part of a coarse picture: its camera, and its light in the coarse array.
+export type CoarsePart = Part & { c: number };
 
 // A tile to load.
 export type Item = { url: string; bytes: number; needed?: boolean };

@@ -1,0 +1,162 @@
+"""`render --view`: the page of an array opens while it is rendered."""
+
+import threading
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+import typer
+
+from framearray_cli.base.memory import available_cores
+from framearray_cli.base.signals import Stopped, cancel_alarm, stopped_by
+from framearray_cli.base.units import counted, duration
+
+from .document import outcome
+from .screen import Screen, err, print_document, print_result, say
+
+if TYPE_CHECKING:
+    from framearray_cli.array.manifest import Manifest
+    from framearray_cli.base.errors import OutputError
+    from framearray_cli.job.job import Job
+    from framearray_cli.render.progress import CoarseFigures
+    from framearray_cli.tools.view.server import PageServer
+
+LOOPBACK = "127.0.0.1"
+MOST_PROBLEMS = 5  # named one by one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageOptions:
+    """Where the page is served, and whether a browser opens it."""
+
+    port: int
+    host: str
+    browser: bool
+
+
+def page_options(view: bool, port: int | None, host: str | None, browser: bool | None) -> PageOptions | None:
+    """Return the options of the page of `render`; None: no page.
+
+    Raises:
+        BadParameter: one of them was given without --view.
+    """
+    given = {"--port": port, "--host": host, "--browser" if browser else "--no-browser": browser}
+    for option, value in {} if view else given.items():
+        if value is not None:
+            raise typer.BadParameter("needs --view", param_hint=option)
+    return PageOptions(port=port or 0, host=host or LOOPBACK, browser=browser is not False) if view else None
+
+
+class LivePage:
+    """The page of an array that this process renders; open from the first coarse pictures on, until Ctrl-C."""
+
+    def __init__(self, job: "Job", options: PageOptions, *, quiet: bool) -> None:
+        self._job, self._options, self._quiet = job, options, quiet
+        self._stack = ExitStack()
+        self._server: PageServer | None = None
+        self._done = False
+
+    def open(self, manifest: "Manifest | None" = None, screen: Screen | None = None) -> None:
+        """Open the page, unless it is open already.
+
+        Args:
+            manifest: of the array; None: that in its folder.
+            screen: that shows something now.
+
+        Raises:
+            OutputError: the page cannot be served.
+        """
+        if self._server is not None:
+            return
+        from framearray_cli.array.manifest_toml import read_manifest
+        from framearray_cli.tools.view.run import open_browser, open_server, tiles_of
+
+        array = manifest or read_manifest(self._job.output.directory)
+        options = self._options
+        tiles = tiles_of(array, None, 1)  # few threads: the others render
+        self._server = self._stack.enter_context(open_server(tiles, options.port, options.host))
+        line = f"{self._server.url}  shows the array; Ctrl-C ends"
+        if outcome.wanted:
+            say(err, [line])
+        elif screen is not None:
+            screen.show([line])
+        else:
+            print_result([line], outcome.result)
+        if options.browser:
+            open_browser(self._server.url)
+
+    def stay(self) -> None:
+        """Show the finished array until Ctrl-C."""
+        self._done = True
+        print_document("render")
+        try:
+            self.open()
+            self._prepare()
+            threading.Event().wait()
+        except Stopped:  # how a user ends it
+            cancel_alarm()
+
+    def _prepare(self) -> None:
+        """Prepare all pictures, with all threads."""
+        from framearray_cli.tools.view.run import prepare_all
+
+        if self._server is None:
+            return
+        tiles = self._server.look_again()
+        with Screen(err, quiet=self._quiet) as screen:
+            screen.count("preparing", tiles.n_pictures, "picture")
+            problems = prepare_all(tiles, self._job.render.threads or available_cores(), screen.advance)
+            screen.end()
+            screen.say([*warning_lines(problems), "all pictures of the page are prepared; Ctrl-C ends"])
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.close()
+        if error is not None and not self._done and self._server is not None and stopped_by(error):
+            error.add_note(f"`framearray view {self._job.output.directory}` shows what is there")
+
+
+class Growth:
+    """Shows on a screen how an array grows that another process renders."""
+
+    def __init__(self, screen: Screen) -> None:
+        self._screen, self._first, self._last = screen, 0, -1
+        self._started = 0.0
+
+    def show(self, there: int, images: int) -> None:
+        """Show that so many images of the array are there now."""
+        now = time.monotonic()
+        if self._last < 0:
+            self._first, self._last, self._started = there, 0, now
+            self._screen.done = 0
+            self._screen.count("rendered", images, "image", timed=True)
+        if there > self._first:
+            self._screen.expect((images - there) * (now - self._started) / (there - self._first))
+        self._screen.advance(there - self._last)
+        self._last = there
+        if there == images:
+            self._screen.end()
+            self._screen.say([f"all {images:,} images are there"])
+
+
+def coarse_line(coarse: "CoarseFigures") -> str:
+    """Word the size of a coarse array."""
+    (n, cameras), (k, lights), (width, height) = coarse.cameras, coarse.lights, coarse.resolution
+    sizes = f"{n:,} of {counted(cameras, 'camera position')} x {k} of {counted(lights, 'light position')}"
+    return f"coarse array: {sizes}, {width} x {height} pixels, in {duration(coarse.seconds)}"
+
+
+def warning_lines(problems: "Sequence[OutputError]") -> list[str]:
+    """Word the errors of damaged images, the first ones by name."""
+    from framearray_cli.base.units import agree
+
+    rest = len(problems) - MOST_PROBLEMS
+    more = [f"warning: {counted(rest, 'more image')} {agree(rest, 'is', 'are')} damaged"] if rest > 0 else []
+    return [*(f"warning: {problem}" for problem in problems[:MOST_PROBLEMS]), *more]
