@@ -286,5 +286,6 @@ def test_the_page_is_in_the_package():
     page = page_files()
     assert {"index.html", "main.js", "style.css", "icon.svg"} <= set(page)
     assert all(content_type(name) for name in page)
+    assert not [name for name, data in page.items() if b"@import {" in data or b"@type {(" in data], "types stay here"
     foreign = [name for name, data in page.items() if b"http://" in data.replace(b"http://www.w3.org/2000/svg", b"")]
     assert not foreign, "the page requests nothing from elsewhere"
