@@ -5,13 +5,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExportResult:
-    """The folder that `export` wrote."""
+    """The folder that `export` wrote; `sets`: pictures of each set, with `--split`."""
 
     directory: str
     format: str
     cameras: int
     lights: int
     points: int
+    pictures: int
+    sets: dict[str, int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

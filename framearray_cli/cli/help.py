@@ -25,6 +25,7 @@ UsageError = cast("type[Exception]", typer.BadParameter.__mro__[1])
 NARROW, WIDE = 50, 100  # columns of a help screen
 SHORTEST_NAME = 4  # columns, where all are wider
 WIDEST_NAME = 24  # columns; the text of a longer one begins on the next line
+LONGEST_METAVAR = 30  # columns of the value of an option; narrow screens have 50
 SOURCE = Path(__file__).resolve().parents[2]  # the folder of the package: a checkout, or site-packages
 DOCUMENTATION = "share/doc/framearray"  # where a wheel puts the pages, below the prefix of the Python
 
@@ -201,7 +202,11 @@ def _option_name(param: Any) -> str:
     names = ", ".join(sorted(param.opts, key=len))
     if param.secondary_opts:
         names += f", {', '.join(param.secondary_opts)}"
-    return f"{names} {param.metavar}" if param.metavar and not param.is_flag else names
+    metavar = str(param.metavar or "")
+    metavar = (
+        metavar if len(metavar) <= LONGEST_METAVAR else "NAME"
+    )  # of many words, which the help of the option lists
+    return f"{names} {metavar}" if metavar and not param.is_flag else names
 
 
 def _option_text(param: Any) -> str:

@@ -50,6 +50,18 @@ def given_places(manifest: Manifest, light: str | None, at: Sequence[str]) -> di
     return {axis: (option, read_times(option, text, moments[axis])) for axis, (option, text) in given.items()}
 
 
+def read_axis_places(manifest: Manifest, option: str, text: str, axis: str) -> tuple[int, ...]:
+    """Read places along one axis: that of the cameras, or a light axis, whose places may be times.
+
+    Raises:
+        JobError: a place is unknown.
+    """
+    if axis not in manifest.axes:
+        return read_indices(option, text, manifest.n_cameras, axis)
+    text = read_times(option, text, partial(_moments, manifest, axis))
+    return read_indices(option, text, manifest.axes[axis], axis)
+
+
 def _moments(manifest: Manifest, axis: str) -> Sequence[datetime]:
     return axis_moments(manifest).get(axis, ())
 

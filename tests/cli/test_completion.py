@@ -62,7 +62,10 @@ def test_descriptions_are_whole(folder):
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("framearray export out/small --format ", ["nerfstudio", "colmap", "cinema", "rti"]),
+        (
+            "framearray export out/small --format ",
+            ["nerfstudio", "colmap", "cinema", "rti", "blender"],
+        ),
         ("framearray export out/small --image-format t", ["tif"]),
         ("framearray schema ", ["job", "path", "manifest", "results"]),
         ("framearray check ", ["job.toml"]),

@@ -95,7 +95,10 @@ def test_a_name_that_cannot_be_shown(tmp_path):
         (["render", "--threads", "two", "job.toml"], '--threads: expected a whole number from 1 to 1024, got "two"\n'),
         (["render", "job.toml", "-o", ""], "expected a name, got none"),
         (["assemble", "out", "path.toml"], "Error: missing option --output / -o\n"),
-        (["export", "out"], "Error: missing option --format / -f; expected nerfstudio, colmap, cinema or rti\n"),
+        (
+            ["export", "out"],
+            "Error: missing option --format / -f; expected nerfstudio, colmap, cinema, rti or blender\n",
+        ),
         (["assemble", "out", "path.toml", "-o", " "], "expected a name, got none"),
         (
             ["assemble", "out", "path.toml", "-o", "a.mp4", "--exposure", "1e9"],

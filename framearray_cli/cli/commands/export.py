@@ -12,31 +12,59 @@ from ..screen import Screen, err, print_result, print_would
 from ..summing import Environment, Rotate, Soft, Weights, sum_options
 from ..values import choice, whole
 
+KINDS = ("nerfstudio", "colmap", "cinema", "rti", "blender")
+
+Kind = Annotated[
+    Literal["nerfstudio", "colmap", "cinema", "rti", "blender"],
+    typer.Option(
+        "--format", "-f", help=f"What the folder is for: {', '.join(KINDS[:-1])} or {KINDS[-1]}.",
+        show_default=False, **choice(*KINDS),
+    ),
+]  # fmt: skip
+Target = Annotated[
+    str, typer.Option("--output", "-o", help="Folder; cinema adds .cdb.", metavar="FOLDER", show_default=False)
+]
+Split = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--split",
+        help="Sets: 80/10/10 (train/val/test), light=90/10, test=0-lastx8; may be repeated; see guide/export.md.",
+        metavar="RULE",
+    ),
+]
+Seed = Annotated[int, typer.Option("--split-seed", parser=whole(0), help="Of shares that --split draws.", metavar="N")]
+Gap = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--split-gap",
+        help="Leave out N positions beside another set's: 6, light=2; may be repeated.",
+        metavar="[AXIS=]N",
+    ),
+]
+Mixed = Annotated[
+    bool, typer.Option("--split-mixed", help="Keep pictures whose camera and light are in different sets.")
+]
+PicturesFormat = Annotated[
+    Literal["png", "jpg", "exr", "tif"],
+    typer.Option("--image-format", help="Of the pictures.", **choice("png", "jpg", "exr", "tif")),
+]
+Points = Annotated[int, typer.Option("--points", parser=whole(0), help="Points of the scene, at most.", metavar="N")]
+
 
 def export(
     array: ArrayFolder,
-    kind: Annotated[
-        Literal["nerfstudio", "colmap", "cinema", "rti"],
-        typer.Option(
-            "--format", "-f", help="What the folder is for.", show_default=False,
-            **choice("nerfstudio", "colmap", "cinema", "rti"),
-        ),
-    ],
-    target: Annotated[
-        str,
-        typer.Option("--output", "-o", help="Folder; cinema adds .cdb.", metavar="FOLDER", show_default=False),
-    ],
+    kind: Kind,
+    target: Target,
     cameras: Cameras = None,
     light: Light = None,
     at: At = None,
-    image_format: Annotated[
-        Literal["png", "jpg", "exr", "tif"],
-        typer.Option("--image-format", help="Of the pictures.", **choice("png", "jpg", "exr", "tif")),
-    ] = "png",
+    split: Split = None,
+    seed: Seed = 0,
+    gap: Gap = None,
+    mixed: Mixed = False,
+    image_format: PicturesFormat = "png",
     exposure: Exposure = 0.0,
-    points: Annotated[
-        int, typer.Option("--points", parser=whole(0), help="Points of the scene, at most.", metavar="N")
-    ] = 10_000,
+    points: Points = 10_000,
     environment: Environment = None,
     rotate: Rotate = None,
     soft: Soft = None,
@@ -46,9 +74,10 @@ def export(
     dry_run: DryRun = False,
     quiet: Quiet = False,
     json: Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """Export a frame array for other tools: images with cameras, lights, depth and points."""
     from framearray_cli.array.images.images import FOR_SCREENS, ImageFormat
+    from framearray_cli.tools.export import SplitOptions
     from framearray_cli.tools.export import export_array as run
 
     if exposure and image_format not in FOR_SCREENS:
@@ -58,18 +87,22 @@ def export(
             array, output_path(target), kind, cameras=cameras or ALL_PLACES, light=light, at=at or (),
             image_format=ImageFormat(format=image_format, exposure=exposure), points=points, copy=copy,
             sums=sum_options(environment, rotate, soft, weights),
+            split=SplitOptions(rules=tuple(split or ()), seed=seed, gaps=tuple(gap or ()), mixed=mixed),
             force=force, dry_run=dry_run, progress=screen.counter("exporting", "image"),
         )  # fmt: skip
         screen.end()
         screen.say(f"warning: {warning}" for warning in made.warnings)
     size = f"{counted(made.n_cameras, 'camera position')} x {counted(made.n_lights, 'light position')}"
+    if made.sets:
+        size += f", {', '.join(f'{n:,} {name}' for name, n in made.sets.items())}"
     if dry_run:
         print_would([f"would {'replace' if made.replaces else 'write'} {made.target}: {size}"])
         return
-    size += f", {counted(made.n_points, 'point')}" if kind in ("nerfstudio", "colmap") else ""
+    size += f", {counted(made.n_points, 'point')}" if kind in ("nerfstudio", "colmap", "blender") else ""
     from ..array_results import ExportResult
 
     result = ExportResult(
-        directory=str(made.target), format=kind, cameras=made.n_cameras, lights=made.n_lights, points=made.n_points
-    )
+        directory=str(made.target), format=kind, cameras=made.n_cameras, lights=made.n_lights, points=made.n_points,
+        pictures=made.n_pictures, sets=dict(made.sets),
+    )  # fmt: skip
     print_result([f"{made.target}: {size}", *(f"note: {note}" for note in made.notes)], result, quiet=quiet)

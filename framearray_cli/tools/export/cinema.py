@@ -46,11 +46,12 @@ def _row(selection: Selection, frame: ExportedFrame) -> dict[str, Any]:
     row: dict[str, Any] = {"camera": frame.c}
     row |= dict(zip(axis_keys(manifest.axes).values(), frame.lights, strict=True))
     row |= _vector("eye", pose[:3, 3]) | _vector("view", -pose[:3, 2]) | {"fov": float(manifest.cameras[frame.c].fov)}
+    row |= {"set": frame.part} if frame.part else {}
     sources = sources_at(manifest, frame.lights)
     for k, source in enumerate(sources):
         name = "source" if len(sources) == 1 else f"source{k}"
         row[f"{name}_type"] = source["type"]
-        row |= {f"{name}_{key}": str(source[key]) for key in ("material", "file", "ies") if key in source}
+        row |= {f"{name}_{key}": str(source[key]) for key in ("group", "material", "file", "ies") if key in source}
         for key in ("position", "direction", "across", "up", *STRENGTHS):
             if key in source:
                 row |= _vector(f"{name}_{key}", source[key], "rgb" if key in STRENGTHS else "xyz")

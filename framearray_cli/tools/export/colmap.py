@@ -13,7 +13,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.files import write_bytes
 
 from .points import Observations, PointCloud
-from .selection import ExportedFrame, Selection, focal_length, plain_floats, rigid_pose
+from .selection import ExportedFrame, Selection, focal_length, frames_by_set, plain_floats, rigid_pose
 
 MODEL_FOLDER = "sparse/0"  # where COLMAP and tools built on it look for a model
 IMAGES_FILE = f"{MODEL_FOLDER}/images.txt"
@@ -23,7 +23,7 @@ _THEIRS_FROM_OURS = np.diag([1.0, -1.0, -1.0])
 
 
 def write_model(folder: Path, selection: Selection, files: Mapping[str, str], cloud: PointCloud) -> None:
-    """Write `cameras.txt`, `images.txt` and `points3D.txt`.
+    """Write `cameras.txt`, `images.txt`, `points3D.txt`, and the lists of sets.
 
     Args:
         folder: of the export, with its pictures in `images`.
@@ -49,6 +49,9 @@ def write_model(folder: Path, selection: Selection, files: Mapping[str, str], cl
         lines.append("" if observations is None else _observation_line(observations))
     _write(folder / IMAGES_FILE, lines)
     _write(folder / MODEL_FOLDER / "points3D.txt", _point_lines(frames, cloud))
+    if selection.splits is not None:  # lists that nerfstudio reads; it wants all three as soon as there is one
+        for name, own in frames_by_set(selection).items():
+            _write(folder / f"{name}_list.txt", [files[frame.name] for frame in own])
 
 
 def camera_from_world(world_from_camera: Float64) -> tuple[Float64, Float64]:

@@ -1,8 +1,6 @@
 """`transforms.json` as nerfstudio reads it, with depth files and a point cloud."""
 
 import io
-import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,8 +10,9 @@ import numpy as np
 from framearray_cli.array.manifest import Manifest
 from framearray_cli.base.files import write_bytes
 
+from .frames import frame_table, image_size, lens, write_json
 from .points import PointCloud, read_depth
-from .selection import ExportedFrame, Selection, axis_keys, focal_length, plain_floats, rigid_pose, sources_at
+from .selection import Selection, focal_length, frames_by_set
 
 TRANSFORMS_FILE = "transforms.json"
 POINTS_FILE = "points.ply"
@@ -37,12 +36,11 @@ def write_transforms(
             to write.
     """
     manifest = selection.manifest
-    width, height = manifest.resolution
     focals = {c: focal_length(manifest, c) for c in selection.cameras}
     same_lens = len(set(focals.values())) == 1
-    head: dict[str, Any] = {"camera_model": "OPENCV", "w": width, "h": height, "cx": width / 2, "cy": height / 2}
+    head: dict[str, Any] = {"camera_model": "OPENCV"} | image_size(manifest)
     if same_lens:
-        head |= _lens(manifest, focals[selection.cameras[0]])
+        head |= lens(manifest, focals[selection.cameras[0]])
     head |= dict.fromkeys(("k1", "k2", "p1", "p2"), 0.0)
     if exposure:
         head["exposure"] = exposure
@@ -53,47 +51,26 @@ def write_transforms(
             _write_depth(folder / name, manifest, c)
         if len(cloud.position):
             head["ply_file_path"] = POINTS_FILE
-            write_bytes(folder / POINTS_FILE, _ply(cloud))
+            write_bytes(folder / POINTS_FILE, ply(cloud))
     frames = []
     for frame in selection.frames:
         table: dict[str, Any] = {"file_path": files[frame.name]}
         if frame.c in depths:
             table["depth_file_path"] = depths[frame.c]
         if not same_lens:
-            table |= _lens(manifest, focals[frame.c])
-        frames.append(table | _frame(manifest, frame))
-    text = json.dumps(head | {"frames": frames}, indent=2)
-    write_bytes(folder / TRANSFORMS_FILE, f"{text}\n".encode())
+            table |= lens(manifest, focals[frame.c])
+        frames.append(table | frame_table(manifest, frame))
+    write_json(folder / TRANSFORMS_FILE, head | _sets(selection, files) | {"frames": frames})
 
 
-def _lens(manifest: Manifest, focal: float) -> dict[str, float]:
-    """Return the focal length in pixels, and the horizontal angle that some readers take instead."""
-    return {"fl_x": focal, "fl_y": focal, "camera_angle_x": 2 * math.atan(0.5 * manifest.resolution[0] / focal)}
-
-
-def _frame(manifest: Manifest, frame: ExportedFrame) -> dict[str, Any]:
-    """Return pose and light: all sources, and `pl_pos` and `pl_intensity` where the only one is a point."""
-    table: dict[str, Any] = {
-        "transform_matrix": [plain_floats(row) for row in rigid_pose(manifest, frame.c)],
-        "camera": frame.c,
+def _sets(selection: Selection, files: Mapping[str, str]) -> dict[str, list[str]]:
+    """Return the lists of files by set; its parser wants all three as soon as there is one."""
+    if selection.splits is None:
+        return {}
+    return {
+        f"{name}_filenames": [files[frame.name] for frame in frames]
+        for name, frames in frames_by_set(selection).items()
     }
-    table |= dict(zip(axis_keys(manifest.axes).values(), frame.lights, strict=True))
-    sources = sources_at(manifest, frame.lights)
-    if len(sources) == 1 and sources[0]["type"] == "point":
-        table["pl_pos"] = plain_floats(sources[0]["position"])
-        table["pl_intensity"] = plain_floats(sources[0]["intensity"])
-    return table | {"sources": [_source(source) for source in sources]}
-
-
-def _source(source: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a source as the manifest describes it, in values of JSON."""
-
-    def value_of(value: Any) -> Any:
-        if isinstance(value, bool | str):
-            return value
-        return plain_floats(value) if isinstance(value, list | tuple) else float(value)
-
-    return {key: value_of(value) for key, value in source.items()}
 
 
 def _write_depth(file: Path, manifest: Manifest, c: int) -> None:
@@ -103,15 +80,20 @@ def _write_depth(file: Path, manifest: Manifest, c: int) -> None:
     write_bytes(file, buffer.getbuffer())
 
 
-def _ply(cloud: PointCloud) -> bytes:
-    """Return points with colours as a binary PLY, in doubles, as a scene may lie far from its origin."""
-    row_type = [(name, "<f8") for name in "xyz"] + [(name, "u1") for name in ("red", "green", "blue")]
-    rows = np.empty(len(cloud.position), row_type)
+def ply(cloud: PointCloud, *, normals: bool = False) -> bytes:
+    """Return points with colours as a binary PLY, in doubles, as a scene may lie far from its origin.
+
+    Args:
+        cloud: the points.
+        normals: add normals of length 0, which Gaussian splatting expects and does not use.
+    """
+    numbers, codes = (*"xyz", *(("nx", "ny", "nz") if normals else ())), ("red", "green", "blue")
+    rows = np.zeros(len(cloud.position), [(name, "<f8") for name in numbers] + [(name, "u1") for name in codes])
     for k, name in enumerate("xyz"):
         rows[name] = cloud.position[:, k]
-    for k, name in enumerate(("red", "green", "blue")):
+    for k, name in enumerate(codes):
         rows[name] = cloud.codes[:, k]
     head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(rows)}"]
-    head += [f"property double {name}" for name in "xyz"]
-    head += [f"property uchar {name}" for name in ("red", "green", "blue")]
+    head += [f"property double {name}" for name in numbers]
+    head += [f"property uchar {name}" for name in codes]
     return "\n".join([*head, "end_header", ""]).encode() + rows.tobytes()

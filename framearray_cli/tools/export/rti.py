@@ -22,23 +22,26 @@ from .selection import Selection, plain_floats, rigid_pose, sources_at
 LIGHTS_FILE = "lights.json"
 
 
-def check_lights(selection: Selection) -> None:
+def check_lights(selection: Selection, file: str) -> None:
     """Check that one source lights each picture.
 
+    Args:
+        file: that has one direction per picture, for messages.
+
     Raises:
-        OutputError: several do, which an `.lp` cannot say, or none.
+        OutputError: several do, which the file cannot say, or none.
     """
     manifest = selection.manifest
     for lights in selection.lights:
         found = sources_at(manifest, lights)
         if len(found) == 1 and not _vector_key(found[0]):
             raise OutputError(
-                f"{manifest.directory}: expected a source with a position or a direction, as an .lp has one direction "
+                f"{manifest.directory}: expected a source with a position or a direction, as {file} has one direction "
                 f"per picture, got type {found[0]['type']!r}"
             )
         if len(found) != 1:
             raise OutputError(
-                f"{manifest.directory}: expected one source per picture, as an .lp has one direction per picture, got "
+                f"{manifest.directory}: expected one source per picture, as {file} has one direction per picture, got "
                 f"{len(found)} at light position {', '.join(map(str, lights))}"
             )
 

@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from framearray_cli.base.arrays import Float64
 from framearray_cli.base.errors import OutputError
 
 from ..axes import LightIndices
+from .splits import SETS, Splits
 
 # A matrix counts as rigid if its columns are orthonormal to within this; matrices written as float32 are.
 RIGID = 1e-5
@@ -26,26 +28,33 @@ class ExportedFrame:
         c: camera.
         lights: one index per light axis.
         name: of its file, without a suffix; names sort by camera, then by light.
+        part: the set that it belongs to: "train", "val" or "test"; "" without sets.
     """
 
     c: int
     lights: LightIndices
     name: str
+    part: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Selection:
-    """Cameras and light positions; every camera comes with every light position."""
+    """Cameras and light positions; every camera comes with every light position, but for what `splits` leaves out."""
 
     manifest: Manifest
     cameras: tuple[int, ...]
     lights: tuple[LightIndices, ...]
+    splits: Splits | None = None
 
     @property
     def frames(self) -> list[ExportedFrame]:
         """All frames, camera by camera."""
-        name = self._name
-        return [ExportedFrame(c=c, lights=lights, name=name(c, lights)) for c in self.cameras for lights in self.lights]
+        found = []
+        for c, lights in product(self.cameras, self.lights):
+            part = self.splits.of(c, lights) if self.splits else ""
+            if part is not None:
+                found.append(ExportedFrame(c=c, lights=lights, name=self._name(c, lights), part=part))
+        return found
 
     def camera_name(self, c: int) -> str:
         """Name the files of a camera."""
@@ -61,6 +70,16 @@ class Selection:
         return "_".join([self.camera_name(c), *parts])
 
 
+def frames_by_set(selection: Selection) -> dict[str, list[ExportedFrame]]:
+    """Return the frames of all three sets, which some readers insist on; val and test stand in for each other."""
+    frames: dict[str, list[ExportedFrame]] = {name: [] for name in SETS}
+    for frame in selection.frames:
+        frames[frame.part].append(frame)
+    frames["val"] = frames["val"] or frames["test"]
+    frames["test"] = frames["test"] or frames["val"]
+    return frames
+
+
 def axis_keys(axes: Mapping[str, int]) -> dict[str, str]:
     """Map axes to keys of letters, digits and _, all different: "light" for the main one, "light_..." for others."""
     keys: dict[str, str] = {}
@@ -73,11 +92,13 @@ def axis_keys(axes: Mapping[str, int]) -> dict[str, str]:
 
 
 def sources_at(manifest: Manifest, lights: LightIndices) -> list[dict[str, Any]]:
-    """List all sources that shine at a light position."""
+    """List all sources that shine at a light position, with the `group` of each where the array has groups."""
     if not manifest.groups:
         return list(manifest.lights[lights[0]].sources)
     at = dict(zip(manifest.axes, lights, strict=True))
-    return [source for group in manifest.groups for source in group.lights[at[group.axis]].sources]
+    return [
+        source | {"group": group.name} for group in manifest.groups for source in group.lights[at[group.axis]].sources
+    ]
 
 
 def focal_length(manifest: Manifest, c: int) -> float:

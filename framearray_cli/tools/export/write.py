@@ -1,9 +1,10 @@
 """Write a frame array as a folder that other tools read; all input is the manifest and the images it names."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -20,22 +21,15 @@ from framearray_cli.base.files import whole_folder
 from ..axes import read_light_indices
 from ..mixing.mixer import SumOptions, open_pictures
 from ..progress import Progress
-from . import cinema, colmap, nerfstudio, rti
+from . import cinema
 from .folder import find_earlier_export, put_picture
+from .formats import EXPORT_KINDS, FORMATS, ExportKind, Format, Written
 from .points import PointCloud, find_points, source_cameras
-from .selection import Selection
+from .selection import ExportedFrame, Selection
+from .splits import OPTION, SETS, SplitOptions, read_splits, shared_samples
 
-ExportKind: TypeAlias = Literal["nerfstudio", "colmap", "cinema", "rti"]
-
-EXPORT_KINDS: tuple[ExportKind, ...] = ("nerfstudio", "colmap", "cinema", "rti")
-ALL_LIGHTS = ("cinema", "rti")  # take every light position by default, and no points
+PNG = ImageFormat(format="png")
 MOST_POINTS = 10_000  # a COLMAP model has some 25 bytes per point and image
-_MARK_FILES = {
-    "nerfstudio": nerfstudio.TRANSFORMS_FILE,
-    "colmap": colmap.IMAGES_FILE,
-    "cinema": cinema.TABLE_FILE,
-    "rti": rti.LIGHTS_FILE,
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +39,9 @@ class ExportResult:
     Attributes:
         target: the folder.
         n_cameras, n_lights: exported cameras, and light positions of each.
+        n_pictures: pictures of these that belong to a set; all, if there are no sets.
         n_points: in the point cloud.
+        sets: number of pictures of each set, in the order of SETS.
         replaces: whether an earlier export was there.
         notes, warnings: for the user.
     """
@@ -53,7 +49,9 @@ class ExportResult:
     target: Path
     n_cameras: int
     n_lights: int
+    n_pictures: int
     n_points: int
+    sets: Mapping[str, int] = field(default_factory=dict)
     replaces: bool
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
@@ -67,9 +65,10 @@ def export_array(
     cameras: str = ALL_PLACES,
     light: str | None = None,
     at: Sequence[str] = (),
-    image_format: ImageFormat | None = None,
+    image_format: ImageFormat = PNG,
     points: int = MOST_POINTS,
     sums: SumOptions = SumOptions(),  # noqa: B008  # frozen
+    split: SplitOptions = SplitOptions(),  # noqa: B008  # frozen
     copy: bool = False,
     force: bool = False,
     dry_run: bool = False,
@@ -82,10 +81,11 @@ def export_array(
         target: the folder; cinema adds the suffix .cdb.
         kind: one of EXPORT_KINDS.
         cameras: places along the camera path, see `places.read_indices`.
-        light: places along the first light axis; None: all for cinema and rti, the middle one for the others.
+        light: places along the first light axis; None: as `Format.all_lights` says.
         at: "AXIS=PLACES" for the other axes; the default is as for `light`.
-        image_format: of the pictures; None: PNG.
+        image_format: of the pictures.
         points: in the point cloud, at most.
+        split: sets for training, validation and testing.
         sums: what pictures are sums of; those of all light positions are one picture per camera.
         copy: copy pictures of the array that could be linked.
         force: replace an earlier export.
@@ -93,46 +93,76 @@ def export_array(
         progress: called after each picture.
 
     Raises:
-        JobError: a place or an axis is unknown.
+        JobError: an option does not fit the array.
         OutputError: a file of the array is missing or damaged, or the target is in use or cannot be written.
     """
     manifest = read_manifest(out)
-    selection = _select(manifest, kind, cameras, light, at)
-    target, image_format = _full_name(target, kind), image_format or ImageFormat(format="png")
-    require_writer(image_format.format)
+    selection, chosen, target = _select(manifest, kind, cameras, light, at), FORMATS[kind], _full_name(target, kind)
+    _check_images(kind, chosen, image_format)
     pictures, warnings = open_pictures(manifest, sums)
+    has_cloud = chosen.points and bool(manifest.layers)
     selection = _one_light(selection, kind) if sums.collapses else selection
-    has_cloud = kind not in ALL_LIGHTS and bool(manifest.layers)
-    selection, left_out = _split_complete(pictures, selection, layers=has_cloud)
-    replaces = find_earlier_export(target, _MARK_FILES[kind], force=force)
-    cloud = None
+    complete, left_out = _split_complete(pictures, selection, layers=has_cloud)
+    selection = _divide(complete, kind, split)
+    replaces = find_earlier_export(target, chosen.mark, force=force)
+    n_points = 0
     if not dry_run:
         with whole_folder(target, replace=replaces) as folder:
-            files = _write_pictures(pictures, selection, folder / "images", image_format, copy=copy, progress=progress)
+            put = partial(_write_pictures, pictures, selection, chosen, folder, image_format, copy, progress)
+            files = put()
             cloud = _make_cloud(pictures, selection, image_format.exposure, points) if has_cloud else None
-            _write_tables(folder, kind, selection, files, cloud, image_format.exposure)
-    n_points = len(cloud.position) if cloud else 0
-    n_cameras, n_lights = len(selection.cameras), len(selection.lights)
+            n_points = len(cloud.position) if cloud else 0
+            chosen.write(Written(folder, selection, files, cloud, image_format.exposure))
+    notes = [] if dry_run else _notes(chosen, selection, n_points, points)
+    return _result(target, selection, n_points, replaces, notes, [*warnings, *left_out])
+
+
+def _result(
+    target: Path, selection: Selection, n_points: int, replaces: bool, notes: Sequence[str], warnings: Sequence[str]
+) -> ExportResult:
+    frames = selection.frames
+    counts = Counter(frame.part for frame in frames)
     return ExportResult(
-        target=target, n_cameras=n_cameras, n_lights=n_lights, n_points=n_points, replaces=replaces,
-        notes=() if dry_run else _notes(kind, bool(manifest.layers), n_points, points),
-        warnings=(*warnings, *([f"left out: {left_out}"] if left_out else [])),
+        target=target, n_cameras=len(selection.cameras), n_lights=len(selection.lights), n_pictures=len(frames),
+        n_points=n_points, sets={name: counts[name] for name in SETS if counts[name]}, replaces=replaces,
+        notes=tuple(notes), warnings=tuple(warnings),
     )  # fmt: skip
+
+
+def _check_images(kind: ExportKind, chosen: Format, image_format: ImageFormat) -> None:
+    """Refuse a format of images that readers do not take, or that cannot be written here."""
+    if chosen.images and image_format.format not in chosen.images:
+        wanted = " or ".join(chosen.images)
+        raise JobError("--image-format", [f"expected {wanted} for readers of {kind}, got {image_format.format}"])
+    require_writer(image_format.format)
 
 
 def _select(manifest: Manifest, kind: ExportKind, cameras: str, light: str | None, at: Sequence[str]) -> Selection:
     """Read which cameras and light positions to export."""
     if kind not in EXPORT_KINDS:
         raise JobError("--format", [f"expected {', '.join(EXPORT_KINDS)}, got {kind!r}"])
-    default = ALL_PLACES if kind in ALL_LIGHTS else MIDDLE_PLACE
+    default = ALL_PLACES if FORMATS[kind].all_lights else MIDDLE_PLACE
     selection = Selection(
         manifest=manifest,
         cameras=tuple(sorted(read_indices("--cameras", cameras, manifest.n_cameras))),
         lights=tuple(sorted(read_light_indices(manifest, light, at, default))),
     )
-    if kind == "rti":
-        rti.check_lights(selection)
+    FORMATS[kind].check(selection)
     return selection
+
+
+def _divide(selection: Selection, kind: ExportKind, options: SplitOptions) -> Selection:
+    """Return the selection in sets, without the cameras and light positions that are in none."""
+    if options.rules and not FORMATS[kind].splits:
+        raise JobError(OPTION, [f"expected another format than {kind}, which has no sets"])
+    if not options.rules and FORMATS[kind].rule:
+        options = replace(options, rules=(FORMATS[kind].rule,))
+    splits = read_splits(options, selection.manifest, selection.cameras, selection.lights)
+    if splits is None:
+        return selection
+    frames = replace(selection, splits=splits).frames
+    cameras, lights = {frame.c for frame in frames}, {frame.lights for frame in frames}
+    return replace(selection, splits=splits, cameras=tuple(sorted(cameras)), lights=tuple(sorted(lights)))
 
 
 def _one_light(selection: Selection, kind: ExportKind) -> Selection:
@@ -141,8 +171,8 @@ def _one_light(selection: Selection, kind: ExportKind) -> Selection:
     Raises:
         JobError: the format needs a source per picture.
     """
-    if kind == "rti":
-        raise JobError("--format", ["expected another format than rti, as a sum of light has no direction"])
+    if kind in ("rti", "olat"):
+        raise JobError("--format", [f"expected another format than {kind}, as a sum of light has no direction"])
     lights = tuple(dict.fromkeys((0, *lights[1:]) for lights in selection.lights))
     return replace(selection, manifest=_without_sources(selection.manifest), lights=lights)
 
@@ -157,8 +187,8 @@ def _without_sources(manifest: Manifest) -> Manifest:
     return replace(manifest, lights=bare(manifest.lights), groups=groups)
 
 
-def _split_complete(pictures: Pictures, selection: Selection, *, layers: bool) -> tuple[Selection, str]:
-    """Return the cameras of a selection whose files are all there, and a text about the others; "" if there are none.
+def _split_complete(pictures: Pictures, selection: Selection, *, layers: bool) -> tuple[Selection, list[str]]:
+    """Return the cameras of a selection whose files are all there, and a warning about the others if there are any.
 
     Args:
         layers: whether the layers of each camera are needed too.
@@ -174,11 +204,11 @@ def _split_complete(pictures: Pictures, selection: Selection, *, layers: bool) -
 
     complete = tuple(c for c in selection.cameras if is_complete(c))
     if len(complete) == len(selection.cameras):
-        return selection, ""
+        return selection, []
     text = missing_text(set(selection.cameras) - set(complete), len(selection.cameras))
     if not complete:
         raise OutputError(f"{manifest.directory}: {text}")
-    return replace(selection, cameras=complete), text
+    return replace(selection, cameras=complete), [f"left out: {text}"]
 
 
 def _full_name(target: Path, kind: ExportKind) -> Path:
@@ -193,59 +223,45 @@ def _full_name(target: Path, kind: ExportKind) -> Path:
 def _write_pictures(
     pictures: Pictures,
     selection: Selection,
+    chosen: Format,
     folder: Path,
     image_format: ImageFormat,
-    *,
     copy: bool,
     progress: Progress | None,
+    *,
+    then: Callable[[ExportedFrame, Path], None] | None = None,
 ) -> dict[str, str]:
-    """Fill a new folder with the pictures; return name of a frame -> its file in the folder."""
-    folder.mkdir()
+    """Write the pictures; return name of a frame -> its file, relative to the folder.
+
+    Args:
+        then: is called with each picture when it is there.
+    """
     frames = selection.frames
-    files = {frame.name: f"{frame.name}.{image_format.format}" for frame in frames}
+    files = {frame.name: f"{chosen.stem(selection, frame)}.{image_format.format}" for frame in frames}
+    for place in {(folder / file).parent for file in files.values()}:
+        place.mkdir(parents=True, exist_ok=True)
     for done, frame in enumerate(frames, start=1):
         put_picture(pictures, frame, folder / files[frame.name], image_format, copy=copy)
+        if then:
+            then(frame, folder / files[frame.name])
         if progress:
             progress(done, len(frames))
     return files
 
 
-def _write_tables(
-    folder: Path,
-    kind: ExportKind,
-    selection: Selection,
-    files: Mapping[str, str],
-    cloud: PointCloud | None,
-    exposure: float,
-) -> None:
-    """Write what describes the pictures: the files that tools of this kind read first."""
-    from_folder = {name: f"images/{file}" for name, file in files.items()}
-    if kind == "nerfstudio":
-        nerfstudio.write_transforms(folder, selection, from_folder, cloud=cloud, exposure=exposure)
-    elif kind == "colmap":
-        colmap.write_model(folder, selection, files, cloud or _NO_POINTS)
-    elif kind == "rti":
-        rti.write_lights(folder, selection, files)
-    else:
-        cinema.write_table(folder, selection, from_folder)
-
-
-_NO_POINTS = PointCloud(position=np.empty((0, 3)), codes=np.empty((0, 3), np.uint8), observations={})
-
-
 def _make_cloud(pictures: Pictures, selection: Selection, exposure: float, wanted: int) -> PointCloud:
     """Find points, with the colours that they have under the first light position."""
-    lights = selection.lights[0]
+    lights = selection.frames[0].lights
     bright = np.float32(2.0**exposure)
     colours = {c: srgb8_from_linear(pictures.picture(c, lights) * bright) for c in source_cameras(selection.cameras)}
     return find_points(selection.manifest, selection.cameras, colours, wanted)
 
 
-def _notes(kind: ExportKind, layers: bool, n_points: int, wanted: int) -> tuple[str, ...]:
-    if kind in ALL_LIGHTS or not wanted:
-        return ()
-    if not layers:
-        return ("no points and no depth: the array was rendered without layers (output.layers)",)
-    if n_points:
-        return ()
-    return ("no points: no two cameras see the same smooth surface; with samples.hits below 1 depth has holes",)
+def _notes(chosen: Format, selection: Selection, n_points: int, wanted: int) -> list[str]:
+    near = shared_samples(selection.splits, selection.manifest.job)
+    notes = [near] if near else []
+    if chosen.points and wanted and not selection.manifest.layers:
+        notes.append("no points and no depth: the array was rendered without layers (output.layers)")
+    elif chosen.points and wanted and not n_points:
+        notes.append("no points: no two cameras see the same smooth surface; with samples.hits below 1 depth has holes")
+    return notes

@@ -1,0 +1,241 @@
+"""Sets for training, validation and testing: which camera and light positions belong to which.
+
+    rule = [AXIS[:SET]=]VALUE or SET=VALUE;  AXIS: "camera" (the default) or a light axis;  SET: train, val or test
+    VALUE with a set = places; without one = shares in percent: train/val/test or train/test
+
+Shares are drawn by a hash of seed, axis and index, so that they are the same with every version of every library.
+"""
+
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from typing import Any, NamedTuple
+
+from framearray_cli.array.manifest import Manifest
+from framearray_cli.array.places import CAMERA_AXIS
+from framearray_cli.base.errors import JobError
+from framearray_cli.base.forms.words import shown
+from framearray_cli.base.units import counted
+
+from ..axes import LightIndices, axes_of_groups, read_axis_places
+
+SETS = ("train", "val", "test")
+OPTION, GAP_OPTION = "--split", "--split-gap"
+WANTED = "expected shares such as 80/10/10 or 80/20, or places of a set such as test=0-lastx8 or light:test=40-47"
+_SHARES = re.compile(r"\d{1,3}(?:\.\d{1,6})?(?:/\d{1,3}(?:\.\d{1,6})?){1,2}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SplitOptions:
+    """What options say about sets.
+
+    Attributes:
+        rules: see the head of this file; none: no sets.
+        seed: of shares.
+        gaps: "N" or "AXIS=N": positions nearer than N + 1 to another set's are left out, of the set that is earlier
+            in SETS.
+        mixed: keep pictures whose camera and light belong to different sets, in the one that is later in SETS.
+    """
+
+    rules: tuple[str, ...] = ()
+    seed: int = 0
+    gaps: tuple[str, ...] = ()
+    mixed: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Splits:
+    """The sets of the positions along each axis; an axis without sets is not split.
+
+    Attributes:
+        cameras: camera -> its set; those that are left out are missing.
+        lights: the same, per light axis.
+        mixed: as in `SplitOptions`.
+    """
+
+    cameras: Mapping[int, str]
+    lights: tuple[Mapping[int, str], ...]
+    mixed: bool
+
+    def of(self, c: int, lights: LightIndices) -> str | None:
+        """Return the set of a picture; None if it is left out."""
+        found = set()
+        for sets, index in zip((self.cameras, *self.lights), (c, *lights), strict=True):
+            if sets:
+                found.add(sets.get(index, ""))
+        if "" in found or (len(found) > 1 and not self.mixed):
+            return None
+        return max(found, key=SETS.index)
+
+
+class _Rule(NamedTuple):
+    option: str  # for messages
+    name: str  # the set; "": shares
+    value: str
+
+
+def read_splits(
+    options: SplitOptions, manifest: Manifest, cameras: Sequence[int], lights: Sequence[LightIndices]
+) -> Splits | None:
+    """Assign the exported positions to sets.
+
+    Returns:
+        None without rules.
+
+    Raises:
+        JobError: a rule cannot be read, two contradict each other, or a set has no position.
+    """
+    if not options.rules:
+        for option, given in ((GAP_OPTION, options.gaps), ("--split-mixed", options.mixed)):
+            if given:
+                raise JobError(option, [f"expected {OPTION} beside it"])
+        return None
+    axes = [CAMERA_AXIS, *manifest.axes]
+    positions = [tuple(cameras), *(tuple(dict.fromkeys(each)) for each in zip(*lights, strict=True))]
+    rules, gaps = _rules_by_axis(options.rules, manifest), _gaps_by_axis(options.gaps, manifest)
+    sets: list[dict[int, str]] = []
+    for axis, own in zip(axes, positions, strict=True):
+        found = _assign(rules.get(axis, ()), manifest, axis, own, options.seed) if axis in rules else {}
+        sets.append(_with_gap(found, gaps.pop(axis, 0), axis) if found else found)
+    if gaps:
+        raise JobError(GAP_OPTION, [f"expected an axis that {OPTION} divides, got {shown(next(iter(gaps)))}"])
+    _check_agreement([(axis, set(each.values())) for axis, each in zip(axes, sets, strict=True) if each], options.mixed)
+    return Splits(cameras=sets[0], lights=tuple(sets[1:]), mixed=options.mixed)
+
+
+def shared_samples(splits: Splits | None, job: Mapping[str, Any]) -> str:
+    """Word that pictures of different sets hold the same samples; "" if they do not, or nothing is known.
+
+    Picture j shows samples of cameras j - N_r to j + N_r, so pictures up to 2 N_r apart may share some.
+    """
+    reuse = job.get("reuse")
+    n_r = reuse.get("n_r") if isinstance(reuse, Mapping) else None
+    if splits is None or not splits.cameras or not isinstance(n_r, int) or n_r < 1:
+        return ""
+    near = 2 * n_r
+    if not any(_near(splits.cameras, c, {name} ^ set(SETS), near) for c, name in splits.cameras.items()):
+        return ""
+    return (
+        f"cameras up to {counted(near, 'position')} apart share samples (reuse.n_r = {n_r}), and so noise; "
+        f"{GAP_OPTION} {near} leaves those between sets out"
+    )
+
+
+# rules
+
+
+def _rules_by_axis(texts: Sequence[str], manifest: Manifest) -> dict[str, list[_Rule]]:
+    """Read rules; return those of each axis."""
+    rules: dict[str, list[_Rule]] = {}
+    for text in texts:
+        head, equals, value = text.partition("=")
+        if not equals:
+            head, value = "", text
+        name = head if head in SETS else head.rpartition(":")[2] if ":" in head else ""
+        axis = _axis(head if not name else head.rpartition(":")[0], manifest)
+        good = (name in SETS or not name) and (name or _SHARES.fullmatch(value.strip()))
+        if axis is None or not good:
+            raise JobError(OPTION, [f"{WANTED}, got {shown(text)}; {_known_axes(manifest)}"])
+        own = rules.setdefault(axis, [])
+        if any(not (rule.name and name) or rule.name == name for rule in own):
+            raise JobError(OPTION, [f"expected shares or places once per set, got {shown(text)} after {own[0].option}"])
+        own.append(_Rule(f"{OPTION} {head or text}", name, value))
+    return rules
+
+
+def _axis(text: str, manifest: Manifest) -> str | None:
+    """Return the axis of a name; None if there is none."""
+    if text in ("", CAMERA_AXIS):
+        return CAMERA_AXIS
+    axis = text if text in manifest.axes else axes_of_groups(manifest).get(text, "")
+    return axis or None
+
+
+def _known_axes(manifest: Manifest) -> str:
+    return f"axes: {', '.join([CAMERA_AXIS, *manifest.axes])}"
+
+
+def _gaps_by_axis(texts: Sequence[str], manifest: Manifest) -> dict[str, int]:
+    gaps: dict[str, int] = {}
+    for text in texts:
+        head, _, value = text.rpartition("=")
+        axis = _axis(head, manifest)
+        if axis is None or axis in gaps or not re.fullmatch(r"\d{1,6}", value):
+            expected = f"expected N or AXIS=N, once per axis ({_known_axes(manifest)})"
+            raise JobError(GAP_OPTION, [f"{expected}, got {shown(text)}"])
+        gaps[axis] = int(value)
+    return gaps
+
+
+def _assign(
+    rules: Sequence[_Rule], manifest: Manifest, axis: str, positions: Sequence[int], seed: int
+) -> dict[int, str]:
+    """Assign positions of one axis."""
+    if not rules[0].name:
+        return _draw(rules[0], axis, positions, seed)
+    sets: dict[int, str] = {}
+    for rule in rules:
+        named = set(read_axis_places(manifest, rule.option, rule.value, axis)) & set(positions)
+        if both := sorted(named & set(sets)):
+            raise JobError(rule.option, [f"expected different places, got {both[0]} in {sets[both[0]]} too"])
+        if not named:
+            raise JobError(rule.option, ["expected at least one exported position, got none"])
+        sets |= dict.fromkeys(named, rule.name)
+    if not any(rule.name == "train" for rule in rules):
+        sets |= {k: "train" for k in positions if k not in sets}
+    return {k: sets[k] for k in positions if k in sets}
+
+
+def _draw(rule: _Rule, axis: str, positions: Sequence[int], seed: int) -> dict[int, str]:
+    """Draw shares: sets get whole numbers of positions by the largest remainder, and each at least one."""
+    shares = [float(part) for part in rule.value.split("/")]
+    names = SETS if len(shares) == 3 else ("train", "test")
+    if abs(sum(shares) - 100) > 1e-6:
+        raise JobError(rule.option, [f"expected shares that add up to 100, got {sum(shares):g}"])
+    wanted = {name: share for name, share in zip(names, shares, strict=True) if share}
+    n = len(positions)
+    if n < len(wanted) or len(wanted) < 2:
+        least = f"at least {counted(len(wanted), 'position')}" if len(wanted) > 1 else "at least two sets"
+        raise JobError(rule.option, [f"expected {least} on axis {axis}, got {n if len(wanted) > 1 else 1}"])
+    sizes = {name: max(1, int(n * share / 100)) for name, share in wanted.items()}
+    while sum(sizes.values()) != n:
+        step = 1 if sum(sizes.values()) < n else -1
+        able = [name for name in sizes if step > 0 or sizes[name] > 1]
+        sizes[max(able, key=lambda name: step * (n * wanted[name] / 100 - sizes[name]))] += step
+    order = sorted(positions, key=lambda k: sha256(f"{seed}/{axis}/{k}".encode()).digest())
+    sets: dict[int, str] = {}
+    for name in reversed(sizes):  # tests first: they stay tests while the others change
+        sets |= dict.fromkeys(order[len(sets) : len(sets) + sizes[name]], name)
+    return {k: sets[k] for k in positions}
+
+
+# what is left out
+
+
+def _with_gap(sets: Mapping[int, str], gap: int, axis: str) -> dict[int, str]:
+    """Leave out what is too near to a position of a later set."""
+    kept = {k: name for k, name in sets.items() if not (gap and _near(sets, k, SETS[SETS.index(name) + 1 :], gap))}
+    for name in dict.fromkeys(sets.values()):
+        if name not in kept.values():
+            raise JobError(GAP_OPTION, [f"expected a gap that leaves something in {name} on axis {axis}, got {gap}"])
+    return kept
+
+
+def _near(sets: Mapping[int, str], k: int, others: Collection[str], gap: int) -> bool:
+    return any(sets.get(near) in others for near in _around(k, gap))
+
+
+def _around(k: int, gap: int) -> Iterator[int]:
+    return (near for near in range(k - gap, k + gap + 1) if near != k)
+
+
+def _check_agreement(found: Sequence[tuple[str, set[str]]], mixed: bool) -> None:
+    """Check that there are pictures in each set: axes have the same sets, unless mixed pictures count."""
+    names = set[str]().union(*(names for _, names in found))
+    if len(names) < 2:
+        raise JobError(OPTION, [f"expected train and another set, got {', '.join(names)}"])
+    for axis, own in found:
+        lacking = [name for name in SETS if name in (["train"] if mixed else names | {"train"}) and name not in own]
+        if lacking:
+            raise JobError(OPTION, [f"expected the same sets on each axis, got no {', '.join(lacking)} on axis {axis}"])
