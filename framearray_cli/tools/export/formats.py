@@ -9,11 +9,11 @@ import numpy as np
 
 from framearray_cli.base.files import write_bytes
 
-from . import blender, cinema, colmap, nerfstudio, rti
+from . import blender, cinema, colmap, nerfstudio, olat, rti
 from .points import PointCloud
 from .selection import ExportedFrame, Selection
 
-ExportKind: TypeAlias = Literal["nerfstudio", "colmap", "cinema", "rti", "blender"]
+ExportKind: TypeAlias = Literal["nerfstudio", "colmap", "cinema", "rti", "blender", "olat"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +84,11 @@ def _names(made: Written) -> dict[str, str]:
     return {name: file.removeprefix("images/") for name, file in made.files.items()}
 
 
+def _olat_stem(selection: Selection, frame: ExportedFrame) -> str:
+    camera = selection.camera_name(frame.c)
+    return f"{camera}/{frame.name.removeprefix(f'{camera}_')}"
+
+
 _NO_POINTS = PointCloud(position=np.empty((0, 3)), codes=np.empty((0, 3), np.uint8), observations={})
 
 FORMATS: Mapping[ExportKind, Format] = {
@@ -98,6 +103,11 @@ FORMATS: Mapping[ExportKind, Format] = {
     "blender": Format(
         mark=blender.TRAIN_FILE, write=_blender, stem=lambda selection, frame: f"{frame.part}/{frame.name}",
         all_lights=False, points=True, rule=blender.DEFAULT_RULE, images=("png",), check=blender.check_lens,
+    ),
+    "olat": Format(
+        mark=olat.POSITIONS_FILE, stem=_olat_stem,
+        check=lambda selection: rti.check_lights(selection, olat.DIRECTIONS_FILE),
+        write=lambda made: olat.write_lights(made.folder, made.selection, made.files, exposure=made.exposure),
     ),
 }  # fmt: skip
 EXPORT_KINDS: tuple[ExportKind, ...] = tuple(FORMATS)
