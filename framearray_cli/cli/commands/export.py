@@ -12,10 +12,10 @@ from ..screen import Screen, err, print_result, print_would
 from ..summing import Environment, Rotate, Soft, Weights, sum_options
 from ..values import choice, whole
 
-KINDS = ("nerfstudio", "colmap", "cinema", "rti", "blender", "olat")
+KINDS = ("nerfstudio", "colmap", "cinema", "rti", "blender", "olat", "webdataset")
 
 Kind = Annotated[
-    Literal["nerfstudio", "colmap", "cinema", "rti", "blender", "olat"],
+    Literal["nerfstudio", "colmap", "cinema", "rti", "blender", "olat", "webdataset"],
     typer.Option(
         "--format", "-f", help=f"What the folder is for: {', '.join(KINDS[:-1])} or {KINDS[-1]}.",
         show_default=False, **choice(*KINDS),
@@ -49,6 +49,9 @@ PicturesFormat = Annotated[
     typer.Option("--image-format", help="Of the pictures.", **choice("png", "jpg", "exr", "tif")),
 ]
 Points = Annotated[int, typer.Option("--points", parser=whole(0), help="Points of the scene, at most.", metavar="N")]
+PerShard = Annotated[
+    int, typer.Option("--per-shard", parser=whole(1), help="Pictures per tar file of webdataset.", metavar="N")
+]
 
 
 def export(
@@ -65,6 +68,7 @@ def export(
     image_format: PicturesFormat = "png",
     exposure: Exposure = 0.0,
     points: Points = 10_000,
+    per_shard: PerShard = 1000,
     environment: Environment = None,
     rotate: Rotate = None,
     soft: Soft = None,
@@ -86,7 +90,7 @@ def export(
         made = run(
             array, output_path(target), kind, cameras=cameras or ALL_PLACES, light=light, at=at or (),
             image_format=ImageFormat(format=image_format, exposure=exposure), points=points, copy=copy,
-            sums=sum_options(environment, rotate, soft, weights),
+            sums=sum_options(environment, rotate, soft, weights), per_shard=per_shard,
             split=SplitOptions(rules=tuple(split or ()), seed=seed, gaps=tuple(gap or ()), mixed=mixed),
             force=force, dry_run=dry_run, progress=screen.counter("exporting", "image"),
         )  # fmt: skip

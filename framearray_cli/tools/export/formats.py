@@ -9,11 +9,11 @@ import numpy as np
 
 from framearray_cli.base.files import write_bytes
 
-from . import blender, cinema, colmap, nerfstudio, olat, rti
+from . import blender, cinema, colmap, nerfstudio, olat, rti, shards
 from .points import PointCloud
 from .selection import ExportedFrame, Selection
 
-ExportKind: TypeAlias = Literal["nerfstudio", "colmap", "cinema", "rti", "blender", "olat"]
+ExportKind: TypeAlias = Literal["nerfstudio", "colmap", "cinema", "rti", "blender", "olat", "webdataset"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,5 +109,6 @@ FORMATS: Mapping[ExportKind, Format] = {
         check=lambda selection: rti.check_lights(selection, olat.DIRECTIONS_FILE),
         write=lambda made: olat.write_lights(made.folder, made.selection, made.files, exposure=made.exposure),
     ),
+    "webdataset": Format(mark=shards.INDEX_FILE, write=lambda made: None),  # `ShardWriter` writes as pictures come
 }  # fmt: skip
 EXPORT_KINDS: tuple[ExportKind, ...] = tuple(FORMATS)

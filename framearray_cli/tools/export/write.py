@@ -26,6 +26,7 @@ from .folder import find_earlier_export, put_picture
 from .formats import EXPORT_KINDS, FORMATS, ExportKind, Format, Written
 from .points import PointCloud, find_points, source_cameras
 from .selection import ExportedFrame, Selection
+from .shards import PER_SHARD, ShardWriter
 from .splits import OPTION, SETS, SplitOptions, read_splits, shared_samples
 
 PNG = ImageFormat(format="png")
@@ -69,6 +70,7 @@ def export_array(
     points: int = MOST_POINTS,
     sums: SumOptions = SumOptions(),  # noqa: B008  # frozen
     split: SplitOptions = SplitOptions(),  # noqa: B008  # frozen
+    per_shard: int = PER_SHARD,
     copy: bool = False,
     force: bool = False,
     dry_run: bool = False,
@@ -86,6 +88,7 @@ def export_array(
         image_format: of the pictures.
         points: in the point cloud, at most.
         split: sets for training, validation and testing.
+        per_shard: pictures per tar file of webdataset.
         sums: what pictures are sums of; those of all light positions are one picture per camera.
         copy: copy pictures of the array that could be linked.
         force: replace an earlier export.
@@ -109,7 +112,7 @@ def export_array(
     if not dry_run:
         with whole_folder(target, replace=replaces) as folder:
             put = partial(_write_pictures, pictures, selection, chosen, folder, image_format, copy, progress)
-            files = put()
+            files = _write_shards(put, selection, folder, per_shard, image_format) if kind == "webdataset" else put()
             cloud = _make_cloud(pictures, selection, image_format.exposure, points) if has_cloud else None
             n_points = len(cloud.position) if cloud else 0
             chosen.write(Written(folder, selection, files, cloud, image_format.exposure))
@@ -246,6 +249,17 @@ def _write_pictures(
             then(frame, folder / files[frame.name])
         if progress:
             progress(done, len(frames))
+    return files
+
+
+def _write_shards(
+    put: Callable[..., dict[str, str]], selection: Selection, folder: Path, per_shard: int, image_format: ImageFormat
+) -> dict[str, str]:
+    """Write pictures one after the other, and move each into its tar file."""
+    with ShardWriter(folder, selection, image_format.exposure, per_shard) as shards:
+        files = put(then=shards.add)
+        shards.write_index()
+    (folder / "images").rmdir()
     return files
 
 
