@@ -64,7 +64,7 @@ def test_descriptions_are_whole(folder):
     [
         (
             "framearray export out/small --format ",
-            ["nerfstudio", "colmap", "cinema", "rti", "blender", "olat", "webdataset"],
+            ["nerfstudio", "colmap", "cinema", "rti", "blender", "olat", "webdataset", "huggingface"],
         ),
         ("framearray export out/small --image-format t", ["tif"]),
         ("framearray schema ", ["job", "path", "manifest", "results"]),

@@ -97,8 +97,8 @@ def test_a_name_that_cannot_be_shown(tmp_path):
         (["assemble", "out", "path.toml"], "Error: missing option --output / -o\n"),
         (
             ["export", "out"],
-            "Error: missing option --format / -f; expected nerfstudio, colmap, cinema, rti, blender, olat or "
-            "webdataset\n",
+            "Error: missing option --format / -f; expected nerfstudio, colmap, cinema, rti, blender, olat, "
+            "webdataset or huggingface\n",
         ),
         (["assemble", "out", "path.toml", "-o", " "], "expected a name, got none"),
         (

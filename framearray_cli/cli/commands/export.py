@@ -12,10 +12,10 @@ from ..screen import Screen, err, print_result, print_would
 from ..summing import Environment, Rotate, Soft, Weights, sum_options
 from ..values import choice, whole
 
-KINDS = ("nerfstudio", "colmap", "cinema", "rti", "blender", "olat", "webdataset")
+KINDS = ("nerfstudio", "colmap", "cinema", "rti", "blender", "olat", "webdataset", "huggingface")
 
 Kind = Annotated[
-    Literal["nerfstudio", "colmap", "cinema", "rti", "blender", "olat", "webdataset"],
+    Literal["nerfstudio", "colmap", "cinema", "rti", "blender", "olat", "webdataset", "huggingface"],
     typer.Option(
         "--format", "-f", help=f"What the folder is for: {', '.join(KINDS[:-1])} or {KINDS[-1]}.",
         show_default=False, **choice(*KINDS),

@@ -7,13 +7,14 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from framearray_cli.array.images.images import FOR_SCREENS
 from framearray_cli.base.files import write_bytes
 
-from . import blender, cinema, colmap, nerfstudio, olat, rti, shards
+from . import blender, cinema, colmap, huggingface, nerfstudio, olat, rti, shards
 from .points import PointCloud
 from .selection import ExportedFrame, Selection
 
-ExportKind: TypeAlias = Literal["nerfstudio", "colmap", "cinema", "rti", "blender", "olat", "webdataset"]
+ExportKind: TypeAlias = Literal["nerfstudio", "colmap", "cinema", "rti", "blender", "olat", "webdataset", "huggingface"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,5 +111,13 @@ FORMATS: Mapping[ExportKind, Format] = {
         write=lambda made: olat.write_lights(made.folder, made.selection, made.files, exposure=made.exposure),
     ),
     "webdataset": Format(mark=shards.INDEX_FILE, write=lambda made: None),  # `ShardWriter` writes as pictures come
+    "huggingface": Format(
+        mark=huggingface.TRAIN_FILE,
+        images=FOR_SCREENS,
+        stem=lambda selection, frame: f"{huggingface.folder_of(frame)}/{frame.name}",
+        write=lambda made: huggingface.write_metadata(
+            made.folder, made.selection, made.files, exposure=made.exposure
+        ),
+    ),
 }  # fmt: skip
 EXPORT_KINDS: tuple[ExportKind, ...] = tuple(FORMATS)
