@@ -1,6 +1,8 @@
 """Open Job Description: openjd-cli checks and runs the template that `framearray openjd` writes."""
 
+import io
 import json
+import logging
 import os
 import shutil
 import subprocess
@@ -9,8 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 from support import tiny
 from support.program import PACKAGE_PARENT, run, write_job
+
+from framearray_cli.base.errors import JobError
+from framearray_cli.cli import farm
 
 N = 6
 OPENJD = shutil.which("openjd", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))
@@ -133,7 +139,65 @@ def test_a_farm_renders_the_same_bytes(n_r, tmp_path, capsys):
     openjd(tmp_path, "check", template)
     printed = openjd(tmp_path, "run", template)
     assert "Cameras(CHUNK[INT]) = 0-2" in printed and "24 files of tiny are whole" in printed
+    assert printed.count("openjd_progress: 100") == 2
     files = {file.name: file.read_bytes() for file in (tmp_path / "whole").glob("tiny.*")}
     assert {file.name: file.read_bytes() for file in (tmp_path / "out").glob("tiny.*")} == files
     assert len(files) == N * 4
     assert sorted(file.stem for file in (tmp_path / "out/records").glob("*.jsonl")) == ["0-2", "3-5"]
+
+
+class Messages(list):  # type: ignore[type-arg]  # of pairs
+    """What a farm reads from the lines of a task, by the reader of the specification's own runner."""
+
+    def __init__(self, lines: str) -> None:
+        module = pytest.importorskip("openjd.sessions._action_filter", reason="openjd-cli is not installed (extra dev)")
+
+        def keep(kind: Any, message: Any, cancel: bool) -> None:
+            self.append((kind.value, message))
+
+        found = module.ActionMonitoringFilter(session_id="s", callback=keep)
+        for line in lines.splitlines():
+            record = logging.LogRecord("a", logging.INFO, "", 0, line, None, None)
+            record.session_id = "s"
+            found.filter(record)
+
+
+def farm_screen(monkeypatch: pytest.MonkeyPatch) -> tuple[Any, io.StringIO]:
+    monkeypatch.setenv("FRAMEARRAY_PROGRESS", "openjd")
+    monkeypatch.setattr(farm, "SECONDS_BETWEEN_MESSAGES", 0.0)
+    text = io.StringIO()
+    monkeypatch.setattr(farm, "err", Console(file=text))
+    return farm.rendering_screen(quiet=True), text
+
+
+def test_a_farm_sees_percent_and_time_left(monkeypatch):
+    screen, text = farm_screen(monkeypatch)
+    with screen:
+        screen.count("rendering", 300, "image", timed=True)
+        for _ in range(299):
+            screen.advance()
+        screen.expect(75.0)
+        screen.advance()
+    found = Messages(text.getvalue())
+    assert [value for kind, value in found if kind == "progress"] == [float(k) for k in range(101)]
+    screen, text = farm_screen(monkeypatch)
+    with screen:
+        screen.count("rendering", 10, "image", timed=True)
+        screen.expect(75.0)
+        screen.advance()
+    assert ("status", "rendering, 1 min 15 s left") in Messages(text.getvalue())
+
+
+def test_a_farm_sees_why_a_task_failed(monkeypatch):
+    screen, text = farm_screen(monkeypatch)
+    with pytest.raises(JobError), screen:
+        raise JobError("a.toml", ["x: expected y", "z: expected w"])
+    assert Messages(text.getvalue()) == [("fail", "a.toml: x: expected y a.toml: z: expected w")]
+
+
+def test_progress_of_another_kind_is_refused(tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("FRAMEARRAY_PROGRESS", "percent")
+    result = run(capsys, "render", write_job(tmp_path, **JOB))
+    assert result.code == 2
+    assert result.err.startswith('FRAMEARRAY_PROGRESS: expected openjd or nothing, got "percent"\n')
+    assert not (tmp_path / "out").exists()

@@ -12,6 +12,7 @@ from framearray_cli.base.units import MOST_THREADS, agree, counted
 from framearray_cli.render.messages import summary_lines
 
 from ..document import outcome
+from ..farm import rendering_screen
 from ..live import LivePage, page_options
 from ..options import (
     At,
@@ -154,7 +155,7 @@ def render_on_screen(
         repairs: whether damaged files were listed already.
         page: opens as soon as there is something to show.
     """
-    with Screen(err, quiet=quiet) as screen:
+    with rendering_screen(quiet=quiet) as screen:
         screen.wait("reading the scene")
         # first: in the other order Python takes and returns memory thousands of times while numba loads, for 0.13 s
         from framearray_cli.render.render import render as run  # isort: skip

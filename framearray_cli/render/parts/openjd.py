@@ -47,6 +47,7 @@ def template(job: Job, job_file: Path, folder: Path | None, chunk: int, threads:
             "file, the scene and the output folder. A chunk that was stopped goes on where it was when it is run again."
         ),
         "parameterDefinitions": _parameters(job, job_file, folder, chunk, threads),
+        "jobEnvironments": [{"name": "Progress", "variables": {"FRAMEARRAY_PROGRESS": "openjd"}}],
         "steps": [
             {
                 "name": "Render",

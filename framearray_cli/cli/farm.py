@@ -1,0 +1,56 @@
+"""Progress for farms: lines that Open Job Description reads from what a program prints, beside its own.
+
+`FRAMEARRAY_PROGRESS=openjd` asks for them; templates of `framearray openjd` set it.
+"""
+
+import os
+import time
+from types import TracebackType
+
+from framearray_cli.base.errors import FrameArrayError, JobError
+from framearray_cli.base.forms.words import printable, shown
+from framearray_cli.base.units import duration
+
+from .screen import Screen, err, say
+
+PROGRESS_VARIABLE, OPENJD = "FRAMEARRAY_PROGRESS", "openjd"
+SECONDS_BETWEEN_MESSAGES = 1.0  # farms keep every line
+
+
+class FarmScreen(Screen):
+    """Also prints `openjd_progress` (percent of the images), `openjd_status` (time left) and `openjd_fail`."""
+
+    _sent, _sent_at = -1, 0.0  # the last percent that was printed, and when
+
+    def advance(self, units: int = 1) -> None:
+        """Count finished units; any thread may call."""
+        super().advance(units)
+        with self._lock:
+            percent = 100 * self.done // self.total if self.total else 0
+            soon = time.monotonic() - self._sent_at < SECONDS_BETWEEN_MESSAGES
+            if percent <= self._sent or (soon and percent < 100):
+                return
+            self._sent, self._sent_at = percent, time.monotonic()
+            lines = [f"openjd_progress: {percent}"]
+            if (left := self.left()) is not None and percent < 100:
+                lines.append(f"openjd_status: {self._label}, {duration(left)} left")
+        say(self._console, lines)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        super().__exit__(kind, error, trace)
+        if isinstance(error, FrameArrayError):
+            say(self._console, [f"openjd_fail: {' '.join(printable(str(error)).split())}"])
+
+
+def rendering_screen(*, quiet: bool = False) -> Screen:
+    """Return the screen of a render.
+
+    Raises:
+        JobError: the environment asks for progress of an unknown kind.
+    """
+    wanted = os.environ.get(PROGRESS_VARIABLE, "")
+    if wanted not in ("", OPENJD):
+        raise JobError(PROGRESS_VARIABLE, [f"expected {OPENJD} or nothing, got {shown(wanted)}"])
+    return FarmScreen(err, quiet=quiet) if wanted else Screen(err, quiet=quiet)
