@@ -81,7 +81,8 @@ def _create(root: zarr.Group, array: StoredArray, dtype: str) -> "zarr.Array[Any
     for axis, n in array.axes.items():
         small[axis] = ((axis,), np.arange(n), {})
     for name, (dims, values, notes) in small.items():
-        root.create_array(name, data=values, dimension_names=dims, attributes=notes)
+        made = root.create_array(name, shape=values.shape, dtype=values.dtype, dimension_names=dims, attributes=notes)
+        made[...] = values
     return root.create_array(
         NAME,
         shape=array.shape,
