@@ -15,7 +15,8 @@ from framearray_cli.base.forms.words import shown
 
 Encode: TypeAlias = Callable[[Image], Float32]
 
-BUILT_IN = "ocio://default"  # the configuration inside OpenColorIO: ACES 2.0
+BUILT_IN = "ocio://default"  # the configuration inside OpenColorIO
+ACES_CONFIG = "ocio://cg-config-v4.0.0_aces-v2.0_ocio-v2.5"  # of ACES 2.0; a later default may name its views otherwise
 ACES = ("sRGB - Display", "ACES 2.0 - SDR 100 nits (Rec.709)")
 # Names of linear light with Rec. 709 primaries in configurations: OpenColorIO's own, ACES 1.2 and Blender, Filmic.
 LINEAR_REC709 = (
@@ -63,7 +64,7 @@ def find_view(name: str) -> View:
     if name == "srgb":
         return SRGB
     if name == "aces":
-        return _ocio_view(name, BUILT_IN, *ACES)
+        return _ocio_view(name, ACES_CONFIG, *ACES)
     place = os.environ.get("OCIO") or BUILT_IN
     config = _config(place)
     displays = {display: list(config.getViews(display)) for display in config.getDisplays()}

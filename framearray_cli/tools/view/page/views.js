@@ -57,9 +57,12 @@ export class Shader {
    */
   constructor(name, { text, tables }, buffer) {
     this.name = name;
-    // The function vec3 screen(vec3 radiance).
+    // The function vec3 screen(vec3 radiance). Shaders of ACES 1 divide by the brightness, and make black white.
     this.screen = `precision highp sampler3D;\n${text}
-vec3 screen(vec3 x) { return clamp(to_screen(vec4(x, 1.0)).rgb, 0.0, 1.0); }\n`;
+vec3 screen(vec3 x) {
+  x = all(equal(x, vec3(0.0))) ? vec3(1e-10) : x;
+  return clamp(to_screen(vec4(x, 1.0)).rgb, 0.0, 1.0);
+}\n`;
     let start = 0;
     this.tables = tables.map((table) => {
       const count = table.size.reduce((product, n) => product * n, table.channels);

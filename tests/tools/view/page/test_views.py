@@ -17,7 +17,10 @@ from framearray_cli.tools.view.coding import decode
 from framearray_cli.tools.view.run import open_server, open_tiles
 from framearray_cli.tools.view.server import PageServer
 
-NAMES = ("aces", "Film", "Screen/Sharp")  # by formulas and tables of one dimension; of three, linear and in tetrahedra
+OLDER = "P3-D60 - Display/ACES 1.0 - SDR Cinema"  # divides by the brightness
+# By formulas and tables of one dimension; by tables of three, linear and in tetrahedra.
+NAMES = ("aces", "Film", "Screen/Sharp", OLDER)
+BUILT_IN = ("ocio://default", "ocio://studio-config-v2.1.0_aces-v1.3_ocio-v2.3")
 SIZE = (128, 96)
 
 
@@ -25,7 +28,9 @@ SIZE = (128, 96)
 def views(tmp_path_factory) -> list[View]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("OCIO", str(write_studio(tmp_path_factory.mktemp("studio"))))
-        return [find_view(name) for name in NAMES]
+        found = [find_view(name) for name in NAMES[:-1]]
+        patch.setenv("OCIO", BUILT_IN[1])
+        return [*found, find_view(OLDER)]
 
 
 @pytest.fixture(scope="module")
@@ -111,3 +116,25 @@ def test_a_link_names_the_view_and_a_broken_file_is_reported(browser, served):
         page.page.route("**/views/*.bin", lambda route: route.abort())
         page.page.locator("#view").select_option("Film")
         page.wait("document.getElementById('note').textContent.startsWith('View Film: cannot be loaded')")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("config", BUILT_IN)
+def test_every_view_of_opencolorios_own_configurations(browser, tmp_path, monkeypatch, config):
+    import PyOpenColorIO as ocio
+
+    monkeypatch.setenv("OCIO", config)
+    known = ocio.Config.CreateFromFile(config)
+    names = [f"{display}/{view}" for display in known.getDisplays() for view in known.getViews(display)]
+    views = [find_view(name) for name in names]
+    manifest = handmade.plain(tmp_path, n_c=1, n_l=1, layers=False)
+    image, errors = colours(), {}
+    with (
+        open_server(open_tiles(manifest.directory, None, 1, None, views)) as server,
+        shown(browser, server.url) as page,
+    ):
+        for view in views:
+            page.get(f"framearray.change((view) => (view.look = {json.dumps(view.name)}))")
+            errors[view.name] = np.abs(encoded(page, image) - codes_of(view, image)).max()
+    assert len(errors) > 30
+    assert {name: error for name, error in errors.items() if error > 1} == {}
