@@ -3,12 +3,14 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+import PIL.features
 import pytest
 from support import tiny
 from support.program import names, run, write_job
 from support.smalldisk import PAGE, SmallDisk, mounted
 
 WALK = tiny.WALK | {"resolution": [60, 45]}
+AVIF = "avif" in PIL.features.modules and PIL.features.check("avif")  # since Pillow 11.3
 FULL = "No space left on device"
 # The file that a command writes, and the command without its array or job.
 FILES = {
@@ -17,6 +19,7 @@ FILES = {
     "movie.mov": ["assemble", "OUT", "--walk", "--force", "-o"],
     "movie.gif": ["assemble", "OUT", "--walk", "--force", "-o"],
     "movie.webp": ["assemble", "OUT", "--walk", "--force", "-o"],
+    **({"movie.avif": ["assemble", "OUT", "--walk", "--force", "-o"]} if AVIF else {}),
     "sheet.png": ["sheet", "OUT", "--force", "-o"],
     "sheet.exr": ["sheet", "OUT", "--force", "-o"],
     "job.toml": ["init", "SCENE", "--force", "-o"],
@@ -27,6 +30,7 @@ FOLDERS = {
     "colmap": ["export", "OUT", "-f", "colmap", "--force", "-o", "colmap"],
     "cinema.cdb": ["export", "OUT", "-f", "cinema", "--force", "-o", "cinema"],
     "page": ["view", "OUT", "--force", "--cache", "CACHE", "--export", "page"],
+    "offline": ["view", "OUT", "--force", "--cache", "CACHE", "--offline", "--export", "offline"],
     "cache": ["view", "OUT", "--force", "--cache", "cache", "--export", "PAGE"],
 }
 
