@@ -51,6 +51,9 @@ test-wheel: $(VENV)/installed-dev ## Build wheel and source distribution, instal
 test-all: $(VENV)/installed-dev ## Run all tests, the slow ones too
 	$(PYTEST) -m 'not bench'
 
+test-bounds: $(VENV)/installed-dev ## Run the tests with the lowest and the newest libraries; BOUNDS="--python 3.13" adds a Python
+	PYTHONPATH=tests $(BIN)/python -m bounds $(BOUNDS)
+
 smoke: $(VENV)/installed ## Render the smallest job
 	$(BIN)/framearray render jobs/smoke.toml
 	$(BIN)/framearray assemble out/smoke jobs/first-movie.toml --output out/smoke/first-movie.mp4 --force
@@ -64,6 +67,8 @@ check: $(VENV)/installed-dev ## Check format, style and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(BIN)/mypy --platform win32
+	$(BIN)/mypy --platform darwin
 	@if [ -x $(BIN)/deno ]; then $(DENO) fmt --check && $(DENO) lint && \
 		$(DENO) check framearray_cli/tools/view/page/*.js; \
 	else echo "the page's JavaScript is not checked: there is no deno for this platform"; fi

@@ -48,15 +48,22 @@ DOORS = {
     "opentimelineio": ("tools/movie/otio",),
     "av": ("tools/movie/video",),
     "scipy": ("scene/paths/curves", "engine/images/standard_error", "engine/frames/blocks", "tools/mixing/environment"),
-    "psutil": ("base/memory",),
+    "psutil": ("base/memory", "base/platform"),
     "xxhash": ("base/hashing",),
     "filelock": ("array/lock", "array/coarse", "engine/kernels/claims"),
     "ephem": ("scene/paths/sun",),
     "pvlib": ("scene/paths/sun",),
-    "distributed": ("render/parts/",),
+    "distributed": ("render/parts/dask",),
     "xarray": ("framearray/array", "framearray/labelled"),  # array: for types only
     "zarr": ("framearray/zarrstore",),
 }
+# What not every system has: modules, and names of modules.
+UNPORTABLE_MODULES = {"resource", "fcntl", "termios", "pwd", "grp", "pty", "msvcrt", "winreg"}
+UNPORTABLE = {
+    "sys.platform", "os.name", "os.fork", "os.statvfs", "os.sched_getaffinity", "os.geteuid", "os.getuid", "os.killpg",
+    "os.mkfifo", "os.setsid", "signal.setitimer", "signal.alarm", "signal.SIGALRM", "signal.SIGHUP", "signal.SIGKILL",
+    "signal.pthread_sigmask",
+}  # fmt: skip
 # Libraries that load slowly or may be absent: `framearray --help` does without.
 HEAVY = (
     "numpy",
@@ -208,6 +215,25 @@ def test_each_library_has_one_door(library: str) -> None:
     users = [module for module, file in files.items() if library in libraries(file)]
     assert users
     assert [module for module in users if not module.startswith(DOORS[library])] == []
+
+
+def test_what_systems_differ_in_has_one_door() -> None:
+    """Calls and modules that some systems lack, and questions which system it is."""
+    outside = []
+    for module, tree in TREES.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                found = {name.partition(".")[0] for name in imported(node)} & UNPORTABLE_MODULES
+            else:
+                found = {ast.unparse(node)} & UNPORTABLE if isinstance(node, ast.Attribute) else set()
+            outside += [f"{module}: {name}" for name in found if module != "base/platform"]
+    assert outside == []
+    assert "getrlimit" in FILES["base/platform"].read_text()
+
+
+def imported(node: ast.Import | ast.ImportFrom) -> list[str]:
+    """Return the modules that an import names."""
+    return [alias.name for alias in node.names] if isinstance(node, ast.Import) else [node.module or ""]
 
 
 def test_hot_loops_are_compiled_by_the_decorators_of_kernel() -> None:

@@ -14,6 +14,7 @@ from framearray_cli import __version__
 from framearray_cli.base.errors import OutputError
 from framearray_cli.base.files import make_folder, reason
 from framearray_cli.base.forms.schema import toml_key
+from framearray_cli.base.platform import free_inodes
 from framearray_cli.base.units import counted
 
 from .manifest import FILE_NAME, MAIN_AXIS, Manifest, array_files
@@ -178,10 +179,7 @@ def free_space(folder: Path) -> int:
 
 def free_files(folder: Path) -> int | None:
     """Return the number of files that the disk of a folder can still hold; None if it has no such limit."""
-    if not hasattr(os, "statvfs"):  # Windows
-        return None
-    disk = os.statvfs(_existing(folder))
-    return disk.f_favail if disk.f_files else None
+    return free_inodes(_existing(folder))
 
 
 def _existing(folder: Path) -> Path:

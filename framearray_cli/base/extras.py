@@ -4,7 +4,6 @@ The command depends on how the program was installed, which pip records in `dire
 """
 
 import json
-import os
 import re
 import shlex
 import sys
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .errors import MissingExtraError
+from .platform import WINDOWS
 
 if TYPE_CHECKING:
     from importlib.metadata import Distribution
@@ -126,6 +126,6 @@ def _in_quotes(text: str, *, always: bool = False) -> str:
     """Quote an argument for a shell, if it needs that; double quotes serve Windows too."""
     if not always and shlex.quote(text) == text:
         return text
-    if os.name != "nt" and UNSAFE_IN_QUOTES & set(text):
+    if not WINDOWS and UNSAFE_IN_QUOTES & set(text):
         return shlex.quote(text)
     return f'"{text}"'

@@ -1,13 +1,13 @@
 """What the system gives this process: memory and cores of its control group (that of a container), address space."""
 
 import os
-import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from .errors import LimitError
+from .platform import largest_size, limit_of, usable_cores
 
 ROOT, OWN, STATUS = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup"), Path("/proc/self/status")
 # Address space and data that compiled libraries take beside the job. Measured on 2 cores: a render with 4 threads takes
@@ -44,7 +44,7 @@ def available_cores(root: Path = ROOT, own: Path = OWN) -> int:
         root: folder where the groups are mounted.
         own: file that names the groups of this process.
     """
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    cores = usable_cores()
     quotas = (_quota(folder, version) for folder, version in _groups("cpu", root, own))
     return min([cores, *(quota for quota in quotas if quota is not None)])
 
@@ -138,12 +138,7 @@ def require_address_space(needs: dict[str, int]) -> None:
 
 def _limits() -> dict[str, int]:
     """Limits that are set for this process, bytes."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return {}
-    found = {name: resource.getrlimit(getattr(resource, name))[0] for name in ULIMIT if hasattr(resource, name)}
-    return {name: limit for name, limit in found.items() if limit != resource.RLIM_INFINITY}
+    return {name: limit for name in ULIMIT if (limit := limit_of(name)) is not None}
 
 
 def _used(name: str) -> int:
@@ -157,18 +152,7 @@ def _used(name: str) -> int:
 
 def peak_memory() -> int:
     """Largest resident size of this process so far, bytes."""
-    if sys.platform == "win32":
-        import psutil
-
-        return int(psutil.Process().memory_info().peak_wset)
-    if sys.platform == "linux":  # getrusage includes the process that started this one
-        for line in Path("/proc/self/status").read_text().splitlines():
-            if line.startswith("VmHWM:"):
-                return int(line.split()[1]) * 1024
-    import resource
-
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return int(peak if sys.platform == "darwin" else peak * 1024)  # bytes on macOS, KiB elsewhere
+    return largest_size()
 
 
 def free_memory() -> int:

@@ -2,6 +2,8 @@
 
 import signal
 
+from .platform import set_alarm
+
 
 class Stopped(BaseException):
     """A signal asked the program to end, as Ctrl-C does."""
@@ -26,5 +28,4 @@ def stopped_by(error: BaseException | None) -> Stopped | None:
 
 def cancel_alarm() -> None:
     """Cancel the timer that would raise `Stopped` again for a signal that has been handled."""
-    if hasattr(signal, "setitimer"):
-        signal.setitimer(signal.ITIMER_REAL, 0)
+    set_alarm(0.0)

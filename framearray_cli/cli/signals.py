@@ -8,6 +8,7 @@ from contextlib import suppress
 from types import FrameType
 
 from framearray_cli.base.errors import OutputError
+from framearray_cli.base.platform import ending_signals, is_hangup, on_alarm, set_alarm
 from framearray_cli.base.signals import Stopped
 from framearray_cli.engine.kernels.clock import is_compiling
 
@@ -25,9 +26,8 @@ TAKING_LOCKS = ("__enter__", "__exit__", "_release_save", "_acquire_restore")
 def listen() -> None:
     """Turn signals into `Stopped` from now on; under `nohup` go on when the terminal closes."""
     watch_for_lost()
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        number = getattr(signal, name, None)  # Windows lacks the last
-        if number is not None and (name != "SIGHUP" or signal.getsignal(number) != signal.SIG_IGN):
+    for number in ending_signals():
+        if not is_hangup(number) or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, stop)
 
 
@@ -38,9 +38,7 @@ def watch_for_lost() -> None:
         return
 
     def lost(what: "sys.UnraisableHookArgs") -> None:
-        if isinstance(what.exc_value, Stopped) and hasattr(signal, "setitimer"):
-            signal.setitimer(signal.ITIMER_REAL, MOMENT)
-        else:
+        if not (isinstance(what.exc_value, Stopped) and set_alarm(MOMENT)):
             hook(what)
 
     sys.unraisablehook = lost
@@ -53,8 +51,7 @@ def stop(signum: int, frame: FrameType | None) -> None:
         timer = threading.Timer(PATIENCE, _exit_now, [Stopped(signum)])
         timer.daemon = True
         timer.start()
-    if hasattr(signal, "setitimer"):
-        signal.signal(signal.SIGALRM, lambda _, frame: _interrupt(signum, frame))
+    on_alarm(lambda frame: _interrupt(signum, frame))
     _interrupt(signum, frame)
 
 
@@ -64,10 +61,8 @@ def _interrupt(signum: int, frame: FrameType | None) -> None:
     while frame is not None and not busy:
         busy = frame.f_globals.get("__name__", "").partition(".")[0] in FORGETFUL
         frame = frame.f_back
-    if hasattr(signal, "setitimer"):
-        signal.setitimer(signal.ITIMER_REAL, MOMENT if busy else 2 * PATIENCE)
-        if busy:
-            return
+    if set_alarm(MOMENT if busy else 2 * PATIENCE) and busy:
+        return
     raise Stopped(signum)
 
 
