@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from framearray_cli import __version__
+from framearray_cli.base.errors import MissingExtraError
 from framearray_cli.base.extras import install_command
 from framearray_cli.base.memory import available_cores, free_memory
 from framearray_cli.engine.embree_c import EmbreeProperties, embree_properties
@@ -32,14 +33,15 @@ REQUIRED = {
     "typer": "typer",
     "rich": "rich",
 }
+FLIP = ("flip_evaluator",) if sys.version_info < (3, 14) else ()  # it has no wheel for later ones
 # Extras of the program: what they are for, and their modules.
 EXTRAS = {
     "movie": ("movies", ("av",)),
     "denoise": ("denoise.obscurance", ("pyoidn",)),
     "sun": ('almanac = "pvlib"', ("pvlib",)),
-    "report": ("framearray report", ("matplotlib", "jinja2", "flip_evaluator")),
+    "report": ("framearray report", ("matplotlib", "jinja2", *FLIP)),
     "otio": ("assemble --otio", ("opentimelineio",)),
-    "dask": ("render --workers and --dask", ("distributed",)),
+    "dask": ("render --dask", ("distributed",)),
 }
 
 
@@ -83,7 +85,7 @@ def _library(name: str, module: str) -> LibraryReport:
 def _embree() -> EmbreeProperties | None:
     try:
         return embree_properties()
-    except ImportError:
+    except MissingExtraError:
         return None
 
 

@@ -141,7 +141,7 @@ def test_a_worker_without_the_program(place, tmp_path):
 
 
 def test_errors_that_mean_a_missing_program():
-    from framearray_cli.render.parts.queue import lacks_program
+    from framearray_cli.render.parts.dask import lacks_program
 
     words = RuntimeError("Error during deserialization of the task")
     words.__cause__ = ModuleNotFoundError("No module named 'framearray_cli'")
@@ -165,7 +165,7 @@ def test_wrong_addresses(address, tmp_path):
 
 
 def test_what_a_worker_must_see(tmp_path):
-    from framearray_cli.render.parts.worker import worker_problem
+    from framearray_cli.render.parts.chunk import worker_problem
 
     scene, probe = tmp_path / "scene.glb", tmp_path / "out/records/.parts-1"
     scene.write_bytes(b"scene")

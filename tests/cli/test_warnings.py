@@ -86,7 +86,6 @@ def test_parts_have_the_pilots_of_the_first(tmp_path, capsys, monkeypatch):
 
 
 def test_workers_are_not_started_for_a_ruined_job(tmp_path, capsys, monkeypatch):
-    pytest.importorskip("distributed", reason="Dask distributed is not installed (extra dask)")
     looks, job = counted_pilots(monkeypatch), write_job(tmp_path, **RADIANS)
     monkeypatch.setattr("framearray_cli.render.parts.run.start_local", lambda workers: pytest.fail("was started"))
     result = run(capsys, "render", "--workers", "2", "--strict", job)

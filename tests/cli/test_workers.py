@@ -1,11 +1,13 @@
 """`render --workers`: the bytes of one run, also when workers are killed, and clear errors."""
 
+import concurrent.futures
 import random
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -14,7 +16,10 @@ from support.handed import JOB, WALK, N, finished, lines, manifest, restarted, s
 from support.program import finish, is_prompt, run, start, wait_for, write_job
 from support.smalldisk import mounted
 
-pytest.importorskip("distributed", reason="Dask distributed is not installed (extra dask)")
+from framearray_cli.base.processes import python_command, python_environment
+from framearray_cli.render.parts import local
+from framearray_cli.render.parts.crew import ChunkDiedError
+
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no kill -9 there")
 
 
@@ -31,7 +36,7 @@ def workers_of(process: subprocess.Popen[str]) -> list[psutil.Process]:
     """Return the worker processes of a render, in no order."""
     try:
         children = psutil.Process(process.pid).children(recursive=True)
-        return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+        return [child for child in children if "parts.process" in " ".join(child.cmdline())]
     except psutil.NoSuchProcess:
         return []
 
@@ -64,7 +69,8 @@ def test_the_bytes_are_those_of_the_whole(changes, tmp_path, monkeypatch):
     assert same(tmp_path / "parts", tmp_path / "whole")
     assert len(finished(tmp_path / "parts")) == N and not restarted(tmp_path / "parts")
     printed = [line for line in whole.err.splitlines() if line.startswith(("ambient", "automatic", "error"))]
-    assert printed and set(printed) <= set(parts.err.splitlines())
+    assert bool(printed) == ("indirect" not in changes), "no ambient light is estimated where images need none"
+    assert set(printed) <= set(parts.err.splitlines())
 
 
 def test_a_difference_is_found(place, tmp_path):
@@ -105,9 +111,8 @@ def test_a_killed_worker_costs_its_chunk(seed, kills, place, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_chunk_that_kills_all_workers_is_given_up(place, tmp_path, monkeypatch):
-    """Dask gives up a chunk at the first death here; the program tries again as long as it makes progress."""
-    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "0")
+def test_a_chunk_that_kills_all_workers_is_given_up(place, tmp_path):
+    """The program tries again as long as the chunk makes progress."""
     out = tmp_path / "out"
     process = start("render", "-q", place / "job.toml", "--workers", 1, "--chunk", N, "-o", out)
     for kill in range(3):  # kill each after planning and before its first image
@@ -116,7 +121,7 @@ def test_a_chunk_that_kills_all_workers_is_given_up(place, tmp_path, monkeypatch
     result = finish(process)
     assert (result.code, result.out) == (4, "")
     assert result.err.startswith("cameras 0-23: workers died on them again and again")
-    monkeypatch.delenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES")
+    assert "run fewer workers; the last was ended by SIGKILL" in result.err
     assert finish(start("render", "-q", place / "job.toml", "--workers", 1, "-o", out)).code == 0
     assert same(out, place / "whole")
 
@@ -175,3 +180,46 @@ def test_options_that_do_not_go_together(tmp_path, capsys):
         result = run(capsys, "render", job, *options)
         assert result.code == 2 and "--" in result.err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_worker_that_cannot_begin_is_reported_with_its_last_words(tmp_path, monkeypatch):
+    """Its code here is broken, so it ends at once."""
+    monkeypatch.setattr(local, "CODE", "import framearray_cli.nothing_of_this_name")
+    words = r"the last ended with exit code 1: ModuleNotFoundError: .*nothing_of"
+    with local.start_local(1) as crew, pytest.raises(ChunkDiedError, match=words):
+        crew.result(finished_future(crew.submit({}, (0,))))
+
+
+def finished_future(handed: Any) -> Any:
+    """Wait for the end of a chunk."""
+    concurrent.futures.wait([handed], timeout=60)
+    return handed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("when", ["working", "starting"])
+def test_workers_end_with_the_program(when, place, tmp_path):
+    """Kill -9 of the program that hands out the chunks."""
+    out = tmp_path / "out"
+    process = start("render", "-q", place / "job.toml", "--workers", 2, "--chunk", 6, "-o", out)
+    wait_for(lambda: len(workers_of(process)) == 2 and (when == "starting" or len(finished(out)) >= 4), process)
+    workers = workers_of(process)
+    process.kill()
+    process.communicate()
+    gone, alive = psutil.wait_procs(workers, timeout=20)
+    assert len(gone) == 2 and not alive
+    assert finish(start("render", "-q", place / "job.toml", "--workers", 2, "-o", out)).code == 0
+    assert same(out, place / "whole")
+
+
+@pytest.mark.slow
+def test_workers_need_no_dask(tmp_path):
+    """After a plain install."""
+    job = write_job(
+        tmp_path, **(JOB | {"camera": WALK | {"resolution": [24, 18], "frames": 2, "keys": WALK["keys"][:1]}})
+    )
+    hidden = "import sys; sys.modules['distributed'] = None; from framearray_cli.cli.main import main; main()"
+    command = python_command(hidden, ["render", str(job), "--workers", "1"])
+    done = subprocess.run(command, capture_output=True, text=True, env=python_environment(), timeout=120, check=False)
+    assert (done.returncode, len(finished(tmp_path / "out"))) == (0, 2), done.stderr
+    assert "1 worker, 1 chunk" in done.stderr

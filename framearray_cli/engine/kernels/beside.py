@@ -14,6 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from framearray_cli.base.memory import available_cores, free_memory
+from framearray_cli.base.processes import python_command, python_environment
 
 from .cache import kept_kernels, kernel_folder
 
@@ -33,7 +34,7 @@ def offer(code: str, arguments: Sequence[str] = ()) -> None:
         code: Python code, which calls `end_with_parent` first.
     """
     if os.environ.get(PROCESSES) != "1" and available_cores() > 1 and sys.executable and kernel_folder():
-        _offered[:] = [sys.executable, "-c", code, *arguments]
+        _offered[:] = python_command(code, arguments)
         if not kept_kernels():
             start()
 
@@ -43,13 +44,10 @@ def start() -> None:
     if not _offered or free_memory() < NEEDS:
         return
     command, _offered[:] = list(_offered), []
-    package = Path(__file__).parents[3]  # where this program was imported from
-    paths = [str(package), *filter(None, [os.environ.get("PYTHONPATH")])]
-    more = {PROCESSES: "1", "PYTHONPATH": os.pathsep.join(paths), "PYTHONSAFEPATH": "1"}
     with suppress(OSError):  # no memory, or no more processes: this one compiles all
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            env=os.environ | more,
+            env=python_environment(**{PROCESSES: "1"}),
         )  # fmt: skip
         _started.append((time.time(), process))
 

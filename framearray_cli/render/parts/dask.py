@@ -1,18 +1,23 @@
-"""Dask: connect to a running scheduler, or start one with workers on this machine for the time of a render."""
+"""Workers of a running Dask scheduler, on this machine and others."""
 
 import logging
 import threading
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from framearray_cli.base.errors import JobError
+from framearray_cli import __version__
+from framearray_cli.base.errors import JobError, WorkerError
 from framearray_cli.base.extras import extra
+
+from .crew import ChunkDiedError, Handed, Message
 
 PATIENCE = 5.0  # seconds in which a scheduler must answer
 SILENT = logging.CRITICAL + 1
+LOST = "the Dask scheduler has gone away"
 
 
 def require_dask() -> Any:
@@ -21,7 +26,7 @@ def require_dask() -> Any:
     Raises:
         MissingExtraError: Dask distributed is not installed.
     """
-    with extra("--workers and --dask need Dask distributed", "[dask]"):
+    with extra("--dask needs Dask distributed", "[dask]"):
         import distributed
     for name in list(logging.root.manager.loggerDict):  # this program reports what matters, in its own words
         if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
@@ -30,10 +35,11 @@ def require_dask() -> Any:
 
 
 @contextmanager
-def connect(address: str) -> Iterator[Any]:
-    """Connect a client to a scheduler.
+def connect(address: str) -> Iterator["DaskCrew"]:
+    """Connect to a scheduler.
 
     Raises:
+        MissingExtraError: Dask distributed is not installed.
         JobError: no scheduler answers at that address.
     """
     distributed = require_dask()
@@ -59,38 +65,89 @@ def connect(address: str) -> Iterator[Any]:
         wanted = 'expected the address of a Dask scheduler, such as "tcp://host:8786"'
         raise JobError(f"--dask {address}", [f"{wanted}; {why}"]) from client
     try:
-        yield client
+        yield DaskCrew(client)
     finally:
-        _close(client)
+        with suppress(OSError, TimeoutError):
+            client.close(timeout=PATIENCE)
 
 
-@contextmanager
-def start_local(workers: int) -> Iterator[Any]:
-    """Start a scheduler with worker processes on this machine and connect a client; workers that die are replaced."""
-    distributed = require_dask()
-    from .worker import IgnoreSignals
+class DaskCrew:
+    """The workers of a scheduler; they may join and leave at any time."""
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        cluster = distributed.LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            memory_limit=0,  # chunks have a limit of their own; Dask would kill a worker above its limit
-            dashboard_address=None,
-            host="127.0.0.1",
-            silence_logs=SILENT,
-        )
+    def __init__(self, client: Any) -> None:
+        self._client = client
+
+    def count(self) -> int:
+        """Return the number of workers now.
+
+        Raises:
+            WorkerError: the scheduler is gone.
+        """
         try:
-            client = distributed.Client(cluster, set_as_default=False)
-            client.register_plugin(IgnoreSignals())
-            yield client
-        finally:
-            with suppress(NameError):
-                _close(client)
-            cluster.close(timeout=PATIENCE)
+            if self._client.status == "running":
+                return len(self._client.nthreads())
+        except (OSError, CancelledError) as error:
+            raise WorkerError(LOST) from error
+        raise WorkerError(LOST)
+
+    def require_fit(self, common: dict[str, Any]) -> None:
+        """Check that all workers can render the job.
+
+        Raises:
+            WorkerError: one cannot.
+        """
+        from .chunk import worker_problem
+
+        for address, found in self._client.run(worker_problem, common, on_error="return").items():
+            if isinstance(found, BaseException) and lacks_program(found):
+                found = f"worker {address}: lacks framearray {common['version']}; install it there"
+            elif isinstance(found, BaseException):
+                found = f"worker {address}: {found}"
+            if found:
+                raise WorkerError(found)
+
+    def listen(self, topic: str, receive: Callable[[Message], None]) -> None:
+        """Have the messages about a render handed to a function, in a thread of Dask."""
+        self._client.subscribe_topic(topic, lambda event: receive(event[1]))
+
+    def submit(self, common: dict[str, Any], cameras: tuple[int, ...]) -> Handed:
+        """Hand a chunk to any worker."""
+        from .dask_worker import run_chunk
+
+        handed: Handed = self._client.submit(run_chunk, common, cameras, pure=False)
+        return handed
+
+    def result(self, handed: Any) -> dict[str, Any]:
+        """Return the result of a chunk.
+
+        Raises:
+            ChunkDiedError: several workers died on it.
+            WorkerError: the scheduler is gone, or a worker lacks the program.
+        """
+        from distributed import KilledWorker
+
+        try:
+            found: dict[str, Any] = handed.result()
+        except CancelledError as error:
+            raise WorkerError(LOST) from error
+        except KilledWorker as error:
+            raise ChunkDiedError("run fewer workers per machine, or read their logs") from error
+        except Exception as error:
+            if not lacks_program(error):
+                raise
+            raise WorkerError(f"a worker that came later: lacks framearray {__version__}; install it there") from error
+        return found
+
+    def cancel(self, handed: Sequence[Handed]) -> None:
+        """Cancel tasks; their workers find out."""
+        with suppress(Exception):  # the scheduler may be gone; report the error that stopped the render
+            self._client.cancel(list(handed), force=True)
 
 
-def _close(client: Any) -> None:
-    with suppress(OSError, TimeoutError):
-        client.close(timeout=PATIENCE)
+def lacks_program(error: BaseException | None) -> bool:
+    """Whether a worker could not import this program; Dask may pass on only the text of the error."""
+    while error is not None:
+        if isinstance(error, ImportError) or "ModuleNotFoundError" in str(error) or "ImportError" in str(error):
+            return True
+        error = error.__cause__
+    return False

@@ -1,8 +1,7 @@
-"""Queue of the chunks of a render: submit them to Dask workers, one per worker, and collect the results."""
+"""Queue of the chunks of a render: submit them to workers, one per worker, and collect the results."""
 
 import threading
 import time
-from concurrent.futures import CancelledError
 from contextlib import suppress
 from typing import Any
 
@@ -14,49 +13,26 @@ from ..progress import AmbientFigures
 from ..session import RenderSession
 from ..target.pilot import Target
 from .chunks import Chunks
+from .crew import ChunkDiedError, Crew, Handed, Message
 from .pace import ChunkPace
 from .progress import PartEvents
 
 # Seconds between two checks for results, and seconds that workers get to stop.
 LOOK_EVERY, STOPPING = 0.5, 5.0
-# Times that Dask may give up a chunk, because several workers died on it, without a further image.
+# Times that a process may die on a chunk, or that Dask may give it up because several did, without a further image.
 MOST_DEATHS = 2
-LOST = "the Dask scheduler has gone away"
-
-
-def count_workers(client: Any) -> int:
-    """Return the number of workers.
-
-    Raises:
-        WorkerError: the scheduler is gone.
-    """
-    try:
-        if client.status == "running":
-            return len(client.nthreads())
-    except (OSError, CancelledError) as error:
-        raise WorkerError(LOST) from error
-    raise WorkerError(LOST)
-
-
-def lacks_program(error: BaseException | None) -> bool:
-    """Whether a worker could not import this program; Dask may pass on only the text of the error."""
-    while error is not None:
-        if isinstance(error, ImportError) or "ModuleNotFoundError" in str(error) or "ImportError" in str(error):
-            return True
-        error = error.__cause__
-    return False
 
 
 class ChunkQueue:
     """The chunks of a render: those waiting, and those in progress on workers."""
 
     def __init__(
-        self, client: Any, common: dict[str, Any], chunks: Chunks, session: RenderSession, events: PartEvents
+        self, crew: Crew, common: dict[str, Any], chunks: Chunks, session: RenderSession, events: PartEvents
     ) -> None:
-        self._client, self._common, self._events = client, common, events
+        self._crew, self._common, self._events = crew, common, events
         self._folder, self._n_lights = session.folder, session.prepared.n_lights
         self._waiting = list(reversed(chunks.each))
-        self._at_work: dict[Any, tuple[int, ...]] = {}
+        self._at_work: dict[Handed, tuple[int, ...]] = {}
         self._left = {chunk[0]: len(chunk) * self._n_lights for chunk in chunks.each}
         self._chunk_ended, self._lock = threading.Event(), threading.Lock()  # set when a chunk ends; guards the counts
         self._pace = ChunkPace()
@@ -64,7 +40,7 @@ class ChunkQueue:
         self._received: set[str] = set()
         self.notes: tuple[str, ...] = ()
         self.peak_memory = self.images = 0
-        client.subscribe_topic(common["topic"], self._receive)
+        crew.listen(common["topic"], self._receive)
 
     def render_all(self) -> None:
         """Submit chunks until all are rendered.
@@ -73,46 +49,35 @@ class ChunkQueue:
             FrameArrayError: the first error of a worker.
         """
         while self._waiting or self._at_work:
-            for _ in range(max(count_workers(self._client), 1) - len(self._at_work)):
+            for _ in range(max(self._crew.count(), 1) - len(self._at_work)):
                 if self._waiting:
                     self._submit(self._waiting.pop())
             self._chunk_ended.wait(LOOK_EVERY)
             self._chunk_ended.clear()
-            for future in [future for future in self._at_work if future.done()]:
-                self._collect(future, self._at_work.pop(future))
+            for handed in [handed for handed in self._at_work if handed.done()]:
+                self._collect(handed, self._at_work.pop(handed))
 
     def _submit(self, chunk: tuple[int, ...]) -> None:
-        from .worker import render_chunk
-
-        future = self._client.submit(render_chunk, self._common, chunk, pure=False)
-        self._at_work[future] = chunk
+        handed = self._crew.submit(self._common, chunk)
+        self._at_work[handed] = chunk
         self._pace.begin(chunk[0], self._left[chunk[0]])
-        future.add_done_callback(lambda _: self._chunk_ended.set())
+        handed.add_done_callback(lambda _: self._chunk_ended.set())
 
-    def _collect(self, future: Any, chunk: tuple[int, ...]) -> None:
+    def _collect(self, handed: Handed, chunk: tuple[int, ...]) -> None:
         """Take the result of a chunk."""
-        from distributed import KilledWorker
-
         try:
-            result = future.result()
-        except CancelledError as error:
-            raise WorkerError(LOST) from error
-        except KilledWorker:
-            self._retry(chunk)
+            result = self._crew.result(handed)
+        except ChunkDiedError as error:
+            self._retry(chunk, error)
             return
-        except Exception as error:
-            if not lacks_program(error):
-                raise
-            version = self._common["version"]
-            raise WorkerError(f"a worker that came later: lacks framearray {version}; install it there") from error
         if "error" in result:
             raise self._error(result)
         self._count_written(chunk[0], 0, last=True)
         self.notes = tuple(dict.fromkeys((*self.notes, *result["notes"])))
         self.peak_memory = max(self.peak_memory, result["peak_memory"])
 
-    def _retry(self, chunk: tuple[int, ...]) -> None:
-        """Queue a chunk again that several workers died on, if it progressed meanwhile.
+    def _retry(self, chunk: tuple[int, ...], error: ChunkDiedError) -> None:
+        """Queue a chunk again that workers died on, if it progressed meanwhile.
 
         Raises:
             WorkerError: it did not progress.
@@ -123,8 +88,8 @@ class ChunkQueue:
         if deaths > MOST_DEATHS:
             raise WorkerError(
                 f"cameras {frames_text(chunk)}: workers died on them again and again, most likely of too little "
-                "memory; run fewer workers per machine, or read their logs"
-            )
+                f"memory; {error}"
+            ) from error
         self._deaths[first] = deaths, self._left[first]
         self._waiting.append(chunk)
 
@@ -143,9 +108,8 @@ class ChunkQueue:
             found.add_note(note)
         return found
 
-    def _receive(self, event: tuple[float, dict[str, Any]]) -> None:
-        """Handle a message of a worker; called in a thread of Dask."""
-        message = event[1]
+    def _receive(self, message: Message) -> None:
+        """Handle a message of a worker; called in any thread."""
         if "left" in message:
             self._count_written(message["chunk"], message["left"])
         if message.get("seconds") is not None:
@@ -162,7 +126,7 @@ class ChunkQueue:
         if self._first("compiled", message):
             self._events.compiled(*message["compiled"])
 
-    def _first(self, kind: str, message: dict[str, Any]) -> bool:
+    def _first(self, kind: str, message: Message) -> bool:
         """Whether this is the first message of a kind that all workers send and only one event reports."""
         if kind not in message or kind in self._received:
             return False
@@ -183,8 +147,7 @@ class ChunkQueue:
 
     def stop(self) -> None:
         """Cancel all chunks, and wait briefly until workers have released the folder."""
-        with suppress(Exception):  # the scheduler may be gone; report the error that stopped the render
-            self._client.cancel(list(self._at_work), force=True)
+        self._crew.cancel(list(self._at_work))
         end = time.monotonic() + STOPPING
         with suppress(OutputError):
             while time.monotonic() < end:

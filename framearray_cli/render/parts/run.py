@@ -1,4 +1,4 @@
-"""Render in parts: chunks of the camera path on Dask workers, on this machine or others that share its folders."""
+"""Render in parts: chunks of the camera path on workers, of this machine or others that share its folders."""
 
 import secrets
 import time
@@ -11,7 +11,7 @@ from typing import Any
 from framearray_cli import __version__
 from framearray_cli.array.manifest_toml import read_manifest, write_manifest
 from framearray_cli.array.record import FOLDER, read_records
-from framearray_cli.base.errors import JobError, OutputError, SceneError, WorkerError
+from framearray_cli.base.errors import JobError, OutputError, SceneError
 from framearray_cli.base.files import reason
 from framearray_cli.base.forms.table import changed
 from framearray_cli.base.hashing import digest
@@ -28,9 +28,11 @@ from ..prepare import Prepared, plan_work
 from ..session import RenderSession, complete_manifest, open_session
 from ..summary import Summary, summarize, with_summary
 from .chunks import Chunks, default_size, plan_chunks
-from .dask import connect, require_dask, start_local
+from .crew import Crew
+from .dask import connect
+from .local import start_local
 from .progress import PartEvents
-from .queue import LOOK_EVERY, ChunkQueue, count_workers, lacks_program
+from .queue import LOOK_EVERY, ChunkQueue
 
 # Share of the free memory for workers; the rest is for the file cache of the system.
 SHARE = 0.9
@@ -67,13 +69,12 @@ def render_in_parts(
 
     Raises:
         JobError, SceneError, OutputError: as `render`; also where no scheduler answers.
-        MissingExtraError: Dask is not installed.
+        MissingExtraError: an address is given, and Dask is not installed.
         WorkerError: workers cannot see their files, or die repeatedly.
     """
     started = time.perf_counter()
-    require_dask()
     with ExitStack() as stack:
-        client = stack.enter_context(connect(options.address)) if options.address else None
+        crew: Crew | None = stack.enter_context(connect(options.address)) if options.address else None
         with open_session(job, events, restart=restart, cameras=cameras) as session:
             if not session.wanted:
                 return complete_manifest(session, time.perf_counter() - started)
@@ -82,15 +83,15 @@ def render_in_parts(
             if coarse:
                 stack.enter_context(coarse_beside(session, events))
             memory = None if options.address else _memory(session.prepared, options.workers)
-        if client is None:
+        if crew is None:
             events.starting_workers()
-            client = stack.enter_context(start_local(options.workers))
-        n_workers = _await_workers(client, options, events)
+            crew = stack.enter_context(start_local(options.workers))
+        n_workers = _await_workers(crew, options, events)
         common = stack.enter_context(_share(job, session, options, memory))
-        _require_fit_workers(client, common)
+        crew.require_fit(common)
         chunks = _split(session, options, n_workers)
         events.chunked(n_workers, chunks)
-        queue = ChunkQueue(client, common, chunks, session, events)
+        queue = ChunkQueue(crew, common, chunks, session, events)
         try:
             queue.render_all()
         except BaseException:
@@ -131,19 +132,19 @@ def _memory(prepared: Prepared, workers: int) -> int:
     return each
 
 
-def _await_workers(client: Any, options: WorkerOptions, events: PartEvents) -> int:
+def _await_workers(crew: Crew, options: WorkerOptions, events: PartEvents) -> int:
     """Wait for a worker; return the number of workers."""
-    if not count_workers(client):
+    if not crew.count():
         events.awaiting_workers(options.address)
-    while not (n := count_workers(client)):
+    while not (n := crew.count()):
         time.sleep(LOOK_EVERY)
-    return max(n, 1 if options.address else options.workers)
+    return n
 
 
 @contextmanager
 def _share(job: Job, session: RenderSession, options: WorkerOptions, memory: int | None) -> Iterator[dict[str, Any]]:
     """Put together what all chunks share, with a temporary file by which workers recognize the output folder."""
-    from .worker import Common
+    from .chunk import Common
 
     folder, scene = job.output.directory, job.scene.file
     token = secrets.token_hex(4)
@@ -177,23 +178,6 @@ def _share(job: Job, session: RenderSession, options: WorkerOptions, memory: int
     finally:
         with suppress(OSError):
             probe.unlink()
-
-
-def _require_fit_workers(client: Any, common: dict[str, Any]) -> None:
-    """Check that all workers can render the job.
-
-    Raises:
-        WorkerError: one cannot.
-    """
-    from .worker import worker_problem
-
-    for address, found in client.run(worker_problem, common, on_error="return").items():
-        if isinstance(found, BaseException) and lacks_program(found):
-            found = f"worker {address}: lacks framearray {common['version']}; install it there"
-        elif isinstance(found, BaseException):
-            found = f"worker {address}: {found}"
-        if found:
-            raise WorkerError(found)
 
 
 def _summarize(session: RenderSession, queue: ChunkQueue, seconds: float) -> Summary:

@@ -1,16 +1,12 @@
-"""Render one chunk on a Dask worker, report its progress, and stop when the chunk is cancelled."""
+"""Render one chunk on a worker, report its progress, and stop when nobody wants it any more."""
 
-import signal
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
-
-from distributed import Reschedule, Worker, WorkerPlugin, get_worker
 
 from framearray_cli import __version__
 from framearray_cli.array.integrity import OnDisk
@@ -28,16 +24,12 @@ from ..progress import RenderEvents, ambient_figures
 from ..render import render
 from ..summary import Summary
 from ..target.pilot import Target
+from .crew import Message
 
-# Seconds between two checks whether the chunk is still wanted, and between two progress messages.
-LOOK_EVERY, SEND_EVERY = 0.2, 0.5
-# Seconds that a chunk waits for one still running in this process before Dask reschedules it, and between two attempts
-# to lock its cameras.
-RETRY_AFTER = 1.0
+SEND_EVERY = 0.5  # seconds between two progress messages
+RETRY_AFTER = 1.0  # seconds between two attempts to lock the cameras
 # Seconds that a chunk waits for cameras that an ending run still locks.
 PATIENCE = 60.0
-
-_one_at_a_time = threading.Lock()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,26 +82,33 @@ def worker_problem(common: dict[str, Any]) -> str:
     return "" if same else f"{here}: has another file {scene} than the machine that hands out the chunks"
 
 
-def render_chunk(common: dict[str, Any], cameras: tuple[int, ...]) -> dict[str, Any]:
+def render_chunk(
+    common: dict[str, Any],
+    cameras: tuple[int, ...],
+    threads: int,
+    send: Callable[[Message], None],
+    unwanted: threading.Event,
+) -> dict[str, Any]:
     """Render some cameras of a job; runs on a worker.
 
-    Errors are returned, so that Dask neither logs them nor retries.
+    Errors are returned, for between processes their classes would not survive.
 
     Args:
         common: the fields of `Common`.
+        threads: of this worker, where neither the render nor the job says how many.
+        send: passes a message on to the program that hands out the chunks; may be called from any thread.
+        unwanted: set when the chunk was cancelled; it then ends at its next image.
 
     Returns:
-        "notes" and "peak_memory" of the render, or "error" (name of its class), "problems" and "notes".
+        "notes" and "peak_memory" of the render, or "error" (name of its class), "problems" and "notes"; nothing if it
+        was cancelled.
     """
-    worker = get_worker()
-    if not _one_at_a_time.acquire(timeout=RETRY_AFTER):
-        raise Reschedule
     try:
         if problem := worker_problem(common):
             return {"error": "WorkerError", "problems": [problem], "notes": []}
-        reporter = _Reporter(worker, Common(**common), cameras)
-        with reporter.watch_task(), compile_clock(lambda: reporter.send(compiling=True)) as reporter.clock:
-            job = reporter.common.job(worker.state.nthreads)
+        reporter = _Reporter(cameras[0], send, unwanted)
+        with compile_clock(lambda: reporter.send(compiling=True)) as reporter.clock:
+            job = Common(**common).job(threads)
             summary = _retry_while_busy(lambda: render(job, reporter, cameras=cameras, pilots=False))
         return {"notes": list(reporter.notes), "peak_memory": summary.peak_memory}
     except FrameArrayError as error:
@@ -119,9 +118,7 @@ def render_chunk(common: dict[str, Any], cameras: tuple[int, ...]) -> dict[str, 
     except MemoryError:
         return {"error": "MemoryError", "problems": [], "notes": []}
     except _Unwanted:
-        return {}  # the result of a cancelled task is not read
-    finally:
-        _one_at_a_time.release()
+        return {}
 
 
 def _retry_while_busy(run: Callable[[], Summary]) -> Summary:
@@ -143,41 +140,19 @@ class _Unwanted(BaseException):
 class _Reporter(RenderEvents):
     """Reports the number of images left, and ends the render when the chunk is cancelled."""
 
-    def __init__(self, worker: Worker, common: Common, cameras: tuple[int, ...]) -> None:
-        self._worker, self.common, self._first = worker, common, cameras[0]
-        self._key = worker.get_current_task()
+    def __init__(self, first: int, send: Callable[[Message], None], unwanted: threading.Event) -> None:
+        self._first, self._send, self._unwanted = first, send, unwanted
         self._lock, self._left, self._last = threading.Lock(), 0, 0.0
         self._seconds: float | None = None
         self.clock = CompileClock()
-        self._unwanted = False
         self.notes: tuple[str, ...] = ()
 
     def send(self, **message: Any) -> None:
-        """Send a message to the program that submits the chunks."""
-        self._worker.log_event(self.common.topic, {"chunk": self._first, **message})
-
-    @contextmanager
-    def watch_task(self) -> Iterator[None]:
-        """Check regularly whether the chunk is still wanted."""
-        done = threading.Event()
-
-        def watch() -> None:
-            while not done.wait(LOOK_EVERY):
-                task = self._worker.state.tasks.get(self._key)
-                if task is None or task.state != "executing":
-                    self._unwanted = True
-                    return
-
-        thread = threading.Thread(target=watch, name="wanted", daemon=True)
-        thread.start()
-        try:
-            yield
-        finally:
-            done.set()
-            thread.join()
+        """Send a message to the program that hands out the chunks."""
+        self._send({"chunk": self._first, **message})
 
     def _raise_if_unwanted(self) -> None:
-        if self._unwanted:
+        if self._unwanted.is_set():
             raise _Unwanted
 
     def prepared(self, prepared: Prepared) -> None:
@@ -215,15 +190,3 @@ class _Reporter(RenderEvents):
             self._last = now
             left = self._left
         self.send(left=left, seconds=self._seconds)
-
-
-class IgnoreSignals(WorkerPlugin):
-    """Makes workers of this machine ignore signals: the terminal sends them Ctrl-C too, but their parent ends them."""
-
-    name = "framearray-signals"
-
-    def setup(self, worker: Worker) -> None:
-        if threading.current_thread() is threading.main_thread():
-            for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-                if hasattr(signal, name):  # Windows lacks the last
-                    signal.signal(getattr(signal, name), signal.SIG_IGN)
