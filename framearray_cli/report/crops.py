@@ -31,7 +31,7 @@ def draw_crops(report: Report) -> list[Picture]:
 
     The crop is the part of the image where the job's own error is most visible.
     """
-    top, left = _worst_crop(report.flip)
+    top, left = _worst_crop(np.abs(report.signed) if report.flip is None else report.flip)
     own = report.measured[0]
     shown: list[tuple[str, Float32]] = [("reference", report.example), (_caption(own), own.example)]
     for family in (LIGHT_REUSE, SCRATCH):
@@ -49,19 +49,17 @@ def draw_crops(report: Report) -> list[Picture]:
 
 
 def draw_maps(report: Report) -> list[Picture]:
-    """Write the reference, the job's own image, and maps of its error: HDR-FLIP, and signed."""
+    """Write the reference, the job's own image, and maps of its error: HDR-FLIP, if it is known, and signed."""
     own, scale = report.measured[0], _white_scale(report.example)
-    return [
+    found = [
         _write_picture(report, "reference.png", srgb8_from_linear(scale * report.example), "reference"),
         _write_picture(report, "own.png", srgb8_from_linear(scale * own.example), _caption(own)),
-        _write_picture(
-            report, "flip.png", _heat_map(report.flip), f"HDR-FLIP: black 0, white 1; mean {report.flip.mean():.3f}"
-        ),
-        _write_picture(
-            report, "signed.png", _signed_map(report.signed),
-            "image less reference: red too bright, blue too dark; full colour at half the mean of the reference",
-        ),
-    ]  # fmt: skip
+    ]
+    if report.flip is not None:
+        caption = f"HDR-FLIP: black 0, white 1; mean {report.flip.mean():.3f}"
+        found.append(_write_picture(report, "flip.png", _heat_map(report.flip), caption))
+    caption = "image less reference: red too bright, blue too dark; full colour at half the mean of the reference"
+    return [*found, _write_picture(report, "signed.png", _signed_map(report.signed), caption)]
 
 
 def _write_picture(report: Report, name: str, codes: Bytes, caption: str) -> Picture:

@@ -20,7 +20,7 @@ class Quality:
     Attributes:
         rmse: root mean square error over the mean of the reference.
         relmse: mean of (I - R)^2 / (R^2 + EPSILON).
-        flip: mean HDR-FLIP, 0 to 1; only for the first of neighbours, because it is slow.
+        flip: mean HDR-FLIP, 0 to 1; only for the first of neighbours, because it is slow; None without its library.
         mean_off: mean of I - R over the mean of the reference.
         edge_rmse, edge_max: error at shadow edges, see `Errors`.
         squared_bias, squared_bias_error: squared bias and its standard error, over the squared mean of the reference;
@@ -96,8 +96,9 @@ def compare_frames(
     return found
 
 
-def _mean_flip(image: Image, wanted: Image) -> float:
-    return float(flip_map(image, wanted).mean(dtype=np.float64))
+def _mean_flip(image: Image, wanted: Image) -> float | None:
+    found = flip_map(image, wanted)
+    return None if found is None else float(found.mean(dtype=np.float64))
 
 
 def _flicker(image: Image, wanted: Image, next_image: Image, next_wanted: Image) -> float:

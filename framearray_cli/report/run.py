@@ -14,7 +14,7 @@ from framearray_cli.base.files import reason
 from framearray_cli.job.job import Job
 
 from .case import Case, open_case
-from .flip import flip_map, require_extra
+from .flip import flip_map, flip_note, require_extra
 from .front import Advice, advise, best_front, model_error
 from .measure import Measured, measure, measure_single_lights
 from .offsets import Offset, measure_offsets
@@ -74,7 +74,8 @@ class Report:
         true_light: settings and methods with respect to true light; None: `without_truth` says why there is none.
         notes: on ambient and indirect light, such as how far light from cells is from that of paths.
         example: (h, w, 3) the reference of the first probe image.
-        flip, signed: (h, w) error of the job's own settings in that image: HDR-FLIP, and I - R over the mean of R.
+        flip, signed: (h, w) error of the job's own settings in that image: HDR-FLIP, None without its library, and
+            I - R over the mean of R.
     """
 
     job: Job
@@ -91,7 +92,7 @@ class Report:
     reference_noise: float
     notes: tuple[str, ...]
     example: Float32
-    flip: Float32
+    flip: Float32 | None
     signed: Float32
 
 
@@ -158,7 +159,7 @@ def make_report(job: Job, folder: Path, options: ReportOptions, events: ReportEv
             without_truth=without or ("" if true_light else "Nothing is compared with true light, which is black."),
             reference_hits=2 * first.hits,
             reference_noise=reference_noise(list(references.values()), case, chosen.lights),
-            notes=case.ambient.notes,
+            notes=(*case.ambient.notes, *filter(None, [flip_note()])),
             example=right,
             flip=flip_map(own.example, right),
             signed=np.asarray((own.example - right).mean(axis=-1) / right.mean(dtype=np.float64), np.float32),

@@ -48,7 +48,8 @@ def write_tables(report: Report) -> None:
         OutputError: they cannot be written.
     """
     rows = [table_row(one, report) for one in report.measured]
-    _write_csv(report.folder / "table.csv", rows, COLUMNS)
+    columns = [name for name in COLUMNS if name != "flip" or report.flip is not None]
+    _write_csv(report.folder / "table.csv", rows, columns)
     table: dict[str, Any] = {
         "job": report.job.name,
         "cameras": [c for frames in report.probes.cameras for c in frames],

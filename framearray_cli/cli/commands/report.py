@@ -11,7 +11,7 @@ from framearray_cli.array.moments import read_times
 from framearray_cli.array.places import CAMERA_AXIS, read_indices
 from framearray_cli.render.messages import scene_lines
 
-from ..options import JobFile, Json, Quiet, Threads, load_job
+from ..options import JobFile, Json, Quiet, Threads, load_job, require_rendering
 from ..screen import Screen, err, print_result
 from ..values import number
 
@@ -77,12 +77,14 @@ def report(
     json: Json = False,
 ) -> None:
     """Measure the effect of each setting of a job on speed and error, as a page with tables and plots."""
+    require_rendering()
     job = load_job(job_file, threads, None)
     with Screen(err, quiet=quiet) as screen:
         screen.wait("reading the scene")
         from framearray_cli import report as reporting
         from framearray_cli.array.manifest import MAIN_AXIS
         from framearray_cli.render.beside import FLOATS, offer_for
+        from framearray_cli.report.flip import flip_note
 
         offer_for(job, FLOATS)
 
@@ -90,7 +92,7 @@ def report(
             """Print the scene, then a progress bar."""
 
             def opened(self, case: "Case") -> None:
-                screen.say(scene_lines(case.prepared))
+                screen.say([*scene_lines(case.prepared), *filter(None, [flip_note()])])
 
             def planned(self, references: int, settings: int) -> None:
                 screen.count("measuring", references + settings, "step")
