@@ -48,6 +48,7 @@ def _threads_option(otherwise: str) -> Any:
     )
 
 
+ThreadsOfVerify = Annotated[int | None, _threads_option("one per core; with --repair the job's to render")]
 Threads = Annotated[int | None, _threads_option("the job's, else one per core")]
 ThreadsOfNoJob = Annotated[int | None, _threads_option("one per core")]
 Output = Annotated[
@@ -128,6 +129,17 @@ def load_job(job_file: Path, threads: int | None, output: str | None, sets: Sequ
         return job
     table = job.output.model_copy(update={"directory": output_path(output).absolute()})  # keep links
     return changed(job, output=table)
+
+
+def require_rendering() -> None:
+    """Check that this machine can trace rays, for the commands that do.
+
+    Raises:
+        MissingExtraError: embreex is not installed.
+    """
+    from framearray_cli.engine.embree_c import require_embree
+
+    require_embree()
 
 
 def with_threads(job: "Job", threads: int | None) -> "Job":

@@ -4,7 +4,12 @@ import ctypes
 import os
 from dataclasses import dataclass
 from functools import cache
+from importlib.util import find_spec
 from typing import Any
+
+from framearray_cli.base.errors import MissingExtraError
+from framearray_cli.base.extras import extra
+from framearray_cli.base.platform import has_wheels_of_embree, machine_name
 
 _VERSION = (1, 2, 3)  # RTCDeviceProperty of Embree 3 and 4: major, minor, patch
 # Rays per packet -> RTC_DEVICE_PROPERTY_NATIVE_RAY..._SUPPORTED.
@@ -12,13 +17,33 @@ _NATIVE = {16: 34, 8: 33, 4: 32}
 WIDEST = 16
 
 
+def require_embree() -> None:
+    """Check that rays can be traced at all, before any work is done.
+
+    Raises:
+        MissingExtraError: embreex is not installed, or cannot be loaded; on some systems it cannot be installed either.
+    """
+    if not has_wheels_of_embree() and find_spec("embreex") is None:
+        raise MissingExtraError(
+            "rendering needs embreex, which has wheels for Linux (with glibc) and Windows on x86-64 and for macOS, but "
+            f"none for this system, {machine_name()}; render on one of those: only render, check, init and report need "
+            "it, and arrays that are copied here can be viewed, assembled, exported and verified"
+        )
+    with extra("rendering needs embreex", "embreex", reason=True):
+        from embreex import rtcore_scene  # noqa: F401
+
+
 @cache
 def embree_library() -> ctypes.CDLL | None:
     """Load Embree from the embreex wheel; None where its symbols cannot be reached.
 
+    Raises:
+        MissingExtraError: embreex is not installed, or cannot be loaded.
+
     Opening the extension module again resolves every `rtc...` symbol through the module's own dependency, however the
     wheel names that library.
     """
+    require_embree()
     from embreex import rtcore_scene
 
     try:
@@ -71,7 +96,10 @@ def packet_width() -> int:
     chosen = os.environ.get("FRAMEARRAY_PACKETS", "")
     if chosen in {str(width) for width in _NATIVE}:
         return int(chosen)
-    return max(native_widths(), default=WIDEST)
+    try:
+        return max(native_widths(), default=WIDEST)
+    except MissingExtraError:  # only kernels without rays are compiled here
+        return WIDEST
 
 
 def native_widths() -> tuple[int, ...]:

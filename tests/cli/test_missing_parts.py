@@ -1,17 +1,23 @@
 """A missing library, encoder or typeface: a message before any work."""
 
+import json
 import os
 import subprocess
 import sys
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import PIL.Image
 import PIL.ImageFont
 import pytest
+from packaging.requirements import Requirement
 from support.program import PACKAGE_PARENT, names, run, write_job
 
 from framearray_cli.array.images import exr as exrtiff
+from framearray_cli.base import platform
+from framearray_cli.base.errors import MissingExtraError
+from framearray_cli.engine import embree_c
 from framearray_cli.tools.movie import label, video
 
 # Runs the command line with some libraries hidden.
@@ -31,6 +37,21 @@ main(sys.argv[2:])
 """
 
 
+# Runs several commands without some libraries, and writes the exit code and the errors of each as a line of JSON.
+SEVERAL = """
+import contextlib, io, json
+for arguments in json.loads(sys.argv[2]):
+    errors = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(errors):
+            main(arguments)
+        code = 0
+    except SystemExit as end:
+        code = end.code or 0
+    print(json.dumps([code, errors.getvalue()]))
+"""
+
+
 @pytest.fixture
 def array(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
     assert run(capsys, "render", "-q", write_job(tmp_path, output={"format": "exr"})).code == 0
@@ -43,6 +64,56 @@ def hiding(library: str, *arguments: str | Path) -> tuple[int, str]:
     command = [sys.executable, "-c", HIDING, library, *map(str, arguments)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
     return done.returncode, done.stderr
+
+
+def test_without_embree_all_works_that_traces_no_rays(array, tmp_path):
+    """As on Linux on ARM, for which embreex has no wheels; and with one message where rays are needed."""
+    job, scene = tmp_path / "job.toml", tmp_path / "tiny.glb"
+    works = [
+        ["--help"], ["render", "--help"], ["--version"], ["schema"], ["verify", array],
+        ["sheet", array, "-o", tmp_path / "sheet.png"], ["view", array, "--export", tmp_path / "page"],
+        ["assemble", array, "--light", "-o", tmp_path / "a.webp"],
+        ["export", array, "-f", "nerfstudio", "-o", tmp_path / "nerf"],
+    ]  # fmt: skip
+    fails = [["render", job], ["check", job], ["init", scene, "-o", tmp_path / "new.toml"], ["report", job]]
+    commands = json.dumps([[str(one) for one in command] for command in [*works, *fails, ["doctor"]]])
+    script = HIDING.replace("main(sys.argv[2:])", SEVERAL)
+    done = subprocess.run(
+        [sys.executable, "-c", script, "embreex", commands], env=os.environ | {"PYTHONPATH": str(PACKAGE_PARENT)},
+        capture_output=True, text=True, timeout=300, check=True,
+    )  # fmt: skip
+    results = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [code for code, _ in results] == [0] * len(works) + [2] * len(fails) + [5], results
+    for _, errors in results[len(works) : -1]:
+        assert errors.startswith("rendering needs embreex") and errors.count("\n") == 1
+    assert not (tmp_path / "new.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "libc", "wheels"),
+    [
+        ("linux", "x86_64", "glibc", True),
+        ("linux", "x86_64", "", False),
+        ("linux", "aarch64", "glibc", False),
+        ("darwin", "arm64", "", True),
+        ("win32", "AMD64", "", True),
+        ("win32", "ARM64", "", False),
+    ],
+)
+def test_systems_that_embreex_has_wheels_for(system, machine, libc, wheels, monkeypatch):
+    """pyproject.toml says the same, except of the C library, of which markers know nothing."""
+    monkeypatch.setattr(sys, "platform", system)
+    monkeypatch.setattr(platform.platform, "machine", lambda: machine)
+    monkeypatch.setattr(platform.platform, "libc_ver", lambda: (libc, ""))
+    assert platform.has_wheels_of_embree() is wheels
+    project = tomllib.loads((PACKAGE_PARENT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    (need,) = (Requirement(line) for line in project["dependencies"] if line.startswith("embreex"))
+    names = {"sys_platform": system, "platform_machine": machine}
+    assert need.marker.evaluate(names) is wheels or (system, machine) == ("linux", "x86_64")
+    monkeypatch.setattr(embree_c, "find_spec", lambda name: None)
+    if not wheels:
+        with pytest.raises(MissingExtraError, match=f"none for this system, .* on {machine}; render on one of those"):
+            embree_c.require_embree()
 
 
 @pytest.mark.slow
@@ -58,7 +129,6 @@ def test_libraries_that_are_not_installed(array, tmp_path):
         ("pvlib", ["render", sunny], "[sun]"),
         ("pyoidn", ["render", smooth], "[denoise]"),
         ("matplotlib,jinja2", ["report", plain], "[report]"),
-        ("flip_evaluator", ["report", plain], "[report]"),
         ("OpenImageIO", ["render", "-q", plain], "pip install OpenImageIO"),
         ("OpenImageIO", ["verify", array], ""),
     ]

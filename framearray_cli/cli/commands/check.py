@@ -13,7 +13,7 @@ from framearray_cli.render.messages import (
 )
 from framearray_cli.render.progress import RenderEvents, ambient_figures
 
-from ..options import JobFile, Json, Output, Sets, Strict, Threads, load_job, refuse_warnings
+from ..options import JobFile, Json, Output, Sets, Strict, Threads, load_job, refuse_warnings, require_rendering
 from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ def check(
     json: Json = False,
 ) -> None:
     """Validate a job and its scene, and print its size, memory, disk and time, without rendering it."""
+    require_rendering()
     job = load_job(job_file, threads, output, sets)
     with Screen(err) as screen:
         screen.show(size_lines(job))  # before the scene is read: a wrong number is seen at once

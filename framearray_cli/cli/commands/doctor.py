@@ -49,6 +49,8 @@ def doctor_lines(found: "DoctorResult") -> list[str]:
 
 
 def _embree_line(found: "DoctorResult") -> str:
+    if found.embree is None and any(library.name == "embreex" and library.problem for library in found.libraries):
+        return "Embree: missing, so that nothing can be rendered here; render, check, init and report say why"
     if found.embree is None:
         return "Embree: its functions cannot be reached; rays go through embreex, which is slower"
     widths = found.embree.packet_widths

@@ -9,7 +9,7 @@ import typer
 from framearray_cli.base.units import counted
 
 from ..completions import complete_camera, complete_scene
-from ..options import DryRun, Json, Quiet, output_path
+from ..options import DryRun, Json, Quiet, output_path, require_rendering
 from ..screen import INIT_KERNELS, Screen, err, out, print_result, print_would, say
 from ..streams import refuse_json
 from ..values import choice, whole
@@ -91,6 +91,7 @@ def init(
     json: Json = False,
 ) -> None:
     """Write a first job for a scene: camera, lights and exposure are found or chosen."""
+    require_rendering()
     job_file = Path(f"{scene.stem or 'scene'}.toml") if target is None else output_path(target)
     refuse_json(str(job_file))
     if dry_run:

@@ -30,6 +30,7 @@ from ..options import (
     Strict,
     Threads,
     load_job,
+    require_rendering,
 )
 from ..rendering import RenderingEvents
 from ..screen import Screen, err, print_result, print_would
@@ -96,6 +97,7 @@ def render(
     others = {"--workers": workers, "--dask": dask, "--chunk": chunk, "--restart": restart, "--strict": strict}
     others |= {"--dry-run": dry_run, "--view": view}
     refuse_conflicts(preview, others, {"--light": light, "--at": at, "--force": force})
+    require_rendering()
     page = page_options(view, port, host, browser)
     job = load_job(job_file, threads, None if preview else output, sets)
     if preview:

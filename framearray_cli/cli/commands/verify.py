@@ -10,7 +10,7 @@ from framearray_cli.base.errors import CheckError
 from framearray_cli.base.memory import RENDER_NEEDS, available_cores, require_address_space
 from framearray_cli.base.units import agree, counted
 
-from ..options import ArrayFolder, Json, Quiet, Threads, with_threads
+from ..options import ArrayFolder, Json, Quiet, ThreadsOfVerify, require_rendering, with_threads
 from ..screen import Screen, err, print_result
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def verify(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="With --repair: say what would be rendered; touch nothing.")
     ] = False,
-    threads: Threads = None,
+    threads: ThreadsOfVerify = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -55,6 +55,7 @@ def verify(
 
     from .render import render_on_screen
 
+    require_rendering()
     require_address_space(RENDER_NEEDS)
     print_result(lines, verify_result(found), quiet=quiet)
     folder = found.manifest.directory
