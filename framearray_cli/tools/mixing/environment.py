@@ -112,7 +112,8 @@ def _reach(to_light: Float64) -> float:
         return 2.0
     from scipy.spatial import cKDTree
 
-    return float(cKDTree(different).query(different, k=2)[0][:, 1].max())
+    distance = np.asarray(cKDTree(different).query(different, k=2)[0])
+    return float(distance[:, 1].max())
 
 
 def light_field(manifest: Manifest) -> LightField:
