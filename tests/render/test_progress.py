@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import framearray_cli.render.parts.worker as worker
+import framearray_cli.render.parts.chunk as chunk
 from framearray_cli.cli import rendering
 from framearray_cli.engine.terms.ambient.estimate import Ambient
 from framearray_cli.render.messages import ambient_lines, target_lines
@@ -45,17 +45,18 @@ class Kept(PartEvents):
         self.seen.append(images)
 
 
-def sent(**message: Any) -> tuple[float, dict[str, Any]]:
-    """Return a message as it arrives: tuples become lists on the way."""
-    return 0.0, json.loads(json.dumps({"chunk": 0, **message}))
+def sent(**message: Any) -> dict[str, Any]:
+    """Return a message as it may arrive: on the way through Dask tuples become lists."""
+    found: dict[str, Any] = json.loads(json.dumps({"chunk": 0, **message}))
+    return found
 
 
 def test_only_the_first_of_the_messages_that_all_workers_send_is_reported() -> None:
     handlers: list[Any] = []
-    client = SimpleNamespace(subscribe_topic=lambda topic, handler: handlers.append(handler))
+    crew: Any = SimpleNamespace(listen=lambda topic, handler: handlers.append(handler))
     session: Any = SimpleNamespace(folder=None, prepared=SimpleNamespace(n_lights=4))
     events = Kept()
-    ChunkQueue(client, {"topic": "t"}, Chunks(each=((0, 1), (2, 3)), more=0.0), session, events)
+    ChunkQueue(crew, {"topic": "t"}, Chunks(each=((0, 1), (2, 3)), more=0.0), session, events)
     for _ in range(2):
         handlers[0](sent(compiling=True))
         handlers[0](sent(ambient=asdict(FIGURES)))
@@ -100,7 +101,7 @@ def test_lines_of_a_target_that_is_not_reached() -> None:
 
 
 @pytest.mark.parametrize(
-    ("module", "name", "base"), [(rendering, "RenderingEvents", PartEvents), (worker, "_Reporter", RenderEvents)]
+    ("module", "name", "base"), [(rendering, "RenderingEvents", PartEvents), (chunk, "_Reporter", RenderEvents)]
 )
 def test_listeners_override_existing_events(module: Any, name: str, base: type) -> None:
     """A method with a wrong name would never be called, and nothing would report it."""
@@ -111,7 +112,7 @@ def test_listeners_override_existing_events(module: Any, name: str, base: type) 
     ]
     methods = {node.name for node in found.body if isinstance(node, ast.FunctionDef)}
     events = {event for event in dir(base) if not event.startswith("_")}
-    own = {"send", "watch_task"}  # of the reporter
+    own = {"send"}  # of the reporter
     assert {method for method in methods if not method.startswith("_")} - own <= events
     assert "written" in methods
     if base is PartEvents:
