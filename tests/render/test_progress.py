@@ -116,4 +116,5 @@ def test_listeners_override_existing_events(module: Any, name: str, base: type) 
     assert {method for method in methods if not method.startswith("_")} - own <= events
     assert "written" in methods
     if base is PartEvents:
-        assert events <= methods, "an event that is not shown"
+        silent = {"frame_written"}  # the images of a frame are counted as they are written
+        assert events - silent <= methods, "an event that is not shown"
